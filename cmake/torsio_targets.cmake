@@ -1,0 +1,32 @@
+# The settings that every target of ours shares; users of the installed library inherit none of them but C++20.
+add_library(torsio_build_settings INTERFACE)
+target_compile_options(torsio_build_settings INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -ffp-contract=off
+  $<$<BOOL:${TORSIO_WARNINGS_AS_ERRORS}>:-Werror>)
+if(TORSIO_SANITIZE)
+  target_compile_options(torsio_build_settings INTERFACE -fsanitize=${TORSIO_SANITIZE} -fno-omit-frame-pointer
+    -fno-sanitize-recover=all)
+  target_link_options(torsio_build_settings INTERFACE -fsanitize=${TORSIO_SANITIZE})
+endif()
+
+# torsio_folder(<target> <folder> HEADERS a.hpp ... SOURCES a.cpp ...): one folder of one library.
+# Headers are named relative to include/torsio/<folder>, sources relative to src/<folder>.
+function(torsio_folder target folder)
+  cmake_parse_arguments(PARSE_ARGV 2 arg "" "" "HEADERS;SOURCES")
+  list(TRANSFORM arg_HEADERS PREPEND ${PROJECT_SOURCE_DIR}/include/torsio/${folder}/)
+  list(TRANSFORM arg_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/src/${folder}/)
+  target_sources(${target}
+    PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR}/include FILES ${arg_HEADERS}
+    PRIVATE ${arg_SOURCES})
+endfunction()
+
+# torsio_library(<name>): the library torsio_<name>, known as torsio::<name>.
+function(torsio_library name)
+  add_library(torsio_${name} STATIC)
+  add_library(torsio::${name} ALIAS torsio_${name})
+  target_compile_features(torsio_${name} PUBLIC cxx_std_20)
+  set_target_properties(torsio_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON
+    CXX_EXTENSIONS OFF)
+  target_include_directories(torsio_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_link_libraries(torsio_${name} PRIVATE $<BUILD_INTERFACE:torsio_build_settings>)
+endfunction()

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace torsio {
+
+/// What a real-time step has to say about its own output. The value beside it is finite in every
+/// case.
+enum class Fault : std::uint8_t {
+  none,               ///< the value may be used
+  input_not_finite,   ///< an input was NaN or infinite; the last good value is held
+  input_count_wrong,  ///< the caller passed another number of inputs than `raw_inputs()` lists
+  warming_up,         ///< filters, differentiators or hidden state have not settled since `reset()`
+  outside_training_range,  ///< an input left the range that the model was trained on; linear
+                           ///< fallback in use
+  model_not_finite,        ///< the model produced NaN or infinity; linear fallback in use
+};
+
+/// The enumerator's own spelling, for logs and JSON.
+[[nodiscard]] std::string_view name(Fault fault) noexcept;
+
+}  // namespace torsio

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/data/recording.hpp"
+
+namespace torsio {
+
+enum class Role : std::uint8_t { train, validation, test };
+
+[[nodiscard]] std::string_view name(Role role) noexcept;
+
+/// Samples [begin, end) of a record and what they are for. Samples in no segment (an embargo) are
+/// used for nothing, but a filter or a hidden state runs through them.
+struct Segment {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  Role role = Role::train;
+};
+
+struct DatasetRecord {
+  Recording recording;
+  std::vector<Segment> segments;  ///< in order, without overlap
+};
+
+/// Recordings with a role each, on one sample rate. Splits are by record or by contiguous block,
+/// never by shuffled sample.
+struct Dataset {
+  std::vector<DatasetRecord> records;
+  std::string target = "torque_Nm";
+  /// Named lists of input expressions that the manifest proposes; the first is the default. May be
+  /// empty.
+  std::vector<std::pair<std::string, std::vector<std::string>>> input_sets;
+  /// Channels that the target was computed from ("torque from motor current"): a leak if used as an
+  /// input.
+  std::vector<std::string> target_computed_from;
+  std::string
+      label;  ///< what the split means, printed with its scores: "interpolation within one cycle"
+
+  [[nodiscard]] double sample_rate_Hz() const;  ///< @throws Error if empty
+  [[nodiscard]] bool has_role(Role role) const noexcept;
+  /// @throws Error if the records differ in sample rate or lack the target.
+  void check() const;
+};
+
+/// One segment over the whole record.
+[[nodiscard]] std::vector<Segment> whole_record(std::size_t samples, Role role);
+
+/// Cuts a record into `blocks` blocks of equal length and gives every `test_every`-th (the last of
+/// each group) the role test, the others train. `embargo_samples` are left out of the training side
+/// of every border between the roles.
+/// @throws Error if a block would not outlast the embargo.
+[[nodiscard]] std::vector<Segment> interleaved_blocks(std::size_t samples, std::size_t blocks,
+                                                      std::size_t test_every,
+                                                      std::size_t embargo_samples);
+
+/// The first `train_fraction` of a record trains, the rest tests, with the embargo between them.
+[[nodiscard]] std::vector<Segment> contiguous_blocks(std::size_t samples, double train_fraction,
+                                                     std::size_t embargo_samples);
+
+}  // namespace torsio

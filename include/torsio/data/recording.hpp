@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// One measured quantity on the recording's clock, in SI; the name ends in the SI unit.
+struct Channel {
+  std::string name;
+  std::vector<double> values;
+  /// 1 where the sensor delivered a new value, 0 where the last one is held (a load cell at 125 Hz
+  /// beside encoders at 1 kHz). Empty: every sample is new.
+  std::vector<std::uint8_t> fresh = {};
+
+  [[nodiscard]] bool is_fresh(std::size_t sample) const {
+    return fresh.empty() || fresh[sample] != 0;
+  }
+};
+
+/// Where a recording came from, for the card of whatever is trained on it.
+struct Source {
+  std::string file;    ///< as the user named it
+  std::string sha256;  ///< of the file's bytes; empty for a recording that was made in memory
+};
+
+/// A zero that is taken from each record's own start, or (offline only) from its middle.
+struct ZeroRule {
+  std::string channel;
+  double first_s = 0.0;    ///< mean over this much of the start; 0 with `mid_range`
+  bool mid_range = false;  ///< (min + max) / 2 of the whole record: looks ahead, so rows say
+                           ///< "zero": "non_causal"
+  bool operator==(const ZeroRule&) const = default;
+};
+
+/// Channels by name on one uniform clock. All channels have `size()` samples; names are unique.
+class Recording {
+ public:
+  /// @throws Error if the rate is not positive and finite.
+  Recording(std::string name, double sample_rate_Hz, double start_s = 0.0);
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] double sample_rate_Hz() const noexcept { return sample_rate_Hz_; }
+  [[nodiscard]] double time_s(std::size_t sample) const noexcept {
+    return start_s_ + static_cast<double>(sample) / sample_rate_Hz_;
+  }
+  [[nodiscard]] std::size_t size() const noexcept {
+    return channels_.empty() ? 0 : channels_.front().values.size();
+  }
+
+  [[nodiscard]] const std::vector<Channel>& channels() const noexcept { return channels_; }
+  [[nodiscard]] bool has(std::string_view channel) const noexcept;
+  /// @throws Error that lists the channels if there is none of that name.
+  [[nodiscard]] const Channel& channel(std::string_view name) const;
+
+  /// @throws Error if the length differs from the other channels', the name exists, or it does not
+  /// end in an SI unit.
+  void add(Channel channel);
+  /// A condition of the whole record (support position, temperature): a constant channel.
+  void add_condition(std::string name, double value);
+  [[nodiscard]] const std::vector<std::string>& conditions() const noexcept { return conditions_; }
+
+  Source source;
+  /// Channels of this recording that a mapping computed from others, so that a model's inputs go
+  /// back to measured ones.
+  std::vector<ChannelDefinition> definitions;
+  std::vector<ZeroRule> zeros;  ///< already applied to the values
+
+ private:
+  std::string name_;
+  double sample_rate_Hz_;
+  double start_s_;
+  std::vector<Channel> channels_;
+  std::vector<std::string> conditions_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// The range of each feature in the training data.
+struct FeatureRanges {
+  std::vector<double> lowest;
+  std::vector<double> highest;
+  double margin =
+      0.05;  ///< share of the range by which a feature may leave it before the guard acts
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("lowest", self.lowest);
+    visit("highest", self.highest);
+    visit("margin", self.margin);
+  }
+};
+
+/// value = intercept + sum_j slope_j * feature_j, used where the model must not be trusted.
+struct LinearFallback {
+  double intercept = 0.0;
+  std::vector<double> slope;
+  double residual_std =
+      std::numeric_limits<double>::quiet_NaN();  ///< of its own training residuals, target's unit
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("intercept", self.intercept);
+    visit("slope", self.slope);
+    visit("residual_std", self.residual_std);
+  }
+};
+
+/// Spread of the model's residuals by region of its own output, for families that know no error bar
+/// of their own. `std_dev[i]` holds for values in [edges[i], edges[i+1]); outside, the nearest
+/// region's. Empty: no evidence.
+struct ResidualTable {
+  std::vector<double> edges;    ///< ascending, one more than regions
+  std::vector<double> std_dev;  ///< target's unit
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("edges", self.edges);
+    visit("std_dev", self.std_dev);
+  }
+};
+
+/// Everything around the model: the path from raw channels to features, and the guards. Plain data,
+/// stored in the model file.
+struct EstimatorSettings {
+  FeatureSpec features;
+  double sample_rate_Hz = 0.0;
+  std::string target;  ///< channel name with unit: "torque_Nm"
+  std::vector<std::string>
+      zeroed_channels;  ///< raw channels whose zero was taken from each record: set it at run time
+  FeatureRanges ranges;
+  LinearFallback fallback;
+  ResidualTable residuals;
+};
+
+}  // namespace torsio

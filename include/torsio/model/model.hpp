@@ -1,0 +1,41 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <span>
+
+#include "torsio/core/fault.hpp"
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+/// The inputs of one tick, in the order that the model's own `inputs` list names.
+using Features = std::span<const double>;
+
+/// What a model or an estimator says at one tick. `value` is finite in every case.
+struct Estimate {
+  double value = 0.0;  ///< in the target's unit
+  double std_dev =
+      kNotMeasured;  ///< one standard deviation, same unit; NaN where there is no evidence, never 0
+  double novelty = kNotMeasured;  ///< how unlike the training data the input is; larger is
+                                  ///< stranger, NaN if untold
+  Fault fault = Fault::none;
+};
+
+/// What every model family offers; tests/laws says what it must mean.
+///
+/// `M::Parameters` is plain data with everything that `step` needs; constructing from it checks it
+/// and may throw `Error`. `step` may assume `input_count()` finite features (the estimator sees to
+/// both) and never allocates, locks or throws.
+template <class M>
+concept Model = std::copyable<M> && requires(M model, const M fixed, Features features) {
+  typename M::Parameters;
+  M(fixed.parameters());
+  { fixed.input_count() } noexcept -> std::same_as<std::size_t>;
+  { fixed.parameter_count() } noexcept -> std::same_as<std::size_t>;
+  { model.reset() } noexcept;
+  { model.step(features) } noexcept -> std::same_as<Estimate>;
+};
+
+}  // namespace torsio

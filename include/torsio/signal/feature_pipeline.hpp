@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+/// A channel that is computed from others: `{"spring_deflection_rad", "gear_angle_rad -
+/// joint_angle_rad"}`.
+struct ChannelDefinition {
+  std::string name;
+  std::string expression;
+  bool operator==(const ChannelDefinition&) const = default;
+};
+
+/// Which inputs a model takes and how they come from raw channels. Plain data: it is stored in the
+/// model file as it is.
+struct FeatureSpec {
+  std::vector<std::string> inputs;  ///< one expression each, causal (see docs/expressions.md)
+  std::vector<ChannelDefinition>
+      definitions;  ///< names that an expression may use besides raw channels
+  bool operator==(const FeatureSpec&) const = default;
+};
+
+/// Raw channels of one tick -> features of one tick. Parsed once; `step` allocates nothing.
+///
+/// An expression is built from channel names, numbers (a unit may follow: `10Hz`, `0.3deg`), `+ - *
+/// / ^`, parentheses and the functions `rate lowpass lag sign tanh abs sqrt exp min max`. Equal
+/// sub-expressions are evaluated once. `rate(x)` is the backward difference over one sample,
+/// `lowpass(x, f)` a second-order Butterworth filter re-discretised for the sample rate that starts
+/// in the steady state of its first input, `lag(x, n)` the value n samples ago.
+class FeaturePipeline {
+ public:
+  /// @throws Error naming the expression and the column in it if one cannot be parsed, names
+  /// itself, or filters at or above half the sample rate.
+  FeaturePipeline(FeatureSpec spec, double sample_rate_Hz);
+  FeaturePipeline(const FeaturePipeline& other);
+  FeaturePipeline(FeaturePipeline&&) noexcept;
+  FeaturePipeline& operator=(FeaturePipeline other) noexcept;
+  ~FeaturePipeline();
+
+  [[nodiscard]] const FeatureSpec& spec() const noexcept;
+  [[nodiscard]] double sample_rate_Hz() const noexcept;
+  [[nodiscard]] std::size_t feature_count() const noexcept;
+
+  /// The channels that `step` wants, in this order: those of the expressions after all definitions
+  /// are put in.
+  [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept;
+
+  /// Whether a feature says how fast something moves: it uses channels only inside `rate(...)` or
+  /// channels that are rates by their unit (`_rad_s`, `_m_s`).
+  [[nodiscard]] bool is_rate(std::size_t feature) const noexcept;
+
+  /// Subtracts `value` (SI) from a raw channel from now on; call while configuring. @throws
+  /// UsageError for an unknown channel.
+  void set_zero(std::string_view channel, double value);
+
+  /// Samples after `reset()` until every difference, lag and filter has settled (to 1 % of a step).
+  [[nodiscard]] std::size_t settling_samples() const noexcept;
+
+  void reset() noexcept;
+
+  /// @param raw one value for each of `raw_inputs()`, all finite.
+  /// @returns the features, valid until the next call.
+  std::span<const double> step(std::span<const double> raw) noexcept TORSIO_REALTIME;
+
+  /// Whether `settling_samples()` steps were made since `reset()`.
+  [[nodiscard]] bool is_settled() const noexcept;
+
+ private:
+  struct Program;
+  std::unique_ptr<Program> program_;
+};
+
+/// The channel names that occur in an expression, in order of appearance. @throws Error if it
+/// cannot be parsed.
+[[nodiscard]] std::vector<std::string> channels_of(std::string_view expression);
+
+/// Splits "a, lowpass(b, 10Hz), c" on the commas outside parentheses and trims the parts.
+[[nodiscard]] std::vector<std::string> split_inputs(std::string_view list);
+
+}  // namespace torsio

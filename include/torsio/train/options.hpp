@@ -1,0 +1,38 @@
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace torsio {
+
+/// One setting of a fitter: its name, range and default stand in one table, which `--help`, the
+/// checks and later tuning read.
+struct OptionInfo {
+  enum class Kind { number, integer, boolean, text };
+  std::string_view name;
+  Kind kind = Kind::number;
+  std::string_view default_value;
+  double minimum = 0.0;  ///< numbers and integers only
+  double maximum = 0.0;
+  std::string_view help;
+};
+
+/// Settings of one fit as given by the user (`--set name=value`), checked against a family's table.
+class Options {
+ public:
+  /// @throws UsageError for an unknown name (listing the known ones), a value of the wrong kind or
+  /// out of range.
+  Options(std::span<const OptionInfo> known, const std::map<std::string, std::string>& given);
+
+  [[nodiscard]] double number(std::string_view name) const;
+  [[nodiscard]] std::size_t integer(std::string_view name) const;
+  [[nodiscard]] bool boolean(std::string_view name) const;
+  [[nodiscard]] const std::string& text(std::string_view name) const;
+
+ private:
+  std::map<std::string, std::string, std::less<>> values_;
+};
+
+}  // namespace torsio

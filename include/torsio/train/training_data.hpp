@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "torsio/core/matrix.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// One input of a model as a fitter sees it.
+struct InputInfo {
+  std::string expression;
+  bool is_rate = false;  ///< FeaturePipeline::is_rate
+};
+
+/// One record after the feature pipeline: contiguous in time, so that families with memory can run
+/// through it.
+struct Sequence {
+  std::string recording;
+  Matrix features;             ///< samples x inputs
+  std::vector<double> target;  ///< NaN where not measured
+  std::vector<std::uint8_t>
+      use;  ///< 1: may be learned from (role, settled filters, fresh and finite target)
+};
+
+/// What every fitter is given.
+struct TrainingData {
+  std::vector<InputInfo> inputs;
+  std::string target;
+  double sample_rate_Hz = 0.0;
+  std::vector<Sequence> sequences;
+
+  [[nodiscard]] std::size_t input_count() const noexcept { return inputs.size(); }
+  [[nodiscard]] std::size_t usable_samples() const noexcept;
+};
+
+/// The usable samples of all sequences under each other, for families without memory.
+struct Table {
+  Matrix features;
+  std::vector<double> target;
+};
+[[nodiscard]] Table usable_table(const TrainingData& data);
+
+/// Runs each record of the dataset that has segments of `role` through the pipeline.
+/// @throws Error if a raw input is missing or not finite (naming record, channel, sample), or
+/// nothing usable remains.
+[[nodiscard]] TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec,
+                                         Role role = Role::train);
+
+}  // namespace torsio

@@ -1,0 +1,30 @@
+#include "torsio/core/error.hpp"
+
+#include <utility>
+
+namespace torsio {
+namespace {
+
+std::string message(const ErrorReport& report) {
+  std::string text = report.place;
+  const auto append = [&text](std::string_view separator, const std::string& part) {
+    if (part.empty()) return;
+    if (!text.empty()) text += separator;
+    text += part;
+  };
+  append(": ", report.problem);
+  if (!report.expected.empty())
+    append(report.problem.empty() ? ": " : "; ", "expected " + report.expected);
+  if (!report.found.empty()) append(report.expected.empty() ? ": " : ", ", "found " + report.found);
+  append("\n  ", report.advice);
+  return text;
+}
+
+}  // namespace
+
+Error::Error(ErrorReport report)
+    : std::runtime_error(message(report)), report_(std::move(report)) {}
+
+Cancelled::Cancelled() : Error({.problem = "stopped on request; nothing was written"}) {}
+
+}  // namespace torsio
