@@ -47,9 +47,9 @@ TEST(Units, ReadQuantities) {
   EXPECT_DOUBLE_EQ(si_quantity("50 ms", "s", "embargo"), 0.05);
   EXPECT_DOUBLE_EQ(si_quantity("10Hz", "Hz", "cut-off"), 10.0);
   EXPECT_DOUBLE_EQ(si_quantity("0.5", "s", "embargo"), 0.5);
-  EXPECT_THROW(si_quantity("5 Nm", "s", "embargo"), UsageError);
-  EXPECT_THROW(si_quantity("soon", "s", "embargo"), UsageError);
-  EXPECT_THROW(si_quantity("nan", "s", "embargo"), UsageError);
+  EXPECT_THROW((void)si_quantity("5 Nm", "s", "embargo"), UsageError);
+  EXPECT_THROW((void)si_quantity("soon", "s", "embargo"), UsageError);
+  EXPECT_THROW((void)si_quantity("nan", "s", "embargo"), UsageError);
 }
 
 TEST(Units, HaveLabelsForPeople) {
