@@ -13,9 +13,10 @@ std::string message(const ErrorReport& report) {
     text += part;
   };
   append(": ", report.problem);
-  if (!report.expected.empty())
-    append(report.problem.empty() ? ": " : "; ", "expected " + report.expected);
-  if (!report.found.empty()) append(report.expected.empty() ? ": " : ", ", "found " + report.found);
+  const std::string_view after_place = report.problem.empty() ? ": " : "; ";
+  if (!report.expected.empty()) append(after_place, "expected " + report.expected);
+  if (!report.found.empty())
+    append(report.expected.empty() ? after_place : ", ", "found " + report.found);
   append("\n  ", report.advice);
   return text;
 }
