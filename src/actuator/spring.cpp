@@ -1,0 +1,38 @@
+#include "torsio/actuator/spring.hpp"
+
+#include "checks.hpp"
+
+namespace torsio {
+namespace {
+
+SpringFriction friction_of(const Spring::Parameters& parameters) {
+  return std::visit(
+      [](const MaxwellSlip<4>::Parameters& of) -> SpringFriction { return MaxwellSlip<4>(of); },
+      parameters.friction);
+}
+
+}  // namespace
+
+Spring::Spring(const Parameters& parameters)
+    : elastic_(parameters.elastic),
+      friction_(friction_of(parameters)),
+      viscosity_Nms_rad_(parameters.viscosity_Nms_rad) {
+  require_not_negative("spring", "viscosity_Nms_rad", parameters.viscosity_Nms_rad);
+}
+
+void Spring::reset(double deflection_rad) noexcept {
+  last_deflection_rad_ = deflection_rad;
+  friction_Nm_ = 0.0;
+  std::visit([](auto& friction) { friction.reset(); }, friction_);
+}
+
+double Spring::friction_energy() const noexcept {
+  return std::visit([](const auto& friction) { return friction.energy(); }, friction_);
+}
+
+double Spring::steepest(double load_Nm) const noexcept {
+  return elastic_.steepest() +
+         std::visit([=](const auto& friction) { return friction.stiffness(load_Nm); }, friction_);
+}
+
+}  // namespace torsio
