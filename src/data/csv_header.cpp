@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 #include "data/decimal.hpp"
 #include "data/names.hpp"
@@ -84,16 +85,17 @@ void check_names(const std::vector<std::string>& names, const std::string& place
                  .found = "numbers: '" + printable(joined(names)) + "'",
                  .advice = "Put a line such as  t_s,angle_deg,torque_Nm  first; a header that "
                            "starts with '#' is taken for a comment."});
+  std::map<std::string_view, std::size_t> seen;
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i].empty())
       throw Error({.place = fmt::format("{}, column {}", place, i + 1),
                    .problem = "the column has no name",
                    .advice = "Name it, or remove a separator at the end of the lines."});
-    const auto first = static_cast<std::size_t>(std::ranges::find(names, names[i]) - names.begin());
-    if (first != i)
+    const auto [first, is_new] = seen.emplace(names[i], i + 1);
+    if (!is_new)
       throw Error(
           {.place = fmt::format("{}, column {} ({})", place, i + 1, printable(names[i])),
-           .problem = fmt::format("duplicate column: column {} has the same name", first + 1),
+           .problem = fmt::format("duplicate column: column {} has the same name", first->second),
            .advice = "Rename one of them in the file."});
   }
 }
