@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "torsio/core/error.hpp"
 
@@ -146,30 +149,34 @@ void Plant::set_period(double dt_s) noexcept {
   motor_.set_period(dt_s_);
 }
 
+void Plant::reset(const PlantState& state) noexcept {
+  state_ = state;
+  torques_ = {};
+  motor_.reset();
+  motor_friction_.reset();
+  gear_.reset(state.rotor_angle_rad, state.gear_angle_rad);
+  spring_.reset(state.gear_angle_rad - state.joint_angle_rad);
+  bearing_.reset();
+}
+
 void Plant::reset(double joint_angle_rad, const Load& load) noexcept {
   const double torque_Nm =
       load.is_locked ? 0.0 : load.gravity_Nm * std::sin(joint_angle_rad) - load.external_torque_Nm;
-  state_ = {};
-  torques_ = {};
-  state_.joint_angle_rad = joint_angle_rad;
-  const double deflection_rad = spring_.elastic().deflection(torque_Nm);
-  state_.gear_angle_rad = joint_angle_rad + deflection_rad;
-  // The kinematic error is a hundred times flatter than the gear ratio: this contracts.
-  const double unloaded_rad = state_.gear_angle_rad + torque_Nm / parameters_.gear.stiffness_Nm_rad;
-  state_.rotor_angle_rad = parameters_.gear.ratio * unloaded_rad;
+  PlantState rest{.joint_angle_rad = joint_angle_rad};
+  rest.gear_angle_rad = joint_angle_rad + spring_.elastic().deflection(torque_Nm);
+  const double unloaded_rad = rest.gear_angle_rad + torque_Nm / parameters_.gear.stiffness_Nm_rad;
+  // The kinematic error is far flatter than the gear's own slope: this contracts.
+  rest.rotor_angle_rad = parameters_.gear.ratio * unloaded_rad;
   for (int i = 0; i < 20; ++i) {
-    const double error_rad = gear_.kinematics(state_.rotor_angle_rad).angle_rad - unloaded_rad;
-    state_.rotor_angle_rad -= parameters_.gear.ratio * error_rad;
+    const double error_rad = gear_.kinematics(rest.rotor_angle_rad).angle_rad - unloaded_rad;
+    rest.rotor_angle_rad -= parameters_.gear.ratio * error_rad;
   }
-  gear_.reset(state_.rotor_angle_rad, state_.gear_angle_rad);
-  spring_.reset(deflection_rad);
-  motor_friction_.reset();
-  bearing_.reset();
-  const double slope = gear_.kinematics(state_.rotor_angle_rad).slope;
-  motor_.reset(torque_Nm * slope / parameters_.motor.torque_constant_Nm_A);
-  torques_ = {.motor_Nm = torque_Nm * slope,
+  reset(rest);
+  const double rotor_torque_Nm = torque_Nm * gear_.kinematics(rest.rotor_angle_rad).slope;
+  motor_.reset(rotor_torque_Nm / parameters_.motor.torque_constant_Nm_A);
+  torques_ = {.motor_Nm = rotor_torque_Nm,
               .gear_Nm = torque_Nm,
-              .gear_on_rotor_Nm = torque_Nm * slope,
+              .gear_on_rotor_Nm = rotor_torque_Nm,
               .spring_Nm = torque_Nm,
               .joint_Nm = torque_Nm};
 }

@@ -56,14 +56,24 @@ TEST(DataSheet, RatedSpeedStaysWithinTheSupplyVoltage) {
 TEST(DataSheet, ListsEveryValueOnceWithAnOrigin) {
   for (const DataSheet& sheet : data_sheets()) {
     std::map<std::string, int> seen;
-    sheet.visit_values([&](std::string_view name, std::string_view, SheetValue value) {
-      ++seen[std::string(name)];
-      EXPECT_TRUE(std::isfinite(value.value)) << name;
-    });
+    for (const SheetRow& row : describe(sheet)) {
+      ++seen[std::string(row.name)];
+      EXPECT_TRUE(std::isfinite(row.value.value)) << row.name;
+    }
     for (const auto& [name, count] : seen) EXPECT_EQ(count, 1) << name;
     EXPECT_EQ(seen.size() * sizeof(SheetValue), sizeof(DataSheet) - 2 * sizeof(std::string_view))
         << "a field of the sheet is not listed";
   }
+}
+
+TEST(DataSheet, TellsPrintedFromDerivedFromAssumed) {
+  std::map<std::string_view, SheetRow> rows;
+  for (const SheetRow& row : describe(data_sheet("dfki-120"))) rows[row.name] = row;
+  EXPECT_EQ(rows["spring_stiffness"].value.origin, Origin::printed);
+  EXPECT_NEAR(rows["spring_stiffness"].value.value, 19.8 * 180.0 / std::numbers::pi, 1e-9);
+  EXPECT_EQ(rows["spring_stiffness"].unit, "Nm/rad");
+  EXPECT_EQ(rows["gear_stiffness"].value.origin, Origin::derived);
+  EXPECT_EQ(rows["rotor_inertia"].value.origin, Origin::assumed);
 }
 
 TEST(DataSheet, UnknownNameListsTheKnownOnes) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace torsio {
 
@@ -91,72 +92,22 @@ struct DataSheet {
   SheetValue torque_noise_share = assumed(0.0005 / 3.0);  ///< 0.05 % class read as three sigma
   SheetValue torque_rate_Hz = printed(125.0);
   SheetValue torque_latency_s = assumed(2e-3);
-
-  /// Calls `visit(name, unit, value)` for every number, in the order above.
-  template <class Visit>
-  void visit_values(Visit&& visit) const;
 };
+
+/// One line of a printed data sheet.
+struct SheetRow {
+  std::string_view name;
+  std::string_view unit;  ///< as a person writes it; empty for a plain number
+  SheetValue value;
+};
+
+/// Every number of the sheet, in the order above.
+[[nodiscard]] std::vector<SheetRow> describe(const DataSheet& sheet);
 
 /// The actuators that torsio knows, in the order of their size.
 [[nodiscard]] std::span<const DataSheet> data_sheets() noexcept;
 
 /// @throws UsageError that lists the known names if there is none of this name.
 [[nodiscard]] const DataSheet& data_sheet(std::string_view name);
-
-template <class Visit>
-void DataSheet::visit_values(Visit&& visit) const {
-  visit("rated_torque", "Nm", rated_torque_Nm);
-  visit("rated_current", "A", rated_current_A);
-  visit("top_speed", "rad/s", top_speed_rad_s);
-  visit("torque_constant", "Nm/A", torque_constant_Nm_A);
-  visit("rotor_inertia", "kg m^2", rotor_inertia_kg_m2);
-  visit("winding_resistance", "Ohm", winding_resistance_Ohm);
-  visit("supply", "V", supply_V);
-  visit("peak_current_ratio", "", peak_current_ratio);
-  visit("current_time_constant", "s", current_time_constant_s);
-  visit("torque_ripple", "", torque_ripple);
-  visit("ripple_order", "", ripple_order);
-  visit("gear_ratio", "", gear_ratio);
-  visit("gear_inertia", "kg m^2", gear_inertia_kg_m2);
-  visit("gear_stiffness", "Nm/rad", gear_stiffness_Nm_rad);
-  visit("gear_damping_time", "s", gear_damping_time_s);
-  visit("gear_hysteresis", "rad", gear_hysteresis_rad);
-  visit("gear_break_away", "rad", gear_break_away_rad);
-  visit("gear_error_2_per_turn", "rad", gear_error_rad[0]);
-  visit("gear_error_4_per_turn", "rad", gear_error_rad[1]);
-  visit("gear_error_2_phase", "rad", gear_error_phase_rad[0]);
-  visit("gear_error_4_phase", "rad", gear_error_phase_rad[1]);
-  visit("friction", "Nm", friction_Nm);
-  visit("friction_viscous", "Nms/rad", friction_viscous_Nms_rad);
-  visit("friction_load_factor", "", friction_load_factor);
-  visit("friction_static_ratio", "", friction_static_ratio);
-  visit("friction_stribeck", "rad/s", friction_stribeck_rad_s);
-  visit("friction_bristle", "rad", friction_bristle_rad);
-  visit("spring_stiffness", "Nm/rad", spring_stiffness_Nm_rad);
-  visit("spring_stage", "rad", spring_stage_rad);
-  visit("spring_stage_stiffness", "Nm/rad", spring_stage_stiffness_Nm_rad);
-  visit("spring_half_gap", "rad", spring_half_gap_rad);
-  visit("spring_asymmetry", "", spring_asymmetry);
-  visit("spring_friction", "Nm", spring_friction_Nm);
-  visit("spring_load_friction", "", spring_load_friction);
-  visit("spring_viscosity", "Nms/rad", spring_viscosity_Nms_rad);
-  constexpr std::array<std::string_view, 4> kShare = {"spring_slip_share_1", "spring_slip_share_2",
-                                                      "spring_slip_share_3", "spring_slip_share_4"};
-  constexpr std::array<std::string_view, 4> kBreak = {"spring_break_away_1", "spring_break_away_2",
-                                                      "spring_break_away_3", "spring_break_away_4"};
-  for (std::size_t i = 0; i < 4; ++i) visit(kShare[i], "", spring_slip_share[i]);
-  for (std::size_t i = 0; i < 4; ++i) visit(kBreak[i], "rad", spring_break_away_rad[i]);
-  visit("output_inertia", "kg m^2", output_inertia_kg_m2);
-  visit("bearing_friction", "Nm", bearing_friction_Nm);
-  visit("bearing_break_away", "rad", bearing_break_away_rad);
-  visit("joint_viscous", "Nms/rad", joint_viscous_Nms_rad);
-  visit("encoder_bits", "", encoder_bits);
-  visit("encoder_jitter", "LSB", encoder_jitter_LSB);
-  visit("current_noise", "A", current_noise_A);
-  visit("torque_sensor_range", "Nm", torque_range_Nm);
-  visit("torque_sensor_noise_share", "", torque_noise_share);
-  visit("torque_sensor_rate", "Hz", torque_rate_Hz);
-  visit("torque_sensor_latency", "s", torque_latency_s);
-}
 
 }  // namespace torsio

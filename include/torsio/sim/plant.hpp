@@ -88,6 +88,8 @@ class Plant {
   /// At rest at this joint angle, the spring and the motor current carrying the load, all friction
   /// relaxed.
   void reset(double joint_angle_rad = 0.0, const Load& load = {}) noexcept;
+  /// In any state, without current, all friction relaxed.
+  void reset(const PlantState& state) noexcept;
 
   /// Advances the plant. A value that is not finite, a negative inertia or a dt that is not
   /// positive is `Fault::input_not_finite`, and nothing moves.
