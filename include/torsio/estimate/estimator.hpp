@@ -11,6 +11,7 @@
 #include "torsio/core/realtime.hpp"
 #include "torsio/estimate/estimator_core.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
+#include "torsio/model/any_model.hpp"
 #include "torsio/model/model.hpp"
 
 namespace torsio {
@@ -79,5 +80,8 @@ class BasicEstimator {
   EstimatorCore core_;
   M model_;
 };
+
+/// An estimator around a model of any known family, as model files hold them.
+using Estimator = BasicEstimator<AnyModel>;
 
 }  // namespace torsio

@@ -66,4 +66,6 @@ class BasicTorqueEstimator {
   JointInputs inputs_;
 };
 
+using TorqueEstimator = BasicTorqueEstimator<AnyModel>;
+
 }  // namespace torsio
