@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/core/provenance.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
@@ -22,21 +23,6 @@ struct Channel {
   [[nodiscard]] bool is_fresh(std::size_t sample) const {
     return fresh.empty() || fresh[sample] != 0;
   }
-};
-
-/// Where a recording came from, for the card of whatever is trained on it.
-struct Source {
-  std::string file;    ///< as the user named it
-  std::string sha256;  ///< of the file's bytes; empty for a recording that was made in memory
-};
-
-/// A zero that is taken from each record's own start, or (offline only) from its middle.
-struct ZeroRule {
-  std::string channel;
-  double first_s = 0.0;    ///< mean over this much of the start; 0 with `mid_range`
-  bool mid_range = false;  ///< (min + max) / 2 of the whole record: looks ahead, so rows say
-                           ///< "zero": "non_causal"
-  bool operator==(const ZeroRule&) const = default;
 };
 
 /// Channels by name on one uniform clock. All channels have `size()` samples; names are unique.

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/fault.hpp"
+#include "torsio/core/realtime.hpp"
+#include "torsio/estimate/estimator_settings.hpp"
+#include "torsio/model/model.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// A gap in the inputs longer than this starts the filters and the model afresh; a shorter one they
+/// run across, as if its ticks had not been.
+inline constexpr double kLongestGap_s = 0.01;
+
+/// Everything of an estimator that does not depend on the family of its model: raw channels in,
+/// features out, and the guards that decide whether what the model made of them may be used.
+class EstimatorCore {
+ public:
+  /// @throws Error if the settings contradict each other or the model, or a number in them is not
+  /// finite.
+  EstimatorCore(EstimatorSettings settings, std::size_t model_input_count);
+
+  /// One tick's raw channels after the pipeline.
+  struct Conditioned {
+    Features features;          ///< empty where `fault` says that there are none
+    Fault fault = Fault::none;  ///< none, input_count_wrong or input_not_finite
+    bool restarted = false;     ///< the pipeline was reset: the model's memory is void too
+  };
+
+  [[nodiscard]] const EstimatorSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept {
+    return pipeline_.raw_inputs();
+  }
+  [[nodiscard]] bool is_settled() const noexcept { return pipeline_.is_settled(); }
+
+  /// @throws UsageError for an unknown channel or a value that is not finite.
+  void set_zero(std::string_view channel, double value);
+  void reset() noexcept;
+
+  Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;
+  /// The last value that came of good inputs, with the reason why it is held.
+  [[nodiscard]] Estimate held(Fault fault) const noexcept TORSIO_REALTIME;
+  /// What may be told to the outside of `told`, the model's answer to `features`.
+  Estimate judge(Features features, const Estimate& told) noexcept TORSIO_REALTIME;
+
+ private:
+  [[nodiscard]] bool is_inside(Features features) const noexcept;
+  [[nodiscard]] double fallback_value(Features features) const noexcept;
+  [[nodiscard]] double residual_std_at(double value) const noexcept;
+  Conditioned miss(Fault fault) noexcept;
+
+  EstimatorSettings settings_;
+  FeaturePipeline pipeline_;
+  std::vector<double> lower_limits_;  ///< of each feature, margin included
+  std::vector<double> upper_limits_;
+  std::size_t longest_gap_;  ///< ticks
+  std::size_t missed_ = 0;   ///< ticks in a row without usable input
+  bool poisoned_ = false;    ///< a feature was not finite: the filters may never recover from it
+  double last_value_ = 0.0;
+};
+
+}  // namespace torsio

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/provenance.hpp"
+#include "torsio/estimate/estimator.hpp"
+#include "torsio/estimate/estimator_settings.hpp"
+#include "torsio/model/any_model.hpp"
+
+namespace torsio {
+
+/// What this release writes; docs/model_file.md lists which release reads which.
+inline constexpr int kModelFormatVersion = 1;
+
+/// A larger file is refused before memory is taken for it.
+inline constexpr std::size_t kMostModelFileBytes = std::size_t{256} << 20;
+
+/// What a model file says about its model besides what is needed to run it. Nothing here depends on
+/// the clock or the machine: the same fit gives the same bytes.
+struct ModelCard {
+  std::string torsio_version;  ///< that wrote the file; `save_model` fills it in
+  std::string fitted_as;       ///< the fitter's name, where families have several: "dgmm_paper"
+  std::map<std::string, std::string> options;  ///< of the fitter, as given
+  std::uint64_t seed = 0;
+  std::vector<Source> training_files;
+  std::vector<ZeroRule> zeros;            ///< how the training records were zeroed
+  std::string held_out;                   ///< what `metrics` were measured on, in words
+  std::map<std::string, double> metrics;  ///< in the target's unit: "rmse", "mad", ...
+  std::string device_serial;              ///< of the actuator that the model belongs to, or empty
+  bool operator==(const ModelCard&) const = default;
+};
+
+/// A model and everything around it. Plain data.
+struct ModelFile {
+  ModelCard card;
+  EstimatorSettings settings;
+  AnyModel::Parameters parameters;
+};
+
+/// The bytes of a model file (docs/model_file.md).
+[[nodiscard]] std::vector<std::byte> model_bytes(const ModelFile& model);
+
+/// Reads a model from untrusted bytes. When this returns, the estimator can be built.
+/// @param place the file's name, for messages.
+/// @param expected_serial the device that the model will run on; empty: any.
+/// @throws Error naming the tensor or the card's entry: not a model file, another format version,
+/// an unknown family, a tensor missing, unknown, of the wrong type or shape or not finite, settings
+/// that contradict the model, or a model that belongs to another device.
+[[nodiscard]] ModelFile parse_model(std::span<const std::byte> bytes, std::string_view place,
+                                    std::string_view expected_serial = {});
+
+/// Writes a model file whole or not at all (`write_whole_file`). @throws Error also for a model
+/// that `load_model` would refuse.
+void save_model(const std::filesystem::path& path, const ModelFile& model);
+
+/// @throws Error as `parse_model`, or if the file cannot be read.
+[[nodiscard]] ModelFile load_model(const std::filesystem::path& path,
+                                   std::string_view expected_serial = {});
+
+/// The estimator of a model. @throws Error if settings and model do not fit together.
+[[nodiscard]] Estimator make_estimator(const ModelFile& model);
+
+/// `load_model` and `make_estimator` in one: what a robot calls.
+[[nodiscard]] Estimator load_estimator(const std::filesystem::path& path,
+                                       std::string_view expected_serial = {});
+
+}  // namespace torsio

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+namespace torsio {
+
+/// The bytes of a regular file.
+/// @throws Error if it cannot be read, is no regular file, or is larger than `most_bytes`: memory
+/// is taken after its size is known.
+[[nodiscard]] std::vector<std::byte> read_whole_file(const std::filesystem::path& path,
+                                                     std::size_t most_bytes);
+
+/// Writes under a temporary name in the same folder, syncs and renames: the target holds either its
+/// old bytes or all new ones, after a power loss too. A symbolic link stays one.
+/// @throws Error (disk full, no such folder, no permission, the target is no regular file); the
+/// target is then untouched and the temporary file gone.
+void write_whole_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
+
+}  // namespace torsio

@@ -1,0 +1,204 @@
+#include "torsio/estimate/estimator_core.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+bool all_finite(std::span<const double> values) noexcept {
+  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
+
+/// An error bar that says something; NaN for one that does not.
+double evidence(double std_dev) noexcept {
+  return std::isfinite(std_dev) && std_dev > 0.0 ? std_dev : kNotMeasured;
+}
+
+bool is_error_bar(double std_dev) noexcept {
+  return std::isnan(std_dev) || (std::isfinite(std_dev) && std_dev >= 0.0);
+}
+
+[[noreturn]] void refuse(std::string place, std::string expected, std::string found) {
+  throw Error({.place = std::move(place),
+               .expected = std::move(expected),
+               .found = std::move(found),
+               .advice = "Fit the model again: its settings do not fit together."});
+}
+
+void check_count(const char* place, std::size_t expected, std::size_t found) {
+  if (expected != found)
+    refuse(place, fmt::format("{} values", expected), fmt::format("{}", found));
+}
+
+void check_finite(const char* place, std::span<const double> values) {
+  const auto bad =
+      std::ranges::find_if_not(values, [](double value) { return std::isfinite(value); });
+  if (bad != values.end())
+    refuse(fmt::format("{}[{}]", place, bad - values.begin()), "a finite number",
+           fmt::format("{}", *bad));
+}
+
+void check_ranges(const FeatureRanges& ranges, const std::vector<std::string>& inputs) {
+  check_count("guards.ranges.lowest", inputs.size(), ranges.lowest.size());
+  check_count("guards.ranges.highest", inputs.size(), ranges.highest.size());
+  check_finite("guards.ranges.lowest", ranges.lowest);
+  check_finite("guards.ranges.highest", ranges.highest);
+  for (std::size_t i = 0; i < inputs.size(); ++i)
+    if (!(ranges.lowest[i] <= ranges.highest[i]))
+      refuse(fmt::format("guards.ranges of {}", inputs[i]), "lowest <= highest",
+             fmt::format("{} and {}", ranges.lowest[i], ranges.highest[i]));
+  if (!std::isfinite(ranges.margin) || ranges.margin < 0.0)
+    refuse("guards.ranges.margin", "a finite number, at least 0", fmt::format("{}", ranges.margin));
+}
+
+void check_fallback(const LinearFallback& fallback, std::size_t inputs) {
+  check_count("fallback.slope", inputs, fallback.slope.size());
+  check_finite("fallback.slope", fallback.slope);
+  check_finite("fallback.intercept", {&fallback.intercept, 1});
+  if (!is_error_bar(fallback.residual_std))
+    refuse("fallback.residual_std", "a number, at least 0, or NaN for none",
+           fmt::format("{}", fallback.residual_std));
+}
+
+void check_residuals(const ResidualTable& residuals) {
+  const std::size_t regions = residuals.std_dev.size();
+  check_count("residuals.edges", regions == 0 ? 0 : regions + 1, residuals.edges.size());
+  check_finite("residuals.edges", residuals.edges);
+  if (std::ranges::adjacent_find(residuals.edges, std::greater_equal<>{}) != residuals.edges.end())
+    refuse("residuals.edges", "ascending numbers", "one that is not above the one before it");
+  const auto bad = std::ranges::find_if_not(residuals.std_dev, is_error_bar);
+  if (bad != residuals.std_dev.end())
+    refuse(fmt::format("residuals.std_dev[{}]", bad - residuals.std_dev.begin()),
+           "a number, at least 0, or NaN for none", fmt::format("{}", *bad));
+}
+
+void check_settings(const EstimatorSettings& settings, std::size_t model_input_count) {
+  const std::vector<std::string>& inputs = settings.features.inputs;
+  if (inputs.size() != model_input_count)
+    refuse("inputs", fmt::format("{}, as many as the model takes", model_input_count),
+           fmt::format("{} ({})", inputs.size(), fmt::join(inputs, ", ")));
+  if (!split_channel_name(settings.target))
+    refuse("target", "a channel name that ends in its unit, such as torque_Nm",
+           fmt::format("'{}'", settings.target));
+  check_ranges(settings.ranges, inputs);
+  check_fallback(settings.fallback, inputs.size());
+  check_residuals(settings.residuals);
+}
+
+}  // namespace
+
+EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input_count)
+    : settings_(std::move(settings)),
+      pipeline_(settings_.features, settings_.sample_rate_Hz),
+      longest_gap_(static_cast<std::size_t>(
+          std::clamp(kLongestGap_s * settings_.sample_rate_Hz, 1.0, 1e9))) {
+  check_settings(settings_, model_input_count);
+  const FeatureRanges& ranges = settings_.ranges;
+  for (std::size_t i = 0; i < model_input_count; ++i) {
+    const double low = ranges.lowest[i];
+    const double high = ranges.highest[i];
+    // A feature that was constant in training has no width, but rounding must not trip its guard.
+    const double slack =
+        ranges.margin * (high - low) + 1e-9 * std::max(std::abs(low), std::abs(high));
+    lower_limits_.push_back(low - slack);
+    upper_limits_.push_back(high + slack);
+  }
+  check_finite("guards.ranges with margin", lower_limits_);
+  check_finite("guards.ranges with margin", upper_limits_);
+}
+
+void EstimatorCore::set_zero(std::string_view channel, double value) {
+  if (!std::isfinite(value))
+    throw UsageError({.place = fmt::format("zero of {}", channel),
+                      .expected = "a finite number",
+                      .found = fmt::format("{}", value)});
+  pipeline_.set_zero(channel, value);
+}
+
+void EstimatorCore::reset() noexcept {
+  pipeline_.reset();
+  missed_ = 0;
+  poisoned_ = false;
+  last_value_ = 0.0;
+}
+
+EstimatorCore::Conditioned EstimatorCore::miss(Fault fault) noexcept {
+  if (missed_ <= longest_gap_) ++missed_;
+  return {.features = {}, .fault = fault};
+}
+
+EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw) noexcept {
+  if (raw.size() != raw_inputs().size()) return miss(Fault::input_count_wrong);
+  if (!all_finite(raw)) return miss(Fault::input_not_finite);
+  const bool restarted = poisoned_ || missed_ > longest_gap_;
+  if (restarted) pipeline_.reset();
+  const Features features = pipeline_.step(raw);
+  // Finite inputs can still overflow a product or leave a root's domain, and a filter never forgets
+  // that.
+  poisoned_ = !all_finite(features);
+  if (poisoned_) return miss(Fault::input_not_finite);
+  missed_ = 0;
+  return {.features = features, .restarted = restarted};
+}
+
+Estimate EstimatorCore::held(Fault fault) const noexcept {
+  return {.value = last_value_, .fault = fault};
+}
+
+Estimate EstimatorCore::judge(Features features, const Estimate& told) noexcept {
+  const bool inside = is_inside(features);
+  Estimate out{.novelty = told.novelty};
+  if (!is_settled()) {
+    out.fault = Fault::warming_up;
+  } else if (!inside) {
+    out.fault = Fault::outside_training_range;
+  } else if (told.fault != Fault::none) {
+    out.fault = told.fault;
+  } else if (!std::isfinite(told.value)) {
+    out.fault = Fault::model_not_finite;
+  }
+  if (out.fault == Fault::none) {
+    out.value = told.value;
+    const double own = evidence(told.std_dev);
+    out.std_dev = std::isnan(own) ? residual_std_at(told.value) : own;
+  } else {
+    out.value = fallback_value(features);
+    // The fallback's residuals are evidence only where it was fitted.
+    if (inside) out.std_dev = evidence(settings_.fallback.residual_std);
+  }
+  last_value_ = out.value;
+  return out;
+}
+
+bool EstimatorCore::is_inside(Features features) const noexcept {
+  for (std::size_t i = 0; i < features.size(); ++i)
+    if (!(lower_limits_[i] <= features[i] && features[i] <= upper_limits_[i])) return false;
+  return true;
+}
+
+double EstimatorCore::fallback_value(Features features) const noexcept {
+  double value = settings_.fallback.intercept;
+  for (std::size_t i = 0; i < features.size(); ++i)
+    value += settings_.fallback.slope[i] * features[i];
+  return std::isfinite(value) ? value : last_value_;
+}
+
+double EstimatorCore::residual_std_at(double value) const noexcept {
+  const ResidualTable& table = settings_.residuals;
+  if (table.std_dev.empty()) return kNotMeasured;
+  const auto inner_begin = table.edges.begin() + 1;
+  const auto inner_end = table.edges.end() - 1;
+  const auto region = std::upper_bound(inner_begin, inner_end, value) - inner_begin;
+  return evidence(table.std_dev[static_cast<std::size_t>(region)]);
+}
+
+}  // namespace torsio

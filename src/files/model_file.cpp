@@ -1,0 +1,121 @@
+#include "torsio/files/model_file.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+#include <variant>
+
+#include "files/card_json.hpp"
+#include "files/leaf_tensors.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/files/safetensors.hpp"
+#include "torsio/files/whole_file.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr const char* kCardKey = "torsio";
+
+/// Error bars may be NaN: no evidence.
+bool is_error_bar(std::string_view path) {
+  return path == "fallback.residual_std" || path == "residuals.std_dev";
+}
+
+const std::string& card_text(const Safetensors& contents, std::string_view place) {
+  const auto card = contents.metadata.find(kCardKey);
+  if (card == contents.metadata.end())
+    throw Error({.place = fmt::format("{}: /__metadata__/{}", place, kCardKey),
+                 .expected = "the card of a torsio model",
+                 .found = "none",
+                 .advice = "This is a safetensors file of another program: give the file that "
+                           "torsio fit wrote."});
+  return card->second;
+}
+
+void check_serial(const ModelCard& card, std::string_view place, std::string_view expected) {
+  if (expected.empty() || card.device_serial == expected) return;
+  throw Error(
+      {.place = fmt::format("{}: device_serial", place),
+       .expected = fmt::format("'{}'", expected),
+       .found = card.device_serial.empty() ? "none" : fmt::format("'{}'", card.device_serial),
+       .advice = "The model belongs to another actuator: load the one that was fitted to "
+                 "this device."});
+}
+
+void check_nothing_left(const Safetensors& contents, std::string_view place,
+                        std::string_view family) {
+  if (contents.tensors.empty()) return;
+  throw Error({.place = fmt::format("{}: /{}", place, contents.tensors.begin()->first),
+               .expected = fmt::format("only tensors of the family {}", family),
+               .found = "one that it does not have",
+               .advice = "The file does not hold what its card says: fit the model again."});
+}
+
+/// Checks what only the estimator itself can: that settings and model fit together.
+Estimator make_estimator_at(const ModelFile& model, std::string_view place) {
+  try {
+    return make_estimator(model);
+  } catch (const Error& error) {
+    ErrorReport report = error.report();
+    report.place =
+        report.place.empty() ? std::string(place) : fmt::format("{}: {}", place, report.place);
+    throw Error(std::move(report));
+  }
+}
+
+ModelFile read_model(std::span<const std::byte> bytes, std::string_view place,
+                     std::string_view expected_serial) {
+  Safetensors contents = parse_safetensors(bytes, place);
+  ModelFile model = model_of_card(card_text(contents, place), fmt::format("{}: card", place));
+  check_serial(model.card, place, expected_serial);
+  std::visit(
+      [&](auto& parameters) { take_leaves(contents, "model", place, parameters, is_error_bar); },
+      model.parameters);
+  take_leaves(contents, "guards.ranges", place, model.settings.ranges, is_error_bar);
+  take_leaves(contents, "fallback", place, model.settings.fallback, is_error_bar);
+  take_leaves(contents, "residuals", place, model.settings.residuals, is_error_bar);
+  check_nothing_left(contents, place, family_of(model.parameters));
+  return model;
+}
+
+}  // namespace
+
+std::vector<std::byte> model_bytes(const ModelFile& model) {
+  Safetensors contents;
+  contents.metadata[kCardKey] = card_json(model);
+  std::visit([&](const auto& parameters) { put_leaves(contents, "model", parameters); },
+             model.parameters);
+  put_leaves(contents, "guards.ranges", model.settings.ranges);
+  put_leaves(contents, "fallback", model.settings.fallback);
+  put_leaves(contents, "residuals", model.settings.residuals);
+  return safetensors_bytes(contents);
+}
+
+ModelFile parse_model(std::span<const std::byte> bytes, std::string_view place,
+                      std::string_view expected_serial) {
+  ModelFile model = read_model(bytes, place, expected_serial);
+  (void)make_estimator_at(model, place);
+  return model;
+}
+
+void save_model(const std::filesystem::path& path, const ModelFile& model) {
+  const auto bytes = model_bytes(model);
+  (void)parse_model(bytes, path.string());
+  write_whole_file(path, bytes);
+}
+
+ModelFile load_model(const std::filesystem::path& path, std::string_view expected_serial) {
+  return parse_model(read_whole_file(path, kMostModelFileBytes), path.string(), expected_serial);
+}
+
+Estimator make_estimator(const ModelFile& model) {
+  return Estimator(model.settings, AnyModel(model.parameters));
+}
+
+Estimator load_estimator(const std::filesystem::path& path, std::string_view expected_serial) {
+  const std::string place = path.string();
+  const auto bytes = read_whole_file(path, kMostModelFileBytes);
+  return make_estimator_at(read_model(bytes, place, expected_serial), place);
+}
+
+}  // namespace torsio

@@ -1,0 +1,309 @@
+#include "torsio/estimate/estimator.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include "support/error_message.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+using test::error_message;
+using testing::HasSubstr;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Says `gain` times its input plus how many ticks it has seen, or whatever it is told to say.
+class Scripted {
+ public:
+  struct Parameters {
+    double gain = 10.0;
+    Estimate says = {.value = 0.0};
+    bool obeys = false;  ///< says `says`
+    std::size_t inputs = 1;
+  };
+  explicit Scripted(const Parameters& parameters) : parameters_(parameters) {}
+  [[nodiscard]] Parameters parameters() const { return parameters_; }
+  [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.inputs; }
+  [[nodiscard]] std::size_t parameter_count() const noexcept { return 1; }
+  [[nodiscard]] int ticks() const noexcept { return ticks_; }
+  void reset() noexcept { ticks_ = 0; }
+  Estimate step(Features features) noexcept {
+    ++ticks_;
+    if (parameters_.obeys) return parameters_.says;
+    return {.value = parameters_.gain * features[0]};
+  }
+
+ private:
+  Parameters parameters_;
+  int ticks_ = 0;
+};
+
+using ScriptedEstimator = BasicEstimator<Scripted>;
+
+/// One input that needs no settling, trained on -1..1.
+EstimatorSettings settings(const std::string& input = "gear_angle_rad") {
+  return {.features = {.inputs = {input}, .definitions = {}},
+          .sample_rate_Hz = 1000.0,
+          .target = "torque_Nm",
+          .zeroed_channels = {},
+          .ranges = {.lowest = {-1.0}, .highest = {1.0}, .margin = 0.05},
+          .fallback = {.intercept = 0.5, .slope = {7.0}, .residual_std = 3.0},
+          .residuals = {}};
+}
+
+Estimate step(ScriptedEstimator& estimator, double value) { return estimator.step({{value}}); }
+
+ScriptedEstimator saying(const Estimate& estimate) {
+  return {settings(), Scripted({.says = estimate, .obeys = true})};
+}
+
+std::string refusal(const EstimatorSettings& bad, std::size_t inputs = 1) {
+  return error_message([&] { ScriptedEstimator(bad, Scripted({.inputs = inputs})); });
+}
+
+TEST(Estimator, SaysWhatItsModelSays) {
+  ScriptedEstimator estimator(settings(), Scripted({}));
+  EXPECT_THAT(estimator.raw_inputs(), testing::ElementsAre("gear_angle_rad"));
+  const Estimate estimate = step(estimator, 0.25);
+  EXPECT_EQ(estimate.value, 2.5);
+  EXPECT_EQ(estimate.fault, Fault::none);
+  EXPECT_TRUE(std::isnan(estimate.std_dev)) << "no evidence, no error bar";
+}
+
+TEST(Estimator, HoldsTheLastGoodValueWhileAnInputIsMissing) {
+  ScriptedEstimator estimator(settings(), Scripted({}));
+  EXPECT_EQ(step(estimator, kNaN).value, 0.0) << "nothing to hold yet";
+  step(estimator, 0.5);
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+    const Estimate held = step(estimator, bad);
+    EXPECT_EQ(held.value, 5.0);
+    EXPECT_EQ(held.fault, Fault::input_not_finite);
+    EXPECT_TRUE(std::isnan(held.std_dev));
+  }
+  EXPECT_EQ(step(estimator, 0.1).fault, Fault::none);
+}
+
+TEST(Estimator, RefusesAnotherNumberOfInputs) {
+  ScriptedEstimator estimator(settings(), Scripted({}));
+  step(estimator, 0.5);
+  const Estimate none = estimator.step({});
+  const Estimate two = estimator.step(std::array{0.1, 0.2});
+  EXPECT_EQ(none.fault, Fault::input_count_wrong);
+  EXPECT_EQ(two.fault, Fault::input_count_wrong);
+  EXPECT_EQ(two.value, 5.0);
+  EXPECT_EQ(estimator.model().ticks(), 1);
+}
+
+TEST(Estimator, RunsOnAcrossAShortGapAndStartsAfreshAfterALongOne) {
+  ScriptedEstimator estimator(settings("lag(gear_angle_rad, 3)"), Scripted({}));
+  while (!estimator.is_settled()) step(estimator, 0.5);
+  ASSERT_EQ(step(estimator, 0.5).fault, Fault::none);
+  for (int i = 0; i < 10; ++i) step(estimator, kNaN);  // 10 ms: the longest gap
+  EXPECT_EQ(step(estimator, 0.5).fault, Fault::none);
+  const int ticks = estimator.model().ticks();
+  for (int i = 0; i < 11; ++i) step(estimator, kNaN);
+  EXPECT_EQ(estimator.model().ticks(), ticks) << "the model is not stepped without inputs";
+  EXPECT_EQ(step(estimator, 0.5).fault, Fault::warming_up);
+  EXPECT_EQ(estimator.model().ticks(), 1) << "the model's memory started afresh too";
+}
+
+TEST(Estimator, RecoversFromInputsThatPoisonItsFilters) {
+  ScriptedEstimator estimator(settings("lowpass(gear_angle_rad * gear_angle_rad, 100Hz)"),
+                              Scripted({}));
+  while (!estimator.is_settled()) step(estimator, 0.5);
+  const double before = step(estimator, 0.5).value;
+  const Estimate overflow = step(estimator, 1e200);
+  EXPECT_EQ(overflow.fault, Fault::input_not_finite);
+  EXPECT_EQ(overflow.value, before);
+  EXPECT_EQ(step(estimator, 0.5).fault, Fault::warming_up);
+  while (!estimator.is_settled()) step(estimator, 0.5);
+  EXPECT_NEAR(step(estimator, 0.5).value, before, 1e-9);
+}
+
+TEST(Estimator, TellsTheFallbackWhileItWarmsUp) {
+  ScriptedEstimator estimator(settings("lag(gear_angle_rad, 3)"), Scripted({}));
+  const Estimate first = step(estimator, 0.5);
+  EXPECT_EQ(first.fault, Fault::warming_up);
+  EXPECT_EQ(first.value, 0.5 + 7.0 * 0.5);
+  EXPECT_EQ(first.std_dev, 3.0);
+  EXPECT_FALSE(estimator.is_settled());
+}
+
+TEST(Estimator, TellsTheFallbackOutsideTheTrainingRange) {
+  ScriptedEstimator estimator(settings(), Scripted({}));
+  EXPECT_EQ(step(estimator, 1.09).fault, Fault::none) << "within the margin";
+  EXPECT_EQ(step(estimator, -1.09).fault, Fault::none);
+  const Estimate outside = step(estimator, 1.11);
+  EXPECT_EQ(outside.fault, Fault::outside_training_range);
+  EXPECT_DOUBLE_EQ(outside.value, 0.5 + 7.0 * 1.11);
+  EXPECT_TRUE(std::isnan(outside.std_dev)) << "nobody measured the fallback out there";
+  EXPECT_EQ(step(estimator, -1.11).fault, Fault::outside_training_range);
+}
+
+TEST(Estimator, AllowsRoundingWhereAFeatureWasConstantInTraining) {
+  EstimatorSettings constant = settings();
+  constant.ranges.lowest = constant.ranges.highest = {0.033};
+  ScriptedEstimator estimator(constant, Scripted({}));
+  EXPECT_EQ(step(estimator, 0.033 * (1.0 + 1e-12)).fault, Fault::none);
+  EXPECT_EQ(step(estimator, 0.034).fault, Fault::outside_training_range);
+}
+
+TEST(Estimator, TellsTheFallbackWhenTheModelFails) {
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+    ScriptedEstimator estimator = saying({.value = bad, .std_dev = 0.1});
+    const Estimate estimate = step(estimator, 0.5);
+    EXPECT_EQ(estimate.fault, Fault::model_not_finite);
+    EXPECT_EQ(estimate.value, 4.0);
+    EXPECT_EQ(estimate.std_dev, 3.0);
+    EXPECT_EQ(estimator.model().ticks(), 0) << "a memory full of NaN is emptied";
+  }
+}
+
+TEST(Estimator, PassesOnWhatTheModelSaysOfItself) {
+  ScriptedEstimator estimator =
+      saying({.value = 1.0, .novelty = 9.0, .fault = Fault::outside_training_range});
+  const Estimate estimate = step(estimator, 0.5);
+  EXPECT_EQ(estimate.fault, Fault::outside_training_range);
+  EXPECT_EQ(estimate.value, 4.0);
+  EXPECT_EQ(estimate.novelty, 9.0);
+}
+
+TEST(Estimator, TakesTheErrorBarFromTheResidualsOfTheNearestRegion) {
+  EstimatorSettings with_table = settings();
+  with_table.residuals = {.edges = {-5.0, 0.0, 5.0}, .std_dev = {1.0, 2.0}};
+  ScriptedEstimator estimator(with_table, Scripted({}));
+  EXPECT_EQ(step(estimator, -1.0).std_dev, 1.0);
+  EXPECT_EQ(step(estimator, -0.1).std_dev, 1.0);
+  EXPECT_EQ(step(estimator, 0.0).std_dev, 2.0);
+  EXPECT_EQ(step(estimator, 1.0).std_dev, 2.0);
+}
+
+TEST(Estimator, NeverTellsAnErrorBarOfZero) {
+  EstimatorSettings zeros = settings();
+  zeros.residuals = {.edges = {0.0, 1.0}, .std_dev = {0.0}};
+  zeros.fallback.residual_std = 0.0;
+  ScriptedEstimator sure(zeros, Scripted({.says = {.value = 1.0, .std_dev = 0.0}, .obeys = true}));
+  EXPECT_TRUE(std::isnan(step(sure, 0.5).std_dev));
+  ScriptedEstimator failing(zeros, Scripted({.says = {.value = kNaN}, .obeys = true}));
+  EXPECT_TRUE(std::isnan(step(failing, 0.5).std_dev));
+  ScriptedEstimator own = saying({.value = 1.0, .std_dev = 0.25});
+  EXPECT_EQ(step(own, 0.5).std_dev, 0.25) << "the model's own comes first";
+}
+
+TEST(Estimator, HoldsTheLastValueWhenTheFallbackOverflows) {
+  EstimatorSettings steep = settings();
+  steep.fallback.slope = {1e308};
+  ScriptedEstimator estimator(steep, Scripted({}));
+  step(estimator, 0.5);
+  const Estimate estimate = step(estimator, 1e10);
+  EXPECT_EQ(estimate.fault, Fault::outside_training_range);
+  EXPECT_EQ(estimate.value, 5.0);
+}
+
+RC_GTEST_PROP(Estimator, ItsValueIsFiniteForAnyBits, (const std::vector<std::uint64_t>& bits)) {
+  ScriptedEstimator estimator(settings("lowpass(rate(gear_angle_rad), 50Hz)"), Scripted({}));
+  for (const std::uint64_t pattern : bits)
+    RC_ASSERT(std::isfinite(step(estimator, std::bit_cast<double>(pattern)).value));
+}
+
+TEST(Estimator, RepeatsItsRunAfterReset) {
+  ScriptedEstimator estimator(settings("lowpass(gear_angle_rad, 20Hz)"), Scripted({}));
+  const auto run = [&] {
+    std::vector<double> values;
+    for (int i = 0; i < 300; ++i) {
+      const double raw = i % 70 == 69 ? kNaN : std::sin(0.05 * i);
+      values.push_back(step(estimator, raw).value);
+    }
+    return values;
+  };
+  const auto first = run();
+  estimator.reset();
+  EXPECT_EQ(run(), first);
+}
+
+TEST(Estimator, CopiesShareNoState) {
+  ScriptedEstimator one(settings("lag(gear_angle_rad, 1)"), Scripted({}));
+  step(one, 0.5);
+  ScriptedEstimator other = one;
+  step(one, 0.7);
+  EXPECT_EQ(step(one, 0.0).value, 7.0);
+  EXPECT_EQ(step(other, 0.0).value, 5.0);
+}
+
+TEST(Estimator, SubtractsAZero) {
+  ScriptedEstimator estimator(settings(), Scripted({}));
+  estimator.set_zero("gear_angle_rad", 0.2);
+  EXPECT_DOUBLE_EQ(step(estimator, 0.5).value, 3.0);
+  EXPECT_THROW(estimator.set_zero("gear_angle_rad", kNaN), UsageError);
+  EXPECT_THROW(estimator.set_zero("elbow_rad", 0.0), UsageError);
+}
+
+TEST(Estimator, RefusesSettingsThatDoNotFitTheModel) {
+  EXPECT_THAT(
+      refusal(settings(), 2),
+      HasSubstr("inputs: expected 2, as many as the model takes, found 1 (gear_angle_rad)"));
+  EstimatorSettings bad = settings();
+  bad.ranges.lowest = {};
+  EXPECT_THAT(refusal(bad), HasSubstr("guards.ranges.lowest: expected 1 values, found 0"));
+  bad = settings();
+  bad.fallback.slope = {1.0, 2.0};
+  EXPECT_THAT(refusal(bad), HasSubstr("fallback.slope: expected 1 values, found 2"));
+  bad = settings();
+  bad.target = "torque";
+  EXPECT_THAT(refusal(bad), HasSubstr("target: expected a channel name that ends in its unit"));
+  bad = settings();
+  bad.residuals = {.edges = {0.0, 1.0}, .std_dev = {1.0, 2.0}};
+  EXPECT_THAT(refusal(bad), HasSubstr("residuals.edges: expected 3 values, found 2"));
+}
+
+TEST(Estimator, RefusesGuardsThatWouldLetEverythingThrough) {
+  EstimatorSettings bad = settings();
+  bad.ranges.lowest = {kNaN};
+  EXPECT_THAT(refusal(bad),
+              HasSubstr("guards.ranges.lowest[0]: expected a finite number, found nan"));
+  bad = settings();
+  bad.ranges.highest = {kInfinity};
+  EXPECT_THAT(refusal(bad), HasSubstr("guards.ranges.highest[0]: expected a finite number"));
+  bad = settings();
+  bad.ranges = {.lowest = {-1e308}, .highest = {1e308}, .margin = 1.0};
+  EXPECT_THAT(refusal(bad), HasSubstr("guards.ranges with margin[0]: expected a finite number"));
+  bad = settings();
+  bad.ranges.margin = kNaN;
+  EXPECT_THAT(refusal(bad),
+              HasSubstr("guards.ranges.margin: expected a finite number, at least 0"));
+  bad = settings();
+  std::swap(bad.ranges.lowest, bad.ranges.highest);
+  EXPECT_THAT(refusal(bad),
+              HasSubstr("guards.ranges of gear_angle_rad: expected lowest <= highest"));
+}
+
+TEST(Estimator, RefusesNumbersThatAreNotFinite) {
+  EstimatorSettings bad = settings();
+  bad.fallback.slope = {kInfinity};
+  EXPECT_THAT(refusal(bad), HasSubstr("fallback.slope[0]: expected a finite number, found inf"));
+  bad = settings();
+  bad.fallback.residual_std = -1.0;
+  EXPECT_THAT(refusal(bad), HasSubstr("fallback.residual_std: expected a number, at least 0"));
+  bad = settings();
+  bad.residuals = {.edges = {0.0, 0.0}, .std_dev = {1.0}};
+  EXPECT_THAT(refusal(bad), HasSubstr("residuals.edges: expected ascending numbers"));
+  bad.residuals = {.edges = {0.0, 1.0}, .std_dev = {kInfinity}};
+  EXPECT_THAT(refusal(bad), HasSubstr("residuals.std_dev[0]: expected a number, at least 0"));
+  bad = settings();
+  bad.sample_rate_Hz = kNaN;
+  EXPECT_NE(refusal(bad), "");
+}
+
+}  // namespace
+}  // namespace torsio
