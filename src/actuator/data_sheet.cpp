@@ -165,7 +165,7 @@ std::vector<SheetRow> describe(const DataSheet& sheet) {
       {"bearing_break_away", "rad", sheet.bearing_break_away_rad},
       {"joint_viscous", "Nms/rad", sheet.joint_viscous_Nms_rad},
       {"encoder_bits", "", sheet.encoder_bits},
-      {"encoder_jitter", "LSB", sheet.encoder_jitter_LSB},
+      {"encoder_jitter", "LSB", sheet.encoder_jitter_lsb},
       {"current_noise", "A", sheet.current_noise_A},
       {"torque_sensor_range", "Nm", sheet.torque_range_Nm},
       {"torque_sensor_noise_share", "", sheet.torque_noise_share},
@@ -175,7 +175,7 @@ std::vector<SheetRow> describe(const DataSheet& sheet) {
 }
 
 const DataSheet& data_sheet(std::string_view name) {
-  const auto found = std::ranges::find(kSheets, name, &DataSheet::name);
+  const auto* const found = std::ranges::find(kSheets, name, &DataSheet::name);
   if (found != kSheets.end()) return *found;
   std::array<std::string_view, kSheets.size()> known;
   std::ranges::transform(kSheets, known.begin(), &DataSheet::name);

@@ -5,12 +5,16 @@
 #include "checks.hpp"
 
 namespace torsio {
+namespace {
+
+constexpr auto kPlace = "LuGre friction";
+
+}  // namespace
 
 LuGreFriction::LuGreFriction(const Parameters& parameters)
     : parameters_(parameters),
       inverse_stribeck_squared_(1.0 / (parameters.stribeck_rad_s * parameters.stribeck_rad_s)),
       inverse_bristle_(1.0 / parameters.bristle_rad) {
-  constexpr auto kPlace = "LuGre friction";
   require_not_negative(kPlace, "coulomb_Nm", parameters.coulomb_Nm);
   require_not_negative(kPlace, "load_factor", parameters.load_factor);
   require_not_negative(kPlace, "viscous_Nms_rad", parameters.viscous_Nms_rad);

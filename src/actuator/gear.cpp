@@ -6,17 +6,19 @@
 #include "checks.hpp"
 
 namespace torsio {
+namespace {
+
+constexpr auto kPlace = "gear";
+
+}  // namespace
 
 Gear::Gear(const Parameters& parameters)
     : parameters_(parameters),
       inverse_ratio_(1.0 / parameters.ratio),
-      in_phase_{},
-      quadrature_{},
       hysteresis_({.constant_Nm = parameters.hysteresis_Nm,
                    .load_factor = 0.0,
                    .share = {1.0},
                    .break_away_rad = {parameters.break_away_rad}}) {
-  constexpr auto kPlace = "gear";
   require_positive(kPlace, "ratio", parameters.ratio);
   require_positive(kPlace, "stiffness_Nm_rad", parameters.stiffness_Nm_rad);
   require_not_negative(kPlace, "damping_Nms_rad", parameters.damping_Nms_rad);

@@ -6,11 +6,15 @@
 #include "checks.hpp"
 
 namespace torsio {
+namespace {
+
+constexpr auto kPlace = "Maxwell-slip bank";
+
+}  // namespace
 
 template <std::size_t Count>
 MaxwellSlip<Count>::MaxwellSlip(const Parameters& parameters)
     : parameters_(parameters), total_limit_Nm_(parameters.constant_Nm) {
-  constexpr auto kPlace = "Maxwell-slip bank";
   require_not_negative(kPlace, "constant_Nm", parameters.constant_Nm);
   require_not_negative(kPlace, "load_factor", parameters.load_factor);
   for (std::size_t i = 0; i < Count; ++i) {

@@ -5,12 +5,16 @@
 #include "checks.hpp"
 
 namespace torsio {
+namespace {
+
+constexpr auto kPlace = "motor";
+
+}  // namespace
 
 Motor::Motor(const Parameters& parameters)
     : parameters_(parameters),
       inverse_resistance_(1.0 / parameters.resistance_Ohm),
       ripple_Nm_(parameters.ripple * parameters.torque_constant_Nm_A * parameters.peak_current_A) {
-  constexpr auto kPlace = "motor";
   require_positive(kPlace, "torque_constant_Nm_A", parameters.torque_constant_Nm_A);
   require_positive(kPlace, "peak_current_A", parameters.peak_current_A);
   require_positive(kPlace, "current_time_constant_s", parameters.current_time_constant_s);

@@ -9,10 +9,12 @@
 namespace torsio {
 namespace {
 
+constexpr auto kTorqueSensor = "torque sensor";
+
 /// How many ticks a time is. @throws Error if it is no whole number of them.
 std::size_t whole_ticks(double time_s, double tick_s, const std::string& what) {
   const double ticks = std::round(time_s / tick_s);
-  require(std::abs(ticks * tick_s - time_s) < 1e-6 * tick_s, "torque sensor",
+  require(std::abs(ticks * tick_s - time_s) < 1e-6 * tick_s, kTorqueSensor,
           what + " that is a whole number of loop ticks", time_s / tick_s);
   return static_cast<std::size_t>(ticks);
 }
@@ -22,11 +24,11 @@ std::size_t whole_ticks(double time_s, double tick_s, const std::string& what) {
 Encoder::Encoder(const Parameters& parameters, Random& random)
     : lsb_rad_(2.0 * std::numbers::pi / std::exp2(parameters.bits)),
       inverse_lsb_(1.0 / lsb_rad_),
-      jitter_LSB_(parameters.jitter_LSB),
+      jitter_lsb_(parameters.jitter_lsb),
       offset_rad_(random.uniform() * lsb_rad_) {
   require(parameters.bits >= 1.0 && parameters.bits <= 40.0, "encoder", "1..40 bits",
           parameters.bits);
-  require_not_negative("encoder", "jitter_LSB", parameters.jitter_LSB);
+  require_not_negative("encoder", "jitter_lsb", parameters.jitter_lsb);
 }
 
 CurrentSensor::CurrentSensor(const Parameters& parameters) : noise_A_(parameters.noise_A) {
@@ -34,15 +36,14 @@ CurrentSensor::CurrentSensor(const Parameters& parameters) : noise_A_(parameters
 }
 
 TorqueSensor::TorqueSensor(const Parameters& parameters, double tick_s)
-    : noise_Nm_(parameters.noise_Nm), ticks_per_sample_(1), latency_ticks_(0) {
-  constexpr auto kPlace = "torque sensor";
-  require_not_negative(kPlace, "noise_Nm", parameters.noise_Nm);
-  require_positive(kPlace, "sample_rate_Hz", parameters.sample_rate_Hz);
-  require_not_negative(kPlace, "latency_s", parameters.latency_s);
-  require_positive(kPlace, "tick_s", tick_s);
+    : noise_Nm_(parameters.noise_Nm) {
+  require_not_negative(kTorqueSensor, "noise_Nm", parameters.noise_Nm);
+  require_positive(kTorqueSensor, "sample_rate_Hz", parameters.sample_rate_Hz);
+  require_not_negative(kTorqueSensor, "latency_s", parameters.latency_s);
+  require_positive(kTorqueSensor, "tick_s", tick_s);
   ticks_per_sample_ = whole_ticks(1.0 / parameters.sample_rate_Hz, tick_s, "a sample period");
   latency_ticks_ = whole_ticks(parameters.latency_s, tick_s, "a latency");
-  require(ticks_per_sample_ > latency_ticks_, kPlace, "a latency below the sample period",
+  require(ticks_per_sample_ > latency_ticks_, kTorqueSensor, "a latency below the sample period",
           parameters.latency_s);
 }
 

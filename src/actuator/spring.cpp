@@ -23,16 +23,19 @@ Spring::Spring(const Parameters& parameters)
 void Spring::reset(double deflection_rad) noexcept {
   last_deflection_rad_ = deflection_rad;
   friction_Nm_ = 0.0;
-  std::visit([](auto& friction) { friction.reset(); }, friction_);
+  dispatch(friction_, [](auto& friction) {
+    friction.reset();
+    return 0.0;
+  });
 }
 
 double Spring::friction_energy() const noexcept {
-  return std::visit([](const auto& friction) { return friction.energy(); }, friction_);
+  return dispatch(friction_, [](const auto& friction) { return friction.energy(); });
 }
 
 double Spring::steepest(double load_Nm) const noexcept {
   return elastic_.steepest() +
-         std::visit([=](const auto& friction) { return friction.stiffness(load_Nm); }, friction_);
+         dispatch(friction_, [=](const auto& friction) { return friction.stiffness(load_Nm); });
 }
 
 }  // namespace torsio

@@ -19,6 +19,7 @@ constexpr double kMass_kg = 9.0;
 constexpr double kSweepSpeed_rad_s = rad_from_deg(10.0);
 constexpr double kSweepAcceleration_rad_s2 = rad_from_deg(30.0);
 constexpr double kCycle_Hz = 0.05;
+constexpr double kCycles = 3.0;
 
 BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
   const SweepProtocol protocol = sweep_protocol(sheet.name);
@@ -50,7 +51,6 @@ BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
-  constexpr double kCycles = 3.0;
   return {
       .start = {},
       .duration_s = kCycles / kCycle_Hz,
@@ -83,7 +83,7 @@ constexpr auto kInfos = [] {
 std::span<const ExperimentInfo> experiments() noexcept { return kInfos; }
 
 const ExperimentEntry& experiment_entry(std::string_view name) {
-  const auto found =
+  const auto* const found =
       std::ranges::find(kTable, name, [](const ExperimentEntry& entry) { return entry.info.name; });
   if (found != kTable.end()) return *found;
   std::array<std::string_view, kInfos.size()> known;

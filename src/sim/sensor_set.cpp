@@ -4,7 +4,7 @@ namespace torsio {
 namespace {
 
 Encoder::Parameters encoder_of(const DataSheet& sheet) {
-  return {.bits = sheet.encoder_bits.value, .jitter_LSB = sheet.encoder_jitter_LSB.value};
+  return {.bits = sheet.encoder_bits.value, .jitter_lsb = sheet.encoder_jitter_lsb.value};
 }
 
 }  // namespace

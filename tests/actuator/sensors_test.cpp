@@ -44,7 +44,7 @@ TEST(Encoder, TellsWholeCodesOnly) {
 
 TEST(Encoder, ErrorIsJitterPlusQuantisation) {
   Random random(3);
-  const Encoder encoder({.bits = 19.0, .jitter_LSB = 0.5}, random);
+  const Encoder encoder({.bits = 19.0, .jitter_lsb = 0.5}, random);
   std::vector<double> errors;
   for (int i = 0; i < 200000; ++i) {
     const double angle = 2.0 * random.uniform() - 1.0;

@@ -86,7 +86,7 @@ struct DataSheet {
 
   // Sensors
   SheetValue encoder_bits = printed(19.0);
-  SheetValue encoder_jitter_LSB = assumed(0.5);
+  SheetValue encoder_jitter_lsb = assumed(0.5);
   SheetValue current_noise_A = assumed(0.02);
   SheetValue torque_range_Nm;
   SheetValue torque_noise_share = assumed(0.0005 / 3.0);  ///< 0.05 % class read as three sigma

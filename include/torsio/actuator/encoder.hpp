@@ -15,7 +15,7 @@ class Encoder {
  public:
   struct Parameters {
     double bits = 19.0;
-    double jitter_LSB = 0.5;  ///< σ
+    double jitter_lsb = 0.5;  ///< σ
   };
 
   /// Draws o. @throws Error unless 1 ≤ bits ≤ 40 and the jitter is not negative.
@@ -24,7 +24,7 @@ class Encoder {
   /// @returns the angle [rad] as the encoder tells it
   [[nodiscard]] double read(double angle_rad, Random& random) const noexcept {
     const double code = (angle_rad + offset_rad_) * inverse_lsb_ + 0.5;
-    return std::floor(code + jitter_LSB_ * random.normal()) * lsb_rad_ - offset_rad_;
+    return std::floor(code + jitter_lsb_ * random.normal()) * lsb_rad_ - offset_rad_;
   }
   /// @returns the angle of one code [rad]
   [[nodiscard]] double resolution() const noexcept { return lsb_rad_; }
@@ -32,7 +32,7 @@ class Encoder {
  private:
   double lsb_rad_;
   double inverse_lsb_;
-  double jitter_LSB_;
+  double jitter_lsb_;
   double offset_rad_;
 };
 

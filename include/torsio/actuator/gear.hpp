@@ -87,8 +87,8 @@ class Gear {
  private:
   Parameters parameters_;
   double inverse_ratio_;
-  std::array<double, 2> in_phase_;    ///< A cos α
-  std::array<double, 2> quadrature_;  ///< A sin α
+  std::array<double, 2> in_phase_{};    ///< A cos α
+  std::array<double, 2> quadrature_{};  ///< A sin α
   MaxwellSlip<1> hysteresis_;
   double twist_rad_ = 0.0;
   double twist_rate_rad_s_ = 0.0;

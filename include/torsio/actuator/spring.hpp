@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <type_traits>
 #include <variant>
 
 #include "torsio/actuator/elastic_curve.hpp"
@@ -12,6 +14,16 @@ namespace torsio {
 /// has `Parameters`, `reset()`, `step(increment_rad, load_Nm)`, `energy()` and
 /// `stiffness(load_Nm)`.
 using SpringFriction = std::variant<MaxwellSlip<4>>;
+
+/// Calls `visit(alternative)`, which returns a number: a std::visit that cannot throw.
+template <std::size_t Index = 0, class Variant, class Visit>
+double dispatch(Variant& variant, const Visit& visit) noexcept {
+  if (auto* alternative = std::get_if<Index>(&variant)) return visit(*alternative);
+  if constexpr (Index + 1 < std::variant_size_v<std::remove_const_t<Variant>>) {
+    return dispatch<Index + 1>(variant, visit);
+  }
+  return 0.0;
+}
 
 /// A torsion spring: elastic curve, inner friction that grows with the load, and a little
 /// viscosity.
@@ -40,9 +52,8 @@ class Spring {
     const double elastic_Nm = elastic_.torque(deflection_rad);
     const double increment_rad = deflection_rad - last_deflection_rad_;
     last_deflection_rad_ = deflection_rad;
-    friction_Nm_ = std::visit(
-        [&](auto& friction) noexcept { return friction.step(increment_rad, elastic_Nm); },
-        friction_);
+    friction_Nm_ = dispatch(
+        friction_, [&](auto& friction) { return friction.step(increment_rad, elastic_Nm); });
     return elastic_Nm + friction_Nm_ + viscosity_Nms_rad_ * deflection_rate_rad_s;
   }
 

@@ -32,8 +32,8 @@ class TorqueSensor {
 
  private:
   double noise_Nm_;
-  std::size_t ticks_per_sample_;
-  std::size_t latency_ticks_;
+  std::size_t ticks_per_sample_ = 1;
+  std::size_t latency_ticks_ = 0;
   std::size_t phase_ = 0;  ///< ticks since the last sample was taken
   double sampled_Nm_ = 0.0;
   double held_Nm_ = 0.0;
