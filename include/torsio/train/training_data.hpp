@@ -29,10 +29,10 @@ struct Sequence {
 
 /// What every fitter is given.
 struct TrainingData {
-  std::vector<InputInfo> inputs;
+  std::vector<InputInfo> inputs = {};
   std::string target;
   double sample_rate_Hz = 0.0;
-  std::vector<Sequence> sequences;
+  std::vector<Sequence> sequences = {};
 
   [[nodiscard]] std::size_t input_count() const noexcept { return inputs.size(); }
   [[nodiscard]] std::size_t usable_samples() const noexcept;
