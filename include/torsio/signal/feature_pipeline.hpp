@@ -34,11 +34,16 @@ struct FeatureSpec {
 /// / ^`, parentheses and the functions `rate lowpass lag sign tanh abs sqrt exp min max`. Equal
 /// sub-expressions are evaluated once. `rate(x)` is the backward difference over one sample,
 /// `lowpass(x, f)` a second-order Butterworth filter re-discretised for the sample rate that starts
-/// in the steady state of its first input, `lag(x, n)` the value n samples ago.
+/// in the steady state of its first input, `lag(x, n)` the value n samples ago (before there is
+/// one, the oldest). docs/expressions.md has the whole language.
+///
+/// Finite raw values can still give a feature that is not finite (`x / y`). It stays in its tick: a
+/// low-pass passes it through without taking it into its state, a rate has forgotten it one sample
+/// later, a lag n samples later.
 class FeaturePipeline {
  public:
   /// @throws Error naming the expression and the column in it if one cannot be parsed, names
-  /// itself, or filters at or above half the sample rate.
+  /// itself, or filters at or above half the sample rate; UsageError if that rate is not positive.
   FeaturePipeline(FeatureSpec spec, double sample_rate_Hz);
   FeaturePipeline(const FeaturePipeline& other);
   FeaturePipeline(FeaturePipeline&&) noexcept;
@@ -54,14 +59,15 @@ class FeaturePipeline {
   [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept;
 
   /// Whether a feature says how fast something moves: it uses channels only inside `rate(...)` or
-  /// channels that are rates by their unit (`_rad_s`, `_m_s`).
+  /// channels (raw or defined) that are rates by their unit (`_rad_s`, `_m_s`).
   [[nodiscard]] bool is_rate(std::size_t feature) const noexcept;
 
   /// Subtracts `value` (SI) from a raw channel from now on; call while configuring. @throws
   /// UsageError for an unknown channel.
   void set_zero(std::string_view channel, double value);
 
-  /// Samples after `reset()` until every difference, lag and filter has settled (to 1 % of a step).
+  /// Samples after `reset()` until every difference, lag and filter has settled (to 1 % of a step):
+  /// the features of that step are the first that may be used. 0 if nothing has a memory.
   [[nodiscard]] std::size_t settling_samples() const noexcept;
 
   void reset() noexcept;

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "torsio/model/linear.hpp"
+#include "torsio/model/linear_coulomb.hpp"
+#include "torsio/model/model.hpp"
+#include "torsio/model/polynomial.hpp"
+
+namespace torsio {
+
+template <class... Family>
+struct FamilyList {
+  using Models = std::variant<Family...>;
+  using Parameters = std::variant<typename Family::Parameters...>;
+  template <class M>
+  static constexpr bool kHolds = (std::same_as<M, Family> || ...);
+};
+
+/// Every family that model files and the command line know: one line each.
+using KnownFamilies = FamilyList<Linear,         //
+                                 LinearCoulomb,  //
+                                 Polynomial>;
+
+/// A model that can run backwards: from the target to its first input. `invert` returns an
+/// `Estimate`, or a plain value where it never fails; it may need scratch space, so it is not
+/// const.
+template <class M>
+concept Invertible = requires(M& model, double target, Features features) {
+  Estimate{model.invert(target, features)};
+  requires noexcept(model.invert(target, features));
+};
+
+/// A model whose family is known only at run time. Dispatch is a switch: no virtual call, nothing
+/// allocated.
+class AnyModel {
+ public:
+  using Parameters = KnownFamilies::Parameters;
+
+  /// @throws Error if the family refuses its parameters.
+  explicit AnyModel(const Parameters& parameters);
+  template <class Family>
+    requires KnownFamilies::kHolds<Family>
+  AnyModel(Family model)
+      : model_(std::move(model)) {}  // NOLINT(google-explicit-constructor): a
+                                     // family is a model
+
+  /// As model files spell it: "linear".
+  [[nodiscard]] std::string_view family() const noexcept;
+  [[nodiscard]] Parameters parameters() const;
+  [[nodiscard]] std::size_t input_count() const noexcept;
+  [[nodiscard]] std::size_t parameter_count() const noexcept;
+
+  void reset() noexcept;
+  Estimate step(Features features) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] bool can_invert() const noexcept;
+  /// The first input at which the model says `target`, the others being as given; see the family's
+  /// own `invert`. Where `can_invert()` is false the given first input comes back with
+  /// `Fault::model_not_finite`.
+  [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
+
+  /// The model as its own family, or null.
+  template <class Family>
+    requires KnownFamilies::kHolds<Family>
+  [[nodiscard]] const Family* get_if() const noexcept {
+    return std::get_if<Family>(&model_);
+  }
+
+ private:
+  KnownFamilies::Models model_;
+};
+
+/// The family that a set of parameters belongs to.
+[[nodiscard]] std::string_view family_of(const AnyModel::Parameters& parameters) noexcept;
+
+/// Empty parameters of a family, to be filled by whoever reads them.
+/// @throws UsageError that lists the families if there is none of that name.
+[[nodiscard]] AnyModel::Parameters parameters_of_family(std::string_view family);
+
+/// "linear, linear_coulomb, ...": the families of `KnownFamilies`, for messages.
+[[nodiscard]] std::string known_model_families();
+
+}  // namespace torsio

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "torsio/core/realtime.hpp"
+#include "torsio/signal/lowpass.hpp"
+
+namespace torsio {
+
+/// The causal derivative of a sampled signal: the backward difference over one sample
+///
+///     y[n] = (x[n] - x[n-1]) * sample_rate
+///
+/// (it lags by half a sample), low-passed if a cut-off is given. The first output is 0, because
+/// nothing is known yet. An input that is not finite spoils two differences and is then forgotten.
+class Differentiator {
+ public:
+  /// @throws UsageError if the sample rate is not positive and finite, or as `Lowpass` does.
+  explicit Differentiator(double sample_rate_Hz, std::optional<double> cutoff_Hz = std::nullopt);
+
+  void reset() noexcept {
+    seen_ = 0;
+    if (lowpass_) lowpass_->reset();
+  }
+
+  double step(double input) noexcept TORSIO_REALTIME {
+    const double rate = seen_ > 0 ? (input - previous_) * sample_rate_Hz_ : 0.0;
+    previous_ = input;
+    if (seen_ < settling_samples_) ++seen_;
+    return lowpass_ ? lowpass_->step(rate) : rate;
+  }
+
+  /// Samples after `reset()` until the output is the derivative (to 1 % of a step of it): 2 without
+  /// low-pass.
+  [[nodiscard]] std::size_t settling_samples() const noexcept { return settling_samples_; }
+
+  /// Whether `settling_samples()` steps were made since `reset()`.
+  [[nodiscard]] bool is_settled() const noexcept { return seen_ == settling_samples_; }
+
+ private:
+  double sample_rate_Hz_;
+  std::optional<Lowpass> lowpass_;
+  std::size_t settling_samples_;
+  std::size_t seen_ = 0;
+  double previous_ = 0.0;
+};
+
+}  // namespace torsio

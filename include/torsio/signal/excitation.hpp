@@ -1,0 +1,155 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "torsio/core/random.hpp"
+#include "torsio/core/realtime.hpp"
+#include "torsio/signal/lowpass.hpp"
+
+// References that excite an actuator, one sample a `step()`. `reset()` begins again with the same
+// numbers. Amplitudes are in whatever unit the reference has (rad, Nm); the first sample is the
+// value at time 0. Every constructor throws `UsageError` for a parameter that is not finite or out
+// of its stated range, and for a frequency at or above half the sample rate.
+
+namespace torsio {
+
+/// The time of a streamed signal: counted, so that it does not drift.
+class SampleClock {
+ public:
+  explicit SampleClock(double sample_rate_Hz) : sample_rate_Hz_(sample_rate_Hz) {}
+  double next_s() noexcept { return static_cast<double>(sample_++) / sample_rate_Hz_; }
+  void reset() noexcept { sample_ = 0; }
+
+ private:
+  double sample_rate_Hz_;
+  std::uint64_t sample_ = 0;
+};
+
+/// A sine whose frequency rises (or falls) linearly from f0 to f1 over the duration T and then
+/// stays:
+///
+///     y(t) = A sin(2 pi (f0 t + (f1 - f0) t^2 / (2 T)))
+class Chirp {
+ public:
+  struct Parameters {
+    double amplitude = 1.0;
+    double start_Hz = 0.01;
+    double end_Hz = 0.3;
+    double duration_s = 100.0;
+  };
+  Chirp(const Parameters& parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept { clock_.reset(); }
+
+ private:
+  Parameters parameters_;
+  SampleClock clock_;
+};
+
+/// Straight lines between +A and -A, from 0 upwards.
+class Triangle {
+ public:
+  struct Parameters {
+    double amplitude = 1.0;
+    double frequency_Hz = 1.0;
+  };
+  Triangle(const Parameters& parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept { clock_.reset(); }
+
+ private:
+  Parameters parameters_;
+  SampleClock clock_;
+};
+
+/// A position that goes to and fro between +A and -A with a trapezoidal speed: from rest at 0 to
+/// +A, then between the ends, never faster than `speed` nor accelerated more than `acceleration`
+/// (a range too short for full speed is crossed without reaching it). SPEC 4.7, `sweep`.
+class TrapezoidSweep {
+ public:
+  struct Parameters {
+    double amplitude = 1.0;     ///< > 0
+    double speed = 1.0;         ///< amplitude's unit per s, > 0
+    double acceleration = 1.0;  ///< amplitude's unit per s^2, > 0
+  };
+  TrapezoidSweep(const Parameters& parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept { clock_.reset(); }
+
+ private:
+  /// A move from rest to rest.
+  struct Stroke {
+    Stroke(double distance, const Parameters& limits);
+    [[nodiscard]] double covered(double time_s) const noexcept;
+
+    double length;
+    double acceleration;
+    double speed;
+    double ramp_s;
+    double duration_s;
+  };
+  Stroke first_;  // from 0 to +A
+  Stroke next_;   // from end to end
+  SampleClock clock_;
+};
+
+/// A sum of sines with random phases: y(t) = sum_i A_i sin(2 pi f_i t + phi_i), phi_i uniform in
+/// [0, 2 pi) by the seed. SPEC 1, 002-24.
+class Multisine {
+ public:
+  struct Parameters {
+    std::vector<double> frequencies_Hz;
+    std::vector<double> amplitudes;  ///< one per frequency
+    std::uint64_t seed = 1;
+  };
+  Multisine(Parameters parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept { clock_.reset(); }
+
+ private:
+  Parameters parameters_;
+  std::vector<double> phases_;
+  SampleClock clock_;
+};
+
+/// White Gaussian steps through a Butterworth low-pass, scaled to a standard deviation of `rms` in
+/// the long run; starts at rest. SPEC 4.7.
+class RandomWalk {
+ public:
+  struct Parameters {
+    double rms = 1.0;        ///< >= 0
+    double cutoff_Hz = 1.0;  ///< as `Lowpass` takes it
+    std::uint64_t seed = 1;
+  };
+  RandomWalk(const Parameters& parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept;
+
+ private:
+  std::uint64_t seed_;
+  Lowpass lowpass_;
+  double step_std_;
+  Random random_;
+  double output_ = 0.0;
+};
+
+/// Each level for the hold time, one after the other, and again from the first.
+class Steps {
+ public:
+  struct Parameters {
+    std::vector<double> levels;  ///< at least one
+    double hold_s = 1.0;         ///< at least one sample
+  };
+  Steps(Parameters parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept { sample_ = 0; }
+
+ private:
+  std::vector<double> levels_;
+  std::uint64_t hold_samples_ = 1;
+  std::uint64_t sample_ = 0;
+};
+
+}  // namespace torsio

@@ -1,0 +1,103 @@
+#include "torsio/model/any_model.hpp"
+
+#include <array>
+#include <optional>
+#include <type_traits>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial>);
+static_assert(Invertible<AnyModel>);
+
+template <class... Family>
+constexpr auto family_names(std::type_identity<std::variant<Family...>>) {
+  return std::array<std::string_view, sizeof...(Family)>{Family::kFamily...};
+}
+
+template <class... Family>
+std::optional<AnyModel::Parameters> empty_parameters(std::string_view family,
+                                                     std::type_identity<std::variant<Family...>>) {
+  std::optional<AnyModel::Parameters> found;
+  ((family == Family::kFamily ? void(found = typename Family::Parameters{}) : void()), ...);
+  return found;
+}
+
+constexpr std::type_identity<KnownFamilies::Models> kModels;
+constexpr auto kNames = family_names(kModels);
+
+template <class... Family>
+KnownFamilies::Models construct(const AnyModel::Parameters& parameters,
+                                std::type_identity<std::variant<Family...>>) {
+  std::optional<KnownFamilies::Models> model;
+  const auto take = [&]<class F>(std::type_identity<F>) {
+    if (const auto* own = std::get_if<typename F::Parameters>(&parameters)) model.emplace(F(*own));
+  };
+  (take(std::type_identity<Family>{}), ...);
+  return *std::move(model);
+}
+
+}  // namespace
+
+AnyModel::AnyModel(const Parameters& parameters) : model_(construct(parameters, kModels)) {}
+
+std::string_view AnyModel::family() const noexcept { return kNames[model_.index()]; }
+
+AnyModel::Parameters AnyModel::parameters() const {
+  return std::visit([](const auto& model) -> Parameters { return model.parameters(); }, model_);
+}
+
+std::size_t AnyModel::input_count() const noexcept {
+  return std::visit([](const auto& model) { return model.input_count(); }, model_);
+}
+
+std::size_t AnyModel::parameter_count() const noexcept {
+  return std::visit([](const auto& model) { return model.parameter_count(); }, model_);
+}
+
+void AnyModel::reset() noexcept {
+  std::visit([](auto& model) { model.reset(); }, model_);
+}
+
+Estimate AnyModel::step(Features features) noexcept {
+  return std::visit([&](auto& model) { return model.step(features); }, model_);
+}
+
+bool AnyModel::can_invert() const noexcept {
+  return std::visit([]<class M>(const M&) { return Invertible<M>; }, model_);
+}
+
+Estimate AnyModel::invert(double target, Features features) noexcept {
+  return std::visit(
+      [&]<class M>(M& model) -> Estimate {
+        if constexpr (Invertible<M>) {
+          return Estimate{model.invert(target, features)};
+        } else {
+          return {.value = features[0], .fault = Fault::model_not_finite};
+        }
+      },
+      model_);
+}
+
+std::string_view family_of(const AnyModel::Parameters& parameters) noexcept {
+  return kNames[parameters.index()];
+}
+
+AnyModel::Parameters parameters_of_family(std::string_view family) {
+  if (auto found = empty_parameters(family, kModels)) return *std::move(found);
+  throw UsageError({.problem = "no model family is called \"" + std::string(family) + '"',
+                    .expected = "one of " + known_model_families()});
+}
+
+std::string known_model_families() {
+  std::string list;
+  for (const std::string_view family : kNames) {
+    if (!list.empty()) list += ", ";
+    list += family;
+  }
+  return list;
+}
+
+}  // namespace torsio

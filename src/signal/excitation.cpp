@@ -1,0 +1,170 @@
+#include "torsio/signal/excitation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+#include <utility>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kMostHoldSamples = 1e15;  // still counted exactly
+
+void require(bool is_right, std::string_view signal, std::string_view parameter,
+             std::string expected, double found) {
+  if (is_right && std::isfinite(found)) return;
+  throw UsageError({.place = fmt::format("{}: {}", signal, parameter),
+                    .expected = std::move(expected),
+                    .found = fmt::format("{}", found)});
+}
+
+void require_finite(std::string_view signal, std::string_view parameter, double value) {
+  require(true, signal, parameter, "a finite number", value);
+}
+
+void require_positive(std::string_view signal, std::string_view parameter, double value) {
+  require(value > 0.0, signal, parameter, "a positive number", value);
+}
+
+void require_frequency(std::string_view signal, double frequency_Hz, double sample_rate_Hz) {
+  require_positive(signal, "sample rate", sample_rate_Hz);
+  require(frequency_Hz >= 0.0 && frequency_Hz < 0.5 * sample_rate_Hz, signal, "frequency",
+          fmt::format("at least 0 and below {} Hz, half the sample rate", 0.5 * sample_rate_Hz),
+          frequency_Hz);
+}
+
+}  // namespace
+
+Chirp::Chirp(const Parameters& parameters, double sample_rate_Hz)
+    : parameters_(parameters), clock_(sample_rate_Hz) {
+  require_finite("chirp", "amplitude", parameters.amplitude);
+  require_frequency("chirp", parameters.start_Hz, sample_rate_Hz);
+  require_frequency("chirp", parameters.end_Hz, sample_rate_Hz);
+  require_positive("chirp", "duration", parameters.duration_s);
+}
+
+double Chirp::step() noexcept {
+  const auto& [amplitude, start_Hz, end_Hz, duration_s] = parameters_;
+  const double time_s = clock_.next_s();
+  const double swept_s = std::min(time_s, duration_s);
+  const double turns = swept_s * (start_Hz + 0.5 * (end_Hz - start_Hz) * swept_s / duration_s) +
+                       end_Hz * (time_s - swept_s);
+  return amplitude * std::sin(kTurn * turns);
+}
+
+Triangle::Triangle(const Parameters& parameters, double sample_rate_Hz)
+    : parameters_(parameters), clock_(sample_rate_Hz) {
+  require_finite("triangle", "amplitude", parameters.amplitude);
+  require_frequency("triangle", parameters.frequency_Hz, sample_rate_Hz);
+}
+
+double Triangle::step() noexcept {
+  const double turns = clock_.next_s() * parameters_.frequency_Hz;
+  // The signal starts a quarter of a turn behind its lowest point.
+  const double from_lowest = turns + 0.25 - std::floor(turns + 0.25);
+  return parameters_.amplitude * (1.0 - std::abs(4.0 * from_lowest - 2.0));
+}
+
+TrapezoidSweep::Stroke::Stroke(double distance, const Parameters& limits)
+    : length(distance),
+      acceleration(limits.acceleration),
+      speed(std::min(limits.speed, std::sqrt(distance * acceleration))),
+      ramp_s(speed / acceleration),
+      duration_s(distance / speed + ramp_s) {}
+
+double TrapezoidSweep::Stroke::covered(double time_s) const noexcept {
+  if (time_s < ramp_s) return 0.5 * acceleration * time_s * time_s;
+  const double left_s = duration_s - time_s;
+  if (left_s < ramp_s) return length - 0.5 * acceleration * left_s * left_s;
+  return speed * (time_s - 0.5 * ramp_s);
+}
+
+TrapezoidSweep::TrapezoidSweep(const Parameters& parameters, double sample_rate_Hz)
+    : first_(parameters.amplitude, parameters),
+      next_(2.0 * parameters.amplitude, parameters),
+      clock_(sample_rate_Hz) {
+  require_positive("trapezoid sweep", "sample rate", sample_rate_Hz);
+  require_positive("trapezoid sweep", "amplitude", parameters.amplitude);
+  require_positive("trapezoid sweep", "speed", parameters.speed);
+  require_positive("trapezoid sweep", "acceleration", parameters.acceleration);
+}
+
+double TrapezoidSweep::step() noexcept {
+  const double time_s = clock_.next_s();
+  if (time_s < first_.duration_s) return first_.covered(time_s);
+  const double strokes = (time_s - first_.duration_s) / next_.duration_s;
+  const double done = std::floor(strokes);
+  const double from_middle = next_.covered((strokes - done) * next_.duration_s) - first_.length;
+  return std::fmod(done, 2.0) == 0.0 ? -from_middle : from_middle;
+}
+
+Multisine::Multisine(Parameters parameters, double sample_rate_Hz)
+    : parameters_(std::move(parameters)), clock_(sample_rate_Hz) {
+  const auto& [frequencies_Hz, amplitudes, seed] = parameters_;
+  if (frequencies_Hz.empty() || frequencies_Hz.size() != amplitudes.size())
+    throw UsageError({.place = "multisine",
+                      .expected = "at least one frequency, and as many amplitudes",
+                      .found = fmt::format("{} frequencies, {} amplitudes", frequencies_Hz.size(),
+                                           amplitudes.size())});
+  for (const double frequency_Hz : frequencies_Hz)
+    require_frequency("multisine", frequency_Hz, sample_rate_Hz);
+  for (const double amplitude : amplitudes) require_finite("multisine", "amplitude", amplitude);
+  Random random(seed);
+  for (std::size_t i = 0; i < frequencies_Hz.size(); ++i)
+    phases_.push_back(kTurn * random.uniform());
+}
+
+double Multisine::step() noexcept {
+  const double time_s = clock_.next_s();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < phases_.size(); ++i)
+    sum += parameters_.amplitudes[i] *
+           std::sin(kTurn * parameters_.frequencies_Hz[i] * time_s + phases_[i]);
+  return sum;
+}
+
+RandomWalk::RandomWalk(const Parameters& parameters, double sample_rate_Hz)
+    : seed_(parameters.seed),
+      lowpass_(parameters.cutoff_Hz, sample_rate_Hz),
+      step_std_(parameters.rms / lowpass_.noise_gain()),
+      random_(parameters.seed) {
+  require(parameters.rms >= 0.0, "random walk", "rms", "at least 0", parameters.rms);
+  reset();
+}
+
+double RandomWalk::step() noexcept {
+  const double output = output_;
+  output_ = lowpass_.step(step_std_ * random_.normal());
+  return output;
+}
+
+void RandomWalk::reset() noexcept {
+  random_ = Random(seed_);
+  lowpass_.reset();
+  output_ = lowpass_.step(0.0);  // at rest, instead of in the steady state of the first white step
+}
+
+Steps::Steps(Parameters parameters, double sample_rate_Hz) : levels_(std::move(parameters.levels)) {
+  require_positive("steps", "sample rate", sample_rate_Hz);
+  if (levels_.empty())
+    throw UsageError({.place = "steps", .expected = "at least one level", .found = "none"});
+  for (const double level : levels_) require_finite("steps", "level", level);
+  const double hold_samples = std::round(parameters.hold_s * sample_rate_Hz);
+  require(
+      hold_samples >= 1.0 && hold_samples < kMostHoldSamples, "steps", "hold time",
+      fmt::format("from one sample ({} s) to {} samples", 1.0 / sample_rate_Hz, kMostHoldSamples),
+      parameters.hold_s);
+  hold_samples_ = static_cast<std::uint64_t>(hold_samples);
+}
+
+double Steps::step() noexcept {
+  return levels_[static_cast<std::size_t>((sample_++ / hold_samples_) % levels_.size())];
+}
+
+}  // namespace torsio

@@ -1,0 +1,288 @@
+#include "torsio/signal/feature_pipeline.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "signal/expression_graph.hpp"
+#include "signal/expression_parser.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/signal/differentiator.hpp"
+#include "torsio/signal/lowpass.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kMostLagMemory = 1'000'000;  // samples, all lags of a pipeline together
+
+/// The value `samples` ticks ago; before there is one, the first.
+class DelayLine {
+ public:
+  explicit DelayLine(std::size_t samples) : past_(samples) {}
+
+  void reset() noexcept {
+    oldest_ = 0;
+    is_full_ = false;
+  }
+
+  double step(double input) noexcept {
+    const bool is_first = !is_full_ && oldest_ == 0;
+    const double output = is_full_ ? past_[oldest_] : (is_first ? input : past_[0]);
+    past_[oldest_] = input;
+    if (++oldest_ == past_.size()) {
+      oldest_ = 0;
+      is_full_ = true;
+    }
+    return output;
+  }
+
+ private:
+  std::vector<double> past_;  // a ring
+  std::size_t oldest_ = 0;
+  bool is_full_ = false;
+};
+
+struct Instruction {
+  Operation operation;
+  std::uint32_t target;  ///< index into the values; the operands' likewise
+  std::uint32_t left;
+  std::uint32_t right;
+  std::uint32_t state;  ///< index among the differentiators, low-passes or lags
+};
+
+bool has_operands(const Node& node) {
+  return node.operation != Operation::channel && node.operation != Operation::constant;
+}
+
+void check_sample_rate(double sample_rate_Hz) {
+  if (!(sample_rate_Hz > 0.0) || !std::isfinite(sample_rate_Hz))
+    throw UsageError({.place = "feature pipeline",
+                      .expected = "a positive sample rate",
+                      .found = fmt::format("{} Hz", sample_rate_Hz)});
+}
+
+}  // namespace
+
+// The graph as straight code over one array of values: channels and constants have their places in
+// it, each instruction writes one.
+struct FeaturePipeline::Program {
+  Program(FeatureSpec feature_spec, double rate_Hz);
+  void compile(const ExpressionGraph& graph, const std::vector<std::uint32_t>& input_nodes);
+  /// @returns by how many samples the operation settles later than its operands.
+  std::size_t add(const Node& node, std::uint32_t target);
+  [[nodiscard]] double run(const Instruction& instruction) noexcept TORSIO_REALTIME;
+
+  FeatureSpec spec;
+  double sample_rate_Hz;
+  std::vector<std::string> raw_inputs;
+  std::vector<double> zeros;
+  std::vector<std::uint32_t> raw_targets;
+  std::vector<double> values;
+  std::vector<Instruction> instructions;
+  std::vector<Differentiator> differentiators;
+  std::vector<Lowpass> lowpasses;
+  std::vector<DelayLine> delay_lines;
+  std::size_t lag_memory = 0;
+  std::vector<std::uint32_t> feature_sources;
+  std::vector<double> features;
+  std::vector<bool> is_rate;
+  std::size_t settling_samples = 0;
+  std::size_t seen = 0;
+};
+
+FeaturePipeline::Program::Program(FeatureSpec feature_spec, double rate_Hz)
+    : spec(std::move(feature_spec)), sample_rate_Hz(rate_Hz) {
+  check_sample_rate(rate_Hz);
+  ExpressionGraph graph;
+  ExpressionParser parser(graph, spec.definitions, rate_Hz);
+  std::vector<std::uint32_t> input_nodes;
+  for (const std::string& input : spec.inputs) input_nodes.push_back(parser.parse(input, "input"));
+  parser.check_unused_definitions();
+  compile(graph, input_nodes);
+}
+
+void FeaturePipeline::Program::compile(const ExpressionGraph& graph,
+                                       const std::vector<std::uint32_t>& input_nodes) {
+  const std::vector<Node>& nodes = graph.nodes();
+  std::vector<bool> is_needed(nodes.size(), false);
+  for (const std::uint32_t node : input_nodes) is_needed[node] = true;
+  for (std::size_t i = nodes.size(); i-- > 0;) {
+    if (!is_needed[i] || !has_operands(nodes[i])) continue;
+    is_needed[nodes[i].left] = true;
+    is_needed[nodes[i].right] = true;
+  }
+
+  values.resize(nodes.size());
+  std::vector<std::size_t> unsettled(nodes.size(), 0);  // leading samples that are not settled
+  for (std::uint32_t i = 0; i < nodes.size(); ++i) {
+    if (!is_needed[i]) continue;
+    const Node& node = nodes[i];
+    if (node.operation == Operation::constant) {
+      values[i] = node.parameter;
+    } else if (node.operation == Operation::channel) {
+      raw_inputs.push_back(graph.channels()[node.left]);
+      raw_targets.push_back(i);
+    } else {
+      unsettled[i] = std::max(unsettled[node.left], unsettled[node.right]) + add(node, i);
+    }
+  }
+  zeros.resize(raw_inputs.size());
+
+  const std::vector<Motion> motions = graph.motions();
+  std::size_t longest = 0;
+  for (const std::uint32_t node : input_nodes) {
+    is_rate.push_back(motions[node] == Motion::rate);
+    longest = std::max(longest, unsettled[node]);
+  }
+  settling_samples = longest == 0 ? 0 : longest + 1;
+  feature_sources = input_nodes;
+  features.resize(input_nodes.size());
+}
+
+std::size_t FeaturePipeline::Program::add(const Node& node, std::uint32_t target) {
+  std::size_t state = 0;
+  std::size_t delay = 0;
+  switch (node.operation) {
+    case Operation::rate:
+      state = differentiators.size();
+      differentiators.emplace_back(sample_rate_Hz);
+      delay = differentiators.back().settling_samples() - 1;
+      break;
+    case Operation::lowpass:
+      state = lowpasses.size();
+      lowpasses.emplace_back(node.parameter, sample_rate_Hz);
+      delay = lowpasses.back().settling_samples() - 1;
+      break;
+    case Operation::lag:
+      state = delay_lines.size();
+      delay = static_cast<std::size_t>(node.parameter);
+      lag_memory += delay;
+      if (lag_memory > kMostLagMemory)
+        throw Error({.place = "feature pipeline",
+                     .expected = fmt::format("lags of at most {} samples together", kMostLagMemory),
+                     .found = "more"});
+      delay_lines.emplace_back(delay);
+      break;
+    default: break;
+  }
+  instructions.push_back(
+      {node.operation, target, node.left, node.right, static_cast<std::uint32_t>(state)});
+  return delay;
+}
+
+double FeaturePipeline::Program::run(const Instruction& instruction) noexcept {
+  const double left = values[instruction.left];
+  switch (instruction.operation) {
+    case Operation::rate: return differentiators[instruction.state].step(left);
+    case Operation::lowpass: return lowpasses[instruction.state].step(left);
+    case Operation::lag: return delay_lines[instruction.state].step(left);
+    default: return computed(instruction.operation, left, values[instruction.right]);
+  }
+}
+
+FeaturePipeline::FeaturePipeline(FeatureSpec spec, double sample_rate_Hz)
+    : program_(std::make_unique<Program>(std::move(spec), sample_rate_Hz)) {}
+
+FeaturePipeline::FeaturePipeline(const FeaturePipeline& other)
+    : program_(std::make_unique<Program>(*other.program_)) {}
+
+FeaturePipeline::FeaturePipeline(FeaturePipeline&&) noexcept = default;
+
+FeaturePipeline& FeaturePipeline::operator=(FeaturePipeline other) noexcept {
+  program_.swap(other.program_);
+  return *this;
+}
+
+FeaturePipeline::~FeaturePipeline() = default;
+
+const FeatureSpec& FeaturePipeline::spec() const noexcept { return program_->spec; }
+
+double FeaturePipeline::sample_rate_Hz() const noexcept { return program_->sample_rate_Hz; }
+
+std::size_t FeaturePipeline::feature_count() const noexcept { return program_->features.size(); }
+
+const std::vector<std::string>& FeaturePipeline::raw_inputs() const noexcept {
+  return program_->raw_inputs;
+}
+
+bool FeaturePipeline::is_rate(std::size_t feature) const noexcept {
+  return program_->is_rate[feature];
+}
+
+void FeaturePipeline::set_zero(std::string_view channel, double value) {
+  const std::vector<std::string>& names = program_->raw_inputs;
+  const auto found = std::find(names.begin(), names.end(), channel);
+  if (found == names.end())
+    throw UsageError({.place = "set_zero",
+                      .expected = fmt::format("one of {}", fmt::join(names, ", ")),
+                      .found = fmt::format("'{}'", channel)});
+  if (!std::isfinite(value))
+    throw UsageError({.place = fmt::format("set_zero of {}", channel),
+                      .expected = "a finite value",
+                      .found = fmt::format("{}", value)});
+  program_->zeros[static_cast<std::size_t>(found - names.begin())] = value;
+}
+
+std::size_t FeaturePipeline::settling_samples() const noexcept {
+  return program_->settling_samples;
+}
+
+void FeaturePipeline::reset() noexcept {
+  for (Differentiator& differentiator : program_->differentiators) differentiator.reset();
+  for (Lowpass& lowpass : program_->lowpasses) lowpass.reset();
+  for (DelayLine& line : program_->delay_lines) line.reset();
+  program_->seen = 0;
+}
+
+std::span<const double> FeaturePipeline::step(std::span<const double> raw) noexcept {
+  Program& program = *program_;
+  for (std::size_t i = 0; i < program.raw_targets.size(); ++i)
+    program.values[program.raw_targets[i]] = raw[i] - program.zeros[i];
+  for (const Instruction& instruction : program.instructions)
+    program.values[instruction.target] = program.run(instruction);
+  for (std::size_t i = 0; i < program.features.size(); ++i)
+    program.features[i] = program.values[program.feature_sources[i]];
+  if (program.seen < program.settling_samples) ++program.seen;
+  return program.features;
+}
+
+bool FeaturePipeline::is_settled() const noexcept {
+  return program_->seen == program_->settling_samples;
+}
+
+std::vector<std::string> channels_of(std::string_view expression) {
+  ExpressionGraph graph;
+  ExpressionParser(graph, {}, std::nullopt).parse(expression, "expression");
+  return graph.channels();
+}
+
+std::vector<std::string> split_inputs(std::string_view list) {
+  constexpr std::string_view kBlank = " \t\r\n";
+  std::vector<std::string> inputs;
+  if (list.find_first_not_of(kBlank) == std::string_view::npos) return inputs;
+  const auto add_trimmed = [&](std::string_view part) {
+    const std::size_t first = part.find_first_not_of(kBlank);
+    if (first == std::string_view::npos)
+      inputs.emplace_back();
+    else
+      inputs.emplace_back(part.substr(first, part.find_last_not_of(kBlank) - first + 1));
+  };
+  std::size_t start = 0;
+  std::ptrdiff_t depth = 0;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (list[i] == '(') ++depth;
+    if (list[i] == ')') --depth;
+    if (list[i] != ',' || depth > 0) continue;
+    add_trimmed(list.substr(start, i - start));
+    start = i + 1;
+  }
+  add_trimmed(list.substr(start));
+  return inputs;
+}
+
+}  // namespace torsio

@@ -1,0 +1,152 @@
+#include "torsio/signal/lowpass.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "torsio/core/error.hpp"
+#include "torsio/core/random.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// The response to one 1 after a 0 (which starts the filter at rest).
+std::vector<double> impulse_response(Lowpass filter, std::size_t count) {
+  (void)filter.step(0.0);
+  std::vector<double> response{filter.step(1.0)};
+  while (response.size() < count) response.push_back(filter.step(0.0));
+  return response;
+}
+
+double gain(const std::vector<double>& impulse_response, double frequency_Hz,
+            double sample_rate_Hz) {
+  std::complex<double> sum = 0.0;
+  for (std::size_t n = 0; n < impulse_response.size(); ++n)
+    sum += std::polar(impulse_response[n], -2.0 * std::numbers::pi * frequency_Hz *
+                                               static_cast<double>(n) / sample_rate_Hz);
+  return std::abs(sum);
+}
+
+struct Reference {
+  double cutoff_Hz;
+  double sample_rate_Hz;
+  std::array<double, 3> frequencies_Hz;
+  std::array<double, 3> gains;
+  double b0;  // first coefficient of the numerator
+};
+
+// scipy 1.10.1: b, a = signal.butter(2, cutoff, fs=rate); abs(signal.freqz(b, a, worN=[cutoff / 2,
+// cutoff, (cutoff + rate / 2) / 2], fs=rate)[1])
+constexpr auto kReferences = std::to_array<Reference>({
+    {10.0,
+     1000.0,
+     {5.0, 10.0, 255.0},
+     {0.9701706571168695, 0.7071067811865451, 0.0009274560999258706},
+     0.0009446918438401507},
+    {10.0,
+     125.0,
+     {5.0, 10.0, 36.25},
+     {0.9719257468948765, 0.7071067811865472, 0.0396337978804377},
+     0.046131802093312906},
+    {45.0,
+     100.0,
+     {22.5, 45.0, 47.5},
+     {0.99983261882416, 0.7071067811865478, 0.23971354445309212},
+     0.8005924034645703},
+    {0.5,
+     2000.0,
+     {0.25, 0.5, 500.25},
+     {0.9701425177450052, 0.707106781186489, 6.158823427039127e-07},
+     6.161657604287632e-07},
+});
+
+TEST(Butterworth, HasTheFrequencyResponseOfScipyAtEveryRate) {
+  for (const Reference& reference : kReferences) {
+    SCOPED_TRACE(reference.sample_rate_Hz);
+    const std::vector<double> response =
+        impulse_response(Lowpass(reference.cutoff_Hz, reference.sample_rate_Hz), 40'000);
+    EXPECT_NEAR(response[0], reference.b0, 1e-12);
+    for (std::size_t i = 0; i < reference.gains.size(); ++i)
+      EXPECT_NEAR(gain(response, reference.frequencies_Hz[i], reference.sample_rate_Hz),
+                  reference.gains[i], 1e-10);
+  }
+}
+
+TEST(Butterworth, StartsInTheSteadyStateOfItsFirstInput) {
+  Lowpass filter(10.0, 1000.0);
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(filter.step(-3.7), -3.7);
+  filter.reset();
+  EXPECT_EQ(filter.step(0.1), 0.1);
+}
+
+TEST(Butterworth, SettlesToOnePercentOfAStepInTheSamplesItSays) {
+  for (const double cutoff_Hz : {0.02, 1.0, 10.0, 120.0, 250.0, 400.0, 499.0}) {
+    SCOPED_TRACE(cutoff_Hz);
+    Lowpass filter(cutoff_Hz, 1000.0);
+    const std::size_t promised = filter.settling_samples();
+    (void)filter.step(0.0);
+    std::size_t needed = 0;
+    for (std::size_t n = 1; n < 4 * promised + 10; ++n)
+      if (std::abs(filter.step(1.0) - 1.0) > 0.01) needed = n + 1;
+    EXPECT_LE(needed, promised);
+    if (cutoff_Hz < 100.0) {
+      EXPECT_GE(static_cast<double>(needed), 0.9 * static_cast<double>(promised));
+    }
+  }
+}
+
+TEST(Butterworth, KnowsItsGainForWhiteNoise) {
+  for (const double cutoff_Hz : {0.5, 10.0, 120.0, 400.0}) {
+    SCOPED_TRACE(cutoff_Hz);
+    const Lowpass filter(cutoff_Hz, 1000.0);
+    double energy = 0.0;
+    for (const double value : impulse_response(filter, 20'000)) energy += value * value;
+    EXPECT_NEAR(filter.noise_gain(), std::sqrt(energy), 1e-9);
+  }
+}
+
+TEST(Butterworth, IgnoresSamplesThatAreNotFinite) {
+  Lowpass disturbed(10.0, 1000.0);
+  Lowpass quiet(10.0, 1000.0);
+  Random random(3);
+  EXPECT_TRUE(std::isnan(disturbed.step(kNan)));
+  for (int i = 0; i < 200; ++i) {
+    const double input = random.normal();
+    EXPECT_EQ(disturbed.step(input), quiet.step(input));
+    if (i % 50 == 0) {
+      EXPECT_TRUE(std::isnan(disturbed.step(kNan)));
+    }
+    if (i % 60 == 0) {
+      EXPECT_TRUE(std::isinf(disturbed.step(std::numeric_limits<double>::infinity())));
+    }
+  }
+}
+
+TEST(Butterworth, RecoversFromInputsThatOverflowIt) {
+  Lowpass filter(400.0, 1000.0);
+  constexpr double kHuge = std::numeric_limits<double>::max();
+  for (int i = 0; i < 20; ++i) (void)filter.step(i % 2 == 0 ? kHuge : -kHuge);
+  double last = 0.0;
+  for (int i = 0; i < 5000; ++i) last = filter.step(1.0);
+  EXPECT_NEAR(last, 1.0, 1e-9);
+}
+
+TEST(Butterworth, RefusesCutOffsThatTheRateCannotCarry) {
+  EXPECT_THROW(Lowpass(500.0, 1000.0), UsageError);
+  EXPECT_THROW(Lowpass(0.0, 1000.0), UsageError);
+  EXPECT_THROW(Lowpass(-1.0, 1000.0), UsageError);
+  EXPECT_THROW(Lowpass(kNan, 1000.0), UsageError);
+  EXPECT_THROW(Lowpass(1.0, 0.0), UsageError);
+  EXPECT_THROW(Lowpass(1.0, kNan), UsageError);
+  EXPECT_NO_THROW(Lowpass(499.9, 1000.0));
+}
+
+}  // namespace
+}  // namespace torsio

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "torsio/core/matrix.hpp"
+#include "torsio/model/any_model.hpp"
+#include "torsio/model/linear.hpp"
+#include "torsio/model/linear_coulomb.hpp"
+#include "torsio/model/polynomial.hpp"
+
+namespace torsio::test {
+
+/// A small model of each family, of two inputs (a deflection of +-0.1 rad and its rate, as
+/// `example_features` makes them). A new family specialises this once, for the laws and for every
+/// test that needs "some model".
+template <class Family>
+Family example();
+
+template <>
+inline Linear example<Linear>() {
+  Linear::Parameters parameters;
+  parameters.coefficients.values = Matrix(1, 3);
+  parameters.coefficients.values.values = {0.5, 600.0, 0.25};
+  return Linear(parameters);
+}
+
+/// Its coefficients are scheduled over the second input.
+template <>
+inline LinearCoulomb example<LinearCoulomb>() {
+  LinearCoulomb::Parameters parameters;
+  parameters.rate_feature = 1;
+  parameters.rate_scale = 0.05;
+  parameters.coefficients = {.scheduled = true, .feature = 1, .knots = {-0.2, 0.0, 0.3}};
+  parameters.coefficients.values = Matrix(3, 4);
+  parameters.coefficients.values.values = {0.5, 600.0, 0.0, 1.5,  //
+                                           0.4, 620.0, 0.0, 1.2,  //
+                                           0.3, 700.0, 0.0, 1.4};
+  return LinearCoulomb(parameters);
+}
+
+/// One curve for each direction.
+template <>
+inline Polynomial example<Polynomial>() {
+  Polynomial::Parameters parameters;
+  parameters.degree = 3;
+  parameters.by_direction = true;
+  parameters.dead_band = 0.002;
+  parameters.half_range = 0.1;
+  parameters.coefficients.values = Matrix(1, 10);
+  parameters.coefficients.values.values = {1.2,  50.0, -1.0, 12.0,  //
+                                           -1.1, 52.0, 0.5,  10.0,  //
+                                           0.0,  0.4};
+  return Polynomial(parameters);
+}
+
+template <>
+inline AnyModel example<AnyModel>() {
+  return example<Polynomial>();
+}
+
+/// Features for `inputs` inputs: slow oscillations with reversals, the first +-0.1, the second
+/// +-0.4, all of them finite and the same at every call.
+inline Matrix example_features(std::size_t samples, std::size_t inputs) {
+  Matrix features(samples, inputs);
+  for (std::size_t n = 0; n < samples; ++n) {
+    const double phase = 0.04 * static_cast<double>(n);
+    for (std::size_t j = 0; j < inputs; ++j) {
+      const auto order = static_cast<double>(j);
+      features(n, j) = (0.1 + 0.3 * order) * std::sin(phase * (1.0 + 0.37 * order) + 1.3 * order);
+    }
+  }
+  return features;
+}
+
+}  // namespace torsio::test
