@@ -23,18 +23,14 @@ constexpr double kThinQuantile = 0.01;
 
 // Usable samples under each other: target, then the inputs.
 Matrix joint_samples(const TrainingData& data) {
-  Matrix samples;
-  samples.columns = data.input_count() + 1;
-  for (const Sequence& sequence : data.sequences)
-    for (std::size_t i = 0; i < sequence.target.size(); ++i) {
-      if (sequence.use[i] == 0) continue;
-      const auto features = sequence.features.row(i);
-      samples.values.push_back(sequence.target[i]);
-      samples.values.insert(samples.values.end(), features.begin(), features.end());
-      ++samples.rows;
-    }
-  if (samples.rows == 0)
+  const Table table = usable_table(data);
+  if (table.target.empty())
     throw Error({.place = "dgmm", .expected = "samples to learn from", .found = "none"});
+  Matrix samples(table.target.size(), data.input_count() + 1);
+  for (std::size_t i = 0; i < samples.rows; ++i) {
+    samples(i, 0) = table.target[i];
+    std::ranges::copy(table.features.row(i), samples.row(i).begin() + 1);
+  }
   return samples;
 }
 
@@ -153,8 +149,8 @@ void check_options(const DgmmOptions& options) {
                       .found = fmt::format("{}", options.clamp)});
 }
 
-GaussianMixture learn_online(const Matrix& samples, const Standardisation& standardisation,
-                             const OnlineMixtureSettings& settings, const Progress& progress) {
+OnlineMixture learn_online(const Matrix& samples, const Standardisation& standardisation,
+                           const OnlineMixtureSettings& settings, const Progress& progress) {
   OnlineMixture learner(standardisation, settings);
   for (std::size_t i = 0; i < samples.rows; ++i) {
     if (i % kSamplesPerReport == 0)
@@ -162,18 +158,25 @@ GaussianMixture learn_online(const Matrix& samples, const Standardisation& stand
                       "learning online");
     learner.learn(samples.row(i));
   }
-  return learner.mixture();
+  return learner;
 }
 
 }  // namespace
 
-Dgmm::Parameters fit_dgmm(const TrainingData& data, const DgmmOptions& options,
-                          const Progress& progress) {
+Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options,
+                      const Progress& progress) {
   check_options(options);
   const Matrix samples = joint_samples(data);
   const Standardisation standardisation = standardisation_of(samples, data);
-  Dgmm::Parameters result;
-  result.mixture = learn_online(samples, standardisation, options.online, progress);
+  const OnlineMixture learner = learn_online(samples, standardisation, options.online, progress);
+  Fitted<Dgmm> fitted;
+  if (learner.merges() > 0)
+    fitted.notes.push_back(fmt::format(
+        "the data filled all {} components and {} pairs were merged to make room: allow more "
+        "components, or a larger novelty_distance",
+        options.online.components, learner.merges()));
+  Dgmm::Parameters& result = fitted.parameters;
+  result.mixture = learner.mixture();
   if (options.em_iterations > 0) {
     const MixtureEm em(samples, standardisation,
                        {.count = static_cast<double>(samples.columns) + 1.0,
@@ -191,11 +194,11 @@ Dgmm::Parameters fit_dgmm(const TrainingData& data, const DgmmOptions& options,
   result.clamp.thin_log_density = thin_log_density(result.mixture, 0, samples);
   result.clamp.thin_log_density_inverse = thin_log_density(result.mixture, 1, samples);
   report_progress(progress, 1.0, "done");
-  return result;
+  return fitted;
 }
 
-Dgmm::Parameters fit_dgmm_paper(const TrainingData& data, const PaperDgmmOptions& options,
-                                const Progress& progress) {
+Fitted<Dgmm> fit_dgmm_paper(const TrainingData& data, const PaperDgmmOptions& options,
+                            const Progress& progress) {
   const Matrix samples = joint_samples(data);
   const Standardisation by = standardisation_of(samples, data);
   const std::size_t d = samples.columns;
@@ -227,7 +230,8 @@ Dgmm::Parameters fit_dgmm_paper(const TrainingData& data, const PaperDgmmOptions
     counts[winner] += 1.0;
   }
 
-  Dgmm::Parameters result;
+  Fitted<Dgmm> fitted;
+  Dgmm::Parameters& result = fitted.parameters;
   result.mixture = {.centre = by.centre,
                     .scale = by.scale,
                     .weights = counts,
@@ -238,7 +242,7 @@ Dgmm::Parameters fit_dgmm_paper(const TrainingData& data, const PaperDgmmOptions
     for (std::size_t j = 0; j < d; ++j)
       result.mixture.covariances(k, j * d + j) = options.spread * options.spread;
   result.clamp.slope.assign(d - 1, 0.0);
-  return result;
+  return fitted;
 }
 
 }  // namespace torsio

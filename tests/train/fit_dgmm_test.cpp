@@ -53,7 +53,7 @@ double rmse(Dgmm model, const TrainingData& data) {
 }
 
 TEST(FitDgmm, LearnsFrictionThatALineCannot) {
-  const Dgmm::Parameters parameters = fit_dgmm(sweeps(4000, 1));
+  const Dgmm::Parameters parameters = fit_dgmm(sweeps(4000, 1)).parameters;
   const double line_rmse = parameters.clamp.width / 2.0;
   EXPECT_GT(line_rmse, 0.2);
   EXPECT_LT(rmse(Dgmm(parameters), sweeps(1000, 2, 0.9)), 0.5 * line_rmse);
@@ -62,13 +62,13 @@ TEST(FitDgmm, LearnsFrictionThatALineCannot) {
 TEST(FitDgmm, RefinementFitsBetterThanTheOnlinePassAlone) {
   DgmmOptions options;
   options.online.components = 30;
-  const double online = rmse(Dgmm(fit_dgmm(sweeps(4000, 1), options)), sweeps(1000, 2));
+  const double online = rmse(Dgmm(fit_dgmm(sweeps(4000, 1), options).parameters), sweeps(1000, 2));
   options.em_iterations = 10;
-  EXPECT_LT(rmse(Dgmm(fit_dgmm(sweeps(4000, 1), options)), sweeps(1000, 2)), online);
+  EXPECT_LT(rmse(Dgmm(fit_dgmm(sweeps(4000, 1), options).parameters), sweeps(1000, 2)), online);
 }
 
 TEST(FitDgmm, ItsErrorBarIsTheSizeOfItsErrors) {
-  Dgmm model(fit_dgmm(sweeps(4000, 1)));
+  Dgmm model(fit_dgmm(sweeps(4000, 1)).parameters);
   const TrainingData test = sweeps(1000, 2);
   double square = 0.0;
   for (std::size_t i = 0; i < 1000; ++i) {
@@ -80,7 +80,7 @@ TEST(FitDgmm, ItsErrorBarIsTheSizeOfItsErrors) {
 }
 
 TEST(FitDgmm, IsALineFarFromAllData) {
-  const Dgmm::Parameters parameters = fit_dgmm(sweeps(2000, 1));
+  const Dgmm::Parameters parameters = fit_dgmm(sweeps(2000, 1)).parameters;
   Dgmm model(parameters);
   const double at_ten = model.step(std::vector{10.0, 0.0}).value;
   const double line = parameters.clamp.intercept + 10.0 * parameters.clamp.slope[0];
@@ -91,7 +91,7 @@ TEST(FitDgmm, IsALineFarFromAllData) {
 TEST(FitDgmm, TheBackgroundAloneLeadsBackToTheLine) {
   DgmmOptions options;
   options.clamp = 0.0;
-  const Dgmm::Parameters parameters = fit_dgmm(sweeps(2000, 1), options);
+  const Dgmm::Parameters parameters = fit_dgmm(sweeps(2000, 1), options).parameters;
   const double value = Dgmm(parameters).step(std::vector{30.0, 0.0}).value;
   const double line = parameters.clamp.intercept + 30.0 * parameters.clamp.slope[0];
   EXPECT_NEAR(value, line, 0.01 * std::abs(line));
@@ -99,20 +99,21 @@ TEST(FitDgmm, TheBackgroundAloneLeadsBackToTheLine) {
 
 TEST(FitDgmm, LeavesUnusableSamplesOut) {
   TrainingData data = sweeps(2000, 1);
-  const Dgmm::Parameters clean = fit_dgmm(data);
+  const Dgmm::Parameters clean = fit_dgmm(data).parameters;
   for (Sequence& sequence : data.sequences) {
     sequence.target.push_back(std::nan(""));
     sequence.use.push_back(0);
     sequence.features.values.insert(sequence.features.values.end(), {1e9, 1e9});
     ++sequence.features.rows;
   }
-  EXPECT_EQ(fit_dgmm(data).mixture, clean.mixture);
+  EXPECT_EQ(fit_dgmm(data).parameters.mixture, clean.mixture);
 }
 
 TEST(FitDgmm, IsDeterministicForAnyNumberOfThreads) {
   DgmmOptions one{.em_iterations = 3, .threads = 1};
   DgmmOptions two{.em_iterations = 3, .threads = 2};
-  EXPECT_EQ(fit_dgmm(sweeps(3000, 1), one).mixture, fit_dgmm(sweeps(3000, 1), two).mixture);
+  EXPECT_EQ(fit_dgmm(sweeps(3000, 1), one).parameters.mixture,
+            fit_dgmm(sweeps(3000, 1), two).parameters.mixture);
 }
 
 TEST(FitDgmm, AcceptsInputsThatSayTheSame) {
@@ -121,8 +122,15 @@ TEST(FitDgmm, AcceptsInputsThatSayTheSame) {
   for (Sequence& sequence : data.sequences)
     for (std::size_t i = 0; i < sequence.features.rows; ++i)
       sequence.features(i, 1) = sequence.features(i, 0);
-  const Dgmm::Parameters parameters = fit_dgmm(data);
+  const Dgmm::Parameters parameters = fit_dgmm(data).parameters;
   EXPECT_LT(rmse(Dgmm(parameters), data), 1.05 * parameters.clamp.width / 2.0);
+}
+
+TEST(FitDgmm, NotesThatItRanOutOfComponents) {
+  DgmmOptions options;
+  EXPECT_TRUE(fit_dgmm(sweeps(2000, 1), options).notes.empty());
+  options.online.components = 10;
+  EXPECT_EQ(fit_dgmm(sweeps(2000, 1), options).notes.size(), 1U);
 }
 
 TEST(FitDgmm, SaysWhatIsWrong) {
@@ -140,7 +148,8 @@ TEST(FitDgmm, StopsWhenAsked) {
 }
 
 TEST(FitDgmmPaper, ItsCovariancesAreFixedAndIsotropic) {
-  const GaussianMixture mixture = fit_dgmm_paper(sweeps(2000, 1), {.components = 50}).mixture;
+  const GaussianMixture mixture =
+      fit_dgmm_paper(sweeps(2000, 1), {.components = 50}).parameters.mixture;
   ASSERT_EQ(mixture.size(), 50U);
   for (std::size_t i = 0; i < 50; ++i)
     for (std::size_t r = 0; r < 3; ++r)
@@ -149,9 +158,10 @@ TEST(FitDgmmPaper, ItsCovariancesAreFixedAndIsotropic) {
 }
 
 TEST(FitDgmmPaper, IsWorseThanALine) {
-  const double line_rmse = fit_dgmm(sweeps(4000, 1)).clamp.width / 2.0;
-  EXPECT_GT(rmse(Dgmm(fit_dgmm_paper(sweeps(4000, 1), {.components = 50})), sweeps(1000, 2)),
-            line_rmse);
+  const double line_rmse = fit_dgmm(sweeps(4000, 1)).parameters.clamp.width / 2.0;
+  EXPECT_GT(
+      rmse(Dgmm(fit_dgmm_paper(sweeps(4000, 1), {.components = 50}).parameters), sweeps(1000, 2)),
+      line_rmse);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/model/dgmm.hpp"
+#include "torsio/train/fitted.hpp"
 #include "torsio/train/online_mixture.hpp"
 #include "torsio/train/training_data.hpp"
 
@@ -25,8 +26,8 @@ struct DgmmOptions {
 ///
 /// Source: SPEC 3.1. Deterministic; independent of the number of threads.
 /// @throws Error if no sample is usable or an option is out of range; Cancelled if `progress` asks.
-[[nodiscard]] Dgmm::Parameters fit_dgmm(const TrainingData& data, const DgmmOptions& options = {},
-                                        const Progress& progress = {});
+[[nodiscard]] Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options = {},
+                                    const Progress& progress = {});
 
 struct PaperDgmmOptions {
   std::size_t components = 500;
@@ -39,8 +40,8 @@ struct PaperDgmmOptions {
 /// each later sample moves the nearest mean. No guards. Expect it to be worse than a straight line:
 /// at 1 kHz all components are born within the first half second, and a covariance without
 /// correlation makes the regression a kernel average (SPEC 3.1).
-[[nodiscard]] Dgmm::Parameters fit_dgmm_paper(const TrainingData& data,
-                                              const PaperDgmmOptions& options = {},
-                                              const Progress& progress = {});
+[[nodiscard]] Fitted<Dgmm> fit_dgmm_paper(const TrainingData& data,
+                                          const PaperDgmmOptions& options = {},
+                                          const Progress& progress = {});
 
 }  // namespace torsio
