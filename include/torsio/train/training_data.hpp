@@ -21,10 +21,10 @@ struct InputInfo {
 /// through it.
 struct Sequence {
   std::string recording;
-  Matrix features;             ///< samples x inputs
-  std::vector<double> target;  ///< NaN where not measured
-  std::vector<std::uint8_t>
-      use;  ///< 1: may be learned from (role, settled filters, fresh and finite target)
+  Matrix features = {};             ///< samples x inputs
+  std::vector<double> target = {};  ///< NaN where not measured
+  std::vector<std::uint8_t> use =
+      {};  ///< 1: may be learned from (role, settled filters, fresh and finite target)
 };
 
 /// What every fitter is given.
