@@ -69,11 +69,11 @@ bool AnyModel::can_invert() const noexcept {
   return std::visit([]<class M>(const M&) { return Invertible<M>; }, model_);
 }
 
-Estimate AnyModel::invert(double target, Features features) const noexcept {
+Estimate AnyModel::invert(double target, Features features) noexcept {
   return std::visit(
-      [&]<class M>(const M& model) -> Estimate {
+      [&]<class M>(M& model) -> Estimate {
         if constexpr (Invertible<M>) {
-          return model.invert(target, features);
+          return Estimate{model.invert(target, features)};
         } else {
           return {.value = features[0], .fault = Fault::model_not_finite};
         }

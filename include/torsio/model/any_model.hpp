@@ -27,10 +27,13 @@ using KnownFamilies = FamilyList<Linear,         //
                                  LinearCoulomb,  //
                                  Polynomial>;
 
-/// A model that can run backwards: from the target to its first input.
+/// A model that can run backwards: from the target to its first input. `invert` returns an
+/// `Estimate`, or a plain value where it never fails; it may need scratch space, so it is not
+/// const.
 template <class M>
-concept Invertible = requires(const M& model, double target, Features features) {
-  { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
+concept Invertible = requires(M& model, double target, Features features) {
+  Estimate{model.invert(target, features)};
+  requires noexcept(model.invert(target, features));
 };
 
 /// A model whose family is known only at run time. Dispatch is a switch: no virtual call, nothing
@@ -60,7 +63,7 @@ class AnyModel {
   /// The first input at which the model says `target`, the others being as given; see the family's
   /// own `invert`. Where `can_invert()` is false the given first input comes back with
   /// `Fault::model_not_finite`.
-  [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
+  [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
 
   /// The model as its own family, or null.
   template <class Family>

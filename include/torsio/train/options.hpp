@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -13,8 +15,8 @@ struct OptionInfo {
   enum class Kind { number, integer, boolean, text };
   std::string_view name;
   Kind kind = Kind::number;
-  std::string_view default_value;
-  double minimum = 0.0;  ///< numbers and integers only
+  std::string_view default_value;  ///< "auto": the fitter finds it, and `auto` may be given too
+  double minimum = 0.0;            ///< numbers and integers only
   double maximum = 0.0;
   std::string_view help;
 };
@@ -26,6 +28,7 @@ class Options {
   /// out of range.
   Options(std::span<const OptionInfo> known, const std::map<std::string, std::string>& given);
 
+  /// Each @throws Error if the table has no such option. A number that is `auto` is NaN.
   [[nodiscard]] double number(std::string_view name) const;
   [[nodiscard]] std::size_t integer(std::string_view name) const;
   [[nodiscard]] bool boolean(std::string_view name) const;

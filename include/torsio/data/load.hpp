@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "torsio/data/dataset.hpp"
+
+namespace torsio {
+
+/// What a user says beside the files.
+struct LoadOptions {
+  std::optional<std::string> mapping;  ///< file; replaces the mapping of a manifest
+  /// All records are brought to this rate; it is also the clock of a log that has none.
+  std::optional<double> rate_Hz;
+  std::string target;  ///< empty: the manifest's, else torque_Nm
+};
+
+/// Loads a CSV file, plain or gzipped, or every file of a manifest (`.yaml`).
+/// @throws Error or UsageError with place, expected, found and what to do.
+[[nodiscard]] std::vector<Recording> load_recordings(const std::string& path,
+                                                     const LoadOptions& options = {});
+
+/// A dataset from files or manifests. A CSV file has the role of the list that it stands in. A
+/// manifest in `train_files` brings its own roles and splits; in `test_files` all of it is test.
+/// @throws Error as `load_recordings` and `Dataset::check`; UsageError if manifests disagree.
+[[nodiscard]] Dataset load_dataset(const std::vector<std::string>& train_files,
+                                   const std::vector<std::string>& test_files,
+                                   const LoadOptions& options = {});
+
+}  // namespace torsio

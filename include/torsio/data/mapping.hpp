@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/data/csv.hpp"
+#include "torsio/data/recording.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// A channel made from one column: `channel = sign * scale * SI(column) + offset`.
+struct ChannelRule {
+  std::string name;  ///< with a unit; inside torsio it becomes the SI one
+  std::string from;  ///< column
+  std::string unit;  ///< of the column; empty: its own suffix, else that of `name`
+  double sign = 1.0;
+  double scale = 1.0;  ///< from SI to SI; needed where the quantities differ
+  double offset = 0.0;
+};
+
+/// How the time stamps are taken. Default: they must be even.
+struct ClockRule {
+  bool rebuild = false;          ///< spread the samples evenly between first and last stamp
+  double max_stray_steps = 2.0;  ///< with rebuild: how far a stamp may be from there
+  double resample_Hz = 0.0;      ///< interpolate from uneven stamps onto this rate; 0: no
+};
+
+/// A channel whose sensor reports late by this much.
+struct LatencyRule {
+  std::string channel;
+  double latency_s = 0.0;
+};
+
+/// From the columns of a foreign log to channels. See docs/recordings.md for the file format.
+struct Mapping {
+  std::string file;  ///< for messages; empty: no mapping
+  std::vector<ChannelRule> channels;
+  std::vector<ChannelDefinition> derive;
+  std::vector<std::string> drop;
+  std::string split_by;      ///< column; each run of equal values becomes a record
+  std::vector<double> keep;  ///< of its values; empty: all
+  ClockRule clock;
+  double rate_Hz = 0.0;  ///< of a log without clock; 0: not told
+  std::vector<ZeroRule> zero;
+  std::vector<std::string> hold;
+  std::vector<LatencyRule> latency;
+  std::map<std::string, std::vector<std::string>> computed_from;
+};
+
+/// @throws Error naming file, line, key, the known keys and the nearest one.
+[[nodiscard]] Mapping read_mapping(const std::string& path);
+[[nodiscard]] Mapping parse_mapping(std::string_view text, const std::string& name);
+
+/// The measured channels of a table as recordings in SI: columns, splitting, clock, holding,
+/// latency and zeros, in this order. Derived channels come later (`add_derived`), behind resampling
+/// and conditions. `rate_Hz` is the clock of a log that has none and whose mapping tells none;
+/// `name` names the records, the file's own name if empty.
+/// @throws Error naming place, expected, found and the mapping line that would help.
+[[nodiscard]] std::vector<Recording> measured_recordings(const CsvTable& table,
+                                                         const Mapping& mapping,
+                                                         double rate_Hz = 0.0,
+                                                         const std::string& name = {});
+
+/// Evaluates the definitions over the recording and adds them as channels. Where a channel that one
+/// uses is NaN, so is the result, as long as the expression has no memory.
+/// @throws Error if a channel is missing, or is NaN and goes into a filter, difference or lag.
+void add_derived(Recording& recording, const std::vector<ChannelDefinition>& definitions);
+
+}  // namespace torsio

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/model/any_model.hpp"
+#include "torsio/train/options.hpp"
+#include "torsio/train/training_data.hpp"
+
+namespace torsio {
+
+/// A fitted model of any family, and what the user should be told about the fit.
+struct FittedModel {
+  AnyModel model;
+  std::vector<std::string> notes;
+};
+
+/// How one family is trained: what `fit --list`, the command line, cross-validation and `compare`
+/// know about it.
+struct FamilyInfo {
+  std::string_view name;
+  std::string_view summary;  ///< one line
+  std::span<const OptionInfo> options;
+  /// Deterministic for a seed. @throws Error if the data do not suffice, Cancelled.
+  FittedModel (*fit)(const TrainingData&, const Options&, std::uint64_t seed, const Progress&);
+};
+
+/// Every family that can be trained, cheapest first.
+[[nodiscard]] std::span<const FamilyInfo> families() noexcept;
+
+/// @throws UsageError with the list and the nearest name if there is none of that name.
+[[nodiscard]] const FamilyInfo& find_family(std::string_view name);
+
+}  // namespace torsio

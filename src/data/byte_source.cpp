@@ -1,0 +1,193 @@
+#include "data/byte_source.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <openssl/evp.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kChunk = std::size_t{256} << 10;
+
+std::string system_message(int code) { return std::generic_category().message(code); }
+
+class Sha256 {
+ public:
+  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+    if (!context_ || EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) != 1)
+      throw Error({.problem = "OpenSSL offers no SHA-256"});
+  }
+  void add(const char* bytes, std::size_t size) { EVP_DigestUpdate(context_.get(), bytes, size); }
+  std::string hex() {
+    std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+    unsigned int size = 0;
+    EVP_DigestFinal_ex(context_.get(), digest.data(), &size);
+    std::string text;
+    for (unsigned int i = 0; i < size; ++i) text += fmt::format("{:02x}", digest.at(i));
+    return text;
+  }
+
+ private:
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
+};
+
+class FileBytes final : public ByteSource {
+ public:
+  explicit FileBytes(const std::string& path) : path_(path) {
+    descriptor_ = path == "-" ? dup(STDIN_FILENO) : open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    const int code = errno;
+    if (descriptor_ < 0)
+      throw Error({.place = path,
+                   .problem = "cannot be opened: " + system_message(code),
+                   .advice = code == ENOENT ? "Check the path; '-' reads standard input." : ""});
+    struct stat info {};
+    if (fstat(descriptor_, &info) == 0 && S_ISDIR(info.st_mode)) {
+      close(descriptor_);
+      throw Error({.place = path,
+                   .expected = "a file",
+                   .found = "a directory",
+                   .advice = "Name the files in it, or a dataset manifest (.yaml)."});
+    }
+  }
+  ~FileBytes() override { close(descriptor_); }
+  FileBytes(const FileBytes&) = delete;
+  FileBytes& operator=(const FileBytes&) = delete;
+
+  std::size_t read(char* out, std::size_t size) override {
+    ssize_t got = 0;
+    do {
+      got = ::read(descriptor_, out, size);
+    } while (got < 0 && errno == EINTR);
+    if (got < 0)
+      throw Error({.place = path_, .problem = "cannot be read: " + system_message(errno)});
+    sha_.add(out, static_cast<std::size_t>(got));
+    return static_cast<std::size_t>(got);
+  }
+  std::string sha256() override { return sha_.hex(); }
+
+ private:
+  std::string path_;
+  int descriptor_ = -1;
+  Sha256 sha_;
+};
+
+class MemoryBytes final : public ByteSource {
+ public:
+  explicit MemoryBytes(std::string_view bytes) : bytes_(bytes) {}
+  std::size_t read(char* out, std::size_t size) override {
+    const std::size_t count = std::min(size, bytes_.size());
+    std::copy_n(bytes_.data(), count, out);
+    sha_.add(out, count);
+    bytes_.remove_prefix(count);
+    return count;
+  }
+  std::string sha256() override { return sha_.hex(); }
+
+ private:
+  std::string_view bytes_;
+  Sha256 sha_;
+};
+
+/// Looks at the first two bytes and unpacks what follows if they are gzip's.
+class MaybeGzip final : public ByteSource {
+ public:
+  MaybeGzip(std::unique_ptr<ByteSource> packed, std::string name)
+      : packed_(std::move(packed)), name_(std::move(name)), input_(kChunk) {
+    while (filled_ < 2) {
+      const std::size_t got = packed_->read(input_.data() + filled_, input_.size() - filled_);
+      if (got == 0) break;
+      filled_ += got;
+    }
+    gzip_ = filled_ >= 2 && input_[0] == '\x1f' && input_[1] == '\x8b';
+    constexpr int kGzipOnly = 16 + MAX_WBITS;
+    if (gzip_ && inflateInit2(&stream_, kGzipOnly) != Z_OK)
+      throw Error({.place = name_, .problem = "zlib cannot start"});
+    stream_.next_in = reinterpret_cast<Bytef*>(input_.data());
+    stream_.avail_in = static_cast<uInt>(filled_);
+  }
+  ~MaybeGzip() override {
+    if (gzip_) inflateEnd(&stream_);
+  }
+  MaybeGzip(const MaybeGzip&) = delete;
+  MaybeGzip& operator=(const MaybeGzip&) = delete;
+
+  std::size_t read(char* out, std::size_t size) override {
+    return gzip_ ? unpack(out, size) : pass(out, size);
+  }
+  std::string sha256() override { return packed_->sha256(); }
+
+ private:
+  std::size_t pass(char* out, std::size_t size) {
+    if (handed_ == filled_) return packed_->read(out, size);
+    const std::size_t count = std::min(size, filled_ - handed_);
+    std::copy_n(input_.data() + handed_, count, out);
+    handed_ += count;
+    return count;
+  }
+
+  std::size_t unpack(char* out, std::size_t size) {
+    const auto wanted = static_cast<uInt>(std::min(size, kChunk));
+    stream_.next_out = reinterpret_cast<Bytef*>(out);
+    stream_.avail_out = wanted;
+    while (stream_.avail_out == wanted) {
+      if (stream_.avail_in == 0 && !refill()) {
+        if (inside_member_) fail("it ends in the middle: the file is truncated");
+        return 0;
+      }
+      inside_member_ = true;
+      const int code = inflate(&stream_, Z_NO_FLUSH);
+      if (code == Z_STREAM_END) {
+        inside_member_ = false;
+        inflateReset(&stream_);  // another member may follow
+      } else if (code != Z_OK && code != Z_BUF_ERROR) {
+        fail("its gzip data are corrupt");
+      }
+    }
+    return wanted - stream_.avail_out;
+  }
+
+  bool refill() {
+    const std::size_t got = packed_->read(input_.data(), input_.size());
+    stream_.next_in = reinterpret_cast<Bytef*>(input_.data());
+    stream_.avail_in = static_cast<uInt>(got);
+    return got > 0;
+  }
+
+  [[noreturn]] void fail(const std::string& problem) const {
+    throw Error({.place = name_, .problem = problem, .advice = "Copy or export the file again."});
+  }
+
+  std::unique_ptr<ByteSource> packed_;
+  std::string name_;
+  std::vector<char> input_;
+  std::size_t filled_ = 0;
+  std::size_t handed_ = 0;
+  bool gzip_ = false;
+  bool inside_member_ = false;
+  z_stream stream_{};
+};
+
+}  // namespace
+
+std::unique_ptr<ByteSource> open_bytes(const std::string& path) {
+  return std::make_unique<MaybeGzip>(std::make_unique<FileBytes>(path), path);
+}
+
+std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes, const std::string& name) {
+  return std::make_unique<MaybeGzip>(std::make_unique<MemoryBytes>(bytes), name);
+}
+
+}  // namespace torsio

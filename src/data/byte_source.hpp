@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace torsio {
+
+/// Bytes in order, from wherever they come.
+class ByteSource {
+ public:
+  virtual ~ByteSource() = default;
+  /// Up to `size` bytes into `out`; 0 only at the end. @throws Error if reading fails.
+  virtual std::size_t read(char* out, std::size_t size) = 0;
+  /// SHA-256 (hex) of the bytes as they stand in the file; call at the end.
+  virtual std::string sha256() = 0;
+};
+
+/// A file or pipe by path, "-" for standard input; unpacked if it starts like gzip.
+[[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::string& path);
+
+/// Bytes in memory, unpacked if they start like gzip. `bytes` must outlive the source.
+[[nodiscard]] std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes,
+                                                          const std::string& name);
+
+}  // namespace torsio

@@ -1,0 +1,182 @@
+#include "data/columns.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "data/names.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::string_view kFreshEnding = "_fresh_1";
+
+/// The name without its unit, or all of it where there is none (a mapping may tell the unit).
+std::string_view quantity_of(std::string_view column_name) {
+  const auto parts = split_channel_name(column_name);
+  return parts ? parts->quantity : column_name;
+}
+
+std::vector<double> converted(std::vector<double> values, double scale, double offset) {
+  if (scale == 1.0 && offset == 0.0) return values;  // keeps even the sign of a zero
+  for (double& value : values) value = scale * value + offset;
+  return values;
+}
+
+const Unit* unit_of_source(const ChannelRule& rule, const Unit* unit_of_channel) {
+  if (!rule.unit.empty()) return find_unit(rule.unit);
+  const auto from = split_channel_name(rule.from);
+  return from ? from->unit : unit_of_channel;
+}
+
+TableChannel channel_from_rule(const ChannelRule& rule, const CsvTable& table,
+                               const std::string& mapping_file) {
+  const std::string place = mapping_file + ": channels." + rule.name;
+  const CsvColumn& column = column_named(table, rule.from, place);
+  const auto name = split_channel_name(rule.name);
+  if (!name) throw Error({.place = place, .problem = "the name has no unit"});
+  const Unit* unit = unit_of_source(rule, name->unit);
+  if (unit == nullptr) throw Error({.place = place, .problem = "unknown unit '" + rule.unit + "'"});
+  const double scale = rule.sign * rule.scale;
+  if (unit->si_suffix != name->unit->si_suffix && rule.scale == 1.0)
+    throw Error({.place = place,
+                 .expected = fmt::format("a column in a unit of {}", name->unit->si_suffix),
+                 .found = fmt::format("'{}' in {}", rule.from, unit->suffix),
+                 .advice = fmt::format("Tell the column's unit ('unit:'), or how {} become {} "
+                                       "('scale:').",
+                                       unit->si_suffix, name->unit->si_suffix)});
+  return {.channel = {.name = name->si(),
+                      .values = converted(column.values, scale * unit->scale,
+                                          scale * unit->offset + rule.offset)},
+          .column = &column};
+}
+
+TableChannel channel_from_column(const CsvColumn& column, const CsvTable& table) {
+  const auto name = split_channel_name(column.name);
+  if (!name) {
+    const auto ending = column.name.rfind('_');
+    const bool has_ending = ending != std::string::npos && ending + 1 < column.name.size();
+    throw Error({.place = table.header_place(column),
+                 .problem = has_ending ? fmt::format("'{}' is no known unit",
+                                                     column.name.substr(ending + 1))
+                                       : "the name has no unit",
+                 .expected = "a name that ends in one of " + known_unit_list(),
+                 .found = "'" + printable(column.name) + "'",
+                 .advice = fmt::format(
+                     "Rename the column, or say in a mapping  channels: {{torque_Nm: {{from: {0}, "
+                     "unit: Nm}}}}  or  drop: [{0}]",
+                     column.name)});
+  }
+  return {.channel = {.name = name->si(),
+                      .values = converted(column.values, name->unit->scale, name->unit->offset)},
+          .column = &column};
+}
+
+/// Freshness column -> the column whose samples it marks.
+std::map<const CsvColumn*, const CsvColumn*> freshness_of(const CsvTable& table) {
+  std::map<const CsvColumn*, const CsvColumn*> marked;
+  for (const CsvColumn& mask : table.columns) {
+    std::string_view quantity = mask.name;
+    if (!quantity.ends_with(kFreshEnding)) continue;
+    quantity.remove_suffix(kFreshEnding.size());
+    for (const CsvColumn& column : table.columns) {
+      if (quantity_of(column.name) != quantity) continue;
+      if (!marked.emplace(&mask, &column).second)
+        throw Error({.place = table.header_place(mask),
+                     .problem = "two columns could be meant",
+                     .found = marked[&mask]->name + " and " + column.name});
+    }
+  }
+  return marked;
+}
+
+std::vector<std::uint8_t> freshness_mask(const CsvTable& table, const CsvColumn& column) {
+  std::vector<std::uint8_t> mask(column.values.size());
+  for (std::size_t row = 0; row < mask.size(); ++row) {
+    const double value = column.values[row];
+    if (value != 0.0 && value != 1.0)
+      throw Error({.place = table.place(row, column),
+                   .expected = "1 (new sample) or 0 (held)",
+                   .found = fmt::format("{}", value)});
+    mask[row] = value != 0.0 ? 1 : 0;
+  }
+  return mask;
+}
+
+void refuse_duplicates(const std::vector<TableChannel>& channels, const CsvTable& table) {
+  std::map<std::string_view, const CsvColumn*> seen;
+  for (const TableChannel& made : channels) {
+    const auto [first, is_new] = seen.emplace(made.channel.name, made.column);
+    if (!is_new)
+      throw Error(
+          {.place = table.header_place(*made.column),
+           .problem = fmt::format("duplicate column: in SI it is {}, and so is column {} "
+                                  "({})",
+                                  made.channel.name, first->second->number, first->second->name),
+           .advice = fmt::format("Leave one out in a mapping:  drop: [{}]", made.column->name)});
+  }
+}
+
+bool is_clock(const TableChannel& made) {
+  return made.channel.name == "t_s" || made.channel.name == "time_s";
+}
+
+}  // namespace
+
+const CsvColumn& column_named(const CsvTable& table, const std::string& name,
+                              const std::string& place) {
+  if (const CsvColumn* column = table.find(name)) return *column;
+  std::vector<std::string> names;
+  for (const CsvColumn& column : table.columns) names.push_back(column.name);
+  throw Error({.place = place,
+               .problem = fmt::format("{} has no column '{}'", table.source.file, name),
+               .found = "the columns " + joined(names),
+               .advice = did_you_mean(name, names)});
+}
+
+TableChannels channels_of_table(const CsvTable& table, const Mapping& mapping) {
+  const auto masks = freshness_of(table);
+  std::set<const CsvColumn*> consumed;
+  for (const auto& [mask, column] : masks) consumed.insert(mask);
+  if (!mapping.split_by.empty())
+    consumed.insert(&column_named(table, mapping.split_by, mapping.file + ": split_by"));
+
+  std::vector<TableChannel> all;
+  for (const ChannelRule& rule : mapping.channels) {
+    all.push_back(channel_from_rule(rule, table, mapping.file));
+    consumed.insert(all.back().column);
+  }
+  for (const CsvColumn& column : table.columns)
+    if (!consumed.contains(&column)) all.push_back(channel_from_column(column, table));
+  refuse_duplicates(all, table);
+  for (const auto& [mask, column] : masks)
+    for (TableChannel& made : all)
+      if (made.column == column) made.channel.fresh = freshness_mask(table, *mask);
+
+  TableChannels result;
+  for (TableChannel& made : all) {
+    if (!is_clock(made)) {
+      result.channels.push_back(std::move(made));
+    } else if (!result.clock) {
+      result.clock = std::move(made);
+    } else {
+      throw Error({.place = table.header_place(*made.column),
+                   .problem = "two clocks",
+                   .found = result.clock->column->name + " and " + made.column->name,
+                   .advice = "Leave one out in a mapping:  drop: [" + made.column->name + "]"});
+    }
+  }
+  if (result.channels.empty())
+    throw Error({.place = table.source.file,
+                 .problem = "no channels",
+                 .expected = "at least one column beside the clock"});
+  return result;
+}
+
+}  // namespace torsio

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "torsio/data/csv.hpp"
+#include "torsio/data/mapping.hpp"
+#include "torsio/data/recording.hpp"
+
+namespace torsio {
+
+/// A channel in SI over all rows of a table, and the column that it came from.
+struct TableChannel {
+  Channel channel;
+  const CsvColumn* column = nullptr;
+};
+
+/// All rows of a table in SI, not yet cut or put on a clock.
+struct TableChannels {
+  std::optional<TableChannel> clock;
+  std::vector<TableChannel> channels;
+};
+
+/// Renames and converts the columns, and puts freshness columns to their channels.
+[[nodiscard]] TableChannels channels_of_table(const CsvTable& table, const Mapping& mapping);
+
+/// The column of that name. @throws Error that lists the columns, at `place`.
+[[nodiscard]] const CsvColumn& column_named(const CsvTable& table, const std::string& name,
+                                            const std::string& place);
+
+}  // namespace torsio

@@ -1,0 +1,250 @@
+#include "torsio/data/csv.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "data/byte_source.hpp"
+#include "data/csv_header.hpp"
+#include "data/decimal.hpp"
+#include "data/line_reader.hpp"
+#include "data/names.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+namespace {
+
+/// Turns lines into rows of a table.
+class TableParser {
+ public:
+  TableParser(CsvTable& table, const CsvHeader& header, const CsvOptions& options)
+      : table_(table), separator_(header.separator), limits_(options.limits) {
+    for (std::size_t i = 0; i < header.names.size(); ++i)
+      columns_.push_back({.name = header.names[i], .number = i + 1, .values = {}});
+    for (const CsvColumn& column : columns_)
+      read_.push_back(std::ranges::find(options.skip, column.name) == options.skip.end() ? 1 : 0);
+  }
+
+  /// `line` must be followed by a '\n' in memory.
+  void add(std::string_view line, std::size_t number) {
+    const char* at = line.data();
+    const char* const end = at + line.size();
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      if (i > 0) {
+        if (at == end) refuse_ragged(line, number);
+        ++at;
+      }
+      double value = kNotMeasured;
+      const char* behind = at;
+      if (read_[i] == 0) {
+        at = cell_end(at, end);
+        continue;
+      }
+      if (!read_decimal(behind, value) || (behind != end && *behind != separator_)) {
+        behind = cell_end(at, end);
+        value = unusual_cell({at, behind}, number, columns_[i]);
+      } else if (comma_seen_ && std::string_view(at, behind).find('.') != std::string_view::npos) {
+        refuse_mixture(number, columns_[i]);
+      }
+      columns_[i].values.push_back(value);
+      at = behind;
+    }
+    if (at != end) refuse_ragged(line, number);
+    mark(number);
+    if (++rows_ * columns_.size() > limits_.values)
+      throw Error({.place = fmt::format("{}: line {}", table_.source.file, number),
+                   .problem = fmt::format("more than {} numbers", limits_.values),
+                   .advice = "Cut the log into several files."});
+  }
+
+  void finish() {
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+      if (read_[i] != 0) table_.columns.push_back(std::move(columns_[i]));
+  }
+  [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
+
+ private:
+  [[nodiscard]] const char* cell_end(const char* at, const char* end) const {
+    bool quoted = false;
+    for (; at != end && (quoted || *at != separator_); ++at)
+      if (*at == '"') quoted = !quoted;
+    return at;
+  }
+
+  /// Everything but a plain number: blanks, quotes, an empty cell, nan, a decimal comma.
+  double unusual_cell(std::string_view cell, std::size_t line, const CsvColumn& column) {
+    const std::string_view whole = cell;
+    const auto strip = [&cell](char c) {
+      while (!cell.empty() && cell.front() == c) cell.remove_prefix(1);
+      while (!cell.empty() && cell.back() == c) cell.remove_suffix(1);
+    };
+    strip(' ');
+    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"')
+      cell = cell.substr(1, cell.size() - 2);
+    strip(' ');
+    if (cell.empty() || cell == "nan" || cell == "NaN" || cell == "NAN") return kNotMeasured;
+    std::string text(cell);
+    if (const auto comma = text.find(','); comma != std::string::npos && separator_ != ',') {
+      if (text.find('.') != std::string::npos || (!comma_seen_ && point_was_seen()))
+        refuse_mixture(line, column);
+      text[comma] = '.';
+      comma_seen_ = true;
+    }
+    const char* at = text.c_str();
+    double value = kNotMeasured;
+    if (!read_decimal(at, value) || at != text.c_str() + text.size())
+      throw Error({.place = place(line, column),
+                   .expected = "a number, nan or nothing",
+                   .found = "'" + printable(whole) + "'",
+                   .advice = "Mend the cell, or leave the column out with  drop: [" + column.name +
+                             "]  in a mapping."});
+    return value;
+  }
+
+  /// Asked once, at the first decimal comma: a broken number so far was written with a point.
+  [[nodiscard]] bool point_was_seen() const {
+    const auto is_broken = [](double value) {
+      return std::isfinite(value) && std::trunc(value) != value;
+    };
+    return std::ranges::any_of(columns_, [&](const CsvColumn& column) {
+      return std::ranges::any_of(column.values, is_broken);
+    });
+  }
+
+  void mark(std::size_t line) {
+    if (table_.line_marks.empty() || line != last_line_ + 1)
+      table_.line_marks.emplace_back(rows_, line);
+    last_line_ = line;
+  }
+
+  [[nodiscard]] std::string place(std::size_t line, const CsvColumn& column) const {
+    return fmt::format("{}: line {}, column {} ({})", table_.source.file, line, column.number,
+                       column.name);
+  }
+
+  [[noreturn]] void refuse_mixture(std::size_t line, const CsvColumn& column) const {
+    throw Error({.place = place(line, column),
+                 .problem = "decimal commas and decimal points in one file",
+                 .advice = "Export the log again with one of them and without thousands marks."});
+  }
+
+  [[noreturn]] void refuse_ragged(std::string_view line, std::size_t number) const {
+    std::size_t found = 1;
+    const char* const end = line.data() + line.size();
+    for (const char* at = cell_end(line.data(), end); at != end; at = cell_end(at + 1, end))
+      ++found;
+    throw Error({.place = fmt::format("{}: line {}", table_.source.file, number),
+                 .expected = fmt::format("{} cells, as in the header (line {})", columns_.size(),
+                                         table_.header_line),
+                 .found = fmt::format("{}", found),
+                 .advice = "The line may have been cut off while logging: remove or mend it."});
+  }
+
+  CsvTable& table_;
+  char separator_;
+  CsvLimits limits_;
+  std::vector<CsvColumn> columns_;
+  std::vector<std::uint8_t> read_;
+  std::size_t rows_ = 0;
+  std::size_t last_line_ = 0;
+  bool comma_seen_ = false;
+};
+
+void check_skipped(const CsvHeader& header, const CsvOptions& options, const std::string& place) {
+  for (const std::string& name : options.skip)
+    if (std::ranges::find(header.names, name) == header.names.end())
+      throw Error({.place = place,
+                   .problem = "there is no column '" + name + "' to drop",
+                   .found = "the columns " + printable(joined(header.names)),
+                   .advice = did_you_mean(name, header.names)});
+}
+
+bool is_comment_or_blank(std::string_view line) { return line.empty() || line.front() == '#'; }
+
+/// The first line that is neither blank nor a comment.
+std::string_view header_line(LineReader& lines, const std::string& name, std::size_t limit) {
+  std::string_view line;
+  std::size_t bytes = 0;
+  while (lines.next(line, limit)) {
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+    if (lines.number() == 1 && line.starts_with(kByteOrderMark))
+      line.remove_prefix(kByteOrderMark.size());
+    if (!is_comment_or_blank(line)) return line;
+    bytes += line.size() + 1;
+    if (bytes > limit)
+      throw Error({.place = name,
+                   .problem = fmt::format("no header line within the first {} bytes", limit)});
+  }
+  throw Error({.place = name,
+               .problem = lines.number() == 0 ? "the file is empty" : "no header line",
+               .expected = "a header line and rows of numbers"});
+}
+
+CsvTable parse(ByteSource& source, const std::string& name, const CsvOptions& options) {
+  CsvTable table;
+  table.source.file = name;
+  LineReader lines(source, name);
+  const std::string_view first = header_line(lines, name, options.limits.header_bytes);
+  table.header_line = lines.number();
+  const std::string place = fmt::format("{}: line {}", name, table.header_line);
+  const CsvHeader header = parse_header(first, place);
+  check_skipped(header, options, place);
+  TableParser parser(table, header, options);
+  std::string_view line;
+  while (lines.next(line, options.limits.line_bytes))
+    if (!is_comment_or_blank(line)) parser.add(line, lines.number());
+  if (parser.rows() == 0)
+    throw Error({.place = name,
+                 .problem = "no samples",
+                 .expected = "rows of numbers below the header",
+                 .found = "a header only"});
+  parser.finish();
+  table.source.sha256 = source.sha256();
+  return table;
+}
+
+}  // namespace
+
+const CsvColumn* CsvTable::find(std::string_view name) const noexcept {
+  const auto at = std::ranges::find(columns, name, &CsvColumn::name);
+  return at == columns.end() ? nullptr : &*at;
+}
+
+std::size_t CsvTable::line_of(std::size_t row) const noexcept {
+  const auto behind =
+      std::ranges::upper_bound(line_marks, row, {}, &std::pair<std::size_t, std::size_t>::first);
+  if (behind == line_marks.begin()) return 0;
+  const auto& [first_row, first_line] = *(behind - 1);
+  return first_line + row - first_row;
+}
+
+std::string CsvTable::column_list() const {
+  std::vector<std::string> names;
+  for (const CsvColumn& column : columns) names.push_back(column.name);
+  return joined(names);
+}
+
+std::string CsvTable::place(std::size_t row, const CsvColumn& column) const {
+  return fmt::format("{}: line {}, column {} ({})", source.file, line_of(row), column.number,
+                     column.name);
+}
+
+std::string CsvTable::header_place(const CsvColumn& column) const {
+  return fmt::format("{}: line {}, column {} ({})", source.file, header_line, column.number,
+                     column.name);
+}
+
+CsvTable read_csv(const std::string& path, const CsvOptions& options) {
+  const auto source = open_bytes(path);
+  return parse(*source, path == "-" ? "standard input" : path, options);
+}
+
+CsvTable parse_csv(std::string_view bytes, const std::string& name, const CsvOptions& options) {
+  const auto source = bytes_in_memory(bytes, name);
+  return parse(*source, name, options);
+}
+
+}  // namespace torsio

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "data/byte_source.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+
+/// Lines of a byte source with bounded memory. Each line is followed by a '\n' in memory, also the
+/// last one, so that a parser needs no end check on digits.
+class LineReader {
+ public:
+  LineReader(ByteSource& source, std::string name)
+      : source_(source), name_(std::move(name)), buffer_(kChunk + 1) {}
+
+  /// The next line without its end. @throws Error if it is longer than `longest` bytes.
+  bool next(std::string_view& line, std::size_t longest) {
+    while (true) {
+      const char* const begin = buffer_.data() + begin_;
+      const auto* const newline =
+          static_cast<const char*>(std::memchr(begin + searched_, '\n', end_ - begin_ - searched_));
+      const auto length =
+          newline != nullptr ? static_cast<std::size_t>(newline - begin) : end_ - begin_;
+      if (length > longest) refuse(length);
+      if (newline == nullptr) {
+        searched_ = length;
+        if (fill()) continue;
+        if (length == 0) return false;
+        buffer_[end_] = '\n';
+      }
+      line = {buffer_.data() + begin_, length};
+      begin_ = std::min(begin_ + length + 1, end_);
+      searched_ = 0;
+      ++number_;
+      if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+      return true;
+    }
+  }
+
+  /// Counted from 1, of the line given last.
+  [[nodiscard]] std::size_t number() const noexcept { return number_; }
+
+ private:
+  static constexpr std::size_t kChunk = std::size_t{1} << 18;
+
+  bool fill() {
+    std::move(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_),
+              buffer_.begin() + static_cast<std::ptrdiff_t>(end_), buffer_.begin());
+    end_ -= begin_;
+    begin_ = 0;
+    if (buffer_.size() - end_ - 1 < kChunk / 2) buffer_.resize(2 * buffer_.size());
+    const std::size_t got = source_.read(buffer_.data() + end_, buffer_.size() - end_ - 1);
+    end_ += got;
+    return got > 0;
+  }
+
+  [[noreturn]] void refuse(std::size_t length) const {
+    throw Error({.place = fmt::format("{}: line {}", name_, number_ + 1),
+                 .expected = "a line of text",
+                 .found = fmt::format("{} bytes and no end of the line", length),
+                 .advice = "This is no CSV file, or its line ends are missing."});
+  }
+
+  ByteSource& source_;
+  std::string name_;
+  std::vector<char> buffer_;
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+  std::size_t searched_ = 0;  ///< bytes behind begin_ that are known to hold no line end
+  std::size_t number_ = 0;
+};
+
+}  // namespace torsio

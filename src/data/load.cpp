@@ -1,0 +1,209 @@
+#include "torsio/data/load.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "data/names.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/data/csv.hpp"
+#include "torsio/data/manifest.hpp"
+#include "torsio/data/mapping.hpp"
+#include "torsio/data/resample.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr const char* kDefaultTarget = "torque_Nm";
+
+bool is_manifest(const std::string& path) {
+  return path.ends_with(".yaml") || path.ends_with(".yml");
+}
+
+/// One log and everything that was said about it.
+struct Log {
+  std::string path;
+  ManifestFile entry = {};
+  Mapping mapping = {};
+  double rate_Hz = 0.0;  ///< 0: its own
+};
+
+/// A shift into the past looks ahead: harmless for a target that is only compared with, impossible
+/// for an input at run time.
+void refuse_latency_of_inputs(const Mapping& mapping, const std::string& target) {
+  for (const LatencyRule& rule : mapping.latency)
+    if (rule.channel != target)
+      throw Error(
+          {.place = mapping.file + ": latency." + rule.channel,
+           .problem = "only the target may be shifted: at run time an input arrives late",
+           .expected = target,
+           .found = rule.channel,
+           .advice = "Leave the input late, or name it with --target if it is the target."});
+}
+
+std::vector<Recording> load(const Log& log) {
+  const CsvTable table = read_csv(log.path, {.skip = log.mapping.drop});
+  std::vector<Recording> recordings =
+      measured_recordings(table, log.mapping, log.rate_Hz, log.entry.name);
+  for (Recording& recording : recordings) {
+    if (log.rate_Hz > 0.0 && recording.sample_rate_Hz() != log.rate_Hz)
+      recording = resample(recording, log.rate_Hz);
+    for (const auto& [name, value] : log.entry.conditions) recording.add_condition(name, value);
+    add_derived(recording, log.mapping.derive);
+    recording.source.file = log.entry.file;
+  }
+  return recordings;
+}
+
+std::vector<Segment> segments_of(const Recording& recording, const ManifestFile& entry,
+                                 const std::optional<SplitRule>& split_of_all) {
+  const std::size_t samples = recording.size();
+  if (entry.role) return whole_record(samples, *entry.role);
+  const auto& split = entry.split ? entry.split : split_of_all;
+  if (!split) return whole_record(samples, Role::train);
+  const auto embargo =
+      static_cast<std::size_t>(std::ceil(split->embargo_s * recording.sample_rate_Hz() - 1e-9));
+  try {
+    return split->interleaved_blocks > 0
+               ? interleaved_blocks(samples, split->interleaved_blocks, split->test_every, embargo)
+               : contiguous_blocks(samples, split->contiguous, embargo);
+  } catch (const Error& error) {
+    ErrorReport report = error.report();
+    report.place = recording.name() + ": split";
+    throw Error(std::move(report));
+  }
+}
+
+/// Collects what the files and manifests of one call say.
+class Collector {
+ public:
+  explicit Collector(LoadOptions options) : options_(std::move(options)) {
+    if (options_.rate_Hz && !(*options_.rate_Hz > 0.0 && std::isfinite(*options_.rate_Hz)))
+      throw UsageError({.place = "--rate",
+                        .expected = "a positive number of Hz",
+                        .found = fmt::format("{}", *options_.rate_Hz)});
+    if (options_.mapping) mapping_ = read_mapping(*options_.mapping);
+    dataset_.target = options_.target;
+  }
+
+  void add(const std::string& path, Role role) {
+    if (is_manifest(path))
+      add_manifest(read_manifest(path), role);
+    else
+      add_log(path, role);
+  }
+
+  Dataset finish() {
+    if (dataset_.target.empty()) dataset_.target = kDefaultTarget;
+    name_twins_by_path();
+    for (const Planned& planned : logs_) {
+      const Mapping& mapping = planned.log.mapping;
+      refuse_latency_of_inputs(mapping, dataset_.target);
+      if (const auto leak = mapping.computed_from.find(dataset_.target);
+          leak != mapping.computed_from.end())
+        leaks_.insert(leak->second.begin(), leak->second.end());
+      for (Recording& recording : load(planned.log)) {
+        auto segments = segments_of(recording, planned.log.entry, planned.split_of_all);
+        dataset_.records.push_back(
+            {.recording = std::move(recording), .segments = std::move(segments)});
+      }
+    }
+    dataset_.target_computed_from.assign(leaks_.begin(), leaks_.end());
+    return std::move(dataset_);
+  }
+
+ private:
+  struct Planned {
+    Log log;
+    std::optional<SplitRule> split_of_all = {};
+  };
+
+  void add_log(const std::string& path, Role role) {
+    Planned planned{.log = {.path = path, .mapping = mapping_.value_or(Mapping{})}};
+    planned.log.entry.file = path;
+    planned.log.entry.role = role;
+    planned.log.rate_Hz = options_.rate_Hz.value_or(0.0);
+    logs_.push_back(std::move(planned));
+  }
+
+  /// Two files of one name in different folders must stay apart in every table.
+  void name_twins_by_path() {
+    std::map<std::string, std::size_t> met;
+    for (const Planned& planned : logs_) ++met[file_stem(planned.log.path)];
+    for (Planned& planned : logs_)
+      if (planned.log.entry.name.empty() && met[file_stem(planned.log.path)] > 1)
+        planned.log.entry.name = planned.log.entry.file;
+  }
+
+  void add_manifest(Manifest manifest, Role role) {
+    agree(dataset_.target, manifest.target, "target", manifest.file);
+    agree(dataset_.label, manifest.label, "label", manifest.file);
+    if (dataset_.input_sets.empty()) dataset_.input_sets = manifest.input_sets;
+    const std::filesystem::path folder = data_folder(manifest);
+    for (ManifestFile& entry : manifest.files) {
+      if (role == Role::test) entry.role = Role::test;
+      Planned planned{.log = {.path = (folder / entry.file).string(),
+                              .entry = entry,
+                              .mapping = mapping_of(entry, manifest),
+                              .rate_Hz = options_.rate_Hz.value_or(manifest.sample_rate_Hz)},
+                      .split_of_all = manifest.split};
+      if (entry.zero) planned.log.mapping.zero = *entry.zero;
+      logs_.push_back(std::move(planned));
+    }
+  }
+
+  /// The user's word counts more than a manifest's; two manifests must say the same.
+  void agree(std::string& current, const std::string& said, const std::string& what,
+             const std::string& file) const {
+    if (said.empty() || (what == "target" && !options_.target.empty())) return;
+    if (current.empty()) current = said;
+    if (current != said)
+      throw UsageError({.place = file + ": " + what,
+                        .problem = "the manifests disagree",
+                        .expected = current,
+                        .found = said});
+  }
+
+  [[nodiscard]] Mapping mapping_of(const ManifestFile& entry, const Manifest& manifest) const {
+    if (mapping_) return *mapping_;
+    const auto& choice = entry.mapping ? entry.mapping : manifest.mapping;
+    if (!choice) return {};
+    if (choice->file.empty()) return choice->here;
+    return read_mapping(
+        (std::filesystem::path(manifest.file).parent_path() / choice->file).string());
+  }
+
+  LoadOptions options_;
+  std::optional<Mapping> mapping_;
+  std::vector<Planned> logs_;
+  std::set<std::string> leaks_;
+  Dataset dataset_;
+};
+
+}  // namespace
+
+std::vector<Recording> load_recordings(const std::string& path, const LoadOptions& options) {
+  Collector collector(options);
+  collector.add(path, Role::train);
+  std::vector<Recording> recordings;
+  for (DatasetRecord& record : collector.finish().records)
+    recordings.push_back(std::move(record.recording));
+  return recordings;
+}
+
+Dataset load_dataset(const std::vector<std::string>& train_files,
+                     const std::vector<std::string>& test_files, const LoadOptions& options) {
+  Collector collector(options);
+  for (const std::string& path : train_files) collector.add(path, Role::train);
+  for (const std::string& path : test_files) collector.add(path, Role::test);
+  Dataset dataset = collector.finish();
+  dataset.check();
+  return dataset;
+}
+
+}  // namespace torsio

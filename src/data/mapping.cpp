@@ -1,0 +1,173 @@
+#include "torsio/data/mapping.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "data/columns.hpp"
+#include "data/names.hpp"
+#include "data/record_clock.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kMostRecords = 10000;
+
+struct NamedRows {
+  std::string name;
+  Rows rows;
+};
+
+std::vector<NamedRows> runs_of_equal_value(const CsvTable& table, const Mapping& mapping,
+                                           const std::string& stem) {
+  const CsvColumn& column = column_named(table, mapping.split_by, mapping.file + ": split_by");
+  std::vector<NamedRows> runs;
+  std::map<double, std::size_t> met;
+  const auto& values = column.values;
+  for (std::size_t begin = 0, end = 0; begin < values.size(); begin = end) {
+    if (std::isnan(values[begin]))
+      throw Error({.place = table.place(begin, column),
+                   .expected = "the number of the record (split_by)",
+                   .found = "nothing"});
+    while (end < values.size() && values[end] == values[begin]) ++end;
+    const std::size_t times = ++met[values[begin]];
+    const bool is_kept = mapping.keep.empty() ||
+                         std::ranges::find(mapping.keep, values[begin]) != mapping.keep.end();
+    if (!is_kept) continue;
+    std::string name = fmt::format("{}[{}={}]", stem, column.name, values[begin]);
+    if (times > 1) name += fmt::format("#{}", times);
+    runs.push_back({.name = std::move(name), .rows = {.begin = begin, .end = end}});
+    if (runs.size() > kMostRecords)
+      throw Error({.place = table.header_place(column),
+                   .problem = fmt::format("split_by gives more than {} records", kMostRecords)});
+  }
+  for (const double value : mapping.keep)
+    if (!met.contains(value))
+      throw Error(
+          {.place = mapping.file + ": keep",
+           .problem = fmt::format("{} is never {} in {}", column.name, value, table.source.file)});
+  return runs;
+}
+
+std::vector<NamedRows> records_of(const CsvTable& table, const Mapping& mapping,
+                                  const std::string& name) {
+  const std::string stem = name.empty() ? file_stem(table.source.file) : name;
+  if (!mapping.split_by.empty()) return runs_of_equal_value(table, mapping, stem);
+  return {{.name = stem, .rows = {.begin = 0, .end = table.rows()}}};
+}
+
+Channel cut(const Channel& channel, Rows rows) {
+  const auto part = [rows](const auto& all) {
+    return std::remove_cvref_t<decltype(all)>(all.begin() + static_cast<std::ptrdiff_t>(rows.begin),
+                                              all.begin() + static_cast<std::ptrdiff_t>(rows.end));
+  };
+  Channel result{.name = channel.name, .values = part(channel.values)};
+  if (!channel.fresh.empty()) result.fresh = part(channel.fresh);
+  return result;
+}
+
+/// Finds the channel that a rule names.
+Channel& channel_of_rule(std::vector<Channel>& channels, const std::string& name,
+                         const Mapping& mapping, const std::string& key) {
+  const auto at = std::ranges::find(channels, name, &Channel::name);
+  if (at != channels.end()) return *at;
+  std::vector<std::string> names;
+  for (const Channel& channel : channels) names.push_back(channel.name);
+  const bool is_derived =
+      std::ranges::find(mapping.derive, name, &ChannelDefinition::name) != mapping.derive.end();
+  throw Error({.place = mapping.file + ": " + key,
+               .problem = is_derived
+                              ? "'" + name + "' is derived, and this acts on measured channels"
+                              : "there is no channel '" + name + "'",
+               .found = "the measured channels " + joined(names),
+               .advice = is_derived ? "Name the channels that it is computed from."
+                                    : did_you_mean(name, names)});
+}
+
+void hold(Channel& channel) {
+  channel.fresh.resize(channel.values.size());
+  double last = kNotMeasured;
+  for (std::size_t i = 0; i < channel.values.size(); ++i) {
+    channel.fresh[i] = std::isnan(channel.values[i]) ? 0 : 1;
+    if (channel.fresh[i] != 0) last = channel.values[i];
+    channel.values[i] = last;
+  }
+}
+
+/// Moves the samples to the time when they were true; at the end nothing is left.
+void advance(Channel& channel, std::size_t samples) {
+  const auto by = static_cast<std::ptrdiff_t>(std::min(samples, channel.values.size()));
+  std::shift_left(channel.values.begin(), channel.values.end(), by);
+  std::fill(channel.values.end() - by, channel.values.end(), kNotMeasured);
+  if (channel.fresh.empty()) return;
+  std::shift_left(channel.fresh.begin(), channel.fresh.end(), by);
+  std::fill(channel.fresh.end() - by, channel.fresh.end(), std::uint8_t{0});
+}
+
+double zero_of(const Channel& channel, const ZeroRule& rule, double sample_rate_Hz) {
+  const auto& values = channel.values;
+  double sum = 0.0;
+  double count = 0.0;
+  double lowest = HUGE_VAL;
+  double highest = -HUGE_VAL;
+  const double wanted =
+      rule.mid_range ? HUGE_VAL : std::max(std::round(rule.first_s * sample_rate_Hz), 1.0);
+  for (std::size_t i = 0; i < values.size() && static_cast<double>(i) < wanted; ++i) {
+    if (std::isnan(values[i])) continue;
+    sum += values[i];
+    count += 1.0;
+    lowest = std::min(lowest, values[i]);
+    highest = std::max(highest, values[i]);
+  }
+  if (count == 0.0)
+    throw Error(
+        {.place = channel.name, .problem = "nothing was measured where its zero should be taken"});
+  return rule.mid_range ? 0.5 * (lowest + highest) : sum / count;
+}
+
+Recording recording_of(const CsvTable& table, const TableChannels& columns, const NamedRows& run,
+                       const Mapping& mapping, double rate_Hz) {
+  const RecordClock clock = record_clock(table, columns, run.rows, mapping, rate_Hz);
+  std::vector<Channel> channels;
+  for (const TableChannel& column : columns.channels)
+    channels.push_back(cut(column.channel, run.rows));
+  for (const std::string& name : mapping.hold)
+    hold(channel_of_rule(channels, name, mapping, "hold"));
+  if (columns.clock && mapping.clock.resample_Hz > 0.0) {
+    const auto stamps =
+        std::span(columns.clock->channel.values).subspan(run.rows.begin, run.rows.size());
+    for (Channel& channel : channels)
+      channel = on_even_clock(channel, stamps, clock.sample_rate_Hz);
+  }
+  for (const LatencyRule& rule : mapping.latency)
+    advance(channel_of_rule(channels, rule.channel, mapping, "latency"),
+            static_cast<std::size_t>(std::round(rule.latency_s * clock.sample_rate_Hz)));
+  for (const ZeroRule& rule : mapping.zero) {
+    Channel& channel = channel_of_rule(channels, rule.channel, mapping, "zero");
+    const double zero = zero_of(channel, rule, clock.sample_rate_Hz);
+    for (double& value : channel.values) value -= zero;
+  }
+  Recording recording(run.name, clock.sample_rate_Hz, clock.start_s);
+  recording.source = table.source;
+  recording.zeros = mapping.zero;
+  for (Channel& channel : channels) recording.add(std::move(channel));
+  return recording;
+}
+
+}  // namespace
+
+std::vector<Recording> measured_recordings(const CsvTable& table, const Mapping& mapping,
+                                           double rate_Hz, const std::string& name) {
+  const TableChannels columns = channels_of_table(table, mapping);
+  std::vector<Recording> recordings;
+  for (const NamedRows& run : records_of(table, mapping, name))
+    recordings.push_back(recording_of(table, columns, run, mapping, rate_Hz));
+  return recordings;
+}
+
+}  // namespace torsio

@@ -1,0 +1,184 @@
+#include "data/record_clock.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "torsio/core/error.hpp"
+#include "torsio/data/clock.hpp"
+#include "torsio/data/resample.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kLongestGapIntervals = 5.0;
+
+/// The stamps of one record, with what is needed to complain about them.
+struct Stamps {
+  const CsvTable& table;
+  const CsvColumn& column;
+  Rows rows;
+  std::span<const double> values_s;
+  ClockReport report;
+
+  [[nodiscard]] std::string place(std::size_t sample) const {
+    return table.place(rows.begin + sample, column);
+  }
+};
+
+constexpr const char* kRemedies =
+    "If the samples were taken evenly and only the stamps are coarse, say in a mapping  clock: "
+    "{rebuild: true}\n  If they were really taken unevenly, say  clock: {resample: 500Hz}  with "
+    "the rate that you want.";
+
+void refuse_unusable(const Stamps& stamps) {
+  if (stamps.rows.size() < 2)
+    throw Error({.place = stamps.place(0),
+                 .expected = "at least two samples, to tell the sample rate",
+                 .found = "one sample"});
+  if (stamps.report.not_finite > 0) {
+    const auto missing =
+        std::ranges::find_if(stamps.values_s, [](double stamp) { return !std::isfinite(stamp); });
+    throw Error({.place = stamps.place(static_cast<std::size_t>(missing - stamps.values_s.begin())),
+                 .expected = "a time stamp",
+                 .found = "nothing",
+                 .advice = "Remove the line, or drop the clock column and tell the rate."});
+  }
+  if (!(stamps.report.sample_rate_Hz > 0.0))
+    throw Error(
+        {.place = stamps.place(stamps.rows.size() - 1),
+         .problem = "the last time stamp is not behind the first",
+         .found = fmt::format("{} s after {} s", stamps.values_s.back(), stamps.values_s.front()),
+         .advice = "Drop the clock column in a mapping and tell the rate:  rate: 1000Hz"});
+}
+
+void refuse_not_increasing(const Stamps& stamps, const char* advice) {
+  const std::size_t at = stamps.report.first_not_increasing;
+  if (at == 0) return;
+  throw Error({.place = stamps.place(at),
+               .problem = fmt::format("the clock does not advance ({} stamps are repeated, {} run "
+                                      "backward)",
+                                      stamps.report.duplicated, stamps.report.backward),
+               .expected = fmt::format("more than {} s", stamps.values_s[at - 1]),
+               .found = fmt::format("{} s", stamps.values_s[at]),
+               .advice = advice});
+}
+
+double even_rate(const Stamps& stamps) {
+  refuse_not_increasing(stamps, kRemedies);
+  const ClockReport& report = stamps.report;
+  const std::size_t odd = report.worst_interval;
+  if (!report.is_uniform())
+    throw Error({.place = stamps.place(odd),
+                 .problem = fmt::format("the clock is not even (a stamp strays by {:.3g} samples)",
+                                        report.largest_stray_s * report.sample_rate_Hz),
+                 .expected = fmt::format("an interval near {:.6g} s", report.stamp_step_s),
+                 .found = fmt::format("{:.6g} s", stamps.values_s[odd] - stamps.values_s[odd - 1]),
+                 .advice = kRemedies});
+  const double first = stamps.values_s.front();
+  const double last = stamps.values_s.back();
+  const double rounding = 4.0 * std::numeric_limits<double>::epsilon();
+  const double tolerance =
+      (report.largest_stray_s + rounding * std::max(std::abs(first), std::abs(last))) /
+          (last - first) +
+      rounding;
+  return simplest_rate(report.sample_rate_Hz, tolerance);
+}
+
+double rebuilt_rate(const Stamps& stamps, double max_stray_steps) {
+  const ClockReport& report = stamps.report;
+  const double steps = report.largest_stray_s / report.stamp_step_s;
+  if (!(steps <= max_stray_steps))
+    throw Error(
+        {.place = stamps.place(report.most_stray),
+         .problem = "the samples were not taken evenly enough to rebuild the clock",
+         .expected = fmt::format("at most {} stamp steps of {:.4g} s away from an even spread",
+                                 max_stray_steps, report.stamp_step_s),
+         .found = fmt::format("{:.2f} steps", steps),
+         .advice = fmt::format("Leave this record out (keep:), or accept it knowingly:  clock: "
+                               "{{rebuild: true, max_stray_steps: {:.0f}}}",
+                               std::ceil(steps))});
+  return report.sample_rate_Hz;
+}
+
+void refuse_gaps(const Stamps& stamps) {
+  refuse_not_increasing(stamps, "Resampling needs stamps that increase.");
+  for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
+    const double interval = stamps.values_s[i] - stamps.values_s[i - 1];
+    if (interval > kLongestGapIntervals * stamps.report.stamp_step_s)
+      throw Error({.place = stamps.place(i),
+                   .problem = "a gap too long to interpolate over",
+                   .expected = fmt::format("at most {} intervals of {:.4g} s", kLongestGapIntervals,
+                                           stamps.report.stamp_step_s),
+                   .found = fmt::format("{:.4g} s", interval),
+                   .advice = "Cut the log there into two files."});
+  }
+}
+
+double told_rate(const CsvTable& table, const Mapping& mapping, double rate_Hz) {
+  const double rate = mapping.rate_Hz > 0.0 ? mapping.rate_Hz : rate_Hz;
+  if (rate > 0.0) return rate;
+  throw Error({.place = fmt::format("{}: line {}", table.source.file, table.header_line),
+               .problem = "the log has no clock",
+               .expected = "a column t_s (or t_ms, time_us ...)",
+               .found = "the columns " + table.column_list(),
+               .advice = "Tell the sample rate: --rate 1000, or  rate: 1000Hz  in a mapping."});
+}
+
+}  // namespace
+
+RecordClock record_clock(const CsvTable& table, const TableChannels& columns, Rows rows,
+                         const Mapping& mapping, double rate_Hz) {
+  if (!columns.clock) return {.sample_rate_Hz = told_rate(table, mapping, rate_Hz)};
+  const CsvColumn& column = *columns.clock->column;
+  if (mapping.rate_Hz > 0.0)
+    throw Error({.place = mapping.file + ": rate",
+                 .problem = "the log has a clock of its own, column " + column.name,
+                 .advice = "Remove 'rate:', or drop the column:  drop: [" + column.name + "]"});
+  const std::span<const double> values_s =
+      std::span(columns.clock->channel.values).subspan(rows.begin, rows.size());
+  const Stamps stamps{table, column, rows, values_s, inspect_clock(values_s)};
+  refuse_unusable(stamps);
+  RecordClock clock{.start_s = values_s.front()};
+  if (mapping.clock.rebuild) {
+    clock.sample_rate_Hz = rebuilt_rate(stamps, mapping.clock.max_stray_steps);
+  } else if (mapping.clock.resample_Hz > 0.0) {
+    refuse_gaps(stamps);
+    clock.sample_rate_Hz = mapping.clock.resample_Hz;
+  } else {
+    clock.sample_rate_Hz = even_rate(stamps);
+  }
+  return clock;
+}
+
+Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,
+                      double sample_rate_Hz) {
+  const double periods = (stamps_s.back() - stamps_s.front()) * sample_rate_Hz;
+  constexpr double kMostSamples = 1e9;
+  if (!(periods < kMostSamples))
+    throw Error({.place = channel.name,
+                 .problem = fmt::format("{} Hz would give more than {} samples", sample_rate_Hz,
+                                        kMostSamples)});
+  const auto samples = static_cast<std::size_t>(periods + 1e-9) + 1;
+  Channel even{.name = channel.name, .values = {}};
+  if (channel.fresh.empty()) {
+    even.values = interpolate(stamps_s, channel.values, sample_rate_Hz, samples);
+    return even;
+  }
+  even.values.resize(samples);
+  even.fresh.assign(samples, 0);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double time = stamps_s.front() + static_cast<double>(i) / sample_rate_Hz;
+    for (; next < stamps_s.size() && stamps_s[next] <= time; ++next)
+      if (channel.fresh[next] != 0) even.fresh[i] = 1;
+    even.values[i] = channel.values[std::max<std::size_t>(next, 1) - 1];
+  }
+  return even;
+}
+
+}  // namespace torsio

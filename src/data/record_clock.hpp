@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "data/columns.hpp"
+#include "torsio/data/csv.hpp"
+#include "torsio/data/mapping.hpp"
+
+namespace torsio {
+
+/// Rows [begin, end) of a table that make one record.
+struct Rows {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  [[nodiscard]] std::size_t size() const noexcept { return end - begin; }
+};
+
+struct RecordClock {
+  double sample_rate_Hz = 0.0;
+  double start_s = 0.0;
+};
+
+/// The clock of some rows by the mapping's rules; `rate_Hz` where neither log nor mapping tells.
+[[nodiscard]] RecordClock record_clock(const CsvTable& table, const TableChannels& columns,
+                                       Rows rows, const Mapping& mapping, double rate_Hz);
+
+/// Puts a channel of uneven stamps onto the even clock: interpolated, or held if it has a mask.
+[[nodiscard]] Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,
+                                    double sample_rate_Hz);
+
+}  // namespace torsio

@@ -1,0 +1,121 @@
+#include "torsio/data/resample.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+/// A signal between its samples; positions count source samples.
+class PiecewiseLinear {
+ public:
+  explicit PiecewiseLinear(std::span<const double> values) : values_(values) {}
+
+  [[nodiscard]] double at(double position) const {
+    const std::size_t left = index(position);
+    const double share = position - static_cast<double>(left);
+    if (share == 0.0) return values_[left];
+    return values_[left] + share * (values_[left + 1] - values_[left]);
+  }
+
+  [[nodiscard]] double mean(double from, double to) const {
+    double integral = 0.0;
+    double left = from;
+    double left_value = at(from);
+    while (left < to) {
+      const double right = std::min(std::floor(left) + 1.0, to);
+      const double right_value = at(right);
+      integral += 0.5 * (left_value + right_value) * (right - left);
+      left = right;
+      left_value = right_value;
+    }
+    return integral / (to - from);
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(double position) const {
+    return std::min(static_cast<std::size_t>(position), values_.size() - 1);
+  }
+  std::span<const double> values_;
+};
+
+std::vector<double> held(const Channel& channel, double step, std::size_t samples,
+                         std::vector<std::uint8_t>& fresh) {
+  std::vector<double> values(samples);
+  fresh.assign(samples, 0);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < samples; ++i) {
+    const auto last = std::min(static_cast<std::size_t>(static_cast<double>(i) * step + 1e-9),
+                               channel.values.size() - 1);
+    for (; next <= last; ++next)
+      if (channel.is_fresh(next)) fresh[i] = 1;
+    values[i] = channel.values[last];
+  }
+  return values;
+}
+
+std::vector<double> smooth(const Channel& channel, double step, std::size_t samples) {
+  const PiecewiseLinear signal(channel.values);
+  const auto last = static_cast<double>(channel.values.size() - 1);
+  std::vector<double> values(samples);
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double position = std::min(static_cast<double>(i) * step, last);
+    const double half = step > 1.0 ? std::min({0.5 * step, position, last - position}) : 0.0;
+    values[i] = half > 0.0 ? signal.mean(position - half, position + half) : signal.at(position);
+  }
+  return values;
+}
+
+}  // namespace
+
+Recording resample(const Recording& recording, double sample_rate_Hz) {
+  const double start_s = recording.time_s(0);
+  Recording result(recording.name(), sample_rate_Hz, start_s);
+  result.source = recording.source;
+  result.definitions = recording.definitions;
+  result.zeros = recording.zeros;
+  if (recording.size() == 0) return result;
+
+  const double step = recording.sample_rate_Hz() / sample_rate_Hz;
+  const double periods = static_cast<double>(recording.size() - 1) / step;
+  constexpr double kMostSamples = 1e9;
+  if (!(periods < kMostSamples))
+    throw Error({.place = recording.name(),
+                 .problem = fmt::format("{} Hz would give more than {} samples", sample_rate_Hz,
+                                        kMostSamples)});
+  const auto samples = static_cast<std::size_t>(periods + 1e-9) + 1;
+  const auto is_condition = [&](const std::string& name) {
+    return std::ranges::find(recording.conditions(), name) != recording.conditions().end();
+  };
+  for (const Channel& channel : recording.channels()) {
+    if (is_condition(channel.name)) continue;
+    Channel moved{.name = channel.name, .values = {}};
+    moved.values = channel.fresh.empty() ? smooth(channel, step, samples)
+                                         : held(channel, step, samples, moved.fresh);
+    result.add(std::move(moved));
+  }
+  for (const std::string& name : recording.conditions())
+    result.add_condition(name, recording.channel(name).values.front());
+  return result;
+}
+
+std::vector<double> interpolate(std::span<const double> stamps, std::span<const double> values,
+                                double sample_rate_Hz, std::size_t samples) {
+  std::vector<double> even(samples);
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double time = stamps.front() + static_cast<double>(i) / sample_rate_Hz;
+    while (left + 2 < stamps.size() && stamps[left + 1] <= time) ++left;
+    const double share = std::min((time - stamps[left]) / (stamps[left + 1] - stamps[left]), 1.0);
+    even[i] =
+        share == 0.0 ? values[left] : values[left] + share * (values[left + 1] - values[left]);
+  }
+  return even;
+}
+
+}  // namespace torsio

@@ -1,0 +1,144 @@
+#include "data/yaml_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "data/byte_source.hpp"
+#include "data/names.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kLongestFile = std::size_t{1} << 20;
+
+}  // namespace
+
+YamlValue YamlValue::parse(std::string_view text, const std::string& file) {
+  if (text.size() > kLongestFile)
+    throw Error({.place = file,
+                 .expected = fmt::format("a YAML file of at most {} bytes", kLongestFile),
+                 .found = "a longer one"});
+  try {
+    return {YAML::Load(std::string(text)), file, {}};
+  } catch (const YAML::Exception& problem) {
+    throw Error({.place = fmt::format("{}: line {}, column {}", file, problem.mark.line + 1,
+                                      problem.mark.column + 1),
+                 .problem = "this is no YAML: " + problem.msg});
+  }
+}
+
+YamlValue YamlValue::read(const std::string& path) {
+  const auto source = open_bytes(path);
+  std::string text(kLongestFile + 1, '\0');
+  std::size_t size = 0;
+  while (size < text.size()) {
+    const std::size_t got = source->read(text.data() + size, text.size() - size);
+    if (got == 0) break;
+    size += got;
+  }
+  return parse(std::string_view(text).substr(0, size), path);
+}
+
+std::string YamlValue::place() const {
+  const YAML::Mark mark = node_.Mark();
+  std::string place = file_;
+  if (!mark.is_null()) place += fmt::format(": line {}", mark.line + 1);
+  if (!path_.empty()) place += fmt::format(" ({})", printable(path_));
+  return place;
+}
+
+void YamlValue::refuse(const std::string& expected, const std::string& advice) const {
+  std::string found = "nothing";
+  if (node_.IsMap()) found = "a map";
+  if (node_.IsSequence()) found = "a list";
+  if (node_.IsScalar()) found = "'" + printable(node_.Scalar()) + "'";
+  throw Error({.place = place(), .expected = expected, .found = found, .advice = advice});
+}
+
+std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
+  if (!node_.IsMap()) refuse("keys with values, 'key: value'");
+  std::vector<std::pair<std::string, YamlValue>> all;
+  std::set<std::string> seen;
+  for (const auto& entry : node_) {
+    if (!entry.first.IsScalar()) refuse("keys that are plain text");
+    std::string key = entry.first.Scalar();
+    if (!seen.insert(key).second)
+      throw Error({.place = YamlValue(entry.first, file_, path_).place(),
+                   .problem = "the key '" + printable(key) + "' stands twice"});
+    const std::string path = path_.empty() ? key : path_ + "." + key;
+    all.emplace_back(std::move(key), YamlValue(entry.second, file_, path));
+  }
+  return all;
+}
+
+void YamlValue::allow_only(std::initializer_list<std::string_view> keys) const {
+  const std::vector<std::string> known(keys.begin(), keys.end());
+  for (const auto& [key, value] : entries())
+    if (std::ranges::find(known, key) == known.end())
+      throw Error({.place = value.place(),
+                   .problem = "unknown key '" + printable(key) + "'",
+                   .expected = "one of " + joined(known),
+                   .advice = did_you_mean(key, known)});
+}
+
+std::optional<YamlValue> YamlValue::find(std::string_view wanted) const {
+  for (auto& [key, value] : entries())
+    if (key == wanted) return value;
+  return std::nullopt;
+}
+
+YamlValue YamlValue::at(std::string_view key) const {
+  if (auto value = find(key)) return *value;
+  throw Error({.place = place(), .problem = fmt::format("the key '{}' is missing", key)});
+}
+
+std::vector<YamlValue> YamlValue::items() const {
+  if (node_.IsScalar()) return {*this};
+  if (!node_.IsSequence()) refuse("a list");
+  std::vector<YamlValue> all;
+  for (const auto& item : node_)
+    all.push_back(YamlValue(item, file_, fmt::format("{}[{}]", path_, all.size())));
+  return all;
+}
+
+std::vector<std::string> YamlValue::texts() const {
+  std::vector<std::string> all;
+  for (const YamlValue& item : items()) all.push_back(item.text());
+  return all;
+}
+
+std::string YamlValue::text() const {
+  if (!node_.IsScalar() || node_.Scalar().empty()) refuse("text");
+  return node_.Scalar();
+}
+
+double YamlValue::number(std::string_view si_unit) const {
+  if (!node_.IsScalar()) refuse("a number");
+  return si_quantity(node_.Scalar(), si_unit, place());
+}
+
+double YamlValue::positive_number(std::string_view si_unit) const {
+  const double value = number(si_unit);
+  if (!(value > 0.0)) refuse("a positive number");
+  return value;
+}
+
+std::size_t YamlValue::count() const {
+  const double value = number();
+  constexpr double kLargest = 1e9;
+  if (!(value >= 0.0 && value <= kLargest) || value != std::trunc(value)) refuse("a whole number");
+  return static_cast<std::size_t>(value);
+}
+
+bool YamlValue::boolean() const {
+  bool value = false;
+  if (!node_.IsScalar() || !YAML::convert<bool>::decode(node_, value)) refuse("true or false");
+  return value;
+}
+
+}  // namespace torsio

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <cstddef>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace torsio {
+
+/// A YAML value that knows its place, so that every complaint names file, line and key.
+class YamlValue {
+ public:
+  /// @throws Error if the text is no YAML or too large.
+  static YamlValue parse(std::string_view text, const std::string& file);
+  static YamlValue read(const std::string& path);
+
+  [[nodiscard]] std::string place() const;
+  [[nodiscard]] const std::string& file() const noexcept { return file_; }
+  [[nodiscard]] bool is_map() const { return node_.IsMap(); }
+  [[nodiscard]] bool is_list() const { return node_.IsSequence(); }
+  [[nodiscard]] bool is_scalar() const { return node_.IsScalar(); }
+
+  /// Key and value of a map, in file order. @throws Error if this is no map or a key stands twice.
+  [[nodiscard]] std::vector<std::pair<std::string, YamlValue>> entries() const;
+  /// @throws Error for a key that is not listed, with the nearest one that is.
+  void allow_only(std::initializer_list<std::string_view> keys) const;
+  [[nodiscard]] std::optional<YamlValue> find(std::string_view key) const;
+  [[nodiscard]] YamlValue at(std::string_view key) const;  ///< @throws Error if missing
+
+  [[nodiscard]] std::vector<YamlValue> items() const;  ///< of a list, or a scalar as a list of one
+  [[nodiscard]] std::vector<std::string> texts() const;
+  [[nodiscard]] std::string text() const;
+  /// A number in the SI unit, which may carry another unit of the same quantity.
+  [[nodiscard]] double number(std::string_view si_unit = "1") const;
+  [[nodiscard]] double positive_number(std::string_view si_unit) const;
+  [[nodiscard]] std::size_t count() const;
+  [[nodiscard]] bool boolean() const;
+
+  [[noreturn]] void refuse(const std::string& expected, const std::string& advice = {}) const;
+
+ private:
+  YamlValue(YAML::Node node, std::string file, std::string path)
+      : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)) {}
+
+  YAML::Node node_;
+  std::string file_;
+  std::string path_;  ///< keys down to here: "clock.rebuild"
+};
+
+}  // namespace torsio

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "torsio/core/matrix.hpp"
+#include "torsio/model/schedule.hpp"
+#include "torsio/train/training_data.hpp"
+
+namespace torsio {
+
+/// A model that is linear in its coefficients, before they are fitted.
+struct Design {
+  Matrix columns;                  ///< samples x coefficients; zero where a term is left out
+  std::vector<double> target;      ///< one a sample
+  std::vector<std::string> terms;  ///< what a column is, for messages; empty: left out on purpose
+};
+
+/// Which samples each row of coefficients is fitted to: all of them, or those at each distinct
+/// value of the scheduling input.
+struct Groups {
+  CoefficientSchedule frame;  ///< without values
+  std::string feature;        ///< expression of the scheduling input, empty if not scheduled
+  std::vector<std::vector<std::size_t>> samples;
+};
+
+/// @param schedule expression of the scheduling input; empty: one group.
+/// @param feature_of the scheduling input's value in each sample is `features(sample, index)`.
+/// @throws UsageError if no input is called that, Error if it has less than 2 or more than 64
+/// distinct values.
+[[nodiscard]] Groups groups_by(const std::string& schedule, const TrainingData& data,
+                               const Matrix& features);
+
+struct DesignFit {
+  CoefficientSchedule coefficients;
+  std::vector<std::string> notes;
+};
+
+/// Least squares in every group. Terms that a group cannot tell apart are dropped there, with a
+/// note.
+/// @throws Error if a group has fewer than `kSamplesPerTerm` samples for each term.
+[[nodiscard]] DesignFit fit_design(const Design& design, const Groups& groups);
+inline constexpr std::size_t kSamplesPerTerm = 5;
+
+/// The rows of the design and of the target that belong to `samples`.
+[[nodiscard]] Matrix rows_of(const Matrix& matrix, std::span<const std::size_t> samples);
+[[nodiscard]] std::vector<double> rows_of(const std::vector<double>& values,
+                                          std::span<const std::size_t> samples);
+
+/// Whether input j gets a linear term: it does unless it schedules or is a rate that the family was
+/// not asked to include.
+[[nodiscard]] bool has_slope(const TrainingData& data, std::size_t input, const Groups& groups,
+                             bool rates);
+
+/// Fills the columns `first`... with the inputs that `has_slope`, and names them.
+void add_slopes(Design& design, std::size_t first, const TrainingData& data, const Matrix& features,
+                const Groups& groups, bool rates);
+
+}  // namespace torsio

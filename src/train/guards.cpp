@@ -1,0 +1,108 @@
+#include "torsio/train/guards.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "train/least_squares.hpp"
+
+namespace torsio {
+namespace {
+
+struct Residual {
+  double value = 0.0;  ///< what the model said
+  double error = 0.0;
+};
+
+std::vector<Residual> residuals(AnyModel& model, const TrainingData& data) {
+  std::vector<Residual> all;
+  for (const Sequence& sequence : data.sequences) {
+    model.reset();
+    for (std::size_t n = 0; n < sequence.target.size(); ++n) {
+      const Estimate told = model.step(sequence.features.row(n));
+      if (sequence.use[n] != 0 && std::isfinite(told.value) && told.fault == Fault::none)
+        all.push_back({told.value, told.value - sequence.target[n]});
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+FeatureRanges feature_ranges(const TrainingData& data) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  FeatureRanges ranges;
+  ranges.lowest.assign(data.input_count(), kInfinity);
+  ranges.highest.assign(data.input_count(), -kInfinity);
+  const Matrix features = usable_table(data).features;
+  for (std::size_t n = 0; n < features.rows; ++n) {
+    for (std::size_t j = 0; j < features.columns; ++j) {
+      ranges.lowest[j] = std::min(ranges.lowest[j], features(n, j));
+      ranges.highest[j] = std::max(ranges.highest[j], features(n, j));
+    }
+  }
+  return ranges;
+}
+
+LinearFallback linear_fallback(const TrainingData& data) {
+  const Table table = usable_table(data);
+  Matrix design(table.features.rows, 1 + data.input_count(), 1.0);
+  for (std::size_t n = 0; n < design.rows; ++n)
+    std::ranges::copy(table.features.row(n), design.row(n).begin() + 1);
+  const LeastSquares solved = least_squares(design, table.target);
+  LinearFallback fallback;
+  fallback.intercept = solved.coefficients.front();
+  fallback.slope.assign(solved.coefficients.begin() + 1, solved.coefficients.end());
+  double square_sum = 0.0;
+  for (std::size_t n = 0; n < design.rows; ++n) {
+    double error = -table.target[n];
+    for (std::size_t j = 0; j < design.columns; ++j) error += design(n, j) * solved.coefficients[j];
+    square_sum += error * error;
+  }
+  const std::size_t terms = design.columns - solved.dropped.size();
+  if (design.rows > terms)
+    fallback.residual_std = std::sqrt(square_sum / static_cast<double>(design.rows - terms));
+  return fallback;
+}
+
+ResidualTable residual_table(AnyModel model, const TrainingData& data) {
+  std::vector<Residual> all = residuals(model, data);
+  const std::size_t regions = std::min(all.size() / kResidualsPerRegion, kMostResidualRegions);
+  if (regions == 0) return {};
+  std::ranges::stable_sort(all, {}, &Residual::value);
+  ResidualTable table;
+  table.edges.push_back(all.front().value);
+  std::size_t begin = 0;
+  for (std::size_t region = 1; region <= regions; ++region) {
+    std::size_t end = all.size() * region / regions;
+    // Equal outputs stay in one region, so that edges ascend.
+    while (end < all.size() && all[end].value == all[end - 1].value) ++end;
+    if (end < begin + kResidualsPerRegion) continue;
+    if (all.size() - end < kResidualsPerRegion) end = all.size();
+    double square_sum = 0.0;
+    for (std::size_t n = begin; n < end; ++n) square_sum += all[n].error * all[n].error;
+    const double rms = std::sqrt(square_sum / static_cast<double>(end - begin));
+    table.edges.push_back(end < all.size() ? all[end].value : all.back().value);
+    // Never 0, which would claim certainty: a model may meet its training data exactly.
+    table.std_dev.push_back(std::max(rms, std::numeric_limits<double>::min()));
+    begin = end;
+    if (begin == all.size()) break;
+  }
+  return table;
+}
+
+EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingData& training,
+                                   const AnyModel& model, const TrainingData* validation) {
+  EstimatorSettings settings;
+  settings.features = features;
+  settings.sample_rate_Hz = training.sample_rate_Hz;
+  settings.target = training.target;
+  settings.ranges = feature_ranges(training);
+  settings.fallback = linear_fallback(training);
+  settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
+  return settings;
+}
+
+}  // namespace torsio

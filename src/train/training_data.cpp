@@ -1,0 +1,101 @@
+#include "torsio/train/training_data.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+std::vector<std::uint8_t> role_mask(const DatasetRecord& record, Role role) {
+  std::vector<std::uint8_t> mask(record.recording.size(), 0);
+  for (const Segment& segment : record.segments)
+    if (segment.role == role)
+      std::fill(mask.begin() + static_cast<std::ptrdiff_t>(segment.begin),
+                mask.begin() + static_cast<std::ptrdiff_t>(segment.end), std::uint8_t{1});
+  return mask;
+}
+
+std::vector<const Channel*> raw_channels(const Recording& recording,
+                                         const FeaturePipeline& pipeline) {
+  std::vector<const Channel*> channels;
+  for (const std::string& channel_name : pipeline.raw_inputs()) {
+    const Channel& channel = recording.channel(channel_name);
+    const auto bad =
+        std::ranges::find_if(channel.values, [](double value) { return !std::isfinite(value); });
+    if (bad != channel.values.end())
+      throw Error({.place = recording.name() + ": channel " + channel_name + ", sample " +
+                            std::to_string(bad - channel.values.begin()),
+                   .expected = "a finite value, since the model's inputs need it",
+                   .found = std::to_string(*bad),
+                   .advice = "Cut the gap out of the record or choose inputs without this channel; "
+                             "only the target may be missing."});
+    channels.push_back(&channel);
+  }
+  return channels;
+}
+
+Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::string& target,
+             Role role) {
+  const Recording& recording = record.recording;
+  const std::vector<const Channel*> channels = raw_channels(recording, pipeline);
+  const Channel& measured = recording.channel(target);
+  Sequence sequence{.recording = recording.name(),
+                    .features = Matrix(recording.size(), pipeline.feature_count()),
+                    .target = measured.values,
+                    .use = role_mask(record, role)};
+  std::vector<double> raw(channels.size());
+  pipeline.reset();
+  for (std::size_t n = 0; n < recording.size(); ++n) {
+    std::ranges::transform(channels, raw.begin(),
+                           [n](const Channel* channel) { return channel->values[n]; });
+    std::ranges::copy(pipeline.step(raw), sequence.features.row(n).begin());
+    if (!pipeline.is_settled() || !measured.is_fresh(n) || !std::isfinite(measured.values[n]))
+      sequence.use[n] = 0;
+  }
+  return sequence;
+}
+
+/// A feature that is not finite (a division, a power) may not be learned from, and the model could
+/// not be asked there either.
+void check_features(const TrainingData& data) {
+  for (const Sequence& sequence : data.sequences) {
+    const auto& values = sequence.features.values;
+    const auto bad =
+        std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
+    if (bad == values.end()) continue;
+    const auto index = static_cast<std::size_t>(bad - values.begin());
+    throw Error({.place = sequence.recording + ": input " +
+                          data.inputs[index % data.input_count()].expression + ", sample " +
+                          std::to_string(index / data.input_count()),
+                 .expected = "a finite value",
+                 .found = std::to_string(*bad),
+                 .advice = "Change the expression so that it stays finite for every sample."});
+  }
+}
+
+}  // namespace
+
+TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role role) {
+  FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
+  TrainingData data{.target = dataset.target, .sample_rate_Hz = dataset.sample_rate_Hz()};
+  for (std::size_t j = 0; j < pipeline.feature_count(); ++j)
+    data.inputs.push_back({spec.inputs[j], pipeline.is_rate(j)});
+  const auto has_role = [role](const DatasetRecord& record) {
+    return std::ranges::any_of(record.segments,
+                               [role](const Segment& segment) { return segment.role == role; });
+  };
+  for (const DatasetRecord& record : dataset.records)
+    if (has_role(record)) data.sequences.push_back(run(record, pipeline, dataset.target, role));
+  check_features(data);
+  if (data.usable_samples() == 0)
+    throw Error({.problem = "nothing to use with role " + std::string(name(role)),
+                 .expected = "samples with a measured " + dataset.target +
+                             " after the filters have settled (" +
+                             std::to_string(pipeline.settling_samples()) + " samples)",
+                 .found = std::to_string(data.sequences.size()) + " records of that role"});
+  return data;
+}
+
+}  // namespace torsio

@@ -1,0 +1,179 @@
+#include "torsio/data/csv.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+#include <zlib.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "data/temporary_folder.hpp"
+
+namespace torsio {
+namespace {
+
+std::string gzipped(const std::string& text) {
+  std::string packed(text.size() + 200, '\0');
+  z_stream stream{};
+  deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
+  std::string copy = text;
+  stream.next_in = reinterpret_cast<Bytef*>(copy.data());
+  stream.avail_in = static_cast<uInt>(copy.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+void expect_two_rows(const CsvTable& table) {
+  ASSERT_EQ(table.columns.size(), 2U);
+  EXPECT_EQ(table.columns[0].name, "t_s");
+  EXPECT_EQ(table.columns[1].name, "torque_Nm");
+  EXPECT_EQ(table.columns[0].values, (std::vector<double>{0.0, 0.5}));
+  EXPECT_EQ(table.columns[1].values, (std::vector<double>{1.5, -2.0}));
+}
+
+class CsvDialect : public testing::TestWithParam<std::string> {};
+
+TEST_P(CsvDialect, IsReadLikeThePlainOne) { expect_two_rows(parse_csv(GetParam(), "a.csv")); }
+
+INSTANTIATE_TEST_SUITE_P(
+    All, CsvDialect,
+    testing::Values(
+        "t_s,torque_Nm\n0,1.5\n0.5,-2\n", "t_s,torque_Nm\n0,1.5\n0.5,-2",
+        "t_s,torque_Nm\r\n0,1.5\r\n0.5,-2\r\n", "\xef\xbb\xbft_s,torque_Nm\n0,1.5\n0.5,-2\n",
+        "\xef\xbb\xbf# made by hand\n\nt_s,torque_Nm\n0,1.5\n# a pause\n\n0.5,-2\n",
+        "t_s;torque_Nm\n0;1.5\n0.5;-2\n", "t_s;torque_Nm\n0;1,5\n0,5;-2\n",
+        "t_s\ttorque_Nm\n0\t1.5\n0.5\t-2\n", "t_s\ttorque_Nm\n0\t1,5\n0,5\t-2\n",
+        "\"t_s\",\"torque_Nm\"\n0,1.5\n0.5,-2\n", "\"t_s\"; \"torque_Nm\"\n\"0\";\"1,5\"\n0,5;-2\n",
+        " t_s , torque_Nm\n 0, +1.5 \n .5,-2.\n", "t_s,torque_Nm\n0E0,15e-1\n5e-1,-0.2e+1\n",
+        gzipped("t_s,torque_Nm\n0,1.5\n0.5,-2\n"),
+        gzipped("t_s,torque_Nm\n0,1.5\n") + gzipped("0.5,-2\n")));
+
+TEST(Csv, AQuotedHeaderMayHoldSeparatorsAndQuotes) {
+  const CsvTable table = parse_csv("\"a,b_rad\",\"say \"\"x\"\"_1\"\n1,2\n", "a.csv");
+  ASSERT_EQ(table.columns.size(), 2U);
+  EXPECT_EQ(table.columns[0].name, "a,b_rad");
+  EXPECT_EQ(table.columns[1].name, "say \"x\"_1");
+}
+
+TEST(Csv, EmptyCellsAndNanAreMissingValues) {
+  const CsvTable table = parse_csv("a_1,b_1,c_1\n,nan,\nNaN, ,3\n", "a.csv");
+  EXPECT_TRUE(std::isnan(table.columns[0].values[0]));
+  EXPECT_TRUE(std::isnan(table.columns[0].values[1]));
+  EXPECT_TRUE(std::isnan(table.columns[1].values[0]));
+  EXPECT_TRUE(std::isnan(table.columns[1].values[1]));
+  EXPECT_TRUE(std::isnan(table.columns[2].values[0]));
+  EXPECT_EQ(table.columns[2].values[1], 3.0);
+}
+
+TEST(Csv, ASkippedColumnMayHoldAnything) {
+  const CsvTable table =
+      parse_csv("a_1,phase,b_1\n1,\"up, then down\",2\n3,down,4\n", "a.csv", {.skip = {"phase"}});
+  ASSERT_EQ(table.columns.size(), 2U);
+  EXPECT_EQ(table.columns[1].values, (std::vector<double>{2.0, 4.0}));
+  EXPECT_EQ(table.columns[1].number, 3U);
+}
+
+TEST(Csv, LineNumbersCountCommentsAndBlankLines) {
+  const CsvTable table = parse_csv("# one\na_1\n1\n2\n\n# six\n3\n4\n", "a.csv");
+  EXPECT_EQ(table.line_of(0), 3U);
+  EXPECT_EQ(table.line_of(1), 4U);
+  EXPECT_EQ(table.line_of(2), 7U);
+  EXPECT_EQ(table.line_of(3), 8U);
+  EXPECT_EQ(table.place(2, table.columns[0]), "a.csv: line 7, column 1 (a_1)");
+}
+
+TEST(Csv, TellsTheSha256OfTheFileAsItStands) {
+  const TemporaryFolder folder;
+  // printf 'a_1\n1\n' | sha256sum
+  const std::string path = folder.file("a.csv", "a_1\n1\n");
+  const CsvTable table = read_csv(path);
+  EXPECT_EQ(table.source.file, path);
+  EXPECT_EQ(table.source.sha256,
+            "2ea78cc556ed74a182f57b9ecce150d3ba98cc351c83464a486ded36bcf90042");
+}
+
+TEST(Csv, ReadsLinesThatCrossEveryBufferBorder) {
+  std::string text = "a_1,b_1\n";
+  std::vector<double> expected;
+  for (int i = 0; text.size() < 1'000'000; ++i) {
+    text += std::to_string(i) + "," + std::string(static_cast<std::size_t>(i % 17), '0') + "7\n";
+    expected.push_back(i);
+  }
+  EXPECT_EQ(parse_csv(text, "a.csv").columns[0].values, expected);
+  EXPECT_EQ(parse_csv(text, "a.csv").columns[1].values, std::vector<double>(expected.size(), 7.0));
+}
+
+TEST(Csv, EveryNumberIsRoundedCorrectly) {
+  EXPECT_TRUE(rc::check("the shortest text of a double reads back as it", [](std::uint64_t bits) {
+    const auto value = std::bit_cast<double>(bits);
+    RC_PRE(std::isfinite(value));
+    for (const auto& text : {fmt::format("{}", value), fmt::format("{:.17g}", value),
+                             fmt::format("{:.17e}", value), fmt::format("{:.25g}", value)}) {
+      const double read = parse_csv("a_1\n" + text + "\n", "a.csv").columns[0].values[0];
+      RC_ASSERT(std::bit_cast<std::uint64_t>(read) == bits);
+    }
+  }));
+  EXPECT_TRUE(rc::check("a short decimal reads like strtod", [](std::int64_t mantissa) {
+    const int places = *rc::gen::inRange(-25, 25);
+    const std::string text = fmt::format("{}e{}", mantissa, places);
+    RC_ASSERT(parse_csv("a_1\n" + text + "\n", "a.csv").columns[0].values[0] ==
+              std::strtod(text.c_str(), nullptr));
+  }));
+}
+
+TEST(Csv, NumbersBeyondTheRangeOfDoublesBecomeZeroOrAreRefused) {
+  EXPECT_EQ(parse_csv("a_1\n1e-999\n", "a.csv").columns[0].values[0], 0.0);
+  EXPECT_THROW(parse_csv("a_1\n1e999\n", "a.csv"), std::exception);
+}
+
+Recording example(std::size_t samples) {
+  Recording recording("example", 1000.0, 0.25);
+  std::vector<double> angle(samples);
+  std::vector<double> torque(samples);
+  std::vector<std::uint8_t> fresh(samples);
+  for (std::size_t i = 0; i < samples; ++i) {
+    angle[i] = std::sin(0.01 * static_cast<double>(i));
+    torque[i] = i % 3 == 0 ? -0.0 : std::nan("");
+    fresh[i] = i % 3 == 0 ? 1 : 0;
+  }
+  recording.add({.name = "angle_rad", .values = angle});
+  recording.add({.name = "torque_Nm", .values = torque, .fresh = fresh});
+  return recording;
+}
+
+TEST(CsvWriter, WritesTheClockFirstAndFreshnessBesideItsChannel) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path("a.csv");
+  write_csv(example(2), path);
+  std::ifstream file(path);
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  EXPECT_EQ(
+      text,
+      "t_s,angle_rad,torque_Nm,torque_fresh_1\n0.25,0,-0,1\n0.251,0.009999833334166664,nan,0\n");
+}
+
+TEST(CsvWriter, LeavesTheOldFileAndNothingElseWhenItFails) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.csv", "old");
+  Recording infinite("infinite", 1.0);
+  infinite.add({.name = "a_1", .values = {1.0, HUGE_VAL}});
+  EXPECT_THROW(write_csv(infinite, path), std::exception);
+  std::ifstream file(path);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "old");
+  EXPECT_EQ(folder.files(), 1U);
+  EXPECT_THROW(write_csv(example(2), folder.path("missing/a.csv")), std::exception);
+  EXPECT_THROW(write_csv(example(100000), "/dev/full"), std::exception);
+}
+
+}  // namespace
+}  // namespace torsio
