@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <string>
 
+#include "data/temporary_folder.hpp"
 #include "support/example_model_file.hpp"
-#include "support/temporary_folder.hpp"
 
 namespace torsio {
 namespace {
@@ -24,11 +24,12 @@ std::string output_of(const std::string& command) {
 
 TEST(ForeignReader, OpensAModelFile) {
   if (!std::filesystem::exists(kPython)) GTEST_SKIP() << "no " << kPython;
-  const test::TemporaryFolder folder;
-  save_model(folder / "m.safetensors", test::example_model_file(test::example<LinearCoulomb>()));
+  const TemporaryFolder folder;
+  save_model(folder.path("m.safetensors"),
+             test::example_model_file(test::example<LinearCoulomb>()));
   const auto read = [&](const std::string& tensor) {
     return output_of(std::string(kPython) + " '" TORSIO_FOREIGN_READER "' '" +
-                     (folder / "m.safetensors").string() + "' " + tensor);
+                     folder.path("m.safetensors") + "' " + tensor);
   };
   EXPECT_EQ(read("model.coefficients.values"),
             "[3, 4] [0.5, 600.0, 0.0, 1.5, 0.4, 620.0, 0.0, 1.2, 0.3, 700.0, 0.0, 1.4] "

@@ -8,9 +8,10 @@
 #include <cstdint>
 #include <limits>
 
+#include "data/temporary_folder.hpp"
 #include "support/error_message.hpp"
+#include "support/every_family.hpp"
 #include "support/example_model_file.hpp"
-#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/safetensors.hpp"
 #include "torsio/files/whole_file.hpp"
@@ -38,18 +39,16 @@ std::vector<std::uint64_t> run(Estimator estimator) {
 
 template <class Family>
 class EveryFamily : public testing::Test {};
-using Families = testing::Types<Linear, LinearCoulomb, Polynomial>;
-TYPED_TEST_SUITE(EveryFamily, Families);
+TYPED_TEST_SUITE(EveryFamily, test::EveryFamily);
 
 TYPED_TEST(EveryFamily, ComesBackBitForBit) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const ModelFile saved = example_model_file(example<TypeParam>());
-  save_model(folder / "m.safetensors", saved);
-  const ModelFile loaded = load_model(folder / "m.safetensors");
-  EXPECT_EQ(loaded.parameters, saved.parameters);
+  save_model(folder.path("m.safetensors"), saved);
+  const ModelFile loaded = load_model(folder.path("m.safetensors"));
   EXPECT_EQ(model_bytes(loaded), model_bytes(saved));
-  EXPECT_EQ(run(load_estimator(folder / "m.safetensors")), run(make_estimator(saved)));
-  EXPECT_EQ(folder.file_count(), 1U);
+  EXPECT_EQ(run(load_estimator(folder.path("m.safetensors"))), run(make_estimator(saved)));
+  EXPECT_EQ(folder.files(), 1U);
 }
 
 TEST(ModelFile, KeepsItsCard) {
@@ -96,11 +95,12 @@ TEST(ModelFile, NamesItsTensorsAfterTheFields) {
 }
 
 TEST(ModelFile, IsBoundToItsDevice) {
-  const test::TemporaryFolder folder;
-  save_model(folder / "elbow.safetensors", example_model_file(example<Linear>()));
-  EXPECT_NO_THROW((void)load_estimator(folder / "elbow.safetensors", "elbow-7"));
-  EXPECT_THAT(error_message([&] { (void)load_estimator(folder / "elbow.safetensors", "knee-1"); }),
-              HasSubstr("elbow.safetensors: device_serial: expected 'knee-1', found 'elbow-7'"));
+  const TemporaryFolder folder;
+  save_model(folder.path("elbow.safetensors"), example_model_file(example<Linear>()));
+  EXPECT_NO_THROW((void)load_estimator(folder.path("elbow.safetensors"), "elbow-7"));
+  EXPECT_THAT(
+      error_message([&] { (void)load_estimator(folder.path("elbow.safetensors"), "knee-1"); }),
+      HasSubstr("elbow.safetensors: device_serial: expected 'knee-1', found 'elbow-7'"));
   ModelFile nobody = example_model_file(example<Linear>());
   nobody.card.device_serial = "";
   EXPECT_THAT(error_message([&] { (void)parse_model(model_bytes(nobody), "m", "knee-1"); }),
@@ -108,21 +108,21 @@ TEST(ModelFile, IsBoundToItsDevice) {
 }
 
 TEST(ModelFile, IsNotWrittenIfItCouldNotBeRead) {
-  const test::TemporaryFolder folder;
-  save_model(folder / "m", example_model_file(example<Linear>()));
-  const std::string before = test::read_text(folder / "m");
+  const TemporaryFolder folder;
+  save_model(folder.path("m"), example_model_file(example<Linear>()));
+  const auto before = read_whole_file(folder.path("m"), kMostModelFileBytes);
   ModelFile bad = example_model_file(example<Linear>());
   std::get<Linear::Parameters>(bad.parameters).coefficients.values(0, 1) =
       std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(error_message([&] { save_model(folder / "m", bad); }),
+  EXPECT_THAT(error_message([&] { save_model(folder.path("m"), bad); }),
               HasSubstr("m: /model.coefficients.values: expected finite numbers, found nan at "
                         "index 1"));
   bad = example_model_file(example<Linear>());
   bad.settings.features.inputs.pop_back();
-  EXPECT_THAT(error_message([&] { save_model(folder / "m", bad); }),
+  EXPECT_THAT(error_message([&] { save_model(folder.path("m"), bad); }),
               HasSubstr("m: inputs: expected 2, as many as the model takes, found 1"));
-  EXPECT_EQ(test::read_text(folder / "m"), before);
-  EXPECT_EQ(folder.file_count(), 1U);
+  EXPECT_EQ(read_whole_file(folder.path("m"), kMostModelFileBytes), before);
+  EXPECT_EQ(folder.files(), 1U);
 }
 
 TEST(ModelFile, TakesAFileNameThatIsNoUtf8) {
