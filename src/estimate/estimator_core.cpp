@@ -116,14 +116,6 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
   check_finite("guards.ranges with margin", upper_limits_);
 }
 
-void EstimatorCore::set_zero(std::string_view channel, double value) {
-  if (!std::isfinite(value))
-    throw UsageError({.place = fmt::format("zero of {}", channel),
-                      .expected = "a finite number",
-                      .found = fmt::format("{}", value)});
-  pipeline_.set_zero(channel, value);
-}
-
 void EstimatorCore::reset() noexcept {
   pipeline_.reset();
   missed_ = 0;

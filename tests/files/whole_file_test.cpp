@@ -8,15 +8,14 @@
 #include <csignal>
 #include <string>
 
+#include "data/temporary_folder.hpp"
 #include "support/error_message.hpp"
-#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
 using test::error_message;
-using test::TemporaryFolder;
 using testing::HasSubstr;
 
 std::vector<std::byte> bytes_of(std::string_view text) {
@@ -26,24 +25,24 @@ std::vector<std::byte> bytes_of(std::string_view text) {
 
 TEST(WholeFile, ReplacesItsTargetAndLeavesNothingBeside) {
   const TemporaryFolder folder;
-  write_whole_file(folder / "a", bytes_of("old and long"));
-  write_whole_file(folder / "a", bytes_of("new"));
-  EXPECT_EQ(read_whole_file(folder / "a", 3), bytes_of("new"));
-  EXPECT_EQ(folder.file_count(), 1U);
+  write_whole_file(folder.path("a"), bytes_of("old and long"));
+  write_whole_file(folder.path("a"), bytes_of("new"));
+  EXPECT_EQ(read_whole_file(folder.path("a"), 3), bytes_of("new"));
+  EXPECT_EQ(folder.files(), 1U);
 }
 
 TEST(WholeFile, KeepsASymbolicLink) {
   const TemporaryFolder folder;
-  write_whole_file(folder / "a", bytes_of("old"));
-  std::filesystem::create_symlink("a", folder / "link");
-  write_whole_file(folder / "link", bytes_of("new"));
-  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
-  EXPECT_EQ(read_whole_file(folder / "a", 100), bytes_of("new"));
+  write_whole_file(folder.path("a"), bytes_of("old"));
+  std::filesystem::create_symlink("a", folder.path("link"));
+  write_whole_file(folder.path("link"), bytes_of("new"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path("link")));
+  EXPECT_EQ(read_whole_file(folder.path("a"), 100), bytes_of("new"));
 }
 
 TEST(WholeFile, LeavesItsTargetUntouchedWhenTheDiskIsFull) {
   const TemporaryFolder folder;
-  write_whole_file(folder / "a", bytes_of("old"));
+  write_whole_file(folder.path("a"), bytes_of("old"));
   // A limit on the size of files fails a write half-way, as a full disk does.
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
@@ -51,19 +50,19 @@ TEST(WholeFile, LeavesItsTargetUntouchedWhenTheDiskIsFull) {
   const rlimit small{.rlim_cur = 100, .rlim_max = before.rlim_max};
   ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
   const std::string message =
-      error_message([&] { write_whole_file(folder / "a", bytes_of(std::string(1000, 'x'))); });
+      error_message([&] { write_whole_file(folder.path("a"), bytes_of(std::string(1000, 'x'))); });
   ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
   (void)std::signal(SIGXFSZ, old_handler);
   EXPECT_THAT(message, HasSubstr("/a: cannot write: File too large"));
-  EXPECT_EQ(read_whole_file(folder / "a", 100), bytes_of("old"));
-  EXPECT_EQ(folder.file_count(), 1U);
+  EXPECT_EQ(read_whole_file(folder.path("a"), 100), bytes_of("old"));
+  EXPECT_EQ(folder.files(), 1U);
 }
 
 TEST(WholeFile, SaysWhyItCannotBeWritten) {
   const TemporaryFolder folder;
-  EXPECT_THAT(error_message([&] { write_whole_file(folder / "no/a", {}); }),
+  EXPECT_THAT(error_message([&] { write_whole_file(folder.path("no/a"), {}); }),
               HasSubstr("no/a: cannot write: No such file or directory"));
-  EXPECT_THAT(error_message([&] { write_whole_file(folder.path(), {}); }),
+  EXPECT_THAT(error_message([&] { write_whole_file(folder.path(""), {}); }),
               HasSubstr("expected a regular file, found a directory"));
   EXPECT_THAT(error_message([] { write_whole_file("/dev/null", {}); }),
               HasSubstr("/dev/null: expected a regular file, found a device, pipe or socket"));
@@ -71,19 +70,19 @@ TEST(WholeFile, SaysWhyItCannotBeWritten) {
 
 TEST(WholeFile, SaysWhyItCannotBeRead) {
   const TemporaryFolder folder;
-  EXPECT_THAT(error_message([&] { (void)read_whole_file(folder / "none", 10); }),
+  EXPECT_THAT(error_message([&] { (void)read_whole_file(folder.path("none"), 10); }),
               HasSubstr("none: cannot open: No such file or directory"));
-  EXPECT_THAT(error_message([&] { (void)read_whole_file(folder.path(), 10); }),
+  EXPECT_THAT(error_message([&] { (void)read_whole_file(folder.path(""), 10); }),
               HasSubstr("expected a regular file, found a directory"));
-  write_whole_file(folder / "a", bytes_of("abcd"));
-  EXPECT_THAT(error_message([&] { (void)read_whole_file(folder / "a", 3); }),
+  write_whole_file(folder.path("a"), bytes_of("abcd"));
+  EXPECT_THAT(error_message([&] { (void)read_whole_file(folder.path("a"), 3); }),
               HasSubstr("a: expected at most 3 bytes, found 4"));
 }
 
 TEST(WholeFile, DoesNotWaitForAPipe) {
   const TemporaryFolder folder;
-  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
-  EXPECT_THAT(error_message([&] { (void)read_whole_file(folder / "pipe", 10); }),
+  ASSERT_EQ(::mkfifo(folder.path("pipe").c_str(), 0600), 0);
+  EXPECT_THAT(error_message([&] { (void)read_whole_file(folder.path("pipe"), 10); }),
               HasSubstr("pipe: expected a regular file, found a device, pipe or socket"));
 }
 

@@ -38,8 +38,7 @@ class EstimatorCore {
   }
   [[nodiscard]] bool is_settled() const noexcept { return pipeline_.is_settled(); }
 
-  /// @throws UsageError for an unknown channel or a value that is not finite.
-  void set_zero(std::string_view channel, double value);
+  void set_zero(std::string_view channel, double value) { pipeline_.set_zero(channel, value); }
   void reset() noexcept;
 
   Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;

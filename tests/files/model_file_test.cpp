@@ -1,0 +1,141 @@
+#include "torsio/files/model_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "data/temporary_folder.hpp"
+#include "support/error_message.hpp"
+#include "support/every_family.hpp"
+#include "support/example_model_file.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/files/safetensors.hpp"
+#include "torsio/files/whole_file.hpp"
+
+namespace torsio {
+namespace {
+
+using test::error_message;
+using test::example;
+using test::example_model_file;
+using testing::HasSubstr;
+
+/// Torques of a run, as bits: equality without exception for NaN or signed zero.
+std::vector<std::uint64_t> run(Estimator estimator) {
+  std::vector<std::uint64_t> bits;
+  for (int i = 0; i < 200; ++i) {
+    const double angle = 0.1 * std::sin(0.05 * i);
+    const Estimate estimate = estimator.step({{angle, -0.2 * angle}});
+    bits.push_back(std::bit_cast<std::uint64_t>(estimate.value));
+    bits.push_back(std::bit_cast<std::uint64_t>(estimate.std_dev));
+    bits.push_back(static_cast<std::uint64_t>(estimate.fault));
+  }
+  return bits;
+}
+
+template <class Family>
+class EveryFamily : public testing::Test {};
+TYPED_TEST_SUITE(EveryFamily, test::EveryFamily);
+
+TYPED_TEST(EveryFamily, ComesBackBitForBit) {
+  const TemporaryFolder folder;
+  const ModelFile saved = example_model_file(example<TypeParam>());
+  save_model(folder.path("m.safetensors"), saved);
+  const ModelFile loaded = load_model(folder.path("m.safetensors"));
+  EXPECT_EQ(model_bytes(loaded), model_bytes(saved));
+  EXPECT_EQ(run(load_estimator(folder.path("m.safetensors"))), run(make_estimator(saved)));
+  EXPECT_EQ(folder.files(), 1U);
+}
+
+TEST(ModelFile, KeepsItsCard) {
+  const ModelFile saved = example_model_file(example<Linear>());
+  const ModelFile loaded = parse_model(model_bytes(saved), "m");
+  ModelCard expected = saved.card;
+  expected.torsio_version = loaded.card.torsio_version;
+  EXPECT_EQ(loaded.card, expected);
+  EXPECT_NE(loaded.card.torsio_version, "");
+  EXPECT_EQ(loaded.settings.features, saved.settings.features);
+  EXPECT_EQ(loaded.settings.target, "torque_Nm");
+  EXPECT_EQ(loaded.settings.sample_rate_Hz, 1000.0);
+  EXPECT_EQ(loaded.settings.zeroed_channels, saved.settings.zeroed_channels);
+}
+
+TEST(ModelFile, KeepsWhatHasNoEvidenceAsNaN) {
+  ModelFile model = example_model_file(example<Linear>());
+  model.card.metrics["rmse"] = kNotMeasured;
+  model.settings.fallback.residual_std = kNotMeasured;
+  model.settings.residuals = {.edges = {0.0, 1.0}, .std_dev = {kNotMeasured}};
+  const ModelFile loaded = parse_model(model_bytes(model), "m");
+  EXPECT_TRUE(std::isnan(loaded.card.metrics.at("rmse")));
+  EXPECT_TRUE(std::isnan(loaded.settings.fallback.residual_std));
+  EXPECT_TRUE(std::isnan(loaded.settings.residuals.std_dev[0]));
+}
+
+TEST(ModelFile, NamesItsTensorsAfterTheFields) {
+  const Safetensors contents =
+      parse_safetensors(model_bytes(example_model_file(example<LinearCoulomb>())), "m");
+  std::vector<std::string> names;
+  for (const auto& [name, tensor] : contents.tensors) names.push_back(name);
+  EXPECT_THAT(names,
+              testing::ElementsAre("fallback.intercept", "fallback.residual_std", "fallback.slope",
+                                   "guards.ranges.highest", "guards.ranges.lowest",
+                                   "guards.ranges.margin", "model.coefficients.feature",
+                                   "model.coefficients.knots", "model.coefficients.scheduled",
+                                   "model.coefficients.values", "model.rate_feature",
+                                   "model.rate_scale", "residuals.edges", "residuals.std_dev"));
+  EXPECT_EQ(contents.tensors.at("model.coefficients.values").shape,
+            (std::vector<std::size_t>{3, 4}));
+  EXPECT_EQ(contents.tensors.at("model.rate_scale").shape, std::vector<std::size_t>{});
+  ASSERT_EQ(contents.metadata.size(), 1U);
+  EXPECT_THAT(contents.metadata.at("torsio"), HasSubstr(R"("family":"linear_coulomb")"));
+}
+
+TEST(ModelFile, IsBoundToItsDevice) {
+  const TemporaryFolder folder;
+  save_model(folder.path("elbow.safetensors"), example_model_file(example<Linear>()));
+  EXPECT_NO_THROW((void)load_estimator(folder.path("elbow.safetensors"), "elbow-7"));
+  EXPECT_THAT(
+      error_message([&] { (void)load_estimator(folder.path("elbow.safetensors"), "knee-1"); }),
+      HasSubstr("elbow.safetensors: device_serial: expected 'knee-1', found 'elbow-7'"));
+  ModelFile nobody = example_model_file(example<Linear>());
+  nobody.card.device_serial = "";
+  EXPECT_THAT(error_message([&] { (void)parse_model(model_bytes(nobody), "m", "knee-1"); }),
+              HasSubstr("expected 'knee-1', found none"));
+}
+
+TEST(ModelFile, IsNotWrittenIfItCouldNotBeRead) {
+  const TemporaryFolder folder;
+  save_model(folder.path("m"), example_model_file(example<Linear>()));
+  const auto before = read_whole_file(folder.path("m"), kMostModelFileBytes);
+  ModelFile bad = example_model_file(example<Linear>());
+  std::get<Linear::Parameters>(bad.parameters).coefficients.values(0, 1) =
+      std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(error_message([&] { save_model(folder.path("m"), bad); }),
+              HasSubstr("m: /model.coefficients.values: expected finite numbers, found nan at "
+                        "index 1"));
+  bad = example_model_file(example<Linear>());
+  bad.settings.features.inputs.pop_back();
+  EXPECT_THAT(error_message([&] { save_model(folder.path("m"), bad); }),
+              HasSubstr("m: inputs: expected 2, as many as the model takes, found 1"));
+  EXPECT_EQ(read_whole_file(folder.path("m"), kMostModelFileBytes), before);
+  EXPECT_EQ(folder.files(), 1U);
+}
+
+TEST(ModelFile, TakesAFileNameThatIsNoUtf8) {
+  ModelFile model = example_model_file(example<Linear>());
+  model.card.training_files = {{"sweep \xff.csv", ""}};
+  EXPECT_EQ(parse_model(model_bytes(model), "m").card.training_files[0].file, "sweep \uFFFD.csv");
+}
+
+TEST(ModelFile, RunsAtAnotherRateIfTheUserSaysSo) {
+  ModelFile model = example_model_file(example<Linear>());
+  model.settings.sample_rate_Hz = 250.0;
+  EXPECT_EQ(make_estimator(model).settings().sample_rate_Hz, 250.0);
+}
+
+}  // namespace
+}  // namespace torsio

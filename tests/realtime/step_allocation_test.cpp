@@ -1,0 +1,147 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "support/allocation_counter.hpp"
+#include "support/every_family.hpp"
+#include "support/example_models.hpp"
+#include "support/example_settings.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+namespace {
+
+using test::example;
+using test::example_features;
+using test::heap_calls_during;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TEST(AllocationCounter, SeesEveryWayIntoTheHeap) {
+  // volatile: the compiler may drop a pair of new and delete that nobody looks at.
+  EXPECT_EQ(heap_calls_during([] {
+              int* volatile number = new int(1);
+              delete number;
+            }),
+            2U);
+  EXPECT_EQ(heap_calls_during([] {
+              void* volatile block = std::calloc(3, 5);
+              block = std::realloc(block, 5000);
+              std::free(block);
+            }),
+            3U);
+  EXPECT_EQ(heap_calls_during([] {
+              void* volatile block = std::aligned_alloc(64, 128);
+              std::free(block);
+            }),
+            2U);
+  EXPECT_EQ(heap_calls_during([] { const std::vector<double> values(1000, 1.0); }), 2U);
+}
+
+TEST(AllocationCounter, SeesNoneWhereThereIsNone) {
+  double sum = 0.0;
+  EXPECT_EQ(heap_calls_during([&] { sum = std::sin(1.0); }), 0U);
+  EXPECT_GT(sum, 0.0);
+}
+
+TEST(FeaturePipeline, StepNeverTouchesTheHeap) {
+  FeaturePipeline pipeline(
+      {.inputs = {"a_rad - b_rad", "lowpass(rate(a_rad), 10Hz)", "lag(b_rad, 7)",
+                  "sign(a_rad) * tanh(b_rad / 0.3)", "sqrt(abs(a_rad)) + exp(b_rad)",
+                  "min(a_rad, b_rad) / max(a_rad, 2) ^ 3"},
+       .definitions = {}},
+      1000.0);
+  EXPECT_EQ(heap_calls_during([&] {
+              for (const double value : {0.1, 0.2, -0.3, 1e200, kInfinity, kNaN, 0.1})
+                (void)pipeline.step(std::array{value, -value});
+              pipeline.reset();
+              (void)pipeline.step(std::array{0.1, 0.2});
+            }),
+            0U);
+}
+
+template <class Family>
+class EveryFamily : public testing::Test {};
+TYPED_TEST_SUITE(EveryFamily, test::EveryFamily);
+
+TYPED_TEST(EveryFamily, StepNeverTouchesTheHeap) {
+  auto model = example<TypeParam>();
+  const Matrix features = example_features(300, model.input_count());
+  const std::vector<double> overflowing(model.input_count(), 1e300);
+  EXPECT_EQ(heap_calls_during([&] {
+              for (std::size_t n = 0; n < features.rows; ++n) (void)model.step(features.row(n));
+              (void)model.step(overflowing);
+              model.reset();
+              (void)model.step(features.row(0));
+            }),
+            0U);
+}
+
+TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {
+  Estimator estimator(test::example_settings(), AnyModel(example<TypeParam>()));
+  std::set<Fault> seen;  // filled outside of what is counted
+  std::vector<Fault> faults(2000, Fault::none);
+  std::size_t at = 0;
+  const auto step = [&](double gear, double joint) {
+    faults[at++] = estimator.step(std::array{gear, joint}).fault;
+  };
+  EXPECT_EQ(heap_calls_during([&] {
+              for (int i = 0; i < 500; ++i) step(0.1 * std::sin(0.01 * i), 0.0);
+              step(kNaN, 0.0);                                    // a short gap
+              step(0.0, 0.0);                                     //
+              for (int i = 0; i < 50; ++i) step(0.0, kInfinity);  // a long one
+              for (int i = 0; i < 500; ++i) step(0.0, 0.0);
+              step(5.0, 0.0);       // outside the training range
+              step(1e308, -1e308);  // overflows the pipeline
+              step(0.0, 0.0);
+              faults[at++] = estimator.step({}).fault;
+              estimator.reset();
+              step(0.0, 0.0);
+            }),
+            0U);
+  seen.insert(faults.begin(), faults.begin() + static_cast<std::ptrdiff_t>(at));
+  EXPECT_EQ(seen, (std::set{Fault::none, Fault::input_not_finite, Fault::input_count_wrong,
+                            Fault::warming_up, Fault::outside_training_range}));
+}
+
+/// A model that fails at each second step.
+class Failing {
+ public:
+  struct Parameters {};
+  explicit Failing(Parameters /*none*/) {}
+  [[nodiscard]] Parameters parameters() const { return {}; }
+  [[nodiscard]] std::size_t input_count() const noexcept { return 2; }
+  [[nodiscard]] std::size_t parameter_count() const noexcept { return 0; }
+  void reset() noexcept {}
+  Estimate step(Features /*features*/) noexcept {
+    fails_ = !fails_;
+    return {.value = fails_ ? kNaN : 1.0};
+  }
+
+ private:
+  bool fails_ = false;
+};
+
+TEST(TorqueEstimator, StepNeverTouchesTheHeapWhenTheModelFails) {
+  BasicTorqueEstimator<Failing> estimator(
+      BasicEstimator<Failing>(test::example_settings(), Failing({})));
+  bool failed = false;
+  EXPECT_EQ(heap_calls_during([&] {
+              for (int i = 0; i < 500; ++i)
+                failed |= estimator.step({.gear_angle_rad = 0.1, .joint_angle_rad = 0.0}).fault ==
+                          Fault::model_not_finite;
+            }),
+            0U);
+  EXPECT_TRUE(failed);
+}
+
+}  // namespace
+}  // namespace torsio
