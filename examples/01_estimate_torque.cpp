@@ -1,0 +1,53 @@
+// A joint's torque in a 1 kHz loop, from a model file: links torsio::runtime and torsio::files
+// only.
+#include <cmath>
+#include <cstdio>
+#include <exception>
+
+#include "torsio/estimate/torque_estimator.hpp"
+#include "torsio/files/model_file.hpp"
+
+namespace {
+
+/// Stands for your joint: it swings a spring that is wound by up to 2 degrees.
+torsio::JointSample read_joint(int tick) {
+  const double t_s = 1e-3 * tick;
+  torsio::JointSample joint;
+  joint.t_s = t_s;
+  joint.joint_angle_rad = 0.5 * std::sin(0.6 * t_s);
+  joint.gear_angle_rad = joint.joint_angle_rad + 0.03 * std::sin(1.2 * t_s);
+  return joint;
+}
+
+int run(const char* model_file) {
+  // readme-begin
+  torsio::TorqueEstimator estimator(
+      torsio::load_estimator(model_file));   // may throw: configure first
+  const torsio::DenormalsOff denormals_off;  // once a real-time thread
+  estimator.reset();
+  for (int tick = 0; tick < 2000; ++tick) {
+    const torsio::JointSample joint = read_joint(tick);     // angles on both sides of the spring
+    const torsio::Estimate torque = estimator.step(joint);  // noexcept, no heap, no lock
+    if (torque.fault != torsio::Fault::none)
+      continue;  // warming up, outside the training range, ...
+    if (tick % 500 == 0)
+      std::printf("t = %.1f s: %6.2f Nm +- %.2f\n", joint.t_s, torque.value, torque.std_dev);
+  }
+  // readme-end
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: %s MODEL.safetensors (torsio demo writes one)\n", argv[0]);
+    return 2;
+  }
+  try {
+    return run(argv[1]);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}
