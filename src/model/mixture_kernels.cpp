@@ -59,19 +59,23 @@ float scan_fixed(const float* HWY_RESTRICT packed, std::size_t blocks, std::size
   return hn::GetLane(hn::MaxOfLanes(d, largest));
 }
 
-std::size_t select_blocks(const float* HWY_RESTRICT log_weights, std::size_t exact_blocks,
-                          float threshold, std::size_t* HWY_RESTRICT candidates) {
+Selection select_blocks(const float* HWY_RESTRICT log_weights, std::size_t exact_blocks,
+                        float threshold, float largest, std::size_t* HWY_RESTRICT candidates) {
   const hn::CappedTag<float, kExactLanes> d;
   const auto limit = hn::Set(d, threshold);
-  std::size_t count = 0;
+  const auto top = hn::Set(d, largest);
+  Selection selection{0, 0};
   for (std::size_t b = 0; b < exact_blocks; ++b) {
     bool below = true;  // NaN, which float32 may make of a far input, is never below
-    for (std::size_t lane = 0; lane < kExactLanes; lane += hn::Lanes(d))
-      below &= hn::AllTrue(d, hn::Lt(hn::Load(d, log_weights + b * kExactLanes + lane), limit));
-    candidates[count] = b;
-    count += below ? 0 : 1;
+    for (std::size_t lane = 0; lane < kExactLanes; lane += hn::Lanes(d)) {
+      const auto value = hn::Load(d, log_weights + b * kExactLanes + lane);
+      below &= hn::AllTrue(d, hn::Lt(value, limit));
+      if (!hn::AllFalse(d, hn::Eq(value, top))) selection.best = b;
+    }
+    candidates[selection.count] = b;
+    selection.count += below ? 0 : 1;
   }
-  return count;
+  return selection;
 }
 
 template <std::size_t kFixed, class D>
@@ -148,6 +152,73 @@ Conditional finish_fixed(const double* HWY_RESTRICT packed, std::size_t inputs,
   return {anchor + mean, square - mean * mean, largest + std::log(total)};
 }
 
+// z - mean with the digits that neither has in float.
+template <std::size_t kFixed, class D>
+HWY_INLINE hn::Vec<D> compensated(D d, const float* HWY_RESTRICT block, std::size_t inputs,
+                                  std::size_t column, const float* HWY_RESTRICT z) {
+  const std::size_t n = count_of<kFixed>(inputs);
+  const float* HWY_RESTRICT lost = block + exact_rows(n) * kScanLanes;
+  const auto high = hn::Sub(hn::Set(d, z[column]), hn::Load(d, block + column * kScanLanes));
+  const auto low = hn::Sub(hn::Set(d, z[n + column]), hn::Load(d, lost + column * kScanLanes));
+  return hn::Add(high, low);
+}
+
+template <std::size_t kFixed, class D>
+HWY_INLINE hn::Vec<D> compensated_output(D d, const float* HWY_RESTRICT block, std::size_t inputs,
+                                         const float* HWY_RESTRICT z) {
+  const std::size_t n = count_of<kFixed>(inputs);
+  const float* HWY_RESTRICT output = block + scan_rows(n) * kScanLanes;
+  auto mean = hn::Load(d, output);
+  for (std::size_t c = 0; c < n; ++c)
+    mean = hn::MulAdd(hn::Load(d, output + (c + 1) * kScanLanes),
+                      compensated<kFixed>(d, block, inputs, c, z), mean);
+  return mean;
+}
+
+template <std::size_t kFixed>
+Conditional finish_rounded_fixed(const float* HWY_RESTRICT packed, std::size_t inputs,
+                                 const float* HWY_RESTRICT z,
+                                 const std::size_t* HWY_RESTRICT candidates, std::size_t count,
+                                 std::size_t best, float largest) {
+  const hn::CappedTag<float, kScanLanes> d;
+  const std::size_t n = count_of<kFixed>(inputs);
+  const std::size_t block_size = rounded_rows(n) * kScanLanes;
+  const float anchor =
+      hn::GetLane(compensated_output<kFixed>(d, packed + best * block_size, inputs, z));
+  const auto shift = hn::Set(d, anchor);
+  const auto top = hn::Set(d, largest);
+  const auto lightest = hn::Set(d, -60.0F);  // e^-60 is nothing, and still a normal number: fast
+  auto weight_sum = hn::Zero(d);
+  auto first = hn::Zero(d);
+  auto second = hn::Zero(d);
+  for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t lane = 0; lane < kScanLanes; lane += hn::Lanes(d)) {
+      const float* HWY_RESTRICT block = packed + candidates[k] * block_size + lane;
+      const float* HWY_RESTRICT whitening = block + n * kScanLanes;
+      auto value = hn::Sub(hn::Load(d, block + (scan_rows(n) - 1) * kScanLanes), top);
+      for (std::size_t row = 0; row < n; ++row) {
+        auto white = hn::Zero(d);
+        for (std::size_t column = 0; column <= row; ++column, whitening += kScanLanes)
+          white = hn::MulAdd(hn::Load(d, whitening),
+                             compensated<kFixed>(d, block, inputs, column, z), white);
+        value = hn::NegMulAdd(white, white, value);
+      }
+      const auto weight = hn::Exp(d, hn::Max(value, lightest));
+      const auto mean = hn::Sub(compensated_output<kFixed>(d, block, inputs, z), shift);
+      const auto variance = hn::Load(d, block + (exact_rows(n) - 1) * kScanLanes);
+      weight_sum = hn::Add(weight_sum, weight);
+      first = hn::MulAdd(weight, mean, first);
+      second = hn::MulAdd(weight, hn::MulAdd(mean, mean, variance), second);
+    }
+  }
+  const auto sum = [&](auto v)
+                       HWY_ATTR { return static_cast<double>(hn::GetLane(hn::SumOfLanes(d, v))); };
+  const double total = sum(weight_sum);
+  const double mean = sum(first) / total;
+  return {static_cast<double>(anchor) + mean, sum(second) / total - mean * mean,
+          static_cast<double>(largest) + std::log(total)};
+}
+
 float scan_any(const float* packed, std::size_t blocks, std::size_t inputs, const float* z,
                float* log_weights) {
   switch (inputs) {
@@ -170,6 +241,18 @@ Conditional finish_any(const double* packed, std::size_t inputs, const double* z
   }
 }
 
+Conditional finish_rounded_any(const float* packed, std::size_t inputs, const float* z,
+                               const std::size_t* candidates, std::size_t count, std::size_t best,
+                               float largest) {
+  switch (inputs) {
+    case 1: return finish_rounded_fixed<1>(packed, inputs, z, candidates, count, best, largest);
+    case 2: return finish_rounded_fixed<2>(packed, inputs, z, candidates, count, best, largest);
+    case 3: return finish_rounded_fixed<3>(packed, inputs, z, candidates, count, best, largest);
+    case 4: return finish_rounded_fixed<4>(packed, inputs, z, candidates, count, best, largest);
+    default: return finish_rounded_fixed<0>(packed, inputs, z, candidates, count, best, largest);
+  }
+}
+
 }  // namespace torsio::mixture_kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -179,20 +262,29 @@ namespace torsio::mixture_kernels {
 HWY_EXPORT(scan_any);
 HWY_EXPORT(select_blocks);
 HWY_EXPORT(finish_any);
+HWY_EXPORT(finish_rounded_any);
 
 float scan(const float* packed, std::size_t blocks, std::size_t inputs, const float* z,
            float* log_weights) noexcept {
   return HWY_DYNAMIC_DISPATCH(scan_any)(packed, blocks, inputs, z, log_weights);
 }
 
-std::size_t select(const float* log_weights, std::size_t exact_blocks, float threshold,
-                   std::size_t* candidates) noexcept {
-  return HWY_DYNAMIC_DISPATCH(select_blocks)(log_weights, exact_blocks, threshold, candidates);
+Selection select(const float* log_weights, std::size_t exact_blocks, float threshold, float largest,
+                 std::size_t* candidates) noexcept {
+  return HWY_DYNAMIC_DISPATCH(select_blocks)(log_weights, exact_blocks, threshold, largest,
+                                             candidates);
 }
 
 Conditional finish(const double* packed, std::size_t inputs, const double* z,
                    const std::size_t* candidates, std::size_t count, double* log_weights) noexcept {
   return HWY_DYNAMIC_DISPATCH(finish_any)(packed, inputs, z, candidates, count, log_weights);
+}
+
+Conditional finish_rounded(const float* packed, std::size_t inputs, const float* z,
+                           const std::size_t* candidates, std::size_t count, std::size_t best,
+                           float largest) noexcept {
+  return HWY_DYNAMIC_DISPATCH(finish_rounded_any)(packed, inputs, z, candidates, count, best,
+                                                  largest);
 }
 
 }  // namespace torsio::mixture_kernels

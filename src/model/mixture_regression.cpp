@@ -19,12 +19,24 @@ namespace {
 using mixture_kernels::exact_rows;
 using mixture_kernels::kExactLanes;
 using mixture_kernels::kScanLanes;
+using mixture_kernels::rounded_rows;
 using mixture_kernels::scan_rows;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Components outside this share of the weight are not evaluated: e^-23 = 1e-10.
 constexpr double kNegligible = 23.0;
+
+// Blocks that are evaluated in double however few the mixture has.
+constexpr std::size_t kAlwaysExact = 32;
+
+constexpr double kRounding = std::numeric_limits<float>::epsilon();
+
+// What rounding to float takes from a number.
+float lost_to_float(double value) {
+  const double lost = value - static_cast<double>(static_cast<float>(value));
+  return static_cast<float>(lost);
+}
 
 std::size_t blocks_of(std::size_t count, std::size_t lanes) { return (count + lanes - 1) / lanes; }
 
@@ -123,13 +135,18 @@ void MixtureRegression::pack(const GaussianMixture& mixture, std::size_t output)
   const std::size_t slots = blocks_of(components_, kScanLanes) * kScanLanes;
   const std::size_t offset_row = scan_rows(inputs_) - 1;
   scan_.assign(slots * scan_rows(inputs_), 0.0F);
+  rounded_.assign(slots * rounded_rows(inputs_), 0.0F);
   exact_.assign(slots * exact_rows(inputs_), 0.0);
   const auto store = [&](std::size_t slot, std::size_t row, double value) {
+    const std::size_t lane = slot % kScanLanes;
+    const std::size_t block = slot / kScanLanes;
     const std::size_t exact_block = slot / kExactLanes * exact_rows(inputs_);
+    float* const rounded = rounded_.data() + block * rounded_rows(inputs_) * kScanLanes + lane;
     exact_[(exact_block + row) * kExactLanes + slot % kExactLanes] = value;
-    if (row > offset_row) return;
-    const std::size_t scan_block = slot / kScanLanes * scan_rows(inputs_);
-    scan_[(scan_block + row) * kScanLanes + slot % kScanLanes] = static_cast<float>(value);
+    rounded[row * kScanLanes] = static_cast<float>(value);
+    if (row < inputs_) rounded[(exact_rows(inputs_) + row) * kScanLanes] = lost_to_float(value);
+    if (row <= offset_row)
+      scan_[(block * scan_rows(inputs_) + row) * kScanLanes + lane] = static_cast<float>(value);
   };
   largest_offset_ = -kInfinity;
   for (std::size_t slot = 0; slot < slots; ++slot) {
@@ -149,7 +166,7 @@ void MixtureRegression::pack(const GaussianMixture& mixture, std::size_t output)
     largest_offset_ = std::max(largest_offset_, parameters[offset_row]);
   }
   standardised_.resize(inputs_);
-  scan_input_.resize(inputs_);
+  scan_input_.resize(2 * inputs_);
   scan_log_weights_.resize(slots);
   log_weights_.resize(slots);
   candidates_.resize(slots / kExactLanes);
@@ -159,6 +176,7 @@ void MixtureRegression::standardise(Features inputs) noexcept {
   for (std::size_t j = 0; j < inputs_; ++j) {
     standardised_[j] = (inputs[j] - input_centre_[j]) / input_scale_[j];
     scan_input_[j] = static_cast<float>(standardised_[j]);
+    scan_input_[inputs_ + j] = lost_to_float(standardised_[j]);
   }
 }
 
@@ -167,15 +185,10 @@ Conditional MixtureRegression::physical(const Conditional& standardised) const n
           output_scale_ * output_scale_ * standardised.variance, standardised.log_density};
 }
 
-Conditional MixtureRegression::query(Features inputs) noexcept {
-  standardise(inputs);
-  const double largest = static_cast<double>(
-      mixture_kernels::scan(scan_.data(), scan_log_weights_.size() / kScanLanes, inputs_,
-                            scan_input_.data(), scan_log_weights_.data()));
-
-  // How far a float32 log weight within `cut` of the largest may be off: input, mean and whitening
-  // are rounded to float32, and so is each operation on the whitened vector w.
-  constexpr double kRounding = std::numeric_limits<float>::epsilon();
+// Below this log weight no component can matter. A float32 log weight of one that can, whose
+// whitened vector w is no longer than `distance`, may be off by `error`: input, mean and whitening
+// are rounded, and so is each operation on w.
+double MixtureRegression::threshold(double largest) const noexcept {
   const double count = static_cast<double>(inputs_);
   const double cut = kNegligible + std::log(static_cast<double>(components_));
   double reach = largest_mean_;
@@ -185,23 +198,50 @@ Conditional MixtureRegression::query(Features inputs) noexcept {
   const double error =
       2.0 * distance * shift + shift * shift +
       kRounding * (std::abs(largest_offset_) + (2.0 * count + 4.0) * distance * distance);
-  const double threshold = largest - cut - 2.0 * error;
+  return largest - cut - 2.0 * error;
+}
 
-  const std::size_t found =
+// Whether float32 log weights near the largest are good to 5e-5 once the differences to the means
+// are: only the operations on w are rounded then.
+bool MixtureRegression::float_is_enough(double largest) const noexcept {
+  constexpr double kGood = 5e-5;
+  constexpr double kHeavy = 5.0;  // lighter than e^-5, an error counts for less than a hundredth
+  const double square = std::max(0.0, largest_offset_ - largest + kHeavy);
+  const double operations = 2.0 * static_cast<double>(inputs_) + 4.0;
+  return 0.5 * kRounding * (std::abs(largest) + std::abs(largest_offset_) + operations * square) <
+         kGood;
+}
+
+Conditional MixtureRegression::query(Features inputs) noexcept {
+  standardise(inputs);
+  const std::size_t scan_blocks = scan_log_weights_.size() / kScanLanes;
+  const float largest = mixture_kernels::scan(scan_.data(), scan_blocks, inputs_,
+                                              scan_input_.data(), scan_log_weights_.data());
+  const auto top = static_cast<double>(largest);
+  const auto [count, best] =
       mixture_kernels::select(scan_log_weights_.data(), candidates_.size(),
-                              static_cast<float>(threshold), candidates_.data());
-  evaluated_blocks_ = found;
-  return physical(mixture_kernels::finish(exact_.data(), inputs_, standardised_.data(),
-                                          candidates_.data(), found, log_weights_.data()));
+                              static_cast<float>(threshold(top)), largest, candidates_.data());
+  bytes_read_ = scan_.size() * sizeof(float);
+
+  const bool few = count <= std::max(kAlwaysExact, candidates_.size() / 4);
+  if (few || !float_is_enough(top)) {
+    bytes_read_ += count * exact_rows(inputs_) * kExactLanes * sizeof(double);
+    return physical(mixture_kernels::finish(exact_.data(), inputs_, standardised_.data(),
+                                            candidates_.data(), count, log_weights_.data()));
+  }
+  std::size_t pairs = 0;  // the larger blocks that hold the candidates
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t pair = candidates_[k] / (kScanLanes / kExactLanes);
+    if (pairs == 0 || candidates_[pairs - 1] != pair) candidates_[pairs++] = pair;
+  }
+  bytes_read_ += pairs * rounded_rows(inputs_) * kScanLanes * sizeof(float);
+  return physical(mixture_kernels::finish_rounded(rounded_.data(), inputs_, scan_input_.data(),
+                                                  candidates_.data(), pairs,
+                                                  best / (kScanLanes / kExactLanes), largest));
 }
 
 void MixtureRegression::query(const Matrix& inputs, std::span<Conditional> results) noexcept {
   for (std::size_t i = 0; i < inputs.rows; ++i) results[i] = query(inputs.row(i));
-}
-
-std::size_t MixtureRegression::bytes_read() const noexcept {
-  return scan_.size() * sizeof(float) +
-         evaluated_blocks_ * exact_rows(inputs_) * kExactLanes * sizeof(double);
 }
 
 Conditional MixtureRegression::query_exact(Features inputs) const noexcept {

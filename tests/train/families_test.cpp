@@ -31,7 +31,8 @@ TEST(Families, FindThemselvesAndFitModelsOfTheirName) {
     EXPECT_EQ(&found, &family);
     const FittedModel fitted =
         found.fit(test::noisy_spring(), Options(found.options, {}), 1, Progress{});
-    EXPECT_EQ(fitted.model.family(), family.name);
+    // A second way to train a family carries its name in front: dgmm_paper fits a dgmm.
+    EXPECT_TRUE(family.name.starts_with(fitted.model.family())) << family.name;
   }
 }
 
