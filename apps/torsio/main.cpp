@@ -1,1 +1,52 @@
-int main() {}
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "interrupt.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/version.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+constexpr int kWorkFailed = 1;
+constexpr int kCallWasWrong = 2;
+
+int complain(const char* message, int exit_code) {
+  std::fprintf(stderr, "torsio: %s\n", message);
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Learns how a series-elastic actuator's spring behaves and tells the joint torque from it.",
+      "torsio");
+  app.set_version_flag("--version", torsio::kVersion);
+  app.require_subcommand(1);
+  add_demo(app);
+  add_simulate(app);
+  add_check(app);
+  add_fit(app);
+  add_evaluate(app);
+  add_compare(app);
+  catch_interrupts();
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kCallWasWrong;
+  } catch (const torsio::UsageError& error) {
+    return complain(error.what(), kCallWasWrong);
+  } catch (const torsio::Error& error) {
+    return complain(error.what(), kWorkFailed);
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory: use fewer or shorter recordings", kWorkFailed);
+  } catch (const std::exception& error) {
+    return complain(error.what(), kWorkFailed);
+  }
+}

@@ -9,7 +9,8 @@
 namespace torsio {
 namespace {
 
-static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial>);
+static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial> &&
+              Model<Dgmm>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

@@ -9,7 +9,7 @@
 namespace torsio {
 
 Differentiator::Differentiator(double sample_rate_Hz, std::optional<double> cutoff_Hz)
-    : sample_rate_Hz_(sample_rate_Hz), settling_samples_(2) {
+    : sample_rate_Hz_(sample_rate_Hz) {
   if (!(sample_rate_Hz > 0.0) || !std::isfinite(sample_rate_Hz))
     throw UsageError({.place = "differentiator",
                       .expected = "a positive sample rate",

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <utility>
 
 #include "torsio/core/units.hpp"
@@ -26,7 +27,8 @@ double computed(Operation operation, double left, double right) noexcept {
     case Operation::power: return std::pow(left, right);
     case Operation::negate: return -left;
     case Operation::sign:
-      return std::isnan(left) ? left : static_cast<double>((left > 0.0) - (left < 0.0));
+      if (left > 0.0) return 1.0;
+      return left < 0.0 ? -1.0 : left;  // a zero or a NaN
     case Operation::tanh: return std::tanh(left);
     case Operation::abs: return std::abs(left);
     case Operation::sqrt: return std::sqrt(left);

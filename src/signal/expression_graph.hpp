@@ -1,12 +1,11 @@
 #pragma once
 
-#include <cmath>
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 namespace torsio {
@@ -68,13 +67,8 @@ class ExpressionGraph {
   [[nodiscard]] const std::vector<std::string>& channels() const noexcept { return channels_; }
 
  private:
-  struct Key {
-    Operation operation;
-    std::uint32_t left;
-    std::uint32_t right;
-    std::uint64_t parameter_bits;
-    auto operator<=>(const Key&) const = default;
-  };
+  // operation, left, right, bits of the parameter
+  using Key = std::tuple<Operation, std::uint32_t, std::uint32_t, std::uint64_t>;
   std::uint32_t unique(const Node& node);
 
   std::vector<Node> nodes_;

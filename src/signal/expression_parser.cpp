@@ -55,13 +55,13 @@ bool is_name(std::string_view text) {
 
 // The text as an error message may show it: one line, no control characters, not endless.
 std::string shown(std::string_view text, std::size_t around = 0) {
-  constexpr std::size_t kBefore = 60;
-  constexpr std::size_t kWindow = 120;
-  const std::size_t from = text.size() > kWindow && around > kBefore ? around - kBefore : 0;
-  std::string result(text.substr(from, kWindow));
+  constexpr std::size_t before = 60;
+  constexpr std::size_t window = 120;
+  const std::size_t from = text.size() > window && around > before ? around - before : 0;
+  std::string result(text.substr(from, window));
   std::replace_if(
       result.begin(), result.end(), [](char c) { return !is_printable(c); }, '?');
-  return (from > 0 ? "..." : "") + result + (text.size() > from + kWindow ? "..." : "");
+  return (from > 0 ? "..." : "") + result + (text.size() > from + window ? "..." : "");
 }
 
 }  // namespace
@@ -265,13 +265,13 @@ class ExpressionParser::Reader {
     const std::uint32_t first = arguments[0].node;
     switch (operation) {
       case Operation::rate: return graph_.memory(operation, first, 0.0);
-      case Operation::lowpass: return graph_.memory(operation, first, cutoff_Hz(arguments[1]));
-      case Operation::lag: return graph_.memory(operation, first, lag_samples(arguments[1]));
+      case Operation::lowpass: return graph_.memory(operation, first, cutoff_of(arguments[1]));
+      case Operation::lag: return graph_.memory(operation, first, lag_of(arguments[1]));
       default: return graph_.operation(operation, first, arguments[1].node);
     }
   }
 
-  double cutoff_Hz(const Operand& argument) const {
+  double cutoff_of(const Operand& argument) const {
     if (!graph_.is_constant(argument.node) ||
         (!argument.si_unit.empty() && argument.si_unit != "Hz"))
       fail(argument.start, "a constant frequency as cut-off, like 10Hz", as_written(argument));
@@ -285,7 +285,7 @@ class ExpressionParser::Reader {
     return value;
   }
 
-  double lag_samples(const Operand& argument) const {
+  double lag_of(const Operand& argument) const {
     const double value = graph_.nodes()[argument.node].parameter;
     if (!graph_.is_constant(argument.node) || !argument.si_unit.empty() || !(value >= 0.0) ||
         value > static_cast<double>(kLongestLag) || value != std::floor(value))

@@ -26,16 +26,15 @@ class DelayLine {
   explicit DelayLine(std::size_t samples) : past_(samples) {}
 
   void reset() noexcept {
-    oldest_ = 0;
+    next_ = 0;
     is_full_ = false;
   }
 
   double step(double input) noexcept {
-    const bool is_first = !is_full_ && oldest_ == 0;
-    const double output = is_full_ ? past_[oldest_] : (is_first ? input : past_[0]);
-    past_[oldest_] = input;
-    if (++oldest_ == past_.size()) {
-      oldest_ = 0;
+    const double leaving = std::exchange(past_[next_], input);
+    const double output = is_full_ ? leaving : past_[0];
+    if (++next_ == past_.size()) {
+      next_ = 0;
       is_full_ = true;
     }
     return output;
@@ -43,7 +42,7 @@ class DelayLine {
 
  private:
   std::vector<double> past_;  // a ring
-  std::size_t oldest_ = 0;
+  std::size_t next_ = 0;
   bool is_full_ = false;
 };
 
@@ -191,7 +190,7 @@ FeaturePipeline::FeaturePipeline(FeatureSpec spec, double sample_rate_Hz)
 FeaturePipeline::FeaturePipeline(const FeaturePipeline& other)
     : program_(std::make_unique<Program>(*other.program_)) {}
 
-FeaturePipeline::FeaturePipeline(FeaturePipeline&&) noexcept = default;
+FeaturePipeline::FeaturePipeline(FeaturePipeline&& other) noexcept = default;
 
 FeaturePipeline& FeaturePipeline::operator=(FeaturePipeline other) noexcept {
   program_.swap(other.program_);
@@ -262,15 +261,15 @@ std::vector<std::string> channels_of(std::string_view expression) {
 }
 
 std::vector<std::string> split_inputs(std::string_view list) {
-  constexpr std::string_view kBlank = " \t\r\n";
+  constexpr std::string_view blank = " \t\r\n";
   std::vector<std::string> inputs;
-  if (list.find_first_not_of(kBlank) == std::string_view::npos) return inputs;
+  if (list.find_first_not_of(blank) == std::string_view::npos) return inputs;
   const auto add_trimmed = [&](std::string_view part) {
-    const std::size_t first = part.find_first_not_of(kBlank);
+    const std::size_t first = part.find_first_not_of(blank);
     if (first == std::string_view::npos)
       inputs.emplace_back();
     else
-      inputs.emplace_back(part.substr(first, part.find_last_not_of(kBlank) - first + 1));
+      inputs.emplace_back(part.substr(first, part.find_last_not_of(blank) - first + 1));
   };
   std::size_t start = 0;
   std::ptrdiff_t depth = 0;

@@ -6,6 +6,7 @@
 
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/train/fit_dgmm.hpp"
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
 
@@ -37,6 +38,30 @@ constexpr std::array kPolynomialOptions{
                "how far the first input moves back before its direction turns"},
     kRates, kSchedule};
 
+constexpr std::array kDgmmOptions{
+    OptionInfo{"components", Kind::integer, "300", 1, 100000, "at most this many Gaussians"},
+    OptionInfo{"novelty_distance", Kind::number, "0.25", 0, 100,
+               "in standard deviations: a sample farther from all Gaussians becomes a new one"},
+    OptionInfo{"initial_spread", Kind::number, "0.15", 1e-6, 100,
+               "standard deviation of a Gaussian that has seen one sample, in standard deviations"},
+    OptionInfo{"learning_rate_floor", Kind::number, "0", 0, 1,
+               "0: means settle; above: they keep following"},
+    OptionInfo{"forgetting", Kind::number, "1", 0, 1, "of a Gaussian's past with each sample"},
+    OptionInfo{"prune_count", Kind::number, "0", 0, 1e12, "drop Gaussians of fewer samples ..."},
+    OptionInfo{"prune_age", Kind::integer, "0", 0, 1e12, "... once so many samples old; 0: never"},
+    OptionInfo{"em_iterations", Kind::integer, "0", 0, 10000,
+               "of expectation maximisation after the online pass"},
+    OptionInfo{"clamp", Kind::number, "2", 0, 1e6,
+               "where data are thin, stay this many RMSE from the straight line; 0: off"},
+    OptionInfo{"background_weight", Kind::number, "0.001", 0, 0.999,
+               "of one Gaussian over all data; 0: none"}};
+
+constexpr std::array kDgmmPaperOptions{
+    OptionInfo{"components", Kind::integer, "500", 1, 100000, "Gaussians"},
+    OptionInfo{"learning_rate", Kind::number, "0.02", 0, 1, "of the nearest Gaussian's mean"},
+    OptionInfo{"spread", Kind::number, "0.15", 1e-6, 100,
+               "of every Gaussian in every direction, in standard deviations"}};
+
 template <class Family>
 FittedModel fitted_model(Fitted<Family> fitted) {
   return {Family(fitted.parameters), std::move(fitted.notes)};
@@ -67,6 +92,32 @@ FittedModel polynomial(const TrainingData& data, const Options& options, std::ui
                                             .schedule = options.text("schedule")}));
 }
 
+FittedModel dgmm(const TrainingData& data, const Options& options, std::uint64_t,
+                 const Progress& progress) {
+  return fitted_model(
+      fit_dgmm(data,
+               {.online = {.components = options.integer("components"),
+                           .novelty_distance = options.number("novelty_distance"),
+                           .initial_spread = options.number("initial_spread"),
+                           .learning_rate_floor = options.number("learning_rate_floor"),
+                           .forgetting = options.number("forgetting"),
+                           .prune_count = options.number("prune_count"),
+                           .prune_age = options.integer("prune_age")},
+                .em_iterations = options.integer("em_iterations"),
+                .clamp = options.number("clamp"),
+                .background_weight = options.number("background_weight")},
+               progress));
+}
+
+FittedModel dgmm_paper(const TrainingData& data, const Options& options, std::uint64_t,
+                       const Progress& progress) {
+  return fitted_model(fit_dgmm_paper(data,
+                                     {.components = options.integer("components"),
+                                      .learning_rate = options.number("learning_rate"),
+                                      .spread = options.number("spread")},
+                                     progress));
+}
+
 constexpr std::array kFamilies{
     FamilyInfo{Linear::kFamily, "spring with a bias: b + sum k x", kLinearOptions, linear},
     FamilyInfo{LinearCoulomb::kFamily, "spring with a bias and friction: b + sum k x + c tanh(r/v)",
@@ -74,6 +125,10 @@ constexpr std::array kFamilies{
     FamilyInfo{Polynomial::kFamily,
                "curve of the first input, one for each direction: P(x) + sum k x",
                kPolynomialOptions, polynomial},
+    FamilyInfo{Dgmm::kFamily, "Gaussian mixture of target and inputs, learned sample by sample",
+               kDgmmOptions, dgmm},
+    FamilyInfo{"dgmm_paper", "the same as printed in the paper: for comparison only",
+               kDgmmPaperOptions, dgmm_paper},
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "torsio/train/model_run.hpp"
 #include "train/least_squares.hpp"
 
 namespace torsio {
@@ -19,12 +20,10 @@ struct Residual {
 std::vector<Residual> residuals(AnyModel& model, const TrainingData& data) {
   std::vector<Residual> all;
   for (const Sequence& sequence : data.sequences) {
-    model.reset();
-    for (std::size_t n = 0; n < sequence.target.size(); ++n) {
-      const Estimate told = model.step(sequence.features.row(n));
-      if (sequence.use[n] != 0 && std::isfinite(told.value) && told.fault == Fault::none)
-        all.push_back({told.value, told.value - sequence.target[n]});
-    }
+    const std::vector<Estimate> told = run(model, sequence);
+    for (std::size_t n = 0; n < told.size(); ++n)
+      if (sequence.use[n] != 0 && std::isfinite(told[n].value) && told[n].fault == Fault::none)
+        all.push_back({told[n].value, told[n].value - sequence.target[n]});
   }
   return all;
 }

@@ -25,7 +25,7 @@ void MetricsAccumulator::add(double value, double target) noexcept {
   const auto count = static_cast<double>(samples_);
   square_sum_ += error * error;
   // A model that told NaN must show as NaN, which std::max would swallow.
-  max_abs_ = std::isnan(error) ? error : std::max(std::abs(error), max_abs_);
+  max_abs_ = std::isnan(error) ? error : std::max(max_abs_, std::abs(error));
   update(std::abs(error), count, mean_abs_, abs_spread_);
   update(target, count, mean_target_, target_spread_);
 }

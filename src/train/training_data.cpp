@@ -79,7 +79,9 @@ void check_features(const TrainingData& data) {
 
 TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role role) {
   FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
-  TrainingData data{.target = dataset.target, .sample_rate_Hz = dataset.sample_rate_Hz()};
+  TrainingData data;
+  data.target = dataset.target;
+  data.sample_rate_Hz = dataset.sample_rate_Hz();
   for (std::size_t j = 0; j < pipeline.feature_count(); ++j)
     data.inputs.push_back({spec.inputs[j], pipeline.is_rate(j)});
   const auto has_role = [role](const DatasetRecord& record) {

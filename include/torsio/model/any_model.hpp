@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "torsio/model/dgmm.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
 #include "torsio/model/model.hpp"
@@ -25,7 +26,8 @@ struct FamilyList {
 /// Every family that model files and the command line know: one line each.
 using KnownFamilies = FamilyList<Linear,         //
                                  LinearCoulomb,  //
-                                 Polynomial>;
+                                 Polynomial,     //
+                                 Dgmm>;
 
 /// A model that can run backwards: from the target to its first input. `invert` returns an
 /// `Estimate`, or a plain value where it never fails; it may need scratch space, so it is not

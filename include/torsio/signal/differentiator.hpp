@@ -41,7 +41,7 @@ class Differentiator {
  private:
   double sample_rate_Hz_;
   std::optional<Lowpass> lowpass_;
-  std::size_t settling_samples_;
+  std::size_t settling_samples_ = 2;
   std::size_t seen_ = 0;
   double previous_ = 0.0;
 };

@@ -46,7 +46,7 @@ class FeaturePipeline {
   /// itself, or filters at or above half the sample rate; UsageError if that rate is not positive.
   FeaturePipeline(FeatureSpec spec, double sample_rate_Hz);
   FeaturePipeline(const FeaturePipeline& other);
-  FeaturePipeline(FeaturePipeline&&) noexcept;
+  FeaturePipeline(FeaturePipeline&& other) noexcept;
   FeaturePipeline& operator=(FeaturePipeline other) noexcept;
   ~FeaturePipeline();
 

@@ -21,18 +21,18 @@ struct InputInfo {
 /// through it.
 struct Sequence {
   std::string recording;
-  Matrix features;             ///< samples x inputs
-  std::vector<double> target;  ///< NaN where not measured
-  std::vector<std::uint8_t>
-      use;  ///< 1: may be learned from (role, settled filters, fresh and finite target)
+  Matrix features = {};             ///< samples x inputs
+  std::vector<double> target = {};  ///< NaN where not measured
+  std::vector<std::uint8_t> use =
+      {};  ///< 1: may be learned from (role, settled filters, fresh and finite target)
 };
 
 /// What every fitter is given.
 struct TrainingData {
-  std::vector<InputInfo> inputs;
+  std::vector<InputInfo> inputs = {};
   std::string target;
   double sample_rate_Hz = 0.0;
-  std::vector<Sequence> sequences;
+  std::vector<Sequence> sequences = {};
 
   [[nodiscard]] std::size_t input_count() const noexcept { return inputs.size(); }
   [[nodiscard]] std::size_t usable_samples() const noexcept;

@@ -1,0 +1,58 @@
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "report_text.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/report/comparison.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct CompareFlags {
+  DataFlags data;
+  std::vector<std::string> validation;
+  std::vector<std::string> test;
+  std::string models = "all";
+  std::string output;
+  std::uint64_t seed = kDefaultSeed;
+  bool allow_leak = false;
+  JsonOutput json;
+};
+
+void run(const CompareFlags& flags) {
+  ProgressBar bar;
+  const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test);
+  const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
+  const auto comparison =
+      torsio::compare(dataset, choices, flags.seed, flags.allow_leak, bar.listener());
+  if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
+  if (!flags.output.empty()) torsio::save_model(flags.output, comparison.best->file);
+  if (flags.json.wants_tables()) print(comparison_text(comparison.results));
+  if (!flags.output.empty()) remark("best model written to " + flags.output);
+  flags.json.write(torsio::results_json(comparison.results));
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app) {
+  auto flags = std::make_shared<CompareFlags>();
+  CLI::App* verb =
+      app.add_subcommand("compare", "fit many models and rank them on held-out recordings");
+  verb->footer(
+      "Example: torsio compare sweep1.csv sweep2.csv --test other_lever.csv --models all --json -");
+  flags->data.add_recordings(*verb, "recordings to train on, or a manifest with roles");
+  flags->data.add_mapping(*verb);
+  flags->data.add_target_and_inputs(*verb);
+  verb->add_option("--test", flags->test, "held-out recordings: they rank the models");
+  verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
+  verb->add_option("--models", flags->models,
+                   "all, or families with settings: linear,polynomial:degree=7:branch=true")
+      ->capture_default_str();
+  verb->add_option("-o,--output", flags->output, "write the best model to this file");
+  verb->add_option("--seed", flags->seed, "seed of everything random")->capture_default_str();
+  verb->add_flag("--allow-leak", flags->allow_leak,
+                 "accept an input that the target was computed from; rows say so");
+  verb->add_option("--json", flags->json.destination,
+                   "write the results as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

@@ -1,0 +1,64 @@
+#include "data_flags.hpp"
+
+#include <utility>
+
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/data/load.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace {
+
+torsio::LoadOptions load_options(const DataFlags& flags) {
+  torsio::LoadOptions options;
+  if (!flags.mapping.empty()) options.mapping = flags.mapping;
+  if (!flags.rate.empty()) options.rate_Hz = torsio::si_quantity(flags.rate, "Hz", "--rate");
+  options.target = flags.target;
+  return options;
+}
+
+}  // namespace
+
+void DataFlags::add_recordings(CLI::App& verb, const char* help) {
+  verb.add_option("REC", recordings, help);
+}
+
+void DataFlags::add_mapping(CLI::App& verb) {
+  verb.add_option("--mapping", mapping,
+                  "YAML file that renames and converts the columns of a foreign log");
+  verb.add_option("--rate", rate, "resample to this rate, or the rate of a log without a clock");
+}
+
+void DataFlags::add_target_and_inputs(CLI::App& verb) {
+  verb.add_option("--target", target, "channel to be told (default torque_Nm)");
+  verb.add_option("--inputs", inputs,
+                  "the model's inputs, separated by commas (default: the manifest's, else the "
+                  "deflection, its filtered rate and the filtered joint speed)");
+}
+
+torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
+                                const std::vector<std::string>& test) const {
+  if (recordings.empty())
+    throw torsio::UsageError(
+        {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
+  torsio::Dataset dataset = torsio::load_dataset(recordings, test, load_options(*this));
+  if (validation.empty()) return dataset;
+  torsio::Dataset held_out = torsio::load_dataset({}, validation, load_options(*this));
+  for (torsio::DatasetRecord& record : held_out.records) {
+    for (torsio::Segment& segment : record.segments) segment.role = torsio::Role::validation;
+    dataset.records.push_back(std::move(record));
+  }
+  dataset.check();
+  return dataset;
+}
+
+torsio::Dataset DataFlags::load_as_test() const {
+  if (recordings.empty())
+    throw torsio::UsageError(
+        {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
+  return torsio::load_dataset({}, recordings, load_options(*this));
+}
+
+std::vector<std::string> DataFlags::wanted_inputs() const {
+  return inputs.empty() ? std::vector<std::string>{} : torsio::split_inputs(inputs);
+}

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "torsio/data/dataset.hpp"
+
+/// The flags of every verb that reads recordings.
+struct DataFlags {
+  std::vector<std::string> recordings;  ///< CSV, CSV.gz or a dataset manifest (.yaml)
+  std::string mapping;
+  std::string rate;
+  std::string target;
+  std::string inputs;
+
+  void add_recordings(CLI::App& verb, const char* help);
+  void add_mapping(CLI::App& verb);
+  void add_target_and_inputs(CLI::App& verb);
+
+  /// The recordings as training data, further ones with other roles.
+  [[nodiscard]] torsio::Dataset load(const std::vector<std::string>& validation,
+                                     const std::vector<std::string>& test) const;
+  /// The recordings as test data, except where a manifest gives roles.
+  [[nodiscard]] torsio::Dataset load_as_test() const;
+  [[nodiscard]] std::vector<std::string> wanted_inputs() const;
+};
+
+inline constexpr std::uint64_t kDefaultSeed = 1;

@@ -1,0 +1,126 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "report_text.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/report/comparison.hpp"
+#include "torsio/report/terminal_plot.hpp"
+#include "torsio/sim/experiment.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct DemoFlags {
+  DataFlags data;
+  std::vector<std::string> test;
+  std::string actuator = "dfki-50";
+  std::string models = "all";
+  std::string output = "torsio-demo.safetensors";
+  std::uint64_t seed = kDefaultSeed;
+  JsonOutput json;
+};
+
+/// Three sweeps to learn from and one with another lever and inclination to be judged on.
+torsio::Dataset simulated_bench(const DemoFlags& flags, const torsio::Progress& progress) {
+  const torsio::SweepProtocol protocol = torsio::sweep_protocol(flags.actuator);
+  torsio::Dataset dataset;
+  const auto record = [&](double lever_m, double inclination_rad, torsio::Role role) {
+    const std::uint64_t seed = flags.seed + dataset.records.size();
+    torsio::Recording sweep = torsio::simulate({.actuator = flags.actuator,
+                                                .experiment = "sweep",
+                                                .seed = seed,
+                                                .lever_m = lever_m,
+                                                .inclination_rad = inclination_rad},
+                                               progress);
+    const std::size_t samples = sweep.size();
+    dataset.records.push_back({std::move(sweep), torsio::whole_record(samples, role)});
+  };
+  for (const double lever_m : protocol.train_lever_m) record(lever_m, 0.0, torsio::Role::train);
+  record(protocol.test_lever_m, protocol.test_inclination_rad, torsio::Role::test);
+  return dataset;
+}
+
+/// The first test record's loop: what was measured against the first input.
+std::string loop_plot(const torsio::Dataset& dataset, const torsio::ModelFile& model) {
+  const auto is_test = [](const torsio::DatasetRecord& record) {
+    return std::ranges::any_of(record.segments, [](const torsio::Segment& segment) {
+      return segment.role == torsio::Role::test;
+    });
+  };
+  const torsio::Recording& recording = std::ranges::find_if(dataset.records, is_test)->recording;
+  torsio::FeatureSpec first = model.settings.features;
+  first.inputs.resize(1);
+  torsio::FeaturePipeline pipeline(first, recording.sample_rate_Hz());
+  const std::vector<double>& target = recording.channel(dataset.target).values;
+  std::vector<double> x;
+  std::vector<double> raw(pipeline.raw_inputs().size());
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    for (std::size_t j = 0; j < raw.size(); ++j)
+      raw[j] = recording.channel(pipeline.raw_inputs()[j]).values[i];
+    x.push_back(pipeline.step(raw).front());
+  }
+  return fmt::format("\n{} over {}, as measured in {}\n", dataset.target, first.inputs.front(),
+                     recording.name()) +
+         torsio::terminal_plot({{"", x, target}}, {first.inputs.front(), dataset.target});
+}
+
+/// Saves the best model, loads it back and streams the test records through it, as a robot would.
+std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
+                       const torsio::TrainedModel& best) {
+  torsio::save_model(flags.output, best.file);
+  torsio::Estimator estimator = torsio::load_estimator(flags.output);
+  const torsio::SplitScore score = torsio::evaluate(estimator, dataset, torsio::Role::test);
+  const torsio::Score& together = score.together;
+  return fmt::format(
+      "\nbest model {} saved to {}, loaded back, {} samples streamed through it:\n"
+      "RMSE {:.3f}, {:.0f} ns a step (99.9 %: {:.0f} ns), {} samples outside the training range or "
+      "faulty\n",
+      best.file.card.fitted_as, flags.output, together.metrics.samples, together.metrics.rmse,
+      together.step_ns_p50, together.step_ns_p999, together.guarded_samples);
+}
+
+void run(const DemoFlags& flags) {
+  ProgressBar bar;
+  const bool is_simulated = flags.data.recordings.empty();
+  if (is_simulated) remark(fmt::format("simulating four sweeps of {} ...", flags.actuator));
+  const torsio::Dataset dataset =
+      is_simulated ? simulated_bench(flags, bar.listener()) : flags.data.load({}, flags.test);
+  const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
+  const torsio::Comparison comparison =
+      torsio::compare(dataset, choices, flags.seed, false, bar.listener());
+  if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
+  const std::string deployed = deployment(flags, dataset, *comparison.best);
+  if (flags.json.wants_tables())
+    print(comparison_text(comparison.results) + loop_plot(dataset, comparison.best->file) +
+          deployed);
+  flags.json.write(torsio::results_json(comparison.results));
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app) {
+  auto flags = std::make_shared<DemoFlags>();
+  CLI::App* verb =
+      app.add_subcommand("demo", "the main job end to end, on a simulated bench or on your files");
+  verb->footer(
+      "Example: torsio demo\n         torsio demo sweep1.csv sweep2.csv --test other_lever.csv");
+  flags->data.add_recordings(
+      *verb, "recordings to train on, or a manifest with roles; none: simulate a bench");
+  flags->data.add_mapping(*verb);
+  flags->data.add_target_and_inputs(*verb);
+  verb->add_option("--test", flags->test, "held-out recordings");
+  verb->add_option("--actuator", flags->actuator, "the simulated bench")->capture_default_str();
+  verb->add_option("--models", flags->models, "as for compare")->capture_default_str();
+  verb->add_option("-o,--output", flags->output, "where the best model goes")
+      ->capture_default_str();
+  verb->add_option("--seed", flags->seed, "seed of everything random")->capture_default_str();
+  verb->add_option("--json", flags->json.destination,
+                   "write compare's document to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

@@ -1,0 +1,80 @@
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "report_text.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/data/csv.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/report/comparison.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct EvaluateFlags {
+  std::string model;
+  DataFlags data;
+  std::string predictions;
+  JsonOutput json;
+};
+
+/// Target, estimate, error bar and fault of every sample of one recording.
+torsio::Recording prediction_recording(torsio::Estimator& estimator,
+                                       const torsio::Recording& recording,
+                                       const std::string& target) {
+  const torsio::Prediction prediction = torsio::predict(estimator, recording);
+  const torsio::ChannelName parts = *torsio::split_channel_name(target);
+  const std::string unit = "_" + std::string(parts.unit->si_suffix);
+  torsio::Channel estimate{"estimated_" + target, {}};
+  torsio::Channel std_dev{std::string(parts.quantity) + "_std_dev" + unit, {}};
+  torsio::Channel fault{"fault_1", {}};
+  for (const torsio::Estimate& told : prediction.estimates) {
+    estimate.values.push_back(told.value);
+    std_dev.values.push_back(told.std_dev);
+    fault.values.push_back(static_cast<double>(told.fault));
+  }
+  torsio::Recording result(recording.name(), recording.sample_rate_Hz(), recording.time_s(0));
+  result.add(recording.channel(target));
+  result.add(std::move(estimate));
+  result.add(std::move(std_dev));
+  result.add(std::move(fault));
+  return result;
+}
+
+void run(const EvaluateFlags& flags) {
+  const torsio::ModelFile file = torsio::load_model(flags.model);
+  DataFlags data = flags.data;
+  data.target = file.settings.target;
+  const torsio::Dataset dataset = data.load_as_test();
+  ProgressBar bar;
+  const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
+  if (!flags.predictions.empty()) {
+    if (dataset.records.size() != 1)
+      throw torsio::UsageError({.place = "--predictions",
+                                .expected = "one recording",
+                                .found = std::to_string(dataset.records.size()),
+                                .advice = "Call evaluate once for each recording."});
+    torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
+    torsio::write_csv(
+        prediction_recording(estimator, dataset.records.front().recording, dataset.target),
+        flags.predictions);
+  }
+  if (flags.json.wants_tables()) print(evaluation_text(results));
+  flags.json.write(torsio::results_json(results));
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app) {
+  auto flags = std::make_shared<EvaluateFlags>();
+  CLI::App* verb = app.add_subcommand("evaluate", "score a model file on recordings");
+  verb->footer("Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv");
+  verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
+  flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
+  flags->data.add_mapping(*verb);
+  verb->add_option("--predictions", flags->predictions,
+                   "write target, estimate, error bar and fault of one recording as CSV");
+  verb->add_option("--json", flags->json.destination,
+                   "write the results as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "report_text.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/report/comparison.hpp"
+#include "torsio/train/families.hpp"
+#include "torsio/train/inputs.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct FitFlags {
+  DataFlags data;
+  std::vector<std::string> validation;
+  std::string family;
+  std::vector<std::string> settings;
+  std::string output;
+  std::string device_serial;
+  std::uint64_t seed = kDefaultSeed;
+  bool allow_leak = false;
+  bool list = false;
+  JsonOutput json;
+};
+
+std::string family_list() {
+  std::string text;
+  for (const torsio::FamilyInfo& family : torsio::families()) {
+    text += fmt::format("{}: {}\n", family.name, family.summary);
+    for (const torsio::OptionInfo& option : family.options) {
+      const bool is_ranged = option.minimum < option.maximum;
+      text += fmt::format(
+          "  --set {}={}  {}{}\n", option.name,
+          option.default_value.empty() ? "(none)" : option.default_value, option.help,
+          is_ranged ? fmt::format(" ({:g} to {:g})", option.minimum, option.maximum) : "");
+    }
+  }
+  return text;
+}
+
+std::map<std::string, std::string> parse_settings(const std::vector<std::string>& settings) {
+  std::map<std::string, std::string> options;
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos)
+      throw torsio::UsageError(
+          {.place = "--set", .expected = "option=value", .found = "'" + setting + "'"});
+    options[setting.substr(0, equals)] = setting.substr(equals + 1);
+  }
+  return options;
+}
+
+void run(const FitFlags& flags) {
+  if (flags.list) return print(family_list());
+  if (flags.data.recordings.empty() || flags.family.empty() || flags.output.empty())
+    throw torsio::UsageError(
+        {.place = "torsio fit",
+         .expected = "recordings, --model FAMILY and -o FILE",
+         .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
+  ProgressBar bar;
+  const torsio::Dataset dataset = flags.data.load(flags.validation, {});
+  const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+  (void)torsio::refuse_leak(dataset, features, flags.allow_leak);
+  const torsio::ModelChoice choice{flags.family, parse_settings(flags.settings), "", features};
+  torsio::TrainedModel trained = torsio::train_model(dataset, choice, flags.seed, bar.listener());
+  trained.file.card.device_serial = flags.device_serial;
+  const torsio::Results results = torsio::evaluate_model(trained.file, dataset, bar.listener());
+  torsio::note_held_out_scores(trained.file.card, results.rows);
+  torsio::save_model(flags.output, trained.file);
+  if (flags.json.wants_tables()) print(evaluation_text(results));
+  for (const std::string& note : trained.notes) remark("note: " + note);
+  remark(fmt::format("{} written in {:.2f} s of fitting", flags.output, trained.fit_seconds));
+  flags.json.write(torsio::results_json(results));
+}
+
+}  // namespace
+
+void add_fit(CLI::App& app) {
+  auto flags = std::make_shared<FitFlags>();
+  CLI::App* verb = app.add_subcommand("fit", "train one model and save it");
+  verb->footer(
+      "Example: torsio fit sweep.csv --model dgmm --set components=300 -o joint.safetensors");
+  flags->data.add_recordings(*verb, "recordings to train on, or a manifest with roles");
+  flags->data.add_mapping(*verb);
+  flags->data.add_target_and_inputs(*verb);
+  verb->add_option("--model", flags->family, "family; --list shows them");
+  verb->add_option("--set", flags->settings, "a setting of the family, option=value")
+      ->allow_extra_args(false);
+  verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
+  verb->add_option("-o,--output", flags->output, "model file; untouched unless the fit succeeds");
+  verb->add_option("--serial", flags->device_serial,
+                   "serial number of the joint that the model belongs to");
+  verb->add_option("--seed", flags->seed, "seed of everything random")->capture_default_str();
+  verb->add_flag("--allow-leak", flags->allow_leak,
+                 "accept an input that the target was computed from; rows say so");
+  verb->add_flag("--list", flags->list, "show the families and their settings");
+  verb->add_option("--json", flags->json.destination,
+                   "write the scores as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

@@ -1,0 +1,26 @@
+#include "output.hpp"
+
+#include <cstdio>
+#include <span>
+
+#include "torsio/core/error.hpp"
+#include "torsio/files/whole_file.hpp"
+
+void print(std::string_view text) {
+  const std::size_t written = std::fwrite(text.data(), 1, text.size(), stdout);
+  if (written != text.size() || std::fflush(stdout) != 0)
+    throw torsio::Error({.place = "standard output", .problem = "could not be written to the end"});
+}
+
+void remark(std::string_view text) {
+  std::fprintf(stderr, "%.*s\n", static_cast<int>(text.size()), text.data());
+}
+
+void JsonOutput::write(std::string_view document) const {
+  if (destination.empty()) return;
+  if (destination == "-") {
+    print(document);
+  } else {
+    torsio::write_whole_file(destination, std::as_bytes(std::span(document)));
+  }
+}

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+/// Where a verb's machine-readable document goes (`--json FILE|-`) and, with it, whether people's
+/// tables are printed.
+struct JsonOutput {
+  std::string destination;  ///< empty: none; "-": standard output
+
+  /// Tables for people go to stdout unless the document does.
+  [[nodiscard]] bool wants_tables() const { return destination != "-"; }
+  /// @throws torsio::Error if the document cannot be written whole.
+  void write(std::string_view document) const;
+};
+
+/// Prints to stdout; a full disk or a closed pipe is an Error.
+void print(std::string_view text);
+/// Prints a remark to stderr.
+void remark(std::string_view text);

@@ -1,0 +1,54 @@
+#include "report_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "torsio/report/text_table.hpp"
+
+std::string comparison_text(const torsio::Results& results) {
+  std::string text = fmt::format("target {}{}\n", results.target,
+                                 results.label.empty() ? "" : ", " + results.label);
+  if (results.input_sets.empty()) {
+    text += fmt::format("inputs {}\n", fmt::join(results.inputs, ", "));
+  } else {
+    for (const auto& [set_name, inputs] : results.input_sets)
+      text += fmt::format("inputs {}: {}\n", set_name, fmt::join(inputs, ", "));
+  }
+  if (results.non_causal_zero)
+    text += "zero: non-causal (taken from the middle of each whole record)\n";
+  for (const torsio::Role role : {torsio::Role::validation, torsio::Role::test}) {
+    const bool has_rows = std::ranges::any_of(
+        results.rows, [&](const torsio::ResultRow& row) { return row.split == role; });
+    if (!has_rows) continue;
+    text += fmt::format("\nheld-out ({}) errors in {}, free run, best first\n{}",
+                        torsio::name(role), results.unit, torsio::ranked_table(results, role));
+  }
+  return text;
+}
+
+std::string evaluation_text(const torsio::Results& results) {
+  torsio::TextTable table;
+  table.header(
+      {"split", "RMSE", "MAD", "max|e|", "fit %", "samples", "by a guard", "step ns", "p99.9"});
+  for (const torsio::ResultRow& row : results.rows) {
+    const torsio::Metrics& metrics = row.score.metrics;
+    std::string split(torsio::name(row.split));
+    if (row.recording) split = "  " + *row.recording;
+    table.row({split, fmt::format("{:.4f}", metrics.rmse), fmt::format("{:.4f}", metrics.mad),
+               fmt::format("{:.4f}", metrics.max_abs), fmt::format("{:.1f}", metrics.fit_percent),
+               fmt::format("{}", metrics.samples), fmt::format("{}", row.score.guarded_samples),
+               fmt::format("{:.0f}", row.score.step_ns_p50),
+               fmt::format("{:.0f}", row.score.step_ns_p999)});
+  }
+  return fmt::format("target {}, inputs {}\nerrors in {}, free run\n{}", results.target,
+                     fmt::join(results.inputs, ", "),
+                     results.unit.empty() ? "no unit" : results.unit, table.text());
+}
+
+std::string first_failure(const torsio::Results& results) {
+  for (const torsio::ResultRow& row : results.rows)
+    if (row.status != "ok") return "no model could be fitted; " + row.family + ": " + row.reason;
+  return "no model could be scored";
+}

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+#include "torsio/report/results.hpp"
+
+/// What a person is shown of a comparison: what was compared, the ranked test table, and the
+/// remarks to its rows.
+[[nodiscard]] std::string comparison_text(const torsio::Results& results);
+
+/// The scores of one model on each role and recording.
+[[nodiscard]] std::string evaluation_text(const torsio::Results& results);
+
+/// Why nothing could be fitted.
+[[nodiscard]] std::string first_failure(const torsio::Results& results);

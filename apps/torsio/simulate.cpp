@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/data/csv.hpp"
+#include "torsio/report/text_table.hpp"
+#include "torsio/sim/experiment.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct SimulateFlags {
+  std::string actuator;
+  std::string experiment;
+  std::string output;
+  std::string duration;
+  std::string lever;
+  std::string inclination;
+  std::string describe;
+  std::uint64_t seed = kDefaultSeed;
+  bool with_truth = false;
+  bool list = false;
+};
+
+std::string bench_list() {
+  torsio::TextTable actuators;
+  actuators.header({"actuator", "what it is"});
+  for (const torsio::DataSheet& sheet : torsio::data_sheets())
+    actuators.row({std::string(sheet.name), std::string(sheet.title)});
+  torsio::TextTable experiments;
+  experiments.header({"experiment", "what is done"});
+  for (const torsio::ExperimentInfo& info : torsio::experiments())
+    experiments.row({std::string(info.name), std::string(info.description)});
+  return actuators.text() + "\n" + experiments.text();
+}
+
+std::string description(const torsio::DataSheet& sheet) {
+  torsio::TextTable table;
+  table.header({"parameter", "value", "unit", "origin"});
+  for (const torsio::SheetRow& row : torsio::describe(sheet))
+    table.row({std::string(row.name), fmt::format("{:.6g}", row.value.value), std::string(row.unit),
+               std::string(1, static_cast<char>(row.value.origin))});
+  return fmt::format(
+      "{}: {}\n{}origin: P printed in a paper, D derived from printed numbers, A assumed\n",
+      sheet.name, sheet.title, table.text());
+}
+
+torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
+  torsio::ExperimentSpec spec{.actuator = flags.actuator,
+                              .experiment = flags.experiment,
+                              .seed = flags.seed,
+                              .with_truth = flags.with_truth};
+  if (!flags.duration.empty())
+    spec.duration_s = torsio::si_quantity(flags.duration, "s", "--duration");
+  if (!flags.lever.empty()) spec.lever_m = torsio::si_quantity(flags.lever, "m", "--lever");
+  if (!flags.inclination.empty())
+    spec.inclination_rad = torsio::si_quantity(flags.inclination, "rad", "--inclination");
+  return spec;
+}
+
+void run(const SimulateFlags& flags) {
+  if (flags.list) return print(bench_list());
+  if (!flags.describe.empty()) return print(description(torsio::data_sheet(flags.describe)));
+  if (flags.actuator.empty() || flags.experiment.empty() || flags.output.empty())
+    throw torsio::UsageError({.place = "torsio simulate",
+                              .expected = "ACTUATOR EXPERIMENT -o FILE",
+                              .advice = "torsio simulate --list shows what there is; example: "
+                                        "torsio simulate dfki-50 sweep -o sweep.csv"});
+  ProgressBar bar;
+  const torsio::Recording recording = torsio::simulate(experiment_spec(flags), bar.listener());
+  torsio::write_csv(recording, flags.output);
+  remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),
+                     recording.sample_rate_Hz()));
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app) {
+  auto flags = std::make_shared<SimulateFlags>();
+  CLI::App* verb = app.add_subcommand("simulate", "record a run of a simulated bench");
+  verb->footer("Example: torsio simulate dfki-50 sweep --lever 0.17m --seed 2 -o sweep.csv");
+  verb->add_option("ACTUATOR", flags->actuator, "--list shows the names");
+  verb->add_option("EXPERIMENT", flags->experiment, "--list shows the names");
+  verb->add_option("-o,--output", flags->output, "CSV file to write, or - for standard output");
+  verb->add_option("--duration", flags->duration, "length of the record (default: the protocol's)");
+  verb->add_option("--lever", flags->lever, "where the 9 kg mass hangs on the lever: 0.17m");
+  verb->add_option("--inclination", flags->inclination,
+                   "of the lever's plane of motion from the vertical: 37.8deg");
+  verb->add_option("--seed", flags->seed, "seed of every sensor's noise")->capture_default_str();
+  verb->add_flag("--truth", flags->with_truth, "add the truth_ channels that no sensor sees");
+  verb->add_flag("--list", flags->list, "show actuators and experiments");
+  verb->add_option("--describe", flags->describe, "show an actuator's data sheet");
+  verb->callback([flags] { run(*flags); });
+}

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+#include <type_traits>
+#include <variant>
+
+#include "torsio/actuator/elastic_curve.hpp"
+#include "torsio/actuator/maxwell_slip.hpp"
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+/// The inner friction of a spring, one alternative a variant of the plant (SPEC section 4.6). Each
+/// has `Parameters`, `reset()`, `step(increment_rad, load_Nm)`, `energy()` and
+/// `stiffness(load_Nm)`.
+using SpringFriction = std::variant<MaxwellSlip<4>>;
+
+/// Calls `visit(alternative)`, which returns a number: a std::visit that cannot throw.
+template <std::size_t Index = 0, class Variant, class Visit>
+double dispatch(Variant& variant, const Visit& visit) noexcept {
+  if (auto* alternative = std::get_if<Index>(&variant)) return visit(*alternative);
+  if constexpr (Index + 1 < std::variant_size_v<std::remove_const_t<Variant>>) {
+    return dispatch<Index + 1>(variant, visit);
+  }
+  return 0.0;
+}
+
+/// A torsion spring: elastic curve, inner friction that grows with the load, and a little
+/// viscosity.
+///
+///     τ = τ_el(δ) + F[δ, |τ_el|] + d δ̇
+///
+/// Source: SPEC section 4.1.
+class Spring {
+ public:
+  struct Parameters {
+    ElasticCurve::Parameters elastic;
+    std::variant<MaxwellSlip<4>::Parameters> friction;
+    double viscosity_Nms_rad = 0.0;
+  };
+
+  /// @throws Error as its parts do, or if the viscosity is negative.
+  explicit Spring(const Parameters& parameters);
+  [[nodiscard]] const ElasticCurve& elastic() const noexcept { return elastic_; }
+  [[nodiscard]] double viscosity() const noexcept { return viscosity_Nms_rad_; }
+
+  /// Relaxed friction at this deflection.
+  void reset(double deflection_rad = 0.0) noexcept;
+
+  /// @returns the torque on the joint [Nm]
+  double step(double deflection_rad, double deflection_rate_rad_s) noexcept TORSIO_REALTIME {
+    const double elastic_Nm = elastic_.torque(deflection_rad);
+    const double increment_rad = deflection_rad - last_deflection_rad_;
+    last_deflection_rad_ = deflection_rad;
+    friction_Nm_ = dispatch(
+        friction_, [&](auto& friction) { return friction.step(increment_rad, elastic_Nm); });
+    return elastic_Nm + friction_Nm_ + viscosity_Nms_rad_ * deflection_rate_rad_s;
+  }
+
+  /// @returns the friction's share of the last step's torque [Nm]
+  [[nodiscard]] double friction_torque() const noexcept { return friction_Nm_; }
+  /// @returns the energy [J] stored in the elastic curve and in the friction elements
+  [[nodiscard]] double elastic_energy() const noexcept {
+    return elastic_.energy(last_deflection_rad_);
+  }
+  [[nodiscard]] double friction_energy() const noexcept;
+  /// @returns the largest stiffness [Nm/rad] under loads up to this one
+  [[nodiscard]] double steepest(double load_Nm) const noexcept;
+
+ private:
+  ElasticCurve elastic_;
+  SpringFriction friction_;
+  double viscosity_Nms_rad_;
+  double last_deflection_rad_ = 0.0;
+  double friction_Nm_ = 0.0;
+};
+
+}  // namespace torsio

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "torsio/core/aligned_vector.hpp"
+#include "torsio/core/matrix.hpp"
+#include "torsio/core/realtime.hpp"
+#include "torsio/model/gaussian_mixture.hpp"
+#include "torsio/model/model.hpp"
+
+namespace torsio {
+
+/// What a mixture says about one of its quantities once the others are known.
+struct Conditional {
+  double mean = 0.0;         ///< the quantity's unit
+  double variance = 0.0;     ///< unit squared
+  double log_density = 0.0;  ///< ln p(z~) of the given quantities, standardised: no unit
+};
+
+/// Gaussian mixture regression: one quantity y of a mixture given all the others z, in any
+/// direction from one mixture.
+///
+///     l_i = ln w_i - sum ln diag L_i - d/2 ln 2 pi - |L_i^-1 (z - mu_i^Z)|^2 / 2,  L_i L_i^T =
+///     S_i^ZZ m_i = mu_i^Y + B_i (z - mu_i^Z),   B_i = S_i^YZ (S_i^ZZ)^-1,   s_i^2 = S_i^YY - B_i
+///     S_i^ZY pi_i = exp(l_i) / sum exp(l_j);   mean = sum pi_i m_i;   variance = sum pi_i (s_i^2 +
+///     (m_i - mean)^2)
+///
+/// `query` scans all components in float32 for those whose weight can matter at all and evaluates
+/// these in double; what it leaves out, and what float32 may have judged wrongly, is bounded: the
+/// dropped components hold less than 1e-10 of the weight. `query_exact` evaluates all of them in
+/// double, one by one. Where no component has a density that double can hold, the results are NaN.
+///
+/// Source: SPEC 3.1 (papers 000 and 001, equations 8 to 11, with the variance of the mixture).
+/// Cost of `query`: 4 (d + d(d+1)/2 + 1) bytes a component from cache, d given quantities. Nothing
+/// is allocated after construction.
+class MixtureRegression {
+ public:
+  /// @param output index of y among the mixture's quantities; z are the others in their order.
+  /// @throws Error if the mixture is not sound (see `check`), has less than two quantities, or
+  /// lacks `output`.
+  MixtureRegression(const GaussianMixture& mixture, std::size_t output);
+
+  [[nodiscard]] std::size_t input_count() const noexcept { return inputs_; }
+  [[nodiscard]] std::size_t size() const noexcept { return components_; }
+
+  /// @param inputs `input_count()` values, physical units.
+  [[nodiscard]] Conditional query(Features inputs) noexcept TORSIO_REALTIME;
+
+  /// The same for each row of `inputs`, to the bit.
+  void query(const Matrix& inputs, std::span<Conditional> results) noexcept TORSIO_REALTIME;
+
+  /// The reference path.
+  [[nodiscard]] Conditional query_exact(Features inputs) const noexcept TORSIO_REALTIME;
+
+  /// Bytes that `query` read last: for measuring against the machine's floor.
+  [[nodiscard]] std::size_t bytes_read() const noexcept;
+
+ private:
+  void pack(const GaussianMixture& mixture, std::size_t output);
+  void standardise(Features inputs) noexcept;
+  [[nodiscard]] Conditional physical(const Conditional& standardised) const noexcept;
+
+  std::size_t inputs_ = 0;
+  std::size_t components_ = 0;
+  double output_centre_ = 0.0;
+  double output_scale_ = 1.0;
+  std::vector<double> input_centre_;
+  std::vector<double> input_scale_;
+  // Bounds from which `query` knows how far a float32 log weight may be off.
+  double largest_mean_ = 0.0;
+  double largest_whitening_ = 0.0;
+  double largest_offset_ = 0.0;
+  AlignedVector<float> scan_;  // blocks of 16 components: mean, whitening, offset
+  AlignedVector<double>
+      exact_;  // blocks of 8 components: the same, then output mean, slope, variance
+  // Scratch of one query.
+  std::size_t evaluated_blocks_ = 0;
+  std::vector<double> standardised_;
+  AlignedVector<float> scan_input_;
+  AlignedVector<float> scan_log_weights_;
+  AlignedVector<double> log_weights_;
+  std::vector<std::size_t> candidates_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/report/results.hpp"
+#include "torsio/train/train_model.hpp"
+
+namespace torsio {
+
+/// Reads `--models`: `all`, or families separated by commas, each with settings behind colons
+/// (`linear,polynomial:degree=7:branch=true`). Each is paired with every input set. `all` is every
+/// family, `polynomial` also without branches, and, where a condition takes several values in training,
+/// the scheduled variants over it.
+/// @throws UsageError for a family or setting that does not exist.
+[[nodiscard]] std::vector<ModelChoice> model_choices(const Dataset& dataset,
+                                                     std::string_view models,
+                                                     const std::vector<std::string>& wanted_inputs);
+
+struct Comparison {
+  Results results;
+  std::optional<TrainedModel> best;  ///< lowest RMSE on the test records; none if every fit failed
+};
+
+/// Trains every choice on the training records and scores it on the other roles. A fit that fails
+/// is a row that says why.
+/// @throws Error if there are no test records, or an input is a leak and `allow_leak` is not set.
+[[nodiscard]] Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
+                                 std::uint64_t seed, bool allow_leak,
+                                 const Progress& progress = {});
+
+/// The model's estimator at another sample rate: filters are re-discretised.
+[[nodiscard]] Estimator estimator_at(const ModelFile& file, double sample_rate_Hz);
+
+/// One model's rows on every role that the dataset has.
+[[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
+                                     const Progress& progress = {});
+
+/// Puts the scores of a model's rows on its held-out records (validation if there are, else test)
+/// into its card, with words for what they were measured on. Without held-out records nothing
+/// changes.
+void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows);
+
+}  // namespace torsio

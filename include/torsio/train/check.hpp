@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/data/dataset.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+enum class Verdict : std::uint8_t { pass, warn, fail };
+
+[[nodiscard]] std::string_view name(Verdict verdict) noexcept;
+
+/// What one check has to say about one recording, or about all of them together.
+struct Finding {
+  Verdict verdict = Verdict::pass;
+  std::string check;      ///< clock, gaps, delay, sign, ...
+  std::string recording;  ///< empty: the recordings together
+  std::string message;    ///< what was measured
+  std::string advice;     ///< what to do; empty if nothing
+};
+
+/// Can a torque model be learned from these recordings? Looks at each channel that the inputs need
+/// and at the target: values that are missing, constant or saturated; gaps; the delay and the sign
+/// between the first input and the target; reversals and speeds; offsets that differ between
+/// records; a target computed from an input; test data outside the training range. Every check
+/// gives at least one finding, PASS ones included, in a fixed order.
+[[nodiscard]] std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec);
+
+}  // namespace torsio

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/estimate/estimator.hpp"
+#include "torsio/train/metrics.hpp"
+
+namespace torsio {
+
+/// How well and how fast an estimator did on some samples, in free run (no past target is fed
+/// back).
+struct Score {
+  Metrics metrics;
+  std::size_t initialised_samples = 0;  ///< not scored: filters had not settled
+  std::size_t guarded_samples = 0;      ///< scored, but answered by a guard instead of the model
+  double step_ns_p50 = kNotMeasured;    ///< of `Estimator::step`, the clock's own cost taken off
+  double step_ns_p999 = kNotMeasured;
+};
+
+/// The estimator's answer to every sample of a recording, streamed through `step` from `reset()`.
+struct Prediction {
+  std::vector<Estimate> estimates;
+  std::vector<double> step_ns;
+};
+
+/// @throws Error naming the recording, the channel and the sample if a raw input is missing or not
+/// finite, or the recording has another sample rate than the estimator.
+[[nodiscard]] Prediction predict(Estimator& estimator, const Recording& recording);
+
+/// Scores of each recording that has segments of `role`, and of all of them together.
+struct SplitScore {
+  struct OfRecording {
+    std::string recording;
+    Score score;
+  };
+  std::vector<OfRecording> recordings;
+  Score together;
+};
+[[nodiscard]] SplitScore evaluate(Estimator& estimator, const Dataset& dataset, Role role,
+                                  const Progress& progress = {});
+
+}  // namespace torsio

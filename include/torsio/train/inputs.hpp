@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "torsio/data/dataset.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// What the user asked for -> what a model is built on: the wanted input expressions with every
+/// definition they need, so that the model's raw inputs are measured channels.
+///
+/// Definitions are those of the recordings' mapping and, unless recorded themselves, the canonical
+/// ones (SPEC section 0): `spring_deflection_rad = gear_angle_rad - joint_angle_rad`,
+/// `spring_deflection_rate_rad_s`, `joint_speed_rad_s`. Without wanted inputs: the dataset's first
+/// input set, else the deflection, its 10 Hz-filtered rate and the filtered joint speed, as far as
+/// present.
+/// @throws Error listing the channels if an input needs one that a record lacks, or no default
+/// applies.
+[[nodiscard]] FeatureSpec resolve_inputs(const Dataset& dataset,
+                                         const std::vector<std::string>& wanted);
+
+/// A raw input that the target was computed from, declared by the dataset or found in the data (the
+/// target is a straight line of the input to 3e-5 of its spread); empty if there is none. Such an
+/// input is a leak: a score with it means nothing.
+[[nodiscard]] std::string find_leak(const Dataset& dataset, const FeatureSpec& spec);
+
+/// `find_leak`, and unless the user allows it, @throws UsageError if there is one.
+std::string refuse_leak(const Dataset& dataset, const FeatureSpec& spec, bool allow_leak);
+
+}  // namespace torsio

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// One model to train: a family, its settings, and the inputs it is given.
+struct ModelChoice {
+  std::string family;
+  std::map<std::string, std::string> options;  ///< as in `--set name=value`
+  std::string input_set;  ///< name of the dataset's input set, for tables; may be empty
+  FeatureSpec features;   ///< from `resolve_inputs`
+
+  /// "branch=true,schedule=support_m": the settings that differ from the defaults, as the user gave
+  /// them.
+  [[nodiscard]] std::string variant() const;
+};
+
+/// A fitted model with all that it needs to run (`make_estimator(file)`) and to be saved.
+struct TrainedModel {
+  ModelFile file;
+  std::vector<std::string> notes;  ///< what the user should be told about the fit
+  double fit_seconds = 0.0;
+};
+
+/// Recording -> features -> fitted model -> guards: what `torsio fit` does. Learns from the records
+/// with the role train only; guards take their error bars from the validation records, if there are
+/// any. Deterministic for a seed.
+/// @throws Error if the data cannot be learned from, Cancelled if `progress` asks to stop.
+[[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
+                                       std::uint64_t seed, const Progress& progress = {});
+
+}  // namespace torsio

@@ -1,0 +1,41 @@
+#include "torsio/actuator/spring.hpp"
+
+#include "checks.hpp"
+
+namespace torsio {
+namespace {
+
+SpringFriction friction_of(const Spring::Parameters& parameters) {
+  return std::visit(
+      [](const MaxwellSlip<4>::Parameters& of) -> SpringFriction { return MaxwellSlip<4>(of); },
+      parameters.friction);
+}
+
+}  // namespace
+
+Spring::Spring(const Parameters& parameters)
+    : elastic_(parameters.elastic),
+      friction_(friction_of(parameters)),
+      viscosity_Nms_rad_(parameters.viscosity_Nms_rad) {
+  require_not_negative("spring", "viscosity_Nms_rad", parameters.viscosity_Nms_rad);
+}
+
+void Spring::reset(double deflection_rad) noexcept {
+  last_deflection_rad_ = deflection_rad;
+  friction_Nm_ = 0.0;
+  dispatch(friction_, [](auto& friction) {
+    friction.reset();
+    return 0.0;
+  });
+}
+
+double Spring::friction_energy() const noexcept {
+  return dispatch(friction_, [](const auto& friction) { return friction.energy(); });
+}
+
+double Spring::steepest(double load_Nm) const noexcept {
+  return elastic_.steepest() +
+         dispatch(friction_, [=](const auto& friction) { return friction.stiffness(load_Nm); });
+}
+
+}  // namespace torsio

@@ -1,0 +1,258 @@
+#include "torsio/report/comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/train/families.hpp"
+#include "torsio/train/inputs.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kRoles = std::to_array<Role>({Role::train, Role::validation, Role::test});
+
+struct FamilyChoice {
+  std::string family;
+  std::map<std::string, std::string> options;
+};
+
+/// "polynomial:degree=7:branch=true" -> family and settings.
+FamilyChoice parse_choice(std::string_view text) {
+  FamilyChoice choice;
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find(':', begin), text.size());
+    const std::string_view part = text.substr(begin, end - begin);
+    if (begin == 0) {
+      choice.family = find_family(part).name;
+    } else {
+      const std::size_t equals = part.find('=');
+      if (equals == std::string_view::npos)
+        throw UsageError({.place = "--models",
+                          .expected = "option=value behind a colon",
+                          .found = std::string(part)});
+      choice.options.emplace(part.substr(0, equals), part.substr(equals + 1));
+    }
+    begin = end + 1;
+  }
+  (void)Options(find_family(choice.family).options,
+                choice.options);  // refuses unknown settings before any work is done
+  return choice;
+}
+
+bool has_option(const FamilyInfo& family, std::string_view option) {
+  return std::ranges::any_of(family.options,
+                             [&](const OptionInfo& known) { return known.name == option; });
+}
+
+/// A condition among the inputs that takes more than one value in training: parameters may be
+/// interpolated over it.
+std::string schedulable_condition(const Dataset& dataset, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::set<double> values;
+    for (const DatasetRecord& record : dataset.records) {
+      const auto& conditions = record.recording.conditions();
+      if (std::ranges::find(conditions, input) == conditions.end()) continue;
+      if (std::ranges::any_of(record.segments,
+                              [](const Segment& segment) { return segment.role == Role::train; }))
+        values.insert(record.recording.channel(input).values.front());
+    }
+    if (values.size() > 1) return input;
+  }
+  return {};
+}
+
+bool is_on_by_default(const FamilyInfo& family, std::string_view option) {
+  return std::ranges::any_of(family.options, [&](const OptionInfo& known) {
+    return known.name == option && known.default_value == "true";
+  });
+}
+
+/// Every family as it comes, without its branches by direction, and scheduled over a condition
+/// where the data have one.
+std::vector<FamilyChoice> all_choices(const Dataset& dataset,
+                                      const std::vector<std::string>& inputs) {
+  const std::string condition = schedulable_condition(dataset, inputs);
+  std::vector<FamilyChoice> choices;
+  for (const FamilyInfo& family : families()) {
+    const std::string family_name(family.name);
+    choices.push_back({family_name, {}});
+    if (is_on_by_default(family, "branch")) choices.push_back({family_name, {{"branch", "false"}}});
+    if (!condition.empty() && has_option(family, "schedule"))
+      choices.push_back({family_name, {{"schedule", condition}}});
+  }
+  return choices;
+}
+
+ResultRow row_for(const ModelFile& file, Role split, Score score) {
+  ResultRow row;
+  row.family = file.card.fitted_as;
+  row.split = split;
+  row.score = std::move(score);
+  row.parameter_count = AnyModel(file.parameters).parameter_count();
+  if (!std::isfinite(row.score.metrics.rmse)) {
+    row.status = "failed";
+    row.reason = "no sample of this split could be scored";
+  } else if (row.score.guarded_samples > 0) {
+    row.reason = fmt::format("{:.1f} % of the samples were answered by a guard",
+                             100.0 * static_cast<double>(row.score.guarded_samples) /
+                                 static_cast<double>(row.score.metrics.samples));
+  }
+  return row;
+}
+
+/// The rows of one model: on each role, on each recording and on all of the role together.
+std::vector<ResultRow> rows_for(const ModelFile& file, Estimator& estimator, const Dataset& dataset,
+                                const Progress& progress) {
+  std::vector<ResultRow> rows;
+  for (const Role role : kRoles) {
+    if (!dataset.has_role(role)) continue;
+    SplitScore scores = evaluate(estimator, dataset, role, progress);
+    rows.push_back(row_for(file, role, std::move(scores.together)));
+    for (auto& of_recording : scores.recordings) {
+      rows.push_back(row_for(file, role, std::move(of_recording.score)));
+      rows.back().recording = of_recording.recording;
+    }
+  }
+  return rows;
+}
+
+Results empty_results(const Dataset& dataset) {
+  Results results;
+  results.target = dataset.target;
+  results.unit = unit_label(dataset.target);
+  results.label = dataset.label;
+  for (const DatasetRecord& record : dataset.records)
+    for (const ZeroRule& zero : record.recording.zeros) results.non_causal_zero |= zero.mid_range;
+  return results;
+}
+
+ResultRow failed_row(const ModelChoice& choice, const Error& error) {
+  ResultRow row;
+  row.family = choice.family;
+  row.status = "failed";
+  row.reason = error.what();
+  return row;
+}
+
+double test_rmse(const std::vector<ResultRow>& rows) {
+  for (const ResultRow& row : rows)
+    if (row.split == Role::test && !row.recording && row.status == "ok")
+      return row.score.metrics.rmse;
+  return kNotMeasured;
+}
+
+/// A model's share of the whole work's progress.
+Progress part_of(const Progress& progress, std::size_t index, std::size_t count,
+                 const std::string& doing) {
+  if (!progress) return {};
+  return [&progress, index, count, doing](double fraction, std::string_view) {
+    return progress((static_cast<double>(index) + fraction) / static_cast<double>(count), doing);
+  };
+}
+
+}  // namespace
+
+std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view models,
+                                       const std::vector<std::string>& wanted_inputs) {
+  auto input_sets = dataset.input_sets;
+  if (!wanted_inputs.empty() || input_sets.empty()) input_sets = {{"", wanted_inputs}};
+  std::vector<ModelChoice> choices;
+  for (const auto& [set_name, inputs] : input_sets) {
+    const FeatureSpec features = resolve_inputs(dataset, inputs);
+    std::vector<FamilyChoice> wanted;
+    if (models == "all") {
+      wanted = all_choices(dataset, features.inputs);
+    } else {
+      for (const std::string& model : split_inputs(models)) wanted.push_back(parse_choice(model));
+    }
+    for (FamilyChoice& choice : wanted)
+      choices.push_back({std::move(choice.family), std::move(choice.options), set_name, features});
+  }
+  return choices;
+}
+
+Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
+                   std::uint64_t seed, bool allow_leak, const Progress& progress) {
+  dataset.check();
+  if (!dataset.has_role(Role::test))
+    throw UsageError(
+        {.problem = "nothing to compare on: no recording has the role test",
+         .advice =
+             "Name held-out recordings with --test, or give them `role: test` in a manifest."});
+  Comparison comparison{.results = empty_results(dataset), .best = {}};
+  Results& results = comparison.results;
+  double best_rmse = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    const ModelChoice& choice = choices[i];
+    if (results.inputs.empty()) results.inputs = choice.features.inputs;
+    if (results.input_sets.empty() || results.input_sets.back().first != choice.input_set)
+      results.input_sets.emplace_back(choice.input_set, choice.features.inputs);
+    const std::string leak = refuse_leak(dataset, choice.features, allow_leak);
+    std::vector<ResultRow> rows;
+    try {
+      const Progress part = part_of(progress, i, choices.size(), choice.family);
+      TrainedModel trained = train_model(dataset, choice, seed, part);
+      Estimator estimator = make_estimator(trained.file);
+      rows = rows_for(trained.file, estimator, dataset, part);
+      for (ResultRow& row : rows) row.fit_seconds = trained.fit_seconds;
+      if (const double rmse = test_rmse(rows); rmse < best_rmse) {
+        best_rmse = rmse;
+        note_held_out_scores(trained.file.card, rows);
+        comparison.best = std::move(trained);
+      }
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {
+      rows = {failed_row(choice, error)};
+    }
+    for (ResultRow& row : rows) {
+      row.variant = choice.variant();
+      row.input_set = choice.input_set;
+      row.leak = !leak.empty();
+      results.rows.push_back(std::move(row));
+    }
+  }
+  if (results.input_sets.size() == 1 && results.input_sets.front().first.empty())
+    results.input_sets.clear();
+  return comparison;
+}
+
+Estimator estimator_at(const ModelFile& file, double sample_rate_Hz) {
+  ModelFile resampled = file;
+  resampled.settings.sample_rate_Hz = sample_rate_Hz;
+  return make_estimator(resampled);
+}
+
+Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Progress& progress) {
+  dataset.check();
+  Results results = empty_results(dataset);
+  results.inputs = file.settings.features.inputs;
+  Estimator estimator = estimator_at(file, dataset.sample_rate_Hz());
+  results.rows = rows_for(file, estimator, dataset, progress);
+  return results;
+}
+
+void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows) {
+  for (const Role role : {Role::validation, Role::test}) {
+    for (const ResultRow& row : rows) {
+      if (row.split != role || row.recording || row.status != "ok") continue;
+      const Metrics& metrics = row.score.metrics;
+      card.held_out = fmt::format("{} {} samples, free run", metrics.samples, name(role));
+      card.metrics = {{"rmse", metrics.rmse},
+                      {"mad", metrics.mad},
+                      {"std_abs", metrics.std_abs},
+                      {"max_abs", metrics.max_abs},
+                      {"fit_percent", metrics.fit_percent}};
+      return;
+    }
+  }
+}
+
+}  // namespace torsio

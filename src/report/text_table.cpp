@@ -1,0 +1,40 @@
+#include "torsio/report/text_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace torsio {
+
+void TextTable::header(const std::vector<std::string>& cells) {
+  header_.insert(header_.end(), cells.begin(), cells.end());
+}
+
+void TextTable::row(std::vector<std::string> cells) {
+  cells.resize(header_.size());
+  rows_.push_back(std::move(cells));
+}
+
+std::string TextTable::text() const {
+  std::vector<std::size_t> widths;
+  for (std::size_t column = 0; column < header_.size(); ++column) {
+    std::size_t width = header_[column].size();
+    for (const auto& row : rows_) width = std::max(width, row[column].size());
+    widths.push_back(width);
+  }
+  std::string text;
+  const auto append = [&](const std::vector<std::string>& cells) {
+    std::string line;
+    for (std::size_t column = 0; column < cells.size(); ++column)
+      line += column == 0 ? fmt::format("{:<{}}", cells[column], widths[column])
+                          : fmt::format("  {:>{}}", cells[column], widths[column]);
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  };
+  append(header_);
+  for (const auto& row : rows_) append(row);
+  return text;
+}
+
+}  // namespace torsio

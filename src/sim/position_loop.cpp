@@ -1,0 +1,45 @@
+#include "torsio/sim/position_loop.hpp"
+
+#include <algorithm>
+
+namespace torsio {
+namespace {
+
+constexpr double kBandwidth_rad_s = 25.0;
+constexpr double kPositionGain = 8.0;  // 1/s
+constexpr double kIntegralGain = 8.0;  // 1/s
+constexpr double kSpeedCutoff_Hz = 60.0;
+
+}  // namespace
+
+PositionLoop::PositionLoop(const PlantParameters& plant, double sample_rate_Hz)
+    : sample_rate_Hz_(sample_rate_Hz),
+      inverse_ratio_(1.0 / plant.gear.ratio),
+      speed_gain_A_s_rad_(plant.rotor_inertia_kg_m2 * plant.gear.ratio * kBandwidth_rad_s /
+                          plant.motor.torque_constant_Nm_A),
+      integral_limit_(plant.motor.peak_current_A / (speed_gain_A_s_rad_ * kIntegralGain)),
+      speed_filter_(kSpeedCutoff_Hz, sample_rate_Hz) {}
+
+void PositionLoop::reset() noexcept {
+  speed_filter_.reset();
+  integral_ = 0.0;
+  is_started_ = false;
+}
+
+double PositionLoop::step(double wanted_rad, double rotor_angle_rad) noexcept {
+  const double angle_rad = rotor_angle_rad * inverse_ratio_;
+  if (!is_started_) {
+    last_wanted_rad_ = wanted_rad;
+    last_angle_rad_ = angle_rad;
+    is_started_ = true;
+  }
+  const double speed = speed_filter_.step((angle_rad - last_angle_rad_) * sample_rate_Hz_);
+  const double wanted_speed = (wanted_rad - last_wanted_rad_) * sample_rate_Hz_;
+  last_angle_rad_ = angle_rad;
+  last_wanted_rad_ = wanted_rad;
+  const double error = kPositionGain * (wanted_rad - angle_rad) + wanted_speed - speed;
+  integral_ = std::clamp(integral_ + error / sample_rate_Hz_, -integral_limit_, integral_limit_);
+  return speed_gain_A_s_rad_ * (error + kIntegralGain * integral_);
+}
+
+}  // namespace torsio

@@ -1,0 +1,501 @@
+#include "torsio/train/check.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/train/inputs.hpp"
+
+namespace torsio {
+namespace {
+
+/// The first input and the target of one recording, on the recording's clock.
+struct Pair {
+  std::vector<double> input;
+  std::vector<double> target;  ///< straight lines between fresh samples
+};
+
+bool is_finite(double value) { return std::isfinite(value); }
+
+/// The target at every sample, straight lines between those that the sensor delivered: a held value
+/// would look late.
+std::vector<double> bridged(const Channel& channel) {
+  std::vector<double> values(channel.values.size(), kNotMeasured);
+  std::size_t last = values.size();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!channel.is_fresh(i) || !is_finite(channel.values[i])) continue;
+    values[i] = channel.values[i];
+    if (last < i) {
+      const double slope = (values[i] - values[last]) / static_cast<double>(i - last);
+      for (std::size_t j = last + 1; j < i; ++j)
+        values[j] = values[last] + slope * static_cast<double>(j - last);
+    }
+    last = i;
+  }
+  return values;
+}
+
+/// The first input's values; filters have not settled at the very start, which no check here minds.
+std::vector<double> first_input(const Recording& recording, const FeatureSpec& spec) {
+  FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
+  std::vector<const std::vector<double>*> raw_channels;
+  for (const std::string& input : pipeline.raw_inputs())
+    raw_channels.push_back(&recording.channel(input).values);
+  std::vector<double> raw(raw_channels.size());
+  std::vector<double> values(recording.size(), kNotMeasured);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*raw_channels[j])[i];
+    if (std::ranges::all_of(raw, is_finite)) values[i] = pipeline.step(raw).front();
+  }
+  return values;
+}
+
+double correlation(const std::vector<double>& x, const std::vector<double>& y, std::ptrdiff_t lag) {
+  double n = 0, sx = 0, sy = 0, xx = 0, xy = 0, yy = 0;
+  const auto size = static_cast<std::ptrdiff_t>(x.size());
+  for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, lag); i < std::min(size, size + lag); ++i) {
+    const double a = x[static_cast<std::size_t>(i - lag)];
+    const double b = y[static_cast<std::size_t>(i)];
+    if (!is_finite(a) || !is_finite(b)) continue;
+    n += 1.0, sx += a, sy += b, xx += a * a, xy += a * b, yy += b * b;
+  }
+  const double spread = (n * xx - sx * sx) * (n * yy - sy * sy);
+  return spread > 0.0 ? (n * xy - sx * sy) / std::sqrt(spread) : 0.0;
+}
+
+/// Differences over `window` samples: what moves, without the offsets.
+std::vector<double> movement(const std::vector<double>& values, std::size_t window) {
+  std::vector<double> differences(values.size(), kNotMeasured);
+  for (std::size_t i = window; i < values.size(); ++i)
+    differences[i] = values[i] - values[i - window];
+  return differences;
+}
+
+struct Span {
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -std::numeric_limits<double>::infinity();
+  void include(double value) {
+    if (!is_finite(value)) return;
+    lowest = std::min(lowest, value);
+    highest = std::max(highest, value);
+  }
+  [[nodiscard]] double width() const { return highest - lowest; }
+};
+
+Span span_of(const std::vector<double>& values) {
+  Span span;
+  for (const double value : values) span.include(value);
+  return span;
+}
+
+bool has_segment(const DatasetRecord& record, Role role) {
+  return std::ranges::any_of(record.segments,
+                             [&](const Segment& segment) { return segment.role == role; });
+}
+
+/// Runs the checks one after the other and collects what they find.
+class Checker {
+ public:
+  Checker(const Dataset& dataset, const FeatureSpec& spec)
+      : dataset_(dataset), spec_(spec), pipeline_(spec, dataset.sample_rate_Hz()) {
+    channels_ = pipeline_.raw_inputs();
+    channels_.push_back(dataset.target);
+    for (const DatasetRecord& record : dataset.records)
+      pairs_.push_back(
+          {first_input(record.recording, spec), bridged(record.recording.channel(dataset.target))});
+  }
+
+  std::vector<Finding> run() {
+    check_length();
+    check_missing();
+    check_constant();
+    check_saturation();
+    check_gaps();
+    check_delay();
+    check_sign();
+    check_excitation();
+    check_offsets();
+    check_leak();
+    check_range();
+    return std::move(findings_);
+  }
+
+ private:
+  void add(Verdict verdict, std::string check, std::string recording, std::string message,
+           std::string advice = {}) {
+    findings_.push_back(
+        {verdict, std::move(check), std::move(recording), std::move(message), std::move(advice)});
+  }
+
+  /// Adds a PASS unless the check that ran meanwhile found something.
+  void pass_unless_found(const std::string& check, std::string message,
+                         const std::function<void()>& body) {
+    const std::size_t before = findings_.size();
+    body();
+    if (findings_.size() == before) add(Verdict::pass, check, "", std::move(message));
+  }
+
+  template <class Body>
+  void for_each_channel(Body&& body) {
+    for (const DatasetRecord& record : dataset_.records)
+      for (const std::string& channel : channels_)
+        body(record.recording, record.recording.channel(channel));
+  }
+
+  [[nodiscard]] bool is_condition(const Recording& recording, const std::string& channel) const {
+    return std::ranges::find(recording.conditions(), channel) != recording.conditions().end();
+  }
+
+  void check_length() {
+    pass_unless_found(
+        "length",
+        fmt::format("{} recordings at {:g} Hz", dataset_.records.size(), dataset_.sample_rate_Hz()),
+        [&] {
+          for (const DatasetRecord& record : dataset_.records)
+            if (record.recording.size() < kFewSamples)
+              add(Verdict::fail, "length", record.recording.name(),
+                  fmt::format("{} samples", record.recording.size()),
+                  fmt::format("Record at least {} samples.", kFewSamples));
+        });
+  }
+
+  void check_missing() {
+    pass_unless_found("missing values", "none", [&] {
+      for_each_channel([&](const Recording& recording, const Channel& channel) {
+        const auto missing = static_cast<std::size_t>(
+            std::ranges::count_if(channel.values, [](double v) { return !is_finite(v); }));
+        if (missing == 0) return;
+        const bool is_target = channel.name == dataset_.target;
+        const double share =
+            static_cast<double>(missing) / static_cast<double>(channel.values.size());
+        add(is_target && share < 1.0 ? Verdict::warn : Verdict::fail, "missing values",
+            recording.name(),
+            fmt::format("{}: {} of {} samples are NaN", channel.name, missing,
+                        channel.values.size()),
+            is_target
+                ? "They are neither trained on nor scored."
+                : fmt::format("An input may not be missing. If it is a slower sensor: hold: [{}]",
+                              channel.name));
+      });
+    });
+  }
+
+  void check_constant() {
+    pass_unless_found("constant channels", "every input and the target move", [&] {
+      for_each_channel([&](const Recording& recording, const Channel& channel) {
+        if (is_condition(recording, channel.name) || span_of(channel.values).width() > 0.0) return;
+        add(Verdict::fail, "constant channels", recording.name(),
+            fmt::format("{} never changes from {:g}", channel.name, channel.values.front()),
+            "Is the sensor connected? If it is a condition of the record, name it under "
+            "conditions: in a manifest.");
+      });
+    });
+  }
+
+  // A range limit shows as many samples in runs exactly at the extreme value.
+  void check_saturation() {
+    pass_unless_found("saturation", "no channel rests at its extreme value", [&] {
+      for_each_channel([&](const Recording& recording, const Channel& channel) {
+        const Span span = span_of(channel.values);
+        if (!(span.width() > 0.0)) return;
+        for (const double extreme : {span.lowest, span.highest}) {
+          const auto count = static_cast<double>(std::ranges::count(channel.values, extreme));
+          const double share = count / static_cast<double>(channel.values.size());
+          if (share < kSaturatedShare || approaches_gradually(channel, extreme, span)) continue;
+          add(Verdict::warn, "saturation", recording.name(),
+              fmt::format("{}: {:.1f} % of the samples are exactly {:g}", channel.name,
+                          100.0 * share, extreme),
+              "Is that the sensor's limit? Then cut those parts out, or use a sensor of larger "
+              "range.");
+        }
+      });
+    });
+  }
+
+  // A signal that turns round at its extreme spends time near it too; one that is cut off sits
+  // exactly on it.
+  [[nodiscard]] static bool approaches_gradually(const Channel& channel, double extreme,
+                                                 const Span& span) {
+    std::size_t at_extreme = 0;
+    std::size_t near_extreme = 0;
+    for (const double value : channel.values) {
+      if (value == extreme) ++at_extreme;
+      if (std::abs(value - extreme) < 0.01 * span.width()) ++near_extreme;
+    }
+    return 2 * at_extreme < near_extreme;
+  }
+
+  void check_gaps() {
+    pass_unless_found("gaps", "no jump and no run of held values", [&] {
+      for_each_channel([&](const Recording& recording, const Channel& channel) {
+        if (is_condition(recording, channel.name)) return;
+        const std::vector<double> values = bridged(channel);
+        std::vector<double> steps;
+        for (std::size_t i = 1; i < values.size(); ++i)
+          if (is_finite(values[i] - values[i - 1]))
+            steps.push_back(std::abs(values[i] - values[i - 1]));
+        if (steps.empty()) return;
+        const auto largest = std::ranges::max_element(steps);
+        const auto at = static_cast<std::size_t>(largest - steps.begin());
+        const double peak = *largest;
+        if (peak < kJumpShare * span_of(values).width()) return;
+        const double others = second_largest_elsewhere(steps, at);
+        if (peak < kJumpOverOthers * others) return;
+        add(Verdict::warn, "gaps", recording.name(),
+            fmt::format("{} jumps by {:.3g} at t = {:.4g} s, {:.0f} times more than anywhere else",
+                        channel.name, peak, recording.time_s(at + 1),
+                        peak / std::max(others, 1e-300)),
+            "Were samples lost there? Cut the record in two, or resample it with --rate.");
+      });
+    });
+  }
+
+  [[nodiscard]] static double second_largest_elsewhere(const std::vector<double>& steps,
+                                                       std::size_t at) {
+    double largest = 0.0;
+    for (std::size_t i = 0; i < steps.size(); ++i)
+      if (i + kJumpNeighbourhood < at || i > at + kJumpNeighbourhood)
+        largest = std::max(largest, steps[i]);
+    return largest;
+  }
+
+  void check_delay() {
+    const double rate = dataset_.sample_rate_Hz();
+    const auto window =
+        static_cast<std::size_t>(std::max(1.0, std::round(kMovementWindow_s * rate)));
+    const auto longest = static_cast<std::ptrdiff_t>(std::round(kLongestDelay_s * rate));
+    pass_unless_found(
+        "delay", fmt::format("{} and {} move together", spec_.inputs.front(), dataset_.target),
+        [&] {
+          for (std::size_t r = 0; r < pairs_.size(); ++r) {
+            const std::vector<double> x = movement(pairs_[r].input, window);
+            const std::vector<double> y = movement(pairs_[r].target, window);
+            std::ptrdiff_t best = 0;
+            double peak = 0.0;
+            for (std::ptrdiff_t lag = -longest; lag <= longest; ++lag)
+              if (const double value = std::abs(correlation(x, y, lag)); value > peak)
+                best = lag, peak = value;
+            const double at_zero = std::abs(correlation(x, y, 0));
+            if (peak < kClearCorrelation || peak - at_zero < kDelayGain) continue;
+            const double delay_ms = 1e3 * static_cast<double>(best) / rate;
+            add(Verdict::warn, "delay", dataset_.records[r].recording.name(),
+                fmt::format(
+                    "{} comes {:.1f} ms {} {} (correlation {:.3f} there, {:.3f} without shift)",
+                    dataset_.target, std::abs(delay_ms), delay_ms > 0 ? "after" : "before",
+                    spec_.inputs.front(), peak, at_zero),
+                delay_ms > 0
+                    ? fmt::format("Mapping line that takes it out: latency: {{{}: {:.1f}ms}}",
+                                  dataset_.target, delay_ms)
+                    : "Look at the loggers' clocks: a torque cannot precede its deflection.");
+          }
+        });
+  }
+
+  void check_sign() {
+    pass_unless_found("sign",
+                      fmt::format("{} rises with {}", dataset_.target, spec_.inputs.front()), [&] {
+                        for (std::size_t r = 0; r < pairs_.size(); ++r) {
+                          const double value = correlation(pairs_[r].input, pairs_[r].target, 0);
+                          const std::string& recording = dataset_.records[r].recording.name();
+                          if (value < -kClearCorrelation) {
+                            add(Verdict::fail, "sign", recording,
+                                fmt::format("{} falls with {} (correlation {:.3f})",
+                                            dataset_.target, spec_.inputs.front(), value),
+                                fmt::format("Mapping: flip one of them with sign: -1 (channels: "
+                                            "{{{}: {{from: ..., sign: -1}}}})",
+                                            dataset_.target));
+                          } else if (value < kClearCorrelation) {
+                            add(Verdict::warn, "sign", recording,
+                                fmt::format("{} hardly follows {} (correlation {:.3f})",
+                                            dataset_.target, spec_.inputs.front(), value),
+                                "Is this the channel that the torque comes from?");
+                          }
+                        }
+                      });
+  }
+
+  // Hysteresis shows only at reversals; a rate that never changes cannot be told from a constant.
+  void check_excitation() {
+    std::size_t reversals = 0;
+    Span speeds;
+    const auto window = static_cast<std::size_t>(
+        std::max(1.0, std::round(kSpeedWindow_s * dataset_.sample_rate_Hz())));
+    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+      if (!has_segment(dataset_.records[r], Role::train)) continue;
+      reversals += count_reversals(pairs_[r].input);
+      for (const double speed : typical_speeds(movement(pairs_[r].input, window)))
+        speeds.include(speed);
+    }
+    if (speeds.width() < 0.0) return;  // nothing to train on: another check says so
+    if (reversals < kFewReversals)
+      add(Verdict::warn, "excitation", "",
+          fmt::format("{} reversals of {} in training", reversals, spec_.inputs.front()),
+          "Hysteresis shows only where the motion turns back: load and unload several times.");
+    if (speeds.highest < kSpeedRatio * speeds.lowest)
+      add(Verdict::warn, "excitation", "", "the training data move at one speed only",
+          "A model cannot learn what speed does; add recordings that are twice as slow and twice "
+          "as fast.");
+    if (findings_.empty() || findings_.back().check != "excitation")
+      add(Verdict::pass, "excitation", "",
+          fmt::format("{} reversals, several speeds in training", reversals));
+  }
+
+  [[nodiscard]] static std::size_t count_reversals(const std::vector<double>& values) {
+    const double dead_band = kReversalShare * span_of(values).width();
+    std::size_t count = 0;
+    double extreme = kNotMeasured;
+    int direction = 0;
+    for (const double value : values) {
+      if (!is_finite(value)) continue;
+      if (!is_finite(extreme)) extreme = value;
+      const double back = (value - extreme) * (direction == 0 ? 1.0 : direction);
+      if (direction == 0 ? std::abs(back) > dead_band : back < -dead_band) {
+        if (direction != 0) ++count;
+        direction = value > extreme ? 1 : -1;
+        extreme = value;
+      } else if (direction != 0 && back > 0.0) {
+        extreme = value;
+      }
+    }
+    return count;
+  }
+
+  /// Lower and upper decile of the speeds while moving.
+  [[nodiscard]] static std::vector<double> typical_speeds(std::vector<double> differences) {
+    std::vector<double> speeds;
+    for (const double difference : differences)
+      if (is_finite(difference)) speeds.push_back(std::abs(difference));
+    if (speeds.empty()) return {};
+    const double fastest = *std::ranges::max_element(speeds);
+    std::erase_if(speeds, [&](double speed) { return speed < kStandstillShare * fastest; });
+    std::ranges::sort(speeds);
+    if (speeds.empty()) return {};
+    return {speeds[speeds.size() / 10], speeds[speeds.size() * 9 / 10]};
+  }
+
+  // Two records of one joint whose torques differ by a constant at the same deflection disagree
+  // about zero.
+  void check_offsets() {
+    pass_unless_found("offsets", "the records agree about zero", [&] {
+      std::vector<double> offsets;
+      double slope_sum = 0.0;
+      for (const Pair& pair : pairs_) slope_sum += slope_of(pair);
+      const double slope = slope_sum / static_cast<double>(pairs_.size());
+      double spread = 0.0;
+      for (const Pair& pair : pairs_) {
+        offsets.push_back(mean_of(pair.target) - slope * mean_of(pair.input));
+        spread = std::max(spread, span_of(pair.target).width());
+      }
+      if (offsets.size() < 2) return;
+      std::vector<double> sorted = offsets;
+      std::ranges::sort(sorted);
+      const double median = sorted[sorted.size() / 2];
+      for (std::size_t r = 0; r < offsets.size(); ++r)
+        if (std::abs(offsets[r] - median) > kOffsetShare * spread)
+          add(Verdict::warn, "offsets", dataset_.records[r].recording.name(),
+              fmt::format("zero lies {:.3g} {} away from the other records'", offsets[r] - median,
+                          unit_label(dataset_.target)),
+              "Take each record's own zero in the mapping: zero: [{channel: ..., first: 0.1s}]");
+    });
+  }
+
+  [[nodiscard]] static double mean_of(const std::vector<double>& values) {
+    double sum = 0.0;
+    double count = 0.0;
+    for (const double value : values)
+      if (is_finite(value)) sum += value, count += 1.0;
+    return count > 0.0 ? sum / count : 0.0;
+  }
+
+  [[nodiscard]] static double slope_of(const Pair& pair) {
+    const double mean_x = mean_of(pair.input);
+    double xx = 0.0;
+    double xy = 0.0;
+    for (std::size_t i = 0; i < pair.input.size(); ++i) {
+      if (!is_finite(pair.input[i]) || !is_finite(pair.target[i])) continue;
+      xx += (pair.input[i] - mean_x) * (pair.input[i] - mean_x);
+      xy += (pair.input[i] - mean_x) * pair.target[i];
+    }
+    return xx > 0.0 ? xy / xx : 0.0;
+  }
+
+  void check_leak() {
+    const std::string leak = find_leak(dataset_, spec_);
+    if (leak.empty()) {
+      add(Verdict::pass, "leak", "", "the target was not computed from an input");
+    } else {
+      add(Verdict::fail, "leak", "", fmt::format("{} was computed from {}", dataset_.target, leak),
+          "Leave it out of --inputs: a model would learn the formula, not the spring.");
+    }
+  }
+
+  void check_range() {
+    if (!dataset_.has_role(Role::test) || !dataset_.has_role(Role::train)) return;
+    pass_unless_found("range", "the test data lie inside the training range", [&] {
+      std::vector<std::string> names = channels_;
+      for (const std::string& channel : names) {
+        Span trained;
+        Span tested;
+        for (const DatasetRecord& record : dataset_.records)
+          for (const Segment& segment : record.segments)
+            for (std::size_t i = segment.begin; i < segment.end; ++i)
+              (segment.role == Role::test ? tested : trained)
+                  .include(record.recording.channel(channel).values[i]);
+        const double slack = kRangeSlack * trained.width();
+        if (tested.lowest < trained.lowest - slack || tested.highest > trained.highest + slack)
+          add(Verdict::warn, "range", "",
+              fmt::format("{}: tested on {:.4g} to {:.4g}, trained on {:.4g} to {:.4g}", channel,
+                          tested.lowest, tested.highest, trained.lowest, trained.highest),
+              "Models guess out there: the range guard answers with its linear fallback.");
+      }
+    });
+  }
+
+  static constexpr std::size_t kFewSamples = 100;
+  static constexpr double kSaturatedShare = 0.005;
+  static constexpr double kJumpShare = 0.02;
+  static constexpr double kJumpOverOthers = 5.0;
+  static constexpr std::size_t kJumpNeighbourhood = 3;
+  static constexpr double kMovementWindow_s = 0.02;
+  static constexpr double kLongestDelay_s = 0.1;
+  static constexpr double kClearCorrelation = 0.5;
+  static constexpr double kDelayGain = 0.01;
+  static constexpr double kReversalShare = 0.05;
+  static constexpr std::size_t kFewReversals = 3;
+  static constexpr double kSpeedWindow_s = 0.1;
+  static constexpr double kSpeedRatio = 2.0;
+  static constexpr double kStandstillShare = 0.05;
+  static constexpr double kOffsetShare = 0.05;
+  static constexpr double kRangeSlack = 0.01;
+
+  const Dataset& dataset_;
+  const FeatureSpec& spec_;
+  FeaturePipeline pipeline_;
+  std::vector<std::string> channels_;  ///< raw inputs and the target
+  std::vector<Pair> pairs_;
+  std::vector<Finding> findings_;
+};
+
+}  // namespace
+
+std::string_view name(Verdict verdict) noexcept {
+  switch (verdict) {
+    case Verdict::pass: return "PASS";
+    case Verdict::warn: return "WARN";
+    case Verdict::fail: return "FAIL";
+  }
+  return "unknown";
+}
+
+std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec) {
+  return Checker(dataset, spec).run();
+}
+
+}  // namespace torsio

@@ -1,0 +1,136 @@
+#include "torsio/train/evaluate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double nanoseconds(Clock::duration duration) {
+  return std::chrono::duration<double, std::nano>(duration).count();
+}
+
+/// What one reading of the clock costs: it stands in every measured step.
+double clock_cost_ns() {
+  static const double cost = [] {
+    double least = 1e9;
+    for (int i = 0; i < 1000; ++i) {
+      const auto start = Clock::now();
+      least = std::min(least, nanoseconds(Clock::now() - start));
+    }
+    return least;
+  }();
+  return cost;
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return kNotMeasured;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+std::vector<const std::vector<double>*> raw_channels(const Estimator& estimator,
+                                                     const Recording& recording) {
+  std::vector<const std::vector<double>*> channels;
+  for (const std::string& input : estimator.raw_inputs()) {
+    const std::vector<double>& values = recording.channel(input).values;
+    const auto bad =
+        std::ranges::find_if_not(values, [](double value) { return std::isfinite(value); });
+    if (bad != values.end())
+      throw Error(
+          {.place = fmt::format("{}: {}", recording.name(), input),
+           .expected = "a finite number in every sample: it is an input of the model",
+           .found = fmt::format("{} at t = {} s", *bad,
+                                recording.time_s(static_cast<std::size_t>(bad - values.begin()))),
+           .advice = "Cut the record there, or bridge a slow sensor with `hold:` in the mapping."});
+    channels.push_back(&values);
+  }
+  return channels;
+}
+
+/// Adds up one recording's, or a whole split's, samples.
+struct Tally {
+  MetricsAccumulator metrics;
+  std::vector<double> step_ns;
+  std::size_t initialised = 0;
+  std::size_t guarded = 0;
+
+  void add(const Prediction& prediction, const Channel& target, const Segment& segment) {
+    for (std::size_t i = segment.begin; i < segment.end; ++i) {
+      const Estimate& estimate = prediction.estimates[i];
+      step_ns.push_back(prediction.step_ns[i]);
+      if (!target.is_fresh(i) || !std::isfinite(target.values[i])) continue;
+      if (estimate.fault == Fault::warming_up) {
+        ++initialised;
+        continue;
+      }
+      if (estimate.fault != Fault::none) ++guarded;
+      metrics.add(estimate.value, target.values[i]);
+    }
+  }
+
+  [[nodiscard]] Score score() const {
+    return {.metrics = metrics.metrics(),
+            .initialised_samples = initialised,
+            .guarded_samples = guarded,
+            .step_ns_p50 = quantile(step_ns, 0.5),
+            .step_ns_p999 = quantile(step_ns, 0.999)};
+  }
+};
+
+}  // namespace
+
+Prediction predict(Estimator& estimator, const Recording& recording) {
+  const auto channels = raw_channels(estimator, recording);
+  std::vector<double> raw(channels.size());
+  Prediction prediction;
+  prediction.estimates.resize(recording.size());
+  prediction.step_ns.resize(recording.size());
+  const double clock_cost = clock_cost_ns();
+  const DenormalsOff denormals_off;
+  estimator.reset();
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[i];
+    const auto start = Clock::now();
+    prediction.estimates[i] = estimator.step(raw);
+    prediction.step_ns[i] = std::max(0.0, nanoseconds(Clock::now() - start) - clock_cost);
+  }
+  return prediction;
+}
+
+SplitScore evaluate(Estimator& estimator, const Dataset& dataset, Role role,
+                    const Progress& progress) {
+  SplitScore split;
+  Tally together;
+  std::size_t done = 0;
+  for (const DatasetRecord& record : dataset.records) {
+    report_progress(progress,
+                    static_cast<double>(done++) / static_cast<double>(dataset.records.size()),
+                    "scoring");
+    if (std::ranges::none_of(record.segments,
+                             [&](const Segment& segment) { return segment.role == role; }))
+      continue;
+    const Prediction prediction = predict(estimator, record.recording);
+    const Channel& target = record.recording.channel(dataset.target);
+    Tally own;
+    for (const Segment& segment : record.segments) {
+      if (segment.role != role) continue;
+      own.add(prediction, target, segment);
+      together.add(prediction, target, segment);
+    }
+    split.recordings.push_back({record.recording.name(), own.score()});
+  }
+  split.together = together.score();
+  return split;
+}
+
+}  // namespace torsio

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace torsio {
+
+/// Calls `work(chunk)` for every chunk in 0 .. chunks - 1, on several threads. Chunks must not
+/// depend on each other; give each its own result and reduce these in order afterwards, then the
+/// number of threads changes no bit. The first exception is thrown again here.
+/// @param threads 0: as many as the machine has.
+template <class Work>
+void for_each_chunk(std::size_t chunks, std::size_t threads, const Work& work) {
+  if (threads == 0) threads = std::max(1U, std::thread::hardware_concurrency());
+  threads = std::min(threads, chunks);
+  std::atomic<std::size_t> next = 0;
+  std::exception_ptr failure;
+  std::mutex failure_guard;
+  const auto run = [&] {
+    for (std::size_t chunk = next++; chunk < chunks; chunk = next++) {
+      try {
+        work(chunk);
+      } catch (...) {
+        const std::scoped_lock lock(failure_guard);
+        if (!failure) failure = std::current_exception();
+        next = chunks;
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> helpers;
+    for (std::size_t k = 1; k < threads; ++k) helpers.emplace_back(run);
+    run();
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace torsio

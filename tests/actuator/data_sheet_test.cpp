@@ -1,0 +1,90 @@
+#include "torsio/actuator/data_sheet.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+TEST(DataSheet, RatedTorqueOverStiffnessIsThePapersDeflection) {
+  const std::map<std::string_view, double> printed_deg = {
+      {"dfki-28", 5.0}, {"dfki-50", 5.0}, {"dfki-120", 6.06}, {"dfki-300", 7.63}};
+  ASSERT_EQ(data_sheets().size(), printed_deg.size());
+  for (const DataSheet& sheet : data_sheets()) {
+    const double deflection_rad = sheet.rated_torque_Nm.value / sheet.spring_stiffness_Nm_rad.value;
+    EXPECT_NEAR(deg_from_rad(deflection_rad), printed_deg.at(sheet.name), 0.005) << sheet.name;
+  }
+}
+
+TEST(DataSheet, GearModesLieWhereTheSpecificationPutsThem) {
+  const std::map<std::string_view, double> expected_Hz = {
+      {"dfki-28", 172.5}, {"dfki-50", 201.3}, {"dfki-120", 195.5}, {"dfki-300", 178.1}};
+  for (const DataSheet& sheet : data_sheets()) {
+    const double mode_Hz =
+        std::sqrt(sheet.gear_stiffness_Nm_rad.value / sheet.gear_inertia_kg_m2.value) /
+        (2.0 * std::numbers::pi);
+    EXPECT_NEAR(mode_Hz, expected_Hz.at(sheet.name), 0.1) << sheet.name;
+  }
+}
+
+TEST(DataSheet, GearEfficiencyAtTheRatingIsThatOfTheSpecification) {
+  const std::map<std::string_view, double> ideal_Nm = {
+      {"dfki-28", 27.4}, {"dfki-50", 62.4}, {"dfki-120", 151.2}, {"dfki-300", 369.6}};
+  for (const DataSheet& sheet : data_sheets()) {
+    EXPECT_NEAR(
+        sheet.torque_constant_Nm_A.value * sheet.rated_current_A.value * sheet.gear_ratio.value,
+        ideal_Nm.at(sheet.name), 0.05)
+        << sheet.name;
+  }
+}
+
+TEST(DataSheet, RatedSpeedStaysWithinTheSupplyVoltage) {
+  for (const DataSheet& sheet : data_sheets()) {
+    const double back_emf_V =
+        sheet.torque_constant_Nm_A.value * sheet.gear_ratio.value * sheet.top_speed_rad_s.value;
+    EXPECT_LE(back_emf_V, 36.0) << sheet.name;
+  }
+}
+
+TEST(DataSheet, ListsEveryValueOnceWithAnOrigin) {
+  for (const DataSheet& sheet : data_sheets()) {
+    std::map<std::string, int> seen;
+    for (const SheetRow& row : describe(sheet)) {
+      ++seen[std::string(row.name)];
+      EXPECT_TRUE(std::isfinite(row.value.value)) << row.name;
+    }
+    for (const auto& [name, count] : seen) EXPECT_EQ(count, 1) << name;
+    EXPECT_EQ(seen.size() * sizeof(SheetValue), sizeof(DataSheet) - 2 * sizeof(std::string_view))
+        << "a field of the sheet is not listed";
+  }
+}
+
+TEST(DataSheet, TellsPrintedFromDerivedFromAssumed) {
+  std::map<std::string_view, SheetRow> rows;
+  for (const SheetRow& row : describe(data_sheet("dfki-120"))) rows[row.name] = row;
+  EXPECT_EQ(rows["spring_stiffness"].value.origin, Origin::printed);
+  EXPECT_NEAR(rows["spring_stiffness"].value.value, 19.8 * 180.0 / std::numbers::pi, 1e-9);
+  EXPECT_EQ(rows["spring_stiffness"].unit, "Nm/rad");
+  EXPECT_EQ(rows["gear_stiffness"].value.origin, Origin::derived);
+  EXPECT_EQ(rows["rotor_inertia"].value.origin, Origin::assumed);
+}
+
+TEST(DataSheet, UnknownNameListsTheKnownOnes) {
+  try {
+    static_cast<void>(data_sheet("dfki-500"));
+    FAIL() << "an unknown actuator was accepted";
+  } catch (const UsageError& error) {
+    EXPECT_EQ(error.report().expected, "one of dfki-28, dfki-50, dfki-120, dfki-300");
+    EXPECT_EQ(error.report().found, "\"dfki-500\"");
+  }
+}
+
+}  // namespace
+}  // namespace torsio

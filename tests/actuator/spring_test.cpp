@@ -1,0 +1,113 @@
+#include "torsio/actuator/spring.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/sim/plant.hpp"
+
+namespace torsio {
+namespace {
+
+Spring spring_of(const DataSheet& sheet) { return Spring(plant_parameters(sheet).spring); }
+
+/// A closed path [rad] of eight harmonics with random phases, at most `amplitude_rad` large.
+std::vector<double> random_closed_path(double amplitude_rad, Random& random) {
+  constexpr int kSamples = 4000;
+  constexpr int kHarmonics = 8;
+  std::vector<double> path(kSamples, 0.0);
+  for (int k = 1; k <= kHarmonics; ++k) {
+    const double height = random.normal() / k;
+    const double phase = 2.0 * std::numbers::pi * random.uniform();
+    for (int i = 0; i < kSamples; ++i) {
+      path[static_cast<std::size_t>(i)] +=
+          height * std::sin(2.0 * std::numbers::pi * k * i / kSamples + phase);
+    }
+  }
+  double highest = 0.0;
+  for (const double x : path) highest = std::max(highest, std::abs(x));
+  for (double& x : path) x *= amplitude_rad / highest;
+  return path;
+}
+
+/// Work [J] that one turn around the path puts into the spring.
+double work_of_one_turn(Spring& spring, const std::vector<double>& path) {
+  double work_J = 0.0;
+  double last_Nm = spring.step(path.back(), 0.0);
+  double last_rad = path.back();
+  for (const double deflection_rad : path) {
+    const double torque_Nm = spring.step(deflection_rad, 0.0);
+    work_J += 0.5 * (torque_Nm + last_Nm) * (deflection_rad - last_rad);
+    last_Nm = torque_Nm;
+    last_rad = deflection_rad;
+  }
+  return work_J;
+}
+
+TEST(Spring, NeverGivesWorkOnAClosedPath) {
+  Random random(1);
+  for (const DataSheet& sheet : data_sheets()) {
+    for (int path = 0; path < 30; ++path) {
+      const double amplitude_deg = 0.05 + 3.95 * random.uniform();
+      const auto closed = random_closed_path(rad_from_deg(amplitude_deg), random);
+      Spring spring = spring_of(sheet);
+      work_of_one_turn(spring, closed);
+      work_of_one_turn(spring, closed);
+      EXPECT_GE(work_of_one_turn(spring, closed), 0.0)
+          << sheet.name << ", path " << path << ", " << amplitude_deg << " deg";
+    }
+  }
+}
+
+TEST(Spring, LoopIsAsWideAsItsFriction) {
+  const DataSheet& sheet = data_sheet("dfki-50");
+  Spring spring = spring_of(sheet);
+  const double middle = rad_from_deg(2.0);
+  for (double x = 0.0; x < 2.0 * middle; x += 1e-5) spring.step(x, 0.0);
+  for (double x = 2.0 * middle; x > middle; x -= 1e-5) spring.step(x, 0.0);
+  const double falling_Nm = spring.step(middle, 0.0);
+  for (double x = middle; x > -2.0 * middle; x -= 1e-5) spring.step(x, 0.0);
+  for (double x = -2.0 * middle; x < middle; x += 1e-5) spring.step(x, 0.0);
+  const double rising_Nm = spring.step(middle, 0.0);
+  const double limit_Nm = sheet.spring_friction_Nm.value +
+                          sheet.spring_load_friction.value * spring.elastic().torque(middle);
+  EXPECT_NEAR(rising_Nm - falling_Nm, 2.0 * limit_Nm, 1e-6);
+}
+
+TEST(Spring, SticksWithTheStiffnessOfItsFriction) {
+  Spring spring = spring_of(data_sheet("dfki-120"));
+  spring.reset(0.01);
+  const double elastic_Nm = spring.elastic().torque(0.01 + 1e-6);
+  const double extra_Nm = spring.step(0.01 + 1e-6, 0.0) - elastic_Nm;
+  EXPECT_NEAR(extra_Nm / 1e-6, spring.steepest(elastic_Nm) - spring.elastic().steepest(), 1e-3);
+}
+
+TEST(MaxwellSlip, ShrinkingLimitDropsTheForceWithoutMotion) {
+  MaxwellSlip<1> slip(
+      {.constant_Nm = 1.0, .load_factor = 0.1, .share = {1.0}, .break_away_rad = {1e-3}});
+  EXPECT_NEAR(slip.step(1.0, 20.0), 3.0, 1e-12);
+  EXPECT_NEAR(slip.step(0.0, 5.0), 1.5, 1e-12);
+  EXPECT_NEAR(slip.step(0.0, 20.0), 1.5, 1e-12);
+}
+
+TEST(Spring, RefusesImpossibleParameters) {
+  Spring::Parameters parameters{.elastic = {.stiffness_Nm_rad = 500.0},
+                                .friction = MaxwellSlip<4>::Parameters{
+                                    .constant_Nm = 1.0, .break_away_rad = {1e-3, 1e-3, 1e-3, 0.0}}};
+  EXPECT_THROW(Spring{parameters}, Error);
+  std::get<0>(parameters.friction).break_away_rad[3] = 1e-3;
+  EXPECT_NO_THROW(Spring{parameters});
+  parameters.viscosity_Nms_rad = -1.0;
+  EXPECT_THROW(Spring{parameters}, Error);
+}
+
+}  // namespace
+}  // namespace torsio

@@ -1,0 +1,10 @@
+#include "laws/model_laws.hpp"
+
+namespace torsio::test {
+
+INSTANTIATE_TYPED_TEST_SUITE_P(Linear, ModelLaws, Linear);
+INSTANTIATE_TYPED_TEST_SUITE_P(LinearCoulomb, ModelLaws, LinearCoulomb);
+INSTANTIATE_TYPED_TEST_SUITE_P(Polynomial, ModelLaws, Polynomial);
+INSTANTIATE_TYPED_TEST_SUITE_P(AnyModel, ModelLaws, AnyModel);
+
+}  // namespace torsio::test

@@ -1,0 +1,108 @@
+#include "torsio/train/guards.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/example_data.hpp"
+#include "torsio/train/fit_linear.hpp"
+
+namespace torsio {
+namespace {
+
+using test::deflection_and_rate;
+using test::oscillation;
+using test::training_data_of;
+
+using Row = std::span<const double>;
+
+TEST(Guards, RangesAreThoseOfUsableSamples) {
+  Matrix features(4, 2);
+  features.values = {1.0, -5.0, 2.0, 7.0, 99.0, -99.0, 0.0, 6.0};
+  auto data = training_data_of(deflection_and_rate(), features, [](Row) { return 0.0; });
+  data.sequences[0].use[2] = 0;
+  const FeatureRanges ranges = feature_ranges(data);
+  EXPECT_EQ(ranges.lowest, (std::vector{0.0, -5.0}));
+  EXPECT_EQ(ranges.highest, (std::vector{2.0, 7.0}));
+}
+
+TEST(Guards, TheFallbackIsLeastSquaresOnAllInputs) {
+  Random random(5);
+  const auto data = training_data_of(deflection_and_rate(), oscillation(4000), [&](Row x) {
+    return 1.0 + 100.0 * x[0] + 2.0 * x[1] + 0.25 * random.normal();
+  });
+  const LinearFallback fallback = linear_fallback(data);
+  EXPECT_NEAR(fallback.intercept, 1.0, 0.03);
+  ASSERT_EQ(fallback.slope.size(), 2U);
+  EXPECT_NEAR(fallback.slope[0], 100.0, 0.5);
+  EXPECT_NEAR(fallback.slope[1], 2.0, 0.1);
+  EXPECT_NEAR(fallback.residual_std, 0.25, 0.01);
+}
+
+AnyModel spring(double stiffness) {
+  Linear::Parameters parameters;
+  parameters.coefficients.values = Matrix(1, 3);
+  parameters.coefficients.values(0, 1) = stiffness;
+  return Linear(parameters);
+}
+
+TEST(Guards, TheResidualTableTellsTheSpreadByRegionOfTheOutput) {
+  Random random(6);
+  const auto data = training_data_of(deflection_and_rate(), oscillation(8000), [&](Row x) {
+    return 100.0 * x[0] + (x[0] > 0.0 ? 2.0 : 0.5) * random.normal();
+  });
+  const ResidualTable table = residual_table(spring(100.0), data);
+  ASSERT_EQ(table.std_dev.size(), kMostResidualRegions);
+  ASSERT_EQ(table.edges.size(), table.std_dev.size() + 1);
+  EXPECT_TRUE(std::ranges::is_sorted(table.edges));
+  for (std::size_t i = 0; i < table.std_dev.size(); ++i) {
+    const bool below = table.edges[i + 1] <= 0.0;
+    if (!below && table.edges[i] < 0.0) continue;
+    EXPECT_NEAR(table.std_dev[i], below ? 0.5 : 2.0, below ? 0.08 : 0.3) << "region " << i;
+  }
+}
+
+TEST(Guards, ABiasCountsAsSpread) {
+  const auto data = training_data_of(deflection_and_rate(), oscillation(1000),
+                                     [](Row x) { return 100.0 * x[0] + 0.75; });
+  for (const double each : residual_table(spring(100.0), data).std_dev)
+    EXPECT_NEAR(each, 0.75, 1e-12);
+}
+
+TEST(Guards, TheResidualTableIsEmptyWithoutEvidenceAndNeverZero) {
+  const auto target = [](Row x) { return 100.0 * x[0]; };
+  const auto few = training_data_of(deflection_and_rate(), oscillation(49), target);
+  EXPECT_TRUE(residual_table(spring(100.0), few).std_dev.empty());
+  EXPECT_TRUE(residual_table(spring(100.0), few).edges.empty());
+  const auto exact = training_data_of(deflection_and_rate(), oscillation(200), target);
+  for (const double each : residual_table(spring(100.0), exact).std_dev) EXPECT_GT(each, 0.0);
+}
+
+TEST(Guards, RegionsNeverSplitEqualOutputs) {
+  Matrix features(1000, 2);
+  for (std::size_t n = 0; n < 1000; ++n) features(n, 0) = n < 700 ? 0.0 : 0.1;
+  const auto data = training_data_of(deflection_and_rate(), features, [](Row) { return 0.0; });
+  const ResidualTable table = residual_table(spring(100.0), data);
+  EXPECT_EQ(table.edges, (std::vector{0.0, 10.0, 10.0}));
+  EXPECT_EQ(table.std_dev.back(), 10.0);
+}
+
+TEST(Guards, FillTheSettingsAndPreferValidationData) {
+  const TrainingData training = test::noisy_spring();
+  TrainingData validation = training;
+  for (double& target : validation.sequences[0].target) target += 5.0;
+  const AnyModel model = Linear(fit_linear(training, {}).parameters);
+  const FeatureSpec spec{.inputs = {"a", "b"}, .definitions = {}};
+  const EstimatorSettings own = guarded_settings(spec, training, model);
+  const EstimatorSettings other = guarded_settings(spec, training, model, &validation);
+  EXPECT_EQ(own.features, spec);
+  EXPECT_EQ(own.target, "torque_Nm");
+  EXPECT_EQ(own.sample_rate_Hz, 1000.0);
+  EXPECT_EQ(own.ranges.highest, feature_ranges(training).highest);
+  EXPECT_EQ(own.fallback.slope, linear_fallback(training).slope);
+  EXPECT_GT(std::ranges::min(other.residuals.std_dev), std::ranges::max(own.residuals.std_dev));
+}
+
+}  // namespace
+}  // namespace torsio
