@@ -5,6 +5,9 @@
 #include <cstdlib>
 #include <span>
 #include <string>
+#include <string_view>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "support/example_model_file.hpp"
@@ -20,13 +23,14 @@ namespace {
 
 using Input = std::span<const std::uint8_t>;
 
+template <class... Family>
+auto a_file_of_each(std::type_identity<std::variant<Family...>> /*models*/) {
+  return std::array{
+      torsio::model_bytes(torsio::test::example_model_file(torsio::test::example<Family>()))...};
+}
+
 const std::vector<std::byte>& good_bytes(std::uint8_t which) {
-  using torsio::model_bytes;
-  using torsio::test::example;
-  using torsio::test::example_model_file;
-  static const std::array files{model_bytes(example_model_file(example<torsio::Linear>())),
-                                model_bytes(example_model_file(example<torsio::LinearCoulomb>())),
-                                model_bytes(example_model_file(example<torsio::Polynomial>()))};
+  static const auto files = a_file_of_each(std::type_identity<torsio::KnownFamilies::Models>{});
   return files[which % files.size()];
 }
 
