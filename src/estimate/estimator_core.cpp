@@ -100,7 +100,7 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
     : settings_(std::move(settings)),
       pipeline_(settings_.features, settings_.sample_rate_Hz),
       longest_gap_(static_cast<std::size_t>(
-          std::clamp(kLongestGap_s * settings_.sample_rate_Hz, 1.0, 1e9))) {
+          std::clamp(kLongestGapSeconds * settings_.sample_rate_Hz, 1.0, 1e9))) {
   check_settings(settings_, model_input_count);
   const FeatureRanges& ranges = settings_.ranges;
   for (std::size_t i = 0; i < model_input_count; ++i) {

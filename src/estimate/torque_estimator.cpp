@@ -46,7 +46,7 @@ JointInputs::JointInputs(const std::vector<std::string>& raw_inputs, const std::
                  .found = fmt::format("the target '{}'", target),
                  .advice = "Use an Estimator: it tells any target."});
   for (const std::string& name : raw_inputs) {
-    const auto channel = std::ranges::find(kJointChannels, name, &JointChannel::name);
+    const auto* const channel = std::ranges::find(kJointChannels, name, &JointChannel::name);
     if (channel == kJointChannels.end())
       throw Error({.place = fmt::format("torque estimator: raw input {}", name),
                    .expected = fmt::format("one of {}", known_names()),

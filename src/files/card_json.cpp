@@ -12,6 +12,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/core/version.hpp"
 
 namespace torsio {
 namespace {
@@ -121,14 +122,13 @@ class CardObject {
 void check_version(const CardObject& card, const std::string& place) {
   const std::uint64_t version = card.whole_number("format_version");
   if (version == kModelFormatVersion) return;
-  throw Error(
-      {.place = place + "/format_version",
-       .expected = fmt::format("{}, which torsio {} reads", kModelFormatVersion, TORSIO_VERSION),
-       .found = fmt::format("{}", version),
-       .advice = version > kModelFormatVersion
-                     ? "A newer torsio wrote the file: update torsio, or fit the model "
-                       "again with this one."
-                     : "No release wrote this version: the card is damaged."});
+  throw Error({.place = place + "/format_version",
+               .expected = fmt::format("{}, which torsio {} reads", kModelFormatVersion, kVersion),
+               .found = fmt::format("{}", version),
+               .advice = version > kModelFormatVersion
+                             ? "A newer torsio wrote the file: update torsio, or fit the model "
+                               "again with this one."
+                             : "No release wrote this version: the card is damaged."});
 }
 
 AnyModel::Parameters empty_parameters(const std::string& family, const std::string& place) {
@@ -156,7 +156,7 @@ std::string card_json(const ModelFile& model) {
   const EstimatorSettings& settings = model.settings;
   ordered_json json_card;
   json_card["format_version"] = kModelFormatVersion;
-  json_card["torsio_version"] = TORSIO_VERSION;
+  json_card["torsio_version"] = kVersion;
   json_card["family"] = family_of(model.parameters);
   json_card["fitted_as"] = card.fitted_as;
   json_card["target"] = settings.target;

@@ -109,7 +109,7 @@ ModelFile load_model(const std::filesystem::path& path, std::string_view expecte
 }
 
 Estimator make_estimator(const ModelFile& model) {
-  return Estimator(model.settings, AnyModel(model.parameters));
+  return {model.settings, AnyModel(model.parameters)};
 }
 
 Estimator load_estimator(const std::filesystem::path& path, std::string_view expected_serial) {

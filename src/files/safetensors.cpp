@@ -86,10 +86,10 @@ Entry parse_entry(const std::string& name, const json& value, const std::string&
   Entry entry;
   entry.name = name;
   const json& type = member(value, "dtype", place);
-  const auto known = std::ranges::find_if(
+  const auto* const known = std::ranges::find_if(
       kElementTypes, [&](const ElementType& known_type) { return type == known_type.name; });
   if (known == kElementTypes.end())
-    refuse(place + "/dtype", "\"F64\", \"I64\" or \"U8\"", type.dump());
+    refuse(place + "/dtype", R"("F64", "I64" or "U8")", type.dump());
   entry.type = static_cast<std::size_t>(known - kElementTypes.begin());
   entry.shape = sizes(member(value, "shape", place), kMostDimensions, place + "/shape");
   const auto offsets = sizes(member(value, "data_offsets", place), 2, place + "/data_offsets");

@@ -1,9 +1,13 @@
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <span>
 #include <string>
+#include <string_view>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "support/example_model_file.hpp"
@@ -19,16 +23,15 @@ namespace {
 
 using Input = std::span<const std::uint8_t>;
 
-std::vector<std::byte> good_bytes(std::uint8_t which) {
-  using torsio::test::example;
-  switch (which % 3) {
-    case 0: return torsio::model_bytes(torsio::test::example_model_file(example<torsio::Linear>()));
-    case 1:
-      return torsio::model_bytes(
-          torsio::test::example_model_file(example<torsio::LinearCoulomb>()));
-    default:
-      return torsio::model_bytes(torsio::test::example_model_file(example<torsio::Polynomial>()));
-  }
+template <class... Family>
+auto a_file_of_each(std::type_identity<std::variant<Family...>> /*models*/) {
+  return std::array{
+      torsio::model_bytes(torsio::test::example_model_file(torsio::test::example<Family>()))...};
+}
+
+const std::vector<std::byte>& good_bytes(std::uint8_t which) {
+  static const auto files = a_file_of_each(std::type_identity<torsio::KnownFamilies::Models>{});
+  return files[which % files.size()];
 }
 
 /// Three bytes a change: where (modulo the length), and the new value.
@@ -49,7 +52,7 @@ std::vector<std::byte> file_of(Input data) {
   const std::uint8_t how = data.front();
   const Input rest = data.subspan(1);
   if (how % 4 == 0) return {std::as_bytes(rest).begin(), std::as_bytes(rest).end()};
-  const auto good = good_bytes(how / 4);
+  const auto& good = good_bytes(how / 4);
   return how % 4 == 1 ? with_card(good, rest) : changed(good, rest);
 }
 
@@ -59,7 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     const torsio::ModelFile model = torsio::parse_model(file_of({data, size}), "fuzz");
     torsio::Estimator estimator = torsio::make_estimator(model);
-    for (const double value : {0.0, 0.1, -1e308, NAN, 0.2, -0.3}) {
+    for (const double value : {0.0, 0.1, -1e308, torsio::kNotMeasured, 0.2, -0.3}) {
       const std::vector<double> raw(estimator.raw_inputs().size(), value);
       if (!std::isfinite(estimator.step(raw).value)) std::abort();
     }

@@ -30,10 +30,11 @@ namespace torsio {
 /// reset | linear fallback | the fallback's | | any other | the model itself said so | linear
 /// fallback | the fallback's |
 ///
-/// Should the fallback overflow, the last value is held. After a gap of at most `kLongestGap_s`
-/// (never less than one tick) filters and model run on as if the missing ticks had not been, so a
-/// plain `rate(x)` shows the whole step over the gap in one tick; after a longer one they start
-/// afresh and warm up. A model without an error bar of its own gets that of the residual table.
+/// Should the fallback overflow, the last value is held. After a gap of at most
+/// `kLongestGapSeconds` (never less than one tick) filters and model run on as if the missing ticks
+/// had not been, so a plain `rate(x)` shows the whole step over the gap in one tick; after a longer
+/// one they start afresh and warm up. A model without an error bar of its own gets that of the
+/// residual table.
 ///
 /// Channels in `settings().zeroed_channels` had their zero taken from each record in training: set
 /// it with `set_zero` before the first step, or the value is off by the slope times that zero.

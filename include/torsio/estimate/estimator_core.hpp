@@ -15,7 +15,7 @@ namespace torsio {
 
 /// A gap in the inputs longer than this starts the filters and the model afresh; a shorter one they
 /// run across, as if its ticks had not been.
-inline constexpr double kLongestGap_s = 0.01;
+inline constexpr double kLongestGapSeconds = 0.01;
 
 /// Everything of an estimator that does not depend on the family of its model: raw channels in,
 /// features out, and the guards that decide whether what the model made of them may be used.
