@@ -14,13 +14,13 @@ static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>
-constexpr auto family_names(std::type_identity<std::variant<Family...>>) {
+constexpr auto family_names(std::type_identity<std::variant<Family...>> /*models*/) {
   return std::array<std::string_view, sizeof...(Family)>{Family::kFamily...};
 }
 
 template <class... Family>
-std::optional<AnyModel::Parameters> empty_parameters(std::string_view family,
-                                                     std::type_identity<std::variant<Family...>>) {
+std::optional<AnyModel::Parameters> empty_parameters(
+    std::string_view family, std::type_identity<std::variant<Family...>> /*models*/) {
   std::optional<AnyModel::Parameters> found;
   ((family == Family::kFamily ? void(found = typename Family::Parameters{}) : void()), ...);
   return found;
@@ -31,13 +31,23 @@ constexpr auto kNames = family_names(kModels);
 
 template <class... Family>
 KnownFamilies::Models construct(const AnyModel::Parameters& parameters,
-                                std::type_identity<std::variant<Family...>>) {
+                                std::type_identity<std::variant<Family...>> /*models*/) {
   std::optional<KnownFamilies::Models> model;
   const auto take = [&]<class F>(std::type_identity<F>) {
     if (const auto* own = std::get_if<typename F::Parameters>(&parameters)) model.emplace(F(*own));
   };
   (take(std::type_identity<Family>{}), ...);
   return *std::move(model);
+}
+
+/// std::visit without the exception that it throws for a variant that holds nothing, which no
+/// function here leaves behind.
+template <std::size_t index = 0, class Models, class Visit>
+decltype(auto) dispatch(Models& model, const Visit& visit) noexcept {
+  if constexpr (index + 1 < std::variant_size_v<KnownFamilies::Models>) {
+    if (model.index() != index) return dispatch<index + 1>(model, visit);
+  }
+  return visit(*std::get_if<index>(&model));
 }
 
 }  // namespace
@@ -51,35 +61,33 @@ AnyModel::Parameters AnyModel::parameters() const {
 }
 
 std::size_t AnyModel::input_count() const noexcept {
-  return std::visit([](const auto& model) { return model.input_count(); }, model_);
+  return dispatch(model_, [](const auto& model) { return model.input_count(); });
 }
 
 std::size_t AnyModel::parameter_count() const noexcept {
-  return std::visit([](const auto& model) { return model.parameter_count(); }, model_);
+  return dispatch(model_, [](const auto& model) { return model.parameter_count(); });
 }
 
 void AnyModel::reset() noexcept {
-  std::visit([](auto& model) { model.reset(); }, model_);
+  dispatch(model_, [](auto& model) { model.reset(); });
 }
 
 Estimate AnyModel::step(Features features) noexcept {
-  return std::visit([&](auto& model) { return model.step(features); }, model_);
+  return dispatch(model_, [&](auto& model) { return model.step(features); });
 }
 
 bool AnyModel::can_invert() const noexcept {
-  return std::visit([]<class M>(const M&) { return Invertible<M>; }, model_);
+  return dispatch(model_, []<class M>(const M&) { return Invertible<M>; });
 }
 
 Estimate AnyModel::invert(double target, Features features) noexcept {
-  return std::visit(
-      [&]<class M>(M& model) -> Estimate {
-        if constexpr (Invertible<M>) {
-          return Estimate{model.invert(target, features)};
-        } else {
-          return {.value = features[0], .fault = Fault::model_not_finite};
-        }
-      },
-      model_);
+  return dispatch(model_, [&]<class M>(M& model) -> Estimate {
+    if constexpr (Invertible<M>) {
+      return Estimate{model.invert(target, features)};
+    } else {
+      return {.value = features[0], .fault = Fault::model_not_finite};
+    }
+  });
 }
 
 std::string_view family_of(const AnyModel::Parameters& parameters) noexcept {

@@ -67,14 +67,14 @@ FittedModel fitted_model(Fitted<Family> fitted) {
   return {Family(fitted.parameters), std::move(fitted.notes)};
 }
 
-FittedModel linear(const TrainingData& data, const Options& options, std::uint64_t,
+FittedModel linear(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
                    const Progress& progress) {
   report_progress(progress, 0.0, "fitting linear");
   return fitted_model(
       fit_linear(data, {.rates = options.boolean("rates"), .schedule = options.text("schedule")}));
 }
 
-FittedModel linear_coulomb(const TrainingData& data, const Options& options, std::uint64_t,
+FittedModel linear_coulomb(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
                            const Progress& progress) {
   report_progress(progress, 0.0, "fitting linear_coulomb");
   return fitted_model(fit_linear_coulomb(data, {.rates = options.boolean("rates"),
@@ -82,7 +82,7 @@ FittedModel linear_coulomb(const TrainingData& data, const Options& options, std
                                                 .rate_scale = options.number("rate_scale")}));
 }
 
-FittedModel polynomial(const TrainingData& data, const Options& options, std::uint64_t,
+FittedModel polynomial(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
                        const Progress& progress) {
   report_progress(progress, 0.0, "fitting polynomial");
   return fitted_model(fit_polynomial(data, {.degree = options.integer("degree"),
@@ -136,9 +136,10 @@ constexpr std::array kFamilies{
 std::span<const FamilyInfo> families() noexcept { return kFamilies; }
 
 const FamilyInfo& find_family(std::string_view name) {
-  const auto family = std::ranges::find(kFamilies, name, &FamilyInfo::name);
+  const auto* const family = std::ranges::find(kFamilies, name, &FamilyInfo::name);
   if (family != kFamilies.end()) return *family;
   std::vector<std::string> names;
+  names.reserve(kFamilies.size());
   for (const FamilyInfo& each : kFamilies) names.emplace_back(each.name);
   throw UsageError({.problem = "no model family is called \"" + std::string(name) + '"',
                     .expected = "one of " + joined(names),

@@ -11,6 +11,8 @@
 namespace torsio {
 namespace {
 
+constexpr int kGridPoints = 33;
+
 /// Bias and slopes, and room for `extra` columns behind them.
 Design affine_design(const TrainingData& data, Table& table, const Groups& groups, bool rates,
                      std::size_t extra) {
@@ -48,7 +50,6 @@ class FrictionSearch {
 
   /// The scale between `lowest` and `highest` that leaves least.
   [[nodiscard]] double best_scale(double lowest, double highest) const {
-    constexpr int kGridPoints = 33;
     const double step = std::log(highest / lowest) / (kGridPoints - 1);
     const auto gain_at = [&](double position) { return gain(lowest * std::exp(position * step)); };
     int best = 0;
@@ -138,9 +139,10 @@ double found_scale(const Design& design, const Groups& groups, std::span<const d
   const double lowest = 1e-3 * rms;
   const double scale = FrictionSearch(design, groups, rate).best_scale(lowest, largest);
   if (scale > 0.99 * largest)
-    notes.emplace_back("the friction grows up to the largest rate: more viscous than Coulomb");
+    notes.emplace_back(
+        "the friction still grows at the largest rate: the data do not tell it from a viscous one");
   if (scale < 1.01 * lowest)
-    notes.emplace_back("the friction is a step in the rate: its scale is not told by the data");
+    notes.emplace_back("the friction is a step in the rate: the data do not tell its scale");
   return scale;
 }
 

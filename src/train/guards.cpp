@@ -12,6 +12,8 @@
 namespace torsio {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 struct Residual {
   double value = 0.0;  ///< what the model said
   double error = 0.0;
@@ -31,7 +33,6 @@ std::vector<Residual> residuals(AnyModel& model, const TrainingData& data) {
 }  // namespace
 
 FeatureRanges feature_ranges(const TrainingData& data) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   FeatureRanges ranges;
   ranges.lowest.assign(data.input_count(), kInfinity);
   ranges.highest.assign(data.input_count(), -kInfinity);

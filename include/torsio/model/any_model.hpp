@@ -48,9 +48,7 @@ class AnyModel {
   explicit AnyModel(const Parameters& parameters);
   template <class Family>
     requires KnownFamilies::kHolds<Family>
-  AnyModel(Family model)
-      : model_(std::move(model)) {}  // NOLINT(google-explicit-constructor): a
-                                     // family is a model
+  AnyModel(Family model) : model_(std::move(model)) {}
 
   /// As model files spell it: "linear".
   [[nodiscard]] std::string_view family() const noexcept;

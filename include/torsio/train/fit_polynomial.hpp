@@ -22,8 +22,9 @@ struct PolynomialOptions {
 inline constexpr std::size_t kHighestChosenDegree = 9;
 
 /// Least squares over the usable samples; scheduled as `fit_linear`. By branch, samples whose
-/// direction is not known yet are left out. The chosen degree is the lowest whose error in 5
-/// contiguous folds (of each knot's samples) is within 1 % of the best.
+/// direction is not known yet are left out. The chosen degree is the lowest whose error is within
+/// 1 % of the best, held out in 5 folds of 10 interleaved contiguous blocks (of each knot's
+/// samples).
 /// @throws Error if the first input is constant, moves in one direction only (by branch), or as
 /// `fit_linear`.
 [[nodiscard]] Fitted<Polynomial> fit_polynomial(const TrainingData& data,
