@@ -48,7 +48,7 @@ int main() {
   try {
     torsio::BasicEstimator<CubicSpring> estimator(
         settings(), CubicSpring({.k_Nm_rad = 500.0, .k3_Nm_rad3 = 2e4}));
-    for (const double deflection_rad : {0.0, 0.05, 0.1, 0.5, NAN}) {
+    for (const double deflection_rad : {0.0, 0.05, 0.1, 0.5, std::nan("")}) {
       const double raw[] = {deflection_rad, 0.0};  // in the order of estimator.raw_inputs()
       const torsio::Estimate torque = estimator.step(raw);
       const std::string_view fault = torsio::name(torque.fault);

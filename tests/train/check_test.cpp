@@ -1,0 +1,158 @@
+#include "torsio/train/check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "support/bench_dataset.hpp"
+#include "torsio/train/inputs.hpp"
+
+namespace torsio {
+namespace {
+
+using test::add_record;
+using test::bench_recording;
+using test::BenchOptions;
+
+std::vector<Finding> findings_of(const Dataset& dataset) {
+  return check_dataset(dataset, resolve_inputs(dataset, {}));
+}
+
+/// The worst verdict of one check.
+Verdict verdict_of(const std::vector<Finding>& findings, const std::string& check) {
+  Verdict worst = Verdict::pass;
+  bool is_found = false;
+  for (const Finding& finding : findings) {
+    if (finding.check != check) continue;
+    worst = std::max(worst, finding.verdict);
+    is_found = true;
+  }
+  EXPECT_TRUE(is_found) << check;
+  return worst;
+}
+
+const Finding& first_of(const std::vector<Finding>& findings, const std::string& check) {
+  return *std::ranges::find_if(findings, [&](const Finding& finding) { return finding.check == check; });
+}
+
+/// The good bench with one record changed.
+Dataset with_record(Recording recording) {
+  Dataset dataset = test::bench_dataset();
+  add_record(dataset, std::move(recording), Role::train);
+  return dataset;
+}
+
+Recording changed(const std::string& channel, const std::function<void(Channel&)>& change) {
+  const Recording good = bench_recording("changed");
+  Recording recording("changed", 1000.0);
+  for (Channel copy : good.channels()) {
+    if (copy.name == channel) change(copy);
+    recording.add(std::move(copy));
+  }
+  return recording;
+}
+
+TEST(Check, PassesAGoodBench) {
+  for (const Finding& finding : findings_of(test::bench_dataset()))
+    EXPECT_EQ(finding.verdict, Verdict::pass) << finding.check << ": " << finding.message;
+}
+
+TEST(Check, SaysThatAShortRecordIsTooShort) {
+  const auto findings = findings_of(with_record(bench_recording("short", {.samples = 50})));
+  EXPECT_EQ(verdict_of(findings, "length"), Verdict::fail);
+}
+
+TEST(Check, FailsOnAMissingInputAndWarnsOfAMissingTarget) {
+  const auto spoil = [](Channel& channel) {
+    std::fill_n(channel.values.begin() + 100, 20, std::numeric_limits<double>::quiet_NaN());
+  };
+  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", spoil))), "missing values"), Verdict::warn);
+  EXPECT_EQ(verdict_of(findings_of(with_record(changed("gear_angle_rad", spoil))), "missing values"), Verdict::fail);
+}
+
+TEST(Check, FailsOnADeadChannel) {
+  const auto dead = [](Channel& channel) { std::ranges::fill(channel.values, 1.5); };
+  const auto findings = findings_of(with_record(changed("torque_Nm", dead)));
+  EXPECT_EQ(verdict_of(findings, "constant channels"), Verdict::fail);
+  EXPECT_NE(first_of(findings, "constant channels").message.find("torque_Nm never changes from 1.5"), std::string::npos);
+}
+
+TEST(Check, WarnsOfASensorAtItsLimit) {
+  const auto clip = [](Channel& channel) {
+    for (double& value : channel.values) value = std::clamp(value, -8.0, 8.0);
+  };
+  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", clip))), "saturation"), Verdict::warn);
+}
+
+TEST(Check, WarnsOfAJump) {
+  const auto jump = [](Channel& channel) {
+    for (std::size_t i = 2000; i < channel.values.size(); ++i) channel.values[i] += 20.0;
+  };
+  const auto findings = findings_of(with_record(changed("torque_Nm", jump)));
+  EXPECT_EQ(verdict_of(findings, "gaps"), Verdict::warn);
+  EXPECT_NE(first_of(findings, "gaps").message.find("t = 2 s"), std::string::npos);
+}
+
+TEST(Check, MeasuresADelayAndSaysTheMappingLine) {
+  const auto findings = findings_of(with_record(bench_recording("late", {.torque_delay = 30})));
+  ASSERT_EQ(verdict_of(findings, "delay"), Verdict::warn);
+  // Friction leads the deflection a little, so the delay is told to a few milliseconds.
+  const std::string& advice = first_of(findings, "delay").advice;
+  const std::size_t at = advice.find("torque_Nm: ");
+  ASSERT_NE(at, std::string::npos) << advice;
+  EXPECT_NEAR(std::stod(advice.substr(at + 11)), 30.0, 6.0) << advice;
+}
+
+TEST(Check, FailsOnAWrongSign) {
+  const auto flip = [](Channel& channel) {
+    for (double& value : channel.values) value = -value;
+  };
+  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", flip))), "sign"), Verdict::fail);
+}
+
+TEST(Check, WarnsWhenARecordHasAnotherZero) {
+  const auto findings = findings_of(with_record(bench_recording("shifted", {.offset_Nm = 6.0})));
+  EXPECT_EQ(verdict_of(findings, "offsets"), Verdict::warn);
+  EXPECT_EQ(first_of(findings, "offsets").recording, "shifted");
+}
+
+TEST(Check, WarnsOfOneSpeedWithoutReversal) {
+  Recording recording("ramp", 1000.0);
+  Channel gear{"gear_angle_rad", {}};
+  Channel joint{"joint_angle_rad", {}};
+  Channel torque{"torque_Nm", {}};
+  for (std::size_t n = 0; n < 3000; ++n) {
+    const double x = 1e-5 * static_cast<double>(n);
+    gear.values.push_back(x);
+    joint.values.push_back(1e-9 * static_cast<double>(n));
+    torque.values.push_back(500.0 * x + 0.1 * std::sin(static_cast<double>(n)));
+  }
+  recording.add(std::move(gear));
+  recording.add(std::move(joint));
+  recording.add(std::move(torque));
+  Dataset dataset;
+  add_record(dataset, std::move(recording), Role::train);
+  EXPECT_EQ(verdict_of(findings_of(dataset), "excitation"), Verdict::warn);
+}
+
+TEST(Check, FailsOnATargetThatWasComputedFromAnInput) {
+  Recording recording = bench_recording("leaky");
+  Channel current{"motor_current_A", recording.channel("torque_Nm").values};
+  for (double& value : current.values) value = 0.2 * value - 1.0;
+  recording.add(std::move(current));
+  Dataset dataset;
+  add_record(dataset, std::move(recording), Role::train);
+  const auto findings = check_dataset(dataset, resolve_inputs(dataset, {"gear_angle_rad", "motor_current_A"}));
+  EXPECT_EQ(verdict_of(findings, "leak"), Verdict::fail);
+}
+
+TEST(Check, WarnsOfTestDataOutsideTheTrainingRange) {
+  Dataset dataset = test::bench_dataset();
+  add_record(dataset, bench_recording("far", {.amplitude_rad = 0.06}), Role::test);
+  const auto findings = findings_of(dataset);
+  EXPECT_EQ(verdict_of(findings, "range"), Verdict::warn);
+}
+
+}  // namespace
+}  // namespace torsio

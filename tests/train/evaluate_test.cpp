@@ -1,0 +1,90 @@
+#include "torsio/train/evaluate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "support/bench_dataset.hpp"
+#include "support/error_message.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/train/inputs.hpp"
+#include "torsio/train/train_model.hpp"
+
+namespace torsio {
+namespace {
+
+TrainedModel trained(const Dataset& dataset, const std::string& family) {
+  return train_model(dataset, {.family = family, .features = resolve_inputs(dataset, {})}, 1);
+}
+
+TEST(Evaluate, FindsTheNoiseThatARightModelCannotExplain) {
+  const Dataset dataset = test::bench_dataset();
+  Estimator estimator = make_estimator(trained(dataset, "linear_coulomb").file);
+  const SplitScore score = evaluate(estimator, dataset, Role::test);
+  ASSERT_EQ(score.recordings.size(), 1U);
+  EXPECT_EQ(score.recordings.front().recording, "held out");
+  EXPECT_LT(score.together.metrics.rmse, 0.4);
+  EXPECT_GT(score.together.metrics.rmse, 0.05);
+  EXPECT_EQ(score.together.metrics.samples + score.together.initialised_samples, dataset.records.back().recording.size());
+}
+
+TEST(Evaluate, ScoresOnlyFreshSamples) {
+  Dataset dataset = test::bench_dataset();
+  Estimator estimator = make_estimator(trained(dataset, "linear").file);
+  const std::size_t all = evaluate(estimator, dataset, Role::test).together.metrics.samples;
+
+  const Recording& old = dataset.records.back().recording;
+  Recording held("held", 1000.0);
+  for (Channel channel : old.channels()) {
+    if (channel.name == "torque_Nm")
+      for (std::size_t i = 0; i < old.size(); ++i) channel.fresh.push_back(i % 8 == 0 ? 1 : 0);
+    held.add(std::move(channel));
+  }
+  dataset.records.pop_back();
+  test::add_record(dataset, std::move(held), Role::test);
+  EXPECT_NEAR(static_cast<double>(evaluate(estimator, dataset, Role::test).together.metrics.samples),
+              static_cast<double>(all) / 8.0, 1.0);
+}
+
+TEST(Evaluate, LeavesTheEmbargoOut) {
+  Dataset dataset;
+  Recording recording = test::bench_recording("blocks");
+  const std::size_t samples = recording.size();
+  dataset.records.push_back({std::move(recording), interleaved_blocks(samples, 10, 5, 50)});
+  Estimator estimator = make_estimator(trained(dataset, "linear").file);
+  const SplitScore score = evaluate(estimator, dataset, Role::test);
+  EXPECT_EQ(score.together.metrics.samples, 2 * samples / 10);
+}
+
+TEST(Evaluate, SaysWhereAnInputIsMissing) {
+  Dataset dataset = test::bench_dataset();
+  Estimator estimator = make_estimator(trained(dataset, "linear").file);
+  const Recording good = test::bench_recording("holes");
+  Recording holes("holes", 1000.0);
+  for (Channel channel : good.channels()) {
+    if (channel.name == "gear_angle_rad") channel.values[123] = std::numeric_limits<double>::quiet_NaN();
+    holes.add(std::move(channel));
+  }
+  const std::string message = test::error_message([&] { (void)predict(estimator, holes); });
+  EXPECT_NE(message.find("holes: gear_angle_rad"), std::string::npos) << message;
+  EXPECT_NE(message.find("t = 0.123 s"), std::string::npos) << message;
+}
+
+TEST(TrainModel, IsTheSameForTheSameSeedAndKnowsWhereItCameFrom) {
+  const Dataset dataset = test::bench_dataset();
+  for (const char* family : {"linear", "linear_coulomb", "polynomial", "dgmm"})
+    EXPECT_EQ(model_bytes(trained(dataset, family).file), model_bytes(trained(dataset, family).file)) << family;
+  const TrainedModel model = trained(dataset, "dgmm");
+  EXPECT_EQ(model.file.card.fitted_as, "dgmm");
+  EXPECT_EQ(model.file.card.training_files.size(), 2U);
+  EXPECT_EQ(model.file.settings.target, "torque_Nm");
+}
+
+TEST(TrainModel, StopsWhenAskedTo) {
+  const Dataset dataset = test::bench_dataset();
+  const ModelChoice choice{.family = "dgmm", .features = resolve_inputs(dataset, {})};
+  EXPECT_THROW((void)train_model(dataset, choice, 1, [](double, std::string_view) { return false; }), Cancelled);
+}
+
+}  // namespace
+}  // namespace torsio
