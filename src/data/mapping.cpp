@@ -139,8 +139,8 @@ Recording recording_of(const CsvTable& table, const TableChannels& columns, cons
   for (const std::string& name : mapping.hold)
     hold(channel_of_rule(channels, name, mapping, "hold"));
   if (columns.clock && mapping.clock.resample_Hz > 0.0) {
-    const auto stamps =
-        std::span(columns.clock->channel.values).subspan(run.rows.begin, run.rows.size());
+    const auto stamps = spread_within_stamps(
+        std::span(columns.clock->channel.values).subspan(run.rows.begin, run.rows.size()));
     for (Channel& channel : channels)
       channel = on_even_clock(channel, stamps, clock.sample_rate_Hz);
   }

@@ -106,9 +106,14 @@ double rebuilt_rate(const Stamps& stamps, double max_stray_steps) {
 }
 
 void refuse_gaps(const Stamps& stamps) {
-  refuse_not_increasing(stamps, "Resampling needs stamps that increase.");
   for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
     const double interval = stamps.values_s[i] - stamps.values_s[i - 1];
+    if (interval < 0.0)
+      throw Error({.place = stamps.place(i),
+                   .problem = "the clock runs backward",
+                   .expected = fmt::format("at least {} s", stamps.values_s[i - 1]),
+                   .found = fmt::format("{} s", stamps.values_s[i]),
+                   .advice = "Cut the log there into two files."});
     if (interval > kLongestGapIntervals * stamps.report.stamp_step_s)
       throw Error({.place = stamps.place(i),
                    .problem = "a gap too long to interpolate over",
@@ -153,6 +158,19 @@ RecordClock record_clock(const CsvTable& table, const TableChannels& columns, Ro
     clock.sample_rate_Hz = even_rate(stamps);
   }
   return clock;
+}
+
+std::vector<double> spread_within_stamps(std::span<const double> stamps) {
+  std::vector<double> spread(stamps.begin(), stamps.end());
+  double interval = 0.0;
+  for (std::size_t begin = 0, end = 0; begin < spread.size(); begin = end) {
+    while (end < spread.size() && stamps[end] == stamps[begin]) ++end;
+    if (end < spread.size())
+      interval = (stamps[end] - stamps[begin]) / static_cast<double>(end - begin);
+    for (std::size_t i = begin; i < end; ++i)
+      spread[i] = stamps[begin] + static_cast<double>(i - begin) * interval;
+  }
+  return spread;
 }
 
 Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,

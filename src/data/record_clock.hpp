@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "data/columns.hpp"
@@ -24,6 +25,10 @@ struct RecordClock {
 /// The clock of some rows by the mapping's rules; `rate_Hz` where neither log nor mapping tells.
 [[nodiscard]] RecordClock record_clock(const CsvTable& table, const TableChannels& columns,
                                        Rows rows, const Mapping& mapping, double rate_Hz);
+
+/// Samples that share a stamp, spread evenly up to the next stamp (the last ones as those before),
+/// so that stamps coarser than the sampling tell a time for each sample.
+[[nodiscard]] std::vector<double> spread_within_stamps(std::span<const double> stamps_s);
 
 /// Puts a channel of uneven stamps onto the even clock: interpolated, or held if it has a mask.
 [[nodiscard]] Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,

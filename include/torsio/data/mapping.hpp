@@ -26,7 +26,9 @@ struct ChannelRule {
 struct ClockRule {
   bool rebuild = false;          ///< spread the samples evenly between first and last stamp
   double max_stray_steps = 2.0;  ///< with rebuild: how far a stamp may be from there
-  double resample_Hz = 0.0;      ///< interpolate from uneven stamps onto this rate; 0: no
+  /// Interpolate from uneven stamps onto this rate; samples that share a stamp are first spread
+  /// evenly up to the next one. 0: no.
+  double resample_Hz = 0.0;
 };
 
 /// A channel whose sensor reports late by this much.
