@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -15,8 +16,10 @@ class TemporaryFolder {
  public:
   TemporaryFolder() {
     const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+    std::string name = test->name();
+    std::ranges::replace(name, '/', '_');
     path_ = std::filesystem::temp_directory_path() /
-            ("torsio_" + std::string(test->name()) + "_" + std::to_string(getpid()));
+            ("torsio_" + name + "_" + std::to_string(getpid()));
     std::filesystem::create_directories(path_);
   }
   ~TemporaryFolder() {

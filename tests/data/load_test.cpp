@@ -1,0 +1,153 @@
+#include "torsio/data/load.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "data/temporary_folder.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/data/manifest.hpp"
+
+namespace torsio {
+namespace {
+
+std::string ramp(int samples, const std::string& header = "t_s,angle_deg,torque_Nm") {
+  std::string csv = header + "\n";
+  for (int i = 0; i < samples; ++i)
+    csv += std::to_string(i) + "e-2," + std::to_string(i) + "," + std::to_string(2 * i) + "\n";
+  return csv;
+}
+
+TEST(LoadDataset, CsvFilesTakeTheRoleOfTheirList) {
+  const TemporaryFolder folder;
+  const std::string a = folder.file("a.csv", ramp(10));
+  const std::string b = folder.file("b.csv", ramp(20));
+  const Dataset dataset = load_dataset({a}, {b});
+  ASSERT_EQ(dataset.records.size(), 2U);
+  EXPECT_EQ(dataset.records[0].segments[0].role, Role::train);
+  EXPECT_EQ(dataset.records[1].segments[0].role, Role::test);
+  EXPECT_EQ(dataset.records[1].segments[0].end, 20U);
+  EXPECT_EQ(dataset.target, "torque_Nm");
+  EXPECT_EQ(dataset.records[0].recording.name(), "a");
+  EXPECT_EQ(dataset.records[0].recording.source.file, a);
+}
+
+TEST(LoadDataset, OneRateServesAll) {
+  const TemporaryFolder folder;
+  const std::string a = folder.file("a.csv", ramp(11));
+  const std::string b = folder.file("b.csv", "torque_Nm\n1\n2\n");
+  const Dataset dataset = load_dataset({a, b}, {}, {.mapping = {}, .rate_Hz = 50.0, .target = {}});
+  EXPECT_EQ(dataset.sample_rate_Hz(), 50.0);
+  EXPECT_EQ(dataset.records[0].recording.size(), 6U);
+  EXPECT_EQ(dataset.records[1].recording.size(), 2U);
+}
+
+TEST(LoadDataset, FilesOfOneNameStayApart) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder.path("x"));
+  std::filesystem::create_directories(folder.path("y"));
+  const std::string a = folder.file("x/run.csv", ramp(5));
+  const std::string b = folder.file("y/run.csv", ramp(5));
+  const Dataset dataset = load_dataset({a}, {b});
+  EXPECT_EQ(dataset.records[0].recording.name(), a);
+  EXPECT_EQ(dataset.records[1].recording.name(), b);
+}
+
+constexpr const char* kManifest = R"(
+label: a made-up bench
+root: [not_there, "${TORSIO_TEST_UNSET}/x", logs]
+sample_rate_Hz: 100
+target: torque_Nm
+mapping: map.yaml
+split: {contiguous: 0.8, embargo: 20ms}
+input_sets:
+  plain: angle_rad, lowpass(rate(angle_rad), 10Hz)
+  short: [angle_rad]
+files:
+  - a.csv
+  - {file: b.csv, name: other, role: validation, conditions: {support_mm: 33, temperature_degC: 20}}
+  - file: c.csv
+    split: {interleaved_blocks: 4, test_every: 2}
+    mapping: {}
+    zero: [{channel: angle_rad, mid_range: true}]
+)";
+
+class Manifests : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::filesystem::create_directories(folder_.path("logs"));
+    static_cast<void>(folder_.file("logs/a.csv", ramp(100)));
+    static_cast<void>(folder_.file("logs/b.csv", ramp(50)));
+    static_cast<void>(folder_.file("logs/c.csv", ramp(40, "t_s,angle_rad,torque_Nm")));
+    static_cast<void>(folder_.file("map.yaml", R"(
+derive: {double_angle_rad: 2 * angle_rad}
+computed_from: {torque_Nm: [iq_A]}
+)"));
+    manifest_ = folder_.file("set.yaml", kManifest);
+  }
+  TemporaryFolder folder_;
+  std::string manifest_;
+};
+
+TEST_F(Manifests, SayFilesRolesConditionsMappingsAndSplits) {
+  const Dataset dataset = load_dataset({manifest_}, {});
+  ASSERT_EQ(dataset.records.size(), 3U);
+  EXPECT_EQ(dataset.label, "a made-up bench");
+  ASSERT_EQ(dataset.input_sets.size(), 2U);
+  EXPECT_EQ(dataset.input_sets[0].second,
+            (std::vector<std::string>{"angle_rad", "lowpass(rate(angle_rad), 10Hz)"}));
+  EXPECT_EQ(dataset.target_computed_from, std::vector<std::string>{"iq_A"});
+
+  const DatasetRecord& first = dataset.records[0];
+  ASSERT_EQ(first.segments.size(), 2U);
+  EXPECT_EQ(first.segments[0].end, 78U);
+  EXPECT_TRUE(first.recording.has("double_angle_rad"));
+
+  const DatasetRecord& other = dataset.records[1];
+  EXPECT_EQ(other.recording.name(), "other");
+  EXPECT_EQ(other.segments[0].role, Role::validation);
+  EXPECT_DOUBLE_EQ(other.recording.channel("support_m").values[0], 0.033);
+  EXPECT_DOUBLE_EQ(other.recording.channel("temperature_K").values[0], 293.15);
+
+  const DatasetRecord& third = dataset.records[2];
+  EXPECT_EQ(third.segments.size(), 4U);
+  EXPECT_FALSE(third.recording.has("double_angle_rad"));
+  EXPECT_TRUE(third.recording.zeros[0].mid_range);
+  EXPECT_EQ(third.recording.channel("angle_rad").values[0], -19.5);
+}
+
+TEST_F(Manifests, AsATestAllOfItIsTest) {
+  const Dataset dataset = load_dataset({folder_.path("logs/a.csv")}, {manifest_});
+  for (std::size_t i = 1; i < dataset.records.size(); ++i) {
+    EXPECT_EQ(dataset.records[i].segments.size(), 1U);
+    EXPECT_EQ(dataset.records[i].segments[0].role, Role::test);
+  }
+}
+
+TEST_F(Manifests, TheUsersWordCountsMore) {
+  const std::string mapping = folder_.file("mine.yaml", "derive: {mine_rad: angle_rad}");
+  const auto recordings =
+      load_recordings(manifest_, {.mapping = mapping, .rate_Hz = 50.0, .target = {}});
+  ASSERT_EQ(recordings.size(), 3U);
+  for (const Recording& recording : recordings) {
+    EXPECT_TRUE(recording.has("mine_rad"));
+    EXPECT_EQ(recording.sample_rate_Hz(), 50.0);
+  }
+}
+
+TEST_F(Manifests, ARootMayStandInAnEnvironmentVariable) {
+  ASSERT_EQ(setenv("TORSIO_TEST_ROOT", folder_.path("logs").c_str(), 1), 0);
+  const Manifest manifest =
+      parse_manifest("{root: '${TORSIO_TEST_ROOT}', files: [a.csv]}", folder_.path("x.yaml"));
+  EXPECT_TRUE(std::filesystem::equivalent(data_folder(manifest), folder_.path("logs")));
+}
+
+TEST_F(Manifests, ThatDisagreeAreRefused) {
+  const std::string force = folder_.file("force.yaml", "{target: force_N, files: [logs/a.csv]}");
+  EXPECT_THROW(static_cast<void>(load_dataset({manifest_, force}, {})), UsageError);
+}
+
+}  // namespace
+}  // namespace torsio

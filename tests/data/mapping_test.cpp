@@ -1,0 +1,195 @@
+#include "torsio/data/mapping.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <bit>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "data/temporary_folder.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+std::vector<Recording> read(const std::string& csv, const std::string& mapping = "{}",
+                            double rate_Hz = 0.0) {
+  const Mapping rules = parse_mapping(mapping, "map.yaml");
+  return measured_recordings(parse_csv(csv, "log.csv", {.skip = rules.drop}), rules, rate_Hz);
+}
+
+constexpr double kDeg = std::numbers::pi / 180.0;
+
+TEST(Mapping, WithoutOneTheHeadersTellEverything) {
+  const auto recordings = read("t_ms,angle_deg,torque_mNm\n500,1,10\n502,2,20\n504,3,nan\n");
+  ASSERT_EQ(recordings.size(), 1U);
+  const Recording& recording = recordings[0];
+  EXPECT_EQ(recording.name(), "log");
+  EXPECT_EQ(recording.sample_rate_Hz(), 500.0);
+  EXPECT_DOUBLE_EQ(recording.time_s(0), 0.5);
+  ASSERT_EQ(recording.channels().size(), 2U);
+  EXPECT_DOUBLE_EQ(recording.channel("angle_rad").values[2], 3.0 * kDeg);
+  EXPECT_DOUBLE_EQ(recording.channel("torque_Nm").values[1], 0.02);
+  EXPECT_TRUE(std::isnan(recording.channel("torque_Nm").values[2]));
+}
+
+TEST(Mapping, RenamesFlipsScalesAndShifts) {
+  const Recording recording = read("stamp,Pos,tau,cur_mA\n0,10,5,100\n1,20,6,200\n", R"(
+channels:
+  t_s: {from: stamp, unit: ms}
+  joint_angle_rad: {from: Pos, unit: deg, sign: -1, offset: 90deg}
+  torque_Nm: tau
+  motor_torque_Nm: {from: cur_mA, scale: 2.5}
+)")[0];
+  EXPECT_EQ(recording.sample_rate_Hz(), 1000.0);
+  EXPECT_DOUBLE_EQ(recording.channel("joint_angle_rad").values[0], 80.0 * kDeg);
+  EXPECT_DOUBLE_EQ(recording.channel("torque_Nm").values[1], 6.0);
+  EXPECT_DOUBLE_EQ(recording.channel("motor_torque_Nm").values[1], 0.5);
+  EXPECT_FALSE(recording.has("cur_A"));
+}
+
+TEST(Mapping, DropsTextAndSplitsIntoRecords) {
+  const auto recordings =
+      read("t_s,x_m,run,note\n0,1,7,a\n1,2,7,b\n2,3,8,c\n3,4,8,d\n4,5,7,e\n5,6,7,f\n",
+           "{drop: [note], split_by: run}");
+  ASSERT_EQ(recordings.size(), 3U);
+  EXPECT_EQ(recordings[0].name(), "log[run=7]");
+  EXPECT_EQ(recordings[1].name(), "log[run=8]");
+  EXPECT_EQ(recordings[2].name(), "log[run=7]#2");
+  EXPECT_EQ(recordings[1].channel("x_m").values, (std::vector<double>{3.0, 4.0}));
+  EXPECT_EQ(recordings[1].time_s(0), 2.0);
+  const auto kept = read("t_s,x_m,run\n0,1,7\n1,2,7\n2,3,8\n3,4,8\n", "{split_by: run, keep: [8]}");
+  ASSERT_EQ(kept.size(), 1U);
+  EXPECT_EQ(kept[0].name(), "log[run=8]");
+}
+
+TEST(Mapping, ALogWithoutAClockTakesTheRateThatIsTold) {
+  EXPECT_EQ(read("x_m\n1\n2\n", "rate: 2kHz")[0].sample_rate_Hz(), 2000.0);
+  EXPECT_EQ(read("x_m\n1\n2\n", "{}", 50.0)[0].sample_rate_Hz(), 50.0);
+  EXPECT_EQ(read("x_m\n1\n", "{}", 50.0)[0].size(), 1U);
+}
+
+TEST(Mapping, RebuildsAClockWithCoarseStamps) {
+  std::string csv = "t_s,x_m\n";
+  for (int i = 0; i < 101; ++i)
+    csv += std::to_string(i / 10 * 10) + "e-3," + std::to_string(i) + "\n";
+  const Recording recording = read(csv, "clock: {rebuild: true}")[0];
+  EXPECT_NEAR(recording.sample_rate_Hz(), 1000.0, 1e-6);
+  EXPECT_EQ(recording.size(), 101U);
+}
+
+TEST(Mapping, ResamplesUnevenStampsWhereTheyAre) {
+  const Recording recording =
+      read("t_s,x_m\n0,0\n0.1,1\n0.3,3\n0.4,4\n0.8,8\n", "clock: {resample: 10Hz}")[0];
+  ASSERT_EQ(recording.size(), 9U);
+  for (std::size_t i = 0; i < 9; ++i)
+    EXPECT_NEAR(recording.channels()[0].values[i], static_cast<double>(i), 1e-12);
+}
+
+TEST(Mapping, ResamplingSpreadsSamplesThatShareAStamp) {
+  const Recording recording =
+      read("t_s,x_m\n0,0\n0,1\n0.2,2\n0.2,3\n0.4,4\n0.4,5\n", "clock: {resample: 10Hz}")[0];
+  EXPECT_EQ(recording.size(), 6U);
+  for (std::size_t i = 0; i < recording.size(); ++i)
+    EXPECT_NEAR(recording.channels()[0].values[i], static_cast<double>(i), 1e-12);
+}
+
+TEST(Mapping, HoldsASlowSensorAndMarksItsSamples) {
+  const Channel torque =
+      read("t_s,torque_Nm\n0,\n1,5\n2,\n3,\n4,7\n", "hold: [torque_Nm]")[0].channel("torque_Nm");
+  EXPECT_TRUE(std::isnan(torque.values[0]));
+  EXPECT_EQ(std::vector<double>(torque.values.begin() + 1, torque.values.end()),
+            (std::vector<double>{5, 5, 5, 7}));
+  EXPECT_EQ(torque.fresh, (std::vector<std::uint8_t>{0, 1, 0, 0, 1}));
+}
+
+TEST(Mapping, AFreshnessColumnFollowsItsChannelThroughARenaming) {
+  const Recording recording =
+      read("t_s,load_Nm,load_fresh_1\n0,1,1\n1,1,0\n2,2,1\n", "channels: {torque_Nm: load_Nm}")[0];
+  EXPECT_EQ(recording.channels().size(), 1U);
+  EXPECT_EQ(recording.channel("torque_Nm").fresh, (std::vector<std::uint8_t>{1, 0, 1}));
+}
+
+TEST(Mapping, CompensatesALatencyByWholeSamples) {
+  const Recording recording =
+      read("t_s,torque_Nm\n0,1\n0.01,2\n0.02,3\n0.03,4\n", "latency: {torque_Nm: 21ms}")[0];
+  const auto& values = recording.channel("torque_Nm").values;
+  EXPECT_EQ(values[0], 3.0);
+  EXPECT_EQ(values[1], 4.0);
+  EXPECT_TRUE(std::isnan(values[2]));
+}
+
+TEST(Mapping, TakesZerosFromTheStartOrTheMiddle) {
+  const std::string csv = "t_s,a_rad,b_rad\n0,1,1\n1,3,3\n2,9,9\n";
+  const Recording recording = read(csv, R"(
+zero:
+  - {channel: a_rad, first: 2s}
+  - {channel: b_rad, mid_range: true}
+)")[0];
+  EXPECT_EQ(recording.channel("a_rad").values, (std::vector<double>{-1, 1, 7}));
+  EXPECT_EQ(recording.channel("b_rad").values, (std::vector<double>{-4, -2, 4}));
+  ASSERT_EQ(recording.zeros.size(), 2U);
+  EXPECT_EQ(recording.zeros[0].first_s, 2.0);
+  EXPECT_TRUE(recording.zeros[1].mid_range);
+}
+
+TEST(Mapping, DerivesChannelsAndRemembersHow) {
+  Recording recording =
+      read("t_s,gear_angle_rad,joint_angle_rad,torque_Nm\n0,3,1,5\n1,5,1,\n2,9,2,6\n")[0];
+  const Mapping mapping = parse_mapping(R"(
+derive:
+  spring_deflection_rad: gear_angle_rad - joint_angle_rad
+  half_torque_Nm: torque_Nm / 2
+)",
+                                        "map.yaml");
+  add_derived(recording, mapping.derive);
+  EXPECT_EQ(recording.channel("spring_deflection_rad").values, (std::vector<double>{2, 4, 7}));
+  EXPECT_TRUE(std::isnan(recording.channel("half_torque_Nm").values[1]));
+  EXPECT_EQ(recording.channel("half_torque_Nm").values[2], 3.0);
+  EXPECT_EQ(recording.definitions, mapping.derive);
+  EXPECT_THROW(add_derived(recording, {{"torque_rate_Nm_s", "rate(torque_Nm)"}}), Error);
+}
+
+TEST(Mapping, WhatIsWrittenReadsBackBitByBit) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path("a.csv");
+  EXPECT_TRUE(rc::check([&] {
+    const auto samples = *rc::gen::inRange<std::size_t>(2, 200);
+    const double rate_Hz = *rc::gen::element(1000.0, 1.0 / 0.0012, 333.0, 0.1, 999.97, 1.0 / 3.0);
+    const double start_s = *rc::gen::element(0.0, 12.5, -3.0, 1.7e9);
+    Recording written("a", rate_Hz, start_s);
+    for (const char* name : {"a_rad", "b_Nm"}) {
+      Channel channel{.name = name, .values = std::vector<double>(samples), .fresh = {}};
+      for (double& value : channel.values) {
+        value = std::bit_cast<double>(*rc::gen::arbitrary<std::uint64_t>());
+        if (!std::isfinite(value)) value = std::nan("");
+      }
+      if (*rc::gen::arbitrary<bool>())
+        for (std::size_t i = 0; i < samples; ++i) channel.fresh.push_back(i % 3 == 0 ? 1 : 0);
+      written.add(channel);
+    }
+    write_csv(written, path);
+    const Recording read_back = measured_recordings(read_csv(path), {})[0];
+    RC_ASSERT(read_back.channels().size() == written.channels().size());
+    for (std::size_t c = 0; c < written.channels().size(); ++c) {
+      const Channel& before = written.channels()[c];
+      const Channel& after = read_back.channels()[c];
+      RC_ASSERT(after.name == before.name);
+      RC_ASSERT(after.fresh == before.fresh);
+      for (std::size_t i = 0; i < samples; ++i) {
+        const bool both_missing = std::isnan(before.values[i]) && std::isnan(after.values[i]);
+        RC_ASSERT(both_missing || std::bit_cast<std::uint64_t>(before.values[i]) ==
+                                      std::bit_cast<std::uint64_t>(after.values[i]));
+      }
+    }
+    // Stamps since 1970 hold the time to 2^-22 s only.
+    const double tolerance = start_s > 1e9 ? 1e-3 : 1e-12;
+    RC_ASSERT(std::abs(read_back.sample_rate_Hz() - rate_Hz) <= tolerance * rate_Hz);
+  }));
+}
+
+}  // namespace
+}  // namespace torsio

@@ -1,0 +1,1 @@
+torsio_fuzzer(csv torsio::lab)
