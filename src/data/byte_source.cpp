@@ -20,7 +20,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kChunk = std::size_t{256} << 10;
+constexpr std::size_t kChunk = std::size_t{1} << 16;
 
 std::string system_message(int code) { return std::generic_category().message(code); }
 

@@ -50,7 +50,7 @@ class LineReader {
   [[nodiscard]] std::size_t number() const noexcept { return number_; }
 
  private:
-  static constexpr std::size_t kChunk = std::size_t{1} << 18;
+  static constexpr std::size_t kChunk = std::size_t{1} << 16;
 
   bool fill() {
     std::move(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_),
