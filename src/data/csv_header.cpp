@@ -68,7 +68,7 @@ bool is_number(const std::string& text) {
 
 void refuse_binary(std::string_view line, const std::string& place) {
   const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t'; };
-  const auto at = std::ranges::find_if(line, is_control);
+  const auto* const at = std::ranges::find_if(line, is_control);
   if (at == line.end()) return;
   const bool wide = line.starts_with("\xff\xfe") || line.starts_with("\xfe\xff");
   throw Error({.place = place,

@@ -28,7 +28,7 @@ void check_segments(const DatasetRecord& record) {
 
 /// Blocks of one role each, next to each other -> segments with the embargo cut off the training
 /// side, equal neighbours merged.
-std::vector<Segment> with_embargo(std::vector<Segment> blocks, std::size_t embargo) {
+std::vector<Segment> with_embargo(const std::vector<Segment>& blocks, std::size_t embargo) {
   std::vector<Segment> segments;
   for (const Segment& block : blocks) {
     if (!segments.empty() && segments.back().role == block.role)
@@ -111,7 +111,7 @@ std::vector<Segment> interleaved_blocks(std::size_t samples, std::size_t blocks,
     cut.push_back({.begin = border(block),
                    .end = border(block + 1),
                    .role = (block + 1) % test_every == 0 ? Role::test : Role::train});
-  return with_embargo(std::move(cut), embargo_samples);
+  return with_embargo(cut, embargo_samples);
 }
 
 std::vector<Segment> contiguous_blocks(std::size_t samples, double train_fraction,

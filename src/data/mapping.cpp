@@ -61,7 +61,9 @@ std::vector<NamedRows> records_of(const CsvTable& table, const Mapping& mapping,
   return {{.name = stem, .rows = {.begin = 0, .end = table.rows()}}};
 }
 
-Channel cut(const Channel& channel, Rows rows) {
+/// The rows of a channel; all of them are moved out, for then no other record wants any.
+Channel cut(Channel& channel, Rows rows) {
+  if (rows.size() == channel.values.size()) return std::move(channel);
   const auto part = [rows](const auto& all) {
     return std::remove_cvref_t<decltype(all)>(all.begin() + static_cast<std::ptrdiff_t>(rows.begin),
                                               all.begin() + static_cast<std::ptrdiff_t>(rows.end));
@@ -77,6 +79,7 @@ Channel& channel_of_rule(std::vector<Channel>& channels, const std::string& name
   const auto at = std::ranges::find(channels, name, &Channel::name);
   if (at != channels.end()) return *at;
   std::vector<std::string> names;
+  names.reserve(channels.size());
   for (const Channel& channel : channels) names.push_back(channel.name);
   const bool is_derived =
       std::ranges::find(mapping.derive, name, &ChannelDefinition::name) != mapping.derive.end();
@@ -130,12 +133,11 @@ double zero_of(const Channel& channel, const ZeroRule& rule, double sample_rate_
   return rule.mid_range ? 0.5 * (lowest + highest) : sum / count;
 }
 
-Recording recording_of(const CsvTable& table, const TableChannels& columns, const NamedRows& run,
+Recording recording_of(const CsvTable& table, TableChannels& columns, const NamedRows& run,
                        const Mapping& mapping, double rate_Hz) {
   const RecordClock clock = record_clock(table, columns, run.rows, mapping, rate_Hz);
   std::vector<Channel> channels;
-  for (const TableChannel& column : columns.channels)
-    channels.push_back(cut(column.channel, run.rows));
+  for (TableChannel& column : columns.channels) channels.push_back(cut(column.channel, run.rows));
   for (const std::string& name : mapping.hold)
     hold(channel_of_rule(channels, name, mapping, "hold"));
   if (columns.clock && mapping.clock.resample_Hz > 0.0) {
@@ -163,7 +165,7 @@ Recording recording_of(const CsvTable& table, const TableChannels& columns, cons
 
 std::vector<Recording> measured_recordings(const CsvTable& table, const Mapping& mapping,
                                            double rate_Hz, const std::string& name) {
-  const TableChannels columns = channels_of_table(table, mapping);
+  TableChannels columns = channels_of_table(table, mapping);
   std::vector<Recording> recordings;
   for (const NamedRows& run : records_of(table, mapping, name))
     recordings.push_back(recording_of(table, columns, run, mapping, rate_Hz));

@@ -94,10 +94,10 @@ Recording resample(const Recording& recording, double sample_rate_Hz) {
   };
   for (const Channel& channel : recording.channels()) {
     if (is_condition(channel.name)) continue;
-    Channel moved{.name = channel.name, .values = {}};
-    moved.values = channel.fresh.empty() ? smooth(channel, step, samples)
-                                         : held(channel, step, samples, moved.fresh);
-    result.add(std::move(moved));
+    std::vector<std::uint8_t> fresh;
+    auto values = channel.fresh.empty() ? smooth(channel, step, samples)
+                                        : held(channel, step, samples, fresh);
+    result.add({.name = channel.name, .values = std::move(values), .fresh = std::move(fresh)});
   }
   for (const std::string& name : recording.conditions())
     result.add_condition(name, recording.channel(name).values.front());

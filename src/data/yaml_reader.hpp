@@ -29,7 +29,7 @@ class YamlValue {
   [[nodiscard]] std::vector<std::pair<std::string, YamlValue>> entries() const;
   /// @throws Error for a key that is not listed, with the nearest one that is.
   void allow_only(std::initializer_list<std::string_view> keys) const;
-  [[nodiscard]] std::optional<YamlValue> find(std::string_view key) const;
+  [[nodiscard]] std::optional<YamlValue> find(std::string_view wanted) const;
   [[nodiscard]] YamlValue at(std::string_view key) const;  ///< @throws Error if missing
 
   [[nodiscard]] std::vector<YamlValue> items() const;  ///< of a list, or a scalar as a list of one
@@ -44,8 +44,8 @@ class YamlValue {
   [[noreturn]] void refuse(const std::string& expected, const std::string& advice = {}) const;
 
  private:
-  YamlValue(YAML::Node node, std::string file, std::string path)
-      : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)) {}
+  YamlValue(const YAML::Node& node, std::string file, std::string path)
+      : node_(node), file_(std::move(file)), path_(std::move(path)) {}
 
   YAML::Node node_;
   std::string file_;

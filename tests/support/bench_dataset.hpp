@@ -21,7 +21,8 @@ struct BenchOptions {
   std::uint64_t seed = 3;
 };
 
-/// Gear and joint angle and torque at 1 kHz: the joint swings slowly while the spring is wound to and fro at two speeds.
+/// Gear and joint angle and torque at 1 kHz: the joint swings slowly while the spring is wound to
+/// and fro at two speeds.
 inline Recording bench_recording(const std::string& name, const BenchOptions& options = {}) {
   Random random(options.seed);
   Channel gear{"gear_angle_rad", {}};
@@ -37,7 +38,8 @@ inline Recording bench_recording(const std::string& name, const BenchOptions& op
     joint.values.push_back(0.4 * std::sin(0.9 * t_s));
     gear.values.push_back(joint.values.back() + deflection(t_s));
     torque.values.push_back(options.stiffness_Nm_rad * deflection(then_s) + options.offset_Nm +
-                            options.friction_Nm * std::tanh(rate / 0.01) + options.noise_Nm * random.normal());
+                            options.friction_Nm * std::tanh(rate / 0.01) +
+                            options.noise_Nm * random.normal());
   }
   Recording recording(name, 1000.0);
   recording.add(std::move(gear));

@@ -33,7 +33,8 @@ Verdict verdict_of(const std::vector<Finding>& findings, const std::string& chec
 }
 
 const Finding& first_of(const std::vector<Finding>& findings, const std::string& check) {
-  return *std::ranges::find_if(findings, [&](const Finding& finding) { return finding.check == check; });
+  return *std::ranges::find_if(findings,
+                               [&](const Finding& finding) { return finding.check == check; });
 }
 
 /// The good bench with one record changed.
@@ -67,22 +68,28 @@ TEST(Check, FailsOnAMissingInputAndWarnsOfAMissingTarget) {
   const auto spoil = [](Channel& channel) {
     std::fill_n(channel.values.begin() + 100, 20, std::numeric_limits<double>::quiet_NaN());
   };
-  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", spoil))), "missing values"), Verdict::warn);
-  EXPECT_EQ(verdict_of(findings_of(with_record(changed("gear_angle_rad", spoil))), "missing values"), Verdict::fail);
+  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", spoil))), "missing values"),
+            Verdict::warn);
+  EXPECT_EQ(
+      verdict_of(findings_of(with_record(changed("gear_angle_rad", spoil))), "missing values"),
+      Verdict::fail);
 }
 
 TEST(Check, FailsOnADeadChannel) {
   const auto dead = [](Channel& channel) { std::ranges::fill(channel.values, 1.5); };
   const auto findings = findings_of(with_record(changed("torque_Nm", dead)));
   EXPECT_EQ(verdict_of(findings, "constant channels"), Verdict::fail);
-  EXPECT_NE(first_of(findings, "constant channels").message.find("torque_Nm never changes from 1.5"), std::string::npos);
+  EXPECT_NE(
+      first_of(findings, "constant channels").message.find("torque_Nm never changes from 1.5"),
+      std::string::npos);
 }
 
 TEST(Check, WarnsOfASensorAtItsLimit) {
   const auto clip = [](Channel& channel) {
     for (double& value : channel.values) value = std::clamp(value, -8.0, 8.0);
   };
-  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", clip))), "saturation"), Verdict::warn);
+  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", clip))), "saturation"),
+            Verdict::warn);
 }
 
 TEST(Check, WarnsOfAJump) {
@@ -108,7 +115,8 @@ TEST(Check, FailsOnAWrongSign) {
   const auto flip = [](Channel& channel) {
     for (double& value : channel.values) value = -value;
   };
-  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", flip))), "sign"), Verdict::fail);
+  EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", flip))), "sign"),
+            Verdict::fail);
 }
 
 TEST(Check, WarnsWhenARecordHasAnotherZero) {
@@ -143,7 +151,8 @@ TEST(Check, FailsOnATargetThatWasComputedFromAnInput) {
   recording.add(std::move(current));
   Dataset dataset;
   add_record(dataset, std::move(recording), Role::train);
-  const auto findings = check_dataset(dataset, resolve_inputs(dataset, {"gear_angle_rad", "motor_current_A"}));
+  const auto findings =
+      check_dataset(dataset, resolve_inputs(dataset, {"gear_angle_rad", "motor_current_A"}));
   EXPECT_EQ(verdict_of(findings, "leak"), Verdict::fail);
 }
 

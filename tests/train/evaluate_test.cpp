@@ -25,7 +25,8 @@ TEST(Evaluate, FindsTheNoiseThatARightModelCannotExplain) {
   EXPECT_EQ(score.recordings.front().recording, "held out");
   EXPECT_LT(score.together.metrics.rmse, 0.4);
   EXPECT_GT(score.together.metrics.rmse, 0.05);
-  EXPECT_EQ(score.together.metrics.samples + score.together.initialised_samples, dataset.records.back().recording.size());
+  EXPECT_EQ(score.together.metrics.samples + score.together.initialised_samples,
+            dataset.records.back().recording.size());
 }
 
 TEST(Evaluate, ScoresOnlyFreshSamples) {
@@ -42,8 +43,9 @@ TEST(Evaluate, ScoresOnlyFreshSamples) {
   }
   dataset.records.pop_back();
   test::add_record(dataset, std::move(held), Role::test);
-  EXPECT_NEAR(static_cast<double>(evaluate(estimator, dataset, Role::test).together.metrics.samples),
-              static_cast<double>(all) / 8.0, 1.0);
+  EXPECT_NEAR(
+      static_cast<double>(evaluate(estimator, dataset, Role::test).together.metrics.samples),
+      static_cast<double>(all) / 8.0, 1.0);
 }
 
 TEST(Evaluate, LeavesTheEmbargoOut) {
@@ -62,7 +64,8 @@ TEST(Evaluate, SaysWhereAnInputIsMissing) {
   const Recording good = test::bench_recording("holes");
   Recording holes("holes", 1000.0);
   for (Channel channel : good.channels()) {
-    if (channel.name == "gear_angle_rad") channel.values[123] = std::numeric_limits<double>::quiet_NaN();
+    if (channel.name == "gear_angle_rad")
+      channel.values[123] = std::numeric_limits<double>::quiet_NaN();
     holes.add(std::move(channel));
   }
   const std::string message = test::error_message([&] { (void)predict(estimator, holes); });
@@ -73,7 +76,9 @@ TEST(Evaluate, SaysWhereAnInputIsMissing) {
 TEST(TrainModel, IsTheSameForTheSameSeedAndKnowsWhereItCameFrom) {
   const Dataset dataset = test::bench_dataset();
   for (const char* family : {"linear", "linear_coulomb", "polynomial", "dgmm"})
-    EXPECT_EQ(model_bytes(trained(dataset, family).file), model_bytes(trained(dataset, family).file)) << family;
+    EXPECT_EQ(model_bytes(trained(dataset, family).file),
+              model_bytes(trained(dataset, family).file))
+        << family;
   const TrainedModel model = trained(dataset, "dgmm");
   EXPECT_EQ(model.file.card.fitted_as, "dgmm");
   EXPECT_EQ(model.file.card.training_files.size(), 2U);
@@ -83,7 +88,9 @@ TEST(TrainModel, IsTheSameForTheSameSeedAndKnowsWhereItCameFrom) {
 TEST(TrainModel, StopsWhenAskedTo) {
   const Dataset dataset = test::bench_dataset();
   const ModelChoice choice{.family = "dgmm", .features = resolve_inputs(dataset, {})};
-  EXPECT_THROW((void)train_model(dataset, choice, 1, [](double, std::string_view) { return false; }), Cancelled);
+  EXPECT_THROW(
+      (void)train_model(dataset, choice, 1, [](double, std::string_view) { return false; }),
+      Cancelled);
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 
 #include "support/example_data.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/train/model_run.hpp"
 #include "torsio/train/fit_linear.hpp"
+#include "torsio/train/model_run.hpp"
 
 namespace torsio {
 namespace {

@@ -26,7 +26,8 @@ TEST(ResolveInputs, TakesARecordedDeflectionAsItIs) {
   test::add_record(dataset, std::move(recording), Role::train);
   const FeatureSpec spec = resolve_inputs(dataset, {});
   ASSERT_EQ(spec.inputs.size(), 2U);  // no joint speed without a joint angle
-  EXPECT_EQ(FeaturePipeline(spec, 1000.0).raw_inputs(), std::vector<std::string>{"spring_deflection_rad"});
+  EXPECT_EQ(FeaturePipeline(spec, 1000.0).raw_inputs(),
+            std::vector<std::string>{"spring_deflection_rad"});
 }
 
 TEST(ResolveInputs, PrefersTheManifestsFirstInputSet) {
@@ -39,7 +40,8 @@ TEST(ResolveInputs, ListsTheChannelsWhenOneIsMissing) {
   const std::string message =
       test::error_message([] { (void)resolve_inputs(bench_dataset(), {"motor_current_A"}); });
   EXPECT_NE(message.find("motor_current_A"), std::string::npos) << message;
-  EXPECT_NE(message.find("gear_angle_rad, joint_angle_rad, torque_Nm"), std::string::npos) << message;
+  EXPECT_NE(message.find("gear_angle_rad, joint_angle_rad, torque_Nm"), std::string::npos)
+      << message;
 }
 
 TEST(ResolveInputs, RefusesTheTargetAsAnInput) {

@@ -1,0 +1,104 @@
+#include "torsio/report/results.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "support/bench_dataset.hpp"
+#include "torsio/report/comparison.hpp"
+
+namespace torsio {
+namespace {
+
+Comparison small_comparison(const std::string& models = "linear,linear_coulomb") {
+  const Dataset dataset = test::bench_dataset();
+  return compare(dataset, model_choices(dataset, models, {}), 1, false);
+}
+
+TEST(ResultsJson, HasTheFieldsOfTheContract) {
+  const auto json = nlohmann::json::parse(results_json(small_comparison().results));
+  EXPECT_EQ(json.at("target"), "torque_Nm");
+  EXPECT_EQ(json.at("unit"), "Nm");
+  EXPECT_EQ(json.at("inputs").size(), 3U);
+  // Two models, each on train (two records and together) and test (one record and together).
+  ASSERT_EQ(json.at("results").size(), 2U * 5U);
+  for (const auto& row : json.at("results"))
+    for (const char* field :
+         {"family", "split", "recording", "mode", "rmse", "mad", "std_abs", "max_abs",
+          "fit_percent", "samples", "initialised_samples", "step_ns_p50", "step_ns_p999",
+          "fit_seconds", "parameter_count", "status", "reason"})
+      EXPECT_TRUE(row.contains(field)) << field;
+}
+
+TEST(ResultsJson, WritesWhatIsNotANumberAsNull) {
+  Results results{.target = "torque_Nm", .unit = "Nm"};
+  results.rows.push_back({.family = "linear", .status = "failed", .reason = "too few samples"});
+  const auto json = nlohmann::json::parse(results_json(results));
+  EXPECT_TRUE(json.at("results").at(0).at("rmse").is_null());
+  EXPECT_EQ(json.at("results").at(0).at("reason"), "too few samples");
+}
+
+TEST(Compare, KeepsTheModelOfTheLowestTestError) {
+  const Comparison comparison = small_comparison();
+  ASSERT_TRUE(comparison.best);
+  EXPECT_EQ(comparison.best->file.card.fitted_as, "linear_coulomb");
+  EXPECT_FALSE(comparison.best->file.card.metrics.empty());
+}
+
+TEST(Compare, TurnsAFitThatFailsIntoARowThatSaysWhy) {
+  const Dataset dataset = test::bench_dataset();
+  const auto choices =
+      model_choices(dataset, "linear,linear_coulomb", {"gear_angle_rad - joint_angle_rad"});
+  const Comparison comparison = compare(dataset, choices, 1, false);
+  const auto& failed = comparison.results.rows.back();
+  EXPECT_EQ(failed.family, "linear_coulomb");
+  EXPECT_EQ(failed.status, "failed");
+  EXPECT_NE(failed.reason.find("rate"), std::string::npos) << failed.reason;
+  EXPECT_NE(ranked_table(comparison.results, Role::test).find("not in the ranking"),
+            std::string::npos);
+}
+
+TEST(Compare, RefusesALeakUnlessItIsAllowedAndMarksItThen) {
+  Dataset dataset = test::bench_dataset();
+  dataset.target_computed_from = {"gear_angle_rad"};
+  const auto choices = model_choices(dataset, "linear", {});
+  EXPECT_THROW((void)compare(dataset, choices, 1, false), UsageError);
+  const Comparison comparison = compare(dataset, choices, 1, true);
+  EXPECT_TRUE(comparison.results.rows.front().leak);
+  EXPECT_NE(results_json(comparison.results).find("\"leak\": true"), std::string::npos);
+}
+
+TEST(Compare, NeedsTestRecords) {
+  Dataset dataset = test::bench_dataset();
+  dataset.records.pop_back();
+  EXPECT_THROW((void)compare(dataset, model_choices(dataset, "linear", {}), 1, false), UsageError);
+}
+
+TEST(ModelChoices, ReadFamiliesWithSettings) {
+  const Dataset dataset = test::bench_dataset();
+  const auto choices = model_choices(dataset, "linear,polynomial:degree=3:branch=false", {});
+  ASSERT_EQ(choices.size(), 2U);
+  EXPECT_EQ(choices[1].variant(), "branch=false,degree=3");
+  EXPECT_THROW((void)model_choices(dataset, "linaer", {}), UsageError);
+  EXPECT_THROW((void)model_choices(dataset, "linear:colour=red", {}), UsageError);
+  EXPECT_THROW((void)model_choices(dataset, "polynomial:degree", {}), UsageError);
+}
+
+TEST(ModelChoices, OfAllScheduleOverAConditionThatChangesInTraining) {
+  Dataset dataset = test::bench_dataset();
+  double support_m = 0.0;
+  for (DatasetRecord& record : dataset.records)
+    record.recording.add_condition("support_m", support_m += 0.01);
+  const auto choices = model_choices(dataset, "all", {"spring_deflection_rad", "support_m"});
+  const auto scheduled = std::ranges::count_if(
+      choices, [](const ModelChoice& choice) { return choice.options.contains("schedule"); });
+  EXPECT_EQ(scheduled, 3);
+}
+
+TEST(RankedTable, PutsTheBestFirst) {
+  const std::string table = ranked_table(small_comparison().results, Role::test);
+  EXPECT_LT(table.find("linear_coulomb"), table.find("linear "));
+}
+
+}  // namespace
+}  // namespace torsio
