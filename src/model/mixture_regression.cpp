@@ -30,7 +30,7 @@ constexpr double kNegligible = 23.0;
 // Blocks that are evaluated in double however few the mixture has.
 constexpr std::size_t kAlwaysExact = 32;
 
-constexpr double kRounding = std::numeric_limits<float>::epsilon();
+constexpr double kRounding = static_cast<double>(std::numeric_limits<float>::epsilon());
 
 // What rounding to float takes from a number.
 float lost_to_float(double value) {
