@@ -19,8 +19,8 @@ struct CacheLineAllocator {
   [[nodiscard]] T* allocate(std::size_t count) {
     return static_cast<T*>(::operator new(count * sizeof(T), kAlignment));
   }
-  void deallocate(T* memory, std::size_t count) noexcept {
-    ::operator delete(memory, count * sizeof(T), kAlignment);
+  void deallocate(T* memory, std::size_t /*count*/) noexcept {
+    ::operator delete(memory, kAlignment);
   }
   bool operator==(const CacheLineAllocator&) const = default;
 };
