@@ -189,7 +189,7 @@ Conditional MixtureRegression::physical(const Conditional& standardised) const n
 // whitened vector w is no longer than `distance`, may be off by `error`: input, mean and whitening
 // are rounded, and so is each operation on w.
 double MixtureRegression::threshold(double largest) const noexcept {
-  const double count = static_cast<double>(inputs_);
+  const auto count = static_cast<double>(inputs_);
   const double cut = kNegligible + std::log(static_cast<double>(components_));
   double reach = largest_mean_;
   for (const double z : standardised_) reach = std::max(reach, std::abs(z) + largest_mean_);

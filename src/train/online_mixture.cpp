@@ -73,7 +73,7 @@ Standardisation robust_standardisation(const Matrix& samples, std::span<const do
     std::sort(column.begin(), column.end());
     const auto tail = static_cast<std::size_t>(kTail * static_cast<double>(samples.rows));
     const std::span<const double> core(column.data() + tail, samples.rows - 2 * tail);
-    const double count = static_cast<double>(core.size());
+    const auto count = static_cast<double>(core.size());
     const double mean = std::accumulate(core.begin(), core.end(), 0.0) / count;
     double square = 0.0;
     for (const double value : core) square += (value - mean) * (value - mean);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "model/random_mixture.hpp"
+#include "support/each_instruction_set.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -143,6 +144,48 @@ INSTANTIATE_TEST_SUITE_P(
       std::replace(name.begin(), name.end(), ' ', '_');
       return name;
     });
+
+TEST(MixtureRegression, AgreesWithTheExactPathOnEveryInstructionSet) {
+  int sets = 0;
+  test::on_each_instruction_set([&](const char* name) {
+    SCOPED_TRACE(name);
+    ++sets;
+    for (const double spread : {0.1, 1.0}) {  // finished in double and in float32
+      const GaussianMixture mixture = random_mixture(
+          {.components = 1000, .narrowest = spread, .widest = spread, .background = true}, 8);
+      MixtureRegression regression(mixture, 0);
+      std::mt19937_64 random(9);
+      for (int k = 0; k < 50; ++k) {
+        const std::vector<double> inputs = random_inputs(mixture, 0, random);
+        const Conditional exact = regression.query_exact(inputs);
+        const Conditional fast = regression.query(inputs);
+        ASSERT_NEAR(fast.mean, exact.mean, 1e-4 * mixture.scale[0]);
+        ASSERT_NEAR(std::sqrt(fast.variance), std::sqrt(exact.variance), 1e-4 * mixture.scale[0]);
+        ASSERT_NEAR(fast.log_density, exact.log_density, 1e-4);
+      }
+    }
+  });
+  EXPECT_GE(sets, 2);
+}
+
+TEST(MixtureRegression, DoesNotDependOnTheOrderOfComponents) {
+  const GaussianMixture mixture = random_mixture({.components = 60}, 15);
+  GaussianMixture turned = mixture;
+  for (std::size_t i = 0; i < mixture.size(); ++i) {
+    const std::size_t from = mixture.size() - 1 - i;
+    turned.weights[i] = mixture.weights[from];
+    std::ranges::copy(mixture.means.row(from), turned.means.row(i).begin());
+    std::ranges::copy(mixture.covariances.row(from), turned.covariances.row(i).begin());
+  }
+  MixtureRegression one(mixture, 0);
+  MixtureRegression other(turned, 0);
+  std::mt19937_64 random(16);
+  for (int k = 0; k < 50; ++k) {
+    const std::vector<double> inputs = random_inputs(mixture, 0, random);
+    const double mean = one.query(inputs).mean;
+    EXPECT_NEAR(other.query(inputs).mean, mean, 1e-9 * std::max(1.0, std::abs(mean)));
+  }
+}
 
 TEST(MixtureRegression, FindsANarrowComponentThatFloatCannotPlace) {
   // Two components a hundred times closer to each other than float32 can tell at their position.

@@ -62,6 +62,7 @@ TEST(FitDgmm, LearnsFrictionThatALineCannot) {
 TEST(FitDgmm, RefinementFitsBetterThanTheOnlinePassAlone) {
   DgmmOptions options;
   options.online.components = 30;
+  options.em_iterations = 0;
   const double online = rmse(Dgmm(fit_dgmm(sweeps(4000, 1), options).parameters), sweeps(1000, 2));
   options.em_iterations = 10;
   EXPECT_LT(rmse(Dgmm(fit_dgmm(sweeps(4000, 1), options).parameters), sweeps(1000, 2)), online);

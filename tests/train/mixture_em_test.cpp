@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "model/random_mixture.hpp"
+#include "support/each_instruction_set.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -104,6 +105,20 @@ TEST_P(EmDimension, AnIterationEqualsTheEquations) {
     EXPECT_NEAR(mixture.covariances.values[i], expected.covariances.values[i], 1e-9);
 }
 INSTANTIATE_TEST_SUITE_P(MixtureEm, EmDimension, ::testing::Values(1, 2, 3, 4, 5, 7));
+
+TEST(MixtureEm, AgreesOnEveryInstructionSet) {
+  const GaussianMixture start = test::random_mixture({.components = 10}, 4);
+  const Matrix samples = draw(start, 3000, 5);
+  const MixtureEm em(samples, {start.centre, start.scale}, kPrior);
+  std::vector<double> likelihoods;
+  test::on_each_instruction_set([&](const char*) {
+    GaussianMixture mixture = start;
+    static_cast<void>(em.iterate(mixture));
+    likelihoods.push_back(em.iterate(mixture));
+  });
+  ASSERT_GE(likelihoods.size(), 2U);
+  for (const double likelihood : likelihoods) EXPECT_NEAR(likelihood, likelihoods.front(), 1e-10);
+}
 
 TEST(MixtureEm, ClimbsTheLikelihoodFromAPoorStart) {
   const GaussianMixture truth = test::random_mixture({.components = 5, .dimension = 2}, 12);

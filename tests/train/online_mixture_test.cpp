@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "support/each_instruction_set.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -134,6 +135,18 @@ TEST(OnlineMixture, GivesASampleToTheNearestOfManyComponents) {
     const GaussianMixture mixture = learner.mixture();
     EXPECT_EQ(mixture.weights[expected], 2.0 / 778.0);
   }
+}
+
+TEST(OnlineMixture, LearnsTheSameBitsOnEveryInstructionSet) {
+  const Matrix samples = random_samples(4000, 4, 31);
+  std::vector<GaussianMixture> learned;
+  test::on_each_instruction_set([&](const char*) {
+    OnlineMixture learner(plain(4), {.components = 200});
+    learn_all(learner, samples);
+    learned.push_back(learner.mixture());
+  });
+  ASSERT_GE(learned.size(), 2U);
+  for (const GaussianMixture& mixture : learned) EXPECT_EQ(mixture, learned.front());
 }
 
 TEST(OnlineMixture, ForgetsWithItsForgettingFactor) {

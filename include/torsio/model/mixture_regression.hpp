@@ -64,7 +64,7 @@ class MixtureRegression {
  private:
   void pack(const GaussianMixture& mixture, std::size_t output);
   void standardise(Features inputs) noexcept;
-  [[nodiscard]] bool float_is_enough(double log_weight) const noexcept;
+  [[nodiscard]] bool float_is_enough(double largest) const noexcept;
   [[nodiscard]] double threshold(double largest) const noexcept;
   [[nodiscard]] Conditional physical(const Conditional& standardised) const noexcept;
 

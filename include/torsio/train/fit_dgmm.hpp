@@ -12,7 +12,7 @@ namespace torsio {
 
 struct DgmmOptions {
   OnlineMixtureSettings online = {};
-  std::size_t em_iterations = 0;    ///< refinement after the online pass
+  std::size_t em_iterations = 10;   ///< refinement after the online pass; 0: none
   double clamp = 2.0;               ///< LinearClamp::width in RMSE of the linear model; 0: none
   double background_weight = 1e-3;  ///< of the one Gaussian over all data; 0: none
   std::size_t threads = 0;          ///< for the refinement only; 0: as many as the machine has
