@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "data/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"

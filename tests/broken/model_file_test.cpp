@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-#include "data/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/error_message.hpp"
 #include "support/example_model_file.hpp"
 #include "torsio/core/error.hpp"

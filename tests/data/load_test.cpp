@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "data/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/manifest.hpp"
 

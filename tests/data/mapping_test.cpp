@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "data/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "data/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/example_model_file.hpp"
 
 namespace torsio {

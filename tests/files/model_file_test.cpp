@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "data/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/error_message.hpp"
 #include "support/every_family.hpp"
 #include "support/example_model_file.hpp"

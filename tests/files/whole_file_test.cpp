@@ -8,7 +8,7 @@
 #include <csignal>
 #include <string>
 
-#include "data/temporary_folder.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/bench_dataset.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/report/comparison.hpp"
 
 namespace torsio {

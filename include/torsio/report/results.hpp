@@ -15,27 +15,27 @@ namespace torsio {
 /// split together.
 struct ResultRow {
   std::string family;
-  std::string variant;    ///< what tells it from another row of the same family:
-                          ///< "schedule=support_m"; may be empty
-  std::string input_set;  ///< name of the manifest's input set; may be empty
+  std::string variant = {};    ///< what tells it from another row of the same family:
+                               ///< "schedule=support_m"; may be empty
+  std::string input_set = {};  ///< name of the manifest's input set; may be empty
   Role split = Role::test;
-  std::optional<std::string> recording;  ///< empty: the whole split together
-  Score score;
+  std::optional<std::string> recording = {};  ///< empty: the whole split together
+  Score score = {};
   double fit_seconds = 0.0;
   std::size_t parameter_count = 0;
   std::string status = "ok";  ///< ok, failed, diverged
-  std::string reason;         ///< why it failed, or what to know about the row
+  std::string reason = {};    ///< why it failed, or what to know about the row
   bool leak = false;          ///< an input was computed from the target, or the target from it
 };
 
 struct Results {
   std::string target;
   std::string unit;
-  std::string label;                ///< what the split means
-  std::vector<std::string> inputs;  ///< of the first input set
-  std::vector<std::pair<std::string, std::vector<std::string>>> input_sets;
+  std::string label = {};                ///< what the split means
+  std::vector<std::string> inputs = {};  ///< of the first input set
+  std::vector<std::pair<std::string, std::vector<std::string>>> input_sets = {};
   bool non_causal_zero = false;
-  std::vector<ResultRow> rows;
+  std::vector<ResultRow> rows = {};
 };
 
 /// The document that DESIGN section 5 fixes for `compare`, `evaluate` and `demo`; ends with a line

@@ -31,7 +31,7 @@ class TemporaryFolder {
 
   [[nodiscard]] std::string path(const std::string& name) const { return (path_ / name).string(); }
   /// Writes a file and tells its path.
-  [[nodiscard]] std::string file(const std::string& name, std::string_view text) const {
+  std::string file(const std::string& name, std::string_view text) const {
     std::ofstream(path_ / name, std::ios::binary) << text;
     return path(name);
   }

@@ -1,0 +1,122 @@
+// Bad calls and bad input through the program: a clear message, the right exit code, nothing
+// half-written.
+#include "program/program.hpp"
+
+namespace torsio::test {
+namespace {
+
+constexpr int kWorkFailed = 1;
+constexpr int kCallWasWrong = 2;
+
+class BrokenCalls : public Program {
+ protected:
+  void record() {
+    ASSERT_EQ(torsio("simulate dfki-50 sweep --duration 40s -o a.csv").exit_code, 0);
+  }
+
+  void expect_error(const Outcome& outcome, int exit_code, const std::string& text) {
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
+  }
+};
+
+TEST_F(BrokenCalls, OfTheCommandLineExitWithTwo) {
+  EXPECT_EQ(torsio("").exit_code, kCallWasWrong);
+  EXPECT_EQ(torsio("frobnicate").exit_code, kCallWasWrong);
+  EXPECT_EQ(torsio("demo --colour red").exit_code, kCallWasWrong);
+  EXPECT_EQ(torsio("simulate").exit_code, kCallWasWrong);
+  expect_error(torsio("simulate dfki-51 sweep -o x.csv"), kCallWasWrong, "dfki-50");
+  expect_error(torsio("simulate dfki-50 swoop -o x.csv"), kCallWasWrong, "sweep");
+  expect_error(torsio("simulate dfki-50 sweep --duration 3Nm -o x.csv"), kCallWasWrong,
+               "--duration");
+  EXPECT_EQ(torsio("check").exit_code, kCallWasWrong);
+}
+
+TEST_F(BrokenCalls, NameTheFileThatIsMissing) {
+  for (const char* call :
+       {"check nowhere.csv", "fit nowhere.csv --model linear -o m.safetensors",
+        "compare nowhere.csv --test nowhere.csv", "evaluate nowhere.safetensors a.csv"}) {
+    const Outcome outcome = torsio(call);
+    EXPECT_NE(outcome.exit_code, 0) << call;
+    EXPECT_NE(outcome.err.find("nowhere"), std::string::npos) << outcome.err;
+  }
+}
+
+TEST_F(BrokenCalls, LeaveTheOutputUntouchedWhenTheFitFails) {
+  record();
+  folder_.file("m.safetensors", "precious");
+  expect_error(torsio("fit a.csv --model linaer -o m.safetensors"), kCallWasWrong, "linear");
+  expect_error(torsio("fit a.csv --model dgmm --set components=0 -o m.safetensors"), kCallWasWrong,
+               "components");
+  expect_error(torsio("fit a.csv --model dgmm --set components -o m.safetensors"), kCallWasWrong,
+               "option=value");
+  expect_error(torsio("fit a.csv --model linear --inputs nothing_rad -o m.safetensors"),
+               kCallWasWrong, "nothing_rad");
+  expect_error(torsio("fit a.csv --model linear --target force_N -o m.safetensors"), kWorkFailed,
+               "force_N");
+  EXPECT_EQ(contents("m.safetensors"), "precious");
+}
+
+TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
+  record();
+  folder_.file("m.safetensors", "precious");
+  const Outcome outcome = shell(
+      "timeout --signal=INT --preserve-status 1 {torsio} fit a.csv --model dgmm --set "
+      "components=2000 "
+      "--set novelty_distance=0.01 --set em_iterations=10000 -o m.safetensors");
+  EXPECT_EQ(outcome.exit_code, kWorkFailed) << outcome.err;
+  EXPECT_NE(outcome.err.find("stopped on request"), std::string::npos) << outcome.err;
+  EXPECT_EQ(contents("m.safetensors"), "precious");
+}
+
+TEST_F(BrokenCalls, OnAFullDiskSaySoAndLeaveNothing) {
+  expect_error(torsio("simulate dfki-50 sweep --duration 5s -o - > /dev/full"), kWorkFailed, "");
+  record();
+  expect_error(torsio("fit a.csv --model linear -o /dev/full"), kWorkFailed, "/dev/full");
+  expect_error(torsio("fit a.csv --model linear -o no/such/folder/m.safetensors"), kWorkFailed,
+               "no/such/folder");
+}
+
+TEST_F(BrokenCalls, OnAnEndlessPipeStopEarly) {
+  const Outcome outcome = shell("head -c 10000000000 /dev/zero | timeout 20 {torsio} check -");
+  EXPECT_NE(outcome.exit_code, 0);
+  EXPECT_NE(outcome.exit_code, 124) << "it read on";
+  EXPECT_NE(outcome.err.find("standard input"), std::string::npos) << outcome.err << outcome.out;
+}
+
+TEST_F(BrokenCalls, PrintTheMappingLineThatMendsAClock) {
+  std::string text = "t_s,gear_angle_rad,joint_angle_rad,torque_Nm\n";
+  for (int i = 0; i < 500; ++i)
+    text += std::to_string(i / 7 * 0.0156) + ",0.0" + std::to_string(i % 10) + ",0,1\n";
+  folder_.file("coarse.csv", text);
+  const Outcome outcome = torsio("check coarse.csv");
+  EXPECT_EQ(outcome.exit_code, kWorkFailed);
+  EXPECT_NE(outcome.out.find("FAIL  clock"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("clock: {rebuild: true}"), std::string::npos) << outcome.out;
+}
+
+TEST_F(BrokenCalls, RefuseAModelWhoseInputsTheRecordingLacks) {
+  record();
+  ASSERT_EQ(torsio("fit a.csv --model linear -o m.safetensors").exit_code, 0);
+  folder_.file("b.csv", "t_s,torque_Nm\n0,1\n0.001,2\n0.002,3\n");
+  const Outcome outcome = torsio("evaluate m.safetensors b.csv");
+  EXPECT_EQ(outcome.exit_code, kWorkFailed);
+  EXPECT_NE(outcome.err.find("gear_angle_rad"), std::string::npos) << outcome.err;
+}
+
+TEST_F(BrokenCalls, RefuseALeakUnlessItIsAllowed) {
+  std::string text = "t_s,angle_rad,motor_current_A,torque_Nm\n";
+  for (int i = 0; i < 400; ++i) {
+    const int torque = (i * 37) % 101;
+    text += std::to_string(i * 0.001) + "," + std::to_string((i * 13) % 17) + "," +
+            std::to_string(torque) + "," + std::to_string(2 * torque) + "\n";
+  }
+  folder_.file("leaky.csv", text);
+  const std::string call =
+      "fit leaky.csv --model linear --inputs angle_rad,motor_current_A -o m.safetensors";
+  expect_error(torsio(call), kCallWasWrong, "motor_current_A");
+  EXPECT_EQ(torsio(call + " --allow-leak").exit_code, 0);
+}
+
+}  // namespace
+}  // namespace torsio::test

@@ -1,0 +1,107 @@
+// The main job as a user types it: simulate, check, fit, evaluate, compare, demo.
+#include <nlohmann/json.hpp>
+
+#include "program/program.hpp"
+
+namespace torsio::test {
+namespace {
+
+class MainJob : public Program {
+ protected:
+  /// Two short sweeps with a reversal each.
+  void record() {
+    ASSERT_EQ(
+        torsio("simulate dfki-50 sweep --duration 40s --lever 0.24m --seed 1 -o a.csv").exit_code,
+        0);
+    ASSERT_EQ(
+        torsio("simulate dfki-50 sweep --duration 40s --lever 0.17m --seed 2 -o b.csv").exit_code,
+        0);
+  }
+};
+
+TEST_F(MainJob, GoesFromARecordingToADeployedModel) {
+  record();
+  const Outcome check = torsio("check a.csv --test b.csv --json check.json");
+  EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
+  EXPECT_EQ(nlohmann::json::parse(contents("check.json")).at("findings").at(0).at("verdict"),
+            "PASS");
+
+  const Outcome fit = torsio("fit a.csv --model linear_coulomb -o joint.safetensors");
+  EXPECT_EQ(fit.exit_code, 0) << fit.err;
+  const Outcome evaluate =
+      torsio("evaluate joint.safetensors b.csv --predictions out.csv --json -");
+  EXPECT_EQ(evaluate.exit_code, 0) << evaluate.err;
+  const auto json = nlohmann::json::parse(evaluate.out);
+  EXPECT_EQ(json.at("results").at(0).at("split"), "test");
+  EXPECT_LT(json.at("results").at(0).at("rmse"), 2.0);
+  EXPECT_EQ(contents("out.csv").substr(0, contents("out.csv").find('\n')),
+            "t_s,torque_Nm,estimated_torque_Nm,torque_std_dev_Nm,fault_1,torque_fresh_1");
+}
+
+TEST_F(MainJob, RanksEveryFamilyOnHeldOutRecords) {
+  record();
+  const Outcome compare =
+      torsio("compare a.csv --test b.csv -o best.safetensors --json results.json");
+  ASSERT_EQ(compare.exit_code, 0) << compare.err;
+  for (const char* family : {"linear ", "linear_coulomb", "polynomial", "dgmm ", "dgmm_paper"})
+    EXPECT_NE(compare.out.find(family), std::string::npos) << compare.out;
+  EXPECT_EQ(torsio("evaluate best.safetensors b.csv").exit_code, 0);
+}
+
+TEST_F(MainJob, DemoWritesComparesDocument) {
+  record();
+  const Outcome compare = torsio("compare a.csv --test b.csv --models linear --json -");
+  const Outcome demo = torsio("demo a.csv --test b.csv --models linear --json -");
+  ASSERT_EQ(demo.exit_code, 0) << demo.err;
+  auto theirs = nlohmann::json::parse(compare.out);
+  auto ours = nlohmann::json::parse(demo.out);
+  for (auto* document : {&theirs, &ours})
+    for (auto& row : (*document)["results"])
+      for (const char* timing : {"step_ns_p50", "step_ns_p999", "fit_seconds"}) row.erase(timing);
+  EXPECT_EQ(ours, theirs);
+}
+
+TEST_F(MainJob, DemoShowsTableLoopAndDeployment) {
+  record();
+  const Outcome demo = torsio("demo a.csv --test b.csv");
+  ASSERT_EQ(demo.exit_code, 0) << demo.err;
+  for (const char* text : {"best first", "torque_Nm over spring_deflection_rad", "loaded back"})
+    EXPECT_NE(demo.out.find(text), std::string::npos) << demo.out;
+  EXPECT_FALSE(contents("torsio-demo.safetensors").empty());
+}
+
+TEST_F(MainJob, IsReproducible) {
+  record();
+  ASSERT_EQ(
+      torsio("simulate dfki-50 sweep --duration 40s --lever 0.24m --seed 1 -o again.csv").exit_code,
+      0);
+  EXPECT_EQ(contents("again.csv"), contents("a.csv"));
+  ASSERT_EQ(torsio("fit a.csv --model dgmm -o one.safetensors").exit_code, 0);
+  ASSERT_EQ(torsio("fit a.csv --model dgmm -o two.safetensors").exit_code, 0);
+  EXPECT_EQ(contents("one.safetensors"), contents("two.safetensors"));
+}
+
+TEST_F(MainJob, RunsTheExamples) {
+  record();
+  ASSERT_EQ(torsio("fit a.csv --model dgmm -o joint.safetensors").exit_code, 0);
+  const Outcome estimate =
+      shell(std::string(TORSIO_EXAMPLES) + "/example_01_estimate_torque joint.safetensors");
+  EXPECT_EQ(estimate.exit_code, 0) << estimate.err;
+  EXPECT_NE(estimate.out.find("Nm +-"), std::string::npos) << estimate.out;
+  const Outcome own = shell(std::string(TORSIO_EXAMPLES) + "/example_02_own_model");
+  EXPECT_EQ(own.exit_code, 0) << own.err;
+  EXPECT_NE(own.out.find("outside_training_range"), std::string::npos) << own.out;
+  EXPECT_NE(own.out.find("input_not_finite"), std::string::npos) << own.out;
+}
+
+TEST_F(MainJob, ListsAndDescribes) {
+  EXPECT_NE(torsio("simulate --list").out.find("dfki-300"), std::string::npos);
+  EXPECT_NE(torsio("simulate --describe dfki-50").out.find("gear_ratio"), std::string::npos);
+  EXPECT_NE(torsio("fit --list").out.find("dgmm"), std::string::npos);
+  EXPECT_EQ(torsio("--help").exit_code, 0);
+  for (const char* verb : {"demo", "simulate", "check", "fit", "evaluate", "compare"})
+    EXPECT_NE(torsio(std::string(verb) + " --help").out.find("Example"), std::string::npos) << verb;
+}
+
+}  // namespace
+}  // namespace torsio::test
