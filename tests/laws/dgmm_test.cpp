@@ -4,4 +4,4 @@ namespace torsio::test {
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Dgmm, ModelLaws, Dgmm);
 
-}  // namespace torsio
+}  // namespace torsio::test
