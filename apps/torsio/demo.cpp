@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "data_flags.hpp"
 #include "output.hpp"
@@ -12,6 +11,7 @@
 #include "torsio/report/comparison.hpp"
 #include "torsio/report/terminal_plot.hpp"
 #include "torsio/sim/experiment.hpp"
+#include "torsio/train/inputs.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -54,20 +54,12 @@ std::string loop_plot(const torsio::Dataset& dataset, const torsio::ModelFile& m
     });
   };
   const torsio::Recording& recording = std::ranges::find_if(dataset.records, is_test)->recording;
-  torsio::FeatureSpec first = model.settings.features;
-  first.inputs.resize(1);
-  torsio::FeaturePipeline pipeline(first, recording.sample_rate_Hz());
+  const torsio::FeatureSpec& features = model.settings.features;
+  const std::vector<double> x = torsio::first_feature(recording, features);
   const std::vector<double>& target = recording.channel(dataset.target).values;
-  std::vector<double> x;
-  std::vector<double> raw(pipeline.raw_inputs().size());
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    for (std::size_t j = 0; j < raw.size(); ++j)
-      raw[j] = recording.channel(pipeline.raw_inputs()[j]).values[i];
-    x.push_back(pipeline.step(raw).front());
-  }
-  return fmt::format("\n{} over {}, as measured in {}\n", dataset.target, first.inputs.front(),
+  return fmt::format("\n{} over {}, as measured in {}\n", dataset.target, features.inputs.front(),
                      recording.name()) +
-         torsio::terminal_plot({{"", x, target}}, {first.inputs.front(), dataset.target});
+         torsio::terminal_plot({{"", x, target}}, {features.inputs.front(), dataset.target});
 }
 
 /// Saves the best model, loads it back and streams the test records through it, as a robot would.
