@@ -10,7 +10,7 @@
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/comparison.hpp"
 #include "torsio/report/terminal_plot.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/bench_dataset.hpp"
 #include "torsio/train/inputs.hpp"
 #include "verbs.hpp"
 
@@ -25,26 +25,6 @@ struct DemoFlags {
   std::uint64_t seed = kDefaultSeed;
   JsonOutput json;
 };
-
-/// Three sweeps to learn from and one with another lever and inclination to be judged on.
-torsio::Dataset simulated_bench(const DemoFlags& flags, const torsio::Progress& progress) {
-  const torsio::SweepProtocol protocol = torsio::sweep_protocol(flags.actuator);
-  torsio::Dataset dataset;
-  const auto record = [&](double lever_m, double inclination_rad, torsio::Role role) {
-    const std::uint64_t seed = flags.seed + dataset.records.size();
-    torsio::Recording sweep = torsio::simulate({.actuator = flags.actuator,
-                                                .experiment = "sweep",
-                                                .seed = seed,
-                                                .lever_m = lever_m,
-                                                .inclination_rad = inclination_rad},
-                                               progress);
-    const std::size_t samples = sweep.size();
-    dataset.records.push_back({std::move(sweep), torsio::whole_record(samples, role)});
-  };
-  for (const double lever_m : protocol.train_lever_m) record(lever_m, 0.0, torsio::Role::train);
-  record(protocol.test_lever_m, protocol.test_inclination_rad, torsio::Role::test);
-  return dataset;
-}
 
 /// The first test record's loop: what was measured against the first input.
 std::string loop_plot(const torsio::Dataset& dataset, const torsio::ModelFile& model) {
@@ -82,7 +62,8 @@ void run(const DemoFlags& flags) {
   const bool is_simulated = flags.data.recordings.empty();
   if (is_simulated) remark(fmt::format("simulating four sweeps of {} ...", flags.actuator));
   const torsio::Dataset dataset =
-      is_simulated ? simulated_bench(flags, bar.listener()) : flags.data.load({}, flags.test);
+      is_simulated ? torsio::sweep_dataset(flags.actuator, flags.seed, bar.listener())
+                   : flags.data.load({}, flags.test);
   const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   const torsio::Comparison comparison =
       torsio::compare(dataset, choices, flags.seed, false, bar.listener());

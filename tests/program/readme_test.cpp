@@ -43,13 +43,15 @@ TEST(Readme, LinksOnlyToWhatExists) {
   const std::string text = contents(root / "README.md");
   const std::regex link(R"(\]\(([^)#:]+)\))");
   std::size_t links = 0;
-  for (std::sregex_iterator match(text.begin(), text.end(), link), end; match != end; ++match, ++links)
+  for (std::sregex_iterator match(text.begin(), text.end(), link), end; match != end;
+       ++match, ++links)
     EXPECT_TRUE(fs::exists(root / (*match)[1].str())) << (*match)[1];
   EXPECT_GT(links, 5U);
 }
 
 TEST(Examples, StayUnderEightyLines) {
-  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(TORSIO_SOURCE) / "examples")) {
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(fs::path(TORSIO_SOURCE) / "examples")) {
     if (entry.path().extension() != ".cpp") continue;
     const std::string text = contents(entry.path());
     EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 80) << entry.path();
