@@ -58,6 +58,7 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
 }
 
 void run(const DemoFlags& flags) {
+  require_folder_of(flags.output);
   ProgressBar bar;
   const bool is_simulated = flags.data.recordings.empty();
   if (is_simulated) remark(fmt::format("simulating four sweeps of {} ...", flags.actuator));

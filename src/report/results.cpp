@@ -111,7 +111,7 @@ std::string ranked_table(const Results& results, Role split) {
   if (has_sets) table.header({"inputs"});
   table.header({"RMSE", "MAD", "max|e|", "fit %"});
   for (const std::string& recording : recordings) table.header({"RMSE " + recording});
-  table.header({"step ns", "p99.9", "fit s", "numbers"});
+  table.header({"step ns", "p99.9", "fit s", "parameters"});
 
   std::string failures;
   for (const ResultRow* row : ranking(results, split)) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <utility>
@@ -14,16 +15,19 @@
 namespace torsio {
 namespace {
 
-ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, std::uint64_t seed) {
+ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Options& options,
+                   std::uint64_t seed) {
   ModelCard card;
   card.fitted_as = choice.family;
-  card.options = choice.options;
+  card.options = options.values();
   card.seed = seed;
   card.zeros = dataset.records.front().recording.zeros;
   for (const DatasetRecord& record : dataset.records) {
     bool is_trained_on = false;
     for (const Segment& segment : record.segments) is_trained_on |= segment.role == Role::train;
-    if (is_trained_on) card.training_files.push_back(record.recording.source);
+    const bool is_listed = std::ranges::find(card.training_files, record.recording.source) !=
+                           card.training_files.end();
+    if (is_trained_on && !is_listed) card.training_files.push_back(record.recording.source);
   }
   return card;
 }
@@ -50,7 +54,7 @@ TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std:
   FittedModel fitted = family.fit(data, options, seed, progress);
   const std::chrono::duration<double> fit_time = std::chrono::steady_clock::now() - start;
 
-  TrainedModel trained{.file = {.card = card_for(dataset, choice, seed),
+  TrainedModel trained{.file = {.card = card_for(dataset, choice, options, seed),
                                 .settings = guarded_settings(choice.features, data, fitted.model,
                                                              validation ? &*validation : nullptr),
                                 .parameters = fitted.model.parameters()},

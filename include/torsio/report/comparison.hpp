@@ -24,7 +24,9 @@ namespace torsio {
 
 struct Comparison {
   Results results;
-  std::optional<TrainedModel> best;  ///< lowest RMSE on the test records; none if every fit failed
+  /// Lowest RMSE on the validation records, or on the test records where there are no others: its card
+  /// then says that the score which it carries also chose it. None if every fit failed.
+  std::optional<TrainedModel> best;
 };
 
 /// Trains every choice on the training records and scores it on the other roles. A fit that fails
@@ -41,9 +43,8 @@ struct Comparison {
 [[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
                                      const Progress& progress = {});
 
-/// Puts the scores of a model's rows on its held-out records (validation if there are, else test)
-/// into its card, with words for what they were measured on. Without held-out records nothing
-/// changes.
+/// Puts a model's scores on all test records (validation, if there are no test records) into its
+/// card, with words for what they were measured on. Nothing held out: nothing changes.
 void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows);
 
 }  // namespace torsio
