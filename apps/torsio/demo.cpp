@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "data_flags.hpp"
 #include "output.hpp"
@@ -11,7 +10,8 @@
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/comparison.hpp"
 #include "torsio/report/terminal_plot.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/bench_dataset.hpp"
+#include "torsio/train/inputs.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -26,26 +26,6 @@ struct DemoFlags {
   JsonOutput json;
 };
 
-/// Three sweeps to learn from and one with another lever and inclination to be judged on.
-torsio::Dataset simulated_bench(const DemoFlags& flags, const torsio::Progress& progress) {
-  const torsio::SweepProtocol protocol = torsio::sweep_protocol(flags.actuator);
-  torsio::Dataset dataset;
-  const auto record = [&](double lever_m, double inclination_rad, torsio::Role role) {
-    const std::uint64_t seed = flags.seed + dataset.records.size();
-    torsio::Recording sweep = torsio::simulate({.actuator = flags.actuator,
-                                                .experiment = "sweep",
-                                                .seed = seed,
-                                                .lever_m = lever_m,
-                                                .inclination_rad = inclination_rad},
-                                               progress);
-    const std::size_t samples = sweep.size();
-    dataset.records.push_back({std::move(sweep), torsio::whole_record(samples, role)});
-  };
-  for (const double lever_m : protocol.train_lever_m) record(lever_m, 0.0, torsio::Role::train);
-  record(protocol.test_lever_m, protocol.test_inclination_rad, torsio::Role::test);
-  return dataset;
-}
-
 /// The first test record's loop: what was measured against the first input.
 std::string loop_plot(const torsio::Dataset& dataset, const torsio::ModelFile& model) {
   const auto is_test = [](const torsio::DatasetRecord& record) {
@@ -54,20 +34,12 @@ std::string loop_plot(const torsio::Dataset& dataset, const torsio::ModelFile& m
     });
   };
   const torsio::Recording& recording = std::ranges::find_if(dataset.records, is_test)->recording;
-  torsio::FeatureSpec first = model.settings.features;
-  first.inputs.resize(1);
-  torsio::FeaturePipeline pipeline(first, recording.sample_rate_Hz());
+  const torsio::FeatureSpec& features = model.settings.features;
+  const std::vector<double> x = torsio::first_feature(recording, features);
   const std::vector<double>& target = recording.channel(dataset.target).values;
-  std::vector<double> x;
-  std::vector<double> raw(pipeline.raw_inputs().size());
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    for (std::size_t j = 0; j < raw.size(); ++j)
-      raw[j] = recording.channel(pipeline.raw_inputs()[j]).values[i];
-    x.push_back(pipeline.step(raw).front());
-  }
-  return fmt::format("\n{} over {}, as measured in {}\n", dataset.target, first.inputs.front(),
+  return fmt::format("\n{} over {}, as measured in {}\n", dataset.target, features.inputs.front(),
                      recording.name()) +
-         torsio::terminal_plot({{"", x, target}}, {first.inputs.front(), dataset.target});
+         torsio::terminal_plot({{"", x, target}}, {features.inputs.front(), dataset.target});
 }
 
 /// Saves the best model, loads it back and streams the test records through it, as a robot would.
@@ -90,7 +62,8 @@ void run(const DemoFlags& flags) {
   const bool is_simulated = flags.data.recordings.empty();
   if (is_simulated) remark(fmt::format("simulating four sweeps of {} ...", flags.actuator));
   const torsio::Dataset dataset =
-      is_simulated ? simulated_bench(flags, bar.listener()) : flags.data.load({}, flags.test);
+      is_simulated ? torsio::sweep_dataset(flags.actuator, flags.seed, bar.listener())
+                   : flags.data.load({}, flags.test);
   const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   const torsio::Comparison comparison =
       torsio::compare(dataset, choices, flags.seed, false, bar.listener());

@@ -37,19 +37,19 @@ constexpr const char* kRemedies =
 
 void refuse_unusable(const Stamps& stamps) {
   if (stamps.rows.size() < 2)
-    throw Error({.place = stamps.place(0),
+    throw ClockError({.place = stamps.place(0),
                  .expected = "at least two samples, to tell the sample rate",
                  .found = "one sample"});
   if (stamps.report.not_finite > 0) {
     const auto missing =
         std::ranges::find_if(stamps.values_s, [](double stamp) { return !std::isfinite(stamp); });
-    throw Error({.place = stamps.place(static_cast<std::size_t>(missing - stamps.values_s.begin())),
+    throw ClockError({.place = stamps.place(static_cast<std::size_t>(missing - stamps.values_s.begin())),
                  .expected = "a time stamp",
                  .found = "nothing",
                  .advice = "Remove the line, or drop the clock column and tell the rate."});
   }
   if (!(stamps.report.sample_rate_Hz > 0.0))
-    throw Error(
+    throw ClockError(
         {.place = stamps.place(stamps.rows.size() - 1),
          .problem = "the last time stamp is not behind the first",
          .found = fmt::format("{} s after {} s", stamps.values_s.back(), stamps.values_s.front()),
@@ -59,7 +59,7 @@ void refuse_unusable(const Stamps& stamps) {
 void refuse_not_increasing(const Stamps& stamps, const char* advice) {
   const std::size_t at = stamps.report.first_not_increasing;
   if (at == 0) return;
-  throw Error({.place = stamps.place(at),
+  throw ClockError({.place = stamps.place(at),
                .problem = fmt::format("the clock does not advance ({} stamps are repeated, {} run "
                                       "backward)",
                                       stamps.report.duplicated, stamps.report.backward),
@@ -73,7 +73,7 @@ double even_rate(const Stamps& stamps) {
   const ClockReport& report = stamps.report;
   const std::size_t odd = report.worst_interval;
   if (!report.is_uniform())
-    throw Error({.place = stamps.place(odd),
+    throw ClockError({.place = stamps.place(odd),
                  .problem = fmt::format("the clock is not even (a stamp strays by {:.3g} samples)",
                                         report.largest_stray_s * report.sample_rate_Hz),
                  .expected = fmt::format("an interval near {:.6g} s", report.stamp_step_s),
@@ -93,7 +93,7 @@ double rebuilt_rate(const Stamps& stamps, double max_stray_steps) {
   const ClockReport& report = stamps.report;
   const double steps = report.largest_stray_s / report.stamp_step_s;
   if (!(steps <= max_stray_steps))
-    throw Error(
+    throw ClockError(
         {.place = stamps.place(report.most_stray),
          .problem = "the samples were not taken evenly enough to rebuild the clock",
          .expected = fmt::format("at most {} stamp steps of {:.4g} s away from an even spread",
@@ -109,13 +109,13 @@ void refuse_gaps(const Stamps& stamps) {
   for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
     const double interval = stamps.values_s[i] - stamps.values_s[i - 1];
     if (interval < 0.0)
-      throw Error({.place = stamps.place(i),
+      throw ClockError({.place = stamps.place(i),
                    .problem = "the clock runs backward",
                    .expected = fmt::format("at least {} s", stamps.values_s[i - 1]),
                    .found = fmt::format("{} s", stamps.values_s[i]),
                    .advice = "Cut the log there into two files."});
     if (interval > kLongestGapIntervals * stamps.report.stamp_step_s)
-      throw Error({.place = stamps.place(i),
+      throw ClockError({.place = stamps.place(i),
                    .problem = "a gap too long to interpolate over",
                    .expected = fmt::format("at most {} intervals of {:.4g} s", kLongestGapIntervals,
                                            stamps.report.stamp_step_s),

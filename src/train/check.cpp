@@ -12,88 +12,12 @@
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/train/inputs.hpp"
+#include "train/signal_pair.hpp"
 
 namespace torsio {
 namespace {
 
-/// The first input and the target of one recording, on the recording's clock.
-struct Pair {
-  std::vector<double> input;
-  std::vector<double> target;  ///< straight lines between fresh samples
-};
-
 bool is_finite(double value) { return std::isfinite(value); }
-
-/// The target at every sample, straight lines between those that the sensor delivered: a held value
-/// would look late.
-std::vector<double> bridged(const Channel& channel) {
-  std::vector<double> values(channel.values.size(), kNotMeasured);
-  std::size_t last = values.size();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!channel.is_fresh(i) || !is_finite(channel.values[i])) continue;
-    values[i] = channel.values[i];
-    if (last < i) {
-      const double slope = (values[i] - values[last]) / static_cast<double>(i - last);
-      for (std::size_t j = last + 1; j < i; ++j)
-        values[j] = values[last] + slope * static_cast<double>(j - last);
-    }
-    last = i;
-  }
-  return values;
-}
-
-/// The first input's values; filters have not settled at the very start, which no check here minds.
-std::vector<double> first_input(const Recording& recording, const FeatureSpec& spec) {
-  FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
-  std::vector<const std::vector<double>*> raw_channels;
-  for (const std::string& input : pipeline.raw_inputs())
-    raw_channels.push_back(&recording.channel(input).values);
-  std::vector<double> raw(raw_channels.size());
-  std::vector<double> values(recording.size(), kNotMeasured);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*raw_channels[j])[i];
-    if (std::ranges::all_of(raw, is_finite)) values[i] = pipeline.step(raw).front();
-  }
-  return values;
-}
-
-double correlation(const std::vector<double>& x, const std::vector<double>& y, std::ptrdiff_t lag) {
-  double n = 0, sx = 0, sy = 0, xx = 0, xy = 0, yy = 0;
-  const auto size = static_cast<std::ptrdiff_t>(x.size());
-  for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, lag); i < std::min(size, size + lag); ++i) {
-    const double a = x[static_cast<std::size_t>(i - lag)];
-    const double b = y[static_cast<std::size_t>(i)];
-    if (!is_finite(a) || !is_finite(b)) continue;
-    n += 1.0, sx += a, sy += b, xx += a * a, xy += a * b, yy += b * b;
-  }
-  const double spread = (n * xx - sx * sx) * (n * yy - sy * sy);
-  return spread > 0.0 ? (n * xy - sx * sy) / std::sqrt(spread) : 0.0;
-}
-
-/// Differences over `window` samples: what moves, without the offsets.
-std::vector<double> movement(const std::vector<double>& values, std::size_t window) {
-  std::vector<double> differences(values.size(), kNotMeasured);
-  for (std::size_t i = window; i < values.size(); ++i)
-    differences[i] = values[i] - values[i - window];
-  return differences;
-}
-
-struct Span {
-  double lowest = std::numeric_limits<double>::infinity();
-  double highest = -std::numeric_limits<double>::infinity();
-  void include(double value) {
-    if (!is_finite(value)) return;
-    lowest = std::min(lowest, value);
-    highest = std::max(highest, value);
-  }
-  [[nodiscard]] double width() const { return highest - lowest; }
-};
-
-Span span_of(const std::vector<double>& values) {
-  Span span;
-  for (const double value : values) span.include(value);
-  return span;
-}
 
 bool has_segment(const DatasetRecord& record, Role role) {
   return std::ranges::any_of(record.segments,
@@ -108,8 +32,8 @@ class Checker {
     channels_ = pipeline_.raw_inputs();
     channels_.push_back(dataset.target);
     for (const DatasetRecord& record : dataset.records)
-      pairs_.push_back(
-          {first_input(record.recording, spec), bridged(record.recording.channel(dataset.target))});
+      pairs_.push_back({first_feature(record.recording, spec),
+                        bridged(record.recording.channel(dataset.target))});
   }
 
   std::vector<Finding> run() {
@@ -190,7 +114,8 @@ class Checker {
   void check_constant() {
     pass_unless_found("constant channels", "every input and the target move", [&] {
       for_each_channel([&](const Recording& recording, const Channel& channel) {
-        if (is_condition(recording, channel.name) || span_of(channel.values).width() > 0.0) return;
+        if (is_condition(recording, channel.name) || extent_of(channel.values).width() > 0.0)
+          return;
         add(Verdict::fail, "constant channels", recording.name(),
             fmt::format("{} never changes from {:g}", channel.name, channel.values.front()),
             "Is the sensor connected? If it is a condition of the record, name it under "
@@ -203,7 +128,7 @@ class Checker {
   void check_saturation() {
     pass_unless_found("saturation", "no channel rests at its extreme value", [&] {
       for_each_channel([&](const Recording& recording, const Channel& channel) {
-        const Span span = span_of(channel.values);
+        const Extent span = extent_of(channel.values);
         if (!(span.width() > 0.0)) return;
         for (const double extreme : {span.lowest, span.highest}) {
           const auto count = static_cast<double>(std::ranges::count(channel.values, extreme));
@@ -222,7 +147,7 @@ class Checker {
   // A signal that turns round at its extreme spends time near it too; one that is cut off sits
   // exactly on it.
   [[nodiscard]] static bool approaches_gradually(const Channel& channel, double extreme,
-                                                 const Span& span) {
+                                                 const Extent& span) {
     std::size_t at_extreme = 0;
     std::size_t near_extreme = 0;
     for (const double value : channel.values) {
@@ -245,7 +170,7 @@ class Checker {
         const auto largest = std::ranges::max_element(steps);
         const auto at = static_cast<std::size_t>(largest - steps.begin());
         const double peak = *largest;
-        if (peak < kJumpShare * span_of(values).width()) return;
+        if (peak < kJumpShare * extent_of(values).width()) return;
         const double others = second_largest_elsewhere(steps, at);
         if (peak < kJumpOverOthers * others) return;
         add(Verdict::warn, "gaps", recording.name(),
@@ -266,30 +191,30 @@ class Checker {
     return largest;
   }
 
+  // Friction makes the torque lead the deflection, so a bare cross-correlation would call every
+  // hysteretic spring early. The delay is therefore the shift at which spring and friction together
+  // explain the torque best.
   void check_delay() {
     const double rate = dataset_.sample_rate_Hz();
-    const auto window =
-        static_cast<std::size_t>(std::max(1.0, std::round(kMovementWindow_s * rate)));
     const auto longest = static_cast<std::ptrdiff_t>(std::round(kLongestDelay_s * rate));
     pass_unless_found(
         "delay", fmt::format("{} and {} move together", spec_.inputs.front(), dataset_.target),
         [&] {
           for (std::size_t r = 0; r < pairs_.size(); ++r) {
-            const std::vector<double> x = movement(pairs_[r].input, window);
-            const std::vector<double> y = movement(pairs_[r].target, window);
+            const ShiftedFit fit(pairs_[r], rate);
+            const double at_zero = fit.unexplained(0);
             std::ptrdiff_t best = 0;
-            double peak = 0.0;
+            double least = at_zero;
             for (std::ptrdiff_t lag = -longest; lag <= longest; ++lag)
-              if (const double value = std::abs(correlation(x, y, lag)); value > peak)
-                best = lag, peak = value;
-            const double at_zero = std::abs(correlation(x, y, 0));
-            if (peak < kClearCorrelation || peak - at_zero < kDelayGain) continue;
+              if (const double share = fit.unexplained(lag); share < least)
+                best = lag, least = share;
+            if (least > kExplainsLittle || least > kDelayGain * at_zero) continue;
             const double delay_ms = 1e3 * static_cast<double>(best) / rate;
             add(Verdict::warn, "delay", dataset_.records[r].recording.name(),
                 fmt::format(
-                    "{} comes {:.1f} ms {} {} (correlation {:.3f} there, {:.3f} without shift)",
+                    "{} comes {:.1f} ms {} {} (unexplained {:.2f} % there, {:.2f} % without shift)",
                     dataset_.target, std::abs(delay_ms), delay_ms > 0 ? "after" : "before",
-                    spec_.inputs.front(), peak, at_zero),
+                    spec_.inputs.front(), 100.0 * least, 100.0 * at_zero),
                 delay_ms > 0
                     ? fmt::format("Mapping line that takes it out: latency: {{{}: {:.1f}ms}}",
                                   dataset_.target, delay_ms)
@@ -302,7 +227,7 @@ class Checker {
     pass_unless_found("sign",
                       fmt::format("{} rises with {}", dataset_.target, spec_.inputs.front()), [&] {
                         for (std::size_t r = 0; r < pairs_.size(); ++r) {
-                          const double value = correlation(pairs_[r].input, pairs_[r].target, 0);
+                          const double value = correlation(pairs_[r].input, pairs_[r].target);
                           const std::string& recording = dataset_.records[r].recording.name();
                           if (value < -kClearCorrelation) {
                             add(Verdict::fail, "sign", recording,
@@ -324,9 +249,9 @@ class Checker {
   // Hysteresis shows only at reversals; a rate that never changes cannot be told from a constant.
   void check_excitation() {
     std::size_t reversals = 0;
-    Span speeds;
+    Extent speeds;
     const auto window = static_cast<std::size_t>(
-        std::max(1.0, std::round(kSpeedWindow_s * dataset_.sample_rate_Hz())));
+        std::max(1.0, std::round(kSpeedHalfWindow_s * dataset_.sample_rate_Hz())));
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
       if (!has_segment(dataset_.records[r], Role::train)) continue;
       reversals += count_reversals(pairs_[r].input);
@@ -348,7 +273,7 @@ class Checker {
   }
 
   [[nodiscard]] static std::size_t count_reversals(const std::vector<double>& values) {
-    const double dead_band = kReversalShare * span_of(values).width();
+    const double dead_band = kReversalShare * extent_of(values).width();
     std::size_t count = 0;
     double extreme = kNotMeasured;
     int direction = 0;
@@ -391,7 +316,7 @@ class Checker {
       double spread = 0.0;
       for (const Pair& pair : pairs_) {
         offsets.push_back(mean_of(pair.target) - slope * mean_of(pair.input));
-        spread = std::max(spread, span_of(pair.target).width());
+        spread = std::max(spread, extent_of(pair.target).width());
       }
       if (offsets.size() < 2) return;
       std::vector<double> sorted = offsets;
@@ -441,8 +366,8 @@ class Checker {
     pass_unless_found("range", "the test data lie inside the training range", [&] {
       std::vector<std::string> names = channels_;
       for (const std::string& channel : names) {
-        Span trained;
-        Span tested;
+        Extent trained;
+        Extent tested;
         for (const DatasetRecord& record : dataset_.records)
           for (const Segment& segment : record.segments)
             for (std::size_t i = segment.begin; i < segment.end; ++i)
@@ -463,13 +388,14 @@ class Checker {
   static constexpr double kJumpShare = 0.02;
   static constexpr double kJumpOverOthers = 5.0;
   static constexpr std::size_t kJumpNeighbourhood = 3;
-  static constexpr double kMovementWindow_s = 0.02;
   static constexpr double kLongestDelay_s = 0.1;
   static constexpr double kClearCorrelation = 0.5;
-  static constexpr double kDelayGain = 0.01;
+  static constexpr double kExplainsLittle =
+      0.2;  ///< of the variance: a fit that leaves more tells no delay
+  static constexpr double kDelayGain = 0.7;  ///< of what is unexplained without shift
   static constexpr double kReversalShare = 0.05;
   static constexpr std::size_t kFewReversals = 3;
-  static constexpr double kSpeedWindow_s = 0.1;
+  static constexpr double kSpeedHalfWindow_s = 0.05;
   static constexpr double kSpeedRatio = 2.0;
   static constexpr double kStandstillShare = 0.05;
   static constexpr double kOffsetShare = 0.05;

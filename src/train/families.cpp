@@ -40,10 +40,12 @@ constexpr std::array kPolynomialOptions{
 
 constexpr std::array kDgmmOptions{
     OptionInfo{"components", Kind::integer, "300", 1, 100000, "at most this many Gaussians"},
-    OptionInfo{"novelty_distance", Kind::number, "0.25", 0, 100,
-               "in standard deviations: a sample farther from all Gaussians becomes a new one"},
-    OptionInfo{"initial_spread", Kind::number, "0.15", 1e-6, 100,
-               "standard deviation of a Gaussian that has seen one sample, in standard deviations"},
+    OptionInfo{"novelty_distance", Kind::number, "auto", 0, 100,
+               "in standard deviations: a sample farther from all Gaussians becomes a new one; "
+               "auto: 5/3 of the initial spread"},
+    OptionInfo{"initial_spread", Kind::number, "auto", 1e-6, 100,
+               "standard deviation of a Gaussian that has seen one sample, in standard deviations; "
+               "auto: found by leaving one training record out at a time"},
     OptionInfo{"learning_rate_floor", Kind::number, "0", 0, 1,
                "0: means settle; above: they keep following"},
     OptionInfo{"forgetting", Kind::number, "1", 0, 1, "of a Gaussian's past with each sample"},

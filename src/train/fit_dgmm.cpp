@@ -14,6 +14,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/train/mixture_em.hpp"
+#include "train/dgmm_spread.hpp"
 
 namespace torsio {
 namespace {
@@ -161,21 +162,25 @@ OnlineMixture learn_online(const Matrix& samples, const Standardisation& standar
   return learner;
 }
 
-}  // namespace
+DgmmOptions with_spread(DgmmOptions options, double spread) {
+  options.online.initial_spread = spread;
+  if (std::isnan(options.online.novelty_distance))
+    options.online.novelty_distance = kNoveltyPerSpread * spread;
+  return options;
+}
 
-Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options,
-                      const Progress& progress) {
-  check_options(options);
-  const Matrix samples = joint_samples(data);
+struct MixtureFit {
+  Dgmm::Parameters parameters;
+  std::size_t merges = 0;
+};
+
+// A mixture with its guards, all settings known.
+MixtureFit fit_samples(const Matrix& samples, const TrainingData& data, const DgmmOptions& options,
+                       const Progress& progress) {
   const Standardisation standardisation = standardisation_of(samples, data);
   const OnlineMixture learner = learn_online(samples, standardisation, options.online, progress);
-  Fitted<Dgmm> fitted;
-  if (learner.merges() > 0)
-    fitted.notes.push_back(fmt::format(
-        "the data filled all {} components and {} pairs were merged to make room: allow more "
-        "components, or a larger novelty_distance",
-        options.online.components, learner.merges()));
-  Dgmm::Parameters& result = fitted.parameters;
+  MixtureFit fit{.parameters = {}, .merges = learner.merges()};
+  Dgmm::Parameters& result = fit.parameters;
   result.mixture = learner.mixture();
   if (options.em_iterations > 0) {
     const MixtureEm em(samples, standardisation,
@@ -193,6 +198,34 @@ Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options,
   result.clamp = linear_clamp(all, standardisation, options.clamp);
   result.clamp.thin_log_density = thin_log_density(result.mixture, 0, samples);
   result.clamp.thin_log_density_inverse = thin_log_density(result.mixture, 1, samples);
+  return fit;
+}
+
+}  // namespace
+
+Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options,
+                      const Progress& progress) {
+  check_options(options);
+  const Matrix samples = joint_samples(data);
+  Fitted<Dgmm> fitted;
+  double spread = options.online.initial_spread;
+  if (std::isnan(spread)) {
+    const FitWithSpread fit = [&](const Matrix& part, double candidate) {
+      DgmmOptions one = with_spread(options, candidate);
+      one.threads = 1;
+      return fit_samples(part, data, one, {}).parameters;
+    };
+    SpreadChoice choice = choose_spread(samples, data, fit, options.threads, progress);
+    spread = choice.spread;
+    fitted.notes.push_back(std::move(choice.note));
+  }
+  MixtureFit fit = fit_samples(samples, data, with_spread(options, spread), progress);
+  if (fit.merges > 0)
+    fitted.notes.push_back(fmt::format(
+        "the data filled all {} components and {} pairs were merged to make room: allow more "
+        "components, or a larger novelty_distance",
+        options.online.components, fit.merges));
+  fitted.parameters = std::move(fit.parameters);
   report_progress(progress, 1.0, "done");
   return fitted;
 }

@@ -12,12 +12,10 @@
 
 #include "torsio/core/error.hpp"
 #include "train/design.hpp"
+#include "train/folds.hpp"
 
 namespace torsio {
 namespace {
-
-constexpr std::size_t kFolds = 5;
-constexpr std::size_t kBlocksPerFold = 10;
 
 /// The usable samples that have a direction, if one is needed.
 struct Samples {
@@ -86,9 +84,7 @@ Design polynomial_design(const TrainingData& data, const Samples& samples, const
   return design;
 }
 
-/// Sum of squared errors on each fifth of each group, fitted to the rest of the group. A fifth is
-/// every fifth of 50 contiguous blocks: in one piece it would be a range of the first input that
-/// the rest never saw, and extrapolation would choose degree 1.
+/// Sum of squared errors on each fifth of each group, fitted to the rest of the group.
 double held_out_error(const Design& design, const Groups& groups) {
   double sum = 0.0;
   for (std::size_t fold = 0; fold < kFolds; ++fold) {
@@ -98,8 +94,8 @@ double held_out_error(const Design& design, const Groups& groups) {
       auto& kept = training.samples.emplace_back();
       auto& left_out = held_out.emplace_back();
       for (std::size_t i = 0; i < samples.size(); ++i) {
-        const std::size_t block = i * kFolds * kBlocksPerFold / samples.size();
-        (block % kFolds == fold ? left_out : kept).push_back(samples[i]);
+        const bool is_held_out = interleaved_fold(i, samples.size()) == fold;
+        (is_held_out ? left_out : kept).push_back(samples[i]);
       }
     }
     const Matrix coefficients = fit_design(design, training).coefficients.values;

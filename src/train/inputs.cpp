@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
@@ -147,6 +148,21 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
         {.problem = "the target " + dataset.target + " is among the inputs of the model",
          .advice = "A model that is given its answer learns nothing: choose other --inputs."});
   return spec;
+}
+
+std::vector<double> first_feature(const Recording& recording, const FeatureSpec& spec) {
+  FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
+  std::vector<const std::vector<double>*> raw_channels;
+  for (const std::string& input : pipeline.raw_inputs())
+    raw_channels.push_back(&recording.channel(input).values);
+  std::vector<double> raw(raw_channels.size());
+  std::vector<double> values(recording.size(), kNotMeasured);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*raw_channels[j])[i];
+    if (std::ranges::all_of(raw, [](double value) { return std::isfinite(value); }))
+      values[i] = pipeline.step(raw).front();
+  }
+  return values;
 }
 
 std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {

@@ -8,9 +8,9 @@
 #include <limits>
 #include <string>
 
-#include "support/temporary_folder.hpp"
 #include "support/error_message.hpp"
 #include "support/example_model_file.hpp"
+#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/safetensors.hpp"
 #include "torsio/files/whole_file.hpp"

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <string>
 
-#include "support/temporary_folder.hpp"
 #include "support/example_model_file.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace torsio {
 namespace {

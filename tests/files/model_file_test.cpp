@@ -8,10 +8,10 @@
 #include <cstdint>
 #include <limits>
 
-#include "support/temporary_folder.hpp"
 #include "support/error_message.hpp"
 #include "support/every_family.hpp"
 #include "support/example_model_file.hpp"
+#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/files/safetensors.hpp"

@@ -8,8 +8,8 @@
 #include <csignal>
 #include <string>
 
-#include "support/temporary_folder.hpp"
 #include "support/error_message.hpp"
+#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

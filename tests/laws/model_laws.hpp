@@ -17,8 +17,8 @@
 #include "torsio/core/random.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/model/parameters.hpp"
-#include "torsio/train/model_run.hpp"
 #include "torsio/train/families.hpp"
+#include "torsio/train/model_run.hpp"
 
 /// What it means to be a model family. A new one specialises `example` (support/example_models.hpp)
 /// and adds one line:

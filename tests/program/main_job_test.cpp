@@ -35,7 +35,7 @@ TEST_F(MainJob, GoesFromARecordingToADeployedModel) {
   EXPECT_EQ(json.at("results").at(0).at("split"), "test");
   EXPECT_LT(json.at("results").at(0).at("rmse"), 2.0);
   EXPECT_EQ(contents("out.csv").substr(0, contents("out.csv").find('\n')),
-            "t_s,torque_Nm,estimated_torque_Nm,torque_std_dev_Nm,fault_1,torque_fresh_1");
+            "t_s,torque_Nm,torque_fresh_1,estimated_torque_Nm,torque_std_dev_Nm,fault_1");
 }
 
 TEST_F(MainJob, RanksEveryFamilyOnHeldOutRecords) {

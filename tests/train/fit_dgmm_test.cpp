@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "torsio/core/error.hpp"
@@ -129,9 +130,83 @@ TEST(FitDgmm, AcceptsInputsThatSayTheSame) {
 
 TEST(FitDgmm, NotesThatItRanOutOfComponents) {
   DgmmOptions options;
+  options.online.initial_spread = 0.15;
   EXPECT_TRUE(fit_dgmm(sweeps(2000, 1), options).notes.empty());
   options.online.components = 10;
   EXPECT_EQ(fit_dgmm(sweeps(2000, 1), options).notes.size(), 1U);
+}
+
+// A torque over a deflection and a support position that is another constant in every record. The
+// frequencies are how quickly the torque curves over the deflection and over the support.
+TrainingData supports(double over_deflection, double over_support) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  TrainingData data;
+  data.inputs = {{.expression = "spring_deflection_rad"}, {.expression = "support_m"}};
+  data.target = "torque_Nm";
+  data.sample_rate_Hz = 100.0;
+  for (const double support : {0.0, 0.2, 0.4, 0.6, 0.8, 1.0}) {
+    Sequence sequence{.recording = "one support", .features = Matrix(1500, 2)};
+    for (std::size_t i = 0; i < 1500; ++i) {
+      const double deflection = std::sin(0.01 * static_cast<double>(i));
+      sequence.features(i, 0) = deflection;
+      sequence.features(i, 1) = support;
+      sequence.target.push_back(10.0 * std::sin(over_deflection * deflection) +
+                                20.0 * deflection * std::sin(over_support * support) +
+                                0.05 * normal(random));
+      sequence.use.push_back(1);
+    }
+    data.sequences.push_back(std::move(sequence));
+  }
+  return data;
+}
+
+// Follows "initial_spread " in the first note.
+double noted_spread(const Fitted<Dgmm>& fitted) {
+  const std::string lead = "initial_spread ";
+  EXPECT_EQ(fitted.notes.at(0).rfind(lead, 0), 0U) << fitted.notes.at(0);
+  return std::stod(fitted.notes.at(0).substr(lead.size()));
+}
+
+TEST(FitDgmmSpread, IsWideWhereConditionsLieFarApart) {
+  const Fitted<Dgmm> fitted = fit_dgmm(supports(0.8, 1.2));
+  EXPECT_GE(noted_spread(fitted), 0.4) << fitted.notes[0];
+}
+
+TEST(FitDgmmSpread, IsNarrowWhereTheSurfaceIsCurved) {
+  TrainingData data = supports(12.0, 0.0);
+  data.inputs.resize(1);
+  for (Sequence& sequence : data.sequences) {
+    Matrix deflection(sequence.features.rows, 1);
+    for (std::size_t i = 0; i < deflection.rows; ++i) deflection(i, 0) = sequence.features(i, 0);
+    sequence.features = deflection;
+  }
+  const Fitted<Dgmm> fitted = fit_dgmm(data);
+  EXPECT_LE(noted_spread(fitted), 0.15) << fitted.notes[0];
+}
+
+TEST(FitDgmmSpread, IsTheSameForAnyNumberOfThreads) {
+  const Fitted<Dgmm> one = fit_dgmm(supports(0.8, 1.2), {.em_iterations = 3, .threads = 1});
+  const Fitted<Dgmm> two = fit_dgmm(supports(0.8, 1.2), {.em_iterations = 3, .threads = 2});
+  EXPECT_EQ(one.notes, two.notes);
+  EXPECT_EQ(one.parameters.mixture, two.parameters.mixture);
+}
+
+TEST(FitDgmmSpread, OfOneRecordIsFoundByItsBlocks) {
+  TrainingData data = sweeps(2000, 1);
+  data.sequences.resize(1);
+  EXPECT_NE(fit_dgmm(data).notes.at(0).find("a fifth of the record at a time"), std::string::npos);
+}
+
+TEST(FitDgmmSpread, StaysAtTheDefaultWhereNoRecordCanBeJudgedByTheOthers) {
+  TrainingData data = supports(0.8, 1.2);
+  data.sequences.resize(2);
+  const Fitted<Dgmm> fitted = fit_dgmm(data);
+  EXPECT_EQ(noted_spread(fitted), 0.15);
+  DgmmOptions given;
+  given.online.initial_spread = 0.15;
+  given.online.novelty_distance = 0.25;
+  EXPECT_EQ(fitted.parameters.mixture, fit_dgmm(data, given).parameters.mixture);
 }
 
 TEST(FitDgmm, SaysWhatIsWrong) {

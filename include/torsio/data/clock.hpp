@@ -3,7 +3,15 @@
 #include <cstddef>
 #include <span>
 
+#include "torsio/core/error.hpp"
+
 namespace torsio {
+
+/// The stamps of a log make no uniform clock; the advice names the mapping line that mends them.
+class ClockError : public Error {
+ public:
+  using Error::Error;
+};
 
 /// What the time stamps of a log say about its clock.
 struct ClockReport {

@@ -22,13 +22,14 @@ namespace torsio {
 ///
 /// | fault | when | value | std_dev |
 /// |---|---|---|---|
-/// | input_count_wrong, input_not_finite | the tick cannot be used; nothing is stepped | the last
-/// one from usable inputs (0 if none) | NaN | | warming_up | filters have not settled since
-/// `reset()` or a long gap | linear fallback | the fallback's, NaN outside the training range | |
-/// outside_training_range | a feature left its range by more than the margin | linear fallback |
-/// NaN: no evidence there | | model_not_finite | the model's value is NaN or infinite; the model is
-/// reset | linear fallback | the fallback's | | any other | the model itself said so | linear
-/// fallback | the fallback's |
+/// | input_count_wrong, input_not_finite | tick unusable, nothing stepped | last good or 0 | NaN |
+/// | warming_up | filters not settled since `reset()` or a long gap | fallback | fallback's (1) |
+/// | outside_training_range | a feature left its range by more than the margin | fallback | NaN |
+/// | model_not_finite | the model's value is NaN or infinite; it is reset | fallback | fallback's |
+/// | any other | the model itself said so | fallback | fallback's |
+///
+/// fallback: the linear one. last good: the last value from usable inputs. (1): NaN outside the
+/// training range, where there is no evidence.
 ///
 /// Should the fallback overflow, the last value is held. After a gap of at most
 /// `kLongestGapSeconds` (never less than one tick) filters and model run on as if the missing ticks

@@ -13,7 +13,8 @@ namespace torsio {
 
 /// What keeps a mixture's answer near the straight line where training data were thin.
 ///
-///     line(z) = intercept + slope . z;   limit(z) = width max(1, p(z) / p_thin)
+///     line(z) = intercept + slope . z
+///     limit(z) = width max(1, p(z) / p_thin)
 ///
 /// The answer stays within line +- limit. So it may leave the line by `width` where the density of
 /// the inputs is at or below p_thin, by ever more where it is higher, and in dense regions the line
@@ -38,8 +39,9 @@ struct LinearClamp {
 /// Dynamic Gaussian mixture model: the joint density of target and inputs, learned sample by
 /// sample, and conditioned on whatever is known.
 ///
-///     value = E[target | inputs],  std_dev^2 = E[(target - value)^2 | inputs],  novelty = -ln
-///     p(z~)
+///     value = E[target | inputs]
+///     std_dev^2 = E[(target - value)^2 | inputs]
+///     novelty = -ln p(z~)
 ///
 /// p(z~) is the density of the standardised inputs, so novelty has no unit. The same mixture run
 /// the other way tells the first input from the target and the other inputs.

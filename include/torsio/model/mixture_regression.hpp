@@ -22,19 +22,24 @@ struct Conditional {
 /// Gaussian mixture regression: one quantity y of a mixture given all the others z, in any
 /// direction from one mixture.
 ///
-///     l_i = ln w_i - sum ln diag L_i - d/2 ln 2 pi - |L_i^-1 (z - mu_i^Z)|^2 / 2,  L_i L_i^T =
-///     S_i^ZZ m_i = mu_i^Y + B_i (z - mu_i^Z),   B_i = S_i^YZ (S_i^ZZ)^-1,   s_i^2 = S_i^YY - B_i
-///     S_i^ZY pi_i = exp(l_i) / sum exp(l_j);   mean = sum pi_i m_i;   variance = sum pi_i (s_i^2 +
-///     (m_i - mean)^2)
+///     l_i = ln w_i - sum ln diag L_i - d/2 ln 2 pi - |L_i^-1 (z - mu_i^Z)|^2 / 2
+///           with L_i L_i^T = S_i^ZZ
+///     m_i = mu_i^Y + B_i (z - mu_i^Z),   B_i = S_i^YZ (S_i^ZZ)^-1
+///     s_i^2 = S_i^YY - B_i S_i^ZY
+///     pi_i = exp(l_i) / sum_j exp(l_j)
+///     mean = sum pi_i m_i
+///     variance = sum pi_i (s_i^2 + (m_i - mean)^2)
 ///
 /// `query` scans all components in float32 for those whose weight can matter at all. Few are then
 /// evaluated in double. Where many matter and float32 can be trusted, they are evaluated in
-/// float32, with differences to the means that keep what rounding takes from them. What is left
-/// out, and what float32 may judge wrongly, is bounded for each query: the dropped components hold
-/// less than 1e-10 of the weight, a float32 log weight that counts is off by at most 5e-5. So mean
-/// and standard deviation stay within 1e-4 standard deviations of the output from `query_exact`,
-/// which evaluates all components in double, one by one, and the log density within 1e-4. Where no
-/// component has a density that double can hold, the results are NaN.
+/// float32, with differences to the means that keep what rounding takes from them.
+///
+/// How exact that is: for each query a bound on the scan's rounding sees to it that the dropped
+/// components hold less than 1e-10 of the weight. Whether float32 can be trusted is an estimate
+/// from the size of the numbers (a log weight that counts off by 5e-5), not a bound. Tests hold
+/// mean and standard deviation to 1e-4 standard deviations of the output from `query_exact`, which
+/// evaluates all components in double, one by one, and the log density to 1e-4. Where no component
+/// has a density that double can hold, the results are NaN.
 ///
 /// Source: SPEC 3.1 (papers 000 and 001, equations 8 to 11, with the variance of the mixture).
 /// Cost of `query`: 4 (d + d(d+1)/2 + 1) bytes a component from cache, d given quantities, and

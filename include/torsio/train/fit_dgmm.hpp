@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "torsio/core/not_measured.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/model/dgmm.hpp"
 #include "torsio/train/fitted.hpp"
@@ -11,11 +12,13 @@
 namespace torsio {
 
 struct DgmmOptions {
-  OnlineMixtureSettings online = {};
+  /// NaN as `initial_spread` (the default here): chosen from the training records; as
+  /// `novelty_distance`: 5/3 of the initial spread, SPEC's ratio of 0.25 to 0.15.
+  OnlineMixtureSettings online = {.novelty_distance = kNotMeasured, .initial_spread = kNotMeasured};
   std::size_t em_iterations = 10;   ///< refinement after the online pass; 0: none
   double clamp = 2.0;               ///< LinearClamp::width in RMSE of the linear model; 0: none
   double background_weight = 1e-3;  ///< of the one Gaussian over all data; 0: none
-  std::size_t threads = 0;          ///< for the refinement only; 0: as many as the machine has
+  std::size_t threads = 0;          ///< for search and refinement; 0: as many as the machine has
 };
 
 /// Learns the joint density of target and inputs from the usable samples in the order of recording
@@ -23,6 +26,11 @@ struct DgmmOptions {
 /// background component, which makes the answer far from all data a linear regression, and the
 /// clamp to the linear model, whose threshold of density is the first percentile over the training
 /// samples.
+///
+/// How far components must reach to bridge the gaps between recorded conditions the training
+/// records tell themselves: unless given, the initial spread is the one of a short list that does
+/// best when one record at a time is left out (a single record: every fifth of 50 blocks). The
+/// notes state choice and scores.
 ///
 /// Source: SPEC 3.1. Deterministic; independent of the number of threads.
 /// @throws Error if no sample is usable or an option is out of range; Cancelled if `progress` asks.

@@ -21,6 +21,11 @@ namespace torsio {
 [[nodiscard]] FeatureSpec resolve_inputs(const Dataset& dataset,
                                          const std::vector<std::string>& wanted);
 
+/// The first input at every sample of a recording, from a fresh pipeline; NaN where a raw channel
+/// is not finite. What a plot over "the input" needs.
+[[nodiscard]] std::vector<double> first_feature(const Recording& recording,
+                                                const FeatureSpec& spec);
+
 /// A raw input that the target was computed from, declared by the dataset or found in the data (the
 /// target is a straight line of the input to 3e-5 of its spread); empty if there is none. Such an
 /// input is a leak: a score with it means nothing.

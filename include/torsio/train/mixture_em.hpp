@@ -12,8 +12,10 @@ namespace torsio {
 
 /// Refines a mixture by expectation maximisation with full covariances.
 ///
-///     r_ki = w_i N(x~_k; mu_i, Sigma_i) / sum_j w_j N(x~_k; mu_j, Sigma_j),   n_i = sum_k r_ki
-///     w_i = n_i / N;  mu_i = sum_k r_ki x~_k / n_i
+///     r_ki = w_i N(x~_k; mu_i, Sigma_i) / sum_j w_j N(x~_k; mu_j, Sigma_j)
+///     n_i = sum_k r_ki
+///     w_i = n_i / N
+///     mu_i = sum_k r_ki x~_k / n_i
 ///     Sigma_i = (nu0 s0^2 I + sum_k r_ki (x~_k - mu_i)(x~_k - mu_i)^T) / (nu0 + n_i)
 ///
 /// nu0 = prior_count and s0 = prior_spread are the inverse-Wishart prior of `OnlineMixture`, so

@@ -40,7 +40,10 @@ struct OnlineMixtureSettings {
 ///
 /// The nearest component i takes the sample x~:
 ///
-///     n = forgetting n + 1;  d = x~ - mu;  eta = max(1 / n, floor);  mu += eta d
+///     n = forgetting n + 1
+///     d = x~ - mu
+///     eta = max(1 / n, floor)
+///     mu += eta d
 ///     A = forgetting A + (1 - eta) d d^T       (Welford's update for forgetting 1, floor 0)
 ///     Sigma = (nu0 s0^2 I + A) / (nu0 + n),   nu0 = D + 1, s0 the initial spread
 ///

@@ -1,0 +1,99 @@
+#include "train/signal_pair.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kHalfWindow_s = 0.005;
+constexpr double kSmallStep = 0.1;
+constexpr std::size_t kEnoughSamples = 20000;
+
+bool is_finite(double value) { return std::isfinite(value); }
+
+}  // namespace
+
+Extent extent_of(const std::vector<double>& values) {
+  Extent extent;
+  for (const double value : values) extent.include(value);
+  return extent;
+}
+
+std::vector<double> bridged(const Channel& channel) {
+  std::vector<double> values(channel.values.size(), kNotMeasured);
+  std::size_t last = values.size();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!channel.is_fresh(i) || !is_finite(channel.values[i])) continue;
+    values[i] = channel.values[i];
+    if (last < i) {
+      const double slope = (values[i] - values[last]) / static_cast<double>(i - last);
+      for (std::size_t j = last + 1; j < i; ++j)
+        values[j] = values[last] + slope * static_cast<double>(j - last);
+    }
+    last = i;
+  }
+  return values;
+}
+
+double correlation(const std::vector<double>& x, const std::vector<double>& y) {
+  double n = 0, sx = 0, sy = 0, xx = 0, xy = 0, yy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double a = x[i];
+    const double b = y[i];
+    if (!is_finite(a) || !is_finite(b)) continue;
+    n += 1.0, sx += a, sy += b, xx += a * a, xy += a * b, yy += b * b;
+  }
+  const double spread = (n * xx - sx * sx) * (n * yy - sy * sy);
+  return spread > 0.0 ? (n * xy - sx * sy) / std::sqrt(spread) : 0.0;
+}
+
+std::vector<double> movement(const std::vector<double>& values, std::size_t half_window) {
+  std::vector<double> differences(values.size(), kNotMeasured);
+  for (std::size_t i = half_window; i + half_window < values.size(); ++i)
+    differences[i] = values[i + half_window] - values[i - half_window];
+  return differences;
+}
+
+ShiftedFit::ShiftedFit(const Pair& pair, double sample_rate_Hz) : pair_(pair) {
+  const auto half_window =
+      static_cast<std::size_t>(std::max(1.0, std::round(kHalfWindow_s * sample_rate_Hz)));
+  direction_ = movement(pair.input, half_window);
+  double sum = 0.0;
+  double count = 0.0;
+  for (const double step : direction_)
+    if (is_finite(step)) sum += step * step, count += 1.0;
+  const double typical = count > 0.0 ? std::sqrt(sum / count) : 1.0;
+  for (double& step : direction_) step = std::tanh(step / (kSmallStep * typical));
+  stride_ =
+      static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, pair.input.size() / kEnoughSamples));
+}
+
+double ShiftedFit::unexplained(std::ptrdiff_t lag) const {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  double sum = 0.0;
+  double square_sum = 0.0;
+  const auto size = static_cast<std::ptrdiff_t>(pair_.input.size());
+  for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, lag); i < std::min(size, size + lag);
+       i += stride_) {
+    const auto now = static_cast<std::size_t>(i);
+    const auto then = static_cast<std::size_t>(i - lag);
+    const Eigen::Vector3d row(1.0, pair_.input[then], direction_[then]);
+    const double y = pair_.target[now];
+    if (!is_finite(y) || !row.allFinite()) continue;
+    normal += row * row.transpose();
+    moment += row * y;
+    sum += y;
+    square_sum += y * y;
+  }
+  const double variance = square_sum - sum * sum / std::max(1.0, normal(0, 0));
+  if (!(variance > 0.0)) return 1.0;
+  const Eigen::Vector3d solution = normal.completeOrthogonalDecomposition().solve(moment);
+  return std::max(0.0, square_sum - solution.dot(moment)) / variance;
+}
+
+}  // namespace torsio

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "torsio/data/recording.hpp"
+
+namespace torsio {
+
+/// The first input and the target of one recording, on the recording's clock.
+struct Pair {
+  std::vector<double> input;
+  std::vector<double> target;  ///< straight lines between fresh samples
+};
+
+struct Extent {
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -std::numeric_limits<double>::infinity();
+  void include(double value) {
+    if (!std::isfinite(value)) return;
+    lowest = std::min(lowest, value);
+    highest = std::max(highest, value);
+  }
+  [[nodiscard]] double width() const { return highest - lowest; }
+};
+[[nodiscard]] Extent extent_of(const std::vector<double>& values);
+
+/// A channel at every sample, straight lines between those that the sensor delivered: a held value
+/// would look late.
+[[nodiscard]] std::vector<double> bridged(const Channel& channel);
+
+/// Pearson's, over the samples where both are finite; 0 if one does not move.
+[[nodiscard]] double correlation(const std::vector<double>& x, const std::vector<double>& y);
+
+/// Differences over the `half_window` samples before and after each: what moves, without offset or
+/// delay; NaN at both ends.
+[[nodiscard]] std::vector<double> movement(const std::vector<double>& values,
+                                           std::size_t half_window);
+
+/// target(t) = a + k input(t - lag) + c sign(rate of input(t - lag)): how much of the target it
+/// leaves unexplained.
+class ShiftedFit {
+ public:
+  ShiftedFit(const Pair& pair, double sample_rate_Hz);
+
+  /// Share of the target's variance; 1 if there is nothing to tell it from.
+  [[nodiscard]] double unexplained(std::ptrdiff_t lag) const;
+
+ private:
+  const Pair& pair_;
+  std::vector<double> direction_;  ///< of the input's motion, -1 to 1
+  std::ptrdiff_t stride_ = 1;
+};
+
+}  // namespace torsio
