@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
 
 namespace torsio::bench {
+
+/// A folder of this process; what lies in it is gone at its end.
+[[nodiscard]] const std::filesystem::path& scratch_folder();
 
 /// One measurement. A value in "<something>/s" is better the larger, any other the smaller.
 struct Row {

@@ -1,9 +1,8 @@
-#include "dgmm_bench.hpp"
-
 #include <cmath>
 #include <fstream>
 #include <vector>
 
+#include "rows.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/model/mixture_regression.hpp"
 #include "torsio/train/mixture_em.hpp"
@@ -14,6 +13,7 @@ namespace {
 
 constexpr std::size_t kSamples = 216000;
 constexpr std::size_t kQueries = 100000;
+constexpr std::size_t kFewQueries = 1000;
 constexpr std::size_t kInputs = 3;
 
 // A lever swung to and fro on a spring with friction, the amplitude swelling: torque, deflection,
@@ -38,11 +38,13 @@ Matrix spring_samples(std::size_t count, std::uint64_t seed) {
   return samples;
 }
 
-Matrix query_inputs() {
+// Any number of them is spread over the whole record.
+Matrix query_inputs(std::size_t count) {
   const Matrix samples = spring_samples(kSamples, 2);
-  Matrix inputs(kQueries, kInputs);
-  for (std::size_t i = 0; i < kQueries; ++i)
-    for (std::size_t j = 0; j < kInputs; ++j) inputs(i, j) = samples(2 * i, j + 1);
+  Matrix inputs(count, kInputs);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = 0; j < kInputs; ++j)
+      inputs(i, j) = samples(2 * (kQueries / count) * i, j + 1);
   return inputs;
 }
 
@@ -63,13 +65,12 @@ const GaussianMixture& full_mixture() {
 }
 
 double mean_query_bytes(MixtureRegression& regression, const Matrix& inputs) {
-  constexpr std::size_t kStride = 100;
   double sum = 0.0;
-  for (std::size_t i = 0; i < inputs.rows; i += kStride) {
+  for (std::size_t i = 0; i < inputs.rows; ++i) {
     static_cast<void>(regression.query(inputs.row(i)));
     sum += static_cast<double>(regression.bytes_read());
   }
-  return sum * static_cast<double>(kStride) / static_cast<double>(inputs.rows);
+  return sum / static_cast<double>(inputs.rows);
 }
 
 struct QueryTimes {
@@ -79,16 +80,15 @@ struct QueryTimes {
 
 QueryTimes time_queries(std::size_t count) {
   MixtureRegression regression(full_mixture(), 0);
-  Matrix inputs = query_inputs();
+  const Matrix inputs = query_inputs(count);
   const double bytes = mean_query_bytes(regression, inputs);
-  inputs.rows = count;
   std::vector<Conditional> results(count);
   const double seconds = best_seconds([&] { regression.query(inputs, results); });
   return {seconds / static_cast<double>(count), stream_seconds(static_cast<std::size_t>(bytes))};
 }
 
-void write_doubles(const std::filesystem::path& file, const std::vector<double>& values) {
-  std::ofstream out(file, std::ios::binary);
+void write_doubles(const char* file, const std::vector<double>& values) {
+  std::ofstream out(scratch_folder() / file, std::ios::binary);
   out.exceptions(std::ios::failbit | std::ios::badbit);
   out.write(reinterpret_cast<const char*>(values.data()),
             static_cast<std::streamsize>(values.size() * sizeof(double)));
@@ -97,14 +97,15 @@ void write_doubles(const std::filesystem::path& file, const std::vector<double>&
 }  // namespace
 
 Row dgmm_5000_query() {
-  const QueryTimes times = time_queries(1000);
+  const QueryTimes times = time_queries(kFewQueries);
   return {.value = times.query_s * 1e6, .unit = "us", .floor = times.floor_s * 1e6};
 }
 
 Row dgmm_100k_batch() {
   const QueryTimes times = time_queries(kQueries);
   constexpr auto kCount = static_cast<double>(kQueries);
-  return {.value = times.query_s * kCount, .unit = "s", .floor = times.floor_s * kCount};
+  return {
+      .value = times.query_s * kCount * 1e6, .unit = "us", .floor = times.floor_s * kCount * 1e6};
 }
 
 Row dgmm_online_216k() {
@@ -112,7 +113,8 @@ Row dgmm_online_216k() {
   const double seconds = best_seconds([&] { static_cast<void>(learned(samples, kFull)); }, 0.0, 3);
   // Each sample is compared with each mean, in float.
   const double search = stream_seconds(kFull.components * (kInputs + 1) * sizeof(float));
-  return {.value = seconds, .unit = "s", .floor = search * static_cast<double>(kSamples)};
+  return {
+      .value = seconds * 1e6, .unit = "us", .floor = search * static_cast<double>(kSamples) * 1e6};
 }
 
 Row em_k100_iteration() {
@@ -126,28 +128,39 @@ Row em_k100_iteration() {
   // The log density of every sample under every component: 4 differences, 10 + 4 multiply-adds.
   const double operations =
       18.0 * static_cast<double>(kSamples) * static_cast<double>(start.size());
-  return {.value = seconds, .unit = "s", .floor = operations / multiply_adds_per_second()};
+  return {
+      .value = seconds * 1e6, .unit = "us", .floor = operations / multiply_adds_per_second() * 1e6};
 }
 
-void write_dgmm_inputs(const std::filesystem::path& folder) {
-  std::filesystem::create_directories(folder);
+void write_query_inputs() {
   const GaussianMixture& mixture = full_mixture();
-  write_doubles(folder / "weights.f64", mixture.weights);
-  write_doubles(folder / "means.f64", mixture.means.values);
-  write_doubles(folder / "covariances.f64", mixture.covariances.values);
-  write_doubles(folder / "centre.f64", mixture.centre);
-  write_doubles(folder / "scale.f64", mixture.scale);
-  write_doubles(folder / "queries.f64", query_inputs().values);
+  write_doubles("weights.f64", mixture.weights);
+  write_doubles("means.f64", mixture.means.values);
+  write_doubles("covariances.f64", mixture.covariances.values);
+  write_doubles("centre.f64", mixture.centre);
+  write_doubles("scale.f64", mixture.scale);
+  const Matrix inputs = query_inputs(kFewQueries);
+  write_doubles("queries.f64", inputs.values);
+  MixtureRegression regression(mixture, 0);
+  std::vector<double> answers;
+  for (std::size_t i = 0; i < kFewQueries; ++i) {
+    const Conditional answer = regression.query_exact(inputs.row(i));
+    answers.insert(answers.end(), {answer.mean, answer.variance, answer.log_density});
+  }
+  write_doubles("answers.f64", answers);
+}
+
+void write_em_inputs() {
   const Matrix samples = spring_samples(kSamples, 1);
   const GaussianMixture start = learned(samples, kHundred);
   Matrix standardised = samples;
   for (std::size_t i = 0; i < samples.rows; ++i)
     for (std::size_t j = 0; j < samples.columns; ++j)
       standardised(i, j) = (samples(i, j) - start.centre[j]) / start.scale[j];
-  write_doubles(folder / "em_samples.f64", standardised.values);
-  write_doubles(folder / "em_weights.f64", start.weights);
-  write_doubles(folder / "em_means.f64", start.means.values);
-  write_doubles(folder / "em_covariances.f64", start.covariances.values);
+  write_doubles("em_samples.f64", standardised.values);
+  write_doubles("em_weights.f64", start.weights);
+  write_doubles("em_means.f64", start.means.values);
+  write_doubles("em_covariances.f64", start.covariances.values);
 }
 
 }  // namespace torsio::bench

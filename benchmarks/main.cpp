@@ -1,55 +1,63 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
 #include "bench_row.hpp"
-#include "dgmm_bench.hpp"
+#include "rows.hpp"
 
 namespace torsio::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A row is a function and the peer that benchmarks/peers measures for it, if any.
+/// Who else does the work of a row.
+struct Peer {
+  std::string_view name;
+  void (*write_inputs)() = nullptr;
+};
+
 struct Bench {
   std::string_view name;
   Row (*run)();
-  std::string_view peer;
+  std::optional<Peer> peer = {};
 };
 
 constexpr std::array kBenches{
-    Bench{"dgmm_5000_query", dgmm_5000_query, "numpy"},
-    Bench{"dgmm_100k_batch", dgmm_100k_batch, "numpy"},
-    Bench{"dgmm_online_216k", dgmm_online_216k, ""},
-    Bench{"em_k100_iteration", em_k100_iteration, "Armadillo"},
+    Bench{"dgmm_5000_query", dgmm_5000_query, Peer{"numpy", write_query_inputs}},
+    Bench{"dgmm_100k_batch", dgmm_100k_batch, Peer{"numpy", write_query_inputs}},
+    Bench{"dgmm_online_216k", dgmm_online_216k},
+    Bench{"em_k100_iteration", em_k100_iteration, Peer{"Armadillo", write_em_inputs}},
+    Bench{"csv_load", csv_load, Peer{"numpy.loadtxt"}},
+    Bench{"simulate_dfki_120", simulate_dfki_120},
 };
 
 struct Arguments {
-  std::string json;    ///< file to write the rows to
-  std::string only;    ///< one row
-  std::string peers;   ///< file with {"row": value} as the peers wrote it
-  std::string inputs;  ///< folder to write the peers' inputs to, instead of measuring
+  std::string json;   ///< file to write the rows to
+  std::string only;   ///< one row
+  std::string peers;  ///< command that measures a peer
 };
 
 Arguments parse(int count, char** values) {
   Arguments arguments;
   for (int k = 1; k < count; ++k) {
     const std::string_view flag = values[k];
-    std::string* const target = flag == "--json"     ? &arguments.json
-                                : flag == "--only"   ? &arguments.only
-                                : flag == "--peers"  ? &arguments.peers
-                                : flag == "--inputs" ? &arguments.inputs
-                                                     : nullptr;
+    std::string* const target = flag == "--json"    ? &arguments.json
+                                : flag == "--only"  ? &arguments.only
+                                : flag == "--peers" ? &arguments.peers
+                                                    : nullptr;
     if (target == nullptr || k + 1 == count)
       throw std::invalid_argument(
-          "usage: torsio_bench [--json FILE] [--only ROW] [--peers FILE] | --inputs FOLDER");
+          "usage: torsio_bench [--json FILE] [--only ROW] [--peers COMMAND]\n"
+          "COMMAND ROW FOLDER prints what a peer takes for ROW, in the unit of ROW, on the inputs "
+          "in FOLDER.");
     *target = values[++k];
   }
   return arguments;
@@ -60,7 +68,19 @@ double ratio(const Row& row, double better, double worse) {
   return row.unit.ends_with("/s") ? better / worse : worse / better;
 }
 
-Json document(const Bench& bench, const Row& row, const Json& peers) {
+double peer_value(const Peer& peer, std::string_view row, const std::string& command) {
+  if (peer.write_inputs != nullptr) peer.write_inputs();
+  const std::string call = fmt::format("{} {} '{}'", command, row, scratch_folder().string());
+  std::FILE* const output = popen(call.c_str(), "r");
+  double value = 0.0;
+  const bool is_number = output != nullptr && std::fscanf(output, "%lf", &value) == 1;
+  if (output == nullptr || pclose(output) != 0 || !is_number)
+    throw std::runtime_error("the peer could not be measured: " + call);
+  return value;
+}
+
+Json measure(const Bench& bench, const std::string& peers) {
+  const Row row = bench.run();
   Json result = {{"name", bench.name},    {"value", row.value}, {"unit", row.unit},
                  {"floor", nullptr},      {"x_floor", nullptr}, {"peer", nullptr},
                  {"peer_value", nullptr}, {"x_peer", nullptr}};
@@ -68,45 +88,43 @@ Json document(const Bench& bench, const Row& row, const Json& peers) {
     result["floor"] = *row.floor;
     result["x_floor"] = ratio(row, *row.floor, row.value);
   }
-  if (const auto peer = peers.find(bench.name); peer != peers.end()) {
-    const double peer_value = peer->get<double>();
-    result["peer"] = bench.peer;
-    result["peer_value"] = peer_value;
-    result["x_peer"] = ratio(row, row.value, peer_value);
+  if (bench.peer && !peers.empty()) {
+    const double value = peer_value(*bench.peer, bench.name, peers);
+    result["peer"] = bench.peer->name;
+    result["peer_value"] = value;
+    result["x_peer"] = ratio(row, row.value, value);
   }
   return result;
 }
 
 void print(const Json& row) {
-  const auto times = [&](const char* key) {
-    return row[key].is_null() ? std::string("-") : fmt::format("{:.2f}", row[key].get<double>());
+  const auto number = [&](const char* key) {
+    return row[key].is_null() ? std::string("-") : fmt::format("{:.5g}", row[key].get<double>());
   };
-  fmt::print("{:<24} {:>12.5g} {:<8} {:>8} x floor  {:>8} x faster than {}\n",
-             row["name"].get<std::string>(), row["value"].get<double>(),
-             row["unit"].get<std::string>(), times("x_floor"), times("x_peer"),
+  fmt::print("{:<18} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", row["name"].get<std::string>(),
+             number("value"), row["unit"].get<std::string>(), number("floor"), number("x_floor"),
+             number("peer_value"), number("x_peer"),
              row["peer"].is_null() ? "-" : row["peer"].get<std::string>());
   std::fflush(stdout);
 }
 
 int run(const Arguments& arguments) {
-  if (!arguments.inputs.empty()) {
-    write_dgmm_inputs(arguments.inputs);
-    return 0;
+  std::ofstream file;
+  if (!arguments.json.empty()) {
+    file.open(arguments.json);
+    if (!file) throw std::invalid_argument(arguments.json + ": cannot be written");
   }
-  Json peers = Json::object();
-  if (!arguments.peers.empty()) {
-    std::ifstream file(arguments.peers);
-    if (!file) throw std::invalid_argument(arguments.peers + ": cannot be read");
-    peers = Json::parse(file);
-  }
+  fmt::print("{:<18} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", "row", "value", "unit", "floor",
+             "x_floor", "peer value", "x_peer", "peer");
   Json rows = Json::array();
   for (const Bench& bench : kBenches) {
     if (!arguments.only.empty() && arguments.only != bench.name) continue;
-    rows.push_back(document(bench, bench.run(), peers));
+    rows.push_back(measure(bench, arguments.peers));
     print(rows.back());
   }
   if (rows.empty()) throw std::invalid_argument("no row is called " + arguments.only);
-  if (!arguments.json.empty()) std::ofstream(arguments.json) << rows.dump(2) << '\n';
+  if (!arguments.json.empty() && !(file << rows.dump(2) << std::endl))
+    throw std::runtime_error(arguments.json + ": cannot be written");
   return 0;
 }
 

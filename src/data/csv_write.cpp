@@ -1,78 +1,16 @@
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <set>
+#include <span>
 #include <string>
-#include <system_error>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
+#include "torsio/files/output_file.hpp"
 
 namespace torsio {
 namespace {
-
-[[noreturn]] void refuse(const std::string& path, int code) {
-  throw Error(
-      {.place = path, .problem = "cannot be written: " + std::generic_category().message(code)});
-}
-
-/// Writes beside the file and takes its name only when all is on the disk; a device or pipe is
-/// written straight.
-class OutputFile {
- public:
-  explicit OutputFile(std::string path) : path_(std::move(path)) {
-    struct stat info {};
-    const bool exists = stat(path_.c_str(), &info) == 0;
-    if (path_ == "-") {
-      descriptor_ = dup(STDOUT_FILENO);
-    } else if (exists && !S_ISREG(info.st_mode)) {
-      descriptor_ = open(path_.c_str(), O_WRONLY | O_CLOEXEC);
-    } else {
-      temporary_ = fmt::format("{}.{}.tmp", path_, getpid());
-      descriptor_ = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-      if (descriptor_ < 0) temporary_.clear();
-    }
-    if (descriptor_ < 0) refuse(path_, errno);
-  }
-  ~OutputFile() {
-    if (descriptor_ >= 0) close(descriptor_);
-    if (!temporary_.empty()) unlink(temporary_.c_str());
-  }
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
-
-  void write(const char* bytes, std::size_t size) {
-    while (size > 0) {
-      const ssize_t done = ::write(descriptor_, bytes, size);
-      if (done < 0 && errno == EINTR) continue;
-      if (done < 0) refuse(path_, errno);
-      bytes += done;
-      size -= static_cast<std::size_t>(done);
-    }
-  }
-
-  void finish() {
-    if (!temporary_.empty() && fsync(descriptor_) != 0) refuse(path_, errno);
-    const int closed = close(descriptor_);
-    descriptor_ = -1;
-    if (closed != 0) refuse(path_, errno);
-    if (temporary_.empty()) return;
-    if (std::rename(temporary_.c_str(), path_.c_str()) != 0) refuse(path_, errno);
-    temporary_.clear();
-  }
-
- private:
-  std::string path_;
-  std::string temporary_;  ///< empty when there is none to remove
-  int descriptor_ = -1;
-};
 
 /// Collects text and hands it on in large pieces.
 class Text {
@@ -89,7 +27,7 @@ class Text {
     add(std::string_view(std::begin(digits), end));
   }
   void flush() {
-    file_.write(text_.data(), text_.size());
+    file_.write(std::as_bytes(std::span(text_)));
     text_.clear();
   }
 
@@ -126,7 +64,7 @@ std::string freshness_column(std::string_view channel_name) {
 
 void write_csv(const Recording& recording, const std::string& path) {
   check_writable(recording);
-  OutputFile file(path);
+  OutputFile file = path == "-" ? OutputFile::standard_output() : OutputFile(path);
   Text text(file);
   text.add("t_s");
   for (const Channel& channel : recording.channels()) {
@@ -147,7 +85,7 @@ void write_csv(const Recording& recording, const std::string& path) {
     text.add("\n");
   }
   text.flush();
-  file.finish();
+  file.commit();
 }
 
 }  // namespace torsio

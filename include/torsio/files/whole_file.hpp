@@ -13,10 +13,9 @@ namespace torsio {
 [[nodiscard]] std::vector<std::byte> read_whole_file(const std::filesystem::path& path,
                                                      std::size_t most_bytes);
 
-/// Writes under a temporary name in the same folder, syncs and renames: the target holds either its
-/// old bytes or all new ones, after a power loss too. A symbolic link stays one.
+/// Writes a regular file whole or not at all (`OutputFile`).
 /// @throws Error (disk full, no such folder, no permission, the target is no regular file); the
-/// target is then untouched and the temporary file gone.
+/// target is then untouched.
 void write_whole_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 }  // namespace torsio

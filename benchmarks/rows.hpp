@@ -1,0 +1,19 @@
+#pragma once
+
+#include "bench_row.hpp"
+
+namespace torsio::bench {
+
+Row dgmm_5000_query();
+Row dgmm_100k_batch();
+Row dgmm_online_216k();
+Row em_k100_iteration();
+Row csv_load();
+Row simulate_dfki_120();
+
+/// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
+/// work on the same. The peer of `csv_load` reads the file which that row leaves there.
+void write_query_inputs();
+void write_em_inputs();
+
+}  // namespace torsio::bench

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+
+namespace torsio {
+
+/// A file that appears under its name whole or not at all.
+///
+/// It is written under a temporary name in the same folder; `commit` syncs and renames it, so that
+/// the target holds either its old bytes or all new ones, after a power loss too. Destroyed without
+/// `commit`, it leaves nothing. A symbolic link stays one. A device or pipe is written straight.
+class OutputFile {
+ public:
+  /// @throws Error (no such folder, no permission, the target is a directory).
+  explicit OutputFile(const std::filesystem::path& path);
+  /// Written straight, too.
+  [[nodiscard]] static OutputFile standard_output();
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  /// @throws Error if the disk is full, or nobody reads the pipe any more.
+  void write(std::span<const std::byte> bytes);
+  /// Call once, at the end. @throws Error; the target is then untouched.
+  void commit();
+
+ private:
+  OutputFile(std::filesystem::path place, int descriptor);
+  [[noreturn]] void refuse() const;
+
+  std::filesystem::path place_;      ///< for messages
+  std::filesystem::path target_;     ///< what `temporary_` becomes
+  std::filesystem::path temporary_;  ///< empty: none to remove
+  int descriptor_ = -1;
+};
+
+}  // namespace torsio

@@ -1,0 +1,72 @@
+#include "torsio/files/output_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <string_view>
+
+#include "support/error_message.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace torsio {
+namespace {
+
+using test::error_message;
+using testing::HasSubstr;
+
+void write(OutputFile& file, std::string_view text) { file.write(std::as_bytes(std::span(text))); }
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(OutputFile, HasItsNameOnlyAfterCommit) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a", "old");
+  OutputFile file(path);
+  write(file, "one ");
+  write(file, "two");
+  EXPECT_EQ(text_of(path), "old");
+  file.commit();
+  EXPECT_EQ(text_of(path), "one two");
+  EXPECT_EQ(folder.files(), 1U);
+}
+
+TEST(OutputFile, LeavesNothingWithoutCommit) {
+  const TemporaryFolder folder;
+  {
+    OutputFile file(folder.path("a"));
+    write(file, "half");
+  }
+  EXPECT_EQ(folder.files(), 0U);
+}
+
+TEST(OutputFile, TwoOfOneNameDoNotMix) {
+  const TemporaryFolder folder;
+  OutputFile first(folder.path("a"));
+  OutputFile second(folder.path("a"));
+  write(first, "first");
+  write(second, "second");
+  second.commit();
+  first.commit();
+  EXPECT_EQ(text_of(folder.path("a")), "first");
+  EXPECT_EQ(folder.files(), 1U);
+}
+
+TEST(OutputFile, SaysWhyADeviceOrFolderCannotBeWritten) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(error_message([] {
+                OutputFile full("/dev/full");
+                write(full, "x");
+              }),
+              HasSubstr("/dev/full: cannot write: No space left on device"));
+  EXPECT_THAT(error_message([&] { const OutputFile directory(folder.path("")); }),
+              HasSubstr("cannot write: Is a directory"));
+}
+
+}  // namespace
+}  // namespace torsio
