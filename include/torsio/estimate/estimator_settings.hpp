@@ -24,7 +24,8 @@ struct FeatureRanges {
   }
 };
 
-/// value = intercept + sum_j slope_j * feature_j, used where the model must not be trusted.
+/// value = intercept + sum_j slope_j * feature_j, used where the model must not be trusted. Fitted
+/// ones have slope 0 on rates.
 struct LinearFallback {
   double intercept = 0.0;
   std::vector<double> slope;
