@@ -14,7 +14,7 @@ struct FeatureRanges {
   std::vector<double> lowest;
   std::vector<double> highest;
   double margin =
-      0.05;  ///< share of the range by which a feature may leave it before the guard acts
+      0.05;  ///< share of the range over which, outside it, the model hands over to the fallback
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
