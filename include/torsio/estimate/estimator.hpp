@@ -18,18 +18,20 @@ namespace torsio {
 
 /// What runs in the loop: raw channels -> features -> model -> guards -> value with error bar.
 ///
-/// `value` is finite in every case. Where `fault` is not `none` it does not come from the model:
+/// `value` is finite in every case. Within the training range of every feature the model alone
+/// answers. Just outside, over a border as wide as `margin` says, model and fallback are blended:
+/// the fallback's weight w grows linearly with the worst feature's excursion, from 0 at the range
+/// to 1 at the border's end, so that no value jumps; std_dev^2 = (1-w) model's + w fallback's + w
+/// (1-w) (model - fallback)^2, and the fault is still `none`. Where `fault` is not `none`, the
+/// value does not come from the model. The first of these that holds is told:
 ///
-/// | fault | when | value | std_dev |
-/// |---|---|---|---|
-/// | input_count_wrong, input_not_finite | tick unusable, nothing stepped | last good or 0 | NaN |
-/// | warming_up | filters not settled since `reset()` or a long gap | fallback | fallback's (1) |
-/// | outside_training_range | a feature left its range by more than the margin | fallback | NaN |
-/// | model_not_finite | the model's value is NaN or infinite; it is reset | fallback | fallback's |
-/// | any other | the model itself said so | fallback | fallback's |
-///
-/// fallback: the linear one. last good: the last value from usable inputs. (1): NaN outside the
-/// training range, where there is no evidence.
+/// - `input_count_wrong`, `input_not_finite`: the tick cannot be used and nothing is stepped; the
+///   last value from usable inputs (0 if none), without error bar.
+/// - `warming_up`: filters have not settled since `reset()` or a long gap; linear fallback.
+/// - `outside_training_range`: a feature is beyond the border; linear fallback, without error bar:
+///   there is no evidence.
+/// - whatever the model said of itself, or `model_not_finite` (the model is then reset); linear
+///   fallback.
 ///
 /// Should the fallback overflow, the last value is held. After a gap of at most
 /// `kLongestGapSeconds` (never less than one tick) filters and model run on as if the missing ticks
