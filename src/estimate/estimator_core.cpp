@@ -143,8 +143,8 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   const bool restarted = poisoned_ || missed_ > longest_gap_;
   if (restarted) pipeline_.reset();
   const Features features = pipeline_.step(raw);
-  // Finite inputs can still overflow a product or leave a root's domain, and a filter never forgets
-  // that.
+  // Finite inputs can still overflow a product or leave a root's domain; differences and lags hold
+  // such a value for some ticks, so the next usable tick starts afresh.
   poisoned_ = !all_finite(features);
   if (poisoned_) return miss(Fault::input_not_finite);
   missed_ = 0;

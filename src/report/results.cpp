@@ -84,6 +84,7 @@ double rmse_on(const Results& results, const ResultRow& model, const std::string
 }
 
 std::string seconds_text(double seconds) {
+  if (std::isnan(seconds)) return "-";
   return seconds < 0.01 ? "<0.01" : fmt::format("{:.2f}", seconds);
 }
 

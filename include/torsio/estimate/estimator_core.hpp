@@ -70,7 +70,7 @@ class EstimatorCore {
   std::vector<Range> ranges_;  ///< of each feature, tolerance included
   std::size_t longest_gap_;    ///< ticks
   std::size_t missed_ = 0;     ///< ticks in a row without usable input
-  bool poisoned_ = false;      ///< a feature was not finite: the filters may never recover from it
+  bool poisoned_ = false;      ///< a feature was not finite: differences and lags still hold it
   double last_value_ = 0.0;
 };
 
