@@ -19,7 +19,7 @@ struct EvaluateFlags {
 };
 
 /// Target, estimate, error bar and fault of every sample of one recording.
-torsio::Recording prediction_recording(torsio::Estimator& estimator,
+torsio::Recording prediction_recording(const torsio::Estimator& estimator,
                                        const torsio::Recording& recording,
                                        const std::string& target) {
   const torsio::Prediction prediction = torsio::predict(estimator, recording);
@@ -54,7 +54,7 @@ void run(const EvaluateFlags& flags) {
                                 .expected = "one recording",
                                 .found = std::to_string(dataset.records.size()),
                                 .advice = "Call evaluate once for each recording."});
-    torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
+    const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
     torsio::write_csv(
         prediction_recording(estimator, dataset.records.front().recording, dataset.target),
         flags.predictions);
