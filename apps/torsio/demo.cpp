@@ -46,7 +46,7 @@ std::string loop_plot(const torsio::Dataset& dataset, const torsio::ModelFile& m
 std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
                        const torsio::TrainedModel& best) {
   torsio::save_model(flags.output, best.file);
-  torsio::Estimator estimator = torsio::load_estimator(flags.output);
+  const torsio::Estimator estimator = torsio::load_estimator(flags.output);
   const torsio::SplitScore score = torsio::evaluate(estimator, dataset, torsio::Role::test);
   const torsio::Score& together = score.together;
   return fmt::format(

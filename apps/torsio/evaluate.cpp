@@ -19,7 +19,7 @@ struct EvaluateFlags {
 };
 
 /// Target, estimate, error bar and fault of every sample of one recording.
-torsio::Recording prediction_recording(torsio::Estimator& estimator,
+torsio::Recording prediction_recording(const torsio::Estimator& estimator,
                                        const torsio::Recording& recording,
                                        const std::string& target) {
   const torsio::Prediction prediction = torsio::predict(estimator, recording);
@@ -54,7 +54,7 @@ void run(const EvaluateFlags& flags) {
   ProgressBar bar;
   const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
   if (!flags.predictions.empty()) {
-    torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
+    const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
     torsio::write_csv(
         prediction_recording(estimator, dataset.records.front().recording, dataset.target),
         flags.predictions);
@@ -72,7 +72,7 @@ void add_evaluate(CLI::App& app) {
       "Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv\n"
       "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "
       "count,\n"
-      "3 warming up, 4 outside the training range, 5 model not finite, 6 zero not set");
+      "3 warming up, 4 zero not set, 5 outside the training range, 6 model not finite");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
   flags->data.add_mapping(*verb);

@@ -104,14 +104,24 @@ void check_settings(const EstimatorSettings& settings, std::size_t model_input_c
   check_residuals(settings.residuals);
 }
 
+void check_zeroed(const std::vector<std::string>& channels,
+                  const std::vector<std::string>& raw_inputs) {
+  for (const std::string& channel : channels)
+    if (std::ranges::find(raw_inputs, channel) == raw_inputs.end())
+      refuse("zeroed_channels", fmt::format("some of {}", fmt::join(raw_inputs, ", ")),
+             fmt::format("'{}'", channel));
+}
+
 }  // namespace
 
 EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input_count)
     : settings_(std::move(settings)),
       pipeline_(settings_.features, settings_.sample_rate_Hz),
+      unset_zeros_(settings_.zeroed_channels),
       longest_gap_(static_cast<std::size_t>(
           std::clamp(kLongestGapSeconds * settings_.sample_rate_Hz, 1.0, 1e9))) {
   check_settings(settings_, model_input_count);
+  check_zeroed(settings_.zeroed_channels, raw_inputs());
   const FeatureRanges& ranges = settings_.ranges;
   for (std::size_t i = 0; i < model_input_count; ++i) {
     const double low = ranges.lowest[i];
@@ -123,6 +133,11 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
     check_finite("guards.ranges with margin",
                  std::array{low - slack - border, high + slack + border});
   }
+}
+
+void EstimatorCore::set_zero(std::string_view channel, double value) {
+  pipeline_.set_zero(channel, value);
+  std::erase(unset_zeros_, channel);
 }
 
 void EstimatorCore::reset() noexcept {
@@ -176,6 +191,11 @@ Estimate EstimatorCore::judge(Features features, const Estimate& told) noexcept 
     if (inside) out.std_dev = evidence(settings_.fallback.residual_std);
   }
   out.novelty = told.novelty;
+  if (!unset_zeros_.empty()) {
+    // Off by an unknown amount, it says nothing that a channel seems to be outside its range.
+    if (out.fault != Fault::warming_up) out.fault = Fault::zero_not_set;
+    out.std_dev = kNotMeasured;
+  }
   last_value_ = out.value;
   return out;
 }

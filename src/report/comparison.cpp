@@ -108,8 +108,8 @@ ResultRow row_for(const ModelFile& file, Role split, Score score) {
 }
 
 /// The rows of one model: on each role, on each recording and on all of the role together.
-std::vector<ResultRow> rows_for(const ModelFile& file, Estimator& estimator, const Dataset& dataset,
-                                const Progress& progress) {
+std::vector<ResultRow> rows_for(const ModelFile& file, const Estimator& estimator,
+                                const Dataset& dataset, const Progress& progress) {
   std::vector<ResultRow> rows;
   for (const Role role : kRoles) {
     if (!dataset.has_role(role)) continue;
@@ -199,7 +199,7 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
     try {
       const Progress part = part_of(progress, i, choices.size(), choice.family);
       TrainedModel trained = train_model(dataset, choice, seed, part);
-      Estimator estimator = make_estimator(trained.file);
+      const Estimator estimator = make_estimator(trained.file);
       rows = rows_for(trained.file, estimator, dataset, part);
       for (ResultRow& row : rows) row.fit_seconds = trained.fit_seconds;
       const ResultRow* judged = whole_split(rows, judge);
@@ -238,7 +238,7 @@ Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Prog
   dataset.check();
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
-  Estimator estimator = estimator_at(file, dataset.sample_rate_Hz());
+  const Estimator estimator = estimator_at(file, dataset.sample_rate_Hz());
   results.rows = rows_for(file, estimator, dataset, progress);
   return results;
 }

@@ -89,7 +89,9 @@ struct Tally {
 
 }  // namespace
 
-Prediction predict(Estimator& estimator, const Recording& recording) {
+Prediction predict(Estimator estimator, const Recording& recording) {
+  for (const std::string& channel : estimator.settings().zeroed_channels)
+    estimator.set_zero(channel, 0.0);
   const auto channels = raw_channels(estimator, recording);
   std::vector<double> raw(channels.size());
   Prediction prediction;
@@ -107,7 +109,7 @@ Prediction predict(Estimator& estimator, const Recording& recording) {
   return prediction;
 }
 
-SplitScore evaluate(Estimator& estimator, const Dataset& dataset, Role role,
+SplitScore evaluate(const Estimator& estimator, const Dataset& dataset, Role role,
                     const Progress& progress) {
   SplitScore split;
   Tally together;

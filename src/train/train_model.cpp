@@ -60,8 +60,10 @@ TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std:
                                 .parameters = fitted.model.parameters()},
                        .notes = std::move(fitted.notes),
                        .fit_seconds = fit_time.count()};
+  const FeaturePipeline pipeline(choice.features, data.sample_rate_Hz);
   for (const ZeroRule& zero : trained.file.card.zeros)
-    trained.file.settings.zeroed_channels.push_back(zero.channel);
+    if (std::ranges::find(pipeline.raw_inputs(), zero.channel) != pipeline.raw_inputs().end())
+      trained.file.settings.zeroed_channels.push_back(zero.channel);
   return trained;
 }
 

@@ -360,6 +360,65 @@ TEST(Estimator, SubtractsAZero) {
   EXPECT_THROW(estimator.set_zero("elbow_rad", 0.0), UsageError);
 }
 
+/// Trained on records whose zero was taken from each.
+EstimatorSettings zeroed_settings(const std::string& input = "gear_angle_rad") {
+  EstimatorSettings zeroed = settings(input);
+  zeroed.zeroed_channels = {"gear_angle_rad"};
+  zeroed.residuals = {.edges = {-10.0, 10.0}, .std_dev = {1.0}};
+  return zeroed;
+}
+
+TEST(Estimator, IsNotToBeUsedBeforeItsZeroIsSet) {
+  ScriptedEstimator estimator(zeroed_settings(), Scripted({}));
+  EXPECT_THAT(estimator.unset_zeros(), testing::ElementsAre("gear_angle_rad"));
+  for (int i = 0; i < 3; ++i) {
+    const Estimate estimate = step(estimator, 0.5);
+    EXPECT_EQ(estimate.fault, Fault::zero_not_set);
+    EXPECT_EQ(estimate.value, 5.0);
+    EXPECT_TRUE(std::isnan(estimate.std_dev)) << "off by an unknown amount";
+  }
+  estimator.set_zero("gear_angle_rad", 0.2);
+  EXPECT_THAT(estimator.unset_zeros(), testing::IsEmpty());
+  const Estimate estimate = step(estimator, 0.5);
+  EXPECT_EQ(estimate.fault, Fault::none);
+  EXPECT_DOUBLE_EQ(estimate.value, 3.0);
+  EXPECT_EQ(estimate.std_dev, 1.0);
+}
+
+TEST(Estimator, WantsEveryZeroThatTrainingTook) {
+  EstimatorSettings two = zeroed_settings("gear_angle_rad - joint_angle_rad");
+  two.zeroed_channels = {"gear_angle_rad", "joint_angle_rad"};
+  ScriptedEstimator estimator(two, Scripted({}));
+  estimator.set_zero("joint_angle_rad", 0.0);
+  EXPECT_EQ(estimator.step(std::array{0.2, 0.1}).fault, Fault::zero_not_set);
+  EXPECT_THROW(estimator.set_zero("gear_angle_rad", kNaN), UsageError);
+  EXPECT_EQ(estimator.step(std::array{0.2, 0.1}).fault, Fault::zero_not_set);
+  estimator.set_zero("gear_angle_rad", 0.0);
+  EXPECT_EQ(estimator.step(std::array{0.2, 0.1}).fault, Fault::none);
+}
+
+TEST(Estimator, KeepsItsZeroOverAReset) {
+  ScriptedEstimator estimator(zeroed_settings(), Scripted({}));
+  estimator.reset();
+  EXPECT_EQ(step(estimator, 0.5).fault, Fault::zero_not_set);
+  estimator.set_zero("gear_angle_rad", 0.2);
+  estimator.reset();
+  EXPECT_EQ(step(estimator, 0.5).fault, Fault::none);
+  EXPECT_DOUBLE_EQ(step(estimator, 0.5).value, 3.0);
+}
+
+TEST(Estimator, TellsAMissingZeroBehindInputsAndWarmUpAndBeforeTheRange) {
+  ScriptedEstimator estimator(zeroed_settings("lag(gear_angle_rad, 1)"), Scripted({}));
+  EXPECT_EQ(step(estimator, kNaN).fault, Fault::input_not_finite);
+  EXPECT_EQ(step(estimator, 5.0).fault, Fault::warming_up);
+  const Estimate outside = step(estimator, 5.0);
+  EXPECT_EQ(outside.fault, Fault::zero_not_set);
+  EXPECT_EQ(outside.value, 35.5) << "the fallback's, as it would be with a zero";
+  ScriptedEstimator failing(zeroed_settings(), Scripted({.says = {.value = kNaN}, .obeys = true}));
+  EXPECT_EQ(step(failing, 0.5).fault, Fault::zero_not_set);
+  EXPECT_EQ(step(failing, 0.5).value, 4.0);
+}
+
 TEST(Estimator, RefusesSettingsThatDoNotFitTheModel) {
   EXPECT_THAT(
       refusal(settings(), 2),
@@ -376,6 +435,11 @@ TEST(Estimator, RefusesSettingsThatDoNotFitTheModel) {
   bad = settings();
   bad.residuals = {.edges = {0.0, 1.0}, .std_dev = {1.0, 2.0}};
   EXPECT_THAT(refusal(bad), HasSubstr("residuals.edges: expected 3 values, found 2"));
+  bad = settings();
+  bad.zeroed_channels = {"joint_angle_rad"};
+  EXPECT_THAT(
+      refusal(bad),
+      HasSubstr("zeroed_channels: expected some of gear_angle_rad, found 'joint_angle_rad'"));
 }
 
 TEST(Estimator, RefusesGuardsThatWouldLetEverythingThrough) {

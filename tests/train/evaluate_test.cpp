@@ -73,6 +73,26 @@ TEST(Evaluate, SaysWhereAnInputIsMissing) {
   EXPECT_NE(message.find("t = 0.123 s"), std::string::npos) << message;
 }
 
+TEST(Evaluate, KnowsThatTheZerosOfRecordingsWereSubtracted) {
+  Dataset dataset = test::bench_dataset();
+  const SplitScore plain =
+      evaluate(make_estimator(trained(dataset, "linear").file), dataset, Role::test);
+  for (DatasetRecord& record : dataset.records)
+    record.recording.zeros = {{.channel = "joint_angle_rad", .first_s = 0.1, .mid_range = false},
+                              {.channel = "torque_Nm", .first_s = 0.1, .mid_range = false}};
+  const TrainedModel model = trained(dataset, "linear");
+  EXPECT_EQ(model.file.settings.zeroed_channels, std::vector<std::string>{"joint_angle_rad"})
+      << "the target has no zero at run time";
+  Estimator estimator = make_estimator(model.file);
+  estimator.set_zero("joint_angle_rad", 0.7);  // the robot's own
+  const SplitScore score = evaluate(estimator, dataset, Role::test);
+  EXPECT_EQ(score.together.guarded_samples, plain.together.guarded_samples);
+  EXPECT_EQ(score.together.metrics.rmse, plain.together.metrics.rmse);
+  EXPECT_EQ(
+      predict(make_estimator(model.file), dataset.records[2].recording).estimates.back().fault,
+      Fault::none);
+}
+
 TEST(TrainModel, IsTheSameForTheSameSeedAndKnowsWhereItCameFrom) {
   const Dataset dataset = test::bench_dataset();
   for (const char* family : {"linear", "linear_coulomb", "polynomial", "dgmm"})

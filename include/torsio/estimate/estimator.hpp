@@ -23,11 +23,15 @@ namespace torsio {
 /// the fallback's weight w grows linearly with the worst feature's excursion, from 0 at the range
 /// to 1 at the border's end, so that no value jumps; std_dev^2 = (1-w) model's + w fallback's + w
 /// (1-w) (model - fallback)^2, and the fault is still `none`. Where `fault` is not `none`, the
-/// value does not come from the model. The first of these that holds is told:
+/// value must not be used as the model's. The first of these that holds is told:
 ///
 /// - `input_count_wrong`, `input_not_finite`: the tick cannot be used and nothing is stepped; the
 ///   last value from usable inputs (0 if none), without error bar.
 /// - `warming_up`: filters have not settled since `reset()` or a long gap; linear fallback.
+/// - `zero_not_set`: a channel in `settings().zeroed_channels` had its zero taken from each record
+///   in training, and `set_zero` was not called for it. The value is what it would be otherwise,
+///   off by the slope times that zero, without error bar. It stands before the range, because
+///   nobody knows where a channel without a zero is.
 /// - `outside_training_range`: a feature is beyond the border; linear fallback, without error bar:
 ///   there is no evidence.
 /// - whatever the model said of itself, or `model_not_finite` (the model is then reset); linear
@@ -38,9 +42,6 @@ namespace torsio {
 /// had not been, so a plain `rate(x)` shows the whole step over the gap in one tick; after a longer
 /// one they start afresh and warm up. A model without an error bar of its own gets that of the
 /// residual table.
-///
-/// Channels in `settings().zeroed_channels` had their zero taken from each record in training: set
-/// it with `set_zero` before the first step, or the value is off by the slope times that zero.
 template <Model M>
 class BasicEstimator {
  public:
@@ -58,9 +59,15 @@ class BasicEstimator {
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return core_.settings(); }
   [[nodiscard]] const M& model() const noexcept { return model_; }
 
-  /// Subtracts `value` (SI) from a raw channel from now on. Call it while configuring.
+  /// Subtracts `value` (SI) from a raw channel from now on, `reset()` or not. Call it while
+  /// configuring.
   /// @throws UsageError for an unknown channel or a value that is not finite.
   void set_zero(std::string_view channel, double value) { core_.set_zero(channel, value); }
+  /// The channels in `settings().zeroed_channels` that still wait for `set_zero`; while there are
+  /// any, each step says `Fault::zero_not_set`.
+  [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept {
+    return core_.unset_zeros();
+  }
 
   void reset() noexcept {
     core_.reset();

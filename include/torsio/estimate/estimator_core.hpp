@@ -38,7 +38,10 @@ class EstimatorCore {
   }
   [[nodiscard]] bool is_settled() const noexcept { return pipeline_.is_settled(); }
 
-  void set_zero(std::string_view channel, double value) { pipeline_.set_zero(channel, value); }
+  void set_zero(std::string_view channel, double value);
+  [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept {
+    return unset_zeros_;
+  }
   void reset() noexcept;
 
   Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;
@@ -68,9 +71,10 @@ class EstimatorCore {
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
   std::vector<Range> ranges_;  ///< of each feature, tolerance included
-  std::size_t longest_gap_;    ///< ticks
-  std::size_t missed_ = 0;     ///< ticks in a row without usable input
-  bool poisoned_ = false;      ///< a feature was not finite: differences and lags still hold it
+  std::vector<std::string> unset_zeros_;
+  std::size_t longest_gap_;  ///< ticks
+  std::size_t missed_ = 0;   ///< ticks in a row without usable input
+  bool poisoned_ = false;    ///< a feature was not finite: differences and lags still hold it
   double last_value_ = 0.0;
 };
 

@@ -59,9 +59,9 @@ struct ResidualTable {
 struct EstimatorSettings {
   FeatureSpec features;
   double sample_rate_Hz = 0.0;
-  std::string target;  ///< channel name with unit: "torque_Nm"
-  std::vector<std::string>
-      zeroed_channels;  ///< raw channels whose zero was taken from each record: set it at run time
+  std::string target;                        ///< channel name with unit: "torque_Nm"
+  std::vector<std::string> zeroed_channels;  ///< raw inputs whose zero was taken from each record:
+                                             ///< `set_zero` at run time
   FeatureRanges ranges;
   LinearFallback fallback;
   ResidualTable residuals;
