@@ -45,8 +45,8 @@ void run(const EvaluateFlags& flags) {
   const torsio::ModelFile file = torsio::load_model(flags.model);
   DataFlags data = flags.data;
   data.target = file.settings.target;
-  const torsio::Dataset dataset = data.load_as_test();
   ProgressBar bar;
+  const torsio::Dataset dataset = data.load_as_test(bar.listener());
   const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
   if (!flags.predictions.empty()) {
     if (dataset.records.size() != 1)
