@@ -23,7 +23,7 @@ TEST(TrainModel, TakesTheZerosOfTheTrainingRecords) {
 
   dataset.records[2].recording.zeros[0].channel = "joint_angle_rad";
   const std::string message = test::error_message([&] { (void)train_model(dataset, choice, 1); });
-  EXPECT_NE(message.find("second: zero"), std::string::npos) << message;
+  EXPECT_NE(message.find("first: zero"), std::string::npos) << message;
   dataset.records[2].recording.zeros.clear();
   EXPECT_THROW((void)train_model(dataset, choice, 1), Error);
 }
