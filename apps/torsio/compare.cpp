@@ -25,7 +25,7 @@ void run(const CompareFlags& flags) {
   require_folder_of(flags.output);
   require_folder_of(flags.report);
   ProgressBar bar;
-  const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test);
+  const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, bar.listener());
   const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   const auto comparison =
       torsio::compare(dataset, choices, flags.seed, flags.allow_leak, bar.listener());

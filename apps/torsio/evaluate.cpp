@@ -45,13 +45,13 @@ void run(const EvaluateFlags& flags) {
   const torsio::ModelFile file = torsio::load_model(flags.model);
   DataFlags data = flags.data;
   data.target = file.settings.target;
-  const torsio::Dataset dataset = data.load_as_test();
+  ProgressBar bar;
+  const torsio::Dataset dataset = data.load_as_test(bar.listener());
   if (!flags.predictions.empty() && dataset.records.size() != 1)
     throw torsio::UsageError({.place = "--predictions",
                               .expected = "one recording",
                               .found = std::to_string(dataset.records.size()),
                               .advice = "Call evaluate once for each recording."});
-  ProgressBar bar;
   const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
   if (!flags.predictions.empty()) {
     const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());

@@ -62,7 +62,7 @@ void run(const FitFlags& flags) {
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
   require_folder_of(flags.output);
   ProgressBar bar;
-  const torsio::Dataset dataset = flags.data.load(flags.validation, {});
+  const torsio::Dataset dataset = flags.data.load(flags.validation, {}, bar.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   (void)torsio::refuse_leak(dataset, features, flags.allow_leak);
   const torsio::ModelChoice choice{flags.family, parse_settings(flags.settings), "", features};

@@ -59,8 +59,7 @@ std::string schedulable_condition(const Dataset& dataset, const std::vector<std:
     for (const DatasetRecord& record : dataset.records) {
       const auto& conditions = record.recording.conditions();
       if (std::ranges::find(conditions, input) == conditions.end()) continue;
-      if (std::ranges::any_of(record.segments,
-                              [](const Segment& segment) { return segment.role == Role::train; }))
+      if (record.has_role(Role::train))
         values.insert(record.recording.channel(input).values.front());
     }
     if (values.size() > 1) return input;
@@ -213,6 +212,8 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
       }
     } catch (const Cancelled&) {
       throw;
+    } catch (const UsageError&) {
+      throw;  // a setting is wrong; what merely cannot be fitted to these data is another Error
     } catch (const Error& error) {
       rows = {failed_row(choice, error)};
     }

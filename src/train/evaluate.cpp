@@ -118,9 +118,7 @@ SplitScore evaluate(const Estimator& estimator, const Dataset& dataset, Role rol
     report_progress(progress,
                     static_cast<double>(done++) / static_cast<double>(dataset.records.size()),
                     "scoring");
-    if (std::ranges::none_of(record.segments,
-                             [&](const Segment& segment) { return segment.role == role; }))
-      continue;
+    if (!record.has_role(role)) continue;
     const Prediction prediction = predict(estimator, record.recording);
     const Channel& target = record.recording.channel(dataset.target);
     Tally own;

@@ -69,6 +69,16 @@ TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
   EXPECT_EQ(contents("m.safetensors"), "precious");
 }
 
+TEST_F(BrokenCalls, CtrlCStopsTheWaitForAPipe) {
+  for (const char* signal : {"INT", "TERM"}) {
+    const Outcome outcome =
+        shell(std::string("rm -f pipe; mkfifo pipe; sleep 4 >pipe & timeout --signal=") + signal +
+              " --preserve-status 1 {torsio} check pipe");
+    EXPECT_EQ(outcome.exit_code, kWorkFailed) << outcome.err;
+    EXPECT_NE(outcome.err.find("stopped on request"), std::string::npos) << outcome.err;
+  }
+}
+
 TEST_F(BrokenCalls, OnAFullDiskSaySoAndLeaveNothing) {
   expect_error(torsio("simulate dfki-50 sweep --duration 5s -o - > /dev/full"), kWorkFailed, "");
   record();

@@ -31,7 +31,8 @@ struct Comparison {
 
 /// Trains every choice on the training records and scores it on the other roles. A fit that fails
 /// is a row that says why.
-/// @throws Error if there are no test records, or an input is a leak and `allow_leak` is not set.
+/// @throws UsageError if there are no test records, an input is a leak and `allow_leak` is not set,
+/// or a setting names an input that there is not.
 [[nodiscard]] Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
                                  std::uint64_t seed, bool allow_leak,
                                  const Progress& progress = {});

@@ -22,7 +22,7 @@ namespace torsio {
 /// input set, else the deflection, its 10 Hz-filtered rate and the filtered joint speed, as far as
 /// present.
 /// @throws Error listing the channels if an input needs one that a record lacks, or no default
-/// applies.
+/// applies, or if two records define one name differently.
 [[nodiscard]] FeatureSpec resolve_inputs(const Dataset& dataset,
                                          const std::vector<std::string>& wanted);
 

@@ -17,7 +17,7 @@ struct ModelChoice {
   std::string family;
   std::map<std::string, std::string> options = {};  ///< as in `--set name=value`
   std::string input_set = {};  ///< name of the dataset's input set, for tables; may be empty
-  FeatureSpec features;   ///< from `resolve_inputs`
+  FeatureSpec features;        ///< from `resolve_inputs`
 
   /// "branch=true,schedule=support_m": the settings that differ from the defaults, as the user gave
   /// them.
@@ -34,7 +34,8 @@ struct TrainedModel {
 /// Recording -> features -> fitted model -> guards: what `torsio fit` does. Learns from the records
 /// with the role train only; guards take their error bars from the validation records, if there are
 /// any. Deterministic for a seed.
-/// @throws Error if the data cannot be learned from, Cancelled if `progress` asks to stop.
+/// @throws Error if the data cannot be learned from or the training records disagree about which
+/// channels are zeroed, UsageError for a wrong setting, Cancelled if `progress` asks to stop.
 [[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                                        std::uint64_t seed, const Progress& progress = {});
 
