@@ -23,8 +23,8 @@ struct Sequence {
   std::string recording;
   Matrix features = {};             ///< samples x inputs
   std::vector<double> target = {};  ///< NaN where not measured
-  std::vector<std::uint8_t> use =
-      {};  ///< 1: may be learned from (role, settled filters, fresh and finite target)
+  /// 1: may be learned from (role, settled filters, fresh and finite target)
+  std::vector<std::uint8_t> use = {};
 };
 
 /// What every fitter is given.
