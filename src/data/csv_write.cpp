@@ -19,8 +19,8 @@ namespace torsio {
 namespace {
 
 [[noreturn]] void refuse(const std::string& path, int code) {
-  throw Error(
-      {.place = path, .problem = "cannot be written: " + std::generic_category().message(code)});
+  throw Error({.place = path == "-" ? "standard output" : path,
+               .problem = "cannot be written: " + std::generic_category().message(code)});
 }
 
 /// Writes beside the file and takes its name only when all is on the disk; a device or pipe is
