@@ -2,11 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/train/families.hpp"
 #include "torsio/train/inputs.hpp"
 #include "torsio/train/train_model.hpp"
 
@@ -56,6 +60,33 @@ TEST(Evaluate, LeavesTheEmbargoOut) {
   Estimator estimator = make_estimator(trained(dataset, "linear").file);
   const SplitScore score = evaluate(estimator, dataset, Role::test);
   EXPECT_EQ(score.together.metrics.samples, 2 * samples / 10);
+}
+
+TEST(Evaluate, PredictsWhatAnEstimatorFedByHandSays) {
+  const Dataset dataset = test::bench_dataset();
+  const Recording& recording = dataset.records.back().recording;
+  for (const FamilyInfo& family : families()) {
+    SCOPED_TRACE(family.name);
+    const TrainedModel model = trained(dataset, std::string(family.name));
+    Estimator estimator = make_estimator(model.file);
+    (void)predict(estimator, dataset.records.front().recording);  // must leave no trace
+    const Prediction offline = predict(estimator, recording);
+    ASSERT_EQ(offline.estimates.size(), recording.size());
+
+    Estimator in_the_loop = make_estimator(model.file);
+    std::vector<double> raw(in_the_loop.raw_inputs().size());
+    for (std::size_t n = 0; n < recording.size(); ++n) {
+      for (std::size_t j = 0; j < raw.size(); ++j)
+        raw[j] = recording.channel(in_the_loop.raw_inputs()[j]).values[n];
+      const Estimate streamed = in_the_loop.step(raw);
+      const Estimate& told = offline.estimates[n];
+      ASSERT_EQ(told.value, streamed.value) << "sample " << n;
+      ASSERT_EQ(told.fault, streamed.fault) << "sample " << n;
+      ASSERT_TRUE(told.std_dev == streamed.std_dev ||
+                  (std::isnan(told.std_dev) && std::isnan(streamed.std_dev)))
+          << "sample " << n;
+    }
+  }
 }
 
 TEST(Evaluate, SaysWhereAnInputIsMissing) {

@@ -52,8 +52,9 @@ struct OnlineMixtureSettings {
 ///
 ///     ((w_i + w_j) ln|S_ij| - w_i ln|S_i| - w_j ln|S_j|) / 2
 ///
-/// among the lightest and their nearest neighbours is merged first, keeping its moments. A component's neighbour is looked for again
-/// when one of the two has changed, or a new component came up for which it is the nearest.
+/// among the lightest and their nearest neighbours is merged first, keeping its moments. A
+/// component's neighbour is looked for again when one of the two has changed, or a new component
+/// came up for which it is the nearest.
 ///
 /// Source: SPEC 3.1 (000 Algorithm 1, whose sign diverges as printed). Nothing is allocated after
 /// construction but by `mixture`.

@@ -23,8 +23,8 @@ struct Sequence {
   std::string recording;
   Matrix features = {};             ///< samples x inputs
   std::vector<double> target = {};  ///< NaN where not measured
-  std::vector<std::uint8_t> use =
-      {};  ///< 1: may be learned from (role, settled filters, fresh and finite target and features)
+  /// 1: may be learned from (role, settled filters, fresh and finite target, finite features)
+  std::vector<std::uint8_t> use = {};
 
   /// False where a feature is not finite (a division, a power): no model is stepped there.
   [[nodiscard]] bool has_features(std::size_t sample) const;
