@@ -22,8 +22,8 @@ struct CompareFlags {
 };
 
 void run(const CompareFlags& flags) {
-  require_folder_of(flags.output);
-  require_folder_of(flags.report);
+  for (const std::string& output : {flags.output, flags.report, flags.json.destination})
+    flags.data.check_output(output, flags.test);
   ProgressBar bar;
   const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, bar.listener());
   const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
@@ -35,7 +35,7 @@ void run(const CompareFlags& flags) {
   if (!flags.report.empty()) write_text(flags.report, torsio::results_html(comparison.results));
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, comparison.best->file);
-  remark("best model written to " + flags.output);
+  remark("best model (" + comparison.best->file.card.fitted_as + ") written to " + flags.output);
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include "data_flags.hpp"
 
+#include <filesystem>
 #include <utility>
 
+#include "output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
@@ -66,4 +68,18 @@ torsio::Dataset DataFlags::load_as_test(const torsio::Progress& progress) const 
 
 std::vector<std::string> DataFlags::wanted_inputs() const {
   return inputs.empty() ? std::vector<std::string>{} : torsio::split_inputs(inputs);
+}
+
+void DataFlags::check_output(const std::string& output,
+                             const std::vector<std::string>& more_inputs) const {
+  require_folder_of(output);
+  std::vector<std::string> inputs_read = recordings;
+  inputs_read.insert(inputs_read.end(), more_inputs.begin(), more_inputs.end());
+  for (const std::string& input : inputs_read) {
+    std::error_code absent;
+    if (!output.empty() && std::filesystem::equivalent(input, output, absent))
+      throw torsio::UsageError({.place = output,
+                                .problem = "this output would replace a file that is read",
+                                .advice = "Give the output another name."});
+  }
 }

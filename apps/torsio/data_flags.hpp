@@ -28,6 +28,9 @@ struct DataFlags {
   /// The recordings as test data, except where a manifest gives roles.
   [[nodiscard]] torsio::Dataset load_as_test(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
+  /// Refuses an output that would replace one of the recordings, or has no folder to stand in.
+  void check_output(const std::string& output,
+                    const std::vector<std::string>& more_inputs = {}) const;
 };
 
 inline constexpr std::uint64_t kDefaultSeed = 1;

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
@@ -41,7 +43,30 @@ torsio::Recording prediction_recording(const torsio::Estimator& estimator,
   return result;
 }
 
+/// What makes a score mean less than it says.
+void warn_of_doubts(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
+  const auto& trained = file.card.training_files;
+  for (const torsio::DatasetRecord& record : dataset.records) {
+    const torsio::Recording& recording = record.recording;
+    const bool is_known = std::ranges::any_of(trained, [&](const torsio::Source& source) {
+      return !source.sha256.empty() && source.sha256 == recording.source.sha256;
+    });
+    if (is_known)
+      remark("warning: the model was trained on " + recording.name() +
+             "; its score is no held-out one");
+    for (const std::string& channel : file.settings.zeroed_channels) {
+      const bool is_zeroed = std::ranges::any_of(
+          recording.zeros, [&](const torsio::ZeroRule& zero) { return zero.channel == channel; });
+      if (!is_zeroed)
+        remark("warning: the model expects " + channel + " with its zero taken, but " +
+               recording.name() + " has it as measured: use the mapping that it was trained with");
+    }
+  }
+}
+
 void run(const EvaluateFlags& flags) {
+  flags.data.check_output(flags.predictions, {flags.model});
+  flags.data.check_output(flags.json.destination, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   DataFlags data = flags.data;
   data.target = file.settings.target;
@@ -52,6 +77,7 @@ void run(const EvaluateFlags& flags) {
                               .expected = "one recording",
                               .found = std::to_string(dataset.records.size()),
                               .advice = "Call evaluate once for each recording."});
+  warn_of_doubts(file, dataset);
   const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
   if (!flags.predictions.empty()) {
     const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
@@ -61,6 +87,9 @@ void run(const EvaluateFlags& flags) {
   }
   if (flags.json.wants_tables()) print(evaluation_text(results));
   flags.json.write(torsio::results_json(results));
+  if (std::ranges::all_of(results.rows,
+                          [](const torsio::ResultRow& row) { return row.status != "ok"; }))
+    throw torsio::Error({.problem = first_failure(results)});
 }
 
 }  // namespace

@@ -146,6 +146,22 @@ const ResultRow* whole_split(const std::vector<ResultRow>& rows, Role role) {
   return nullptr;
 }
 
+/// A file that is both trained and tested on would make every score a lie. (Blocks of one record are another matter.)
+void refuse_seen_test_records(const Dataset& dataset) {
+  std::set<std::string> trained;
+  for (const DatasetRecord& record : dataset.records)
+    if (record.has_role(Role::train)) trained.insert(record.recording.source.sha256);
+  for (const DatasetRecord& record : dataset.records) {
+    const bool is_held_out = !record.has_role(Role::train);
+    if (is_held_out && !record.recording.source.sha256.empty() &&
+        trained.contains(record.recording.source.sha256))
+      throw UsageError(
+          {.place = record.recording.name(),
+           .problem = "this file is both trained and judged on",
+           .advice = "Hold another recording out, or split one with `split:` in a manifest."});
+  }
+}
+
 /// A model's share of the whole work's progress.
 Progress part_of(const Progress& progress, std::size_t index, std::size_t count,
                  const std::string& doing) {
@@ -161,6 +177,10 @@ std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view 
                                        const std::vector<std::string>& wanted_inputs) {
   auto input_sets = dataset.input_sets;
   if (!wanted_inputs.empty() || input_sets.empty()) input_sets = {{"", wanted_inputs}};
+  if (models.empty())
+    throw UsageError({.place = "--models",
+                      .expected = "all, or families separated by commas",
+                      .found = "nothing"});
   std::vector<ModelChoice> choices;
   for (const auto& [set_name, inputs] : input_sets) {
     const FeatureSpec features = resolve_inputs(dataset, inputs);
@@ -179,6 +199,7 @@ std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view 
 Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
                    std::uint64_t seed, bool allow_leak, const Progress& progress) {
   dataset.check();
+  refuse_seen_test_records(dataset);
   if (!dataset.has_role(Role::test))
     throw UsageError(
         {.problem = "nothing to compare on: no recording has the role test",

@@ -83,6 +83,11 @@ double rmse_on(const Results& results, const ResultRow& model, const std::string
   return kNotMeasured;
 }
 
+/// Three decimals, until they would fill the line.
+std::string error_text(double value) {
+  return std::abs(value) < 1e6 ? fmt::format("{:.3f}", value) : fmt::format("{:.3g}", value);
+}
+
 std::string seconds_text(double seconds) {
   if (std::isnan(seconds)) return "-";
   return seconds < 0.01 ? "<0.01" : fmt::format("{:.2f}", seconds);
@@ -110,7 +115,7 @@ std::string ranked_table(const Results& results, Role split) {
   TextTable table;
   table.header({"model"});
   if (has_sets) table.header({"inputs"});
-  table.header({"RMSE", "MAD", "max|e|", "fit %"});
+  table.header({"RMSE", "MAD", "max|e|", "fit %", "guard %"});
   for (const std::string& recording : recordings) table.header({"RMSE " + recording});
   table.header({"step ns", "p99.9", "fit s", "parameters"});
 
@@ -126,10 +131,12 @@ std::string ranked_table(const Results& results, Role split) {
     std::vector<std::string> cells{model_label(*row)};
     if (has_sets) cells.push_back(row->input_set);
     for (const double value : {metrics.rmse, metrics.mad, metrics.max_abs})
-      cells.push_back(fmt::format("{:.3f}", value));
+      cells.push_back(error_text(value));
     cells.push_back(fmt::format("{:.1f}", metrics.fit_percent));
+    cells.push_back(fmt::format("{:.1f}", 100.0 * static_cast<double>(row->score.guarded_samples) /
+                                              static_cast<double>(metrics.samples)));
     for (const std::string& recording : recordings)
-      cells.push_back(fmt::format("{:.3f}", rmse_on(results, *row, recording)));
+      cells.push_back(error_text(rmse_on(results, *row, recording)));
     cells.push_back(fmt::format("{:.0f}", row->score.step_ns_p50));
     cells.push_back(fmt::format("{:.0f}", row->score.step_ns_p999));
     cells.push_back(seconds_text(row->fit_seconds));

@@ -40,6 +40,7 @@ class Checker {
 
   std::vector<Finding> run() {
     check_length();
+    if (has_failed()) return std::move(findings_);  // too short: nothing else can be said
     check_missing();
     check_constant();
     check_saturation();
@@ -165,7 +166,7 @@ class Checker {
         if (is_condition(recording, channel.name)) return;
         const std::vector<double> values = bridged(channel);
         const Jump jump = largest_jump(values);
-        if (jump.height < kJumpShare * extent_of(values).width() ||
+        if (!(jump.height > 0.0) || jump.height < kJumpShare * extent_of(values).width() ||
             jump.height < kJumpOverOthers * jump.next_height)
           return;
         add(Verdict::warn, "gaps", recording.name(),
@@ -203,9 +204,11 @@ class Checker {
                     "{} comes {:.1f} ms {} {} (unexplained {:.2f} % there, {:.2f} % without shift)",
                     dataset_.target, std::abs(delay_ms), delay_ms > 0 ? "after" : "before",
                     spec_.inputs.front(), 100.0 * least, 100.0 * at_zero),
-                delay_ms > 0
+                delay_ms > 0 && best < longest
                     ? fmt::format("Mapping line that takes it out: latency: {{{}: {:.1f}ms}}",
                                   dataset_.target, delay_ms)
+                : best == longest
+                    ? "The search ends there: look at the loggers' clocks."
                     : "Look at the loggers' clocks: a torque cannot precede its deflection.");
           }
         });

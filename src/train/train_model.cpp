@@ -61,6 +61,17 @@ ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Opti
   return card;
 }
 
+/// Nothing can be learned from a target that never changes, and every score of it would be 0 / 0.
+void refuse_constant_target(const TrainingData& data) {
+  const std::vector<double> target = usable_table(data).target;
+  const auto [lowest, highest] = std::ranges::minmax(target);
+  if (lowest < highest) return;
+  throw Error({.place = data.target,
+               .expected = "a target that changes",
+               .found = fmt::format("{} in every training sample", lowest),
+               .advice = "Is the sensor connected? torsio check says more."});
+}
+
 }  // namespace
 
 std::string ModelChoice::variant() const {
@@ -76,6 +87,7 @@ TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std:
   const Options options(family.options, choice.options);
   ModelCard card = card_for(dataset, choice, options, seed);
   const TrainingData data = training_data(dataset, choice.features);
+  refuse_constant_target(data);
   std::optional<TrainingData> validation;
   if (dataset.has_role(Role::validation))
     validation = training_data(dataset, choice.features, Role::validation);

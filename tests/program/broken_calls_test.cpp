@@ -102,7 +102,7 @@ TEST_F(BrokenCalls, OnAFullDiskSaySoAndLeaveNothing) {
 TEST_F(BrokenCalls, NameTheOutputThatCannotBeAFile) {
   record();
   expect_error(torsio("fit a.csv --model linear -o /dev/full"), kWorkFailed, "/dev/full");
-  expect_error(torsio("fit a.csv --model linear -o no/such/folder/m.safetensors"), kWorkFailed,
+  expect_error(torsio("fit a.csv --model linear -o no/such/folder/m.safetensors"), kCallWasWrong,
                "no/such/folder");
 }
 
@@ -131,6 +131,26 @@ TEST_F(BrokenCalls, RefuseAModelWhoseInputsTheRecordingLacks) {
   const Outcome outcome = torsio("evaluate m.safetensors b.csv");
   EXPECT_EQ(outcome.exit_code, kWorkFailed);
   EXPECT_NE(outcome.err.find("gear_angle_rad"), std::string::npos) << outcome.err;
+}
+
+TEST_F(BrokenCalls, NeverReplaceWhatTheyRead) {
+  record();
+  const std::string before = contents("a.csv");
+  expect_error(torsio("fit a.csv --model linear -o a.csv"), kCallWasWrong, "a.csv");
+  expect_error(torsio("fit a.csv --model linear -o m.safetensors --json ./a.csv"), kCallWasWrong,
+               "a.csv");
+  ASSERT_EQ(torsio("fit a.csv --model linear -o m.safetensors").exit_code, 0);
+  expect_error(torsio("evaluate m.safetensors a.csv --predictions a.csv"), kCallWasWrong, "a.csv");
+  EXPECT_EQ(contents("a.csv"), before);
+}
+
+TEST_F(BrokenCalls, DoNotPassTrainingDataOffAsHeldOut) {
+  record();
+  expect_error(torsio("compare a.csv --test a.csv"), kCallWasWrong, "both trained and judged on");
+  ASSERT_EQ(torsio("fit a.csv --model linear -o m.safetensors").exit_code, 0);
+  const Outcome evaluate = torsio("evaluate m.safetensors a.csv");
+  EXPECT_EQ(evaluate.exit_code, 0);
+  EXPECT_NE(evaluate.err.find("was trained on"), std::string::npos) << evaluate.err;
 }
 
 TEST_F(BrokenCalls, RefuseALeakUnlessItIsAllowed) {

@@ -5,7 +5,7 @@
 
 namespace torsio {
 
-/// A table for the terminal: the first column left-aligned, the others to the right.
+/// A table for the terminal: columns of numbers to the right (but never the first), of words to the left.
 class TextTable {
  public:
   void header(const std::vector<std::string>& cells);  ///< appends columns
