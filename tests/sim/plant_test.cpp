@@ -154,8 +154,9 @@ TEST(Plant, DividesAStepThatIsLongerThanItsOwn) {
   Plant ten_times(plant_parameters(data_sheet("dfki-120")));
   const Load load = lever(9.0, 0.3);
   for (int i = 0; i < 500; ++i) {
-    once.step({.current_A = 5.0}, load, 1e-3);
-    for (int k = 0; k < 10; ++k) ten_times.step({.current_A = 5.0}, load, 1e-3 / 10.0);
+    EXPECT_EQ(once.step({.current_A = 5.0}, load, 1e-3), Fault::none);
+    for (int k = 0; k < 10; ++k)
+      EXPECT_EQ(ten_times.step({.current_A = 5.0}, load, 1e-3 / 10.0), Fault::none);
   }
   EXPECT_EQ(once.state().rotor_angle_rad, ten_times.state().rotor_angle_rad);
   EXPECT_EQ(once.torques().joint_Nm, ten_times.torques().joint_Nm);
