@@ -38,15 +38,16 @@ constexpr const char* kRemedies =
 void refuse_unusable(const Stamps& stamps) {
   if (stamps.rows.size() < 2)
     throw ClockError({.place = stamps.place(0),
-                 .expected = "at least two samples, to tell the sample rate",
-                 .found = "one sample"});
+                      .expected = "at least two samples, to tell the sample rate",
+                      .found = "one sample"});
   if (stamps.report.not_finite > 0) {
     const auto missing =
         std::ranges::find_if(stamps.values_s, [](double stamp) { return !std::isfinite(stamp); });
-    throw ClockError({.place = stamps.place(static_cast<std::size_t>(missing - stamps.values_s.begin())),
-                 .expected = "a time stamp",
-                 .found = "nothing",
-                 .advice = "Remove the line, or drop the clock column and tell the rate."});
+    throw ClockError(
+        {.place = stamps.place(static_cast<std::size_t>(missing - stamps.values_s.begin())),
+         .expected = "a time stamp",
+         .found = "nothing",
+         .advice = "Remove the line, or drop the clock column and tell the rate."});
   }
   if (!(stamps.report.sample_rate_Hz > 0.0))
     throw ClockError(
@@ -59,13 +60,14 @@ void refuse_unusable(const Stamps& stamps) {
 void refuse_not_increasing(const Stamps& stamps, const char* advice) {
   const std::size_t at = stamps.report.first_not_increasing;
   if (at == 0) return;
-  throw ClockError({.place = stamps.place(at),
-               .problem = fmt::format("the clock does not advance ({} stamps are repeated, {} run "
-                                      "backward)",
-                                      stamps.report.duplicated, stamps.report.backward),
-               .expected = fmt::format("more than {} s", stamps.values_s[at - 1]),
-               .found = fmt::format("{} s", stamps.values_s[at]),
-               .advice = advice});
+  throw ClockError(
+      {.place = stamps.place(at),
+       .problem = fmt::format("the clock does not advance ({} stamps are repeated, {} run "
+                              "backward)",
+                              stamps.report.duplicated, stamps.report.backward),
+       .expected = fmt::format("more than {} s", stamps.values_s[at - 1]),
+       .found = fmt::format("{} s", stamps.values_s[at]),
+       .advice = advice});
 }
 
 double even_rate(const Stamps& stamps) {
@@ -73,12 +75,13 @@ double even_rate(const Stamps& stamps) {
   const ClockReport& report = stamps.report;
   const std::size_t odd = report.worst_interval;
   if (!report.is_uniform())
-    throw ClockError({.place = stamps.place(odd),
-                 .problem = fmt::format("the clock is not even (a stamp strays by {:.3g} samples)",
-                                        report.largest_stray_s * report.sample_rate_Hz),
-                 .expected = fmt::format("an interval near {:.6g} s", report.stamp_step_s),
-                 .found = fmt::format("{:.6g} s", stamps.values_s[odd] - stamps.values_s[odd - 1]),
-                 .advice = kRemedies});
+    throw ClockError(
+        {.place = stamps.place(odd),
+         .problem = fmt::format("the clock is not even (a stamp strays by {:.3g} samples)",
+                                report.largest_stray_s * report.sample_rate_Hz),
+         .expected = fmt::format("an interval near {:.6g} s", report.stamp_step_s),
+         .found = fmt::format("{:.6g} s", stamps.values_s[odd] - stamps.values_s[odd - 1]),
+         .advice = kRemedies});
   const double first = stamps.values_s.front();
   const double last = stamps.values_s.back();
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon();
@@ -110,17 +113,17 @@ void refuse_gaps(const Stamps& stamps) {
     const double interval = stamps.values_s[i] - stamps.values_s[i - 1];
     if (interval < 0.0)
       throw ClockError({.place = stamps.place(i),
-                   .problem = "the clock runs backward",
-                   .expected = fmt::format("at least {} s", stamps.values_s[i - 1]),
-                   .found = fmt::format("{} s", stamps.values_s[i]),
-                   .advice = "Cut the log there into two files."});
+                        .problem = "the clock runs backward",
+                        .expected = fmt::format("at least {} s", stamps.values_s[i - 1]),
+                        .found = fmt::format("{} s", stamps.values_s[i]),
+                        .advice = "Cut the log there into two files."});
     if (interval > kLongestGapIntervals * stamps.report.stamp_step_s)
       throw ClockError({.place = stamps.place(i),
-                   .problem = "a gap too long to interpolate over",
-                   .expected = fmt::format("at most {} intervals of {:.4g} s", kLongestGapIntervals,
-                                           stamps.report.stamp_step_s),
-                   .found = fmt::format("{:.4g} s", interval),
-                   .advice = "Cut the log there into two files."});
+                        .problem = "a gap too long to interpolate over",
+                        .expected = fmt::format("at most {} intervals of {:.4g} s",
+                                                kLongestGapIntervals, stamps.report.stamp_step_s),
+                        .found = fmt::format("{:.4g} s", interval),
+                        .advice = "Cut the log there into two files."});
   }
 }
 

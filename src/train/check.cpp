@@ -73,7 +73,7 @@ class Checker {
         body(record.recording, record.recording.channel(channel));
   }
 
-  [[nodiscard]] bool is_condition(const Recording& recording, const std::string& channel) const {
+  [[nodiscard]] static bool is_condition(const Recording& recording, const std::string& channel) {
     return std::ranges::find(recording.conditions(), channel) != recording.conditions().end();
   }
 
@@ -293,7 +293,7 @@ class Checker {
   }
 
   /// Lower and upper decile of the speeds while moving.
-  [[nodiscard]] static std::vector<double> typical_speeds(std::vector<double> differences) {
+  [[nodiscard]] static std::vector<double> typical_speeds(const std::vector<double>& differences) {
     std::vector<double> speeds;
     for (const double difference : differences)
       if (is_finite(difference)) speeds.push_back(std::abs(difference));

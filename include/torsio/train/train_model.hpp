@@ -17,7 +17,7 @@ struct ModelChoice {
   std::string family;
   std::map<std::string, std::string> options = {};  ///< as in `--set name=value`
   std::string input_set = {};  ///< name of the dataset's input set, for tables; may be empty
-  FeatureSpec features;   ///< from `resolve_inputs`
+  FeatureSpec features;        ///< from `resolve_inputs`
 
   /// "branch=true,schedule=support_m": the settings that differ from the defaults, as the user gave
   /// them.
