@@ -1,5 +1,6 @@
 // A model of your own inside torsio's estimator: anything that satisfies the concept `Model` gets
 // the feature pipeline, the guards and the fault handling.
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -18,10 +19,10 @@ class CubicSpring {
 
   explicit CubicSpring(const Parameters& parameters) : parameters_(parameters) {}
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
-  [[nodiscard]] std::size_t input_count() const noexcept { return 1; }
-  [[nodiscard]] std::size_t parameter_count() const noexcept { return 2; }
+  [[nodiscard]] static std::size_t input_count() noexcept { return 1; }
+  [[nodiscard]] static std::size_t parameter_count() noexcept { return 2; }
   void reset() noexcept {}
-  torsio::Estimate step(torsio::Features x) noexcept {
+  [[nodiscard]] torsio::Estimate step(torsio::Features x) const noexcept {
     return {.value = parameters_.k_Nm_rad * x[0] + parameters_.k3_Nm_rad3 * x[0] * x[0] * x[0]};
   }
 
@@ -49,7 +50,7 @@ int main() {
     torsio::BasicEstimator<CubicSpring> estimator(
         settings(), CubicSpring({.k_Nm_rad = 500.0, .k3_Nm_rad3 = 2e4}));
     for (const double deflection_rad : {0.0, 0.05, 0.1, 0.5, std::nan("")}) {
-      const double raw[] = {deflection_rad, 0.0};  // in the order of estimator.raw_inputs()
+      const std::array raw = {deflection_rad, 0.0};  // in the order of estimator.raw_inputs()
       const torsio::Estimate torque = estimator.step(raw);
       const std::string_view fault = torsio::name(torque.fault);
       std::printf("%5.2f rad: %7.2f Nm, fault %.*s\n", deflection_rad, torque.value,

@@ -20,9 +20,7 @@ int complain(const char* message, int exit_code) {
   return exit_code;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app(
       "Learns how a series-elastic actuator's spring behaves and tells the joint torque from it.",
       "torsio");
@@ -40,6 +38,14 @@ int main(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kCallWasWrong;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
   } catch (const torsio::UsageError& error) {
     return complain(error.what(), kCallWasWrong);
   } catch (const torsio::Error& error) {

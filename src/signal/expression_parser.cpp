@@ -55,13 +55,13 @@ bool is_name(std::string_view text) {
 
 // The text as an error message may show it: one line, no control characters, not endless.
 std::string shown(std::string_view text, std::size_t around = 0) {
-  constexpr std::size_t before = 60;
-  constexpr std::size_t window = 120;
-  const std::size_t from = text.size() > window && around > before ? around - before : 0;
-  std::string result(text.substr(from, window));
+  constexpr std::size_t kBefore = 60;
+  constexpr std::size_t kWindow = 120;
+  const std::size_t from = text.size() > kWindow && around > kBefore ? around - kBefore : 0;
+  std::string result(text.substr(from, kWindow));
   std::replace_if(
       result.begin(), result.end(), [](char c) { return !is_printable(c); }, '?');
-  return (from > 0 ? "..." : "") + result + (text.size() > from + window ? "..." : "");
+  return (from > 0 ? "..." : "") + result + (text.size() > from + kWindow ? "..." : "");
 }
 
 }  // namespace

@@ -261,15 +261,15 @@ std::vector<std::string> channels_of(std::string_view expression) {
 }
 
 std::vector<std::string> split_inputs(std::string_view list) {
-  constexpr std::string_view blank = " \t\r\n";
+  constexpr std::string_view kBlank = " \t\r\n";
   std::vector<std::string> inputs;
-  if (list.find_first_not_of(blank) == std::string_view::npos) return inputs;
+  if (list.find_first_not_of(kBlank) == std::string_view::npos) return inputs;
   const auto add_trimmed = [&](std::string_view part) {
-    const std::size_t first = part.find_first_not_of(blank);
+    const std::size_t first = part.find_first_not_of(kBlank);
     if (first == std::string_view::npos)
       inputs.emplace_back();
     else
-      inputs.emplace_back(part.substr(first, part.find_last_not_of(blank) - first + 1));
+      inputs.emplace_back(part.substr(first, part.find_last_not_of(kBlank) - first + 1));
   };
   std::size_t start = 0;
   std::ptrdiff_t depth = 0;

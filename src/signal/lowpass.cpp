@@ -37,12 +37,12 @@ Lowpass::Lowpass(double cutoff_Hz, double sample_rate_Hz)
 // The poles are p = (1 + q) / (1 - q) with q = g exp(3 pi i / 4), so |p|^2 = 1 - 2 sqrt(2) g / D
 // with D = |1 - q|^2; the step response strays from 1 by at most sqrt(2 / D) |p|^n.
 std::size_t Lowpass::settling_samples() const noexcept {
-  constexpr double tolerance = 0.01;
+  constexpr double kTolerance = 0.01;
   const double d = denominator(prewarped_);
   const double amplitude = std::sqrt(2.0 / d);
-  if (amplitude <= tolerance) return 1;
+  if (amplitude <= kTolerance) return 1;
   const double log_radius = 0.5 * std::log1p(-2.0 * std::numbers::sqrt2 * prewarped_ / d);
-  return 1 + static_cast<std::size_t>(std::ceil(std::log(tolerance / amplitude) / log_radius));
+  return 1 + static_cast<std::size_t>(std::ceil(std::log(kTolerance / amplitude) / log_radius));
 }
 
 // (1/2pi) times the integral of |H|^2 = 1 / (1 + (tan(w/2) / g)^4) over one turn of w.

@@ -76,7 +76,7 @@ class Checker {
         body(record.recording, record.recording.channel(channel));
   }
 
-  [[nodiscard]] bool is_condition(const Recording& recording, const std::string& channel) const {
+  [[nodiscard]] static bool is_condition(const Recording& recording, const std::string& channel) {
     return std::ranges::find(recording.conditions(), channel) != recording.conditions().end();
   }
 

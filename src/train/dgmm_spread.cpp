@@ -129,7 +129,8 @@ bool is_clearly_better(const FoldErrors& errors, const FoldErrors& at_default) {
 SpreadChoice choose_spread(const Matrix& samples, const TrainingData& data,
                            const FitWithSpread& fit, std::size_t threads,
                            const Progress& progress) {
-  const auto [folds, of_records] = folds_of(samples, data);
+  const Folds split = folds_of(samples, data);
+  const std::vector<Fold>& folds = split.folds;
   if (folds.size() < 2)
     return {.note = fmt::format("initial_spread {}: fewer than two records lie within the range of "
                                 "the others, so none could be chosen by leaving one out",
@@ -151,11 +152,12 @@ SpreadChoice choose_spread(const Matrix& samples, const TrainingData& data,
       static_cast<std::size_t>(std::ranges::min_element(errors, {}, mean_of) - errors.begin());
   const bool is_clear = best != kDefault && is_clearly_better(errors[best], errors[kDefault]);
   const double spread = is_clear ? kSpreads[best] : kDefaultSpread;
-  return {.spread = spread,
-          .note = fmt::format(
-              "initial_spread {} {} leaving out {}; RMSE there: {}", spread,
-              best == kDefault || is_clear ? "chosen by" : "kept, none is clearly better when",
-              of_records ? "one record at a time" : "a fifth of the record at a time", scores)};
+  return {
+      .spread = spread,
+      .note = fmt::format(
+          "initial_spread {} {} leaving out {}; RMSE there: {}", spread,
+          best == kDefault || is_clear ? "chosen by" : "kept, none is clearly better when",
+          split.of_records ? "one record at a time" : "a fifth of the record at a time", scores)};
 }
 
 }  // namespace torsio

@@ -94,7 +94,7 @@ FittedModel polynomial(const TrainingData& data, const Options& options, std::ui
                                             .schedule = options.text("schedule")}));
 }
 
-FittedModel dgmm(const TrainingData& data, const Options& options, std::uint64_t,
+FittedModel dgmm(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
                  const Progress& progress) {
   return fitted_model(
       fit_dgmm(data,
@@ -111,7 +111,7 @@ FittedModel dgmm(const TrainingData& data, const Options& options, std::uint64_t
                progress));
 }
 
-FittedModel dgmm_paper(const TrainingData& data, const Options& options, std::uint64_t,
+FittedModel dgmm_paper(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
                        const Progress& progress) {
   return fitted_model(fit_dgmm_paper(data,
                                      {.components = options.integer("components"),

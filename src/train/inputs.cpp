@@ -113,7 +113,12 @@ std::vector<ChannelDefinition> needed_definitions(const std::vector<ChannelDefin
 /// Whether target = slope * input + offset to one part in 10^9 of the variance, over all fresh
 /// samples: no sensor is that good.
 bool is_straight_line(const Dataset& dataset, const std::string& input) {
-  double n = 0, mean_x = 0, mean_y = 0, xx = 0, xy = 0, yy = 0;
+  double n = 0.0;
+  double mean_x = 0.0;
+  double mean_y = 0.0;
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
   for (const DatasetRecord& record : dataset.records) {
     const Channel& target = record.recording.channel(dataset.target);
     const std::vector<double>& x_values = record.recording.channel(input).values;

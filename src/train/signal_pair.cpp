@@ -43,7 +43,12 @@ std::vector<double> bridged(const Channel& channel) {
 }
 
 double correlation(const std::vector<double>& x, const std::vector<double>& y) {
-  double n = 0, sx = 0, sy = 0, xx = 0, xy = 0, yy = 0;
+  double n = 0.0;
+  double sx = 0.0;
+  double sy = 0.0;
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
   for (std::size_t i = 0; i < x.size(); ++i) {
     const double a = x[i];
     const double b = y[i];
