@@ -1,15 +1,20 @@
+# Two export sets, so that a robot that links runtime and files need not have the lab's libraries.
 include(CMakePackageConfigHelpers)
+set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
 
-set(torsio_installed_targets torsio_runtime torsio_files)
-if(TORSIO_BUILD_LAB)
-  list(APPEND torsio_installed_targets torsio_lab)
-  install(TARGETS torsio_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-endif()
-install(TARGETS ${torsio_installed_targets} EXPORT torsioTargets FILE_SET HEADERS
+install(TARGETS torsio_runtime torsio_files EXPORT torsioTargets FILE_SET HEADERS
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(EXPORT torsioTargets NAMESPACE torsio:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
+install(EXPORT torsioTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
+if(TORSIO_BUILD_LAB)
+  install(TARGETS torsio_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT torsioLabTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
+endif()
+
 configure_package_config_file(cmake/torsioConfig.cmake.in ${PROJECT_BINARY_DIR}/torsioConfig.cmake
-  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
+  INSTALL_DESTINATION ${torsio_package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/torsioConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/torsioConfig.cmake ${PROJECT_BINARY_DIR}/torsioConfigVersion.cmake
-        DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
+        DESTINATION ${torsio_package_dir})
+install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})

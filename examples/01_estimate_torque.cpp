@@ -22,14 +22,15 @@ torsio::JointSample read_joint(int tick) {
 int run(const char* model_file) {
   // readme-begin
   torsio::TorqueEstimator estimator(
-      torsio::load_estimator(model_file));   // may throw: configure first
+      torsio::load_estimator(model_file));  // may throw: configure first
+  // Trained on records with a `zero:`? estimator.set_zero("gear_angle_rad", angle_at_rest_rad);
   const torsio::DenormalsOff denormals_off;  // once a real-time thread
   estimator.reset();
   for (int tick = 0; tick < 2000; ++tick) {
     const torsio::JointSample joint = read_joint(tick);     // angles on both sides of the spring
     const torsio::Estimate torque = estimator.step(joint);  // noexcept, no heap, no lock
     if (torque.fault != torsio::Fault::none)
-      continue;  // warming up, outside the training range, ...
+      continue;  // warming up, zero not set, outside the training range, ...
     if (tick % 500 == 0)
       std::printf("t = %.1f s: %6.2f Nm +- %.2f\n", joint.t_s, torque.value, torque.std_dev);
   }

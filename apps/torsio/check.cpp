@@ -7,6 +7,7 @@
 
 #include "data_flags.hpp"
 #include "output.hpp"
+#include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
 #include "torsio/train/inputs.hpp"
@@ -53,7 +54,8 @@ std::string json_of(const std::vector<torsio::Finding>& findings) {
 /// A clock that is not uniform keeps a recording from being read: that is a finding, too.
 std::vector<torsio::Finding> findings_of(const CheckFlags& flags) {
   try {
-    const torsio::Dataset dataset = flags.data.load({}, flags.test);
+    ProgressBar bar;
+    const torsio::Dataset dataset = flags.data.load({}, flags.test, bar.listener());
     const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
     std::vector<torsio::Finding> findings{{torsio::Verdict::pass, "clock", "", "uniform", ""}};
     std::ranges::move(torsio::check_dataset(dataset, spec), std::back_inserter(findings));

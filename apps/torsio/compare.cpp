@@ -4,6 +4,7 @@
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/report/comparison.hpp"
+#include "torsio/report/html.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -14,22 +15,27 @@ struct CompareFlags {
   std::vector<std::string> test;
   std::string models = "all";
   std::string output;
+  std::string report;
   std::uint64_t seed = kDefaultSeed;
   bool allow_leak = false;
   JsonOutput json;
 };
 
 void run(const CompareFlags& flags) {
+  require_folder_of(flags.output);
+  require_folder_of(flags.report);
   ProgressBar bar;
-  const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test);
+  const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, bar.listener());
   const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   const auto comparison =
       torsio::compare(dataset, choices, flags.seed, flags.allow_leak, bar.listener());
-  if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
-  if (!flags.output.empty()) torsio::save_model(flags.output, comparison.best->file);
-  if (flags.json.wants_tables()) print(comparison_text(comparison.results));
-  if (!flags.output.empty()) remark("best model written to " + flags.output);
   flags.json.write(torsio::results_json(comparison.results));
+  if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
+  if (flags.json.wants_tables()) print(comparison_text(comparison.results));
+  if (!flags.report.empty()) write_text(flags.report, torsio::results_html(comparison.results));
+  if (flags.output.empty()) return;
+  torsio::save_model(flags.output, comparison.best->file);
+  remark("best model written to " + flags.output);
 }
 
 }  // namespace
@@ -49,6 +55,7 @@ void add_compare(CLI::App& app) {
                    "all, or families with settings: linear,polynomial:degree=7:branch=true")
       ->capture_default_str();
   verb->add_option("-o,--output", flags->output, "write the best model to this file");
+  verb->add_option("--report", flags->report, "write the tables as a page for a browser");
   verb->add_option("--seed", flags->seed, "seed of everything random")->capture_default_str();
   verb->add_flag("--allow-leak", flags->allow_leak,
                  "accept an input that the target was computed from; rows say so");

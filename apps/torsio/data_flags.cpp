@@ -9,8 +9,9 @@
 
 namespace {
 
-torsio::LoadOptions load_options(const DataFlags& flags) {
+torsio::LoadOptions load_options(const DataFlags& flags, const torsio::Progress& progress) {
   torsio::LoadOptions options;
+  options.progress = progress;
   if (!flags.mapping.empty()) options.mapping = flags.mapping;
   if (!flags.rate.empty()) options.rate_Hz = torsio::si_quantity(flags.rate, "Hz", "--rate");
   options.target = flags.target;
@@ -37,13 +38,15 @@ void DataFlags::add_target_and_inputs(CLI::App& verb) {
 }
 
 torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
-                                const std::vector<std::string>& test) const {
+                                const std::vector<std::string>& test,
+                                const torsio::Progress& progress) const {
   if (recordings.empty())
     throw torsio::UsageError(
         {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
-  torsio::Dataset dataset = torsio::load_dataset(recordings, test, load_options(*this));
+  const torsio::LoadOptions options = load_options(*this, progress);
+  torsio::Dataset dataset = torsio::load_dataset(recordings, test, options);
   if (validation.empty()) return dataset;
-  torsio::Dataset held_out = torsio::load_dataset({}, validation, load_options(*this));
+  torsio::Dataset held_out = torsio::load_dataset({}, validation, options);
   for (torsio::DatasetRecord& record : held_out.records) {
     for (torsio::Segment& segment : record.segments) segment.role = torsio::Role::validation;
     dataset.records.push_back(std::move(record));
@@ -52,11 +55,13 @@ torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
   return dataset;
 }
 
-torsio::Dataset DataFlags::load_as_test() const {
+torsio::Dataset DataFlags::load_as_test(const torsio::Progress& progress) const {
   if (recordings.empty())
     throw torsio::UsageError(
         {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
-  return torsio::load_dataset({}, recordings, load_options(*this));
+  torsio::LoadOptions options = load_options(*this, progress);
+  options.role = torsio::Role::test;
+  return torsio::load_dataset(recordings, {}, options);
 }
 
 std::vector<std::string> DataFlags::wanted_inputs() const {

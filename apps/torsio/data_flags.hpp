@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 
 /// The flags of every verb that reads recordings.
@@ -22,9 +23,10 @@ struct DataFlags {
 
   /// The recordings as training data, further ones with other roles.
   [[nodiscard]] torsio::Dataset load(const std::vector<std::string>& validation,
-                                     const std::vector<std::string>& test) const;
+                                     const std::vector<std::string>& test,
+                                     const torsio::Progress& progress) const;
   /// The recordings as test data, except where a manifest gives roles.
-  [[nodiscard]] torsio::Dataset load_as_test() const;
+  [[nodiscard]] torsio::Dataset load_as_test(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
 };
 

@@ -29,9 +29,7 @@ struct DemoFlags {
 /// The first test record's loop: what was measured against the first input.
 std::string loop_plot(const torsio::Dataset& dataset, const torsio::ModelFile& model) {
   const auto is_test = [](const torsio::DatasetRecord& record) {
-    return std::ranges::any_of(record.segments, [](const torsio::Segment& segment) {
-      return segment.role == torsio::Role::test;
-    });
+    return record.has_role(torsio::Role::test);
   };
   const torsio::Recording& recording = std::ranges::find_if(dataset.records, is_test)->recording;
   const torsio::FeatureSpec& features = model.settings.features;
@@ -46,7 +44,7 @@ std::string loop_plot(const torsio::Dataset& dataset, const torsio::ModelFile& m
 std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
                        const torsio::TrainedModel& best) {
   torsio::save_model(flags.output, best.file);
-  torsio::Estimator estimator = torsio::load_estimator(flags.output);
+  const torsio::Estimator estimator = torsio::load_estimator(flags.output);
   const torsio::SplitScore score = torsio::evaluate(estimator, dataset, torsio::Role::test);
   const torsio::Score& together = score.together;
   return fmt::format(
@@ -58,12 +56,13 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
 }
 
 void run(const DemoFlags& flags) {
+  require_folder_of(flags.output);
   ProgressBar bar;
   const bool is_simulated = flags.data.recordings.empty();
   if (is_simulated) remark(fmt::format("simulating four sweeps of {} ...", flags.actuator));
   const torsio::Dataset dataset =
       is_simulated ? torsio::sweep_dataset(flags.actuator, flags.seed, bar.listener())
-                   : flags.data.load({}, flags.test);
+                   : flags.data.load({}, flags.test, bar.listener());
   const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   const torsio::Comparison comparison =
       torsio::compare(dataset, choices, flags.seed, false, bar.listener());

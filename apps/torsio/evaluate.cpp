@@ -19,7 +19,7 @@ struct EvaluateFlags {
 };
 
 /// Target, estimate, error bar and fault of every sample of one recording.
-torsio::Recording prediction_recording(torsio::Estimator& estimator,
+torsio::Recording prediction_recording(const torsio::Estimator& estimator,
                                        const torsio::Recording& recording,
                                        const std::string& target) {
   const torsio::Prediction prediction = torsio::predict(estimator, recording);
@@ -45,16 +45,16 @@ void run(const EvaluateFlags& flags) {
   const torsio::ModelFile file = torsio::load_model(flags.model);
   DataFlags data = flags.data;
   data.target = file.settings.target;
-  const torsio::Dataset dataset = data.load_as_test();
   ProgressBar bar;
+  const torsio::Dataset dataset = data.load_as_test(bar.listener());
+  if (!flags.predictions.empty() && dataset.records.size() != 1)
+    throw torsio::UsageError({.place = "--predictions",
+                              .expected = "one recording",
+                              .found = std::to_string(dataset.records.size()),
+                              .advice = "Call evaluate once for each recording."});
   const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
   if (!flags.predictions.empty()) {
-    if (dataset.records.size() != 1)
-      throw torsio::UsageError({.place = "--predictions",
-                                .expected = "one recording",
-                                .found = std::to_string(dataset.records.size()),
-                                .advice = "Call evaluate once for each recording."});
-    torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
+    const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
     torsio::write_csv(
         prediction_recording(estimator, dataset.records.front().recording, dataset.target),
         flags.predictions);
@@ -68,7 +68,11 @@ void run(const EvaluateFlags& flags) {
 void add_evaluate(CLI::App& app) {
   auto flags = std::make_shared<EvaluateFlags>();
   CLI::App* verb = app.add_subcommand("evaluate", "score a model file on recordings");
-  verb->footer("Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv");
+  verb->footer(
+      "Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv\n"
+      "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "
+      "count,\n"
+      "3 warming up, 4 zero not set, 5 outside the training range, 6 model not finite");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
   flags->data.add_mapping(*verb);

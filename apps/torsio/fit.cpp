@@ -60,8 +60,9 @@ void run(const FitFlags& flags) {
         {.place = "torsio fit",
          .expected = "recordings, --model FAMILY and -o FILE",
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
+  require_folder_of(flags.output);
   ProgressBar bar;
-  const torsio::Dataset dataset = flags.data.load(flags.validation, {});
+  const torsio::Dataset dataset = flags.data.load(flags.validation, {}, bar.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   (void)torsio::refuse_leak(dataset, features, flags.allow_leak);
   const torsio::ModelChoice choice{flags.family, parse_settings(flags.settings), "", features};
@@ -69,11 +70,11 @@ void run(const FitFlags& flags) {
   trained.file.card.device_serial = flags.device_serial;
   const torsio::Results results = torsio::evaluate_model(trained.file, dataset, bar.listener());
   torsio::note_held_out_scores(trained.file.card, results.rows);
-  torsio::save_model(flags.output, trained.file);
   if (flags.json.wants_tables()) print(evaluation_text(results));
+  flags.json.write(torsio::results_json(results));
+  torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   for (const std::string& note : trained.notes) remark("note: " + note);
   remark(fmt::format("{} written in {:.2f} s of fitting", flags.output, trained.fit_seconds));
-  flags.json.write(torsio::results_json(results));
 }
 
 }  // namespace

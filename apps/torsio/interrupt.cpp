@@ -6,16 +6,17 @@ namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
 
-void on_interrupt(int signal_number) {
-  interrupted = 1;
-  (void)std::signal(signal_number, SIG_DFL);
-}
+void on_interrupt(int) { interrupted = 1; }
 
 }  // namespace
 
 void catch_interrupts() {
-  (void)std::signal(SIGINT, on_interrupt);
-  (void)std::signal(SIGTERM, on_interrupt);
+  struct sigaction action {};
+  action.sa_handler = on_interrupt;
+  // Without SA_RESTART a signal also wakes a program that waits for a pipe.
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  (void)sigaction(SIGINT, &action, nullptr);
+  (void)sigaction(SIGTERM, &action, nullptr);
   (void)std::signal(SIGPIPE, SIG_IGN);  // a closed pipe becomes a write error with a message
 }
 

@@ -1,6 +1,7 @@
 #include "output.hpp"
 
 #include <cstdio>
+#include <filesystem>
 #include <span>
 
 #include "torsio/core/error.hpp"
@@ -21,6 +22,16 @@ void JsonOutput::write(std::string_view document) const {
   if (destination == "-") {
     print(document);
   } else {
-    torsio::write_whole_file(destination, std::as_bytes(std::span(document)));
+    write_text(destination, document);
   }
+}
+
+void require_folder_of(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    throw torsio::UsageError({.place = path, .problem = "there is no folder " + folder.string()});
+}
+
+void write_text(const std::string& path, std::string_view text) {
+  torsio::write_whole_file(path, std::as_bytes(std::span(text)));
 }

@@ -14,6 +14,10 @@ struct JsonOutput {
   void write(std::string_view document) const;
 };
 
+/// Refuses an output whose folder does not exist before any work is done; an empty path is none.
+void require_folder_of(const std::string& path);
+/// Writes a text file whole or not at all.
+void write_text(const std::string& path, std::string_view text);
 /// Prints to stdout; a full disk or a closed pipe is an Error.
 void print(std::string_view text);
 /// Prints a remark to stderr.

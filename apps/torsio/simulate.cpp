@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
@@ -24,6 +26,7 @@ struct SimulateFlags {
   std::uint64_t seed = kDefaultSeed;
   bool with_truth = false;
   bool list = false;
+  JsonOutput json;
 };
 
 std::string bench_list() {
@@ -62,17 +65,63 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
   return spec;
 }
 
+using Json = nlohmann::ordered_json;
+
+Json list_json() {
+  Json document{{"actuators", Json::array()}, {"experiments", Json::array()}};
+  for (const torsio::DataSheet& sheet : torsio::data_sheets())
+    document["actuators"].push_back({{"name", sheet.name}, {"title", sheet.title}});
+  for (const torsio::ExperimentInfo& info : torsio::experiments())
+    document["experiments"].push_back({{"name", info.name}, {"description", info.description}});
+  return document;
+}
+
+Json sheet_json(const torsio::DataSheet& sheet) {
+  Json document{{"name", sheet.name}, {"title", sheet.title}, {"parameters", Json::array()}};
+  for (const torsio::SheetRow& row : torsio::describe(sheet))
+    document["parameters"].push_back(
+        {{"name", row.name},
+         {"value", row.value.value},
+         {"unit", row.unit},
+         {"origin", std::string(1, static_cast<char>(row.value.origin))}});
+  return document;
+}
+
+Json recording_json(const SimulateFlags& flags, const torsio::Recording& recording) {
+  Json document{{"actuator", flags.actuator},  {"experiment", flags.experiment},
+                {"seed", flags.seed},          {"recording", flags.output},
+                {"samples", recording.size()}, {"sample_rate_Hz", recording.sample_rate_Hz()},
+                {"channels", Json::array()}};
+  for (const torsio::Channel& channel : recording.channels())
+    document["channels"].push_back(channel.name);
+  return document;
+}
+
+/// What a person or, with --json, a machine is shown.
+void show(const SimulateFlags& flags, const std::string& text, const Json& document) {
+  if (flags.json.wants_tables()) print(text);
+  flags.json.write(document.dump(2) + "\n");
+}
+
 void run(const SimulateFlags& flags) {
-  if (flags.list) return print(bench_list());
-  if (!flags.describe.empty()) return print(description(torsio::data_sheet(flags.describe)));
+  if (flags.list) return show(flags, bench_list(), list_json());
+  if (!flags.describe.empty()) {
+    const torsio::DataSheet& sheet = torsio::data_sheet(flags.describe);
+    return show(flags, description(sheet), sheet_json(sheet));
+  }
   if (flags.actuator.empty() || flags.experiment.empty() || flags.output.empty())
     throw torsio::UsageError({.place = "torsio simulate",
                               .expected = "ACTUATOR EXPERIMENT -o FILE",
                               .advice = "torsio simulate --list shows what there is; example: "
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
+  if (flags.output == "-" && flags.json.destination == "-")
+    throw torsio::UsageError(
+        {.place = "torsio simulate", .problem = "-o and --json cannot both be standard output"});
+  require_folder_of(flags.output);
   ProgressBar bar;
   const torsio::Recording recording = torsio::simulate(experiment_spec(flags), bar.listener());
   torsio::write_csv(recording, flags.output);
+  flags.json.write(recording_json(flags, recording).dump(2) + "\n");
   remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),
                      recording.sample_rate_Hz()));
 }
@@ -94,5 +143,8 @@ void add_simulate(CLI::App& app) {
   verb->add_flag("--truth", flags->with_truth, "add the truth_ channels that no sensor sees");
   verb->add_flag("--list", flags->list, "show actuators and experiments");
   verb->add_option("--describe", flags->describe, "show an actuator's data sheet");
+  verb->add_option(
+      "--json", flags->json.destination,
+      "write what was recorded, or the list, as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });
 }

@@ -123,8 +123,8 @@ double si_quantity(std::string_view text, std::string_view expected_si, std::str
   const auto [end, code] = std::from_chars(all.data(), all.data() + all.size(), number);
   const std::string_view suffix = trimmed(all.substr(static_cast<std::size_t>(end - all.data())));
   const Unit* unit = suffix.empty() ? find_unit(expected_si) : find_unit(suffix);
-  if (code != std::errc{} || !std::isfinite(number) || unit == nullptr ||
-      unit->si_suffix != expected_si)
+  if (code != std::errc{} || unit == nullptr || unit->si_suffix != expected_si ||
+      !std::isfinite(unit->si(number)))
     throw UsageError(
         {.place = std::string(place),
          .expected = "a number in " + std::string(expected_si) + " or a unit of the same quantity",

@@ -46,15 +46,21 @@ class Sha256 {
 
 class FileBytes final : public ByteSource {
  public:
-  explicit FileBytes(const std::string& path) : path_(path) {
-    descriptor_ = path == "-" ? dup(STDIN_FILENO) : open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    const int code = errno;
+  FileBytes(const std::string& path, const Progress& progress) : path_(path), progress_(progress) {
+    int code = 0;
+    do {
+      report();
+      descriptor_ = path == "-" ? dup(STDIN_FILENO) : open(path.c_str(), O_RDONLY | O_CLOEXEC);
+      code = errno;
+    } while (descriptor_ < 0 && code == EINTR);
     if (descriptor_ < 0)
       throw Error({.place = path,
                    .problem = "cannot be opened: " + system_message(code),
                    .advice = code == ENOENT ? "Check the path; '-' reads standard input." : ""});
     struct stat info {};
-    if (fstat(descriptor_, &info) == 0 && S_ISDIR(info.st_mode)) {
+    const bool is_known = fstat(descriptor_, &info) == 0;
+    if (is_known && S_ISREG(info.st_mode)) bytes_ = static_cast<double>(info.st_size);
+    if (is_known && S_ISDIR(info.st_mode)) {
       close(descriptor_);
       throw Error({.place = path,
                    .expected = "a file",
@@ -69,18 +75,27 @@ class FileBytes final : public ByteSource {
   std::size_t read(char* out, std::size_t size) override {
     ssize_t got = 0;
     do {
+      report();
       got = ::read(descriptor_, out, size);
     } while (got < 0 && errno == EINTR);
     if (got < 0)
       throw Error({.place = path_, .problem = "cannot be read: " + system_message(errno)});
     sha_.add(out, static_cast<std::size_t>(got));
+    read_ += static_cast<double>(got);
     return static_cast<std::size_t>(got);
   }
   std::string sha256() override { return sha_.hex(); }
 
  private:
+  void report() const {
+    report_progress(progress_, bytes_ > 0.0 ? std::min(read_ / bytes_, 1.0) : 0.0, "reading");
+  }
+
   std::string path_;
+  Progress progress_;
   int descriptor_ = -1;
+  double bytes_ = 0.0;  ///< 0 of a pipe
+  double read_ = 0.0;
   Sha256 sha_;
 };
 
@@ -182,8 +197,8 @@ class MaybeGzip final : public ByteSource {
 
 }  // namespace
 
-std::unique_ptr<ByteSource> open_bytes(const std::string& path) {
-  return std::make_unique<MaybeGzip>(std::make_unique<FileBytes>(path), path);
+std::unique_ptr<ByteSource> open_bytes(const std::string& path, const Progress& progress) {
+  return std::make_unique<MaybeGzip>(std::make_unique<FileBytes>(path, progress), path);
 }
 
 std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes, const std::string& name) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "torsio/core/progress.hpp"
+
 namespace torsio {
 
 /// Bytes in order, from wherever they come.
@@ -17,8 +19,10 @@ class ByteSource {
   virtual std::string sha256() = 0;
 };
 
-/// A file or pipe by path, "-" for standard input; unpacked if it starts like gzip.
-[[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::string& path);
+/// A file or pipe by path, "-" for standard input; unpacked if it starts like gzip. The progress is
+/// told with each block and whenever a signal interrupts the wait for one.
+[[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::string& path,
+                                                     const Progress& progress = {});
 
 /// Bytes in memory, unpacked if they start like gzip. `bytes` must outlive the source.
 [[nodiscard]] std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes,

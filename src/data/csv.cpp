@@ -238,7 +238,7 @@ std::string CsvTable::header_place(const CsvColumn& column) const {
 }
 
 CsvTable read_csv(const std::string& path, const CsvOptions& options) {
-  const auto source = open_bytes(path);
+  const auto source = open_bytes(path, options.progress);
   return parse(*source, path == "-" ? "standard input" : path, options);
 }
 

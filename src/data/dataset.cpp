@@ -41,10 +41,11 @@ std::vector<Segment> with_embargo(const std::vector<Segment>& blocks, std::size_
     if (segment.role != Role::train) continue;
     const std::size_t before = i > 0 ? embargo : 0;
     const std::size_t behind = i + 1 < segments.size() ? embargo : 0;
-    if (segment.end - segment.begin <= before + behind)
+    const std::size_t length = segment.end - segment.begin;
+    if (length <= before || length - before <= behind)
       throw Error({.problem = fmt::format("a training block of {} samples does not outlast the "
                                           "embargo of {} samples beside each test block",
-                                          segment.end - segment.begin, embargo),
+                                          length, embargo),
                    .advice = "Use fewer blocks or a shorter embargo."});
     segment.begin += before;
     segment.end -= behind;
@@ -63,15 +64,18 @@ std::string_view name(Role role) noexcept {
   return "unknown";
 }
 
+bool DatasetRecord::has_role(Role role) const noexcept {
+  return std::ranges::find(segments, role, &Segment::role) != segments.end();
+}
+
 double Dataset::sample_rate_Hz() const {
   if (records.empty()) throw Error({.problem = "the dataset has no records"});
   return records.front().recording.sample_rate_Hz();
 }
 
 bool Dataset::has_role(Role role) const noexcept {
-  return std::ranges::any_of(records, [role](const DatasetRecord& record) {
-    return std::ranges::find(record.segments, role, &Segment::role) != record.segments.end();
-  });
+  return std::ranges::any_of(records,
+                             [role](const DatasetRecord& record) { return record.has_role(role); });
 }
 
 void Dataset::check() const {

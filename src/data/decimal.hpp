@@ -4,8 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <string>
 #include <system_error>
 
 namespace torsio {
@@ -45,7 +43,7 @@ inline bool read_decimal(const char*& at, double& value) {
     std::int64_t written = 0;
     if (digit(*q) >= 10) return false;
     while (digit(*q) < 10) {
-      if (written < 100000) written = 10 * written + digit(*q);
+      if (written < 100'000'000) written = 10 * written + digit(*q);
       ++q;
     }
     exponent += negative_exponent ? -written : written;
@@ -62,9 +60,15 @@ inline bool read_decimal(const char*& at, double& value) {
       magnitude *= kPowers[static_cast<std::size_t>(exponent)];
   } else {
     const auto [end, code] = std::from_chars(first, p, magnitude);
-    // from_chars leaves the value alone both for too large and for too small numbers; strtod tells.
-    if (code == std::errc::result_out_of_range)
-      magnitude = std::strtod(std::string(first, p).c_str(), nullptr);
+    // from_chars leaves the value alone both for too large and for too small numbers. Their first
+    // digit tells which: it stands for about 10^exponent, far from 10^0.
+    if (code == std::errc::result_out_of_range) {
+      const char* at_digit = first;
+      for (; at_digit != p && (*at_digit == '0' || *at_digit == '.'); ++at_digit)
+        if (digit(*at_digit) < 10) --digits;
+      if (exponent + digits > 0) return false;
+      magnitude = 0.0;
+    }
     if (!std::isfinite(magnitude)) return false;
   }
   value = negative ? -magnitude : magnitude;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "data/names.hpp"
+#include "data/whole_samples.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/manifest.hpp"
@@ -46,8 +47,8 @@ void refuse_latency_of_inputs(const Mapping& mapping, const std::string& target)
            .advice = "Leave the input late, or name it with --target if it is the target."});
 }
 
-std::vector<Recording> load(const Log& log) {
-  const CsvTable table = read_csv(log.path, {.skip = log.mapping.drop});
+std::vector<Recording> load(const Log& log, const Progress& progress) {
+  const CsvTable table = read_csv(log.path, {.skip = log.mapping.drop, .progress = progress});
   std::vector<Recording> recordings =
       measured_recordings(table, log.mapping, log.rate_Hz, log.entry.name);
   for (Recording& recording : recordings) {
@@ -61,13 +62,14 @@ std::vector<Recording> load(const Log& log) {
 }
 
 std::vector<Segment> segments_of(const Recording& recording, const ManifestFile& entry,
-                                 const std::optional<SplitRule>& split_of_all) {
+                                 const std::optional<SplitRule>& split_of_all, Role else_role) {
   const std::size_t samples = recording.size();
   if (entry.role) return whole_record(samples, *entry.role);
   const auto& split = entry.split ? entry.split : split_of_all;
-  if (!split) return whole_record(samples, Role::train);
-  const auto embargo =
-      static_cast<std::size_t>(std::ceil(split->embargo_s * recording.sample_rate_Hz() - 1e-9));
+  if (!split) return whole_record(samples, else_role);
+  const std::size_t embargo =
+      whole_samples(std::ceil(split->embargo_s * recording.sample_rate_Hz() - 1e-9), samples,
+                    recording.name() + ": split.embargo");
   try {
     return split->interleaved_blocks > 0
                ? interleaved_blocks(samples, split->interleaved_blocks, split->test_every, embargo)
@@ -91,7 +93,8 @@ class Collector {
     dataset_.target = options_.target;
   }
 
-  void add(const std::string& path, Role role) {
+  /// With a role, all of it takes that role.
+  void add(const std::string& path, std::optional<Role> role = {}) {
     if (is_manifest(path))
       add_manifest(read_manifest(path), role);
     else
@@ -107,8 +110,9 @@ class Collector {
       if (const auto leak = mapping.computed_from.find(dataset_.target);
           leak != mapping.computed_from.end())
         leaks_.insert(leak->second.begin(), leak->second.end());
-      for (Recording& recording : load(planned.log)) {
-        auto segments = segments_of(recording, planned.log.entry, planned.split_of_all);
+      for (Recording& recording : load(planned.log, options_.progress)) {
+        auto segments =
+            segments_of(recording, planned.log.entry, planned.split_of_all, options_.role);
         dataset_.records.push_back(
             {.recording = std::move(recording), .segments = std::move(segments)});
       }
@@ -123,7 +127,7 @@ class Collector {
     std::optional<SplitRule> split_of_all = {};
   };
 
-  void add_log(const std::string& path, Role role) {
+  void add_log(const std::string& path, std::optional<Role> role) {
     Planned planned{.log = {.path = path, .mapping = mapping_.value_or(Mapping{})}};
     planned.log.entry.file = path;
     planned.log.entry.role = role;
@@ -140,13 +144,13 @@ class Collector {
         planned.log.entry.name = planned.log.entry.file;
   }
 
-  void add_manifest(Manifest manifest, Role role) {
+  void add_manifest(Manifest manifest, std::optional<Role> role) {
     agree(dataset_.target, manifest.target, "target", manifest.file);
     agree(dataset_.label, manifest.label, "label", manifest.file);
     if (dataset_.input_sets.empty()) dataset_.input_sets = manifest.input_sets;
     const std::filesystem::path folder = data_folder(manifest);
     for (ManifestFile& entry : manifest.files) {
-      if (role == Role::test) entry.role = Role::test;
+      if (role) entry.role = role;
       Planned planned{.log = {.path = (folder / entry.file).string(),
                               .entry = entry,
                               .mapping = mapping_of(entry, manifest),
@@ -189,7 +193,7 @@ class Collector {
 
 std::vector<Recording> load_recordings(const std::string& path, const LoadOptions& options) {
   Collector collector(options);
-  collector.add(path, Role::train);
+  collector.add(path);
   std::vector<Recording> recordings;
   for (DatasetRecord& record : collector.finish().records)
     recordings.push_back(std::move(record.recording));
@@ -199,7 +203,7 @@ std::vector<Recording> load_recordings(const std::string& path, const LoadOption
 Dataset load_dataset(const std::vector<std::string>& train_files,
                      const std::vector<std::string>& test_files, const LoadOptions& options) {
   Collector collector(options);
-  for (const std::string& path : train_files) collector.add(path, Role::train);
+  for (const std::string& path : train_files) collector.add(path);
   for (const std::string& path : test_files) collector.add(path, Role::test);
   Dataset dataset = collector.finish();
   dataset.check();

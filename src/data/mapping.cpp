@@ -10,6 +10,7 @@
 #include "data/columns.hpp"
 #include "data/names.hpp"
 #include "data/record_clock.hpp"
+#include "data/whole_samples.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 
@@ -140,15 +141,20 @@ Recording recording_of(const CsvTable& table, TableChannels& columns, const Name
   for (TableChannel& column : columns.channels) channels.push_back(cut(column.channel, run.rows));
   for (const std::string& name : mapping.hold)
     hold(channel_of_rule(channels, name, mapping, "hold"));
+  std::size_t samples = run.rows.size();
   if (columns.clock && mapping.clock.resample_Hz > 0.0) {
     const auto stamps = spread_within_stamps(
         std::span(columns.clock->channel.values).subspan(run.rows.begin, run.rows.size()));
+    samples = 1 + whole_samples((stamps.back() - stamps.front()) * clock.sample_rate_Hz + 1e-9,
+                                CsvLimits{}.values / std::max<std::size_t>(channels.size(), 1),
+                                mapping.file + ": clock.resample");
     for (Channel& channel : channels)
-      channel = on_even_clock(channel, stamps, clock.sample_rate_Hz);
+      channel = on_even_clock(channel, stamps, clock.sample_rate_Hz, samples);
   }
   for (const LatencyRule& rule : mapping.latency)
     advance(channel_of_rule(channels, rule.channel, mapping, "latency"),
-            static_cast<std::size_t>(std::round(rule.latency_s * clock.sample_rate_Hz)));
+            whole_samples(std::round(rule.latency_s * clock.sample_rate_Hz), samples,
+                          mapping.file + ": latency." + rule.channel));
   for (const ZeroRule& rule : mapping.zero) {
     Channel& channel = channel_of_rule(channels, rule.channel, mapping, "zero");
     const double zero = zero_of(channel, rule, clock.sample_rate_Hz);

@@ -30,8 +30,8 @@ struct RecordClock {
 /// so that stamps coarser than the sampling tell a time for each sample.
 [[nodiscard]] std::vector<double> spread_within_stamps(std::span<const double> stamps_s);
 
-/// Puts a channel of uneven stamps onto the even clock: interpolated, or held if it has a mask.
+/// Puts a channel of uneven stamps onto an even clock of so many samples: interpolated, or held if it has a mask.
 [[nodiscard]] Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,
-                                    double sample_rate_Hz);
+                                    double sample_rate_Hz, std::size_t samples);
 
 }  // namespace torsio

@@ -6,7 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "torsio/core/error.hpp"
+#include "data/whole_samples.hpp"
+#include "torsio/data/csv.hpp"
 
 namespace torsio {
 namespace {
@@ -82,13 +83,10 @@ Recording resample(const Recording& recording, double sample_rate_Hz) {
   if (recording.size() == 0) return result;
 
   const double step = recording.sample_rate_Hz() / sample_rate_Hz;
-  const double periods = static_cast<double>(recording.size() - 1) / step;
-  constexpr double kMostSamples = 1e9;
-  if (!(periods < kMostSamples))
-    throw Error({.place = recording.name(),
-                 .problem = fmt::format("{} Hz would give more than {} samples", sample_rate_Hz,
-                                        kMostSamples)});
-  const auto samples = static_cast<std::size_t>(periods + 1e-9) + 1;
+  const std::size_t samples =
+      1 + whole_samples(static_cast<double>(recording.size() - 1) / step + 1e-9,
+                        CsvLimits{}.values / recording.channels().size(),
+                        fmt::format("{} at {} Hz", recording.name(), sample_rate_Hz));
   const auto is_condition = [&](const std::string& name) {
     return std::ranges::find(recording.conditions(), name) != recording.conditions().end();
   };

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -21,6 +23,14 @@ bool all_finite(std::span<const double> values) noexcept {
 /// An error bar that says something; NaN for one that does not.
 double evidence(double std_dev) noexcept {
   return std::isfinite(std_dev) && std_dev > 0.0 ? std_dev : kNotMeasured;
+}
+
+/// What a feature may leave its range by without being another number: conditions come as float32
+/// from many a bus. A feature that was 0 throughout is measured against one SI unit.
+double tolerance(double lowest, double highest) noexcept {
+  constexpr double kFloatRounding{std::numeric_limits<float>::epsilon()};
+  const double magnitude = std::max(std::abs(lowest), std::abs(highest));
+  return kFloatRounding * (magnitude > 0.0 ? magnitude : 1.0);
 }
 
 bool is_error_bar(double std_dev) noexcept {
@@ -94,26 +104,40 @@ void check_settings(const EstimatorSettings& settings, std::size_t model_input_c
   check_residuals(settings.residuals);
 }
 
+void check_zeroed(const std::vector<std::string>& channels,
+                  const std::vector<std::string>& raw_inputs) {
+  for (const std::string& channel : channels)
+    if (std::ranges::find(raw_inputs, channel) == raw_inputs.end())
+      refuse("zeroed_channels", fmt::format("some of {}", fmt::join(raw_inputs, ", ")),
+             fmt::format("'{}'", channel));
+}
+
 }  // namespace
 
 EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input_count)
     : settings_(std::move(settings)),
       pipeline_(settings_.features, settings_.sample_rate_Hz),
+      unset_zeros_(settings_.zeroed_channels),
       longest_gap_(static_cast<std::size_t>(
           std::clamp(kLongestGapSeconds * settings_.sample_rate_Hz, 1.0, 1e9))) {
   check_settings(settings_, model_input_count);
+  check_zeroed(settings_.zeroed_channels, raw_inputs());
   const FeatureRanges& ranges = settings_.ranges;
   for (std::size_t i = 0; i < model_input_count; ++i) {
     const double low = ranges.lowest[i];
     const double high = ranges.highest[i];
-    // A feature that was constant in training has no width, but rounding must not trip its guard.
-    const double slack =
-        ranges.margin * (high - low) + 1e-9 * std::max(std::abs(low), std::abs(high));
-    lower_limits_.push_back(low - slack);
-    upper_limits_.push_back(high + slack);
+    const double slack = tolerance(low, high);
+    // Never 0, not even for a feature that was constant in training: no value may jump.
+    const double border = ranges.margin * (high - low) + slack;
+    ranges_.push_back({.lowest = low - slack, .highest = high + slack, .border = border});
+    check_finite("guards.ranges with margin",
+                 std::array{low - slack - border, high + slack + border});
   }
-  check_finite("guards.ranges with margin", lower_limits_);
-  check_finite("guards.ranges with margin", upper_limits_);
+}
+
+void EstimatorCore::set_zero(std::string_view channel, double value) {
+  pipeline_.set_zero(channel, value);
+  std::erase(unset_zeros_, channel);
 }
 
 void EstimatorCore::reset() noexcept {
@@ -134,8 +158,8 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   const bool restarted = poisoned_ || missed_ > longest_gap_;
   if (restarted) pipeline_.reset();
   const Features features = pipeline_.step(raw);
-  // Finite inputs can still overflow a product or leave a root's domain, and a filter never forgets
-  // that.
+  // Finite inputs can still overflow a product or leave a root's domain; differences and lags hold
+  // such a value for some ticks, so the next usable tick starts afresh.
   poisoned_ = !all_finite(features);
   if (poisoned_) return miss(Fault::input_not_finite);
   missed_ = 0;
@@ -147,8 +171,9 @@ Estimate EstimatorCore::held(Fault fault) const noexcept {
 }
 
 Estimate EstimatorCore::judge(Features features, const Estimate& told) noexcept {
-  const bool inside = is_inside(features);
-  Estimate out{.novelty = told.novelty};
+  const double weight = excursion(features);
+  const bool inside = weight <= 1.0;
+  Estimate out;
   if (!is_settled()) {
     out.fault = Fault::warming_up;
   } else if (!inside) {
@@ -159,22 +184,47 @@ Estimate EstimatorCore::judge(Features features, const Estimate& told) noexcept 
     out.fault = Fault::model_not_finite;
   }
   if (out.fault == Fault::none) {
-    out.value = told.value;
-    const double own = evidence(told.std_dev);
-    out.std_dev = std::isnan(own) ? residual_std_at(told.value) : own;
+    out = weight > 0.0 ? blended(features, told, weight) : model_part(told);
   } else {
     out.value = fallback_value(features);
     // The fallback's residuals are evidence only where it was fitted.
     if (inside) out.std_dev = evidence(settings_.fallback.residual_std);
   }
+  out.novelty = told.novelty;
+  if (!unset_zeros_.empty()) {
+    // Off by an unknown amount, it says nothing that a channel seems to be outside its range.
+    if (out.fault != Fault::warming_up) out.fault = Fault::zero_not_set;
+    out.std_dev = kNotMeasured;
+  }
   last_value_ = out.value;
   return out;
 }
 
-bool EstimatorCore::is_inside(Features features) const noexcept {
-  for (std::size_t i = 0; i < features.size(); ++i)
-    if (!(lower_limits_[i] <= features[i] && features[i] <= upper_limits_[i])) return false;
-  return true;
+double EstimatorCore::excursion(Features features) const noexcept {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const Range& range = ranges_[i];
+    const double left_by = std::max(range.lowest - features[i], features[i] - range.highest);
+    if (left_by > 0.0) worst = std::max(worst, left_by / range.border);
+  }
+  return worst;
+}
+
+Estimate EstimatorCore::model_part(const Estimate& told) const noexcept {
+  const double own = evidence(told.std_dev);
+  return {.value = told.value, .std_dev = std::isnan(own) ? residual_std_at(told.value) : own};
+}
+
+Estimate EstimatorCore::blended(Features features, const Estimate& told,
+                                double weight) const noexcept {
+  const Estimate model = model_part(told);
+  const double fallback = fallback_value(features);
+  // The second moment about the mean of a draw from the model with probability 1 - w, else from
+  // the fallback: the two variances, and how far the two disagree.
+  const double spread = std::hypot(std::sqrt(1.0 - weight) * model.std_dev,
+                                   std::sqrt(weight) * evidence(settings_.fallback.residual_std),
+                                   std::sqrt(weight * (1.0 - weight)) * (model.value - fallback));
+  return {.value = std::lerp(model.value, fallback, weight), .std_dev = evidence(spread)};
 }
 
 double EstimatorCore::fallback_value(Features features) const noexcept {

@@ -7,16 +7,21 @@
 
 namespace torsio {
 
-/// x_0 from rest = sum_j c_(first + j) x_j, or the given x_0 with a fault where there is none.
+/// Where a model has no inverse: the given x_0, or 0 where that is no number.
+inline Estimate no_inverse(Features features) noexcept {
+  return {.value = std::isfinite(features[0]) ? features[0] : 0.0,
+          .fault = Fault::model_not_finite};
+}
+
+/// x_0 from rest = sum_j c_(first + j) x_j.
 inline Estimate affine_inverse(const ScheduledCoefficients& coefficients,
                                const ScheduledCoefficients::Position& at, std::size_t first,
                                double rest, Features features) noexcept {
   const CoefficientSchedule& schedule = coefficients.schedule();
-  const double slope = coefficients.coefficient(at, first);
-  const double others = coefficients.weighted_sum(at, first, features) - slope * features[0];
-  const double value = (rest - others) / slope;
+  const double others = coefficients.weighted_sum(at, first, features, 1);
+  const double value = (rest - others) / coefficients.coefficient(at, first);
   if (!std::isfinite(value) || (schedule.scheduled && schedule.feature == 0))
-    return {.value = features[0], .fault = Fault::model_not_finite};
+    return no_inverse(features);
   return {.value = value};
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "model/affine_inverse.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -83,9 +84,9 @@ bool AnyModel::can_invert() const noexcept {
 Estimate AnyModel::invert(double target, Features features) noexcept {
   return dispatch(model_, [&]<class M>(M& model) -> Estimate {
     if constexpr (Invertible<M>) {
-      return Estimate{model.invert(target, features)};
+      return model.invert(target, features);
     } else {
-      return {.value = features[0], .fault = Fault::model_not_finite};
+      return no_inverse(features);
     }
   });
 }

@@ -38,6 +38,22 @@ double clamped(double mean, double line, double width, double log_ratio) noexcep
   return std::clamp(mean, line - limit, line + limit);
 }
 
+// What `given` says, held near the line; without density the line itself, or else `centre`.
+Estimate guarded(const Conditional& given, double line, double centre, double width,
+                 double thin_log_density) noexcept {
+  Estimate estimate{.value = given.mean, .novelty = -given.log_density};
+  if (!std::isfinite(given.mean)) {
+    estimate.value = std::isfinite(line) ? line : centre;
+    estimate.fault = Fault::model_not_finite;
+    return estimate;
+  }
+  if (width > 0.0 && std::isfinite(line))
+    estimate.value = clamped(given.mean, line, width, given.log_density - thin_log_density);
+  const double moved = given.mean - estimate.value;
+  estimate.std_dev = std::sqrt(given.variance + moved * moved);
+  return estimate;
+}
+
 }  // namespace
 
 Dgmm::Dgmm(Parameters parameters)
@@ -52,38 +68,22 @@ std::size_t Dgmm::parameter_count() const noexcept {
 }
 
 Estimate Dgmm::step(Features features) noexcept {
-  const Conditional given = forward_.query(features);
   const LinearClamp& clamp = parameters_.clamp;
   double line = clamp.intercept;
   for (std::size_t j = 0; j < features.size(); ++j) line += clamp.slope[j] * features[j];
-
-  Estimate estimate{.value = given.mean, .novelty = -given.log_density};
-  if (!std::isfinite(given.mean)) {
-    estimate.value = std::isfinite(line) ? line : parameters_.mixture.centre[0];
-    estimate.fault = Fault::model_not_finite;
-    return estimate;
-  }
-  if (clamp.width > 0.0)
-    estimate.value =
-        clamped(given.mean, line, clamp.width, given.log_density - clamp.thin_log_density);
-  const double moved = given.mean - estimate.value;
-  estimate.std_dev = std::sqrt(given.variance + moved * moved);
-  return estimate;
+  return guarded(forward_.query(features), line, parameters_.mixture.centre[0], clamp.width,
+                 clamp.thin_log_density);
 }
 
-double Dgmm::invert(double target, Features features) noexcept {
+Estimate Dgmm::invert(double target, Features features) noexcept {
   inverse_inputs_[0] = target;
   std::copy(features.begin() + 1, features.end(), inverse_inputs_.begin() + 1);
-  const Conditional given = inverse_.query(inverse_inputs_);
-
   const LinearClamp& clamp = parameters_.clamp;
   double rest = target - clamp.intercept;
   for (std::size_t j = 1; j < features.size(); ++j) rest -= clamp.slope[j] * features[j];
-  const double line = rest / clamp.slope[0];
-  if (!std::isfinite(given.mean)) return std::isfinite(line) ? line : parameters_.mixture.centre[1];
-  if (clamp.width == 0.0 || !std::isfinite(line)) return given.mean;
-  return clamped(given.mean, line, clamp.width / std::abs(clamp.slope[0]),
-                 given.log_density - clamp.thin_log_density_inverse);
+  return guarded(inverse_.query(inverse_inputs_), rest / clamp.slope[0],
+                 parameters_.mixture.centre[1], clamp.width / std::abs(clamp.slope[0]),
+                 clamp.thin_log_density_inverse);
 }
 
 }  // namespace torsio

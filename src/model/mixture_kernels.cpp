@@ -1,5 +1,6 @@
 #include "model/mixture_kernels.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -70,7 +71,8 @@ Selection select_blocks(const float* HWY_RESTRICT log_weights, std::size_t exact
     for (std::size_t lane = 0; lane < kExactLanes; lane += hn::Lanes(d)) {
       const auto value = hn::Load(d, log_weights + b * kExactLanes + lane);
       below &= hn::AllTrue(d, hn::Lt(value, limit));
-      if (!hn::AllFalse(d, hn::Eq(value, top))) selection.best = b;
+      const auto found = hn::FindFirstTrue(d, hn::Eq(value, top));
+      if (found >= 0) selection.best = b * kExactLanes + lane + static_cast<std::size_t>(found);
     }
     candidates[selection.count] = b;
     selection.count += below ? 0 : 1;
@@ -89,6 +91,11 @@ HWY_INLINE hn::Vec<D> output_mean(D d, const double* HWY_RESTRICT block, std::si
     mean = hn::MulAdd(hn::Load(d, output + (column + 1) * kExactLanes), centred, mean);
   }
   return mean;
+}
+
+// A variance is; its rounded difference need not be. NaN stays.
+inline double positive(double variance) {
+  return std::max(variance, std::numeric_limits<double>::min());
 }
 
 template <std::size_t kFixed>
@@ -149,7 +156,7 @@ Conditional finish_fixed(const double* HWY_RESTRICT packed, std::size_t inputs,
   const double total = hn::GetLane(hn::SumOfLanes(d, weight_sum));
   const double mean = hn::GetLane(hn::SumOfLanes(d, first)) / total;
   const double square = hn::GetLane(hn::SumOfLanes(d, second)) / total;
-  return {anchor + mean, square - mean * mean, largest + std::log(total)};
+  return {anchor + mean, positive(square - mean * mean), largest + std::log(total)};
 }
 
 // z - mean with the digits that neither has in float.
@@ -183,8 +190,11 @@ Conditional finish_rounded_fixed(const float* HWY_RESTRICT packed, std::size_t i
   const hn::CappedTag<float, kScanLanes> d;
   const std::size_t n = count_of<kFixed>(inputs);
   const std::size_t block_size = rounded_rows(n) * kScanLanes;
-  const float anchor =
-      hn::GetLane(compensated_output<kFixed>(d, packed + best * block_size, inputs, z));
+  const std::size_t lane_of_best = best % kScanLanes;
+  const float* HWY_RESTRICT heaviest =
+      packed + best / kScanLanes * block_size + lane_of_best / hn::Lanes(d) * hn::Lanes(d);
+  const float anchor = hn::ExtractLane(compensated_output<kFixed>(d, heaviest, inputs, z),
+                                       lane_of_best % hn::Lanes(d));
   const auto shift = hn::Set(d, anchor);
   const auto top = hn::Set(d, largest);
   const auto lightest = hn::Set(d, -60.0F);  // e^-60 is nothing, and still a normal number: fast
@@ -215,7 +225,7 @@ Conditional finish_rounded_fixed(const float* HWY_RESTRICT packed, std::size_t i
                        HWY_ATTR { return static_cast<double>(hn::GetLane(hn::SumOfLanes(d, v))); };
   const double total = sum(weight_sum);
   const double mean = sum(first) / total;
-  return {static_cast<double>(anchor) + mean, sum(second) / total - mean * mean,
+  return {static_cast<double>(anchor) + mean, positive(sum(second) / total - mean * mean),
           static_cast<double>(largest) + std::log(total)};
 }
 

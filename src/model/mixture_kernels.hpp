@@ -24,10 +24,10 @@ constexpr std::size_t rounded_rows(std::size_t inputs) { return exact_rows(input
 float scan(const float* packed, std::size_t blocks, std::size_t inputs, const float* z,
            float* log_weights) noexcept;
 
-/// Blocks of `kExactLanes` that hold something.
+/// Components that matter.
 struct Selection {
-  std::size_t count;  ///< blocks in which some component is not below the threshold
-  std::size_t best;   ///< a block with the largest log weight
+  std::size_t count;  ///< blocks of `kExactLanes` that hold one not below the threshold
+  std::size_t best;   ///< slot of one with the largest log weight
 };
 
 /// Lists the selected blocks in `candidates`, ascending.
@@ -40,7 +40,7 @@ Conditional finish(const double* packed, std::size_t inputs, const double* z,
 
 /// The mixture's moments in float32, over candidate blocks of `kScanLanes`.
 /// @param z the given quantities rounded to float, then what rounding took from them.
-/// @param best block of `kScanLanes` whose output means the moments are taken about.
+/// @param best slot of the component about whose output mean the moments are taken.
 /// @param largest log weight that the weights are relative to.
 Conditional finish_rounded(const float* packed, std::size_t inputs, const float* z,
                            const std::size_t* candidates, std::size_t count, std::size_t best,

@@ -84,6 +84,11 @@ std::vector<double> conditional_parameters(const GaussianMixture& mixture, std::
       inner(r, c) = covariance[row + given[static_cast<std::size_t>(c)]];
   }
   const Eigen::LLT<Eigen::MatrixXd> cholesky(inner);
+  if (cholesky.info() != Eigen::Success)
+    throw Error({.place = fmt::format("mixture: component {}", component),
+                 .problem = "bad covariance",
+                 .expected = "one whose given quantities have a positive definite part",
+                 .found = fmt::format("none when quantity {} is the output", output)});
   const Eigen::MatrixXd whitening =
       cholesky.matrixL().solve(Eigen::MatrixXd::Identity(n, n)) / std::numbers::sqrt2;
   const Eigen::VectorXd slope = cholesky.solve(cross);
@@ -113,6 +118,8 @@ MixtureRegression::MixtureRegression(const GaussianMixture& mixture, std::size_t
                  .expected = "two quantities or more and an output among them",
                  .found = fmt::format("{} quantities, output {}", mixture.dimension(), output)});
   pack(mixture, output);
+  // The first call of a kernel asks for the machine's instruction sets: here, not in the loop.
+  static_cast<void>(query(input_centre_));
 }
 
 void MixtureRegression::pack(const GaussianMixture& mixture, std::size_t output) {
@@ -236,8 +243,7 @@ Conditional MixtureRegression::query(Features inputs) noexcept {
   }
   bytes_read_ += pairs * rounded_rows(inputs_) * kScanLanes * sizeof(float);
   return physical(mixture_kernels::finish_rounded(rounded_.data(), inputs_, scan_input_.data(),
-                                                  candidates_.data(), pairs,
-                                                  best / (kScanLanes / kExactLanes), largest));
+                                                  candidates_.data(), pairs, best, largest));
 }
 
 void MixtureRegression::query(const Matrix& inputs, std::span<Conditional> results) noexcept {

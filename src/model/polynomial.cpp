@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "model/affine_inverse.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -90,10 +91,9 @@ Estimate Polynomial::step(Features features) noexcept {
 
 Estimate Polynomial::invert(double target, Features features) const noexcept {
   const CoefficientSchedule& schedule = coefficients_.schedule();
-  if (schedule.scheduled && schedule.feature == 0)
-    return {.value = features[0], .fault = Fault::model_not_finite};
+  if (schedule.scheduled && schedule.feature == 0) return no_inverse(features);
   const auto at = coefficients_.locate(features);
-  const double wanted = target - coefficients_.weighted_sum(at, first_slope_, features);
+  const double wanted = target - coefficients_.weighted_sum(at, first_slope_, features, 1);
   const auto x = [this](double z) { return centre_ + half_range_ * z; };
 
   double low = -1.0;
@@ -105,7 +105,8 @@ Estimate Polynomial::invert(double target, Features features) const noexcept {
     return {.value = x(nearer), .fault = Fault::outside_training_range};
   }
   const bool rises = error_high >= error_low;
-  double z = std::clamp((features[0] - centre_) / half_range_, low, high);
+  const double given = (features[0] - centre_) / half_range_;
+  double z = std::isnan(given) ? 0.0 : std::clamp(given, low, high);
   double moved = high - low;
   for (int i = 0; i < kInversionSteps; ++i) {
     const Curve here = curve(at, z);

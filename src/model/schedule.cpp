@@ -96,7 +96,7 @@ ScheduledCoefficients::Position ScheduledCoefficients::locate(Features features)
   const std::vector<double>& knots = schedule_.knots;
   const double s = features[schedule_.feature];
   const std::size_t last = knots.size() - 1;
-  if (s <= knots.front()) return {};
+  if (!(s > knots.front())) return {};  // NaN too, which has no place between knots
   if (s >= knots.back()) return {.left = last, .right = last};
   const auto above = std::ranges::upper_bound(knots, s);
   const auto right = static_cast<std::size_t>(above - knots.begin());
@@ -114,10 +114,11 @@ void ScheduledCoefficients::evaluate(Features features, std::span<double> out) c
   for (std::size_t j = 0; j < size(); ++j) out[j] = coefficient(at, j);
 }
 
-double ScheduledCoefficients::weighted_sum(const Position& at, std::size_t first,
-                                           Features features) const noexcept {
+double ScheduledCoefficients::weighted_sum(const Position& at, std::size_t first, Features features,
+                                           std::size_t from) const noexcept {
   double sum = 0.0;
-  for (std::size_t j = 0; j < features.size(); ++j) sum += coefficient(at, first + j) * features[j];
+  for (std::size_t j = from; j < features.size(); ++j)
+    sum += coefficient(at, first + j) * features[j];
   return sum;
 }
 

@@ -59,8 +59,7 @@ std::string schedulable_condition(const Dataset& dataset, const std::vector<std:
     for (const DatasetRecord& record : dataset.records) {
       const auto& conditions = record.recording.conditions();
       if (std::ranges::find(conditions, input) == conditions.end()) continue;
-      if (std::ranges::any_of(record.segments,
-                              [](const Segment& segment) { return segment.role == Role::train; }))
+      if (record.has_role(Role::train))
         values.insert(record.recording.channel(input).values.front());
     }
     if (values.size() > 1) return input;
@@ -108,8 +107,8 @@ ResultRow row_for(const ModelFile& file, Role split, Score score) {
 }
 
 /// The rows of one model: on each role, on each recording and on all of the role together.
-std::vector<ResultRow> rows_for(const ModelFile& file, Estimator& estimator, const Dataset& dataset,
-                                const Progress& progress) {
+std::vector<ResultRow> rows_for(const ModelFile& file, const Estimator& estimator,
+                                const Dataset& dataset, const Progress& progress) {
   std::vector<ResultRow> rows;
   for (const Role role : kRoles) {
     if (!dataset.has_role(role)) continue;
@@ -141,11 +140,10 @@ ResultRow failed_row(const ModelChoice& choice, const Error& error) {
   return row;
 }
 
-double test_rmse(const std::vector<ResultRow>& rows) {
+const ResultRow* whole_split(const std::vector<ResultRow>& rows, Role role) {
   for (const ResultRow& row : rows)
-    if (row.split == Role::test && !row.recording && row.status == "ok")
-      return row.score.metrics.rmse;
-  return kNotMeasured;
+    if (row.split == role && !row.recording && row.status == "ok") return &row;
+  return nullptr;
 }
 
 /// A model's share of the whole work's progress.
@@ -188,6 +186,7 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
              "Name held-out recordings with --test, or give them `role: test` in a manifest."});
   Comparison comparison{.results = empty_results(dataset), .best = {}};
   Results& results = comparison.results;
+  const Role judge = dataset.has_role(Role::validation) ? Role::validation : Role::test;
   double best_rmse = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < choices.size(); ++i) {
     const ModelChoice& choice = choices[i];
@@ -199,16 +198,22 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
     try {
       const Progress part = part_of(progress, i, choices.size(), choice.family);
       TrainedModel trained = train_model(dataset, choice, seed, part);
-      Estimator estimator = make_estimator(trained.file);
+      const Estimator estimator = make_estimator(trained.file);
       rows = rows_for(trained.file, estimator, dataset, part);
       for (ResultRow& row : rows) row.fit_seconds = trained.fit_seconds;
-      if (const double rmse = test_rmse(rows); rmse < best_rmse) {
-        best_rmse = rmse;
+      const ResultRow* judged = whole_split(rows, judge);
+      if (judged != nullptr && judged->score.metrics.rmse < best_rmse) {
+        best_rmse = judged->score.metrics.rmse;
         note_held_out_scores(trained.file.card, rows);
+        if (judge == Role::test)
+          trained.file.card.held_out +=
+              fmt::format("; this score chose the model among {}", choices.size());
         comparison.best = std::move(trained);
       }
     } catch (const Cancelled&) {
       throw;
+    } catch (const UsageError&) {
+      throw;  // a setting is wrong; what merely cannot be fitted to these data is another Error
     } catch (const Error& error) {
       rows = {failed_row(choice, error)};
     }
@@ -234,24 +239,23 @@ Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Prog
   dataset.check();
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
-  Estimator estimator = estimator_at(file, dataset.sample_rate_Hz());
+  const Estimator estimator = estimator_at(file, dataset.sample_rate_Hz());
   results.rows = rows_for(file, estimator, dataset, progress);
   return results;
 }
 
 void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows) {
-  for (const Role role : {Role::validation, Role::test}) {
-    for (const ResultRow& row : rows) {
-      if (row.split != role || row.recording || row.status != "ok") continue;
-      const Metrics& metrics = row.score.metrics;
-      card.held_out = fmt::format("{} {} samples, free run", metrics.samples, name(role));
-      card.metrics = {{"rmse", metrics.rmse},
-                      {"mad", metrics.mad},
-                      {"std_abs", metrics.std_abs},
-                      {"max_abs", metrics.max_abs},
-                      {"fit_percent", metrics.fit_percent}};
-      return;
-    }
+  for (const Role role : {Role::test, Role::validation}) {
+    const ResultRow* row = whole_split(rows, role);
+    if (row == nullptr) continue;
+    const Metrics& metrics = row->score.metrics;
+    card.held_out = fmt::format("{} {} samples, free run", metrics.samples, name(role));
+    card.metrics = {{"rmse", metrics.rmse},
+                    {"mad", metrics.mad},
+                    {"std_abs", metrics.std_abs},
+                    {"max_abs", metrics.max_abs},
+                    {"fit_percent", metrics.fit_percent}};
+    return;
   }
 }
 

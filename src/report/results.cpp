@@ -84,6 +84,7 @@ double rmse_on(const Results& results, const ResultRow& model, const std::string
 }
 
 std::string seconds_text(double seconds) {
+  if (std::isnan(seconds)) return "-";
   return seconds < 0.01 ? "<0.01" : fmt::format("{:.2f}", seconds);
 }
 
@@ -111,7 +112,7 @@ std::string ranked_table(const Results& results, Role split) {
   if (has_sets) table.header({"inputs"});
   table.header({"RMSE", "MAD", "max|e|", "fit %"});
   for (const std::string& recording : recordings) table.header({"RMSE " + recording});
-  table.header({"step ns", "p99.9", "fit s", "numbers"});
+  table.header({"step ns", "p99.9", "fit s", "parameters"});
 
   std::string failures;
   for (const ResultRow* row : ranking(results, split)) {

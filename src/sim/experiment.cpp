@@ -119,7 +119,12 @@ Recording simulate(const ExperimentSpec& spec, const Progress& progress) {
     const Measurement measured = sensors.step(plant);
     log.add(measured, plant);
     const BenchAction action = program.next(measured);
-    plant.step(action.command, action.load, 1.0 / kBenchRate_Hz);
+    const Fault fault = plant.step(action.command, action.load, 1.0 / kBenchRate_Hz);
+    if (fault != Fault::none)
+      throw Error({.place = fmt::format("{} at {} s", entry.info.name,
+                                        static_cast<double>(i) / kBenchRate_Hz),
+                   .problem = fmt::format("the plant refuses its command or load: {}",
+                                          torsio::name(fault))});
   }
   return log.finish(fmt::format("{} {} seed {}", sheet.name, entry.info.name, spec.seed));
 }

@@ -13,11 +13,13 @@ namespace torsio {
 namespace {
 
 constexpr double kGravity_m_s2 = 9.81;
+constexpr double kMostSmallSteps = 1e6;  // in one step: it must return
 
-bool is_usable(const PlantCommand& command, const Load& load, double dt_s) noexcept {
-  return dt_s > 0.0 && load.inertia_kg_m2 >= 0.0 &&
+bool is_usable(const PlantCommand& command, const Load& load, double dt_s,
+               double longest_dt_s) noexcept {
+  return dt_s > 0.0 && dt_s <= longest_dt_s && load.inertia_kg_m2 >= 0.0 &&
          std::isfinite(command.current_A + load.inertia_kg_m2 + load.gravity_Nm +
-                       load.external_torque_Nm + dt_s);
+                       load.external_torque_Nm);
 }
 
 void require_inertia(const char* name, double value) {
@@ -182,7 +184,8 @@ void Plant::reset(double joint_angle_rad, const Load& load) noexcept {
 }
 
 Fault Plant::step(const PlantCommand& command, const Load& load, double dt_s) noexcept {
-  if (!is_usable(command, load, dt_s)) return Fault::input_not_finite;
+  if (!is_usable(command, load, dt_s, kMostSmallSteps * longest_step_s_))
+    return Fault::input_not_finite;
   if (dt_s != asked_dt_s_) set_period(dt_s);
   for (std::size_t i = 0; i < small_steps_; ++i) small_step(command, load);
   return Fault::none;

@@ -11,7 +11,9 @@
 
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/train/guards.hpp"
 #include "torsio/train/inputs.hpp"
+#include "torsio/train/training_data.hpp"
 #include "train/signal_pair.hpp"
 
 namespace torsio {
@@ -158,37 +160,23 @@ class Checker {
   }
 
   void check_gaps() {
-    pass_unless_found("gaps", "no jump and no run of held values", [&] {
+    pass_unless_found("gaps", "no jump", [&] {
       for_each_channel([&](const Recording& recording, const Channel& channel) {
         if (is_condition(recording, channel.name)) return;
         const std::vector<double> values = bridged(channel);
-        std::vector<double> steps;
-        for (std::size_t i = 1; i < values.size(); ++i)
-          if (is_finite(values[i] - values[i - 1]))
-            steps.push_back(std::abs(values[i] - values[i - 1]));
-        if (steps.empty()) return;
-        const auto largest = std::ranges::max_element(steps);
-        const auto at = static_cast<std::size_t>(largest - steps.begin());
-        const double peak = *largest;
-        if (peak < kJumpShare * extent_of(values).width()) return;
-        const double others = second_largest_elsewhere(steps, at);
-        if (peak < kJumpOverOthers * others) return;
+        const Jump jump = largest_jump(values);
+        if (jump.height < kJumpShare * extent_of(values).width() ||
+            jump.height < kJumpOverOthers * jump.next_height)
+          return;
         add(Verdict::warn, "gaps", recording.name(),
-            fmt::format("{} jumps by {:.3g} at t = {:.4g} s, {:.0f} times more than anywhere else",
-                        channel.name, peak, recording.time_s(at + 1),
-                        peak / std::max(others, 1e-300)),
+            fmt::format("{} jumps by {:.3g} at t = {:.4g} s, {} anywhere else", channel.name,
+                        jump.height, recording.time_s(jump.sample),
+                        jump.next_height > 0.0
+                            ? fmt::format("{:.0f} times more than", jump.height / jump.next_height)
+                            : "and does not move"),
             "Were samples lost there? Cut the record in two, or resample it with --rate.");
       });
     });
-  }
-
-  [[nodiscard]] static double second_largest_elsewhere(const std::vector<double>& steps,
-                                                       std::size_t at) {
-    double largest = 0.0;
-    for (std::size_t i = 0; i < steps.size(); ++i)
-      if (i + kJumpNeighbourhood < at || i > at + kJumpNeighbourhood)
-        largest = std::max(largest, steps[i]);
-    return largest;
   }
 
   // Friction makes the torque lead the deflection, so a bare cross-correlation would call every
@@ -272,53 +260,21 @@ class Checker {
           fmt::format("{} reversals, several speeds in training", reversals));
   }
 
-  [[nodiscard]] static std::size_t count_reversals(const std::vector<double>& values) {
-    const double dead_band = kReversalShare * extent_of(values).width();
-    std::size_t count = 0;
-    double extreme = kNotMeasured;
-    int direction = 0;
-    for (const double value : values) {
-      if (!is_finite(value)) continue;
-      if (!is_finite(extreme)) extreme = value;
-      const double back = (value - extreme) * (direction == 0 ? 1.0 : direction);
-      if (direction == 0 ? std::abs(back) > dead_band : back < -dead_band) {
-        if (direction != 0) ++count;
-        direction = value > extreme ? 1 : -1;
-        extreme = value;
-      } else if (direction != 0 && back > 0.0) {
-        extreme = value;
-      }
-    }
-    return count;
-  }
-
-  /// Lower and upper decile of the speeds while moving.
-  [[nodiscard]] static std::vector<double> typical_speeds(const std::vector<double>& differences) {
-    std::vector<double> speeds;
-    for (const double difference : differences)
-      if (is_finite(difference)) speeds.push_back(std::abs(difference));
-    if (speeds.empty()) return {};
-    const double fastest = *std::ranges::max_element(speeds);
-    std::erase_if(speeds, [&](double speed) { return speed < kStandstillShare * fastest; });
-    std::ranges::sort(speeds);
-    if (speeds.empty()) return {};
-    return {speeds[speeds.size() / 10], speeds[speeds.size() * 9 / 10]};
-  }
-
   // Two records of one joint whose torques differ by a constant at the same deflection disagree
   // about zero.
   void check_offsets() {
     pass_unless_found("offsets", "the records agree about zero", [&] {
-      std::vector<double> offsets;
-      double slope_sum = 0.0;
-      for (const Pair& pair : pairs_) slope_sum += slope_of(pair);
-      const double slope = slope_sum / static_cast<double>(pairs_.size());
+      double slope = 0.0;
       double spread = 0.0;
+      std::vector<Line> lines;
       for (const Pair& pair : pairs_) {
-        offsets.push_back(mean_of(pair.target) - slope * mean_of(pair.input));
+        lines.push_back(line_through(pair));
+        slope += lines.back().slope / static_cast<double>(pairs_.size());
         spread = std::max(spread, extent_of(pair.target).width());
       }
-      if (offsets.size() < 2) return;
+      if (lines.size() < 2) return;
+      std::vector<double> offsets;
+      for (const Line& line : lines) offsets.push_back(line.mean_target - slope * line.mean_input);
       std::vector<double> sorted = offsets;
       std::ranges::sort(sorted);
       const double median = sorted[sorted.size() / 2];
@@ -331,26 +287,6 @@ class Checker {
     });
   }
 
-  [[nodiscard]] static double mean_of(const std::vector<double>& values) {
-    double sum = 0.0;
-    double count = 0.0;
-    for (const double value : values)
-      if (is_finite(value)) sum += value, count += 1.0;
-    return count > 0.0 ? sum / count : 0.0;
-  }
-
-  [[nodiscard]] static double slope_of(const Pair& pair) {
-    const double mean_x = mean_of(pair.input);
-    double xx = 0.0;
-    double xy = 0.0;
-    for (std::size_t i = 0; i < pair.input.size(); ++i) {
-      if (!is_finite(pair.input[i]) || !is_finite(pair.target[i])) continue;
-      xx += (pair.input[i] - mean_x) * (pair.input[i] - mean_x);
-      xy += (pair.input[i] - mean_x) * pair.target[i];
-    }
-    return xx > 0.0 ? xy / xx : 0.0;
-  }
-
   void check_leak() {
     const std::string leak = find_leak(dataset_, spec_);
     if (leak.empty()) {
@@ -361,25 +297,29 @@ class Checker {
     }
   }
 
+  // The guard acts on features, so features are compared; what cannot be learned from at all has failed above.
   void check_range() {
-    if (!dataset_.has_role(Role::test) || !dataset_.has_role(Role::train)) return;
+    if (!dataset_.has_role(Role::test) || !dataset_.has_role(Role::train) || has_failed()) return;
+    const FeatureRanges trained = feature_ranges(training_data(dataset_, spec_, Role::train));
+    const FeatureRanges tested = feature_ranges(training_data(dataset_, spec_, Role::test));
     pass_unless_found("range", "the test data lie inside the training range", [&] {
-      std::vector<std::string> names = channels_;
-      for (const std::string& channel : names) {
-        Extent trained;
-        Extent tested;
-        for (const DatasetRecord& record : dataset_.records)
-          for (const Segment& segment : record.segments)
-            for (std::size_t i = segment.begin; i < segment.end; ++i)
-              (segment.role == Role::test ? tested : trained)
-                  .include(record.recording.channel(channel).values[i]);
-        const double slack = kRangeSlack * trained.width();
-        if (tested.lowest < trained.lowest - slack || tested.highest > trained.highest + slack)
-          add(Verdict::warn, "range", "",
-              fmt::format("{}: tested on {:.4g} to {:.4g}, trained on {:.4g} to {:.4g}", channel,
-                          tested.lowest, tested.highest, trained.lowest, trained.highest),
-              "Models guess out there: the range guard answers with its linear fallback.");
+      for (std::size_t j = 0; j < spec_.inputs.size(); ++j) {
+        const double slack = trained.margin * (trained.highest[j] - trained.lowest[j]);
+        if (tested.lowest[j] >= trained.lowest[j] - slack &&
+            tested.highest[j] <= trained.highest[j] + slack)
+          continue;
+        add(Verdict::warn, "range", "",
+            fmt::format("{}: tested on {:.4g} to {:.4g}, trained on {:.4g} to {:.4g}",
+                        spec_.inputs[j], tested.lowest[j], tested.highest[j], trained.lowest[j],
+                        trained.highest[j]),
+            "Models guess out there: the range guard answers with its linear fallback.");
       }
+    });
+  }
+
+  [[nodiscard]] bool has_failed() const {
+    return std::ranges::any_of(findings_, [](const Finding& finding) {
+      return finding.verdict == Verdict::fail && finding.check != "sign" && finding.check != "leak";
     });
   }
 
@@ -387,19 +327,15 @@ class Checker {
   static constexpr double kSaturatedShare = 0.005;
   static constexpr double kJumpShare = 0.02;
   static constexpr double kJumpOverOthers = 5.0;
-  static constexpr std::size_t kJumpNeighbourhood = 3;
   static constexpr double kLongestDelay_s = 0.1;
   static constexpr double kClearCorrelation = 0.5;
   static constexpr double kExplainsLittle =
       0.2;  ///< of the variance: a fit that leaves more tells no delay
   static constexpr double kDelayGain = 0.7;  ///< of what is unexplained without shift
-  static constexpr double kReversalShare = 0.05;
   static constexpr std::size_t kFewReversals = 3;
   static constexpr double kSpeedHalfWindow_s = 0.05;
   static constexpr double kSpeedRatio = 2.0;
-  static constexpr double kStandstillShare = 0.05;
   static constexpr double kOffsetShare = 0.05;
-  static constexpr double kRangeSlack = 0.01;
 
   const Dataset& dataset_;
   const FeatureSpec& spec_;

@@ -27,7 +27,7 @@ struct Groups {
 };
 
 /// @param schedule expression of the scheduling input; empty: one group.
-/// @param feature_of the scheduling input's value in each sample is `features(sample, index)`.
+/// @param features samples x inputs, as `data` has them.
 /// @throws UsageError if no input is called that, Error if it has less than 2 or more than 64
 /// distinct values.
 [[nodiscard]] Groups groups_by(const std::string& schedule, const TrainingData& data,

@@ -89,7 +89,9 @@ struct Tally {
 
 }  // namespace
 
-Prediction predict(Estimator& estimator, const Recording& recording) {
+Prediction predict(Estimator estimator, const Recording& recording) {
+  for (const std::string& channel : estimator.settings().zeroed_channels)
+    estimator.set_zero(channel, 0.0);
   const auto channels = raw_channels(estimator, recording);
   std::vector<double> raw(channels.size());
   Prediction prediction;
@@ -107,7 +109,7 @@ Prediction predict(Estimator& estimator, const Recording& recording) {
   return prediction;
 }
 
-SplitScore evaluate(Estimator& estimator, const Dataset& dataset, Role role,
+SplitScore evaluate(const Estimator& estimator, const Dataset& dataset, Role role,
                     const Progress& progress) {
   SplitScore split;
   Tally together;
@@ -116,9 +118,7 @@ SplitScore evaluate(Estimator& estimator, const Dataset& dataset, Role role,
     report_progress(progress,
                     static_cast<double>(done++) / static_cast<double>(dataset.records.size()),
                     "scoring");
-    if (std::ranges::none_of(record.segments,
-                             [&](const Segment& segment) { return segment.role == role; }))
-      continue;
+    if (!record.has_role(role)) continue;
     const Prediction prediction = predict(estimator, record.recording);
     const Channel& target = record.recording.channel(dataset.target);
     Tally own;

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -35,17 +37,22 @@ Matrix joint_samples(const TrainingData& data) {
   return samples;
 }
 
-// What a data sheet says that a channel can resolve (SPEC 3.1); 0 for those without one.
+// What a data sheet says that a channel can resolve (SPEC 3.1); 0 for those without one and for
+// what is calculated from channels, whose size may be any.
 double resolution(std::string_view expression, bool is_rate) {
   constexpr double kTorque_Nm = 0.05;
   constexpr double kAngle_rad = rad_from_deg(0.01);
   constexpr double kSpeed_rad_s = rad_from_deg(0.1);
-  const auto channel = split_channel_name(expression);
+  constexpr std::string_view kNameCharacters =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
+  const bool is_name = expression.find_first_not_of(kNameCharacters) == std::string_view::npos;
+  const auto channel = is_name ? split_channel_name(expression) : std::nullopt;
   const std::string_view unit = channel ? channel->unit->si_suffix : std::string_view{};
   if (unit == "Nm") return kTorque_Nm;
   if (unit == "rad") return kAngle_rad;
   if (unit == "rad_s") return kSpeed_rad_s;
-  const bool of_angle = expression.find("_rad") != std::string_view::npos;
+  const bool of_angle = expression.find("_rad") != std::string_view::npos &&
+                        expression.find_first_of("*/^") == std::string_view::npos;
   return is_rate && of_angle ? kSpeed_rad_s : 0.0;
 }
 
@@ -69,6 +76,35 @@ Standardisation standardisation_of(const Matrix& samples, const TrainingData& da
   return robust_standardisation(samples, floors);
 }
 
+// A value so far out would drag a component, the line and the background with it.
+void refuse_outliers(const TrainingData& data, const Standardisation& by) {
+  constexpr double kMostScales = 1e6;
+  const auto check = [&](const Sequence& sequence, std::size_t n, std::size_t quantity) {
+    const double value = quantity == 0 ? sequence.target[n] : sequence.features(n, quantity - 1);
+    if (std::abs(value - by.centre[quantity]) <= kMostScales * by.scale[quantity]) return;
+    throw Error({.place = fmt::format(
+                     "dgmm: {}: {}, sample {}", sequence.recording,
+                     quantity == 0 ? data.target : data.inputs[quantity - 1].expression, n),
+                 .expected = fmt::format("a value within a million of the data's spread, {:.3g}",
+                                         by.scale[quantity]),
+                 .found = fmt::format("{:.6g}", value),
+                 .advice = "Is it an outlier or a mistaken unit? Correct it or leave that stretch "
+                           "of the record out."});
+  };
+  for (const Sequence& sequence : data.sequences)
+    for (std::size_t n = 0; n < sequence.target.size(); ++n)
+      for (std::size_t quantity = 0; sequence.use[n] != 0 && quantity < by.centre.size();
+           ++quantity)
+        check(sequence, n, quantity);
+}
+
+// Usable samples with nothing absurd among them.
+Matrix checked_samples(const TrainingData& data) {
+  Matrix samples = joint_samples(data);
+  refuse_outliers(data, standardisation_of(samples, data));
+  return samples;
+}
+
 // Mean and covariance of all samples, standardised.
 struct Moments {
   Eigen::VectorXd mean;
@@ -88,19 +124,27 @@ Moments moments_of(const Matrix& samples, const Standardisation& by) {
   return {mean.transpose(), standardised.transpose() * standardised / static_cast<double>(rows)};
 }
 
-// The least-squares line of the target on the inputs; inputs that say the same share the slope.
-LinearClamp linear_clamp(const Moments& all, const Standardisation& by, double width_in_rmse) {
-  const Eigen::Index inputs = all.mean.size() - 1;
-  const Eigen::VectorXd cross = all.covariance.col(0).tail(inputs);
-  const Eigen::VectorXd slope = all.covariance.bottomRightCorner(inputs, inputs)
-                                    .completeOrthogonalDecomposition()
-                                    .solve(cross);
+// The least-squares line of the target on the inputs that are no rates (decision 0004); inputs that
+// say the same share the slope.
+LinearClamp linear_clamp(const Moments& all, const Standardisation& by,
+                         std::span<const InputInfo> inputs, double width_in_rmse) {
+  std::vector<Eigen::Index> used;  // among the quantities, of which the target is the first
+  for (std::size_t j = 0; j < inputs.size(); ++j)
+    if (!inputs[j].is_rate) used.push_back(static_cast<Eigen::Index>(j) + 1);
+  const Eigen::VectorXd cross = all.covariance.col(0)(used);
+  Eigen::VectorXd slope(cross.size());
+  if (!used.empty()) {
+    const Eigen::MatrixXd among = all.covariance(used, used);
+    slope = among.completeOrthogonalDecomposition().solve(cross);
+  }
   LinearClamp clamp;
+  clamp.slope.assign(inputs.size(), 0.0);
   clamp.intercept = by.centre[0] + by.scale[0] * all.mean(0);
-  for (Eigen::Index j = 0; j < inputs; ++j) {
-    const auto k = static_cast<std::size_t>(j) + 1;
-    clamp.slope.push_back(slope(j) * by.scale[0] / by.scale[k]);
-    clamp.intercept -= clamp.slope.back() * (by.centre[k] + by.scale[k] * all.mean(j + 1));
+  for (std::size_t u = 0; u < used.size(); ++u) {
+    const auto k = static_cast<std::size_t>(used[u]);
+    double& own = clamp.slope[k - 1];
+    own = slope(static_cast<Eigen::Index>(u)) * by.scale[0] / by.scale[k];
+    clamp.intercept -= own * (by.centre[k] + by.scale[k] * all.mean(used[u]));
   }
   const double residual_variance = std::max(0.0, all.covariance(0, 0) - slope.dot(cross));
   clamp.width = width_in_rmse * by.scale[0] * std::sqrt(residual_variance);
@@ -195,7 +239,7 @@ MixtureFit fit_samples(const Matrix& samples, const TrainingData& data, const Dg
   const Moments all = moments_of(samples, standardisation);
   if (options.background_weight > 0.0)
     append_background(result.mixture, all, options.background_weight);
-  result.clamp = linear_clamp(all, standardisation, options.clamp);
+  result.clamp = linear_clamp(all, standardisation, data.inputs, options.clamp);
   result.clamp.thin_log_density = thin_log_density(result.mixture, 0, samples);
   result.clamp.thin_log_density_inverse = thin_log_density(result.mixture, 1, samples);
   return fit;
@@ -206,7 +250,7 @@ MixtureFit fit_samples(const Matrix& samples, const TrainingData& data, const Dg
 Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options,
                       const Progress& progress) {
   check_options(options);
-  const Matrix samples = joint_samples(data);
+  const Matrix samples = checked_samples(data);
   Fitted<Dgmm> fitted;
   double spread = options.online.initial_spread;
   if (std::isnan(spread)) {
@@ -232,7 +276,7 @@ Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options,
 
 Fitted<Dgmm> fit_dgmm_paper(const TrainingData& data, const PaperDgmmOptions& options,
                             const Progress& progress) {
-  const Matrix samples = joint_samples(data);
+  const Matrix samples = checked_samples(data);
   const Standardisation by = standardisation_of(samples, data);
   const std::size_t d = samples.columns;
   const std::size_t m = std::min(options.components, samples.rows);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -30,7 +29,7 @@ Samples directed_samples(const TrainingData& data, bool branch, double dead_band
   for (const Sequence& sequence : data.sequences) {
     DirectionTracker tracker(dead_band);
     for (std::size_t n = 0; n < sequence.target.size(); ++n) {
-      tracker.step(sequence.features(n, 0));
+      if (sequence.has_features(n)) tracker.step(sequence.features(n, 0));
       if (sequence.use[n] != 0) direction.push_back(tracker.direction());
     }
   }
@@ -113,14 +112,19 @@ double held_out_error(const Design& design, const Groups& groups) {
 
 std::size_t chosen_degree(const TrainingData& data, const Samples& samples, const Groups& groups,
                           Polynomial::Parameters shape, bool rates) {
-  std::array<double, kHighestChosenDegree> errors{};
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    shape.degree = i + 1;
-    errors[i] = held_out_error(polynomial_design(data, samples, groups, shape, rates), groups);
+  std::vector<double> errors;
+  while (errors.size() < kHighestChosenDegree) {
+    shape.degree = errors.size() + 1;
+    try {
+      errors.push_back(
+          held_out_error(polynomial_design(data, samples, groups, shape, rates), groups));
+    } catch (const Error&) {  // too few samples for so many terms, hence for more, too
+      if (errors.empty()) throw;
+      break;
+    }
   }
   const double good = 1.01 * 1.01 * *std::ranges::min_element(errors);
-  const auto* const first =
-      std::ranges::find_if(errors, [good](double error) { return error <= good; });
+  const auto first = std::ranges::find_if(errors, [good](double error) { return error <= good; });
   return static_cast<std::size_t>(first - errors.begin()) + 1;
 }
 
@@ -133,6 +137,7 @@ double default_dead_band(const TrainingData& data) {
   for (const Sequence& sequence : data.sequences) {
     for (std::size_t n = 0; n < sequence.target.size(); ++n) {
       const double x = sequence.features(n, 0);
+      if (!std::isfinite(x)) continue;
       lowest = std::min(lowest, x);
       highest = std::max(highest, x);
       const double change = n == 0 ? 0.0 : std::abs(x - sequence.features(n - 1, 0));

@@ -48,9 +48,13 @@ FeatureRanges feature_ranges(const TrainingData& data) {
 
 LinearFallback linear_fallback(const TrainingData& data) {
   const Table table = usable_table(data);
-  Matrix design(table.features.rows, 1 + data.input_count(), 1.0);
-  for (std::size_t n = 0; n < design.rows; ++n)
-    std::ranges::copy(table.features.row(n), design.row(n).begin() + 1);
+  // The columns of rates stay 0, so that least squares drops them.
+  Matrix design(table.features.rows, 1 + data.input_count());
+  for (std::size_t n = 0; n < design.rows; ++n) {
+    design(n, 0) = 1.0;
+    for (std::size_t j = 0; j < data.input_count(); ++j)
+      if (!data.inputs[j].is_rate) design(n, 1 + j) = table.features(n, j);
+  }
   const LeastSquares solved = least_squares(design, table.target);
   LinearFallback fallback;
   fallback.intercept = solved.coefficients.front();

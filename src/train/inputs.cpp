@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
@@ -50,9 +52,27 @@ bool is_computable(const Dataset& dataset, const std::vector<ChannelDefinition>&
   });
 }
 
+/// A name must mean the same in every record.
+void refuse_conflicts(const Dataset& dataset) {
+  std::map<std::string, std::pair<std::string, std::string>> met;  // name: expression, record
+  for (const DatasetRecord& record : dataset.records)
+    for (const ChannelDefinition& definition : record.recording.definitions) {
+      const auto& [expression, first] =
+          met.try_emplace(definition.name, definition.expression, record.recording.name())
+              .first->second;
+      if (expression != definition.expression)
+        throw Error({.place = record.recording.name() + ": " + definition.name,
+                     .problem = "the recordings define this channel differently",
+                     .expected = expression + ", as in " + first,
+                     .found = definition.expression,
+                     .advice = "Give both the same derive: in their mappings, or two names."});
+    }
+}
+
 /// The mapping's definitions whose sources are still there, then the canonical channels that nobody
 /// recorded.
 std::vector<ChannelDefinition> known_definitions(const Dataset& dataset) {
+  refuse_conflicts(dataset);
   std::vector<ChannelDefinition> definitions;
   for (const ChannelDefinition& definition : dataset.records.front().recording.definitions)
     if (is_computable(dataset, definitions, definition.expression))

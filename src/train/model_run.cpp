@@ -5,7 +5,12 @@ namespace torsio {
 std::vector<Estimate> run(AnyModel& model, const Sequence& sequence) {
   std::vector<Estimate> told(sequence.features.rows);
   model.reset();
-  for (std::size_t n = 0; n < told.size(); ++n) told[n] = model.step(sequence.features.row(n));
+  for (std::size_t n = 0; n < told.size(); ++n) {
+    if (sequence.has_features(n))
+      told[n] = model.step(sequence.features.row(n));
+    else
+      told[n].fault = Fault::input_not_finite;
+  }
   return told;
 }
 

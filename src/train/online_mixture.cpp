@@ -18,9 +18,6 @@ namespace {
 using nearest_kernel::kFarAway;
 using nearest_kernel::kLanes;
 
-// Largest dimension for which the search keeps its point on the stack.
-constexpr std::size_t kMostQuantities = 64;
-
 void check_range(const char* name, double value, double low, double high) {
   if (value >= low && value <= high) return;
   throw Error({.place = std::string("online mixture: ") + name,
@@ -38,7 +35,7 @@ void check_settings(const Standardisation& standardisation, const OnlineMixtureS
   check_range("merge_candidates", static_cast<double>(s.merge_candidates), 1.0, kLargest);
   check_range("prune_count", s.prune_count, 0.0, std::numeric_limits<double>::max());
   const std::size_t d = standardisation.centre.size();
-  check_range("number of quantities", static_cast<double>(d), 1.0, kMostQuantities);
+  check_range("number of quantities", static_cast<double>(d), 1.0, kMostMixtureQuantities);
   check_range("number of scales", static_cast<double>(standardisation.scale.size()),
               static_cast<double>(d), static_cast<double>(d));
   for (const double scale : standardisation.scale)
@@ -120,7 +117,7 @@ void OnlineMixture::learn(std::span<const double> sample) {
 }
 
 OnlineMixture::Nearest OnlineMixture::nearest(std::span<const double> at) const {
-  std::array<float, kMostQuantities> point;
+  std::array<float, kMostMixtureQuantities> point;
   for (std::size_t j = 0; j < dimension_; ++j) point[j] = static_cast<float>(at[j]);
   const std::size_t found = nearest_kernel::nearest(search_.data(), (size_ + kLanes - 1) / kLanes,
                                                     dimension_, point.data());
@@ -193,7 +190,8 @@ std::size_t OnlineMixture::neighbour(std::size_t component) {
   *point = kFarAway;  // hides the component from its own search
   const std::size_t found = nearest(means_.row(component)).component;
   *point = kept;
-  return found;
+  // Where all others are too far for a float, the search says 0.
+  return found != component ? found : (component == 0 ? 1 : 0);
 }
 
 std::size_t OnlineMixture::merge_cheapest() {

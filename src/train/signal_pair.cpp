@@ -12,6 +12,9 @@ namespace {
 constexpr double kHalfWindow_s = 0.005;
 constexpr double kSmallStep = 0.1;
 constexpr std::size_t kEnoughSamples = 20000;
+constexpr std::size_t kJumpNeighbourhood = 3;
+constexpr double kReversalShare = 0.05;
+constexpr double kStandstillShare = 0.05;
 
 bool is_finite(double value) { return std::isfinite(value); }
 
@@ -61,6 +64,67 @@ std::vector<double> movement(const std::vector<double>& values, std::size_t half
   for (std::size_t i = half_window; i + half_window < values.size(); ++i)
     differences[i] = values[i + half_window] - values[i - half_window];
   return differences;
+}
+
+Jump largest_jump(const std::vector<double>& values) {
+  Jump jump;
+  const auto height = [&](std::size_t i) { return std::abs(values[i] - values[i - 1]); };
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (height(i) > jump.height) jump = {.sample = i, .height = height(i)};  // false for NaN
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (i + kJumpNeighbourhood < jump.sample || i > jump.sample + kJumpNeighbourhood)
+      if (height(i) > jump.next_height) jump.next_height = height(i);
+  return jump;
+}
+
+Line line_through(const Pair& pair) {
+  Line line;
+  double count = 0.0;
+  double xx = 0.0;
+  double xy = 0.0;
+  for (std::size_t i = 0; i < pair.input.size(); ++i) {
+    if (!is_finite(pair.input[i]) || !is_finite(pair.target[i])) continue;
+    count += 1.0;
+    const double dx = pair.input[i] - line.mean_input;
+    line.mean_input += dx / count;
+    line.mean_target += (pair.target[i] - line.mean_target) / count;
+    xx += dx * (pair.input[i] - line.mean_input);
+    xy += dx * (pair.target[i] - line.mean_target);
+  }
+  if (xx > 0.0) line.slope = xy / xx;
+  return line;
+}
+
+std::size_t count_reversals(const std::vector<double>& values) {
+  const double dead_band = kReversalShare * extent_of(values).width();
+  std::size_t count = 0;
+  double extreme = kNotMeasured;
+  int direction = 0;
+  for (const double value : values) {
+    if (!is_finite(value)) continue;
+    if (!is_finite(extreme)) extreme = value;
+    const double forward = (value - extreme) * (direction == 0 ? 1.0 : direction);
+    if (direction == 0 ? std::abs(forward) > dead_band : forward < -dead_band) {
+      if (direction != 0) ++count;
+      direction = value > extreme ? 1 : -1;
+      extreme = value;
+    } else if (direction != 0 && forward > 0.0) {
+      extreme = value;
+    }
+  }
+  return count;
+}
+
+std::vector<double> typical_speeds(const std::vector<double>& differences) {
+  std::vector<double> speeds;
+  for (const double difference : differences)
+    if (is_finite(difference)) speeds.push_back(std::abs(difference));
+  if (speeds.empty()) return {};
+  const double fastest = *std::ranges::max_element(speeds);
+  std::erase_if(speeds, [&](double speed) { return speed <= kStandstillShare * fastest; });
+  std::ranges::sort(speeds);
+  if (speeds.empty()) return {};
+  return {speeds[speeds.size() / 10], speeds[speeds.size() * 9 / 10]};
 }
 
 ShiftedFit::ShiftedFit(const Pair& pair, double sample_rate_Hz) : pair_(pair) {

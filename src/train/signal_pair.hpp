@@ -35,6 +35,28 @@ struct Extent {
 /// Pearson's, over the samples where both are finite; 0 if one does not move.
 [[nodiscard]] double correlation(const std::vector<double>& x, const std::vector<double>& y);
 
+/// The highest step between two neighbours, and the highest one away from there.
+struct Jump {
+  std::size_t sample = 0;  ///< behind the step
+  double height = 0.0;
+  double next_height = 0.0;
+};
+[[nodiscard]] Jump largest_jump(const std::vector<double>& values);
+
+/// Least squares through the samples where input and target are both finite.
+struct Line {
+  double mean_input = 0.0;
+  double mean_target = 0.0;
+  double slope = 0.0;
+};
+[[nodiscard]] Line line_through(const Pair& pair);
+
+/// How often the motion turns back by more than 5 % of its range.
+[[nodiscard]] std::size_t count_reversals(const std::vector<double>& values);
+
+/// Lower and upper decile of the speeds while moving; empty if nothing moves.
+[[nodiscard]] std::vector<double> typical_speeds(const std::vector<double>& differences);
+
 /// Differences over the `half_window` samples before and after each: what moves, without offset or
 /// delay; NaN at both ends.
 [[nodiscard]] std::vector<double> movement(const std::vector<double>& values,

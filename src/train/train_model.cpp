@@ -1,11 +1,15 @@
 #include "torsio/train/train_model.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
+#include <set>
 #include <utility>
 
+#include "torsio/core/error.hpp"
 #include "torsio/train/families.hpp"
 #include "torsio/train/guards.hpp"
 #include "torsio/train/options.hpp"
@@ -14,16 +18,45 @@
 namespace torsio {
 namespace {
 
-ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, std::uint64_t seed) {
+std::set<std::string> zeroed_channels(const Recording& recording) {
+  std::set<std::string> channels;
+  for (const ZeroRule& zero : recording.zeros) channels.insert(zero.channel);
+  return channels;
+}
+
+/// The zeros of the training records: a model expects a channel zeroed or not, never both.
+std::vector<ZeroRule> training_zeros(const Dataset& dataset) {
+  const Recording* first = nullptr;
+  for (const DatasetRecord& record : dataset.records) {
+    if (!record.has_role(Role::train)) continue;
+    if (first == nullptr) first = &record.recording;
+    const auto expected = zeroed_channels(*first);
+    const auto found = zeroed_channels(record.recording);
+    if (found == expected) continue;
+    const auto list = [](const std::set<std::string>& channels) {
+      return channels.empty() ? std::string("none") : fmt::format("{}", fmt::join(channels, ", "));
+    };
+    throw Error({.place = record.recording.name() + ": zero",
+                 .problem = "the training recordings disagree about which channels are zeroed",
+                 .expected = list(expected) + ", as in " + first->name(),
+                 .found = list(found),
+                 .advice = "Give all of them the same zero: rules."});
+  }
+  return first == nullptr ? std::vector<ZeroRule>{} : first->zeros;
+}
+
+ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Options& options,
+                   std::uint64_t seed) {
   ModelCard card;
   card.fitted_as = choice.family;
-  card.options = choice.options;
+  card.options = options.values();
   card.seed = seed;
-  card.zeros = dataset.records.front().recording.zeros;
+  card.zeros = training_zeros(dataset);
   for (const DatasetRecord& record : dataset.records) {
-    bool is_trained_on = false;
-    for (const Segment& segment : record.segments) is_trained_on |= segment.role == Role::train;
-    if (is_trained_on) card.training_files.push_back(record.recording.source);
+    const bool is_listed = std::ranges::find(card.training_files, record.recording.source) !=
+                           card.training_files.end();
+    if (record.has_role(Role::train) && !is_listed)
+      card.training_files.push_back(record.recording.source);
   }
   return card;
 }
@@ -41,6 +74,7 @@ TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std:
                          const Progress& progress) {
   const FamilyInfo& family = find_family(choice.family);
   const Options options(family.options, choice.options);
+  ModelCard card = card_for(dataset, choice, options, seed);
   const TrainingData data = training_data(dataset, choice.features);
   std::optional<TrainingData> validation;
   if (dataset.has_role(Role::validation))
@@ -50,14 +84,16 @@ TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std:
   FittedModel fitted = family.fit(data, options, seed, progress);
   const std::chrono::duration<double> fit_time = std::chrono::steady_clock::now() - start;
 
-  TrainedModel trained{.file = {.card = card_for(dataset, choice, seed),
+  TrainedModel trained{.file = {.card = std::move(card),
                                 .settings = guarded_settings(choice.features, data, fitted.model,
                                                              validation ? &*validation : nullptr),
                                 .parameters = fitted.model.parameters()},
                        .notes = std::move(fitted.notes),
                        .fit_seconds = fit_time.count()};
+  const FeaturePipeline pipeline(choice.features, data.sample_rate_Hz);
   for (const ZeroRule& zero : trained.file.card.zeros)
-    trained.file.settings.zeroed_channels.push_back(zero.channel);
+    if (std::ranges::find(pipeline.raw_inputs(), zero.channel) != pipeline.raw_inputs().end())
+      trained.file.settings.zeroed_channels.push_back(zero.channel);
   return trained;
 }
 

@@ -51,15 +51,15 @@ Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::
     std::ranges::transform(channels, raw.begin(),
                            [n](const Channel* channel) { return channel->values[n]; });
     std::ranges::copy(pipeline.step(raw), sequence.features.row(n).begin());
-    if (!pipeline.is_settled() || !measured.is_fresh(n) || !std::isfinite(measured.values[n]))
+    if (!pipeline.is_settled() || !measured.is_fresh(n) || !std::isfinite(measured.values[n]) ||
+        !sequence.has_features(n))
       sequence.use[n] = 0;
   }
   return sequence;
 }
 
-/// A feature that is not finite (a division, a power) may not be learned from, and the model could
-/// not be asked there either.
-void check_features(const TrainingData& data) {
+/// Features that are not finite may be why nothing is left to learn from.
+void refuse_if_not_finite(const TrainingData& data) {
   for (const Sequence& sequence : data.sequences) {
     const auto& values = sequence.features.values;
     const auto bad =
@@ -69,13 +69,19 @@ void check_features(const TrainingData& data) {
     throw Error({.place = sequence.recording + ": input " +
                           data.inputs[index % data.input_count()].expression + ", sample " +
                           std::to_string(index / data.input_count()),
+                 .problem = "no sample is left to learn from",
                  .expected = "a finite value",
                  .found = std::to_string(*bad),
-                 .advice = "Change the expression so that it stays finite for every sample."});
+                 .advice = "Change the expression so that it stays finite."});
   }
 }
 
 }  // namespace
+
+bool Sequence::has_features(std::size_t sample) const {
+  return std::ranges::all_of(features.row(sample),
+                             [](double value) { return std::isfinite(value); });
+}
 
 TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role role) {
   FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
@@ -84,19 +90,17 @@ TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role
   data.sample_rate_Hz = dataset.sample_rate_Hz();
   for (std::size_t j = 0; j < pipeline.feature_count(); ++j)
     data.inputs.push_back({spec.inputs[j], pipeline.is_rate(j)});
-  const auto has_role = [role](const DatasetRecord& record) {
-    return std::ranges::any_of(record.segments,
-                               [role](const Segment& segment) { return segment.role == role; });
-  };
   for (const DatasetRecord& record : dataset.records)
-    if (has_role(record)) data.sequences.push_back(run(record, pipeline, dataset.target, role));
-  check_features(data);
-  if (data.usable_samples() == 0)
+    if (record.has_role(role))
+      data.sequences.push_back(run(record, pipeline, dataset.target, role));
+  if (data.usable_samples() == 0) {
+    refuse_if_not_finite(data);
     throw Error({.problem = "nothing to use with role " + std::string(name(role)),
                  .expected = "samples with a measured " + dataset.target +
                              " after the filters have settled (" +
                              std::to_string(pipeline.settling_samples()) + " samples)",
                  .found = std::to_string(data.sequences.size()) + " records of that role"});
+  }
   return data;
 }
 

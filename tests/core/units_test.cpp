@@ -50,6 +50,7 @@ TEST(Units, ReadQuantities) {
   EXPECT_THROW((void)si_quantity("5 Nm", "s", "embargo"), UsageError);
   EXPECT_THROW((void)si_quantity("soon", "s", "embargo"), UsageError);
   EXPECT_THROW((void)si_quantity("nan", "s", "embargo"), UsageError);
+  EXPECT_THROW((void)si_quantity("1e308min", "s", "embargo"), UsageError);
 }
 
 TEST(Units, HaveLabelsForPeople) {

@@ -6,6 +6,7 @@
 #include <zlib.h>
 
 #include <bit>
+#include <clocale>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -14,9 +15,32 @@
 #include <vector>
 
 #include "support/temporary_folder.hpp"
+#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
+
+TEST(ParseCsv, ANumberTooSmallIsZeroAndOneTooLargeIsRefusedWhateverTheLocale) {
+  struct CommaLocale {
+    CommaLocale() {
+      for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8"})
+        if (std::setlocale(LC_NUMERIC, name) != nullptr) break;
+    }
+    ~CommaLocale() { static_cast<void>(std::setlocale(LC_NUMERIC, "C")); }
+    CommaLocale(const CommaLocale&) = delete;
+    CommaLocale& operator=(const CommaLocale&) = delete;
+  } const comma;
+  const std::string zeros(400, '0');
+  for (const std::string& small :
+       {std::string("5.1e-330"), std::string("0.0071e-400"), "0." + zeros + "9",
+        zeros + ".1e-999999999", std::string("0e999")})
+    EXPECT_EQ(parse_csv("a_1\n-" + small + "\n", "t").columns[0].values[0], 0.0) << small;
+  for (const std::string& large : {std::string("5.1e330"), std::string("0.0071e400"), "9" + zeros,
+                                   "0." + zeros + "1e999999999"})
+    EXPECT_THROW(static_cast<void>(parse_csv("a_1\n" + large + "\n", "t")), Error) << large;
+  EXPECT_EQ(parse_csv("a_1\n0." + zeros + "1e401\n", "t").columns[0].values[0], 1.0);
+  EXPECT_EQ(parse_csv("a_1\n4.9e-324\n", "t").columns[0].values[0], 4.9e-324);
+}
 
 std::string gzipped(const std::string& text) {
   std::string packed(text.size() + 200, '\0');

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 
+#include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/manifest.hpp"
@@ -123,6 +124,30 @@ TEST_F(Manifests, AsATestAllOfItIsTest) {
   for (std::size_t i = 1; i < dataset.records.size(); ++i) {
     EXPECT_EQ(dataset.records[i].segments.size(), 1U);
     EXPECT_EQ(dataset.records[i].segments[0].role, Role::test);
+  }
+}
+
+TEST_F(Manifests, KeepTheirRolesWhereAllElseIsTest) {
+  LoadOptions options;
+  options.role = Role::test;
+  const std::string plain = folder_.file("plain.yaml", "files: [logs/a.csv]");
+  const Dataset dataset = load_dataset({manifest_, folder_.path("logs/c.csv"), plain}, {}, options);
+  ASSERT_EQ(dataset.records.size(), 5U);
+  EXPECT_TRUE(dataset.records[0].has_role(Role::train)) << "by the split";
+  EXPECT_TRUE(dataset.records[1].has_role(Role::validation));
+  EXPECT_EQ(dataset.records[3].segments.front().role, Role::test) << "a CSV file";
+  EXPECT_EQ(dataset.records[4].segments.front().role, Role::test) << "said in no manifest";
+}
+
+TEST_F(Manifests, AnEmbargoLongerThanTheRecordIsRefused) {
+  for (const char* embargo : {"1e300s", "1e308min", "2s"}) {
+    const std::string path = folder_.file(
+        "long.yaml",
+        std::string("{files: [logs/a.csv], split: {contiguous: 0.5, embargo: ") + embargo + "}}");
+    EXPECT_NE(
+        test::error_message([&] { static_cast<void>(load_dataset({path}, {})); }).find("embargo"),
+        std::string::npos)
+        << embargo;
   }
 }
 

@@ -122,6 +122,21 @@ TEST(Mapping, CompensatesALatencyByWholeSamples) {
   EXPECT_TRUE(std::isnan(values[2]));
 }
 
+TEST(Mapping, RefusesALatencyLongerThanTheRecord) {
+  for (const char* latency : {"1e300s", "50ms"})
+    EXPECT_THROW(static_cast<void>(read("t_s,torque_Nm\n0,1\n0.01,2\n0.02,3\n0.03,4\n",
+                                        std::string("latency: {torque_Nm: ") + latency + "}")),
+                 Error)
+        << latency;
+}
+
+TEST(Mapping, RefusesAResamplingThatFillsTheMemory) {
+  // 2^28 numbers are the limit for all channels together.
+  EXPECT_THROW(static_cast<void>(read("t_s,a_m,b_m,c_m\n0,0,0,0\n0.9,1,1,1\n2,3,3,3\n",
+                                      "clock: {resample: 50000kHz}")),
+               Error);
+}
+
 TEST(Mapping, TakesZerosFromTheStartOrTheMiddle) {
   const std::string csv = "t_s,a_rad,b_rad\n0,1,1\n1,3,3\n2,9,9\n";
   const Recording recording = read(csv, R"(

@@ -89,6 +89,11 @@ TEST(Resample, ConditionsStayConditions) {
 TEST(Resample, RefusesARateThatIsNoneOrFillsTheMemory) {
   EXPECT_THROW(static_cast<void>(resample(sine(100.0, 1.0, 50), 0.0)), Error);
   EXPECT_THROW(static_cast<void>(resample(sine(100.0, 1.0, 50), 1e12)), Error);
+  // 10^8 samples a channel, 3 * 10^8 numbers in all
+  Recording three = sine(100.0, 1.0, 101);
+  three.add({.name = "b_m", .values = std::vector<double>(101, 0.0)});
+  three.add({.name = "c_m", .values = std::vector<double>(101, 0.0)});
+  EXPECT_THROW(static_cast<void>(resample(three, 1e8)), Error);
 }
 
 TEST(Interpolate, FollowsUnevenStamps) {

@@ -142,8 +142,6 @@ TEST(Estimator, TellsTheFallbackWhileItWarmsUp) {
 
 TEST(Estimator, TellsTheFallbackOutsideTheTrainingRange) {
   ScriptedEstimator estimator(settings(), Scripted({}));
-  EXPECT_EQ(step(estimator, 1.09).fault, Fault::none) << "within the margin";
-  EXPECT_EQ(step(estimator, -1.09).fault, Fault::none);
   const Estimate outside = step(estimator, 1.11);
   EXPECT_EQ(outside.fault, Fault::outside_training_range);
   EXPECT_DOUBLE_EQ(outside.value, 0.5 + 7.0 * 1.11);
@@ -151,12 +149,125 @@ TEST(Estimator, TellsTheFallbackOutsideTheTrainingRange) {
   EXPECT_EQ(step(estimator, -1.11).fault, Fault::outside_training_range);
 }
 
+TEST(Estimator, HandsOverToTheFallbackAcrossTheBorder) {
+  const double model = 10.0;
+  ScriptedEstimator estimator = saying({.value = model, .std_dev = 2.0});
+  EXPECT_EQ(step(estimator, 1.0).value, model) << "the model alone, up to the range's end";
+  EXPECT_EQ(step(estimator, 1.0).std_dev, 2.0);
+  for (const double weight : {0.1, 0.5, 0.9}) {
+    for (const double side : {-1.0, 1.0}) {
+      const double x = side * (1.0 + 0.1 * weight);
+      const double fallback = 0.5 + 7.0 * x;
+      const double apart = model - fallback;
+      const Estimate blend = step(estimator, x);
+      EXPECT_EQ(blend.fault, Fault::none);
+      EXPECT_NEAR(blend.value, (1.0 - weight) * model + weight * fallback, 1e-4);
+      EXPECT_NEAR(
+          blend.std_dev,
+          std::sqrt((1.0 - weight) * 4.0 + weight * 9.0 + weight * (1.0 - weight) * apart * apart),
+          1e-4);
+    }
+  }
+}
+
+TEST(Estimator, TellsNoErrorBarForABlendWithoutEvidence) {
+  ScriptedEstimator estimator = saying({.value = 10.0});
+  EXPECT_TRUE(std::isnan(step(estimator, 1.05).std_dev));
+  EstimatorSettings no_evidence = settings();
+  no_evidence.fallback.residual_std = kNaN;
+  ScriptedEstimator other(no_evidence,
+                          Scripted({.says = {.value = 1.0, .std_dev = 2.0}, .obeys = true}));
+  EXPECT_TRUE(std::isnan(step(other, 1.05).std_dev));
+}
+
+TEST(Estimator, StaysFiniteWhenModelAndFallbackAreFurtherApartThanANumberCanTell) {
+  EstimatorSettings far = settings();
+  far.fallback = {.intercept = -1e308, .slope = {0.0}, .residual_std = 1.0};
+  ScriptedEstimator estimator(far,
+                              Scripted({.says = {.value = 1e308, .std_dev = 1.0}, .obeys = true}));
+  const Estimate middle = step(estimator, 1.05);
+  EXPECT_LT(std::abs(middle.value), 1e304);
+  EXPECT_FALSE(std::isinf(middle.std_dev));
+}
+
+/// Trained on a range of any place, width and margin in each of two features.
+EstimatorSettings any_two_ranges() {
+  const auto in = [](double low, double high) {
+    return low + (high - low) * 1e-3 * *rc::gen::inRange(0, 1001);
+  };
+  EstimatorSettings two = settings();
+  two.features.inputs = {"gear_angle_rad", "joint_angle_rad"};
+  two.ranges = {.lowest = {in(-5.0, 5.0), in(-5.0, 5.0)}, .highest = {}, .margin = in(0.01, 0.3)};
+  for (const double lowest : two.ranges.lowest) two.ranges.highest.push_back(lowest + in(0.1, 4.0));
+  two.fallback = {.intercept = 100.0, .slope = {in(-9.0, 9.0), in(-9.0, 9.0)}, .residual_std = 3.0};
+  return two;
+}
+
+RC_GTEST_PROP(Estimator, ItsValueJumpsInNoFeature, ()) {
+  const EstimatorSettings two = any_two_ranges();
+  ScriptedEstimator estimator(two, Scripted({.inputs = 2}));
+  const auto border = [&](std::size_t i) {
+    return two.ranges.margin * (two.ranges.highest[i] - two.ranges.lowest[i]);
+  };
+  const std::size_t moving = *rc::gen::inRange<std::size_t>(0, 2);
+  const std::size_t still = 1 - moving;
+  std::array<double, 2> x{};
+  x[still] = two.ranges.highest[still] + 0.1 * *rc::gen::inRange(-10, 15) * border(still);
+  const double from = two.ranges.lowest[moving] - 2.0 * border(moving);
+  const double to = two.ranges.highest[moving] + 2.0 * border(moving);
+  const double stride = 1e-3 * border(moving);
+  x[moving] = from;
+  double before = estimator.step(x).value;
+  // Over one border the blend turns from the one into the other, less than 500 apart; both are
+  // themselves less steep than 10.
+  const double most = 1.1 * (500.0 * 1e-3 + 10.0 * stride);
+  for (int i = 1; from + i * stride < to; ++i) {
+    x[moving] = from + i * stride;
+    const double value = estimator.step(x).value;
+    RC_ASSERT(std::abs(value - before) <= most);
+    before = value;
+  }
+}
+
+RC_GTEST_PROP(Estimator, TheModelAloneAnswersWithinTheRange, ()) {
+  const EstimatorSettings two = any_two_ranges();
+  ScriptedEstimator estimator(two, Scripted({.inputs = 2}));
+  std::array<double, 2> x{};
+  for (std::size_t i = 0; i < 2; ++i)
+    x[i] =
+        std::lerp(two.ranges.lowest[i], two.ranges.highest[i], 1e-3 * *rc::gen::inRange(0, 1001));
+  RC_ASSERT(estimator.step(x).value == 10.0 * x[0]);
+}
+
 TEST(Estimator, AllowsRoundingWhereAFeatureWasConstantInTraining) {
   EstimatorSettings constant = settings();
   constant.ranges.lowest = constant.ranges.highest = {0.033};
   ScriptedEstimator estimator(constant, Scripted({}));
-  EXPECT_EQ(step(estimator, 0.033 * (1.0 + 1e-12)).fault, Fault::none);
+  const auto value_is_the_models = [&](double x) { return step(estimator, x).value == 10.0 * x; };
+  EXPECT_TRUE(value_is_the_models(0.033));
+  EXPECT_TRUE(value_is_the_models(0.033 * (1.0 + 1e-12)));
+  EXPECT_TRUE(value_is_the_models(static_cast<double>(0.033F))) << "it came as a float32";
   EXPECT_EQ(step(estimator, 0.034).fault, Fault::outside_training_range);
+  EXPECT_EQ(step(estimator, 0.033 * (1.0 + 1e-6)).fault, Fault::outside_training_range);
+}
+
+TEST(Estimator, JumpsNotEvenWhereAFeatureWasConstantInTraining) {
+  for (const double trained_at : {0.0, 0.033, -300.0}) {
+    EstimatorSettings constant = settings();
+    constant.ranges.lowest = constant.ranges.highest = {trained_at};
+    constant.fallback = {.intercept = 50.0, .slope = {0.0}};
+    ScriptedEstimator estimator(constant, Scripted({.says = {.value = 10.0}, .obeys = true}));
+    const double reach = 4e-7 * (trained_at == 0.0 ? 1.0 : std::abs(trained_at));
+    double before = step(estimator, trained_at - reach).value;
+    EXPECT_EQ(before, 50.0);
+    for (int i = -999; i <= 1000; ++i) {
+      const double value = step(estimator, trained_at + reach * 1e-3 * i).value;
+      ASSERT_LT(std::abs(value - before), 0.4) << trained_at << ", step " << i;
+      before = value;
+    }
+    EXPECT_EQ(step(estimator, trained_at).value, 10.0);
+    EXPECT_EQ(before, 50.0);
+  }
 }
 
 TEST(Estimator, TellsTheFallbackWhenTheModelFails) {
@@ -249,6 +360,65 @@ TEST(Estimator, SubtractsAZero) {
   EXPECT_THROW(estimator.set_zero("elbow_rad", 0.0), UsageError);
 }
 
+/// Trained on records whose zero was taken from each.
+EstimatorSettings zeroed_settings(const std::string& input = "gear_angle_rad") {
+  EstimatorSettings zeroed = settings(input);
+  zeroed.zeroed_channels = {"gear_angle_rad"};
+  zeroed.residuals = {.edges = {-10.0, 10.0}, .std_dev = {1.0}};
+  return zeroed;
+}
+
+TEST(Estimator, IsNotToBeUsedBeforeItsZeroIsSet) {
+  ScriptedEstimator estimator(zeroed_settings(), Scripted({}));
+  EXPECT_THAT(estimator.unset_zeros(), testing::ElementsAre("gear_angle_rad"));
+  for (int i = 0; i < 3; ++i) {
+    const Estimate estimate = step(estimator, 0.5);
+    EXPECT_EQ(estimate.fault, Fault::zero_not_set);
+    EXPECT_EQ(estimate.value, 5.0);
+    EXPECT_TRUE(std::isnan(estimate.std_dev)) << "off by an unknown amount";
+  }
+  estimator.set_zero("gear_angle_rad", 0.2);
+  EXPECT_THAT(estimator.unset_zeros(), testing::IsEmpty());
+  const Estimate estimate = step(estimator, 0.5);
+  EXPECT_EQ(estimate.fault, Fault::none);
+  EXPECT_DOUBLE_EQ(estimate.value, 3.0);
+  EXPECT_EQ(estimate.std_dev, 1.0);
+}
+
+TEST(Estimator, WantsEveryZeroThatTrainingTook) {
+  EstimatorSettings two = zeroed_settings("gear_angle_rad - joint_angle_rad");
+  two.zeroed_channels = {"gear_angle_rad", "joint_angle_rad"};
+  ScriptedEstimator estimator(two, Scripted({}));
+  estimator.set_zero("joint_angle_rad", 0.0);
+  EXPECT_EQ(estimator.step(std::array{0.2, 0.1}).fault, Fault::zero_not_set);
+  EXPECT_THROW(estimator.set_zero("gear_angle_rad", kNaN), UsageError);
+  EXPECT_EQ(estimator.step(std::array{0.2, 0.1}).fault, Fault::zero_not_set);
+  estimator.set_zero("gear_angle_rad", 0.0);
+  EXPECT_EQ(estimator.step(std::array{0.2, 0.1}).fault, Fault::none);
+}
+
+TEST(Estimator, KeepsItsZeroOverAReset) {
+  ScriptedEstimator estimator(zeroed_settings(), Scripted({}));
+  estimator.reset();
+  EXPECT_EQ(step(estimator, 0.5).fault, Fault::zero_not_set);
+  estimator.set_zero("gear_angle_rad", 0.2);
+  estimator.reset();
+  EXPECT_EQ(step(estimator, 0.5).fault, Fault::none);
+  EXPECT_DOUBLE_EQ(step(estimator, 0.5).value, 3.0);
+}
+
+TEST(Estimator, TellsAMissingZeroBehindInputsAndWarmUpAndBeforeTheRange) {
+  ScriptedEstimator estimator(zeroed_settings("lag(gear_angle_rad, 1)"), Scripted({}));
+  EXPECT_EQ(step(estimator, kNaN).fault, Fault::input_not_finite);
+  EXPECT_EQ(step(estimator, 5.0).fault, Fault::warming_up);
+  const Estimate outside = step(estimator, 5.0);
+  EXPECT_EQ(outside.fault, Fault::zero_not_set);
+  EXPECT_EQ(outside.value, 35.5) << "the fallback's, as it would be with a zero";
+  ScriptedEstimator failing(zeroed_settings(), Scripted({.says = {.value = kNaN}, .obeys = true}));
+  EXPECT_EQ(step(failing, 0.5).fault, Fault::zero_not_set);
+  EXPECT_EQ(step(failing, 0.5).value, 4.0);
+}
+
 TEST(Estimator, RefusesSettingsThatDoNotFitTheModel) {
   EXPECT_THAT(
       refusal(settings(), 2),
@@ -265,6 +435,11 @@ TEST(Estimator, RefusesSettingsThatDoNotFitTheModel) {
   bad = settings();
   bad.residuals = {.edges = {0.0, 1.0}, .std_dev = {1.0, 2.0}};
   EXPECT_THAT(refusal(bad), HasSubstr("residuals.edges: expected 3 values, found 2"));
+  bad = settings();
+  bad.zeroed_channels = {"joint_angle_rad"};
+  EXPECT_THAT(
+      refusal(bad),
+      HasSubstr("zeroed_channels: expected some of gear_angle_rad, found 'joint_angle_rad'"));
 }
 
 TEST(Estimator, RefusesGuardsThatWouldLetEverythingThrough) {

@@ -28,6 +28,7 @@ using testing::HasSubstr;
 /// Torques of a run, as bits: equality without exception for NaN or signed zero.
 std::vector<std::uint64_t> run(Estimator estimator) {
   std::vector<std::uint64_t> bits;
+  estimator.set_zero("joint_angle_rad", 0.0);
   for (int i = 0; i < 200; ++i) {
     const double angle = 0.1 * std::sin(0.05 * i);
     const Estimate estimate = estimator.step({{angle, -0.2 * angle}});

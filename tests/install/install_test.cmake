@@ -1,5 +1,6 @@
 # cmake -DBUILD=<build tree> -DSOURCE=<tests/install/stranger> -DWORK=<scratch> -P install_test.cmake
-# Installs torsio into a scratch prefix, builds a stranger's project against it and runs that.
+# Installs torsio into a scratch prefix, builds two strangers' projects against it (one without, one with the lab)
+# and runs them.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -14,6 +15,9 @@ file(REMOVE_RECURSE ${WORK})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
 run(${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/build -DCMAKE_PREFIX_PATH=${WORK}/prefix)
 run(${CMAKE_COMMAND} --build ${WORK}/build)
+run(${CMAKE_COMMAND} -S ${SOURCE}_of_the_lab -B ${WORK}/build_lab -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+run(${CMAKE_COMMAND} --build ${WORK}/build_lab)
+run(${WORK}/build_lab/stranger_of_the_lab)
 set(torsio ${WORK}/prefix/bin/torsio)
 run(${torsio} simulate dfki-50 sweep --duration 30s -o ${WORK}/sweep.csv)
 run(${torsio} fit ${WORK}/sweep.csv --model linear -o ${WORK}/joint.safetensors)

@@ -35,6 +35,7 @@ TEST(AnyModel, BehavesAsTheFamilyInIt) {
   expect_same_behaviour(example<Linear>());
   expect_same_behaviour(example<LinearCoulomb>());
   expect_same_behaviour(example<Polynomial>());
+  expect_same_behaviour(example<Dgmm>());
 }
 
 TEST(AnyModel, GivesEmptyParametersByFamilyName) {

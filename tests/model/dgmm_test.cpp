@@ -54,7 +54,7 @@ TEST(Dgmm, StaysNearTheLineFarFromAllData) {
     const Estimate estimate = model.step(std::vector{input, 0.0});
     EXPECT_NEAR(estimate.value, 10.0 + 2.0 * input, 0.5 * (1.0 + 1e-9) + 1e-9 * std::abs(input));
     const double torque = 10.0 + 2.0 * input;
-    EXPECT_NEAR(model.invert(torque, std::vector{0.0, 0.0}), input,
+    EXPECT_NEAR(model.invert(torque, std::vector{0.0, 0.0}).value, input,
                 0.25 * (1.0 + 1e-9) + 1e-9 * std::abs(input));
   }
 }
@@ -99,8 +99,12 @@ TEST(Dgmm, InvertsByConditioningTheSameMixtureTheOtherWay) {
   const MixtureRegression other_way(parameters.mixture, 1);
   for (int k = 0; k < 20; ++k) {
     const double x = 0.1 * k - 1.0;
-    const double found = model.invert(x, std::vector{99.0, 0.3, -x});
-    EXPECT_NEAR(found, other_way.query_exact(std::vector{x, 0.3, -x}).mean, 1e-4);
+    const Estimate found = model.invert(x, std::vector{99.0, 0.3, -x});
+    const Conditional expected = other_way.query_exact(std::vector{x, 0.3, -x});
+    EXPECT_NEAR(found.value, expected.mean, 1e-4);
+    EXPECT_NEAR(found.std_dev, std::sqrt(expected.variance), 1e-4);
+    EXPECT_NEAR(found.novelty, -expected.log_density, 1e-4);
+    EXPECT_EQ(found.fault, Fault::none);
   }
 }
 
@@ -108,7 +112,7 @@ TEST(Dgmm, InvertLeadsBackToItsTarget) {
   Dgmm model(example());
   for (const double deflection : {-0.7, -0.2, 0.0, 0.4, 0.9}) {
     const double torque = model.step(std::vector{deflection, 0.0}).value;
-    EXPECT_NEAR(model.invert(torque, std::vector{0.0, 0.0}), deflection, 0.02);
+    EXPECT_NEAR(model.invert(torque, std::vector{0.0, 0.0}).value, deflection, 0.02);
   }
 }
 
@@ -119,7 +123,10 @@ TEST(Dgmm, AnInputWithoutDensityIsAFaultWithAFiniteValue) {
     EXPECT_EQ(estimate.fault, Fault::model_not_finite);
     EXPECT_TRUE(std::isfinite(estimate.value));
     EXPECT_TRUE(std::isnan(estimate.std_dev));
-    EXPECT_TRUE(std::isfinite(model.invert(bad, std::vector{0.0, 0.0})));
+    const Estimate inverse = model.invert(bad, std::vector{0.0, 0.0});
+    EXPECT_EQ(inverse.fault, Fault::model_not_finite);
+    EXPECT_TRUE(std::isfinite(inverse.value));
+    EXPECT_TRUE(std::isnan(inverse.std_dev));
   }
 }
 

@@ -22,6 +22,7 @@ TEST(GaussianMixture, NamesTheComponentAndWhatIsWrongWithIt) {
   const std::vector<Damage> damages = {
       {"at least one component", [](auto& m) { m.weights.clear(); }},
       {"at least one quantity", [](auto& m) { m.centre.clear(); }},
+      {"at most 64 quantities, found 65", [](auto& m) { m.centre.resize(65); }},
       {"scale: expected 4 values", [](auto& m) { m.scale.pop_back(); }},
       {"means: expected [5 x 4], found [5 x 3]", [](auto& m) { m.means = Matrix(5, 3); }},
       {"covariances: expected [5 x 16]", [](auto& m) { m.covariances = Matrix(4, 16); }},

@@ -51,12 +51,20 @@ void expect_round_trip(const Model& model) {
 TEST(Linear, InvertsItself) { expect_round_trip(example<Linear>()); }
 TEST(LinearCoulomb, InvertsItselfAtTheGivenRate) { expect_round_trip(example<LinearCoulomb>()); }
 
+TEST(Linear, InvertDoesNotReadTheFirstInput) {
+  const auto model = example<Linear>();
+  const double expected = model.invert(30.0, std::array{0.0, 0.2}).value;
+  for (const double ignored : {1e18, -1e300, kNotMeasured})
+    EXPECT_EQ(model.invert(30.0, std::array{ignored, 0.2}).value, expected) << ignored;
+}
+
 TEST(Linear, WithoutSlopeHasNoInverse) {
   Linear::Parameters parameters;
   parameters.coefficients.values = Matrix(1, 2);
   const Estimate found = Linear(parameters).invert(1.0, std::array{0.25});
   EXPECT_EQ(found.value, 0.25);
   EXPECT_EQ(found.fault, Fault::model_not_finite);
+  EXPECT_EQ(Linear(parameters).invert(1.0, std::array{kNotMeasured}).value, 0.0);
 }
 
 TEST(Linear, ScheduledOverItsFirstInputHasNoClosedInverse) {

@@ -1,6 +1,7 @@
 #include "torsio/model/mixture_regression.hpp"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -199,6 +200,38 @@ TEST(MixtureRegression, FindsANarrowComponentThatFloatCannotPlace) {
   MixtureRegression regression(mixture, 0);
   EXPECT_NEAR(regression.query(std::vector{3.0 - 1e-9}).mean, -1.0, 1e-9);
   EXPECT_NEAR(regression.query(std::vector{3.0 + 1e-9}).mean, 1.0, 1e-9);
+}
+
+// Strays of no weight far from all other outputs. Moments in float32 about a stray's would have no
+// digits left for the variance; every slot is a stray's once.
+TEST(MixtureRegression, KeepsTheVarianceWhereANeighbourOfNoWeightIsFarOff) {
+  constexpr std::size_t kComponents = 1024;
+  constexpr std::size_t kShare = 8;
+  for (std::size_t stray = 0; stray < kShare; ++stray) {
+    GaussianMixture mixture{.centre = {0.0, 0.0},
+                            .scale = {1.0, 1.0},
+                            .weights = std::vector<double>(kComponents),
+                            .means = Matrix(kComponents, 2),
+                            .covariances = Matrix(kComponents, 4)};
+    for (std::size_t i = 0; i < kComponents; ++i) {
+      const bool is_stray = i % kShare == stray;
+      mixture.weights[i] = (is_stray ? 1e-9 : 1.0) / (kComponents - kComponents / kShare);
+      mixture.means(i, 0) = is_stray ? 30.0 : 0.0;
+      mixture.covariances(i, 0) = 1e-6;
+      mixture.covariances(i, 3) = 1.0;
+    }
+    MixtureRegression regression(mixture, 0);
+    const Conditional exact = regression.query_exact(std::vector{0.1});
+    const Conditional fast = regression.query(std::vector{0.1});
+    EXPECT_NEAR(fast.mean, exact.mean, 1e-6);
+    EXPECT_NEAR(std::sqrt(fast.variance), std::sqrt(exact.variance), 1e-5) << "stray " << stray;
+  }
+}
+
+TEST(MixtureRegression, AsksForTheInstructionSetsWhenConstructed) {
+  hwy::GetChosenTarget().DeInit();
+  const MixtureRegression regression(random_mixture({}, 3), 0);
+  EXPECT_TRUE(hwy::GetChosenTarget().IsInitialized());
 }
 
 TEST(MixtureRegression, SaysNaNWhereNoDensityIsLeft) {

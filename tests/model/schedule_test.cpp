@@ -4,6 +4,7 @@
 #include <rapidcheck.h>
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "torsio/core/error.hpp"
@@ -56,6 +57,7 @@ TEST(Schedule, IsExactAtItsKnotsAndHeldOutside) {
   EXPECT_EQ(at(coefficients, 2.0), 4.0);
   EXPECT_EQ(at(coefficients, -50.0), 3.0);
   EXPECT_EQ(at(coefficients, 50.0), 4.0);
+  EXPECT_EQ(at(coefficients, std::numeric_limits<double>::quiet_NaN()), 3.0);
 }
 
 TEST(Schedule, OneKnotIsAConstant) {

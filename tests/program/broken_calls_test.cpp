@@ -69,8 +69,37 @@ TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
   EXPECT_EQ(contents("m.safetensors"), "precious");
 }
 
+TEST_F(BrokenCalls, CtrlCStopsTheWaitForAPipe) {
+  for (const char* signal : {"INT", "TERM"}) {
+    const Outcome outcome =
+        shell(std::string("rm -f pipe; mkfifo pipe; sleep 4 >pipe & timeout --signal=") + signal +
+              " --preserve-status 1 {torsio} check pipe");
+    EXPECT_EQ(outcome.exit_code, kWorkFailed) << outcome.err;
+    EXPECT_NE(outcome.err.find("stopped on request"), std::string::npos) << outcome.err;
+  }
+}
+
 TEST_F(BrokenCalls, OnAFullDiskSaySoAndLeaveNothing) {
-  expect_error(torsio("simulate dfki-50 sweep --duration 5s -o - > /dev/full"), kWorkFailed, "");
+  record();
+  folder_.file("old.safetensors", "precious");
+  const auto files = [this] { return shell("ls -A").out; };
+  const std::string before = files();
+  // A file may grow to one block; the signal that would kill the program is ignored, so that its
+  // writes fail as on a full disk, midway.
+  const std::string full_disk = "trap '' XFSZ; ulimit -f 1; {torsio} ";
+  expect_error(shell(full_disk + "simulate dfki-50 sweep --duration 5s -o new.csv"), kWorkFailed,
+               "new.csv: cannot be written: File too large");
+  expect_error(shell(full_disk + "fit a.csv --model dgmm -o new.safetensors"), kWorkFailed,
+               "new.safetensors: cannot write: File too large");
+  expect_error(shell(full_disk + "fit a.csv --model dgmm -o old.safetensors"), kWorkFailed,
+               "old.safetensors: cannot write: File too large");
+  EXPECT_EQ(files(), before);
+  EXPECT_EQ(contents("old.safetensors"), "precious");
+  expect_error(torsio("simulate dfki-50 sweep --duration 5s -o - > /dev/full"), kWorkFailed,
+               "standard output");
+}
+
+TEST_F(BrokenCalls, NameTheOutputThatCannotBeAFile) {
   record();
   expect_error(torsio("fit a.csv --model linear -o /dev/full"), kWorkFailed, "/dev/full");
   expect_error(torsio("fit a.csv --model linear -o no/such/folder/m.safetensors"), kWorkFailed,

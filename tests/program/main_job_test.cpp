@@ -94,6 +94,20 @@ TEST_F(MainJob, RunsTheExamples) {
   EXPECT_NE(own.out.find("input_not_finite"), std::string::npos) << own.out;
 }
 
+TEST_F(MainJob, TellsMachinesWhatItSimulated) {
+  const Outcome outcome = torsio("simulate dfki-28 sweep --duration 2s -o a.csv --json -");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(outcome.out).at("samples"), 2000);
+  const auto list = nlohmann::json::parse(torsio("simulate --list --json -").out);
+  EXPECT_EQ(list.at("actuators").size(), 4U);
+}
+
+TEST_F(MainJob, WritesAPageForTheBrowser) {
+  record();
+  ASSERT_EQ(torsio("compare a.csv --test b.csv --models linear --report out.html").exit_code, 0);
+  EXPECT_NE(contents("out.html").find("<h2>test records"), std::string::npos);
+}
+
 TEST_F(MainJob, ListsAndDescribes) {
   EXPECT_NE(torsio("simulate --list").out.find("dfki-300"), std::string::npos);
   EXPECT_NE(torsio("simulate --describe dfki-50").out.find("gear_ratio"), std::string::npos);

@@ -88,13 +88,21 @@ TYPED_TEST(EveryFamily, StepNeverTouchesTheHeap) {
 TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {
   Estimator estimator(test::example_settings(), AnyModel(example<TypeParam>()));
   std::set<Fault> seen;  // filled outside of what is counted
-  std::vector<Fault> faults(2000, Fault::none);
+  std::vector<Fault> faults(4000, Fault::none);
   std::size_t at = 0;
+  Fault in_border = Fault::warming_up;
   const auto step = [&](double gear, double joint) {
     faults[at++] = estimator.step(std::array{gear, joint}).fault;
   };
   EXPECT_EQ(heap_calls_during([&] {
+              for (int i = 0; i < 500; ++i) step(0.1, 0.0);
+            }),
+            0U);
+  estimator.set_zero("joint_angle_rad", 0.0);
+  EXPECT_EQ(heap_calls_during([&] {
               for (int i = 0; i < 500; ++i) step(0.1 * std::sin(0.01 * i), 0.0);
+              for (int i = 0; i < 1250; ++i) step(9e-4 * i, 0.0);  // into the border
+              in_border = faults[at - 1];
               step(kNaN, 0.0);                                    // a short gap
               step(0.0, 0.0);                                     //
               for (int i = 0; i < 50; ++i) step(0.0, kInfinity);  // a long one
@@ -107,9 +115,11 @@ TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {
               step(0.0, 0.0);
             }),
             0U);
+  EXPECT_EQ(in_border, Fault::none);
   seen.insert(faults.begin(), faults.begin() + static_cast<std::ptrdiff_t>(at));
-  EXPECT_EQ(seen, (std::set{Fault::none, Fault::input_not_finite, Fault::input_count_wrong,
-                            Fault::warming_up, Fault::outside_training_range}));
+  EXPECT_EQ(seen,
+            (std::set{Fault::none, Fault::input_not_finite, Fault::input_count_wrong,
+                      Fault::warming_up, Fault::zero_not_set, Fault::outside_training_range}));
 }
 
 /// A model that fails at each second step.
@@ -133,6 +143,7 @@ class Failing {
 TEST(TorqueEstimator, StepNeverTouchesTheHeapWhenTheModelFails) {
   BasicTorqueEstimator<Failing> estimator(
       BasicEstimator<Failing>(test::example_settings(), Failing({})));
+  estimator.set_zero("joint_angle_rad", 0.0);
   bool failed = false;
   EXPECT_EQ(heap_calls_during([&] {
               for (int i = 0; i < 500; ++i)

@@ -59,6 +59,12 @@ TEST(Compare, TurnsAFitThatFailsIntoARowThatSaysWhy) {
             std::string::npos);
 }
 
+TEST(Compare, RefusesASettingThatNamesNoInput) {
+  const Dataset dataset = test::bench_dataset();
+  const auto choices = model_choices(dataset, "linear:schedule=foo", {});
+  EXPECT_THROW((void)compare(dataset, choices, 1, false), UsageError);
+}
+
 TEST(Compare, RefusesALeakUnlessItIsAllowedAndMarksItThen) {
   Dataset dataset = test::bench_dataset();
   dataset.target_computed_from = {"gear_angle_rad"};

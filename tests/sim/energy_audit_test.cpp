@@ -31,7 +31,7 @@ TEST(EnergyAudit, NoEnergyAppearsFromNothingInASweep) {
       const PlantCommand command{.current_A =
                                      loop.step(sweep.step(), plant.state().rotor_angle_rad)};
       for (int i = 0; i < 10; ++i) {
-        plant.step(command, load, kStep_s);
+        ASSERT_EQ(plant.step(command, load, kStep_s), Fault::none);
         audit.observe(plant, load, kStep_s);
       }
       const double elapsed_s = 1e-3 * (tick + 1);
@@ -53,7 +53,7 @@ TEST(EnergyAudit, SeesAPlantThatCreatesEnergy) {
   plant.reset(PlantState{.joint_angle_rad = 0.0, .joint_speed_rad_s = 1.0});
   EnergyAudit audit(plant, billed);
   for (int i = 0; i < 10000; ++i) {
-    plant.step({}, load, kStep_s);
+    ASSERT_EQ(plant.step({}, load, kStep_s), Fault::none);
     audit.observe(plant, billed, kStep_s);
   }
   EXPECT_GT(std::abs(audit.residual()), 1e-2);

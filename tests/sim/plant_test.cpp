@@ -42,7 +42,7 @@ TEST(Plant, GearModeHasItsNaturalFrequency) {
     double last_s = 0.0;
     for (int i = 1; i <= 10000; ++i) {
       const double before = plant.state().gear_angle_rad;
-      plant.step({.is_motor_held = true}, {.is_locked = true}, kStep_s);
+      ASSERT_EQ(plant.step({.is_motor_held = true}, {.is_locked = true}, kStep_s), Fault::none);
       const double after = plant.state().gear_angle_rad;
       if (before * after > 0.0) continue;
       last_s = kStep_s * (i - after / (after - before));
@@ -64,7 +64,8 @@ TEST(Plant, StaysWhereResetPutIt) {
     const Load load = lever(9.0, 0.2);
     plant.reset(1.0, load);
     const double current_A = plant.current();
-    for (int i = 0; i < 20000; ++i) plant.step({.current_A = current_A}, load, kStep_s);
+    for (int i = 0; i < 20000; ++i)
+      ASSERT_EQ(plant.step({.current_A = current_A}, load, kStep_s), Fault::none);
     EXPECT_NEAR(plant.state().joint_angle_rad, 1.0, 1e-4) << sheet.name;
     EXPECT_NEAR(plant.torques().spring_Nm, load.gravity_Nm * std::sin(1.0), 0.05) << sheet.name;
   }
@@ -75,7 +76,7 @@ TEST(Plant, ComesToRestFromAColdStart) {
     Plant plant(plant_parameters(sheet));
     plant.reset(PlantState{.joint_angle_rad = 0.02, .joint_speed_rad_s = 0.5});
     const Load load = lever(9.0, 0.1);
-    for (int i = 0; i < 200000; ++i) plant.step({}, load, kStep_s);
+    for (int i = 0; i < 200000; ++i) ASSERT_EQ(plant.step({}, load, kStep_s), Fault::none);
     EXPECT_NEAR(plant.state().joint_speed_rad_s, 0.0, 1e-6) << sheet.name;
     EXPECT_NEAR(plant.state().gear_speed_rad_s, 0.0, 1e-6) << sheet.name;
     EXPECT_NEAR(plant.state().rotor_speed_rad_s, 0.0, 1e-4) << sheet.name;
@@ -87,7 +88,7 @@ TEST(Plant, PeakCurrentGivesTheRatedTorqueAtALockedOutput) {
     Plant plant(plant_parameters(sheet));
     double reached_Nm = 0.0;
     for (int i = 0; i < 20000; ++i) {
-      plant.step({.current_A = 1e3}, {.is_locked = true}, kStep_s);
+      ASSERT_EQ(plant.step({.current_A = 1e3}, {.is_locked = true}, kStep_s), Fault::none);
       reached_Nm = std::max(reached_Nm, plant.torques().joint_Nm);
     }
     EXPECT_GE(reached_Nm, sheet.rated_torque_Nm.value) << sheet.name;
@@ -97,7 +98,8 @@ TEST(Plant, PeakCurrentGivesTheRatedTorqueAtALockedOutput) {
 TEST(Plant, ReachesItsTopSpeedUnloaded) {
   for (const DataSheet& sheet : data_sheets()) {
     Plant plant(plant_parameters(sheet));
-    for (int i = 0; i < 20000; ++i) plant.step({.current_A = 1e3}, {}, kStep_s);
+    for (int i = 0; i < 20000; ++i)
+      ASSERT_EQ(plant.step({.current_A = 1e3}, {}, kStep_s), Fault::none);
     EXPECT_GE(plant.state().joint_speed_rad_s, sheet.top_speed_rad_s.value) << sheet.name;
   }
 }
@@ -110,7 +112,9 @@ TEST(Plant, ErrorShrinksWithTheStep) {
     const int ticks = static_cast<int>(std::lround(1e-3 / dt_s));
     for (int i = 0; i < 1000; ++i) {
       const double current_A = 3.0 * std::sin(2.0 * std::numbers::pi * 1e-3 * i);
-      for (int k = 0; k < ticks; ++k) plant.step({.current_A = current_A}, load, dt_s);
+      for (int k = 0; k < ticks; ++k) {
+        EXPECT_EQ(plant.step({.current_A = current_A}, load, dt_s), Fault::none);
+      }
     }
     return plant.state().joint_angle_rad;
   };
@@ -159,7 +163,7 @@ TEST(Plant, DividesAStepThatIsLongerThanItsOwn) {
 
 TEST(Plant, ImpossibleInputIsAFaultAndNothingMoves) {
   Plant plant(plant_parameters(data_sheet("dfki-28")));
-  plant.step({.current_A = 2.0}, {}, kStep_s);
+  ASSERT_EQ(plant.step({.current_A = 2.0}, {}, kStep_s), Fault::none);
   const double angle = plant.state().rotor_angle_rad;
   const double nan = std::nan("");
   EXPECT_EQ(plant.step({.current_A = nan}, {}, kStep_s), Fault::input_not_finite);
@@ -167,6 +171,7 @@ TEST(Plant, ImpossibleInputIsAFaultAndNothingMoves) {
   EXPECT_EQ(plant.step({}, {.inertia_kg_m2 = -1.0}, kStep_s), Fault::input_not_finite);
   EXPECT_EQ(plant.step({}, {}, 0.0), Fault::input_not_finite);
   EXPECT_EQ(plant.step({}, {}, nan), Fault::input_not_finite);
+  EXPECT_EQ(plant.step({}, {}, 1e300), Fault::input_not_finite) << "it would never return";
   EXPECT_EQ(plant.state().rotor_angle_rad, angle);
 }
 

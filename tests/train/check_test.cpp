@@ -125,6 +125,16 @@ TEST(Check, WarnsWhenARecordHasAnotherZero) {
   EXPECT_EQ(first_of(findings, "offsets").recording, "shifted");
 }
 
+TEST(Check, IsNotMisledByATargetThatIsMissingInPart) {
+  const auto spoil = [](Channel& channel) {
+    std::fill(channel.values.begin() + 1500, channel.values.end(),
+              std::numeric_limits<double>::quiet_NaN());
+  };
+  const auto findings = findings_of(with_record(changed("torque_Nm", spoil)));
+  EXPECT_EQ(verdict_of(findings, "offsets"), Verdict::pass);
+  EXPECT_EQ(verdict_of(findings, "gaps"), Verdict::pass);
+}
+
 TEST(Check, WarnsOfOneSpeedWithoutReversal) {
   Recording recording("ramp", 1000.0);
   Channel gear{"gear_angle_rad", {}};

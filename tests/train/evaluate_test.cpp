@@ -2,11 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/train/families.hpp"
 #include "torsio/train/inputs.hpp"
 #include "torsio/train/train_model.hpp"
 
@@ -58,6 +62,33 @@ TEST(Evaluate, LeavesTheEmbargoOut) {
   EXPECT_EQ(score.together.metrics.samples, 2 * samples / 10);
 }
 
+TEST(Evaluate, PredictsWhatAnEstimatorFedByHandSays) {
+  const Dataset dataset = test::bench_dataset();
+  const Recording& recording = dataset.records.back().recording;
+  for (const FamilyInfo& family : families()) {
+    SCOPED_TRACE(family.name);
+    const TrainedModel model = trained(dataset, std::string(family.name));
+    Estimator estimator = make_estimator(model.file);
+    (void)predict(estimator, dataset.records.front().recording);  // must leave no trace
+    const Prediction offline = predict(estimator, recording);
+    ASSERT_EQ(offline.estimates.size(), recording.size());
+
+    Estimator in_the_loop = make_estimator(model.file);
+    std::vector<double> raw(in_the_loop.raw_inputs().size());
+    for (std::size_t n = 0; n < recording.size(); ++n) {
+      for (std::size_t j = 0; j < raw.size(); ++j)
+        raw[j] = recording.channel(in_the_loop.raw_inputs()[j]).values[n];
+      const Estimate streamed = in_the_loop.step(raw);
+      const Estimate& told = offline.estimates[n];
+      ASSERT_EQ(told.value, streamed.value) << "sample " << n;
+      ASSERT_EQ(told.fault, streamed.fault) << "sample " << n;
+      ASSERT_TRUE(told.std_dev == streamed.std_dev ||
+                  (std::isnan(told.std_dev) && std::isnan(streamed.std_dev)))
+          << "sample " << n;
+    }
+  }
+}
+
 TEST(Evaluate, SaysWhereAnInputIsMissing) {
   Dataset dataset = test::bench_dataset();
   Estimator estimator = make_estimator(trained(dataset, "linear").file);
@@ -71,6 +102,26 @@ TEST(Evaluate, SaysWhereAnInputIsMissing) {
   const std::string message = test::error_message([&] { (void)predict(estimator, holes); });
   EXPECT_NE(message.find("holes: gear_angle_rad"), std::string::npos) << message;
   EXPECT_NE(message.find("t = 0.123 s"), std::string::npos) << message;
+}
+
+TEST(Evaluate, KnowsThatTheZerosOfRecordingsWereSubtracted) {
+  Dataset dataset = test::bench_dataset();
+  const SplitScore plain =
+      evaluate(make_estimator(trained(dataset, "linear").file), dataset, Role::test);
+  for (DatasetRecord& record : dataset.records)
+    record.recording.zeros = {{.channel = "joint_angle_rad", .first_s = 0.1, .mid_range = false},
+                              {.channel = "torque_Nm", .first_s = 0.1, .mid_range = false}};
+  const TrainedModel model = trained(dataset, "linear");
+  EXPECT_EQ(model.file.settings.zeroed_channels, std::vector<std::string>{"joint_angle_rad"})
+      << "the target has no zero at run time";
+  Estimator estimator = make_estimator(model.file);
+  estimator.set_zero("joint_angle_rad", 0.7);  // the robot's own
+  const SplitScore score = evaluate(estimator, dataset, Role::test);
+  EXPECT_EQ(score.together.guarded_samples, plain.together.guarded_samples);
+  EXPECT_EQ(score.together.metrics.rmse, plain.together.metrics.rmse);
+  EXPECT_EQ(
+      predict(make_estimator(model.file), dataset.records[2].recording).estimates.back().fault,
+      Fault::none);
 }
 
 TEST(TrainModel, IsTheSameForTheSameSeedAndKnowsWhereItCameFrom) {

@@ -1,5 +1,6 @@
 #include "torsio/train/fit_dgmm.hpp"
 
+#include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
@@ -88,6 +91,27 @@ TEST(FitDgmm, IsALineFarFromAllData) {
   const double line = parameters.clamp.intercept + 10.0 * parameters.clamp.slope[0];
   EXPECT_NEAR(at_ten, line, parameters.clamp.width * (1.0 + 1e-12));
   EXPECT_NEAR(parameters.clamp.slope[0], 10.0, 0.5);
+}
+
+TEST(FitDgmm, ItsLineLeavesRatesOut) {
+  TrainingData data = sweeps(2000, 1);
+  EXPECT_EQ(fit_dgmm(data).parameters.clamp.slope[1], 0.0);
+  data.inputs[0].is_rate = true;  // nothing is left: a constant
+  const LinearClamp clamp = fit_dgmm(data).parameters.clamp;
+  EXPECT_EQ(clamp.slope, (std::vector{0.0, 0.0}));
+  EXPECT_TRUE(std::isfinite(clamp.intercept));
+}
+
+// A spread of an expression says nothing about what a sensor resolves.
+TEST(FitDgmm, OnlyAChannelHasTheResolutionOfItsSensor) {
+  TrainingData data = sweeps(1000, 1, 1e-5);
+  constexpr double kResolution_rad = rad_from_deg(0.01);
+  EXPECT_EQ(fit_dgmm(data).parameters.mixture.scale[1], kResolution_rad);
+  data.inputs[0].expression = "1e-5 * spring_deflection_rad";
+  data.inputs[1].expression = "rate(1e-5 * spring_deflection_rad)";
+  const std::vector<double> scale = fit_dgmm(data).parameters.mixture.scale;
+  EXPECT_NEAR(scale[1], 0.7e-5, 0.2e-5);
+  EXPECT_NEAR(scale[2], 0.7e-5, 0.2e-5);
 }
 
 TEST(FitDgmm, TheBackgroundAloneLeadsBackToTheLine) {
@@ -215,6 +239,20 @@ TEST(FitDgmm, SaysWhatIsWrong) {
   EXPECT_THROW(static_cast<void>(fit_dgmm(empty)), Error);
   EXPECT_THROW(static_cast<void>(fit_dgmm(sweeps(10, 1), {.clamp = -1.0})), UsageError);
   EXPECT_THROW(static_cast<void>(fit_dgmm(sweeps(10, 1), {.background_weight = 1.0})), UsageError);
+}
+
+TEST(FitDgmm, NamesASampleThatIsAbsurdlyFarOut) {
+  for (const double outlier : {1.2e19, -1e8, 1e300}) {
+    TrainingData data = sweeps(500, 1);
+    data.sequences[1].recording = "second";
+    data.sequences[1].target[42] = outlier;
+    const std::string found = test::error_message([&] { static_cast<void>(fit_dgmm(data)); });
+    EXPECT_THAT(found, testing::HasSubstr("second: torque_Nm, sample 42"));
+    EXPECT_THAT(found, testing::HasSubstr("outlier or a mistaken unit"));
+    EXPECT_THROW(static_cast<void>(fit_dgmm_paper(data)), Error);
+    data.sequences[1].use[42] = 0;
+    EXPECT_NO_THROW(static_cast<void>(fit_dgmm_paper(data, {.components = 10})));
+  }
 }
 
 TEST(FitDgmm, StopsWhenAsked) {

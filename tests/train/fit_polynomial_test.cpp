@@ -97,6 +97,18 @@ TEST(FitPolynomial, ChoosesTheDegreeOfTheDataByCrossValidation) {
   EXPECT_EQ(fitted.notes, std::vector<std::string>{"degree 3 chosen by cross-validation"});
 }
 
+TEST(FitPolynomial, ChoosesAmongTheDegreesThatTheSamplesSuffice) {
+  Matrix features(35, 1);  // four fifths of them suffice for 5 terms
+  for (std::size_t n = 0; n < features.rows; ++n)
+    features(n, 0) = 0.1 * std::sin(static_cast<double>(n));
+  const auto data = training_data_of({{.expression = "x"}}, features,
+                                     [](Row x) { return 5.0 * x[0] - 400.0 * x[0] * x[0]; });
+  const auto fitted = fit_polynomial(data, {.degree = 0, .branch = false});
+  EXPECT_GE(fitted.parameters.degree, 2U);
+  EXPECT_LT(fitted.parameters.degree, kHighestChosenDegree);
+  EXPECT_LT(evaluate(Polynomial(fitted.parameters), data).max_abs, 1e-10);
+}
+
 TEST(FitPolynomial, SchedulesItsCurvesOverACondition) {
   Matrix features(8000, 2);
   const Matrix loop = triangle(8000);

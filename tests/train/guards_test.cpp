@@ -27,9 +27,10 @@ TEST(Guards, RangesAreThoseOfUsableSamples) {
   EXPECT_EQ(ranges.highest, (std::vector{2.0, 7.0}));
 }
 
-TEST(Guards, TheFallbackIsLeastSquaresOnAllInputs) {
+TEST(Guards, TheFallbackIsLeastSquaresOnAllInputsThatAreNoRates) {
   Random random(5);
-  const auto data = training_data_of(deflection_and_rate(), oscillation(4000), [&](Row x) {
+  const std::vector<InputInfo> inputs = {{.expression = "x"}, {.expression = "y"}};
+  const auto data = training_data_of(inputs, oscillation(4000), [&](Row x) {
     return 1.0 + 100.0 * x[0] + 2.0 * x[1] + 0.25 * random.normal();
   });
   const LinearFallback fallback = linear_fallback(data);
@@ -38,6 +39,22 @@ TEST(Guards, TheFallbackIsLeastSquaresOnAllInputs) {
   EXPECT_NEAR(fallback.slope[0], 100.0, 0.5);
   EXPECT_NEAR(fallback.slope[1], 2.0, 0.1);
   EXPECT_NEAR(fallback.residual_std, 0.25, 0.01);
+}
+
+TEST(Guards, TheFallbackLeavesRatesOut) {
+  const auto data = training_data_of(deflection_and_rate(), oscillation(4000),
+                                     [](Row x) { return 1.0 + 100.0 * x[0] + 2.0 * x[1]; });
+  const LinearFallback fallback = linear_fallback(data);
+  EXPECT_EQ(fallback.slope[1], 0.0);
+  EXPECT_NEAR(fallback.slope[0], 100.0, 5.0);
+  EXPECT_GT(fallback.residual_std, 0.5) << "what the rate would have explained is spread";
+}
+
+TEST(Guards, TheFallbackIsTheMeanWhereEveryInputIsARate) {
+  const auto data = training_data_of({{.expression = "rate(x)", .is_rate = true}},
+                                     Matrix(100, 1, 3.0), [](Row) { return 4.0; });
+  EXPECT_NEAR(linear_fallback(data).intercept, 4.0, 1e-12);
+  EXPECT_EQ(linear_fallback(data).slope, std::vector{0.0});
 }
 
 AnyModel spring(double stiffness) {

@@ -48,6 +48,17 @@ TEST(ResolveInputs, RefusesTheTargetAsAnInput) {
   EXPECT_THROW((void)resolve_inputs(bench_dataset(), {"rate(torque_Nm)"}), UsageError);
 }
 
+TEST(ResolveInputs, RefusesTwoMeaningsOfOneName) {
+  Dataset dataset = bench_dataset();
+  dataset.records[0].recording.definitions = {{"twist_rad", "gear_angle_rad - joint_angle_rad"}};
+  dataset.records[2].recording.definitions = {{"twist_rad", "joint_angle_rad - gear_angle_rad"}};
+  const std::string message =
+      test::error_message([&] { (void)resolve_inputs(dataset, {"twist_rad"}); });
+  EXPECT_NE(message.find("held out: twist_rad"), std::string::npos) << message;
+  dataset.records[2].recording.definitions = dataset.records[0].recording.definitions;
+  EXPECT_EQ(resolve_inputs(dataset, {"twist_rad"}).definitions.size(), 1U);
+}
+
 TEST(FindLeak, SeesDeclaredAndComputedOnes) {
   Dataset dataset = bench_dataset();
   const FeatureSpec spec = resolve_inputs(dataset, {});

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -135,6 +136,39 @@ TEST(OnlineMixture, GivesASampleToTheNearestOfManyComponents) {
     const GaussianMixture mixture = learner.mixture();
     EXPECT_EQ(mixture.weights[expected], 2.0 / 778.0);
   }
+}
+
+// Samples about the distance at which float32 has no squares any more: every slot that is free must
+// stay so, which a sanitiser sees, and the component that looks for a neighbour must find another.
+TEST(OnlineMixture, AnEnormousSampleIsAComponentOfItsOwn) {
+  for (const double far : {1e17, 2e18, 1.2e19, 1.8e19, 1e25, 1e45, 1e150}) {
+    OnlineMixture learner(plain(3), {.components = 20});
+    learn_all(learner, random_samples(10, 3, 3));
+    const std::size_t before = learner.size();
+    learner.learn(std::vector{far, 0.0, 0.0});
+    ASSERT_EQ(learner.size(), before + 1) << far;
+    const GaussianMixture mixture = learner.mixture();
+    EXPECT_EQ(mixture.means(before, 0), far);
+    double total = 0.0;
+    for (std::size_t i = 0; i < before; ++i) {
+      EXPECT_LT(std::abs(mixture.means(i, 0)), 10.0);
+      total += mixture.weights[i];
+    }
+    EXPECT_NEAR(total, 10.0 / 11.0, 1e-12) << far;
+    learner.learn(std::vector{-far, far, 0.0});
+    learn_all(learner, random_samples(100, 3, 4));  // merges, with the far ones among the lightest
+    EXPECT_EQ(learner.size(), 20U);
+    const GaussianMixture full = learner.mixture();
+    EXPECT_NEAR(std::accumulate(full.weights.begin(), full.weights.end(), 0.0), 1.0, 1e-12);
+  }
+}
+
+TEST(OnlineMixture, MergesComponentsThatAreTooFarApartForAFloat) {
+  OnlineMixture learner(plain(1), {.components = 2});
+  for (const double x : {0.0, 1e30, -1e30}) learner.learn(std::vector{x});
+  std::vector<double> means = learner.mixture().means.values;
+  std::sort(means.begin(), means.end());
+  EXPECT_EQ(means, (std::vector{-1e30, 0.5e30}));
 }
 
 TEST(OnlineMixture, LearnsTheSameBitsOnEveryInstructionSet) {

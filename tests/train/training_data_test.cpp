@@ -7,6 +7,8 @@
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
+#include "torsio/model/linear.hpp"
+#include "torsio/train/model_run.hpp"
 
 namespace torsio {
 namespace {
@@ -105,10 +107,24 @@ TEST(TrainingData, NamesRecordChannelAndSampleOfAnInputThatIsNotFinite) {
       << message;
 }
 
-TEST(TrainingData, NamesTheExpressionThatIsNotFinite) {
-  const FeatureSpec spec{.inputs = {"1 / spring_deflection_rad"}, .definitions = {}};
+TEST(TrainingData, LeavesOutSamplesWhoseFeatureIsNotFinite) {
+  const Dataset dataset = dataset_of(ramp(), whole_record(10, Role::train));
+  const FeatureSpec spec{.inputs = {"spring_deflection_rad / (spring_deflection_rad - 16)"},
+                         .definitions = {}};
+  const TrainingData data = training_data(dataset, spec);
+  EXPECT_EQ(data.sequences[0].use, (std::vector<std::uint8_t>{1, 1, 1, 1, 0, 1, 1, 1, 1, 1}));
+  EXPECT_FALSE(data.sequences[0].has_features(4));
+  AnyModel model = Linear({.coefficients = {.values = Matrix(1, 2, 1.0)}});
+  const std::vector<Estimate> told = run(model, data.sequences[0]);
+  EXPECT_EQ(told[4].fault, Fault::input_not_finite);
+  EXPECT_EQ(told[5].fault, Fault::none);
+}
+
+TEST(TrainingData, NamesTheExpressionThatIsNeverFinite) {
+  const FeatureSpec spec{.inputs = {"1 / (spring_deflection_rad * 0)"}, .definitions = {}};
   const std::string message = refusal(dataset_of(ramp(), whole_record(10, Role::train)), spec);
-  EXPECT_NE(message.find("ramp: input 1 / spring_deflection_rad, sample 0"), std::string::npos)
+  EXPECT_NE(message.find("ramp: input 1 / (spring_deflection_rad * 0), sample 0"),
+            std::string::npos)
       << message;
 }
 

@@ -12,8 +12,8 @@ enum class Fault : std::uint8_t {
   input_not_finite,   ///< an input was NaN or infinite; the last good value is held
   input_count_wrong,  ///< the caller passed another number of inputs than `raw_inputs()` lists
   warming_up,         ///< filters, differentiators or hidden state have not settled since `reset()`
-  outside_training_range,  ///< an input left the range that the model was trained on; linear
-                           ///< fallback in use
+  zero_not_set,  ///< a channel whose zero was taken from each training record has none yet (`set_zero`)
+  outside_training_range,  ///< an input left its range in training; linear fallback in use
   model_not_finite,        ///< the model produced NaN or infinity; linear fallback in use
 };
 

@@ -15,8 +15,7 @@ struct Source {
 struct ZeroRule {
   std::string channel;
   double first_s = 0.0;    ///< mean over this much of the start; 0 with `mid_range`
-  bool mid_range = false;  ///< (min + max) / 2 of the whole record: looks ahead, so rows say
-                           ///< "zero": "non_causal"
+  bool mid_range = false;  ///< (min + max) / 2 of the record: looks ahead, and rows say so
   bool operator==(const ZeroRule&) const = default;
 };
 

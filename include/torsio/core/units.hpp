@@ -7,8 +7,8 @@
 
 namespace torsio {
 
-/// A unit that a channel name may end in, and the way to its SI unit: `si = scale * value +
-/// offset`.
+/// A unit that a channel name may end in, and the way to its SI unit:
+/// si = scale * value + offset.
 struct Unit {
   std::string_view suffix;     ///< as written behind the last underscore(s): "deg_s"
   std::string_view si_suffix;  ///< the unit that torsio computes in: "rad_s"

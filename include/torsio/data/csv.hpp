@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
 
 namespace torsio {
@@ -47,12 +48,15 @@ struct CsvLimits {
 struct CsvOptions {
   std::vector<std::string> skip = {};  ///< columns that are not read and may hold anything
   CsvLimits limits = {};
+  Progress progress =
+      {};  ///< told with each block that is read, also while a pipe keeps it waiting
 };
 
 /// Reads a CSV file, plain or gzipped (told by its first bytes); "-" is standard input. The header
 /// gives the names; separator comma, semicolon or tab; lines that start with '#' are comments.
 /// See docs/recordings.md.
-/// @throws Error with line and column for whatever is not a table of numbers.
+/// @throws Error with line and column for whatever is not a table of numbers, Cancelled if the
+/// progress asks to stop.
 [[nodiscard]] CsvTable read_csv(const std::string& path, const CsvOptions& options = {});
 
 /// The same from bytes in memory; `name` stands for the file in messages.

@@ -26,6 +26,8 @@ struct Segment {
 struct DatasetRecord {
   Recording recording;
   std::vector<Segment> segments;  ///< in order, without overlap
+
+  [[nodiscard]] bool has_role(Role role) const noexcept;
 };
 
 /// Recordings with a role each, on one sample rate. Splits are by record or by contiguous block,

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 
 namespace torsio {
@@ -14,6 +15,9 @@ struct LoadOptions {
   /// All records are brought to this rate; it is also the clock of a log that has none.
   std::optional<double> rate_Hz;
   std::string target;  ///< empty: the manifest's, else torque_Nm
+  /// Of what is given none: a CSV file of the first list, a manifest's file without role or split.
+  Role role = Role::train;
+  Progress progress = {};  ///< told while a file is read
 };
 
 /// Loads a CSV file, plain or gzipped, or every file of a manifest (`.yaml`).
@@ -21,8 +25,8 @@ struct LoadOptions {
 [[nodiscard]] std::vector<Recording> load_recordings(const std::string& path,
                                                      const LoadOptions& options = {});
 
-/// A dataset from files or manifests. A CSV file has the role of the list that it stands in. A
-/// manifest in `train_files` brings its own roles and splits; in `test_files` all of it is test.
+/// A dataset from files or manifests. A CSV file in `train_files` has the role of the options, a
+/// manifest there brings its own roles and splits; in `test_files` all is test.
 /// @throws Error as `load_recordings` and `Dataset::check`; UsageError if manifests disagree.
 [[nodiscard]] Dataset load_dataset(const std::vector<std::string>& train_files,
                                    const std::vector<std::string>& test_files,

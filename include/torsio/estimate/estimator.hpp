@@ -18,27 +18,30 @@ namespace torsio {
 
 /// What runs in the loop: raw channels -> features -> model -> guards -> value with error bar.
 ///
-/// `value` is finite in every case. Where `fault` is not `none` it does not come from the model:
+/// `value` is finite in every case. Within the training range of every feature the model alone
+/// answers. Just outside, over a border as wide as `margin` says, model and fallback are blended:
+/// the fallback's weight w grows linearly with the worst feature's excursion, from 0 at the range
+/// to 1 at the border's end, so that no value jumps; std_dev^2 = (1-w) model's + w fallback's + w
+/// (1-w) (model - fallback)^2, and the fault is still `none`. Where `fault` is not `none`, the
+/// value must not be used as the model's. The first of these that holds is told:
 ///
-/// | fault | when | value | std_dev |
-/// |---|---|---|---|
-/// | input_count_wrong, input_not_finite | tick unusable, nothing stepped | last good or 0 | NaN |
-/// | warming_up | filters not settled since `reset()` or a long gap | fallback | fallback's (1) |
-/// | outside_training_range | a feature left its range by more than the margin | fallback | NaN |
-/// | model_not_finite | the model's value is NaN or infinite; it is reset | fallback | fallback's |
-/// | any other | the model itself said so | fallback | fallback's |
-///
-/// fallback: the linear one. last good: the last value from usable inputs. (1): NaN outside the
-/// training range, where there is no evidence.
+/// - `input_count_wrong`, `input_not_finite`: the tick cannot be used and nothing is stepped; the
+///   last value from usable inputs (0 if none), without error bar.
+/// - `warming_up`: filters have not settled since `reset()` or a long gap; linear fallback.
+/// - `zero_not_set`: a channel in `settings().zeroed_channels` had its zero taken from each record
+///   in training, and `set_zero` was not called for it. The value is what it would be otherwise,
+///   off by the slope times that zero, without error bar. It stands before the range, because
+///   nobody knows where a channel without a zero is.
+/// - `outside_training_range`: a feature is beyond the border; linear fallback, without error bar:
+///   there is no evidence.
+/// - whatever the model said of itself, or `model_not_finite` (the model is then reset); linear
+///   fallback.
 ///
 /// Should the fallback overflow, the last value is held. After a gap of at most
 /// `kLongestGapSeconds` (never less than one tick) filters and model run on as if the missing ticks
 /// had not been, so a plain `rate(x)` shows the whole step over the gap in one tick; after a longer
 /// one they start afresh and warm up. A model without an error bar of its own gets that of the
 /// residual table.
-///
-/// Channels in `settings().zeroed_channels` had their zero taken from each record in training: set
-/// it with `set_zero` before the first step, or the value is off by the slope times that zero.
 template <Model M>
 class BasicEstimator {
  public:
@@ -56,9 +59,15 @@ class BasicEstimator {
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return core_.settings(); }
   [[nodiscard]] const M& model() const noexcept { return model_; }
 
-  /// Subtracts `value` (SI) from a raw channel from now on. Call it while configuring.
+  /// Subtracts `value` (SI) from a raw channel from now on, `reset()` or not. Call it while
+  /// configuring.
   /// @throws UsageError for an unknown channel or a value that is not finite.
   void set_zero(std::string_view channel, double value) { core_.set_zero(channel, value); }
+  /// The channels in `settings().zeroed_channels` that still wait for `set_zero`; while there are
+  /// any, each step says `Fault::zero_not_set`.
+  [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept {
+    return core_.unset_zeros();
+  }
 
   void reset() noexcept {
     core_.reset();

@@ -38,7 +38,10 @@ class EstimatorCore {
   }
   [[nodiscard]] bool is_settled() const noexcept { return pipeline_.is_settled(); }
 
-  void set_zero(std::string_view channel, double value) { pipeline_.set_zero(channel, value); }
+  void set_zero(std::string_view channel, double value);
+  [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept {
+    return unset_zeros_;
+  }
   void reset() noexcept;
 
   Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;
@@ -48,18 +51,30 @@ class EstimatorCore {
   Estimate judge(Features features, const Estimate& told) noexcept TORSIO_REALTIME;
 
  private:
-  [[nodiscard]] bool is_inside(Features features) const noexcept;
+  struct Range {
+    double lowest = 0.0;
+    double highest = 0.0;
+    double border = 0.0;  ///< width, on either side, of where the model hands over to the fallback
+  };
+
+  /// How far the worst feature has left its range, in widths of its border: 0 inside, above 1
+  /// beyond the border.
+  [[nodiscard]] double excursion(Features features) const noexcept;
+  [[nodiscard]] Estimate model_part(const Estimate& told) const noexcept;
+  /// `told` handed over to the fallback by the share `weight` in 0..1.
+  [[nodiscard]] Estimate blended(Features features, const Estimate& told,
+                                 double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
   [[nodiscard]] double residual_std_at(double value) const noexcept;
   Conditioned miss(Fault fault) noexcept;
 
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
-  std::vector<double> lower_limits_;  ///< of each feature, margin included
-  std::vector<double> upper_limits_;
+  std::vector<Range> ranges_;  ///< of each feature, tolerance included
+  std::vector<std::string> unset_zeros_;
   std::size_t longest_gap_;  ///< ticks
   std::size_t missed_ = 0;   ///< ticks in a row without usable input
-  bool poisoned_ = false;    ///< a feature was not finite: the filters may never recover from it
+  bool poisoned_ = false;    ///< a feature was not finite: differences and lags still hold it
   double last_value_ = 0.0;
 };
 

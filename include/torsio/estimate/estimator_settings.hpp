@@ -14,7 +14,7 @@ struct FeatureRanges {
   std::vector<double> lowest;
   std::vector<double> highest;
   double margin =
-      0.05;  ///< share of the range by which a feature may leave it before the guard acts
+      0.05;  ///< share of the range over which, outside it, the model hands over to the fallback
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
@@ -24,7 +24,8 @@ struct FeatureRanges {
   }
 };
 
-/// value = intercept + sum_j slope_j * feature_j, used where the model must not be trusted.
+/// value = intercept + sum_j slope_j * feature_j, used where the model must not be trusted. Fitted
+/// ones have slope 0 on rates.
 struct LinearFallback {
   double intercept = 0.0;
   std::vector<double> slope;
@@ -58,9 +59,9 @@ struct ResidualTable {
 struct EstimatorSettings {
   FeatureSpec features;
   double sample_rate_Hz = 0.0;
-  std::string target;  ///< channel name with unit: "torque_Nm"
-  std::vector<std::string>
-      zeroed_channels;  ///< raw channels whose zero was taken from each record: set it at run time
+  std::string target;                        ///< channel name with unit: "torque_Nm"
+  std::vector<std::string> zeroed_channels;  ///< raw inputs whose zero was taken from each record:
+                                             ///< `set_zero` at run time
   FeatureRanges ranges;
   LinearFallback fallback;
   ResidualTable residuals;

@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -55,6 +56,9 @@ class BasicTorqueEstimator {
   [[nodiscard]] const BasicEstimator<M>& estimator() const noexcept { return estimator_; }
 
   void reset() noexcept { estimator_.reset(); }
+
+  /// As the estimator's: a zero of one of its `raw_inputs()`, in SI.
+  void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
 
   /// `value` and `std_dev` in Nm.
   Estimate step(const JointSample& sample) noexcept TORSIO_REALTIME {

@@ -29,13 +29,12 @@ using KnownFamilies = FamilyList<Linear,         //
                                  Polynomial,     //
                                  Dgmm>;
 
-/// A model that can run backwards: from the target to its first input. `invert` returns an
-/// `Estimate`, or a plain value where it never fails; it may need scratch space, so it is not
-/// const.
+/// A model that can run backwards: from the target to its first input, whose value in `features`
+/// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
+/// space, so it is not const.
 template <class M>
 concept Invertible = requires(M& model, double target, Features features) {
-  Estimate{model.invert(target, features)};
-  requires noexcept(model.invert(target, features));
+  { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
 };
 
 /// A model whose family is known only at run time. Dispatch is a switch: no virtual call, nothing
@@ -61,8 +60,8 @@ class AnyModel {
 
   [[nodiscard]] bool can_invert() const noexcept;
   /// The first input at which the model says `target`, the others being as given; see the family's
-  /// own `invert`. Where `can_invert()` is false the given first input comes back with
-  /// `Fault::model_not_finite`.
+  /// own `invert`. Where `can_invert()` is false the given first input (0 if that is no
+  /// number) comes back with `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
 
   /// The model as its own family, or null.

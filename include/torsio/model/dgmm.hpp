@@ -74,8 +74,9 @@ class Dgmm {
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
   /// The first input for which the target would be `target`, the other inputs as in `features`
-  /// (`features[0]` is ignored): E[input 0 | target, inputs 1...]. Finite in every case.
-  [[nodiscard]] double invert(double target, Features features) noexcept TORSIO_REALTIME;
+  /// (`features[0]` is ignored): E[input 0 | target, inputs 1...], with error bar and novelty as in
+  /// `step`. Without density there, the line's value comes back with `Fault::model_not_finite`.
+  [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
 
  private:
   Parameters parameters_;

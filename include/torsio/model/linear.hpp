@@ -44,7 +44,8 @@ class Linear {
 
   /// The first input at which the model says `target`, the other inputs being as given:
   /// x_1 = (target - b - sum_j>1 k_j x_j) / k_1. Where it has none (no slope, or the schedule runs
-  /// over that very input) the given x_1 comes back with `Fault::model_not_finite`.
+  /// over that very input) the given x_1, or 0 if that is no number, comes back with
+  /// `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
 
  private:

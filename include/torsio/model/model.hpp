@@ -18,8 +18,7 @@ struct Estimate {
   double value = 0.0;  ///< in the target's unit
   double std_dev =
       kNotMeasured;  ///< one standard deviation, same unit; NaN where there is no evidence, never 0
-  double novelty = kNotMeasured;  ///< how unlike the training data the input is; larger is
-                                  ///< stranger, NaN if untold
+  double novelty = kNotMeasured;  ///< larger: less like the training data; NaN if untold
   Fault fault = Fault::none;
 };
 

@@ -69,9 +69,9 @@ class ScheduledCoefficients {
   /// All coefficients at once. @param out `size()` values.
   void evaluate(Features features, std::span<double> out) const noexcept TORSIO_REALTIME;
 
-  /// sum_j c_(first + j) x_j
-  [[nodiscard]] double weighted_sum(const Position& at, std::size_t first,
-                                    Features features) const noexcept TORSIO_REALTIME;
+  /// sum_j c_(first + j) x_j over j = `from` and above
+  [[nodiscard]] double weighted_sum(const Position& at, std::size_t first, Features features,
+                                    std::size_t from = 0) const noexcept TORSIO_REALTIME;
 
   /// How many numbers a fit chose: a column that is zero at every knot is no term and not counted.
   [[nodiscard]] std::size_t fitted_count() const noexcept;

@@ -15,8 +15,8 @@ namespace torsio {
 
 /// Reads `--models`: `all`, or families separated by commas, each with settings behind colons
 /// (`linear,polynomial:degree=7:branch=true`). Each is paired with every input set. `all` is every
-/// family, `polynomial` also without branches, and, where a condition takes several values in training,
-/// the scheduled variants over it.
+/// family, `polynomial` also without branches, and, where a condition takes several values in
+/// training, the scheduled variants over it.
 /// @throws UsageError for a family or setting that does not exist.
 [[nodiscard]] std::vector<ModelChoice> model_choices(const Dataset& dataset,
                                                      std::string_view models,
@@ -24,12 +24,15 @@ namespace torsio {
 
 struct Comparison {
   Results results;
-  std::optional<TrainedModel> best;  ///< lowest RMSE on the test records; none if every fit failed
+  /// Lowest RMSE on the validation records, or on the test records where there are no others: its card
+  /// then says that the score which it carries also chose it. None if every fit failed.
+  std::optional<TrainedModel> best;
 };
 
 /// Trains every choice on the training records and scores it on the other roles. A fit that fails
 /// is a row that says why.
-/// @throws Error if there are no test records, or an input is a leak and `allow_leak` is not set.
+/// @throws UsageError if there are no test records, an input is a leak and `allow_leak` is not set,
+/// or a setting names an input that there is not.
 [[nodiscard]] Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
                                  std::uint64_t seed, bool allow_leak,
                                  const Progress& progress = {});
@@ -41,9 +44,8 @@ struct Comparison {
 [[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
                                      const Progress& progress = {});
 
-/// Puts the scores of a model's rows on its held-out records (validation if there are, else test)
-/// into its card, with words for what they were measured on. Without held-out records nothing
-/// changes.
+/// Puts a model's scores on all test records (validation, if there are no test records) into its
+/// card, with words for what they were measured on. Nothing held out: nothing changes.
 void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows);
 
 }  // namespace torsio

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "torsio/core/not_measured.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/train/evaluate.hpp"
 
@@ -15,13 +16,12 @@ namespace torsio {
 /// split together.
 struct ResultRow {
   std::string family;
-  std::string variant = {};    ///< what tells it from another row of the same family:
-                               ///< "schedule=support_m"; may be empty
+  std::string variant = {};    ///< the settings, "schedule=support_m"; may be empty
   std::string input_set = {};  ///< name of the manifest's input set; may be empty
   Role split = Role::test;
   std::optional<std::string> recording = {};  ///< empty: the whole split together
   Score score = {};
-  double fit_seconds = 0.0;
+  double fit_seconds = kNotMeasured;  ///< not measured where the model came from a file
   std::size_t parameter_count = 0;
   std::string status = "ok";  ///< ok, failed, diverged
   std::string reason = {};    ///< why it failed, or what to know about the row

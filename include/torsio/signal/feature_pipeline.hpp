@@ -11,8 +11,8 @@
 
 namespace torsio {
 
-/// A channel that is computed from others: `{"spring_deflection_rad", "gear_angle_rad -
-/// joint_angle_rad"}`.
+/// A channel that is computed from others:
+/// `{"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"}`.
 struct ChannelDefinition {
   std::string name;
   std::string expression;
@@ -30,9 +30,9 @@ struct FeatureSpec {
 
 /// Raw channels of one tick -> features of one tick. Parsed once; `step` allocates nothing.
 ///
-/// An expression is built from channel names, numbers (a unit may follow: `10Hz`, `0.3deg`), `+ - *
-/// / ^`, parentheses and the functions `rate lowpass lag sign tanh abs sqrt exp min max`. Equal
-/// sub-expressions are evaluated once. `rate(x)` is the backward difference over one sample,
+/// An expression is built from channel names, numbers (a unit may follow: `10Hz`, `0.3deg`),
+/// `+ - * / ^`, parentheses and the functions `rate lowpass lag sign tanh abs sqrt exp min max`.
+/// Equal sub-expressions are evaluated once. `rate(x)` is the backward difference over one sample,
 /// `lowpass(x, f)` a second-order Butterworth filter re-discretised for the sample rate that starts
 /// in the steady state of its first input, `lag(x, n)` the value n samples ago (before there is
 /// one, the oldest). docs/expressions.md has the whole language.
@@ -62,8 +62,8 @@ class FeaturePipeline {
   /// channels (raw or defined) that are rates by their unit (`_rad_s`, `_m_s`).
   [[nodiscard]] bool is_rate(std::size_t feature) const noexcept;
 
-  /// Subtracts `value` (SI) from a raw channel from now on; call while configuring. @throws
-  /// UsageError for an unknown channel.
+  /// Subtracts `value` (SI) from a raw channel from now on; call while configuring.
+  /// @throws UsageError for an unknown channel.
   void set_zero(std::string_view channel, double value);
 
   /// Samples after `reset()` until every difference, lag and filter has settled (to 1 % of a step):

@@ -92,8 +92,10 @@ class Plant {
   void reset(const PlantState& state) noexcept;
 
   /// Advances the plant. A value that is not finite, a negative inertia or a dt that is not
-  /// positive is `Fault::input_not_finite`, and nothing moves.
-  Fault step(const PlantCommand& command, const Load& load, double dt_s) noexcept TORSIO_REALTIME;
+  /// positive or longer than 10^6 of the longest steps is `Fault::input_not_finite`, and nothing
+  /// moves.
+  [[nodiscard]] Fault step(const PlantCommand& command, const Load& load,
+                           double dt_s) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const PlantParameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] const PlantState& state() const noexcept { return state_; }

@@ -29,9 +29,11 @@ struct Prediction {
   std::vector<double> step_ns;
 };
 
+/// Zeros of `zeroed_channels` are 0 here, whatever was set: a loaded recording had its own
+/// subtracted already.
 /// @throws Error naming the recording, the channel and the sample if a raw input is missing or not
 /// finite, or the recording has another sample rate than the estimator.
-[[nodiscard]] Prediction predict(Estimator& estimator, const Recording& recording);
+[[nodiscard]] Prediction predict(Estimator estimator, const Recording& recording);
 
 /// Scores of each recording that has segments of `role`, and of all of them together.
 struct SplitScore {
@@ -42,7 +44,7 @@ struct SplitScore {
   std::vector<OfRecording> recordings;
   Score together;
 };
-[[nodiscard]] SplitScore evaluate(Estimator& estimator, const Dataset& dataset, Role role,
+[[nodiscard]] SplitScore evaluate(const Estimator& estimator, const Dataset& dataset, Role role,
                                   const Progress& progress = {});
 
 }  // namespace torsio

@@ -24,7 +24,7 @@ struct DgmmOptions {
 /// Learns the joint density of target and inputs from the usable samples in the order of recording
 /// (`OnlineMixture`), refines it by expectation maximisation if asked to, and adds the guards: a
 /// background component, which makes the answer far from all data a linear regression, and the
-/// clamp to the linear model, whose threshold of density is the first percentile over the training
+/// clamp to the linear model without rates (decision 0004), whose threshold of density is the first percentile over the training
 /// samples.
 ///
 /// How far components must reach to bridge the gaps between recorded conditions the training
@@ -33,7 +33,8 @@ struct DgmmOptions {
 /// notes state choice and scores.
 ///
 /// Source: SPEC 3.1. Deterministic; independent of the number of threads.
-/// @throws Error if no sample is usable or an option is out of range; Cancelled if `progress` asks.
+/// @throws Error if no sample is usable, one lies a million times the spread of its channel away
+/// (naming record, channel and sample), or an option is out of range; Cancelled if `progress` asks.
 [[nodiscard]] Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options = {},
                                     const Progress& progress = {});
 

@@ -11,8 +11,10 @@ namespace torsio {
 /// The range of each input over the usable samples.
 [[nodiscard]] FeatureRanges feature_ranges(const TrainingData& data);
 
-/// Least squares of the target on all inputs, rates too; inputs that are constant or depend
-/// linearly on those before them have slope 0. `residual_std` is sqrt(sum e^2 / (samples - terms)).
+/// Least squares of the target on all inputs that are no rates: tasks reach rates that no training
+/// record has, and a slope there extrapolates without bound (docs/decisions/0004). Rates, and
+/// inputs that are constant or depend linearly on those before them, have slope 0. `residual_std`
+/// is sqrt(sum e^2 / (samples - terms)).
 [[nodiscard]] LinearFallback linear_fallback(const TrainingData& data);
 
 inline constexpr std::size_t kResidualsPerRegion = 50;

@@ -12,12 +12,17 @@ namespace torsio {
 /// definition they need, so that the model's raw inputs are measured channels.
 ///
 /// Definitions are those of the recordings' mapping and, unless recorded themselves, the canonical
-/// ones (SPEC section 0): `spring_deflection_rad = gear_angle_rad - joint_angle_rad`,
-/// `spring_deflection_rate_rad_s`, `joint_speed_rad_s`. Without wanted inputs: the dataset's first
+/// ones (SPEC section 0):
+///
+///     spring_deflection_rad = gear_angle_rad - joint_angle_rad
+///     spring_deflection_rate_rad_s = rate(spring_deflection_rad)
+///     joint_speed_rad_s = rate(joint_angle_rad)
+///
+/// Without wanted inputs: the dataset's first
 /// input set, else the deflection, its 10 Hz-filtered rate and the filtered joint speed, as far as
 /// present.
 /// @throws Error listing the channels if an input needs one that a record lacks, or no default
-/// applies.
+/// applies, or if two records define one name differently.
 [[nodiscard]] FeatureSpec resolve_inputs(const Dataset& dataset,
                                          const std::vector<std::string>& wanted);
 

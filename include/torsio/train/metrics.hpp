@@ -17,8 +17,7 @@ struct Metrics {
   double mad = kNotMeasured;          ///< mean |e|
   double std_abs = kNotMeasured;      ///< standard deviation of |e| about `mad` (divided by n)
   double max_abs = kNotMeasured;      ///< largest |e|
-  double fit_percent = kNotMeasured;  ///< 100 (1 - |e| / |y - mean y|) in the 2-norm (BF); negative
-                                      ///< where the mean of the target would do better
+  double fit_percent = kNotMeasured;  ///< 100 (1 - |e| / |y - mean y|) in the 2-norm (BF)
 };
 
 /// Gathers metrics sample by sample, in one pass and without cancellation.
@@ -26,8 +25,8 @@ class MetricsAccumulator {
  public:
   /// A target that was not measured (NaN) is passed over.
   void add(double value, double target) noexcept;
-  /// @param use 0 where a sample is not to be scored; empty: all are. @throws Error if the lengths
-  /// differ.
+  /// @param use 0 where a sample is not to be scored; empty: all are.
+  /// @throws Error if the lengths differ.
   void add(std::span<const double> values, std::span<const double> targets,
            std::span<const std::uint8_t> use = {});
 

@@ -49,9 +49,12 @@ struct OnlineMixtureSettings {
 ///
 /// A sample farther than the novelty distance from all means becomes a component of its own. When
 /// none is free, the pair with the least Runnalls cost
-/// ((w_i + w_j) ln|S_ij| - w_i ln|S_i| - w_j ln|S_j|) / 2 among the lightest and their nearest
-/// neighbours is merged first, keeping its moments. A component's neighbour is looked for again
-/// when one of the two has changed, or a new component came up for which it is the nearest.
+///
+///     ((w_i + w_j) ln|S_ij| - w_i ln|S_i| - w_j ln|S_j|) / 2
+///
+/// among the lightest and their nearest neighbours is merged first, keeping its moments. A
+/// component's neighbour is looked for again when one of the two has changed, or a new component
+/// came up for which it is the nearest.
 ///
 /// Source: SPEC 3.1 (000 Algorithm 1, whose sign diverges as printed). Nothing is allocated after
 /// construction but by `mixture`.

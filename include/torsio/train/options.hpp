@@ -34,6 +34,11 @@ class Options {
   [[nodiscard]] bool boolean(std::string_view name) const;
   [[nodiscard]] const std::string& text(std::string_view name) const;
 
+  /// Every setting with the value in force, defaults too: what a model's card keeps.
+  [[nodiscard]] std::map<std::string, std::string> values() const {
+    return {values_.begin(), values_.end()};
+  }
+
  private:
   std::map<std::string, std::string, std::less<>> values_;
 };

@@ -34,7 +34,8 @@ struct TrainedModel {
 /// Recording -> features -> fitted model -> guards: what `torsio fit` does. Learns from the records
 /// with the role train only; guards take their error bars from the validation records, if there are
 /// any. Deterministic for a seed.
-/// @throws Error if the data cannot be learned from, Cancelled if `progress` asks to stop.
+/// @throws Error if the data cannot be learned from or the training records disagree about which
+/// channels are zeroed, UsageError for a wrong setting, Cancelled if `progress` asks to stop.
 [[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                                        std::uint64_t seed, const Progress& progress = {});
 

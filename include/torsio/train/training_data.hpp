@@ -23,8 +23,11 @@ struct Sequence {
   std::string recording;
   Matrix features = {};             ///< samples x inputs
   std::vector<double> target = {};  ///< NaN where not measured
-  std::vector<std::uint8_t> use =
-      {};  ///< 1: may be learned from (role, settled filters, fresh and finite target)
+  /// 1: may be learned from (role, settled filters, fresh and finite target, finite features)
+  std::vector<std::uint8_t> use = {};
+
+  /// False where a feature is not finite (a division, a power): no model is stepped there.
+  [[nodiscard]] bool has_features(std::size_t sample) const;
 };
 
 /// What every fitter is given.
@@ -47,7 +50,7 @@ struct Table {
 
 /// Runs each record of the dataset that has segments of `role` through the pipeline.
 /// @throws Error if a raw input is missing or not finite (naming record, channel, sample), or
-/// nothing usable remains.
+/// nothing usable remains. A feature that is not finite only spoils its own sample.
 [[nodiscard]] TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec,
                                          Role role = Role::train);
 

@@ -1,0 +1,32 @@
+#include "torsio/train/train_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "support/bench_dataset.hpp"
+#include "support/error_message.hpp"
+#include "torsio/train/inputs.hpp"
+
+namespace torsio {
+namespace {
+
+TEST(TrainModel, TakesTheZerosOfTheTrainingRecords) {
+  Dataset dataset = test::bench_dataset();
+  std::swap(dataset.records[0], dataset.records[2]);  // the first is for the test
+  for (const std::size_t i : {1, 2})
+    dataset.records[i].recording.zeros = {{.channel = "gear_angle_rad", .first_s = 0.1}};
+  const ModelChoice choice{.family = "linear", .features = resolve_inputs(dataset, {})};
+  const TrainedModel trained = train_model(dataset, choice, 1);
+  EXPECT_EQ(trained.file.card.zeros, dataset.records[1].recording.zeros);
+  EXPECT_EQ(trained.file.settings.zeroed_channels, std::vector<std::string>{"gear_angle_rad"});
+
+  dataset.records[2].recording.zeros[0].channel = "joint_angle_rad";
+  const std::string message = test::error_message([&] { (void)train_model(dataset, choice, 1); });
+  EXPECT_NE(message.find("first: zero"), std::string::npos) << message;
+  dataset.records[2].recording.zeros.clear();
+  EXPECT_THROW((void)train_model(dataset, choice, 1), Error);
+}
+
+}  // namespace
+}  // namespace torsio
