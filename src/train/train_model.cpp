@@ -53,10 +53,11 @@ ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Opti
   card.seed = seed;
   card.zeros = training_zeros(dataset);
   for (const DatasetRecord& record : dataset.records) {
-    const bool is_listed = std::ranges::find(card.training_files, record.recording.source) !=
-                           card.training_files.end();
-    if (record.has_role(Role::train) && !is_listed)
-      card.training_files.push_back(record.recording.source);
+    if (!record.has_role(Role::train)) continue;
+    Source source = record.recording.source;
+    if (source.file.empty()) source.file = record.recording.name();  // made in memory
+    if (std::ranges::find(card.training_files, source) == card.training_files.end())
+      card.training_files.push_back(std::move(source));
   }
   return card;
 }

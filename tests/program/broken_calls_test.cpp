@@ -88,7 +88,7 @@ TEST_F(BrokenCalls, OnAFullDiskSaySoAndLeaveNothing) {
   // writes fail as on a full disk, midway.
   const std::string full_disk = "trap '' XFSZ; ulimit -f 1; {torsio} ";
   expect_error(shell(full_disk + "simulate dfki-50 sweep --duration 5s -o new.csv"), kWorkFailed,
-               "new.csv: cannot be written: File too large");
+               "new.csv: cannot write: File too large");
   expect_error(shell(full_disk + "fit a.csv --model dgmm -o new.safetensors"), kWorkFailed,
                "new.safetensors: cannot write: File too large");
   expect_error(shell(full_disk + "fit a.csv --model dgmm -o old.safetensors"), kWorkFailed,
