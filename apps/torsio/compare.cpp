@@ -3,8 +3,9 @@
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/report/comparison.hpp"
 #include "torsio/report/html.hpp"
+#include "torsio/report/results.hpp"
+#include "torsio/train/comparison.hpp"
 #include "verbs.hpp"
 
 namespace {

@@ -8,7 +8,8 @@
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/report/comparison.hpp"
+#include "torsio/report/results.hpp"
+#include "torsio/train/comparison.hpp"
 #include "verbs.hpp"
 
 namespace {

@@ -6,7 +6,7 @@
 
 #include "support/bench_dataset.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/report/comparison.hpp"
+#include "torsio/train/comparison.hpp"
 
 namespace torsio {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "torsio/report/comparison.hpp"
 #include "torsio/sim/bench_dataset.hpp"
+#include "torsio/train/comparison.hpp"
 
 namespace torsio {
 namespace {

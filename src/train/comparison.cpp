@@ -1,4 +1,4 @@
-#include "torsio/report/comparison.hpp"
+#include "torsio/train/comparison.hpp"
 
 #include <fmt/format.h>
 

@@ -8,7 +8,7 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
-#include "torsio/report/results.hpp"
+#include "torsio/train/results.hpp"
 #include "torsio/train/train_model.hpp"
 
 namespace torsio {
