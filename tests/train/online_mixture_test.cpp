@@ -157,7 +157,7 @@ TEST(OnlineMixture, AnEnormousSampleIsAComponentOfItsOwn) {
     EXPECT_NEAR(total, 10.0 / 11.0, 1e-12) << far;
     learner.learn(std::vector{-far, far, 0.0});
     learn_all(learner, random_samples(100, 3, 4));  // merges, with the far ones among the lightest
-    learner.learn(std::vector{far, far, 0.0});  // no slot is free
+    learner.learn(std::vector{far, far, 0.0});      // no slot is free
     EXPECT_EQ(learner.size(), 20U);
     const GaussianMixture full = learner.mixture();
     EXPECT_NEAR(std::accumulate(full.weights.begin(), full.weights.end(), 0.0), 1.0, 1e-12);
