@@ -46,7 +46,8 @@ class Sha256 {
 
 class FileBytes final : public ByteSource {
  public:
-  FileBytes(const std::string& path, const Progress& progress) : path_(path), progress_(progress) {
+  FileBytes(const std::string& path, Progress progress)
+      : path_(path), progress_(std::move(progress)) {
     int code = 0;
     do {
       report();
