@@ -6,7 +6,7 @@ namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
 
-void on_interrupt(int) { interrupted = 1; }
+void on_interrupt(int /*signal*/) { interrupted = 1; }
 
 }  // namespace
 

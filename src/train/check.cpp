@@ -277,6 +277,7 @@ class Checker {
       }
       if (lines.size() < 2) return;
       std::vector<double> offsets;
+      offsets.reserve(lines.size());
       for (const Line& line : lines) offsets.push_back(line.mean_target - slope * line.mean_input);
       std::vector<double> sorted = offsets;
       std::ranges::sort(sorted);

@@ -89,11 +89,11 @@ std::vector<FamilyChoice> all_choices(const Dataset& dataset,
   return choices;
 }
 
-ResultRow row_for(const ModelFile& file, Role split, Score score) {
+ResultRow row_for(const ModelFile& file, Role split, const Score& score) {
   ResultRow row;
   row.family = file.card.fitted_as;
   row.split = split;
-  row.score = std::move(score);
+  row.score = score;
   row.parameter_count = AnyModel(file.parameters).parameter_count();
   if (!std::isfinite(row.score.metrics.rmse)) {
     row.status = "failed";
@@ -112,10 +112,10 @@ std::vector<ResultRow> rows_for(const ModelFile& file, const Estimator& estimato
   std::vector<ResultRow> rows;
   for (const Role role : kRoles) {
     if (!dataset.has_role(role)) continue;
-    SplitScore scores = evaluate(estimator, dataset, role, progress);
-    rows.push_back(row_for(file, role, std::move(scores.together)));
-    for (auto& of_recording : scores.recordings) {
-      rows.push_back(row_for(file, role, std::move(of_recording.score)));
+    const SplitScore scores = evaluate(estimator, dataset, role, progress);
+    rows.push_back(row_for(file, role, scores.together));
+    for (const auto& of_recording : scores.recordings) {
+      rows.push_back(row_for(file, role, of_recording.score));
       rows.back().recording = of_recording.recording;
     }
   }
