@@ -46,16 +46,16 @@ class Sha256 {
 
 class FileBytes final : public ByteSource {
  public:
-  FileBytes(const std::string& path, Progress progress)
-      : path_(path), progress_(std::move(progress)) {
+  FileBytes(std::string path, Progress progress)
+      : path_(std::move(path)), progress_(std::move(progress)) {
     int code = 0;
     do {
       report();
-      descriptor_ = path == "-" ? dup(STDIN_FILENO) : open(path.c_str(), O_RDONLY | O_CLOEXEC);
+      descriptor_ = path_ == "-" ? dup(STDIN_FILENO) : open(path_.c_str(), O_RDONLY | O_CLOEXEC);
       code = errno;
     } while (descriptor_ < 0 && code == EINTR);
     if (descriptor_ < 0)
-      throw Error({.place = path,
+      throw Error({.place = path_,
                    .problem = "cannot be opened: " + system_message(code),
                    .advice = code == ENOENT ? "Check the path; '-' reads standard input." : ""});
     struct stat info {};
@@ -63,7 +63,7 @@ class FileBytes final : public ByteSource {
     if (is_known && S_ISREG(info.st_mode)) bytes_ = static_cast<double>(info.st_size);
     if (is_known && S_ISDIR(info.st_mode)) {
       close(descriptor_);
-      throw Error({.place = path,
+      throw Error({.place = path_,
                    .expected = "a file",
                    .found = "a directory",
                    .advice = "Name the files in it, or a dataset manifest (.yaml)."});
