@@ -63,7 +63,7 @@ void refuse_conflicts(const Dataset& dataset) {
       if (expression != definition.expression)
         throw Error({.place = record.recording.name() + ": " + definition.name,
                      .problem = "the recordings define this channel differently",
-                     .expected = expression + ", as in " + first,
+                     .expected = fmt::format("{}, as in {}", expression, first),
                      .found = definition.expression,
                      .advice = "Give both the same derive: in their mappings, or two names."});
     }
