@@ -19,8 +19,6 @@
 namespace torsio {
 namespace {
 
-bool is_finite(double value) { return std::isfinite(value); }
-
 bool has_segment(const DatasetRecord& record, Role role) {
   return std::ranges::any_of(record.segments,
                              [&](const Segment& segment) { return segment.role == role; });

@@ -16,8 +16,6 @@ constexpr std::size_t kJumpNeighbourhood = 3;
 constexpr double kReversalShare = 0.05;
 constexpr double kStandstillShare = 0.05;
 
-bool is_finite(double value) { return std::isfinite(value); }
-
 }  // namespace
 
 Extent extent_of(const std::vector<double>& values) {

@@ -10,6 +10,9 @@
 
 namespace torsio {
 
+/// `std::isfinite` as something that algorithms can be handed.
+inline bool is_finite(double value) { return std::isfinite(value); }
+
 /// The first input and the target of one recording, on the recording's clock.
 struct Pair {
   std::vector<double> input;
