@@ -42,6 +42,7 @@ class Checker {
     check_missing();
     check_constant();
     check_saturation();
+    check_frozen();
     check_gaps();
     check_delay();
     check_sign();
@@ -156,6 +157,32 @@ class Checker {
       if (std::abs(value - extreme) < 0.01 * span.width()) ++near_extreme;
     }
     return 2 * at_extreme < near_extreme;
+  }
+
+  // A sensor that tells one number while the others move on is stuck; at a standstill it is right.
+  void check_frozen() {
+    pass_unless_found("frozen sensors", "none rests while the others move", [&] {
+      for_each_channel([&](const Recording& recording, const Channel& channel) {
+        if (is_condition(recording, channel.name)) return;
+        const Rest rest = longest_rest(channel);
+        const double duration_s =
+            static_cast<double>(rest.end - rest.begin) / recording.sample_rate_Hz();
+        if (duration_s < kFrozen_s || rest.deliveries < kFrozenDeliveries ||
+            rest.end - rest.begin == channel.values.size())
+          return;
+        for (const std::string& other : channels_) {
+          const double moved = share_moved(recording.channel(other), rest);
+          if (other == channel.name || moved < kMovedMeanwhile) continue;
+          add(Verdict::warn, "frozen sensors", recording.name(),
+              fmt::format("{} tells {:g} for {:.3g} s from t = {:.4g} s, while {} moves through "
+                          "{:.0f} % of its range",
+                          channel.name, channel.values[rest.begin], duration_s,
+                          recording.time_s(rest.begin), other, 100.0 * moved),
+              "Did its bus stall? Cut that part out: a model would learn the stall.");
+          return;
+        }
+      });
+    });
   }
 
   void check_gaps() {
@@ -327,6 +354,9 @@ class Checker {
 
   static constexpr std::size_t kFewSamples = 100;
   static constexpr double kSaturatedShare = 0.005;
+  static constexpr double kFrozen_s = 0.2;
+  static constexpr std::size_t kFrozenDeliveries = 10;
+  static constexpr double kMovedMeanwhile = 0.4;  ///< of another channel's range
   static constexpr double kJumpShare = 0.02;
   static constexpr double kJumpOverOthers = 5.0;
   static constexpr double kLongestDelay_s = 0.1;

@@ -75,6 +75,25 @@ Jump largest_jump(const std::vector<double>& values) {
   return jump;
 }
 
+Rest longest_rest(const Channel& channel) {
+  Rest longest;
+  Rest rest;
+  for (std::size_t i = 0; i < channel.values.size(); ++i) {
+    if (i == 0 || channel.values[i] != channel.values[i - 1]) rest = {.begin = i, .end = i};
+    rest.end = i + 1;
+    if (channel.is_fresh(i)) ++rest.deliveries;
+    if (rest.end - rest.begin > longest.end - longest.begin) longest = rest;
+  }
+  return longest;
+}
+
+double share_moved(const Channel& channel, const Rest& meanwhile) {
+  Extent passed;
+  for (std::size_t i = meanwhile.begin; i < meanwhile.end; ++i) passed.include(channel.values[i]);
+  const double whole = extent_of(channel.values).width();
+  return whole > 0.0 ? passed.width() / whole : 0.0;
+}
+
 Line line_through(const Pair& pair) {
   Line line;
   double count = 0.0;

@@ -46,6 +46,17 @@ struct Jump {
 };
 [[nodiscard]] Jump largest_jump(const std::vector<double>& values);
 
+/// The longest stretch over which a channel tells the very same number.
+struct Rest {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  std::size_t deliveries = 0;  ///< of the sensor in it
+};
+[[nodiscard]] Rest longest_rest(const Channel& channel);
+
+/// The share of its whole range that a channel passes through meanwhile.
+[[nodiscard]] double share_moved(const Channel& channel, const Rest& meanwhile);
+
 /// Least squares through the samples where input and target are both finite.
 struct Line {
   double mean_input = 0.0;

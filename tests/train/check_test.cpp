@@ -92,6 +92,27 @@ TEST(Check, WarnsOfASensorAtItsLimit) {
             Verdict::warn);
 }
 
+TEST(Check, WarnsOfASensorThatFreezesWhileTheOthersMove) {
+  const auto findings = findings_of(with_record(changed("gear_angle_rad", [](Channel& channel) {
+    for (std::size_t i = 1000; i < 2200; ++i) channel.values[i] = channel.values[1000];
+  })));
+  EXPECT_EQ(verdict_of(findings, "frozen sensors"), Verdict::warn);
+  const std::string message = first_of(findings, "frozen sensors").message;
+  EXPECT_NE(message.find("gear_angle_rad"), std::string::npos) << message;
+  EXPECT_NE(message.find("for 1.2 s from t = 1 s"), std::string::npos) << message;
+}
+
+TEST(Check, DoesNotCallAStandstillFrozen) {
+  Recording at_rest = bench_recording("at rest");
+  Recording recording("at rest", 1000.0);
+  for (Channel copy : at_rest.channels()) {
+    for (std::size_t i = 3000; i < 3600; ++i) copy.values[i] = copy.values[3000];
+    recording.add(std::move(copy));
+  }
+  EXPECT_EQ(verdict_of(findings_of(with_record(std::move(recording))), "frozen sensors"),
+            Verdict::pass);
+}
+
 TEST(Check, WarnsOfAJump) {
   const auto jump = [](Channel& channel) {
     for (std::size_t i = 2000; i < channel.values.size(); ++i) channel.values[i] += 20.0;
