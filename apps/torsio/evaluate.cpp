@@ -8,6 +8,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/report/model_description.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/train/comparison.hpp"
 #include "verbs.hpp"
@@ -69,6 +70,11 @@ void run(const EvaluateFlags& flags) {
   flags.data.check_output(flags.predictions, {flags.model});
   flags.data.check_output(flags.json.destination, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
+  if (flags.data.recordings.empty()) {
+    if (flags.json.wants_tables()) print(torsio::model_description(file));
+    flags.json.write(torsio::model_description_json(file));
+    return;
+  }
   DataFlags data = flags.data;
   data.target = file.settings.target;
   ProgressBar bar;
@@ -97,7 +103,8 @@ void run(const EvaluateFlags& flags) {
 
 void add_evaluate(CLI::App& app) {
   auto flags = std::make_shared<EvaluateFlags>();
-  CLI::App* verb = app.add_subcommand("evaluate", "score a model file on recordings");
+  CLI::App* verb = app.add_subcommand(
+      "evaluate", "score a model file on recordings; without recordings, say what it is");
   verb->footer(
       "Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv\n"
       "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "

@@ -140,6 +140,16 @@ bool is_straight_line(const Dataset& dataset, const std::string& input) {
   return n > 2.0 && xx > 0.0 && yy > 0.0 && yy - xy * xy / xx < kUnexplained * yy;
 }
 
+/// Runs `parse`; here it is the caller who wrote the expressions.
+template <class Parse>
+auto as_asked(const Parse& parse) {
+  try {
+    return parse();
+  } catch (const Error& error) {
+    throw UsageError(error.report());
+  }
+}
+
 }  // namespace
 
 FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string>& wanted) {
@@ -158,8 +168,11 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
          .expected = "spring_deflection_rad, or gear_angle_rad and joint_angle_rad",
          .found = fmt::format("{}", fmt::join(channel_names(first), ", ")),
          .advice = "Name the model's inputs with --inputs, or rename channels with --mapping."});
-  FeatureSpec spec{inputs, needed_definitions(definitions, inputs)};
-  const FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
+  const FeatureSpec spec = as_asked([&] {
+    return FeatureSpec{inputs, needed_definitions(definitions, inputs)};
+  });
+  const FeaturePipeline pipeline =
+      as_asked([&] { return FeaturePipeline(spec, dataset.sample_rate_Hz()); });
   for (const std::string& channel : pipeline.raw_inputs())
     for (const DatasetRecord& record : dataset.records)
       if (!record.recording.has(channel))

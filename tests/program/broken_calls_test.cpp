@@ -52,6 +52,8 @@ TEST_F(BrokenCalls, LeaveTheOutputUntouchedWhenTheFitFails) {
                "option=value");
   expect_error(torsio("fit a.csv --model linear --inputs nothing_rad -o m.safetensors"),
                kCallWasWrong, "nothing_rad");
+  expect_error(torsio("fit a.csv --model linear --inputs 'foo(' -o m.safetensors"), kCallWasWrong,
+               "expected a function");
   expect_error(torsio("fit a.csv --model linear --target force_N -o m.safetensors"), kWorkFailed,
                "force_N");
   EXPECT_EQ(contents("m.safetensors"), "precious");

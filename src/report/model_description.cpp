@@ -1,0 +1,111 @@
+#include "torsio/report/model_description.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "torsio/core/units.hpp"
+#include "torsio/model/parameters.hpp"
+#include "torsio/report/text_table.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kReadable = 32;
+
+/// A tensor of the model, as a list of numbers.
+struct Leaf {
+  std::string name;
+  std::string shape;
+  std::vector<double> values;
+};
+
+Leaf leaf_of(const std::string& name, const Matrix& matrix) {
+  return {name, fmt::format("{} x {}", matrix.rows, matrix.columns), matrix.values};
+}
+Leaf leaf_of(const std::string& name, const std::vector<double>& values) {
+  return {name, fmt::format("{}", values.size()), values};
+}
+template <class Number>
+Leaf leaf_of(const std::string& name, const Number& value) {
+  return {name, "1", {static_cast<double>(value)}};
+}
+
+std::vector<Leaf> leaves_of(const ModelFile& model) {
+  std::vector<Leaf> leaves;
+  std::visit(
+      [&](const auto& parameters) {
+        for_each_leaf(parameters, [&](const std::string& name, const auto& value) {
+          leaves.push_back(leaf_of(name, value));
+        });
+      },
+      model.parameters);
+  return leaves;
+}
+
+std::string family_of(const ModelFile& model) {
+  return model.card.fitted_as.empty() ? std::string(family_of(model.parameters))
+                                      : model.card.fitted_as;
+}
+
+}  // namespace
+
+std::string model_description(const ModelFile& model) {
+  const EstimatorSettings& settings = model.settings;
+  std::string text =
+      fmt::format("{} for {} at {:g} Hz, {} numbers, by torsio {}\n", family_of(model),
+                  settings.target, settings.sample_rate_Hz,
+                  AnyModel(model.parameters).parameter_count(), model.card.torsio_version);
+  if (!model.card.device_serial.empty())
+    text += fmt::format("belongs to the device {}\n", model.card.device_serial);
+  for (const Source& source : model.card.training_files)
+    text += fmt::format("trained on {}{}\n", source.file,
+                        source.sha256.empty() ? "" : fmt::format(", sha256 {}", source.sha256));
+  if (!model.card.metrics.empty()) {
+    text += fmt::format("errors on {}:", model.card.held_out);
+    for (const auto& [name, value] : model.card.metrics)
+      text += fmt::format(" {} {:.4g}", name, value);
+    text += "\n";
+  }
+  TextTable inputs;
+  inputs.header({"input", "lowest", "highest trained on"});
+  for (std::size_t j = 0; j < settings.features.inputs.size(); ++j)
+    inputs.row({settings.features.inputs[j], fmt::format("{:.4g}", settings.ranges.lowest[j]),
+                fmt::format("{:.4g}", settings.ranges.highest[j])});
+  text += fmt::format("\n{}", inputs.text());
+  for (const ChannelDefinition& definition : settings.features.definitions)
+    text += fmt::format("{} = {}\n", definition.name, definition.expression);
+  text += "\n";
+  for (const Leaf& leaf : leaves_of(model)) {
+    text += leaf.values.size() <= kReadable
+                ? fmt::format("{} = {:.6g}\n", leaf.name, fmt::join(leaf.values, ", "))
+                : fmt::format("{}: {} numbers\n", leaf.name, leaf.shape);
+  }
+  return text;
+}
+
+std::string model_description_json(const ModelFile& model) {
+  using Json = nlohmann::ordered_json;
+  Json document{{"family", family_of(model)},
+                {"target", model.settings.target},
+                {"sample_rate_Hz", model.settings.sample_rate_Hz},
+                {"device_serial", model.card.device_serial},
+                {"inputs", Json::array()},
+                {"trained_on", Json::array()},
+                {"held_out", model.card.held_out},
+                {"metrics", model.card.metrics},
+                {"parameters", Json::object()}};
+  for (std::size_t j = 0; j < model.settings.features.inputs.size(); ++j)
+    document["inputs"].push_back({{"expression", model.settings.features.inputs[j]},
+                                  {"lowest", model.settings.ranges.lowest[j]},
+                                  {"highest", model.settings.ranges.highest[j]}});
+  for (const Source& source : model.card.training_files)
+    document["trained_on"].push_back({{"file", source.file}, {"sha256", source.sha256}});
+  for (const Leaf& leaf : leaves_of(model)) document["parameters"][leaf.name] = leaf.values;
+  return document.dump(2) + "\n";
+}
+
+}  // namespace torsio
