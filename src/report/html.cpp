@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "markup_text.hpp"
 #include "torsio/core/version.hpp"
 
 namespace torsio {
@@ -15,22 +16,8 @@ constexpr const char* kStyle =
     "pre{font:13px/1.45 ui-monospace,monospace;overflow-x:auto;padding:1rem;background:#f4f4f2}"
     "dt{font-weight:600}dd{margin:0 0 .5rem 0}";
 
-std::string escaped(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    switch (c) {
-      case '&': safe += "&amp;"; break;
-      case '<': safe += "&lt;"; break;
-      case '>': safe += "&gt;"; break;
-      case '"': safe += "&quot;"; break;
-      default: safe += c;
-    }
-  }
-  return safe;
-}
-
 std::string definition(const std::string& term, const std::string& text) {
-  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", escaped(term), escaped(text));
+  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", markup_text(term), markup_text(text));
 }
 
 }  // namespace
@@ -39,7 +26,7 @@ std::string results_html(const Results& results) {
   std::string page = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>torsio: {0}</title>"
       "<style>{1}</style></head><body>\n<h1>{0}</h1>\n<dl>\n",
-      escaped(results.target), kStyle);
+      markup_text(results.target), kStyle);
   if (!results.label.empty()) page += definition("split", results.label);
   if (results.input_sets.empty())
     page += definition("inputs", fmt::format("{}", fmt::join(results.inputs, ", ")));
@@ -53,7 +40,7 @@ std::string results_html(const Results& results) {
         std::ranges::any_of(results.rows, [&](const ResultRow& row) { return row.split == role; });
     if (!has_rows) continue;
     page += fmt::format("<h2>{} records, errors in {}, free run</h2>\n<pre>{}</pre>\n", name(role),
-                        escaped(results.unit), escaped(ranked_table(results, role)));
+                        markup_text(results.unit), markup_text(ranked_table(results, role)));
   }
   return page + fmt::format("<p>torsio {}</p>\n</body></html>\n", kVersion);
 }

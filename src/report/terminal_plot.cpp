@@ -2,28 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
+
+#include "plot_range.hpp"
 
 namespace torsio {
 namespace {
-
-struct Range {
-  double lowest = std::numeric_limits<double>::infinity();
-  double highest = -std::numeric_limits<double>::infinity();
-
-  void include(double value) {
-    lowest = std::min(lowest, value);
-    highest = std::max(highest, value);
-  }
-  [[nodiscard]] bool is_empty() const { return !(lowest <= highest); }
-  [[nodiscard]] double share(double value) const {
-    return highest > lowest ? (value - lowest) / (highest - lowest) : 0.5;
-  }
-};
 
 /// A grid of dots, eight to a character, in Unicode's braille block.
 class Canvas {
@@ -62,21 +48,14 @@ class Canvas {
 
 std::string terminal_plot(const std::vector<Curve>& curves, const PlotLabels& labels,
                           std::size_t columns, std::size_t rows) {
-  Range x_range;
-  Range y_range;
-  const auto for_each_point = [&curves](auto&& use) {
-    for (const Curve& curve : curves)
-      for (std::size_t i = 0; i < curve.x.size(); ++i)
-        if (std::isfinite(curve.x[i]) && std::isfinite(curve.y[i])) use(curve.x[i], curve.y[i]);
-  };
-  for_each_point([&](double x, double y) {
-    x_range.include(x);
-    y_range.include(y);
-  });
+  const auto [x_range, y_range] = ranges_of(curves);
   if (x_range.is_empty()) return "(nothing to draw)\n";
 
   Canvas canvas(columns, rows);
-  for_each_point([&](double x, double y) { canvas.dot(x_range.share(x), y_range.share(y)); });
+  for (const Curve& curve : curves)
+    for_each_point(curve, [&, x_of = x_range, y_of = y_range](double x, double y) {
+      canvas.dot(x_of.share(x), y_of.share(y));
+    });
 
   std::string text = fmt::format("{:>10} {}\n", "", labels.y);
   for (std::size_t row = 0; row < rows; ++row) {

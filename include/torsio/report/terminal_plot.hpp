@@ -1,23 +1,12 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <string>
 #include <vector>
 
+#include "torsio/report/curve.hpp"
+
 namespace torsio {
-
-/// One curve of a terminal plot; x and y have the same length.
-struct Curve {
-  std::string label;
-  std::span<const double> x;
-  std::span<const double> y;
-};
-
-struct PlotLabels {
-  std::string x;
-  std::string y;
-};
 
 /// Draws curves as braille dots, two by four a character, with axes; several curves share the
 /// canvas (their labels stand below, marked by which was drawn last on top). Non-finite points are
