@@ -35,9 +35,10 @@ std::string bench_list() {
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
     actuators.row({std::string(sheet.name), std::string(sheet.title)});
   torsio::TextTable experiments;
-  experiments.header({"experiment", "what is done"});
+  experiments.header({"experiment", "actuators", "what is done"});
   for (const torsio::ExperimentInfo& info : torsio::experiments())
-    experiments.row({std::string(info.name), std::string(info.description)});
+    experiments.row(
+        {std::string(info.name), std::string(info.actuators), std::string(info.description)});
   return actuators.text() + "\n" + experiments.text();
 }
 
@@ -45,7 +46,7 @@ std::string description(const torsio::DataSheet& sheet) {
   torsio::TextTable table;
   table.header({"parameter", "value", "unit", "origin"});
   for (const torsio::SheetRow& row : torsio::describe(sheet))
-    table.row({std::string(row.name), fmt::format("{:.6g}", row.value.value), std::string(row.unit),
+    table.row({row.name, fmt::format("{:.6g}", row.value.value), std::string(row.unit),
                std::string(1, static_cast<char>(row.value.origin))});
   return fmt::format(
       "{}: {}\n{}origin: P printed in a paper, D derived from printed numbers, A assumed\n",
@@ -72,7 +73,8 @@ Json list_json() {
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
     document["actuators"].push_back({{"name", sheet.name}, {"title", sheet.title}});
   for (const torsio::ExperimentInfo& info : torsio::experiments())
-    document["experiments"].push_back({{"name", info.name}, {"description", info.description}});
+    document["experiments"].push_back(
+        {{"name", info.name}, {"actuators", info.actuators}, {"description", info.description}});
   return document;
 }
 
@@ -106,7 +108,7 @@ void show(const SimulateFlags& flags, const std::string& text, const Json& docum
 void run(const SimulateFlags& flags) {
   if (flags.list) return show(flags, bench_list(), list_json());
   if (!flags.describe.empty()) {
-    const torsio::DataSheet& sheet = torsio::data_sheet(flags.describe);
+    const torsio::DataSheet sheet = torsio::data_sheet(flags.describe);
     return show(flags, description(sheet), sheet_json(sheet));
   }
   if (flags.actuator.empty() || flags.experiment.empty() || flags.output.empty())

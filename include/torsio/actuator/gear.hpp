@@ -74,10 +74,7 @@ class Gear {
   [[nodiscard]] double twist() const noexcept { return twist_rad_; }
   [[nodiscard]] double twist_rate() const noexcept { return twist_rate_rad_s_; }
   [[nodiscard]] double hysteresis_torque() const noexcept { return hysteresis_Nm_; }
-  /// @returns the energy [J] in the elasticity and in the hysteresis element
-  [[nodiscard]] double elastic_energy() const noexcept {
-    return 0.5 * parameters_.stiffness_Nm_rad * twist_rad_ * twist_rad_;
-  }
+  /// @returns the energy [J] in the hysteresis element
   [[nodiscard]] double hysteresis_energy() const noexcept { return hysteresis_.energy(); }
   /// @returns the stiffness [Nm/rad] while the hysteresis element sticks
   [[nodiscard]] double steepest() const noexcept {

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <cstddef>
-#include <type_traits>
 #include <variant>
 
 #include "torsio/actuator/elastic_curve.hpp"
 #include "torsio/actuator/maxwell_slip.hpp"
+#include "torsio/core/dispatch.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {
@@ -14,16 +13,6 @@ namespace torsio {
 /// has `Parameters`, `reset()`, `step(increment_rad, load_Nm)`, `energy()` and
 /// `stiffness(load_Nm)`.
 using SpringFriction = std::variant<MaxwellSlip<4>>;
-
-/// Calls `visit(alternative)`, which returns a number: a std::visit that cannot throw.
-template <std::size_t Index = 0, class Variant, class Visit>
-double dispatch(Variant& variant, const Visit& visit) noexcept {
-  if (auto* alternative = std::get_if<Index>(&variant)) return visit(*alternative);
-  if constexpr (Index + 1 < std::variant_size_v<std::remove_const_t<Variant>>) {
-    return dispatch<Index + 1>(variant, visit);
-  }
-  return 0.0;
-}
 
 /// A torsion spring: elastic curve, inner friction that grows with the load, and a little
 /// viscosity.
@@ -59,13 +48,17 @@ class Spring {
 
   /// @returns the friction's share of the last step's torque [Nm]
   [[nodiscard]] double friction_torque() const noexcept { return friction_Nm_; }
-  /// @returns the energy [J] stored in the elastic curve and in the friction elements
-  [[nodiscard]] double elastic_energy() const noexcept {
-    return elastic_.energy(last_deflection_rad_);
+  /// @returns the energy [J] in the elastic curve at this deflection, and in the friction elements
+  [[nodiscard]] double elastic_energy(double deflection_rad) const noexcept {
+    return elastic_.energy(deflection_rad);
   }
   [[nodiscard]] double friction_energy() const noexcept;
   /// @returns the largest stiffness [Nm/rad] under loads up to this one
   [[nodiscard]] double steepest(double load_Nm) const noexcept;
+  /// @returns the deflection [rad] at which it gives this torque, its friction relaxed
+  [[nodiscard]] double deflection(double torque_Nm) const noexcept {
+    return elastic_.deflection(torque_Nm);
+  }
 
  private:
   ElasticCurve elastic_;

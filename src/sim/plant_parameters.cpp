@@ -1,0 +1,105 @@
+#include <array>
+#include <limits>
+#include <variant>
+
+#include "torsio/sim/plant.hpp"
+
+namespace torsio {
+namespace {
+
+Motor::Parameters motor_of(const DataSheet& sheet) {
+  const MotorSheet& motor = sheet.motor;
+  return {.torque_constant_Nm_A = motor.torque_constant_Nm_A.value,
+          .peak_current_A = motor.peak_current_ratio.value * sheet.rating.current_A.value,
+          .current_time_constant_s = motor.current_time_constant_s.value,
+          .supply_V = motor.supply_V.value,
+          .resistance_Ohm = motor.winding_resistance_Ohm.value,
+          .ripple = motor.torque_ripple.value,
+          .ripple_order = motor.ripple_order.value};
+}
+
+Gear::Parameters stage_of(const GearSheet& gear) {
+  const double stiffness = gear.stiffness_Nm_rad.value;
+  return {.ratio = gear.ratio.value,
+          .error_rad = {gear.error_2_rad.value, gear.error_4_rad.value},
+          .error_phase_rad = {gear.error_2_phase_rad.value, gear.error_4_phase_rad.value},
+          .stiffness_Nm_rad = stiffness,
+          .damping_Nms_rad = gear.damping_time_s.value * stiffness,
+          .hysteresis_Nm = gear.hysteresis_rad.value * stiffness,
+          .break_away_rad = gear.break_away_rad.value};
+}
+
+Gear::Parameters stage_of(const TubeSheet& tube) {
+  return {.ratio = tube.ratio.value,
+          .stiffness_Nm_rad = tube.stiffness_Nm_rad.value,
+          .damping_Nms_rad = tube.damping_Nms_rad.value};
+}
+
+std::array<double, 4> values(const std::array<SheetValue, 4>& from) {
+  return {from[0].value, from[1].value, from[2].value, from[3].value};
+}
+
+Spring::Parameters stage_of(const SpringSheet& spring) {
+  const double stage = spring.stage_rad.value;
+  return {
+      .elastic = {.stiffness_Nm_rad = spring.stiffness_Nm_rad.value,
+                  .half_gap_rad = spring.half_gap_rad.value,
+                  .asymmetry = spring.asymmetry.value,
+                  .stage_rad = stage > 0.0 ? stage : std::numeric_limits<double>::infinity(),
+                  .stage_stiffness_Nm_rad = spring.stage_stiffness_Nm_rad.value},
+      .friction = MaxwellSlip<4>::Parameters{.constant_Nm = spring.friction_Nm.value,
+                                             .load_factor = spring.load_friction.value,
+                                             .share = values(spring.slip_share),
+                                             .break_away_rad = values(spring.break_away_rad)},
+      .viscosity_Nms_rad = spring.viscosity_Nms_rad.value,
+  };
+}
+
+/// What is felt at the joint, brought to the gear's input.
+LuGreFriction::Parameters friction_of(const FrictionSheet& friction, double ratio) {
+  return {.coulomb_Nm = friction.coulomb_Nm.value / ratio,
+          .load_factor = friction.load_factor.value / ratio,
+          .static_ratio = friction.static_ratio.value,
+          .stribeck_rad_s = friction.stribeck_rad_s.value,
+          .bristle_rad = friction.bristle_rad.value,
+          .viscous_Nms_rad = friction.viscous_Nms_rad.value / (ratio * ratio)};
+}
+
+double ratio_of(const Gear::Parameters& gear) { return gear.ratio; }
+double ratio_of(const Spring::Parameters& /*spring*/) { return 1.0; }
+template <class... Stage>
+double ratio_of(const std::variant<Stage...>& stage) {
+  return std::visit([](const auto& of) { return ratio_of(of); }, stage);
+}
+
+}  // namespace
+
+double total_ratio(const PlantParameters& parameters) noexcept {
+  return ratio_of(parameters.first) * ratio_of(parameters.second);
+}
+
+PlantParameters plant_parameters(const DataSheet& sheet) {
+  PlantParameters plant;
+  plant.motor = motor_of(sheet);
+  plant.first =
+      std::visit([](const auto& of) -> decltype(plant.first) { return stage_of(of); }, sheet.first);
+  plant.second = std::visit([](const auto& of) -> decltype(plant.second) { return stage_of(of); },
+                            sheet.second);
+  // The friction sits where the gear is driven.
+  if (std::holds_alternative<GearSheet>(sheet.second)) {
+    plant.middle_friction = friction_of(sheet.friction, ratio_of(plant.second));
+  } else {
+    plant.rotor_friction = friction_of(sheet.friction, ratio_of(plant.first));
+  }
+  plant.rotor_friction.viscous_Nms_rad += sheet.motor.viscous_Nms_rad.value;
+  plant.bearing = {.coulomb_Nm = sheet.joint.bearing_friction_Nm.value,
+                   .bristle_rad = sheet.joint.bearing_break_away_rad.value};
+  plant.joint_viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value;
+  plant.rotor_inertia_kg_m2 = sheet.motor.rotor_inertia_kg_m2.value;
+  plant.middle_inertia_kg_m2 = sheet.middle_inertia_kg_m2.value;
+  plant.joint_inertia_kg_m2 = sheet.joint.inertia_kg_m2.value;
+  plant.rated_torque_Nm = sheet.rating.torque_Nm.value;
+  return plant;
+}
+
+}  // namespace torsio
