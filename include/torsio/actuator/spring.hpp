@@ -4,16 +4,18 @@
 #include <type_traits>
 #include <variant>
 
+#include "torsio/actuator/bouc_wen.hpp"
 #include "torsio/actuator/elastic_curve.hpp"
+#include "torsio/actuator/lugre_slip.hpp"
 #include "torsio/actuator/maxwell_slip.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {
 
 /// The inner friction of a spring, one alternative a variant of the plant (SPEC section 4.6). Each
-/// has `Parameters`, `reset()`, `step(increment_rad, load_Nm)`, `energy()` and
+/// has `Parameters`, `reset()`, `step(increment_rad, rate_rad_s, load_Nm)`, `energy()` and
 /// `stiffness(load_Nm)`.
-using SpringFriction = std::variant<MaxwellSlip<4>>;
+using SpringFriction = std::variant<MaxwellSlip<4>, BoucWen, LuGreSlip>;
 
 /// Calls `visit(alternative)`, which returns a number: a std::visit that cannot throw.
 template <std::size_t Index = 0, class Variant, class Visit>
@@ -35,7 +37,7 @@ class Spring {
  public:
   struct Parameters {
     ElasticCurve::Parameters elastic;
-    std::variant<MaxwellSlip<4>::Parameters> friction;
+    std::variant<MaxwellSlip<4>::Parameters, BoucWen::Parameters, LuGreSlip::Parameters> friction;
     double viscosity_Nms_rad = 0.0;
   };
 
@@ -52,8 +54,9 @@ class Spring {
     const double elastic_Nm = elastic_.torque(deflection_rad);
     const double increment_rad = deflection_rad - last_deflection_rad_;
     last_deflection_rad_ = deflection_rad;
-    friction_Nm_ = dispatch(
-        friction_, [&](auto& friction) { return friction.step(increment_rad, elastic_Nm); });
+    friction_Nm_ = dispatch(friction_, [&](auto& friction) {
+      return friction.step(increment_rad, deflection_rate_rad_s, elastic_Nm);
+    });
     return elastic_Nm + friction_Nm_ + viscosity_Nms_rad_ * deflection_rate_rad_s;
   }
 
