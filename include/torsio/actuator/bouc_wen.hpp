@@ -55,7 +55,7 @@ class BoucWen {
     return limit_Nm_ > 0.0 ? 0.5 * force_Nm_ * force_Nm_ * parameters_.knee_rad / limit_Nm_ : 0.0;
   }
 
-  /// @returns the stiffness [Nm/rad] without force and while unloading, under this load
+  /// @returns the largest stiffness [Nm/rad] under this load, f / X: without force and unloading
   [[nodiscard]] double stiffness(double load_Nm) const noexcept {
     return limit(load_Nm) * per_knee_;
   }

@@ -59,9 +59,10 @@ class LuGreSlip {
                            : 0.0;
   }
 
-  /// @returns the stiffness [Nm/rad] without force, under this load
+  /// @returns the largest stiffness [Nm/rad] under this load, (1 + r) f / X: met where a motion at
+  /// the limit turns back fast; without force it is f / X
   [[nodiscard]] double stiffness(double load_Nm) const noexcept {
-    return limit(load_Nm) * per_bristle_;
+    return (1.0 + parameters_.static_ratio) * limit(load_Nm) * per_bristle_;
   }
 
  private:
