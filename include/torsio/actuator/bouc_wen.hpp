@@ -78,9 +78,9 @@ class BoucWen {
     if (share >= 1.0 || travel >= kSettled) return 1.0;
     // 1 - z^1.5 <= 1.5 (1 - z): a step up to 2/3 ends below 1.
     constexpr double kLongestStep = 0.5;
-    const double steps = std::max(1.0, std::ceil(travel / kLongestStep));
+    const int steps = 1 + static_cast<int>(travel / kLongestStep);
     const double step = travel / steps;
-    for (double i = 0.0; i < steps; i += 1.0) {
+    for (int i = 0; i < steps; ++i) {
       const double middle = share + 0.5 * step * slope(share);
       share += step * slope(middle);
     }
