@@ -81,6 +81,9 @@ void visit_values(Sheet& of, const Visit& visit) {
     visit(fmt::format("spring_slip_share_{}", i + 1), "", of.slip_share[i]);
   for (std::size_t i = 0; i < of.break_away_rad.size(); ++i)
     visit(fmt::format("spring_break_away_{}", i + 1), "rad", of.break_away_rad[i]);
+  visit("spring_knee", "rad", of.knee_rad);
+  visit("spring_static_ratio", "", of.static_ratio);
+  visit("spring_stribeck", "rad/s", of.stribeck_rad_s);
 }
 
 template <SheetOf<JointSheet> Sheet, class Visit>

@@ -39,6 +39,28 @@ std::array<double, 4> values(const std::array<SheetValue, 4>& from) {
   return {from[0].value, from[1].value, from[2].value, from[3].value};
 }
 
+decltype(Spring::Parameters::friction) friction_of(const SpringSheet& spring) {
+  const double constant_Nm = spring.friction_Nm.value;
+  const double load_factor = spring.load_friction.value;
+  switch (spring.variant) {
+    case SpringVariant::bouc_wen:
+      return BoucWen::Parameters{.constant_Nm = constant_Nm,
+                                 .load_factor = load_factor,
+                                 .knee_rad = spring.knee_rad.value};
+    case SpringVariant::lugre:
+      return LuGreSlip::Parameters{.constant_Nm = constant_Nm,
+                                   .load_factor = load_factor,
+                                   .static_ratio = spring.static_ratio.value,
+                                   .stribeck_rad_s = spring.stribeck_rad_s.value,
+                                   .bristle_rad = spring.knee_rad.value};
+    case SpringVariant::maxwell_slip: break;
+  }
+  return MaxwellSlip<4>::Parameters{.constant_Nm = constant_Nm,
+                                    .load_factor = load_factor,
+                                    .share = values(spring.slip_share),
+                                    .break_away_rad = values(spring.break_away_rad)};
+}
+
 Spring::Parameters stage_of(const SpringSheet& spring) {
   const double stage = spring.stage_rad.value;
   return {
@@ -47,10 +69,7 @@ Spring::Parameters stage_of(const SpringSheet& spring) {
                   .asymmetry = spring.asymmetry.value,
                   .stage_rad = stage > 0.0 ? stage : std::numeric_limits<double>::infinity(),
                   .stage_stiffness_Nm_rad = spring.stage_stiffness_Nm_rad.value},
-      .friction = MaxwellSlip<4>::Parameters{.constant_Nm = spring.friction_Nm.value,
-                                             .load_factor = spring.load_friction.value,
-                                             .share = values(spring.slip_share),
-                                             .break_away_rad = values(spring.break_away_rad)},
+      .friction = friction_of(spring),
       .viscosity_Nms_rad = spring.viscosity_Nms_rad.value,
   };
 }

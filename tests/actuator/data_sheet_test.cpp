@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "support/series_elastic.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
@@ -33,8 +34,8 @@ std::size_t bytes_of_values(const DataSheet& sheet) {
 TEST(DataSheet, RatedTorqueOverStiffnessIsThePapersDeflection) {
   const std::map<std::string_view, double> printed_deg = {
       {"dfki-28", 5.0}, {"dfki-50", 5.0}, {"dfki-120", 6.06}, {"dfki-300", 7.63}};
-  ASSERT_EQ(data_sheets().size(), printed_deg.size());
-  for (const DataSheet& sheet : data_sheets()) {
+  ASSERT_EQ(test::series_elastic_sheets().size(), printed_deg.size());
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
     const double deflection_rad =
         sheet.rating.torque_Nm.value / std::get<SpringSheet>(sheet.second).stiffness_Nm_rad.value;
     EXPECT_NEAR(deg_from_rad(deflection_rad), printed_deg.at(sheet.name), 0.005) << sheet.name;
@@ -44,7 +45,7 @@ TEST(DataSheet, RatedTorqueOverStiffnessIsThePapersDeflection) {
 TEST(DataSheet, GearModesLieWhereTheSpecificationPutsThem) {
   const std::map<std::string_view, double> expected_Hz = {
       {"dfki-28", 172.5}, {"dfki-50", 201.3}, {"dfki-120", 195.5}, {"dfki-300", 178.1}};
-  for (const DataSheet& sheet : data_sheets()) {
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
     const double mode_Hz = std::sqrt(std::get<GearSheet>(sheet.first).stiffness_Nm_rad.value /
                                      sheet.middle_inertia_kg_m2.value) /
                            (2.0 * std::numbers::pi);
@@ -55,7 +56,7 @@ TEST(DataSheet, GearModesLieWhereTheSpecificationPutsThem) {
 TEST(DataSheet, GearEfficiencyAtTheRatingIsThatOfTheSpecification) {
   const std::map<std::string_view, double> ideal_Nm = {
       {"dfki-28", 27.4}, {"dfki-50", 62.4}, {"dfki-120", 151.2}, {"dfki-300", 369.6}};
-  for (const DataSheet& sheet : data_sheets()) {
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
     EXPECT_NEAR(sheet.motor.torque_constant_Nm_A.value * sheet.rating.current_A.value *
                     std::get<GearSheet>(sheet.first).ratio.value,
                 ideal_Nm.at(sheet.name), 0.05)
@@ -64,7 +65,7 @@ TEST(DataSheet, GearEfficiencyAtTheRatingIsThatOfTheSpecification) {
 }
 
 TEST(DataSheet, RatedSpeedStaysWithinTheSupplyVoltage) {
-  for (const DataSheet& sheet : data_sheets()) {
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
     const double back_emf_V = sheet.motor.torque_constant_Nm_A.value *
                               std::get<GearSheet>(sheet.first).ratio.value *
                               sheet.rating.speed_rad_s.value;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "support/series_elastic.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
 #include "torsio/sim/experiment.hpp"
@@ -15,7 +16,7 @@ namespace {
 constexpr double kStep_s = 1e-4;
 
 TEST(EnergyAudit, NoEnergyAppearsFromNothingInASweep) {
-  for (const DataSheet& sheet : data_sheets()) {
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
     const PlantParameters parts = plant_parameters(sheet);
     Plant plant(parts, kStep_s);
     const Load load = lever(9.0, sweep_protocol(sheet.name).train_lever_m.back());

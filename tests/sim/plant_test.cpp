@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "support/series_elastic.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
@@ -35,7 +36,7 @@ PlantParameters lossless(const DataSheet& sheet) {
 }
 
 TEST(Plant, GearModeHasItsNaturalFrequency) {
-  for (const DataSheet& sheet : data_sheets()) {
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
     const PlantParameters parts = lossless(sheet);
     Plant plant(parts, kStep_s);
     plant.reset(PlantState{.middle_angle_rad = 1e-4});

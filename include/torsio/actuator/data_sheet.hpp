@@ -8,6 +8,8 @@
 #include <variant>
 #include <vector>
 
+#include "torsio/core/units.hpp"
+
 namespace torsio {
 
 /// How well a number of a data sheet is known.
@@ -92,6 +94,9 @@ struct SpringSheet {
   std::array<SheetValue, 4> slip_share = {assumed(0.30), assumed(0.30), assumed(0.25),
                                           assumed(0.15)};
   std::array<SheetValue, 4> break_away_rad;
+  SheetValue knee_rad = assumed(rad_from_deg(0.15));  ///< bouc-wen, lugre
+  SheetValue static_ratio = assumed(1.15);            ///< lugre
+  SheetValue stribeck_rad_s = assumed(0.05);          ///< lugre
 };
 
 struct JointSheet {

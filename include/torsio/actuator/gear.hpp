@@ -47,7 +47,7 @@ class Gear {
     const double increment_rad = twist_rad - twist_rad_;
     twist_rad_ = twist_rad;
     twist_rate_rad_s_ = motion.slope * rotor_speed_rad_s - output_speed_rad_s;
-    hysteresis_Nm_ = hysteresis_.step(increment_rad, 0.0);
+    hysteresis_Nm_ = hysteresis_.step(increment_rad, twist_rate_rad_s_, 0.0);
     const double torque_Nm = parameters_.stiffness_Nm_rad * twist_rad + hysteresis_Nm_ +
                              parameters_.damping_Nms_rad * twist_rate_rad_s_;
     return {torque_Nm, torque_Nm * motion.slope};

@@ -37,7 +37,8 @@ class MaxwellSlip {
   /// @param increment_rad displacement since the last step
   /// @param load_Nm the torque whose magnitude presses the surfaces together
   /// @returns F [Nm], of the sign of a spring: positive after a positive displacement
-  double step(double increment_rad, double load_Nm) noexcept TORSIO_REALTIME {
+  double step(double increment_rad, double /*rate_rad_s*/,
+              double load_Nm) noexcept TORSIO_REALTIME {
     total_limit_Nm_ =
         parameters_.constant_Nm + parameters_.load_factor * (load_Nm < 0.0 ? -load_Nm : load_Nm);
     const double pull = total_limit_Nm_ * increment_rad;

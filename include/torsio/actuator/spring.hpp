@@ -2,7 +2,9 @@
 
 #include <variant>
 
+#include "torsio/actuator/bouc_wen.hpp"
 #include "torsio/actuator/elastic_curve.hpp"
+#include "torsio/actuator/lugre_slip.hpp"
 #include "torsio/actuator/maxwell_slip.hpp"
 #include "torsio/core/dispatch.hpp"
 #include "torsio/core/realtime.hpp"
@@ -10,9 +12,9 @@
 namespace torsio {
 
 /// The inner friction of a spring, one alternative a variant of the plant (SPEC section 4.6). Each
-/// has `Parameters`, `reset()`, `step(increment_rad, load_Nm)`, `energy()` and
+/// has `Parameters`, `reset()`, `step(increment_rad, rate_rad_s, load_Nm)`, `energy()` and
 /// `stiffness(load_Nm)`.
-using SpringFriction = std::variant<MaxwellSlip<4>>;
+using SpringFriction = std::variant<MaxwellSlip<4>, BoucWen, LuGreSlip>;
 
 /// A torsion spring: elastic curve, inner friction that grows with the load, and a little
 /// viscosity.
@@ -24,7 +26,7 @@ class Spring {
  public:
   struct Parameters {
     ElasticCurve::Parameters elastic;
-    std::variant<MaxwellSlip<4>::Parameters> friction;
+    std::variant<MaxwellSlip<4>::Parameters, BoucWen::Parameters, LuGreSlip::Parameters> friction;
     double viscosity_Nms_rad = 0.0;
   };
 
@@ -41,8 +43,9 @@ class Spring {
     const double elastic_Nm = elastic_.torque(deflection_rad);
     const double increment_rad = deflection_rad - last_deflection_rad_;
     last_deflection_rad_ = deflection_rad;
-    friction_Nm_ = dispatch(
-        friction_, [&](auto& friction) { return friction.step(increment_rad, elastic_Nm); });
+    friction_Nm_ = dispatch(friction_, [&](auto& friction) {
+      return friction.step(increment_rad, deflection_rate_rad_s, elastic_Nm);
+    });
     return elastic_Nm + friction_Nm_ + viscosity_Nms_rad_ * deflection_rate_rad_s;
   }
 
