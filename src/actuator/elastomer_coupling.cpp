@@ -24,20 +24,23 @@ CreepChain chain_of(const ElastomerCoupling::Parameters& parameters) {
 
 ElastomerCoupling::ElastomerCoupling(const Parameters& parameters)
     : parameters_(parameters), chain_(chain_of(parameters)), slip_(parameters.slip) {
-  const double a = parameters.quadratic_1_Nm;
-  const double b = parameters.cubic_1_Nm2;
-  require(b < 0.0 || (a == 0.0 && b == 0.0), kPlace, "cubic_1_Nm2 < 0 (or a linear output)", b);
-  require(std::isfinite(a) && std::isfinite(b), kPlace, "a finite quadratic_1_Nm", a);
+  const auto [first, second, third] = parameters.output_Nm;
+  require_positive(kPlace, "output_Nm[0]", first);
+  require(std::isfinite(second), kPlace, "output_Nm[1] finite", second);
+  require((third < 0.0 && std::isfinite(third)) || (second == 0.0 && third == 0.0), kPlace,
+          "output_Nm[2] < 0 and finite (or a linear output)", third);
+  quadratic_ = second / (first * first);
+  cubic_ = third / (first * first * first);
   require_positive(kPlace, "slip_load_Nm", parameters.slip_load_Nm);
   require(parameters.slip.load_factor == 0.0, kPlace, "slip load_factor = 0",
           parameters.slip.load_factor);
   require(parameters.creep_per_cycle >= 0.0 && parameters.creep_per_cycle < 1.0, kPlace,
           "creep_per_cycle in 0..1", parameters.creep_per_cycle);
   require_not_negative(kPlace, "cycle_dead_band_rad", parameters.cycle_dead_band_rad);
-  // g′ = 1 + 2 a T + 3 b T² = 0, solved for 1 / T.
-  const double root = std::sqrt(a * a - 3.0 * b);
-  lowest_Nm_ = b < 0.0 ? 1.0 / (-a - root) : -kInfinity;
-  highest_Nm_ = b < 0.0 ? 1.0 / (-a + root) : kInfinity;
+  // g = T + a T² + b T³, and g′ = 1 + 2 a T + 3 b T² = 0, solved for 1 / T.
+  const double root = std::sqrt(quadratic_ * quadratic_ - 3.0 * cubic_);
+  lowest_Nm_ = cubic_ < 0.0 ? 1.0 / (-quadratic_ - root) : -kInfinity;
+  highest_Nm_ = cubic_ < 0.0 ? 1.0 / (-quadratic_ + root) : kInfinity;
 }
 
 void ElastomerCoupling::reset(double deflection_rad) noexcept {
@@ -110,13 +113,12 @@ void ElastomerCoupling::count_cycle(double deflection_rad) noexcept {
 
 double ElastomerCoupling::output_torque(double linear_Nm) const noexcept {
   const double t = std::min(std::max(linear_Nm, lowest_Nm_), highest_Nm_);
-  return t * (1.0 + t * (parameters_.quadratic_1_Nm + t * parameters_.cubic_1_Nm2));
+  return t * (1.0 + t * (quadratic_ + t * cubic_));
 }
 
 double ElastomerCoupling::output_energy(double linear_Nm) const noexcept {
   const double t = std::min(std::max(linear_Nm, lowest_Nm_), highest_Nm_);
-  const double rising =
-      t * t * (0.5 + t * (parameters_.quadratic_1_Nm / 3.0 + t * parameters_.cubic_1_Nm2 / 4.0));
+  const double rising = t * t * (0.5 + t * (quadratic_ / 3.0 + t * cubic_ / 4.0));
   return rising + output_torque(t) * (linear_Nm - t);
 }
 
@@ -149,9 +151,7 @@ double ElastomerCoupling::deflection(double torque_Nm) const noexcept {
 
 double ElastomerCoupling::steepest(double /*load_Nm*/) const noexcept {
   // g′ is largest where g″ = 2 a + 6 b T = 0.
-  const double a = parameters_.quadratic_1_Nm;
-  const double b = parameters_.cubic_1_Nm2;
-  const double slope = b < 0.0 ? 1.0 - a * a / (3.0 * b) : 1.0;
+  const double slope = cubic_ < 0.0 ? 1.0 - quadratic_ * quadratic_ / (3.0 * cubic_) : 1.0;
   return slope * chain_.stiffness() + slip_.stiffness(0.0);
 }
 

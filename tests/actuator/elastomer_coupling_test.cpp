@@ -22,8 +22,7 @@ constexpr ElastomerCoupling::Parameters kBonded = {
     .stiffness_Nm_rad = 0.3829 * kPerDeg,
     .branches = {.stiffness_Nm_rad = {0.7701 * kPerDeg, 0.5840 * kPerDeg, 0.15 * kPerDeg},
                  .relaxation_s = {6.0003 / 0.7701, 0.2252 / 0.5840, 0.01}},
-    .quadratic_1_Nm = -0.649e-7 / (kGain * kGain),
-    .cubic_1_Nm2 = -0.141e-10 / (kGain * kGain * kGain),
+    .output_Nm = {kGain, -0.649e-7, -0.141e-10},
     .slip = {.constant_Nm = 0.30,
              .share = {0.08 / 0.30, 0.10 / 0.30, 0.12 / 0.30},
              .break_away_rad = {rad_from_deg(0.2), rad_from_deg(0.8), rad_from_deg(2.5)}}};
@@ -36,7 +35,8 @@ ElastomerCoupling::Parameters unbonded() {
 
 ElastomerCoupling::Parameters linear() {
   auto parameters = kBonded;
-  parameters.quadratic_1_Nm = parameters.cubic_1_Nm2 = parameters.slip.constant_Nm = 0.0;
+  parameters.output_Nm = {1.0, 0.0, 0.0};
+  parameters.slip.constant_Nm = 0.0;
   return parameters;
 }
 
@@ -144,6 +144,8 @@ TEST(ElastomerCoupling, TakesWorkOnEveryClosedPathAndNeverGivesLossBack) {
     const double dt_s = std::pow(10.0, -5.0 + 3.0 * random.uniform());
     const WorkBook book = walk(coupling, path, dt_s, 3);
     EXPECT_GT(book.work_J, book.stored_J) << "path " << i << ", step " << dt_s;
+    // The trapezoids that count the work overrate what a lobe gives back as it lets go by up to
+    // k du^2 / 8; exactly, there is no gain.
     EXPECT_LE(book.largest_gain_J, 1e-6 * book.throughput_J) << "path " << i << ", step " << dt_s;
   }
 }
@@ -190,7 +192,7 @@ TEST(ElastomerCoupling, UnbondedLobesLetGoAndCreepBackBeforeTheyCarryAgain) {
 
 TEST(ElastomerCoupling, UnbondedIsSofterByItsFactor) {
   auto parameters = kBonded;
-  parameters.quadratic_1_Nm = parameters.cubic_1_Nm2 = 0.0;
+  parameters.output_Nm = {1.0, 0.0, 0.0};
   const auto stiffness = [&parameters](bool bonded) {
     parameters.bonded = bonded;
     ElastomerCoupling coupling(parameters);
@@ -260,9 +262,10 @@ TEST(ElastomerCoupling, RefusesImpossibleParameters) {
   refuses([](auto& of) { of.stiffness_Nm_rad = 0.0; });
   refuses([](auto& of) { of.branches.stiffness_Nm_rad[0] = 0.0; });
   refuses([](auto& of) { std::swap(of.branches.relaxation_s[0], of.branches.relaxation_s[1]); });
-  refuses([](auto& of) { of.cubic_1_Nm2 = 1e-3; });
-  refuses([](auto& of) { of.cubic_1_Nm2 = 0.0; });
-  refuses([](auto& of) { of.quadratic_1_Nm = std::nan(""); });
+  refuses([](auto& of) { of.output_Nm[2] = 1e-12; });
+  refuses([](auto& of) { of.output_Nm[2] = 0.0; });
+  refuses([](auto& of) { of.output_Nm[1] = std::nan(""); });
+  refuses([](auto& of) { of.output_Nm[0] = 0.0; });
   refuses([](auto& of) { of.slip.load_factor = 0.1; });
   refuses([](auto& of) { of.slip_load_Nm = 0.0; });
   refuses([](auto& of) { of.unbonded_softening = 0.0; });

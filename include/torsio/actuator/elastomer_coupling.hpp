@@ -13,9 +13,10 @@ namespace torsio {
 /// A shaft coupling of elastomer lobes: linear viscoelasticity, a monotone output curve behind it,
 /// and dry inner friction.
 ///
-///     τ = c (g(T) + F),   g(T) = T + a T² + b T³, held constant outside the range where it rises
+///     τ = c (g(T) + F),   g(T) = c₁ w + c₂ w² + c₃ w³,   w = T / c₁
 ///
-/// T is the torque of a CreepChain [Nm], F that of Maxwell-slip elements. What is stored,
+/// T is the torque of a CreepChain [Nm], F that of Maxwell-slip elements; g is held constant outside
+/// the range around 0 where it rises. What is stored,
 /// G(T)/k + Σ G(kⱼ xⱼ)/kⱼ with G = ∫ g, only ever loses against the work, Σ (g(T) − g(kⱼ xⱼ)) ẋⱼ,
 /// because g rises. Source: SPEC sections 2.1 (a), 4.3 and 4.7; paper 003, Eq. 3.
 ///
@@ -27,16 +28,15 @@ namespace torsio {
 class ElastomerCoupling {
  public:
   struct Parameters {
-    double stiffness_Nm_rad = 0.0;            ///< of the relaxed coupling
-    MaxwellBranches<3>::Parameters branches;  ///< the slowest first
-    double quadratic_1_Nm = 0.0;              ///< a
-    double cubic_1_Nm2 = 0.0;                 ///< b; negative, or 0 with a = 0
-    MaxwellSlip<3>::Parameters slip;          ///< its limits constant: load_factor 0
+    double stiffness_Nm_rad = 0.0;                      ///< of the relaxed coupling
+    MaxwellBranches<3>::Parameters branches;            ///< the slowest first
+    std::array<double, 3> output_Nm = {1.0, 0.0, 0.0};  ///< c₁, c₂, c₃; c₃ < 0 or linear
+    MaxwellSlip<3>::Parameters slip;                    ///< its limits constant: load_factor 0
     bool bonded = true;
-    double unbonded_softening = 1.4;      ///< bonded over unbonded stiffness
-    double slip_load_Nm = 6.0;            ///< from where unbonded slip limits are full
-    double creep_per_cycle = 0.0;         ///< share of c lost in a load cycle
-    double cycle_dead_band_rad = 0.0087;  ///< a cycle goes beyond it to both sides
+    double unbonded_softening = 1.4;    ///< bonded over unbonded stiffness
+    double slip_load_Nm = 6.0;          ///< from where unbonded slip limits are full
+    double creep_per_cycle = 0.0;       ///< share of c lost in a load cycle
+    double cycle_dead_band_rad = 0.01;  ///< a cycle goes beyond it to both sides
   };
 
   /// @throws Error as its parts do, if a factor, load or band is out of range, or if the output
@@ -88,6 +88,8 @@ class ElastomerCoupling {
   Parameters parameters_;
   CreepChain chain_;
   MaxwellSlip<3> slip_;
+  double quadratic_;              ///< c₂ / c₁² [1/Nm]
+  double cubic_;                  ///< c₃ / c₁³ [1/Nm²]
   double lowest_Nm_;              ///< T below which g is constant
   double highest_Nm_;             ///< T above which it is
   std::array<Lobes, 2> lobes_{};  ///< positive (or both) and negative direction
