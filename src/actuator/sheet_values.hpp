@@ -4,6 +4,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <string_view>
 #include <type_traits>
 #include <variant>
 
@@ -57,6 +58,15 @@ void visit_values(Sheet& of, const Visit& visit) {
   visit("tube_damping", "Nms/rad", of.damping_Nms_rad);
 }
 
+template <SheetOf<ClutchSheet> Sheet, class Visit>
+void visit_values(Sheet& of, const Visit& visit) {
+  visit("clutch_ratio", "", of.ratio);
+  visit("cable_stiffness", "Nm/rad", of.stiffness_Nm_rad);
+  visit("cable_damping", "Nms/rad", of.damping_Nms_rad);
+  visit("clutch_static_torque", "Nm", of.static_torque_Nm);
+  visit("clutch_sliding_ratio", "", of.sliding_ratio);
+}
+
 template <SheetOf<FrictionSheet> Sheet, class Visit>
 void visit_values(Sheet& of, const Visit& visit) {
   visit("friction", "Nm", of.coulomb_Nm);
@@ -65,6 +75,13 @@ void visit_values(Sheet& of, const Visit& visit) {
   visit("friction_static_ratio", "", of.static_ratio);
   visit("friction_stribeck", "rad/s", of.stribeck_rad_s);
   visit("friction_bristle", "rad", of.bristle_rad);
+}
+
+/// visit("name_1", unit, values[0]), ...
+template <class Values, class Visit>
+void visit_each(std::string_view name, std::string_view unit, Values& values, const Visit& visit) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    visit(fmt::format("{}_{}", name, i + 1), unit, values[i]);
 }
 
 template <SheetOf<SpringSheet> Sheet, class Visit>
@@ -77,13 +94,36 @@ void visit_values(Sheet& of, const Visit& visit) {
   visit("spring_friction", "Nm", of.friction_Nm);
   visit("spring_load_friction", "", of.load_friction);
   visit("spring_viscosity", "Nms/rad", of.viscosity_Nms_rad);
-  for (std::size_t i = 0; i < of.slip_share.size(); ++i)
-    visit(fmt::format("spring_slip_share_{}", i + 1), "", of.slip_share[i]);
-  for (std::size_t i = 0; i < of.break_away_rad.size(); ++i)
-    visit(fmt::format("spring_break_away_{}", i + 1), "rad", of.break_away_rad[i]);
+  visit_each("spring_slip_share", "", of.slip_share, visit);
+  visit_each("spring_break_away", "rad", of.break_away_rad, visit);
   visit("spring_knee", "rad", of.knee_rad);
   visit("spring_static_ratio", "", of.static_ratio);
   visit("spring_stribeck", "rad/s", of.stribeck_rad_s);
+}
+
+template <SheetOf<ElastomerSheet> Sheet, class Visit>
+void visit_values(Sheet& of, const Visit& visit) {
+  visit("coupling_stiffness", "Nm/rad", of.stiffness_Nm_rad);
+  visit_each("coupling_branch_stiffness", "Nm/rad", of.branch_stiffness_Nm_rad, visit);
+  visit_each("coupling_branch_relaxation", "s", of.branch_relaxation_s, visit);
+  visit_each("coupling_output", "Nm", of.output_Nm, visit);
+  visit_each("coupling_slip", "Nm", of.slip_Nm, visit);
+  visit_each("coupling_break_away", "rad", of.break_away_rad, visit);
+  visit("coupling_unbonded_softening", "", of.unbonded_softening);
+  visit("coupling_slip_load", "Nm", of.slip_load_Nm);
+  visit("coupling_creep_per_cycle", "", of.creep_per_cycle);
+}
+
+template <SheetOf<RubberSheet> Sheet, class Visit>
+void visit_values(Sheet& of, const Visit& visit) {
+  visit("rubber_stiffness", "Nm/rad", of.stiffness_Nm_rad);
+  visit("rubber_asymmetry", "Nm/rad", of.asymmetry_Nm_rad);
+  visit("rubber_blend", "rad", of.blend_rad);
+  visit("rubber_elastic_share", "", of.elastic_share);
+  visit("rubber_branch_share", "", of.branch_share);
+  visit_each("rubber_branch_relaxation", "s", of.branch_relaxation_s, visit);
+  visit("rubber_slip", "Nm", of.slip_Nm);
+  visit_each("rubber_break_away", "rad", of.break_away_rad, visit);
 }
 
 template <SheetOf<JointSheet> Sheet, class Visit>

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <limits>
 #include <variant>
 
@@ -35,8 +37,54 @@ Gear::Parameters stage_of(const TubeSheet& tube) {
           .damping_Nms_rad = tube.damping_Nms_rad.value};
 }
 
-std::array<double, 4> values(const std::array<SheetValue, 4>& from) {
-  return {from[0].value, from[1].value, from[2].value, from[3].value};
+SlipClutch::Parameters stage_of(const ClutchSheet& clutch) {
+  return {.ratio = clutch.ratio.value,
+          .stiffness_Nm_rad = clutch.stiffness_Nm_rad.value,
+          .static_torque_Nm = clutch.static_torque_Nm.value,
+          .sliding_ratio = clutch.sliding_ratio.value,
+          .damping_Nms_rad = clutch.damping_Nms_rad.value};
+}
+
+template <std::size_t Count>
+std::array<double, Count> values(const std::array<SheetValue, Count>& from) {
+  std::array<double, Count> of{};
+  std::ranges::transform(from, of.begin(), &SheetValue::value);
+  return of;
+}
+
+double sum(const std::array<double, 3>& of) { return of[0] + of[1] + of[2]; }
+
+/// Three slip elements with these limits.
+MaxwellSlip<3>::Parameters slip_of(const std::array<double, 3>& limit_Nm,
+                                   const std::array<SheetValue, 3>& break_away_rad) {
+  const double all_Nm = sum(limit_Nm);
+  return {.constant_Nm = all_Nm,
+          .share = {limit_Nm[0] / all_Nm, limit_Nm[1] / all_Nm, limit_Nm[2] / all_Nm},
+          .break_away_rad = values(break_away_rad)};
+}
+
+ElastomerCoupling::Parameters stage_of(const ElastomerSheet& coupling) {
+  return {.stiffness_Nm_rad = coupling.stiffness_Nm_rad.value,
+          .branches = {.stiffness_Nm_rad = values(coupling.branch_stiffness_Nm_rad),
+                       .relaxation_s = values(coupling.branch_relaxation_s)},
+          .output_Nm = values(coupling.output_Nm),
+          .slip = slip_of(values(coupling.slip_Nm), coupling.break_away_rad),
+          .bonded = coupling.bonded,
+          .unbonded_softening = coupling.unbonded_softening.value,
+          .slip_load_Nm = coupling.slip_load_Nm.value,
+          .creep_per_cycle = coupling.creep_per_cycle.value};
+}
+
+RubberSpring::Parameters stage_of(const RubberSheet& rubber) {
+  const double branch_Nm_rad = rubber.branch_share.value * rubber.stiffness_Nm_rad.value;
+  const double slip_Nm = rubber.slip_Nm.value;
+  return {.stiffness_Nm_rad = rubber.stiffness_Nm_rad.value,
+          .asymmetry_Nm_rad = rubber.asymmetry_Nm_rad.value,
+          .blend_rad = rubber.blend_rad.value,
+          .elastic_share = rubber.elastic_share.value,
+          .branches = {.stiffness_Nm_rad = {branch_Nm_rad, branch_Nm_rad, branch_Nm_rad},
+                       .relaxation_s = values(rubber.branch_relaxation_s)},
+          .slip = slip_of({slip_Nm, slip_Nm, slip_Nm}, rubber.break_away_rad)};
 }
 
 decltype(Spring::Parameters::friction) friction_of(const SpringSheet& spring) {
@@ -84,11 +132,14 @@ LuGreFriction::Parameters friction_of(const FrictionSheet& friction, double rati
           .viscous_Nms_rad = friction.viscous_Nms_rad.value / (ratio * ratio)};
 }
 
-double ratio_of(const Gear::Parameters& gear) { return gear.ratio; }
-double ratio_of(const Spring::Parameters& /*spring*/) { return 1.0; }
-template <class... Stage>
-double ratio_of(const std::variant<Stage...>& stage) {
-  return std::visit([](const auto& of) { return ratio_of(of); }, stage);
+/// A stage without a ratio transmits one to one.
+double ratio_of(const auto& stage) {
+  return std::visit(
+      [](const auto& of) {
+        if constexpr (requires { of.ratio; }) return of.ratio;
+        return 1.0;
+      },
+      stage);
 }
 
 }  // namespace

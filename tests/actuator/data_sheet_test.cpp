@@ -7,7 +7,6 @@
 #include <map>
 #include <numbers>
 #include <string>
-#include <type_traits>
 #include <variant>
 
 #include "support/series_elastic.hpp"
@@ -23,8 +22,8 @@ std::size_t bytes_of_values(const DataSheet& sheet) {
                       sizeof(sheet.middle_inertia_kg_m2) + sizeof(sheet.joint) +
                       sizeof(sheet.sensors);
   const auto add = [&]<class Part>(const Part& /*part*/) {
-    // The variant of a spring stands before its values.
-    bytes += sizeof(Part) - (std::is_same_v<Part, SpringSheet> ? sizeof(SheetValue) / 2 : 0);
+    // What says which variant it is stands before the values.
+    bytes += sizeof(Part) / sizeof(SheetValue) * sizeof(SheetValue);
   };
   std::visit(add, sheet.first);
   std::visit(add, sheet.second);
@@ -101,9 +100,42 @@ TEST(DataSheet, UnknownNameListsTheKnownOnes) {
     static_cast<void>(data_sheet("dfki-500"));
     FAIL() << "an unknown actuator was accepted";
   } catch (const UsageError& error) {
-    EXPECT_EQ(error.report().expected, "one of dfki-28, dfki-50, dfki-120, dfki-300");
+    EXPECT_EQ(error.report().expected,
+              "one of dfki-28, dfki-50, dfki-120, dfki-300, elastomer, rubber-clutch, "
+              "harmonic-drive");
     EXPECT_EQ(error.report().found, "\"dfki-500\"");
   }
+}
+
+TEST(DataSheet, TakesAVariantAndASerialNumber) {
+  const DataSheet piece = data_sheet("dfki-300:lugre#03");
+  EXPECT_EQ(std::get<SpringSheet>(piece.second).variant, SpringVariant::lugre);
+  EXPECT_EQ(piece.serial, 3U);
+  EXPECT_EQ(full_name(piece), "dfki-300:lugre#03");
+  EXPECT_EQ(full_name(data_sheet("dfki-300:maxwell-slip")), "dfki-300");
+  const auto tube_Nm_rad = [](const char* name) {
+    return std::get<TubeSheet>(data_sheet(name).first).stiffness_Nm_rad.value;
+  };
+  EXPECT_EQ(tube_Nm_rad("harmonic-drive"), 40.95);
+  EXPECT_EQ(tube_Nm_rad("harmonic-drive:soft"), 14.3);
+  EXPECT_FALSE(std::get<ElastomerSheet>(data_sheet("elastomer:unbonded").second).bonded);
+}
+
+std::string message_of(const char* name) {
+  try {
+    static_cast<void>(data_sheet(name));
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(DataSheet, RefusesVariantsAndSerialNumbersThatItDoesNotHave) {
+  EXPECT_NE(message_of("dfki-50:bouc").find("maxwell-slip, bouc-wen, lugre"), std::string::npos);
+  EXPECT_NE(message_of("rubber-clutch:soft").find("it has no variants"), std::string::npos);
+  EXPECT_NE(message_of("dfki-50:").find("behind the colon"), std::string::npos);
+  for (const char* name : {"dfki-50#", "dfki-50#x", "dfki-50#-1", "dfki-50#10000", "dfki-50#3#4"})
+    EXPECT_NE(message_of(name).find("0 to 9999"), std::string::npos) << name;
 }
 
 }  // namespace

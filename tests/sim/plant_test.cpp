@@ -62,10 +62,16 @@ TEST(Plant, GearModeHasItsNaturalFrequency) {
   }
 }
 
+/// A lever that pulls with a tenth of the rated torque when it is level.
+Load tenth_of_the_rating(const DataSheet& sheet) {
+  constexpr double kLength_m = 0.1;
+  return lever(0.1 * sheet.rating.torque_Nm.value / (9.81 * kLength_m), kLength_m);
+}
+
 TEST(Plant, StaysWhereResetPutIt) {
   for (const DataSheet& sheet : data_sheets()) {
     Plant plant(plant_parameters(sheet));
-    const Load load = lever(9.0, 0.2);
+    const Load load = tenth_of_the_rating(sheet);
     plant.reset(1.0, load);
     const double current_A = plant.current();
     for (int i = 0; i < 20000; ++i)
@@ -79,8 +85,10 @@ TEST(Plant, ComesToRestFromAColdStart) {
   for (const DataSheet& sheet : data_sheets()) {
     Plant plant(plant_parameters(sheet));
     plant.reset(PlantState{.joint_angle_rad = 0.02, .joint_speed_rad_s = 0.5});
-    const Load load = lever(9.0, 0.1);
-    for (int i = 0; i < 200000; ++i) ASSERT_EQ(plant.step({}, load, kStep_s), Fault::none);
+    const Load load = tenth_of_the_rating(sheet);
+    // Rubber creeps for long.
+    const int steps = sheet.family == ActuatorFamily::series_elastic ? 200000 : 1500000;
+    for (int i = 0; i < steps; ++i) ASSERT_EQ(plant.step({}, load, kStep_s), Fault::none);
     EXPECT_NEAR(plant.state().joint_speed_rad_s, 0.0, 1e-6) << sheet.name;
     EXPECT_NEAR(plant.state().middle_speed_rad_s, 0.0, 1e-6) << sheet.name;
     EXPECT_NEAR(plant.state().rotor_speed_rad_s, 0.0, 1e-4) << sheet.name;
@@ -150,7 +158,7 @@ TEST(Plant, StaysFiniteUnderAMillionRandomCommands) {
     EXPECT_TRUE(
         std::isfinite(state.rotor_angle_rad + state.middle_angle_rad + state.joint_angle_rad))
         << sheet.name;
-    EXPECT_LT(std::abs(state.middle_angle_rad - state.joint_angle_rad), 1.0) << sheet.name;
+    EXPECT_LT(std::abs(plant.second_twist()), 1.0) << sheet.name;
   }
 }
 

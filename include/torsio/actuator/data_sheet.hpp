@@ -68,6 +68,15 @@ struct TubeSheet {
   SheetValue damping_Nms_rad;
 };
 
+/// A cable drive that ends in a friction clutch.
+struct ClutchSheet {
+  SheetValue ratio;
+  SheetValue stiffness_Nm_rad;  ///< of the cable
+  SheetValue damping_Nms_rad;
+  SheetValue static_torque_Nm;
+  SheetValue sliding_ratio;  ///< sliding over static torque
+};
+
 /// Dry and viscous friction at the gear's input, as felt at its output.
 struct FrictionSheet {
   SheetValue coulomb_Nm;
@@ -97,6 +106,32 @@ struct SpringSheet {
   SheetValue knee_rad = assumed(rad_from_deg(0.15));  ///< bouc-wen, lugre
   SheetValue static_ratio = assumed(1.15);            ///< lugre
   SheetValue stribeck_rad_s = assumed(0.05);          ///< lugre
+};
+
+/// A shaft coupling of elastomer: branches from slow to fast.
+struct ElastomerSheet {
+  bool bonded = true;
+  SheetValue stiffness_Nm_rad;  ///< relaxed
+  std::array<SheetValue, 3> branch_stiffness_Nm_rad;
+  std::array<SheetValue, 3> branch_relaxation_s;
+  std::array<SheetValue, 3> output_Nm;  ///< coefficients of the output curve
+  std::array<SheetValue, 3> slip_Nm;
+  std::array<SheetValue, 3> break_away_rad;
+  SheetValue unbonded_softening;  ///< bonded over unbonded stiffness
+  SheetValue slip_load_Nm;        ///< from where the slip of the unbonded one is full
+  SheetValue creep_per_cycle;     ///< share of the torque that the glue loses in a load cycle
+};
+
+/// A torsion spring of rubber: branches from slow to fast.
+struct RubberSheet {
+  SheetValue stiffness_Nm_rad;
+  SheetValue asymmetry_Nm_rad;
+  SheetValue blend_rad;
+  SheetValue elastic_share;
+  SheetValue branch_share;  ///< each branch's stiffness over the spring's
+  std::array<SheetValue, 3> branch_relaxation_s;
+  SheetValue slip_Nm;  ///< of each element
+  std::array<SheetValue, 3> break_away_rad;
 };
 
 struct JointSheet {
@@ -136,15 +171,15 @@ struct DataSheet {
   std::string_view name;
   std::string_view title;
   std::array<std::string_view, 3> variants = {};  ///< the first is the default; empty: no more
-  std::string_view variant;                       ///< one of them
+  std::string_view variant = {};                  ///< one of them
   std::optional<unsigned> serial = {};            ///< none: the nominal piece
 
   RatingSheet rating;
   MotorSheet motor;
-  std::variant<GearSheet, TubeSheet> first;
+  std::variant<GearSheet, TubeSheet, ClutchSheet> first;
   FrictionSheet friction;  ///< of the gear and what drives it
   SheetValue middle_inertia_kg_m2;
-  std::variant<SpringSheet, GearSheet> second;
+  std::variant<SpringSheet, ElastomerSheet, RubberSheet, GearSheet> second;
   JointSheet joint;
   SensorSheet sensors;
 };

@@ -51,6 +51,19 @@ class MaxwellSlip {
     return total_Nm;
   }
 
+  /// Drops the forces to their shares of this total [Nm]; the stiffness stays. A limit that shrinks
+  /// so can only turn energy into heat, whatever makes it shrink.
+  /// @returns F [Nm]
+  double shed(double total_Nm) noexcept TORSIO_REALTIME {
+    double sum_Nm = 0.0;
+    for (std::size_t i = 0; i < Count; ++i) {
+      const double limit = parameters_.share[i] * total_Nm;
+      force_Nm_[i] = std::min(std::max(force_Nm_[i], -limit), limit);
+      sum_Nm += force_Nm_[i];
+    }
+    return sum_Nm;
+  }
+
   /// @returns the energy [J] held in the elements, Σ Fᵢ² / 2kᵢ with kᵢ = wᵢ f / Xᵢ of the last step
   [[nodiscard]] double energy() const noexcept {
     double sum = 0.0;
@@ -72,6 +85,7 @@ class MaxwellSlip {
 };
 
 extern template class MaxwellSlip<1>;
+extern template class MaxwellSlip<3>;
 extern template class MaxwellSlip<4>;
 
 }  // namespace torsio

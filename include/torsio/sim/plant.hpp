@@ -6,9 +6,12 @@
 #include <variant>
 
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/actuator/elastomer_coupling.hpp"
 #include "torsio/actuator/friction.hpp"
 #include "torsio/actuator/gear.hpp"
 #include "torsio/actuator/motor.hpp"
+#include "torsio/actuator/rubber_spring.hpp"
+#include "torsio/actuator/slip_clutch.hpp"
 #include "torsio/actuator/spring.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
@@ -48,16 +51,18 @@ struct PlantCondition {
 };
 
 /// Between rotor and middle body, and between middle body and joint.
-using FirstStage = std::variant<Gear>;
-using SecondStage = std::variant<Spring, Gear>;
+using FirstStage = std::variant<Gear, SlipClutch>;
+using SecondStage = std::variant<Spring, ElastomerCoupling, RubberSpring, Gear>;
 
 /// The parts of one actuator.
 struct PlantParameters {
   Motor::Parameters motor;
   LuGreFriction::Parameters rotor_friction;  ///< rotor side; grows with the first stage's torque
-  std::variant<Gear::Parameters> first;
+  std::variant<Gear::Parameters, SlipClutch::Parameters> first;
   LuGreFriction::Parameters middle_friction;  ///< grows with the second stage's torque
-  std::variant<Spring::Parameters, Gear::Parameters> second;
+  std::variant<Spring::Parameters, ElastomerCoupling::Parameters, RubberSpring::Parameters,
+               Gear::Parameters>
+      second;
   LuGreFriction::Parameters bearing;   ///< of the joint, before the load cell
   double joint_viscous_Nms_rad = 0.0;  ///< d, behind the load cell
   double rotor_inertia_kg_m2 = 0.0;
