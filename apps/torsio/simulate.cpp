@@ -22,6 +22,9 @@ struct SimulateFlags {
   std::string duration;
   std::string lever;
   std::string inclination;
+  std::string amplitude;
+  std::string frequency;
+  std::string impedance = "high";
   std::string describe;
   std::uint64_t seed = kDefaultSeed;
   bool with_truth = false;
@@ -53,6 +56,14 @@ std::string description(const torsio::DataSheet& sheet) {
       sheet.name, sheet.title, table.text());
 }
 
+/// Nm or rad, as the experiment has it.
+std::string_view amplitude_unit(const SimulateFlags& flags) {
+  for (const torsio::ExperimentInfo& info : torsio::experiments()) {
+    if (info.name == flags.experiment && !info.amplitude_unit.empty()) return info.amplitude_unit;
+  }
+  return "Nm";
+}
+
 torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
   torsio::ExperimentSpec spec{.actuator = flags.actuator,
                               .experiment = flags.experiment,
@@ -63,6 +74,11 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
   if (!flags.lever.empty()) spec.lever_m = torsio::si_quantity(flags.lever, "m", "--lever");
   if (!flags.inclination.empty())
     spec.inclination_rad = torsio::si_quantity(flags.inclination, "rad", "--inclination");
+  if (!flags.amplitude.empty())
+    spec.amplitude = torsio::si_quantity(flags.amplitude, amplitude_unit(flags), "--amplitude");
+  if (!flags.frequency.empty())
+    spec.frequency_Hz = torsio::si_quantity(flags.frequency, "Hz", "--frequency");
+  spec.is_impedance_zero = flags.impedance == "zero";
   return spec;
 }
 
@@ -141,6 +157,11 @@ void add_simulate(CLI::App& app) {
   verb->add_option("--lever", flags->lever, "where the 9 kg mass hangs on the lever: 0.17m");
   verb->add_option("--inclination", flags->inclination,
                    "of the lever's plane of motion from the vertical: 37.8deg");
+  verb->add_option("--amplitude", flags->amplitude, "of the excitation: 20Nm or 9deg");
+  verb->add_option("--frequency", flags->frequency, "of the excitation: 0.4Hz");
+  verb->add_option("--impedance", flags->impedance, "of the joint's controller: high or zero")
+      ->check(CLI::IsMember({"high", "zero"}))
+      ->capture_default_str();
   verb->add_option("--seed", flags->seed, "seed of every sensor's noise")->capture_default_str();
   verb->add_flag("--truth", flags->with_truth, "add the truth_ channels that no sensor sees");
   verb->add_flag("--list", flags->list, "show actuators and experiments");

@@ -15,28 +15,47 @@ namespace {
 
 constexpr double kLongest_s = 36000.0;
 
-void check(const ExperimentSpec& spec, const ExperimentEntry& entry) {
-  const auto refuse = [&](const char* option, const std::string& expected, double found) {
+void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataSheet& sheet) {
+  const auto require = [&](bool holds, const char* option, const std::string& expected,
+                           const std::string& found) {
+    if (holds) return;
     throw UsageError({.place = fmt::format("{} {}", entry.info.name, option),
                       .expected = expected,
-                      .found = fmt::format("{}", found)});
+                      .found = found});
   };
-  if (spec.duration_s &&
-      !(*spec.duration_s >= 1.0 / kBenchRate_Hz && *spec.duration_s <= kLongest_s)) {
-    refuse("duration", fmt::format("{} to {} s", 1.0 / kBenchRate_Hz, kLongest_s),
-           *spec.duration_s);
+  const auto text = [](double value) { return fmt::format("{}", value); };
+  if (spec.duration_s) {
+    require(
+        *spec.duration_s >= 1.0 / sheet.sensors.log_rate_Hz.value && *spec.duration_s <= kLongest_s,
+        "duration", fmt::format("{} to {} s", 1.0 / sheet.sensors.log_rate_Hz.value, kLongest_s),
+        text(*spec.duration_s));
   }
-  if (!entry.has_lever && spec.lever_m)
-    refuse("lever", "none: this experiment has no lever", *spec.lever_m);
-  if (!entry.has_lever && spec.inclination_rad != 0.0) {
-    refuse("inclination", "none: this experiment has no lever", deg_from_rad(spec.inclination_rad));
+  if (spec.lever_m) {
+    require(entry.has_lever, "lever", "none: this experiment has no lever", text(*spec.lever_m));
+    require(*spec.lever_m > 0.0 && *spec.lever_m <= 2.0, "lever", "0 < metres <= 2",
+            text(*spec.lever_m));
   }
-  if (spec.lever_m && !(*spec.lever_m > 0.0 && *spec.lever_m <= 2.0)) {
-    refuse("lever", "0 < metres <= 2", *spec.lever_m);
+  const double inclination_deg = deg_from_rad(spec.inclination_rad);
+  require(entry.has_lever || spec.inclination_rad == 0.0, "inclination",
+          "none: this experiment has no lever", text(inclination_deg));
+  require(std::abs(inclination_deg) <= 90.0, "inclination", "-90 to 90 deg", text(inclination_deg));
+  if (spec.amplitude) {
+    require(!entry.info.amplitude_unit.empty(), "amplitude",
+            "none: this experiment has an amplitude of its own", text(*spec.amplitude));
+    const double highest = entry.highest_amplitude *
+                           (entry.info.amplitude_unit == "Nm" ? sheet.rating.torque_Nm.value : 1.0);
+    require(*spec.amplitude > 0.0 && *spec.amplitude <= highest, "amplitude",
+            fmt::format("0 < {} <= {:.4g}", entry.info.amplitude_unit, highest),
+            text(*spec.amplitude));
   }
-  if (!(std::abs(spec.inclination_rad) <= rad_from_deg(90.0))) {
-    refuse("inclination", "-90 to 90 deg", deg_from_rad(spec.inclination_rad));
+  if (spec.frequency_Hz) {
+    require(entry.has_frequency, "frequency", "none: this experiment has a frequency of its own",
+            text(*spec.frequency_Hz));
+    require(*spec.frequency_Hz >= 0.0 && *spec.frequency_Hz <= 10.0, "frequency", "0 to 10 Hz",
+            text(*spec.frequency_Hz));
   }
+  require(entry.has_impedance || !spec.is_impedance_zero, "impedance",
+          "none: no impedance controller runs in this experiment", "zero");
 }
 
 double load_cell_torque(LoadCell cell, const Plant& plant, const Load& load) {
@@ -53,7 +72,7 @@ double load_cell_torque(LoadCell cell, const Plant& plant, const Load& load) {
 Recording simulate(const ExperimentSpec& spec, const Progress& progress) {
   const DataSheet sheet = data_sheet(spec.actuator);
   const ExperimentEntry& entry = experiment_entry(spec.experiment, sheet);
-  check(spec, entry);
+  check(spec, entry, sheet);
   BenchProgram program = entry.program(sheet, spec);
   Plant plant(plant_parameters(sheet));
   plant.reset(program.start_angle_rad, program.start);

@@ -39,7 +39,11 @@ struct BenchProgram {
 struct ExperimentEntry {
   ExperimentInfo info;
   ActuatorFamily family = ActuatorFamily::series_elastic;
+  // Which options it takes.
   bool has_lever = false;
+  double highest_amplitude = 0.0;  ///< in `info.amplitude_unit`; of Nm, a share of the rated torque
+  bool has_frequency = false;
+  bool has_impedance = false;
   BenchProgram (*program)(const DataSheet& sheet, const ExperimentSpec& spec) = nullptr;
 };
 

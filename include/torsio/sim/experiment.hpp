@@ -20,13 +20,17 @@ struct ExperimentSpec {
   std::optional<double> duration_s = {};  ///< none: as long as the experiment's protocol is
   std::optional<double> lever_m = {};     ///< none: the first of `sweep_protocol`
   double inclination_rad = 0.0;           ///< of the lever's plane of motion from the vertical
-  bool with_truth = false;                ///< add the `truth_*` channels, which no sensor sees
+  std::optional<double> amplitude = {};   ///< Nm or rad, as the experiment has it; none: its own
+  std::optional<double> frequency_Hz = {};
+  bool is_impedance_zero = false;  ///< of the joint's controller; false: high
+  bool with_truth = false;         ///< add the `truth_*` channels, which no sensor sees
 };
 
 struct ExperimentInfo {
   std::string_view name;
   std::string_view actuators;  ///< that have it
   std::string_view description;
+  std::string_view amplitude_unit = {};  ///< of `ExperimentSpec::amplitude`; empty: it takes none
 };
 
 /// What can be done on the benches. A name may stand there for more than one family.
