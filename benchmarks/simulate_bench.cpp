@@ -11,7 +11,7 @@ Row simulate_dfki_120() {
   const double seconds = best_seconds([&] {
     const Recording recording = simulate({.actuator = "dfki-120"});
     steps = std::round(static_cast<double>(recording.size()) /
-                       (recording.sample_rate_Hz() * kSimulationStep_s));
+                       (recording.sample_rate_Hz() * Plant::kDefaultStep_s));
   });
   return {.value = steps / seconds, .unit = "steps/s"};
 }

@@ -22,6 +22,9 @@ struct SimulateFlags {
   std::string duration;
   std::string lever;
   std::string inclination;
+  std::string amplitude;
+  std::string frequency;
+  std::string impedance = "high";
   std::string describe;
   std::uint64_t seed = kDefaultSeed;
   bool with_truth = false;
@@ -35,9 +38,10 @@ std::string bench_list() {
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
     actuators.row({std::string(sheet.name), std::string(sheet.title)});
   torsio::TextTable experiments;
-  experiments.header({"experiment", "what is done"});
+  experiments.header({"experiment", "actuators", "what is done"});
   for (const torsio::ExperimentInfo& info : torsio::experiments())
-    experiments.row({std::string(info.name), std::string(info.description)});
+    experiments.row(
+        {std::string(info.name), std::string(info.actuators), std::string(info.description)});
   return actuators.text() + "\n" + experiments.text();
 }
 
@@ -45,11 +49,19 @@ std::string description(const torsio::DataSheet& sheet) {
   torsio::TextTable table;
   table.header({"parameter", "value", "unit", "origin"});
   for (const torsio::SheetRow& row : torsio::describe(sheet))
-    table.row({std::string(row.name), fmt::format("{:.6g}", row.value.value), std::string(row.unit),
+    table.row({row.name, fmt::format("{:.6g}", row.value.value), std::string(row.unit),
                std::string(1, static_cast<char>(row.value.origin))});
   return fmt::format(
       "{}: {}\n{}origin: P printed in a paper, D derived from printed numbers, A assumed\n",
       sheet.name, sheet.title, table.text());
+}
+
+/// Nm or rad, as the experiment has it.
+std::string_view amplitude_unit(const SimulateFlags& flags) {
+  for (const torsio::ExperimentInfo& info : torsio::experiments()) {
+    if (info.name == flags.experiment && !info.amplitude_unit.empty()) return info.amplitude_unit;
+  }
+  return "Nm";
 }
 
 torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
@@ -62,6 +74,11 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
   if (!flags.lever.empty()) spec.lever_m = torsio::si_quantity(flags.lever, "m", "--lever");
   if (!flags.inclination.empty())
     spec.inclination_rad = torsio::si_quantity(flags.inclination, "rad", "--inclination");
+  if (!flags.amplitude.empty())
+    spec.amplitude = torsio::si_quantity(flags.amplitude, amplitude_unit(flags), "--amplitude");
+  if (!flags.frequency.empty())
+    spec.frequency_Hz = torsio::si_quantity(flags.frequency, "Hz", "--frequency");
+  spec.is_impedance_zero = flags.impedance == "zero";
   return spec;
 }
 
@@ -72,7 +89,8 @@ Json list_json() {
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
     document["actuators"].push_back({{"name", sheet.name}, {"title", sheet.title}});
   for (const torsio::ExperimentInfo& info : torsio::experiments())
-    document["experiments"].push_back({{"name", info.name}, {"description", info.description}});
+    document["experiments"].push_back(
+        {{"name", info.name}, {"actuators", info.actuators}, {"description", info.description}});
   return document;
 }
 
@@ -106,7 +124,7 @@ void show(const SimulateFlags& flags, const std::string& text, const Json& docum
 void run(const SimulateFlags& flags) {
   if (flags.list) return show(flags, bench_list(), list_json());
   if (!flags.describe.empty()) {
-    const torsio::DataSheet& sheet = torsio::data_sheet(flags.describe);
+    const torsio::DataSheet sheet = torsio::data_sheet(flags.describe);
     return show(flags, description(sheet), sheet_json(sheet));
   }
   if (flags.actuator.empty() || flags.experiment.empty() || flags.output.empty())
@@ -139,6 +157,11 @@ void add_simulate(CLI::App& app) {
   verb->add_option("--lever", flags->lever, "where the 9 kg mass hangs on the lever: 0.17m");
   verb->add_option("--inclination", flags->inclination,
                    "of the lever's plane of motion from the vertical: 37.8deg");
+  verb->add_option("--amplitude", flags->amplitude, "of the excitation: 20Nm or 9deg");
+  verb->add_option("--frequency", flags->frequency, "of the excitation: 0.4Hz");
+  verb->add_option("--impedance", flags->impedance, "of the joint's controller: high or zero")
+      ->check(CLI::IsMember({"high", "zero"}))
+      ->capture_default_str();
   verb->add_option("--seed", flags->seed, "seed of every sensor's noise")->capture_default_str();
   verb->add_flag("--truth", flags->with_truth, "add the truth_ channels that no sensor sees");
   verb->add_flag("--list", flags->list, "show actuators and experiments");

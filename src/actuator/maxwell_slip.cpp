@@ -31,6 +31,7 @@ double MaxwellSlip<Count>::stiffness(double load_Nm) const noexcept {
 }
 
 template class MaxwellSlip<1>;
+template class MaxwellSlip<3>;
 template class MaxwellSlip<4>;
 
 }  // namespace torsio

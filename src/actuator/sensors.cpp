@@ -25,10 +25,12 @@ Encoder::Encoder(const Parameters& parameters, Random& random)
     : lsb_rad_(2.0 * std::numbers::pi / std::exp2(parameters.bits)),
       inverse_lsb_(1.0 / lsb_rad_),
       jitter_lsb_(parameters.jitter_lsb),
-      offset_rad_(random.uniform() * lsb_rad_) {
+      offset_rad_(random.uniform() * lsb_rad_),
+      zero_rad_(parameters.zero_rad) {
   require(parameters.bits >= 1.0 && parameters.bits <= 40.0, "encoder", "1..40 bits",
           parameters.bits);
   require_not_negative("encoder", "jitter_lsb", parameters.jitter_lsb);
+  require(std::isfinite(parameters.zero_rad), "encoder", "a finite zero_rad", parameters.zero_rad);
 }
 
 CurrentSensor::CurrentSensor(const Parameters& parameters) : noise_A_(parameters.noise_A) {

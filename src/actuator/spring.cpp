@@ -5,17 +5,19 @@
 namespace torsio {
 namespace {
 
-SpringFriction friction_of(const Spring::Parameters& parameters) {
-  return std::visit(
-      [](const MaxwellSlip<4>::Parameters& of) -> SpringFriction { return MaxwellSlip<4>(of); },
-      parameters.friction);
-}
+struct FrictionOf {
+  SpringFriction operator()(const MaxwellSlip<4>::Parameters& of) const {
+    return MaxwellSlip<4>(of);
+  }
+  SpringFriction operator()(const BoucWen::Parameters& of) const { return BoucWen(of); }
+  SpringFriction operator()(const LuGreSlip::Parameters& of) const { return LuGreSlip(of); }
+};
 
 }  // namespace
 
 Spring::Spring(const Parameters& parameters)
     : elastic_(parameters.elastic),
-      friction_(friction_of(parameters)),
+      friction_(std::visit(FrictionOf{}, parameters.friction)),
       viscosity_Nms_rad_(parameters.viscosity_Nms_rad) {
   require_not_negative("spring", "viscosity_Nms_rad", parameters.viscosity_Nms_rad);
 }

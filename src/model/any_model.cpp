@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "model/affine_inverse.hpp"
+#include "torsio/core/dispatch.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -39,16 +40,6 @@ KnownFamilies::Models construct(const AnyModel::Parameters& parameters,
   };
   (take(std::type_identity<Family>{}), ...);
   return *std::move(model);
-}
-
-/// std::visit without the exception that it throws for a variant that holds nothing, which no
-/// function here leaves behind.
-template <std::size_t index = 0, class Models, class Visit>
-decltype(auto) dispatch(Models& model, const Visit& visit) noexcept {
-  if constexpr (index + 1 < std::variant_size_v<KnownFamilies::Models>) {
-    if (model.index() != index) return dispatch<index + 1>(model, visit);
-  }
-  return visit(*std::get_if<index>(&model));
 }
 
 }  // namespace

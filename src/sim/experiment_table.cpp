@@ -4,113 +4,45 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <utility>
+#include <vector>
 
 #include "torsio/core/error.hpp"
-#include "torsio/core/units.hpp"
-#include "torsio/signal/excitation.hpp"
-#include "torsio/sim/position_loop.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kMass_kg = 9.0;
-constexpr double kSweepSpeed_rad_s = rad_from_deg(10.0);
-constexpr double kSweepAcceleration_rad_s2 = rad_from_deg(30.0);
-constexpr double kCycle_Hz = 0.05;
-constexpr double kCycles = 3.0;
-
-BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
-  const SweepProtocol protocol = sweep_protocol(sheet.name);
-  const double length_m = spec.lever_m.value_or(protocol.train_lever_m.front());
-  const Load load = lever(kMass_kg, length_m, spec.inclination_rad);
-  if (std::abs(load.gravity_Nm) > sheet.rated_torque_Nm.value) {
-    throw UsageError(
-        {.place = "sweep",
-         .problem = "the lever is too heavy for the actuator",
-         .expected = fmt::format("at most the {} Nm that {} is rated for",
-                                 sheet.rated_torque_Nm.value, sheet.name),
-         .found = fmt::format("{:.1f} Nm ({} kg at {} m)", load.gravity_Nm, kMass_kg, length_m),
-         .advice = "take a shorter lever, or incline it"});
-  }
-  // One period and a quarter: to one end, to the other, back to the first and to the middle.
-  const double duration_s = 5.0 * protocol.amplitude_rad / kSweepSpeed_rad_s;
-  return {.start = load,
-          .duration_s = duration_s,
-          .next = [load,
-                   reference = TrapezoidSweep({.amplitude = protocol.amplitude_rad,
-                                               .speed = kSweepSpeed_rad_s,
-                                               .acceleration = kSweepAcceleration_rad_s2},
-                                              kBenchRate_Hz),
-                   loop = PositionLoop(plant_parameters(sheet), kBenchRate_Hz)](
-                      const Measurement& measured) mutable -> BenchAction {
-            return {.command = {.current_A = loop.step(reference.step(), measured.motor_angle_rad)},
-                    .load = load};
-          }};
+std::vector<ExperimentEntry> table() {
+  std::vector<ExperimentEntry> all;
+  for (const auto entries : {series_elastic_experiments()})
+    all.insert(all.end(), entries.begin(), entries.end());
+  return all;
 }
 
-BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
-  return {
-      .start = {},
-      .duration_s = kCycles / kCycle_Hz,
-      .next = [ramp =
-                   Triangle({.amplitude = sheet.rated_torque_Nm.value, .frequency_Hz = kCycle_Hz},
-                            kBenchRate_Hz)](const Measurement&) mutable -> BenchAction {
-        return {.command = {.is_motor_held = true}, .load = {.external_torque_Nm = ramp.step()}};
-      }};
+const std::vector<ExperimentEntry>& entries() {
+  static const std::vector<ExperimentEntry> all = table();
+  return all;
 }
-
-constexpr auto kTable = std::to_array<ExperimentEntry>({
-    {.info = {"sweep",
-              "a lever with 9 kg is moved to and fro at 10 deg/s, +-170 deg (dfki-28: +-60 deg)"},
-     .has_lever = true,
-     .program = sweep},
-    {.info = {"static-cycle",
-              "rotor held, a torque ramp of +-rated torque pulls on the output at 0.05 Hz"},
-     .has_lever = false,
-     .program = static_cycle},
-});
-
-constexpr auto kInfos = [] {
-  std::array<ExperimentInfo, kTable.size()> infos;
-  std::ranges::transform(kTable, infos.begin(), &ExperimentEntry::info);
-  return infos;
-}();
 
 }  // namespace
 
-std::span<const ExperimentInfo> experiments() noexcept { return kInfos; }
+std::vector<ExperimentInfo> experiments() {
+  std::vector<ExperimentInfo> infos(entries().size());
+  std::ranges::transform(entries(), infos.begin(), &ExperimentEntry::info);
+  return infos;
+}
 
-const ExperimentEntry& experiment_entry(std::string_view name) {
-  const auto* const found =
-      std::ranges::find(kTable, name, [](const ExperimentEntry& entry) { return entry.info.name; });
-  if (found != kTable.end()) return *found;
-  std::array<std::string_view, kInfos.size()> known;
-  std::ranges::transform(kInfos, known.begin(), &ExperimentInfo::name);
+const ExperimentEntry& experiment_entry(std::string_view name, const DataSheet& sheet) {
+  std::vector<std::string_view> known;
+  for (const ExperimentEntry& entry : entries()) {
+    if (entry.family != sheet.family) continue;
+    if (entry.info.name == name) return entry;
+    known.push_back(entry.info.name);
+  }
   throw UsageError({.place = "experiment",
-                    .problem = "unknown name",
+                    .problem = fmt::format("not one of {}", sheet.name),
                     .expected = fmt::format("one of {}", fmt::join(known, ", ")),
                     .found = fmt::format("\"{}\"", name),
                     .advice = "torsio simulate --list shows them"});
-}
-
-SweepProtocol sweep_protocol(std::string_view actuator) {
-  const DataSheet& sheet = data_sheet(actuator);
-  SweepProtocol protocol{.amplitude_rad = rad_from_deg(170.0),
-                         .train_lever_m = {0.35, 0.60, 0.80},
-                         .test_lever_m = 0.72,
-                         .test_inclination_rad = rad_from_deg(37.8)};
-  if (sheet.name == "dfki-50") {
-    protocol.train_lever_m = {0.10, 0.17, 0.24};
-    protocol.test_lever_m = 0.29;
-  }
-  if (sheet.name == "dfki-28") {
-    protocol.amplitude_rad = rad_from_deg(60.0);
-    protocol.train_lever_m = {0.08, 0.14, 0.20};
-    protocol.test_lever_m = 0.23;
-  }
-  return protocol;
 }
 
 }  // namespace torsio

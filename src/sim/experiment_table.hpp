@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/sim/experiment.hpp"
@@ -9,29 +10,48 @@
 
 namespace torsio {
 
+/// The rate of the benches' loops; a logger may be slower.
+constexpr double kBenchRate_Hz = 1000.0;
+
 /// What the bench does to the plant until the next tick.
 struct BenchAction {
   PlantCommand command;
   Load load;
 };
 
+/// What the load cell feels.
+enum class LoadCell {
+  joint,     ///< the torque between joint and load
+  external,  ///< the external torque: it sits in the hand that pushes
+  wall,      ///< the obstacle that the load runs against
+};
+
 /// An experiment that is ready to run: its load at the start, and what follows each measurement.
 struct BenchProgram {
   Load start;
+  double start_angle_rad = 0.0;  ///< of the joint
+  LoadCell load_cell = LoadCell::joint;
   double duration_s = 0.0;
   std::function<BenchAction(const Measurement&)> next;
 };
 
-/// A row of the table of experiments.
+/// A row of the table of experiments. A name may stand in more than one family.
 struct ExperimentEntry {
   ExperimentInfo info;
+  ActuatorFamily family = ActuatorFamily::series_elastic;
+  // Which options it takes.
   bool has_lever = false;
+  double highest_amplitude = 0.0;  ///< in `info.amplitude_unit`; of Nm, a share of the rated torque
+  bool has_frequency = false;
+  bool has_impedance = false;
   BenchProgram (*program)(const DataSheet& sheet, const ExperimentSpec& spec) = nullptr;
 };
 
-constexpr double kBenchRate_Hz = 1000.0;
+/// One list a family, each in its own file.
+[[nodiscard]] std::span<const ExperimentEntry> series_elastic_experiments() noexcept;
 
-/// @throws UsageError that lists the known names.
-[[nodiscard]] const ExperimentEntry& experiment_entry(std::string_view name);
+/// @throws UsageError that lists the names known for this family.
+[[nodiscard]] const ExperimentEntry& experiment_entry(std::string_view name,
+                                                      const DataSheet& sheet);
 
 }  // namespace torsio

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
+#include <cstddef>
+#include <variant>
 
+#include "stages.hpp"
+#include "torsio/core/dispatch.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -18,8 +20,10 @@ constexpr double kMostSmallSteps = 1e6;  // in one step: it must return
 bool is_usable(const PlantCommand& command, const Load& load, double dt_s,
                double longest_dt_s) noexcept {
   return dt_s > 0.0 && dt_s <= longest_dt_s && load.inertia_kg_m2 >= 0.0 &&
+         !std::isnan(load.wall_angle_rad) &&
          std::isfinite(command.current_A + load.inertia_kg_m2 + load.gravity_Nm +
-                       load.external_torque_Nm);
+                       load.external_torque_Nm + load.wall_stiffness_Nm_rad +
+                       load.wall_damping_Nms_rad);
 }
 
 void require_inertia(const char* name, double value) {
@@ -30,8 +34,17 @@ void require_inertia(const char* name, double value) {
                .found = fmt::format("{}", value)});
 }
 
-std::array<double, 4> values(const std::array<SheetValue, 4>& from) {
-  return {from[0].value, from[1].value, from[2].value, from[3].value};
+template <class Stage, class Parameters>
+Stage made(const Parameters& parameters) {
+  return std::visit([](const auto& of) -> Stage { return make_stage(of); }, parameters);
+}
+
+/// The obstacle's torque against the joint.
+double wall_torque(const Load& load, double angle_rad, double speed_rad_s) noexcept {
+  const double depth_rad = angle_rad - load.wall_angle_rad;
+  if (!(depth_rad > 0.0)) return 0.0;
+  return std::max(0.0,
+                  load.wall_stiffness_Nm_rad * depth_rad + load.wall_damping_Nms_rad * speed_rad_s);
 }
 
 }  // namespace
@@ -49,99 +62,55 @@ Load lever(double mass_kg, double length_m, double inclination_rad) {
           .gravity_Nm = mass_kg * length_m * kGravity_m_s2 * std::cos(inclination_rad)};
 }
 
-PlantParameters plant_parameters(const DataSheet& sheet) {
-  const double ratio = sheet.gear_ratio.value;
-  const double gear_stiffness = sheet.gear_stiffness_Nm_rad.value;
-  const double stage = sheet.spring_stage_rad.value;
-  PlantParameters plant;
-  plant.motor = {
-      .torque_constant_Nm_A = sheet.torque_constant_Nm_A.value,
-      .peak_current_A = sheet.peak_current_ratio.value * sheet.rated_current_A.value,
-      .current_time_constant_s = sheet.current_time_constant_s.value,
-      .supply_V = sheet.supply_V.value,
-      .resistance_Ohm = sheet.winding_resistance_Ohm.value,
-      .ripple = sheet.torque_ripple.value,
-      .ripple_order = sheet.ripple_order.value,
-  };
-  plant.motor_friction = {
-      .coulomb_Nm = sheet.friction_Nm.value / ratio,
-      .load_factor = sheet.friction_load_factor.value / ratio,
-      .static_ratio = sheet.friction_static_ratio.value,
-      .stribeck_rad_s = sheet.friction_stribeck_rad_s.value,
-      .bristle_rad = sheet.friction_bristle_rad.value,
-      .viscous_Nms_rad = sheet.friction_viscous_Nms_rad.value / (ratio * ratio),
-  };
-  plant.gear = {
-      .ratio = ratio,
-      .error_rad = {sheet.gear_error_rad[0].value, sheet.gear_error_rad[1].value},
-      .error_phase_rad = {sheet.gear_error_phase_rad[0].value, sheet.gear_error_phase_rad[1].value},
-      .stiffness_Nm_rad = gear_stiffness,
-      .damping_Nms_rad = sheet.gear_damping_time_s.value * gear_stiffness,
-      .hysteresis_Nm = sheet.gear_hysteresis_rad.value * gear_stiffness,
-      .break_away_rad = sheet.gear_break_away_rad.value,
-  };
-  plant.spring = {
-      .elastic = {.stiffness_Nm_rad = sheet.spring_stiffness_Nm_rad.value,
-                  .half_gap_rad = sheet.spring_half_gap_rad.value,
-                  .asymmetry = sheet.spring_asymmetry.value,
-                  .stage_rad = stage > 0.0 ? stage : std::numeric_limits<double>::infinity(),
-                  .stage_stiffness_Nm_rad = sheet.spring_stage_stiffness_Nm_rad.value},
-      .friction = MaxwellSlip<4>::Parameters{.constant_Nm = sheet.spring_friction_Nm.value,
-                                             .load_factor = sheet.spring_load_friction.value,
-                                             .share = values(sheet.spring_slip_share),
-                                             .break_away_rad = values(sheet.spring_break_away_rad)},
-      .viscosity_Nms_rad = sheet.spring_viscosity_Nms_rad.value,
-  };
-  plant.bearing = {.coulomb_Nm = sheet.bearing_friction_Nm.value,
-                   .bristle_rad = sheet.bearing_break_away_rad.value};
-  plant.joint_viscous_Nms_rad = sheet.joint_viscous_Nms_rad.value;
-  plant.rotor_inertia_kg_m2 = sheet.rotor_inertia_kg_m2.value;
-  plant.gear_inertia_kg_m2 = sheet.gear_inertia_kg_m2.value;
-  plant.output_inertia_kg_m2 = sheet.output_inertia_kg_m2.value;
-  plant.rated_torque_Nm = sheet.rated_torque_Nm.value;
-  return plant;
-}
-
 Plant::Plant(const PlantParameters& parameters, double longest_step_s)
     : parameters_(parameters),
       motor_(parameters.motor),
-      motor_friction_(parameters.motor_friction),
-      gear_(parameters.gear),
-      spring_(parameters.spring),
+      rotor_friction_(parameters.rotor_friction),
+      first_(made<FirstStage>(parameters.first)),
+      middle_friction_(parameters.middle_friction),
+      second_(made<SecondStage>(parameters.second)),
       bearing_(parameters.bearing),
       longest_step_s_(longest_step_s) {
   require_inertia("rotor_inertia_kg_m2", parameters.rotor_inertia_kg_m2);
-  require_inertia("gear_inertia_kg_m2", parameters.gear_inertia_kg_m2);
-  require_inertia("output_inertia_kg_m2", parameters.output_inertia_kg_m2);
+  require_inertia("middle_inertia_kg_m2", parameters.middle_inertia_kg_m2);
+  require_inertia("joint_inertia_kg_m2", parameters.joint_inertia_kg_m2);
   const double limit_s = step_limit(parameters);
-  if (!(longest_step_s > 0.0 && longest_step_s <= limit_s)) {
+  if (longest_step_s == 0.0) longest_step_s_ = std::min(limit_s, kDefaultStep_s);
+  if (!(longest_step_s_ > 0.0 && longest_step_s_ <= limit_s)) {
     throw Error({.place = "plant",
                  .problem = "the step does not suit the stiffest mode",
                  .expected = fmt::format("0 s < step <= {:.3g} s", limit_s),
-                 .found = fmt::format("{:.3g} s", longest_step_s),
+                 .found = fmt::format("{:.3g} s", longest_step_s_),
                  .advice = "shorten the step, or soften the stiffest spring"});
   }
   reset();
 }
 
 double Plant::step_limit(const PlantParameters& parameters) {
-  // The largest row sum of M^-1 K bounds its largest eigenvalue. The speeds are scaled so that the
-  // rotor moves as much as the gear's output.
-  const double gear = Gear(parameters.gear).steepest();
-  const double spring = Spring(parameters.spring).steepest(parameters.rated_torque_Nm);
-  const double ratio = parameters.gear.ratio;
-  const double friction =
-      LuGreFriction(parameters.motor_friction).stiffness(parameters.rated_torque_Nm);
-  const double bearing = LuGreFriction(parameters.bearing).stiffness(0.0);
-  const double at_gear = (gear + spring) / parameters.gear_inertia_kg_m2;
-  const double at_rotor = (gear / (ratio * ratio) + friction) / parameters.rotor_inertia_kg_m2;
-  const double at_joint = (spring + bearing) / parameters.output_inertia_kg_m2;
+  // The largest row sum of M^-1 K bounds its largest eigenvalue. The speeds are scaled so that
+  // each body moves as much as the next one.
+  const auto first = made<FirstStage>(parameters.first);
+  const auto second = made<SecondStage>(parameters.second);
+  const double load_Nm = parameters.rated_torque_Nm;
+  const auto stiffness = [&](const auto& stage) { return steepest(stage, load_Nm); };
+  const auto ratio_of = [](const auto& stage) { return ratio(stage); };
+  const double first_ratio = dispatch(first, ratio_of);
+  const double second_ratio = dispatch(second, ratio_of);
+  const double first_Nm_rad = dispatch(first, stiffness);
+  const double second_Nm_rad = dispatch(second, stiffness);
+  const double rotor_Nm_rad = first_Nm_rad / (first_ratio * first_ratio) +
+                              LuGreFriction(parameters.rotor_friction).stiffness(load_Nm);
+  const double middle_Nm_rad = first_Nm_rad + second_Nm_rad / (second_ratio * second_ratio) +
+                               LuGreFriction(parameters.middle_friction).stiffness(load_Nm);
+  const double joint_Nm_rad = second_Nm_rad + LuGreFriction(parameters.bearing).stiffness(0.0);
+  const double rotor = parameters.rotor_inertia_kg_m2;
+  const double middle = parameters.middle_inertia_kg_m2;
+  const double joint = parameters.joint_inertia_kg_m2;
   // Off-diagonal terms couple two neighbours: sqrt(k/m1 * k/m2) each, which their sum bounds.
-  const double coupled =
-      gear / std::sqrt(parameters.gear_inertia_kg_m2 * ratio * ratio *
-                       parameters.rotor_inertia_kg_m2) +
-      spring / std::sqrt(parameters.gear_inertia_kg_m2 * parameters.output_inertia_kg_m2);
-  return 0.25 / std::sqrt(std::max({at_gear, at_rotor, at_joint}) + coupled);
+  const double coupled = first_Nm_rad / (first_ratio * std::sqrt(middle * rotor)) +
+                         second_Nm_rad / (second_ratio * std::sqrt(middle * joint));
+  const double own = std::max({rotor_Nm_rad / rotor, middle_Nm_rad / middle, joint_Nm_rad / joint});
+  return 0.25 / std::sqrt(own + coupled);
 }
 
 void Plant::set_period(double dt_s) noexcept {
@@ -149,15 +118,20 @@ void Plant::set_period(double dt_s) noexcept {
   small_steps_ = static_cast<std::size_t>(std::ceil(dt_s / longest_step_s_ * (1.0 - 1e-12)));
   dt_s_ = dt_s / static_cast<double>(small_steps_);
   motor_.set_period(dt_s_);
+  dispatch(first_, [this](auto& stage) { set_stage_period(stage, dt_s_); });
+  dispatch(second_, [this](auto& stage) { set_stage_period(stage, dt_s_); });
 }
 
 void Plant::reset(const PlantState& state) noexcept {
   state_ = state;
   torques_ = {};
   motor_.reset();
-  motor_friction_.reset();
-  gear_.reset(state.rotor_angle_rad, state.gear_angle_rad);
-  spring_.reset(state.gear_angle_rad - state.joint_angle_rad);
+  rotor_friction_.reset();
+  middle_friction_.reset();
+  dispatch(first_,
+           [&](auto& stage) { reset_stage(stage, state.rotor_angle_rad, state.middle_angle_rad); });
+  dispatch(second_,
+           [&](auto& stage) { reset_stage(stage, state.middle_angle_rad, state.joint_angle_rad); });
   bearing_.reset();
 }
 
@@ -165,21 +139,24 @@ void Plant::reset(double joint_angle_rad, const Load& load) noexcept {
   const double torque_Nm =
       load.is_locked ? 0.0 : load.gravity_Nm * std::sin(joint_angle_rad) - load.external_torque_Nm;
   PlantState rest{.joint_angle_rad = joint_angle_rad};
-  rest.gear_angle_rad = joint_angle_rad + spring_.elastic().deflection(torque_Nm);
-  const double unloaded_rad = rest.gear_angle_rad + torque_Nm / parameters_.gear.stiffness_Nm_rad;
-  // The kinematic error is far flatter than the gear's own slope: this contracts.
-  rest.rotor_angle_rad = parameters_.gear.ratio * unloaded_rad;
-  for (int i = 0; i < 20; ++i) {
-    const double error_rad = gear_.kinematics(rest.rotor_angle_rad).angle_rad - unloaded_rad;
-    rest.rotor_angle_rad -= parameters_.gear.ratio * error_rad;
-  }
+  rest.middle_angle_rad = dispatch(
+      second_, [&](const auto& stage) { return input_angle(stage, joint_angle_rad, torque_Nm); });
+  const double middle_Nm = torque_Nm * dispatch(second_, [&](const auto& stage) {
+                             return kinematics(stage, rest.middle_angle_rad).slope;
+                           });
+  rest.rotor_angle_rad = dispatch(first_, [&](const auto& stage) {
+    return input_angle(stage, rest.middle_angle_rad, middle_Nm);
+  });
   reset(rest);
-  const double rotor_torque_Nm = torque_Nm * gear_.kinematics(rest.rotor_angle_rad).slope;
-  motor_.reset(rotor_torque_Nm / parameters_.motor.torque_constant_Nm_A);
-  torques_ = {.motor_Nm = rotor_torque_Nm,
-              .gear_Nm = torque_Nm,
-              .gear_on_rotor_Nm = rotor_torque_Nm,
-              .spring_Nm = torque_Nm,
+  const double rotor_Nm = middle_Nm * dispatch(first_, [&](const auto& stage) {
+                            return kinematics(stage, rest.rotor_angle_rad).slope;
+                          });
+  motor_.reset(rotor_Nm / parameters_.motor.torque_constant_Nm_A);
+  torques_ = {.motor_Nm = rotor_Nm,
+              .first_Nm = middle_Nm,
+              .first_on_rotor_Nm = rotor_Nm,
+              .second_Nm = torque_Nm,
+              .second_on_middle_Nm = middle_Nm,
               .joint_Nm = torque_Nm};
 }
 
@@ -193,38 +170,69 @@ Fault Plant::step(const PlantCommand& command, const Load& load, double dt_s) no
 
 void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
   PlantState& s = state_;
+  PlantTorques& t = torques_;
   const double dt = dt_s_;
 
-  torques_.motor_Nm = motor_.step(command.current_A, s.rotor_angle_rad, s.rotor_speed_rad_s);
-  torques_.spring_Nm =
-      spring_.step(s.gear_angle_rad - s.joint_angle_rad, s.gear_speed_rad_s - s.joint_speed_rad_s);
-  const Gear::Output gear =
-      gear_.step(s.rotor_angle_rad, s.rotor_speed_rad_s, s.gear_angle_rad, s.gear_speed_rad_s);
-  torques_.gear_Nm = gear.torque_Nm;
-  torques_.gear_on_rotor_Nm = gear.rotor_torque_Nm;
-  torques_.motor_friction_Nm = motor_friction_.step(s.rotor_speed_rad_s, gear.torque_Nm, dt);
-  torques_.bearing_Nm = bearing_.step(s.joint_speed_rad_s, 0.0, dt);
-  torques_.joint_Nm = torques_.spring_Nm - torques_.bearing_Nm;
+  t.motor_Nm = condition_.torque_constant_factor *
+               motor_.step(command.current_A, s.rotor_angle_rad, s.rotor_speed_rad_s);
+  const StageTorques second = step_second();
+  t.second_Nm = second.output_Nm;
+  t.second_on_middle_Nm = second.input_Nm;
+  const StageTorques first = dispatch(first_, [&](auto& stage) {
+    return step_stage(
+        stage, {s.rotor_angle_rad, s.rotor_speed_rad_s, s.middle_angle_rad, s.middle_speed_rad_s});
+  });
+  t.first_Nm = first.output_Nm;
+  t.first_on_rotor_Nm = first.input_Nm;
+  t.rotor_friction_Nm =
+      condition_.friction_factor * rotor_friction_.step(s.rotor_speed_rad_s, t.first_Nm, dt);
+  t.middle_friction_Nm =
+      condition_.friction_factor * middle_friction_.step(s.middle_speed_rad_s, t.second_Nm, dt);
+  t.bearing_Nm = bearing_.step(s.joint_speed_rad_s, 0.0, dt);
+  t.joint_Nm = t.second_Nm - t.bearing_Nm;
+  t.wall_Nm = wall_torque(load, s.joint_angle_rad, s.joint_speed_rad_s);
 
-  s.rotor_speed_rad_s =
-      command.is_motor_held
-          ? 0.0
-          : s.rotor_speed_rad_s +
-                dt * (torques_.motor_Nm - torques_.motor_friction_Nm - gear.rotor_torque_Nm) /
-                    parameters_.rotor_inertia_kg_m2;
-  s.gear_speed_rad_s += dt * (gear.torque_Nm - torques_.spring_Nm) / parameters_.gear_inertia_kg_m2;
+  const double rotor_Nm = t.motor_Nm - t.rotor_friction_Nm - t.first_on_rotor_Nm;
+  const double middle_Nm = t.first_Nm - t.middle_friction_Nm - t.second_on_middle_Nm;
+  const double joint_Nm = t.joint_Nm + load.external_torque_Nm - t.wall_Nm -
+                          parameters_.joint_viscous_Nms_rad * s.joint_speed_rad_s -
+                          load.gravity_Nm * std::sin(s.joint_angle_rad);
+  s.rotor_speed_rad_s = command.is_motor_held
+                            ? 0.0
+                            : s.rotor_speed_rad_s + dt * rotor_Nm / parameters_.rotor_inertia_kg_m2;
+  s.middle_speed_rad_s += dt * middle_Nm / parameters_.middle_inertia_kg_m2;
   s.joint_speed_rad_s =
-      load.is_locked
-          ? 0.0
-          : s.joint_speed_rad_s + dt *
-                                      (torques_.joint_Nm + load.external_torque_Nm -
-                                       parameters_.joint_viscous_Nms_rad * s.joint_speed_rad_s -
-                                       load.gravity_Nm * std::sin(s.joint_angle_rad)) /
-                                      (parameters_.output_inertia_kg_m2 + load.inertia_kg_m2);
+      load.is_locked ? 0.0
+                     : s.joint_speed_rad_s +
+                           dt * joint_Nm / (parameters_.joint_inertia_kg_m2 + load.inertia_kg_m2);
 
   s.rotor_angle_rad += dt * s.rotor_speed_rad_s;
-  s.gear_angle_rad += dt * s.gear_speed_rad_s;
+  s.middle_angle_rad += dt * s.middle_speed_rad_s;
   s.joint_angle_rad += dt * s.joint_speed_rad_s;
+}
+
+StageTorques Plant::step_second() noexcept {
+  const StageMotion motion{state_.middle_angle_rad, state_.middle_speed_rad_s,
+                           state_.joint_angle_rad, state_.joint_speed_rad_s};
+  StageTorques torques = dispatch(second_, [&](auto& stage) { return step_stage(stage, motion); });
+  if (is_sound_) return torques;
+  torques.output_Nm *= condition_.second_stage_factor;
+  torques.input_Nm *= condition_.second_stage_factor;
+  const Gear::Kinematics moved = dispatch(
+      second_, [&](const auto& stage) { return kinematics(stage, motion.input_angle_rad); });
+  const double twist_rad = moved.angle_rad - motion.output_angle_rad;
+  const double beyond_rad = std::abs(twist_rad) - condition_.stop_twist_rad;
+  if (beyond_rad > 0.0) {
+    const double stop_Nm = std::copysign(condition_.stop_stiffness_Nm_rad * beyond_rad, twist_rad);
+    torques.output_Nm += stop_Nm;
+    torques.input_Nm += stop_Nm * moved.slope;
+  }
+  return torques;
+}
+
+void Plant::set_condition(const PlantCondition& condition) noexcept {
+  condition_ = condition;
+  is_sound_ = condition.second_stage_factor == 1.0 && std::isinf(condition.stop_twist_rad);
 }
 
 }  // namespace torsio

@@ -14,8 +14,8 @@ constexpr double kSpeedCutoff_Hz = 60.0;
 
 PositionLoop::PositionLoop(const PlantParameters& plant, double sample_rate_Hz)
     : sample_rate_Hz_(sample_rate_Hz),
-      inverse_ratio_(1.0 / plant.gear.ratio),
-      speed_gain_A_s_rad_(plant.rotor_inertia_kg_m2 * plant.gear.ratio * kBandwidth_rad_s /
+      inverse_ratio_(1.0 / total_ratio(plant)),
+      speed_gain_A_s_rad_(plant.rotor_inertia_kg_m2 * total_ratio(plant) * kBandwidth_rad_s /
                           plant.motor.torque_constant_Nm_A),
       integral_limit_(plant.motor.peak_current_A / (speed_gain_A_s_rad_ * kIntegralGain)),
       speed_filter_(kSpeedCutoff_Hz, sample_rate_Hz) {}

@@ -3,22 +3,40 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
 #include <map>
 #include <numbers>
 #include <string>
+#include <variant>
 
+#include "support/series_elastic.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
 
+/// Of the parts that hold nothing else.
+std::size_t bytes_of_values(const DataSheet& sheet) {
+  std::size_t bytes = sizeof(sheet.rating) + sizeof(sheet.motor) + sizeof(sheet.friction) +
+                      sizeof(sheet.middle_inertia_kg_m2) + sizeof(sheet.joint) +
+                      sizeof(sheet.sensors);
+  const auto add = [&]<class Part>(const Part& /*part*/) {
+    // What says which variant it is stands before the values.
+    bytes += sizeof(Part) / sizeof(SheetValue) * sizeof(SheetValue);
+  };
+  std::visit(add, sheet.first);
+  std::visit(add, sheet.second);
+  return bytes;
+}
+
 TEST(DataSheet, RatedTorqueOverStiffnessIsThePapersDeflection) {
   const std::map<std::string_view, double> printed_deg = {
       {"dfki-28", 5.0}, {"dfki-50", 5.0}, {"dfki-120", 6.06}, {"dfki-300", 7.63}};
-  ASSERT_EQ(data_sheets().size(), printed_deg.size());
-  for (const DataSheet& sheet : data_sheets()) {
-    const double deflection_rad = sheet.rated_torque_Nm.value / sheet.spring_stiffness_Nm_rad.value;
+  ASSERT_EQ(test::series_elastic_sheets().size(), printed_deg.size());
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
+    const double deflection_rad =
+        sheet.rating.torque_Nm.value / std::get<SpringSheet>(sheet.second).stiffness_Nm_rad.value;
     EXPECT_NEAR(deg_from_rad(deflection_rad), printed_deg.at(sheet.name), 0.005) << sheet.name;
   }
 }
@@ -26,10 +44,10 @@ TEST(DataSheet, RatedTorqueOverStiffnessIsThePapersDeflection) {
 TEST(DataSheet, GearModesLieWhereTheSpecificationPutsThem) {
   const std::map<std::string_view, double> expected_Hz = {
       {"dfki-28", 172.5}, {"dfki-50", 201.3}, {"dfki-120", 195.5}, {"dfki-300", 178.1}};
-  for (const DataSheet& sheet : data_sheets()) {
-    const double mode_Hz =
-        std::sqrt(sheet.gear_stiffness_Nm_rad.value / sheet.gear_inertia_kg_m2.value) /
-        (2.0 * std::numbers::pi);
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
+    const double mode_Hz = std::sqrt(std::get<GearSheet>(sheet.first).stiffness_Nm_rad.value /
+                                     sheet.middle_inertia_kg_m2.value) /
+                           (2.0 * std::numbers::pi);
     EXPECT_NEAR(mode_Hz, expected_Hz.at(sheet.name), 0.1) << sheet.name;
   }
 }
@@ -37,18 +55,19 @@ TEST(DataSheet, GearModesLieWhereTheSpecificationPutsThem) {
 TEST(DataSheet, GearEfficiencyAtTheRatingIsThatOfTheSpecification) {
   const std::map<std::string_view, double> ideal_Nm = {
       {"dfki-28", 27.4}, {"dfki-50", 62.4}, {"dfki-120", 151.2}, {"dfki-300", 369.6}};
-  for (const DataSheet& sheet : data_sheets()) {
-    EXPECT_NEAR(
-        sheet.torque_constant_Nm_A.value * sheet.rated_current_A.value * sheet.gear_ratio.value,
-        ideal_Nm.at(sheet.name), 0.05)
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
+    EXPECT_NEAR(sheet.motor.torque_constant_Nm_A.value * sheet.rating.current_A.value *
+                    std::get<GearSheet>(sheet.first).ratio.value,
+                ideal_Nm.at(sheet.name), 0.05)
         << sheet.name;
   }
 }
 
 TEST(DataSheet, RatedSpeedStaysWithinTheSupplyVoltage) {
-  for (const DataSheet& sheet : data_sheets()) {
-    const double back_emf_V =
-        sheet.torque_constant_Nm_A.value * sheet.gear_ratio.value * sheet.top_speed_rad_s.value;
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
+    const double back_emf_V = sheet.motor.torque_constant_Nm_A.value *
+                              std::get<GearSheet>(sheet.first).ratio.value *
+                              sheet.rating.speed_rad_s.value;
     EXPECT_LE(back_emf_V, 36.0) << sheet.name;
   }
 }
@@ -61,13 +80,13 @@ TEST(DataSheet, ListsEveryValueOnceWithAnOrigin) {
       EXPECT_TRUE(std::isfinite(row.value.value)) << row.name;
     }
     for (const auto& [name, count] : seen) EXPECT_EQ(count, 1) << name;
-    EXPECT_EQ(seen.size() * sizeof(SheetValue), sizeof(DataSheet) - 2 * sizeof(std::string_view))
+    EXPECT_EQ(seen.size() * sizeof(SheetValue), bytes_of_values(sheet))
         << "a field of the sheet is not listed";
   }
 }
 
 TEST(DataSheet, TellsPrintedFromDerivedFromAssumed) {
-  std::map<std::string_view, SheetRow> rows;
+  std::map<std::string, SheetRow> rows;
   for (const SheetRow& row : describe(data_sheet("dfki-120"))) rows[row.name] = row;
   EXPECT_EQ(rows["spring_stiffness"].value.origin, Origin::printed);
   EXPECT_NEAR(rows["spring_stiffness"].value.value, 19.8 * 180.0 / std::numbers::pi, 1e-9);
@@ -81,9 +100,42 @@ TEST(DataSheet, UnknownNameListsTheKnownOnes) {
     static_cast<void>(data_sheet("dfki-500"));
     FAIL() << "an unknown actuator was accepted";
   } catch (const UsageError& error) {
-    EXPECT_EQ(error.report().expected, "one of dfki-28, dfki-50, dfki-120, dfki-300");
+    EXPECT_EQ(error.report().expected,
+              "one of dfki-28, dfki-50, dfki-120, dfki-300, elastomer, rubber-clutch, "
+              "harmonic-drive");
     EXPECT_EQ(error.report().found, "\"dfki-500\"");
   }
+}
+
+TEST(DataSheet, TakesAVariantAndASerialNumber) {
+  const DataSheet piece = data_sheet("dfki-300:lugre#03");
+  EXPECT_EQ(std::get<SpringSheet>(piece.second).variant, SpringVariant::lugre);
+  EXPECT_EQ(piece.serial, 3U);
+  EXPECT_EQ(full_name(piece), "dfki-300:lugre#03");
+  EXPECT_EQ(full_name(data_sheet("dfki-300:maxwell-slip")), "dfki-300");
+  const auto tube_Nm_rad = [](const char* name) {
+    return std::get<TubeSheet>(data_sheet(name).first).stiffness_Nm_rad.value;
+  };
+  EXPECT_EQ(tube_Nm_rad("harmonic-drive"), 40.95);
+  EXPECT_EQ(tube_Nm_rad("harmonic-drive:soft"), 14.3);
+  EXPECT_FALSE(std::get<ElastomerSheet>(data_sheet("elastomer:unbonded").second).bonded);
+}
+
+std::string message_of(const char* name) {
+  try {
+    static_cast<void>(data_sheet(name));
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(DataSheet, RefusesVariantsAndSerialNumbersThatItDoesNotHave) {
+  EXPECT_NE(message_of("dfki-50:bouc").find("maxwell-slip, bouc-wen, lugre"), std::string::npos);
+  EXPECT_NE(message_of("rubber-clutch:soft").find("it has no variants"), std::string::npos);
+  EXPECT_NE(message_of("dfki-50:").find("behind the colon"), std::string::npos);
+  for (const char* name : {"dfki-50#", "dfki-50#x", "dfki-50#-1", "dfki-50#10000", "dfki-50#3#4"})
+    EXPECT_NE(message_of(name).find("0 to 9999"), std::string::npos) << name;
 }
 
 }  // namespace

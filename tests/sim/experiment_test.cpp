@@ -99,14 +99,15 @@ TEST(Sweep, LeverReachesBothEnds) {
 TEST(StaticCycle, ReachesTheRatedTorqueAtTheSpringsStiffness) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
     const Recording recording = simulate({.actuator = actuator, .experiment = "static-cycle"});
-    const DataSheet& sheet = data_sheet(actuator);
-    const double rated_Nm = sheet.rated_torque_Nm.value;
+    const DataSheet sheet = data_sheet(actuator);
+    const auto& spring = std::get<SpringSheet>(sheet.second);
+    const double rated_Nm = sheet.rating.torque_Nm.value;
     EXPECT_NEAR(std::abs(largest(recording.channel("torque_Nm").values)), rated_Nm,
-                0.03 * rated_Nm + sheet.bearing_friction_Nm.value);
+                0.03 * rated_Nm + sheet.joint.bearing_friction_Nm.value);
     const Line line = straight_line(recording);
-    const double stiffness_Nm_deg = rad_from_deg(sheet.spring_stiffness_Nm_rad.value);
+    const double stiffness_Nm_deg = rad_from_deg(spring.stiffness_Nm_rad.value);
     EXPECT_NEAR(line.slope, stiffness_Nm_deg, 0.06 * stiffness_Nm_deg) << actuator;
-    EXPECT_GT(line.rmse, 0.3 * sheet.spring_friction_Nm.value) << actuator;
+    EXPECT_GT(line.rmse, 0.3 * spring.friction_Nm.value) << actuator;
   }
 }
 

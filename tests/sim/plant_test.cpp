@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "support/series_elastic.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
@@ -20,54 +21,63 @@ constexpr double kStep_s = 1e-4;
 /// A gear without losses and error behind a spring without friction: only its mode is left.
 PlantParameters lossless(const DataSheet& sheet) {
   PlantParameters parts = plant_parameters(sheet);
-  parts.gear.damping_Nms_rad = 0.0;
-  parts.gear.hysteresis_Nm = 0.0;
-  parts.gear.error_rad = {};
-  parts.spring.viscosity_Nms_rad = 0.0;
-  parts.spring.elastic.half_gap_rad = 0.0;
-  parts.spring.elastic.asymmetry = 0.0;
-  auto& slip = std::get<MaxwellSlip<4>::Parameters>(parts.spring.friction);
+  auto& gear = std::get<Gear::Parameters>(parts.first);
+  auto& spring = std::get<Spring::Parameters>(parts.second);
+  gear.damping_Nms_rad = 0.0;
+  gear.hysteresis_Nm = 0.0;
+  gear.error_rad = {};
+  spring.viscosity_Nms_rad = 0.0;
+  spring.elastic.half_gap_rad = 0.0;
+  spring.elastic.asymmetry = 0.0;
+  auto& slip = std::get<MaxwellSlip<4>::Parameters>(spring.friction);
   slip.constant_Nm = 0.0;
   slip.load_factor = 0.0;
   return parts;
 }
 
 TEST(Plant, GearModeHasItsNaturalFrequency) {
-  for (const DataSheet& sheet : data_sheets()) {
+  for (const DataSheet& sheet : test::series_elastic_sheets()) {
     const PlantParameters parts = lossless(sheet);
     Plant plant(parts, kStep_s);
-    plant.reset(PlantState{.gear_angle_rad = 1e-4});
+    plant.reset(PlantState{.middle_angle_rad = 1e-4});
     int crossings = 0;
     double first_s = 0.0;
     double last_s = 0.0;
     for (int i = 1; i <= 10000; ++i) {
-      const double before = plant.state().gear_angle_rad;
+      const double before = plant.state().middle_angle_rad;
       ASSERT_EQ(plant.step({.is_motor_held = true}, {.is_locked = true}, kStep_s), Fault::none);
-      const double after = plant.state().gear_angle_rad;
+      const double after = plant.state().middle_angle_rad;
       if (before * after > 0.0) continue;
       last_s = kStep_s * (i - after / (after - before));
       if (crossings++ == 0) first_s = last_s;
     }
     const double measured_Hz = 0.5 * (crossings - 1) / (last_s - first_s);
-    const double stiffness = parts.gear.stiffness_Nm_rad + parts.spring.elastic.stiffness_Nm_rad;
+    const double stiffness = std::get<Gear::Parameters>(parts.first).stiffness_Nm_rad +
+                             std::get<Spring::Parameters>(parts.second).elastic.stiffness_Nm_rad;
     const double expected_Hz =
-        std::sqrt(stiffness / parts.gear_inertia_kg_m2) / (2.0 * std::numbers::pi);
+        std::sqrt(stiffness / parts.middle_inertia_kg_m2) / (2.0 * std::numbers::pi);
     EXPECT_NEAR(measured_Hz, expected_Hz, 0.01 * expected_Hz) << sheet.name;
     EXPECT_GT(measured_Hz, 172.0);
     EXPECT_LT(measured_Hz, 207.0);
   }
 }
 
+/// A lever that pulls with a tenth of the rated torque when it is level.
+Load tenth_of_the_rating(const DataSheet& sheet) {
+  constexpr double kLength_m = 0.1;
+  return lever(0.1 * sheet.rating.torque_Nm.value / (9.81 * kLength_m), kLength_m);
+}
+
 TEST(Plant, StaysWhereResetPutIt) {
   for (const DataSheet& sheet : data_sheets()) {
     Plant plant(plant_parameters(sheet));
-    const Load load = lever(9.0, 0.2);
+    const Load load = tenth_of_the_rating(sheet);
     plant.reset(1.0, load);
     const double current_A = plant.current();
     for (int i = 0; i < 20000; ++i)
       ASSERT_EQ(plant.step({.current_A = current_A}, load, kStep_s), Fault::none);
-    EXPECT_NEAR(plant.state().joint_angle_rad, 1.0, 1e-4) << sheet.name;
-    EXPECT_NEAR(plant.torques().spring_Nm, load.gravity_Nm * std::sin(1.0), 0.05) << sheet.name;
+    EXPECT_NEAR(plant.state().joint_angle_rad, 1.0, 2e-4) << sheet.name;
+    EXPECT_NEAR(plant.torques().second_Nm, load.gravity_Nm * std::sin(1.0), 0.05) << sheet.name;
   }
 }
 
@@ -75,10 +85,12 @@ TEST(Plant, ComesToRestFromAColdStart) {
   for (const DataSheet& sheet : data_sheets()) {
     Plant plant(plant_parameters(sheet));
     plant.reset(PlantState{.joint_angle_rad = 0.02, .joint_speed_rad_s = 0.5});
-    const Load load = lever(9.0, 0.1);
-    for (int i = 0; i < 200000; ++i) ASSERT_EQ(plant.step({}, load, kStep_s), Fault::none);
+    const Load load = tenth_of_the_rating(sheet);
+    // Rubber creeps for long.
+    const int steps = sheet.family == ActuatorFamily::series_elastic ? 200000 : 1500000;
+    for (int i = 0; i < steps; ++i) ASSERT_EQ(plant.step({}, load, kStep_s), Fault::none);
     EXPECT_NEAR(plant.state().joint_speed_rad_s, 0.0, 1e-6) << sheet.name;
-    EXPECT_NEAR(plant.state().gear_speed_rad_s, 0.0, 1e-6) << sheet.name;
+    EXPECT_NEAR(plant.state().middle_speed_rad_s, 0.0, 1e-6) << sheet.name;
     EXPECT_NEAR(plant.state().rotor_speed_rad_s, 0.0, 1e-4) << sheet.name;
   }
 }
@@ -91,7 +103,7 @@ TEST(Plant, PeakCurrentGivesTheRatedTorqueAtALockedOutput) {
       ASSERT_EQ(plant.step({.current_A = 1e3}, {.is_locked = true}, kStep_s), Fault::none);
       reached_Nm = std::max(reached_Nm, plant.torques().joint_Nm);
     }
-    EXPECT_GE(reached_Nm, sheet.rated_torque_Nm.value) << sheet.name;
+    EXPECT_GE(reached_Nm, sheet.rating.torque_Nm.value) << sheet.name;
   }
 }
 
@@ -100,7 +112,7 @@ TEST(Plant, ReachesItsTopSpeedUnloaded) {
     Plant plant(plant_parameters(sheet));
     for (int i = 0; i < 20000; ++i)
       ASSERT_EQ(plant.step({.current_A = 1e3}, {}, kStep_s), Fault::none);
-    EXPECT_GE(plant.state().joint_speed_rad_s, sheet.top_speed_rad_s.value) << sheet.name;
+    EXPECT_GE(plant.state().joint_speed_rad_s, sheet.rating.speed_rad_s.value) << sheet.name;
   }
 }
 
@@ -137,15 +149,16 @@ TEST(Plant, StaysFiniteUnderAMillionRandomCommands) {
     for (int i = 0; i < 250000; ++i) {
       if (random.below(8) == 0) {
         command = {.current_A = 60.0 * random.normal(), .is_motor_held = random.below(20) == 0};
-        load.external_torque_Nm = sheet.rated_torque_Nm.value * random.normal();
+        load.external_torque_Nm = sheet.rating.torque_Nm.value * random.normal();
         load.is_locked = random.below(20) == 0;
       }
       ASSERT_EQ(plant.step(command, load, kStep_s), Fault::none);
     }
     const PlantState& state = plant.state();
-    EXPECT_TRUE(std::isfinite(state.rotor_angle_rad + state.gear_angle_rad + state.joint_angle_rad))
+    EXPECT_TRUE(
+        std::isfinite(state.rotor_angle_rad + state.middle_angle_rad + state.joint_angle_rad))
         << sheet.name;
-    EXPECT_LT(std::abs(state.gear_angle_rad - state.joint_angle_rad), 1.0) << sheet.name;
+    EXPECT_LT(std::abs(plant.second_twist()), 1.0) << sheet.name;
   }
 }
 
@@ -194,7 +207,7 @@ TEST(Plant, RefusesImpossibleParts) {
   parts.rotor_inertia_kg_m2 = -1e-5;
   EXPECT_THROW(Plant{parts}, Error);
   parts = plant_parameters(data_sheet("dfki-50"));
-  parts.gear.stiffness_Nm_rad = 0.0;
+  std::get<Gear::Parameters>(parts.first).stiffness_Nm_rad = 0.0;
   EXPECT_THROW(Plant{parts}, Error);
   EXPECT_THROW(static_cast<void>(lever(-1.0, 0.2)), Error);
 }

@@ -10,12 +10,13 @@ namespace torsio {
 ///
 ///     y = LSB ⌊(q + o) / LSB + ½ + σ n⌋ − o,   n ~ N(0, 1),  LSB = 2π / 2^bits
 ///
-/// o is where the code edges lie, random within one LSB. Source: SPEC section 4.1.
+/// plus the zero error. o is where the code edges lie, random within one LSB. Source: SPEC section 4.1.
 class Encoder {
  public:
   struct Parameters {
     double bits = 19.0;
     double jitter_lsb = 0.5;  ///< σ
+    double zero_rad = 0.0;    ///< told too much
   };
 
   /// Draws o. @throws Error unless 1 ≤ bits ≤ 40 and the jitter is not negative.
@@ -24,7 +25,7 @@ class Encoder {
   /// @returns the angle [rad] as the encoder tells it
   [[nodiscard]] double read(double angle_rad, Random& random) const noexcept {
     const double code = (angle_rad + offset_rad_) * inverse_lsb_ + 0.5;
-    return std::floor(code + jitter_lsb_ * random.normal()) * lsb_rad_ - offset_rad_;
+    return std::floor(code + jitter_lsb_ * random.normal()) * lsb_rad_ - offset_rad_ + zero_rad_;
   }
   /// @returns the angle of one code [rad]
   [[nodiscard]] double resolution() const noexcept { return lsb_rad_; }
@@ -34,6 +35,7 @@ class Encoder {
   double inverse_lsb_;
   double jitter_lsb_;
   double offset_rad_;
+  double zero_rad_;
 };
 
 }  // namespace torsio

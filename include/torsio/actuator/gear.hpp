@@ -47,7 +47,7 @@ class Gear {
     const double increment_rad = twist_rad - twist_rad_;
     twist_rad_ = twist_rad;
     twist_rate_rad_s_ = motion.slope * rotor_speed_rad_s - output_speed_rad_s;
-    hysteresis_Nm_ = hysteresis_.step(increment_rad, 0.0);
+    hysteresis_Nm_ = hysteresis_.step(increment_rad, twist_rate_rad_s_, 0.0);
     const double torque_Nm = parameters_.stiffness_Nm_rad * twist_rad + hysteresis_Nm_ +
                              parameters_.damping_Nms_rad * twist_rate_rad_s_;
     return {torque_Nm, torque_Nm * motion.slope};
@@ -74,10 +74,7 @@ class Gear {
   [[nodiscard]] double twist() const noexcept { return twist_rad_; }
   [[nodiscard]] double twist_rate() const noexcept { return twist_rate_rad_s_; }
   [[nodiscard]] double hysteresis_torque() const noexcept { return hysteresis_Nm_; }
-  /// @returns the energy [J] in the elasticity and in the hysteresis element
-  [[nodiscard]] double elastic_energy() const noexcept {
-    return 0.5 * parameters_.stiffness_Nm_rad * twist_rad_ * twist_rad_;
-  }
+  /// @returns the energy [J] in the hysteresis element
   [[nodiscard]] double hysteresis_energy() const noexcept { return hysteresis_.energy(); }
   /// @returns the stiffness [Nm/rad] while the hysteresis element sticks
   [[nodiscard]] double steepest() const noexcept {

@@ -37,7 +37,8 @@ class MaxwellSlip {
   /// @param increment_rad displacement since the last step
   /// @param load_Nm the torque whose magnitude presses the surfaces together
   /// @returns F [Nm], of the sign of a spring: positive after a positive displacement
-  double step(double increment_rad, double load_Nm) noexcept TORSIO_REALTIME {
+  double step(double increment_rad, double /*rate_rad_s*/,
+              double load_Nm) noexcept TORSIO_REALTIME {
     total_limit_Nm_ =
         parameters_.constant_Nm + parameters_.load_factor * (load_Nm < 0.0 ? -load_Nm : load_Nm);
     const double pull = total_limit_Nm_ * increment_rad;
@@ -48,6 +49,19 @@ class MaxwellSlip {
       total_Nm += force_Nm_[i];
     }
     return total_Nm;
+  }
+
+  /// Drops the forces to their shares of this total [Nm]; the stiffness stays. A limit that shrinks
+  /// so can only turn energy into heat, whatever makes it shrink.
+  /// @returns F [Nm]
+  double shed(double total_Nm) noexcept TORSIO_REALTIME {
+    double sum_Nm = 0.0;
+    for (std::size_t i = 0; i < Count; ++i) {
+      const double limit = parameters_.share[i] * total_Nm;
+      force_Nm_[i] = std::min(std::max(force_Nm_[i], -limit), limit);
+      sum_Nm += force_Nm_[i];
+    }
+    return sum_Nm;
   }
 
   /// @returns the energy [J] held in the elements, Σ Fᵢ² / 2kᵢ with kᵢ = wᵢ f / Xᵢ of the last step
@@ -71,6 +85,7 @@ class MaxwellSlip {
 };
 
 extern template class MaxwellSlip<1>;
+extern template class MaxwellSlip<3>;
 extern template class MaxwellSlip<4>;
 
 }  // namespace torsio

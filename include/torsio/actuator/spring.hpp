@@ -1,29 +1,20 @@
 #pragma once
 
-#include <cstddef>
-#include <type_traits>
 #include <variant>
 
+#include "torsio/actuator/bouc_wen.hpp"
 #include "torsio/actuator/elastic_curve.hpp"
+#include "torsio/actuator/lugre_slip.hpp"
 #include "torsio/actuator/maxwell_slip.hpp"
+#include "torsio/core/dispatch.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {
 
 /// The inner friction of a spring, one alternative a variant of the plant (SPEC section 4.6). Each
-/// has `Parameters`, `reset()`, `step(increment_rad, load_Nm)`, `energy()` and
+/// has `Parameters`, `reset()`, `step(increment_rad, rate_rad_s, load_Nm)`, `energy()` and
 /// `stiffness(load_Nm)`.
-using SpringFriction = std::variant<MaxwellSlip<4>>;
-
-/// Calls `visit(alternative)`, which returns a number: a std::visit that cannot throw.
-template <std::size_t Index = 0, class Variant, class Visit>
-double dispatch(Variant& variant, const Visit& visit) noexcept {
-  if (auto* alternative = std::get_if<Index>(&variant)) return visit(*alternative);
-  if constexpr (Index + 1 < std::variant_size_v<std::remove_const_t<Variant>>) {
-    return dispatch<Index + 1>(variant, visit);
-  }
-  return 0.0;
-}
+using SpringFriction = std::variant<MaxwellSlip<4>, BoucWen, LuGreSlip>;
 
 /// A torsion spring: elastic curve, inner friction that grows with the load, and a little
 /// viscosity.
@@ -35,7 +26,7 @@ class Spring {
  public:
   struct Parameters {
     ElasticCurve::Parameters elastic;
-    std::variant<MaxwellSlip<4>::Parameters> friction;
+    std::variant<MaxwellSlip<4>::Parameters, BoucWen::Parameters, LuGreSlip::Parameters> friction;
     double viscosity_Nms_rad = 0.0;
   };
 
@@ -52,20 +43,25 @@ class Spring {
     const double elastic_Nm = elastic_.torque(deflection_rad);
     const double increment_rad = deflection_rad - last_deflection_rad_;
     last_deflection_rad_ = deflection_rad;
-    friction_Nm_ = dispatch(
-        friction_, [&](auto& friction) { return friction.step(increment_rad, elastic_Nm); });
+    friction_Nm_ = dispatch(friction_, [&](auto& friction) {
+      return friction.step(increment_rad, deflection_rate_rad_s, elastic_Nm);
+    });
     return elastic_Nm + friction_Nm_ + viscosity_Nms_rad_ * deflection_rate_rad_s;
   }
 
   /// @returns the friction's share of the last step's torque [Nm]
   [[nodiscard]] double friction_torque() const noexcept { return friction_Nm_; }
-  /// @returns the energy [J] stored in the elastic curve and in the friction elements
-  [[nodiscard]] double elastic_energy() const noexcept {
-    return elastic_.energy(last_deflection_rad_);
+  /// @returns the energy [J] in the elastic curve at this deflection, and in the friction elements
+  [[nodiscard]] double elastic_energy(double deflection_rad) const noexcept {
+    return elastic_.energy(deflection_rad);
   }
   [[nodiscard]] double friction_energy() const noexcept;
   /// @returns the largest stiffness [Nm/rad] under loads up to this one
   [[nodiscard]] double steepest(double load_Nm) const noexcept;
+  /// @returns the deflection [rad] at which it gives this torque, its friction relaxed
+  [[nodiscard]] double deflection(double torque_Nm) const noexcept {
+    return elastic_.deflection(torque_Nm);
+  }
 
  private:
   ElasticCurve elastic_;

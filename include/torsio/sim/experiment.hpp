@@ -3,9 +3,9 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
@@ -14,22 +14,27 @@ namespace torsio {
 
 /// One bench run: which actuator, what is done to it, and the noise's seed.
 struct ExperimentSpec {
-  std::string actuator = "dfki-50";
+  std::string actuator = "dfki-50";  ///< as `data_sheet` takes it
   std::string experiment = "sweep";
   std::uint64_t seed = 1;
   std::optional<double> duration_s = {};  ///< none: as long as the experiment's protocol is
   std::optional<double> lever_m = {};     ///< none: the first of `sweep_protocol`
   double inclination_rad = 0.0;           ///< of the lever's plane of motion from the vertical
-  bool with_truth = false;                ///< add the `truth_*` channels, which no sensor sees
+  std::optional<double> amplitude = {};   ///< Nm or rad, as the experiment has it; none: its own
+  std::optional<double> frequency_Hz = {};
+  bool is_impedance_zero = false;  ///< of the joint's controller; false: high
+  bool with_truth = false;         ///< add the `truth_*` channels, which no sensor sees
 };
 
 struct ExperimentInfo {
   std::string_view name;
+  std::string_view actuators;  ///< that have it
   std::string_view description;
+  std::string_view amplitude_unit = {};  ///< of `ExperimentSpec::amplitude`; empty: it takes none
 };
 
-/// What can be done on the bench.
-[[nodiscard]] std::span<const ExperimentInfo> experiments() noexcept;
+/// What can be done on the benches. A name may stand there for more than one family.
+[[nodiscard]] std::vector<ExperimentInfo> experiments();
 
 /// How the sweeps of one actuator are made: the lever with its 9 kg mass goes to and fro between
 /// +-amplitude (SPEC section 4.7). Levers of dfki-28, for which SPEC names none, are ours: its
@@ -42,9 +47,6 @@ struct SweepProtocol {
 };
 /// @throws UsageError for an unknown actuator.
 [[nodiscard]] SweepProtocol sweep_protocol(std::string_view actuator);
-
-/// The plant's step in every experiment [s]: ten a sample.
-inline constexpr double kSimulationStep_s = 1e-4;
 
 /// Runs an experiment on a simulated bench.
 ///

@@ -1,11 +1,17 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <limits>
+#include <variant>
 
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/actuator/elastomer_coupling.hpp"
 #include "torsio/actuator/friction.hpp"
 #include "torsio/actuator/gear.hpp"
 #include "torsio/actuator/motor.hpp"
+#include "torsio/actuator/rubber_spring.hpp"
+#include "torsio/actuator/slip_clutch.hpp"
 #include "torsio/actuator/spring.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
@@ -20,76 +26,140 @@ struct PlantCommand {
 
 /// What hangs on the joint.
 struct Load {
-  double inertia_kg_m2 = 0.0;       ///< added to the output's own
+  double inertia_kg_m2 = 0.0;       ///< added to the joint's own
   double gravity_Nm = 0.0;          ///< m g l cos(inclination): resists with gravity_Nm sin(q)
   double external_torque_Nm = 0.0;  ///< on the joint, positive along its angle
   bool is_locked = false;           ///< the joint is clamped
+  /// An obstacle that pushes back with k (q - angle) + d ω, never pulls, beyond this angle.
+  double wall_angle_rad = std::numeric_limits<double>::infinity();
+  double wall_stiffness_Nm_rad = 0.0;
+  double wall_damping_Nms_rad = 0.0;
 };
 
 /// A mass on a lever whose plane of motion is inclined by `inclination_rad` from the vertical.
 /// @throws Error if mass or length is negative or not finite.
 [[nodiscard]] Load lever(double mass_kg, double length_m, double inclination_rad = 0.0);
 
+/// What may wear or fail while a plant runs; the defaults are a sound one.
+struct PlantCondition {
+  double friction_factor = 1.0;         ///< of the friction at rotor and middle body
+  double torque_constant_factor = 1.0;  ///< of k_t, unknown to the current loop
+  double second_stage_factor = 1.0;     ///< of the second stage's torque; 0: broken
+  /// Where the second stage's twist meets a hard stop (a bottomed spring).
+  double stop_twist_rad = std::numeric_limits<double>::infinity();
+  double stop_stiffness_Nm_rad = 0.0;
+};
+
+/// Between rotor and middle body, and between middle body and joint.
+using FirstStage = std::variant<Gear, SlipClutch>;
+using SecondStage = std::variant<Spring, ElastomerCoupling, RubberSpring, Gear>;
+
 /// The parts of one actuator.
 struct PlantParameters {
   Motor::Parameters motor;
-  LuGreFriction::Parameters motor_friction;  ///< rotor side
-  Gear::Parameters gear;
-  Spring::Parameters spring;
+  LuGreFriction::Parameters rotor_friction;  ///< rotor side; grows with the first stage's torque
+  std::variant<Gear::Parameters, SlipClutch::Parameters> first;
+  LuGreFriction::Parameters middle_friction;  ///< grows with the second stage's torque
+  std::variant<Spring::Parameters, ElastomerCoupling::Parameters, RubberSpring::Parameters,
+               Gear::Parameters>
+      second;
   LuGreFriction::Parameters bearing;   ///< of the joint, before the load cell
   double joint_viscous_Nms_rad = 0.0;  ///< d, behind the load cell
   double rotor_inertia_kg_m2 = 0.0;
-  double gear_inertia_kg_m2 = 0.0;
-  double output_inertia_kg_m2 = 0.0;
+  double middle_inertia_kg_m2 = 0.0;
+  double joint_inertia_kg_m2 = 0.0;
   double rated_torque_Nm = 0.0;  ///< up to which the stiffest mode is looked for
 };
 [[nodiscard]] PlantParameters plant_parameters(const DataSheet& sheet);
 
+/// @returns turns of the rotor a turn of the joint
+[[nodiscard]] double total_ratio(const PlantParameters& parameters) noexcept;
+
 struct PlantState {
   double rotor_angle_rad = 0.0;
   double rotor_speed_rad_s = 0.0;
-  double gear_angle_rad = 0.0;
-  double gear_speed_rad_s = 0.0;
+  double middle_angle_rad = 0.0;
+  double middle_speed_rad_s = 0.0;
   double joint_angle_rad = 0.0;
   double joint_speed_rad_s = 0.0;
 };
 
 /// The torques of the last step.
 struct PlantTorques {
-  double motor_Nm = 0.0;           ///< on the rotor, ripple included
-  double motor_friction_Nm = 0.0;  ///< against the rotor
-  double gear_Nm = 0.0;            ///< on the gear's output
-  double gear_on_rotor_Nm = 0.0;   ///< against the rotor
-  double spring_Nm = 0.0;          ///< of the spring on the joint
-  double bearing_Nm = 0.0;         ///< dry friction of the joint, against it
-  double joint_Nm = 0.0;           ///< what a load cell between joint and lever feels
+  double motor_Nm = 0.0;             ///< on the rotor, ripple included
+  double rotor_friction_Nm = 0.0;    ///< against the rotor
+  double first_Nm = 0.0;             ///< of the first stage on the middle body
+  double first_on_rotor_Nm = 0.0;    ///< against the rotor
+  double middle_friction_Nm = 0.0;   ///< against the middle body
+  double second_Nm = 0.0;            ///< of the second stage on the joint
+  double second_on_middle_Nm = 0.0;  ///< against the middle body
+  double bearing_Nm = 0.0;           ///< dry friction of the joint, against it
+  double joint_Nm = 0.0;             ///< what a load cell between joint and lever feels
+  double wall_Nm = 0.0;              ///< of the obstacle, against the joint
 };
 
-/// A motor, a strain-wave gear, a series spring and a joint with its load:
+/// What a stage does to the bodies at its two ends.
+struct StageTorques {
+  double output_Nm = 0.0;  ///< on the output body
+  double input_Nm = 0.0;   ///< against the input body
+};
+
+/// A torque and the speed at which it works, for the energy audit.
+struct WorkPort {
+  enum class Kind {
+    input,       ///< into the plant
+    loss,        ///< out of it, as heat
+    hysteretic,  ///< into elements that keep a part of it and turn the rest to heat
+  };
+  Kind kind = Kind::loss;
+  double torque_Nm = 0.0;        ///< over the last step
+  double speed_rad_s = 0.0;      ///< after it
+  double viscous_Nms_rad = 0.0;  ///< adds this times the speed before the step to the torque
+};
+
+/// What is stored in a plant and its load.
+struct StoredEnergy {
+  double all_J = 0.0;
+  double hysteretic_J = 0.0;  ///< the share in slip and viscoelastic elements and in the obstacle
+};
+
+/// Any of the actuators: a chain of three bodies and two stages.
 ///
-///     J_m ω̇_m = τ_motor − τ_friction − τ_h (1/N + ε′)
-///     J_g ω̇_g = τ_h − τ_s
-///     J_l ω̇_l = τ_s − τ_bearing − d ω_l − m g l cos(incl) sin q_l + τ_ext
+///     J_r ω̇_r = τ_motor − τ_rf − τ₁ x₁′
+///     J_m ω̇_m = τ₁ − τ_mf − τ₂ x₂′
+///     J_j ω̇_j = τ₂ − τ_bearing − d ω_j − m g l cos(incl) sin q + τ_ext − τ_wall
 ///
-/// Semi-implicit Euler (speeds, then positions), the current and the friction bristles solved
-/// exactly; order current, spring, gear, friction, speeds, positions. Source: SPEC sections 4.2 and
-/// 4.6.
+/// xᵢ is the transmitted angle of a stage and xᵢ′ its slope: θ/N + ε(θ) for a gear, θ for a spring.
+/// A series-elastic actuator is rotor, gear, its output, spring, joint; one with a torsion tube
+/// before its gear is rotor, tube, wave generator, gear, joint.
+///
+/// Semi-implicit Euler (speeds, then positions); the current, the friction bristles and the
+/// viscoelastic branches are solved exactly; order current, second stage, first stage, friction,
+/// speeds, positions. Source: SPEC sections 4.2 to 4.6.
 class Plant {
  public:
-  /// @param longest_step_s a longer step is divided into equal ones
+  static constexpr double kDefaultStep_s = 1e-4;
+  static constexpr std::size_t kWorkPorts = 11;
+
+  /// @param longest_step_s a longer step is divided into equal ones; none: `step_limit`, but at most
+  /// `kDefaultStep_s`
   /// @throws Error if an inertia is not positive, or the step is too long for the stiffest mode
   /// (the message names the limit).
-  explicit Plant(const PlantParameters& parameters, double longest_step_s = 1e-4);
+  explicit Plant(const PlantParameters& parameters, double longest_step_s = 0.0);
 
   /// The longest step [s] that these parts allow: a quarter radian of the stiffest mode, with all
   /// friction sticking under the rated torque.
   [[nodiscard]] static double step_limit(const PlantParameters& parameters);
 
-  /// At rest at this joint angle, the spring and the motor current carrying the load, all friction
+  /// At rest at this joint angle, the stages and the motor current carrying the load, all friction
   /// relaxed.
   void reset(double joint_angle_rad = 0.0, const Load& load = {}) noexcept;
   /// In any state, without current, all friction relaxed.
   void reset(const PlantState& state) noexcept;
+
+  /// Wear and failures from now on; `reset` leaves them.
+  void set_condition(const PlantCondition& condition) noexcept;
+  [[nodiscard]] const PlantCondition& condition() const noexcept { return condition_; }
 
   /// Advances the plant. A value that is not finite, a negative inertia or a dt that is not
   /// positive or longer than 10^6 of the longest steps is `Fault::input_not_finite`, and nothing
@@ -98,24 +168,40 @@ class Plant {
                            double dt_s) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const PlantParameters& parameters() const noexcept { return parameters_; }
+  [[nodiscard]] double longest_step() const noexcept { return longest_step_s_; }  ///< [s]
   [[nodiscard]] const PlantState& state() const noexcept { return state_; }
   [[nodiscard]] const PlantTorques& torques() const noexcept { return torques_; }
   [[nodiscard]] double current() const noexcept { return motor_.current(); }  ///< [A]
-  [[nodiscard]] const Spring& spring() const noexcept { return spring_; }
-  [[nodiscard]] const Gear& gear() const noexcept { return gear_; }
+  [[nodiscard]] const FirstStage& first() const noexcept { return first_; }
+  [[nodiscard]] const SecondStage& second() const noexcept { return second_; }
+
+  /// @returns twist [rad] and hysteretic torque [Nm] of a stage in the last step
+  [[nodiscard]] double first_twist() const noexcept;
+  [[nodiscard]] double second_twist() const noexcept;
+  [[nodiscard]] double first_friction_torque() const noexcept;
+  [[nodiscard]] double second_friction_torque() const noexcept;
+
+  /// For the energy audit: every port through which work flows, and what is stored. Without
+  /// meaning once the condition has changed.
+  [[nodiscard]] std::array<WorkPort, kWorkPorts> work_ports(const Load& load) const noexcept;
+  [[nodiscard]] StoredEnergy stored_energy(const Load& load) const noexcept;
 
  private:
   void set_period(double dt_s) noexcept;
   void small_step(const PlantCommand& command, const Load& load) noexcept;
+  StageTorques step_second() noexcept;
 
   PlantParameters parameters_;
   Motor motor_;
-  LuGreFriction motor_friction_;
-  Gear gear_;
-  Spring spring_;
+  LuGreFriction rotor_friction_;
+  FirstStage first_;
+  LuGreFriction middle_friction_;
+  SecondStage second_;
   LuGreFriction bearing_;
   PlantState state_;
   PlantTorques torques_;
+  PlantCondition condition_;
+  bool is_sound_ = true;  ///< no part of the condition is about the second stage
   double longest_step_s_;
   double asked_dt_s_ = 0.0;
   double dt_s_ = 0.0;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "torsio/actuator/current_sensor.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/encoder.hpp"
@@ -11,9 +13,10 @@ namespace torsio {
 
 /// What the loop and the logger see at one tick.
 struct Measurement {
-  double motor_angle_rad = 0.0;  ///< of the rotor
-  double gear_angle_rad = 0.0;
+  double motor_angle_rad = 0.0;   ///< of the rotor
+  double middle_angle_rad = 0.0;  ///< of the body between the stages
   double joint_angle_rad = 0.0;
+  double twist_rad = 0.0;  ///< of the second stage, where a sensor of its own tells it
   double motor_current_A = 0.0;
   double torque_Nm = 0.0;        ///< load cell: held between its samples, late
   bool is_torque_fresh = false;  ///< the load cell delivered at this tick
@@ -27,14 +30,16 @@ class SensorSet {
   SensorSet(const DataSheet& sheet, double sample_rate_Hz, std::uint64_t seed);
 
   /// As if the load cell had been running at this torque for long. Goes on in the same noise.
-  void reset(const Plant& plant) noexcept;
-  Measurement step(const Plant& plant) noexcept;
+  void reset(double torque_Nm) noexcept;
+  /// @param torque_Nm what the load cell feels
+  Measurement step(const Plant& plant, double torque_Nm) noexcept;
 
  private:
   Random random_;
   Encoder motor_encoder_;
-  Encoder gear_encoder_;
+  Encoder middle_encoder_;
   Encoder joint_encoder_;
+  std::optional<Encoder> twist_sensor_;
   CurrentSensor current_sensor_;
   TorqueSensor torque_sensor_;
 };
