@@ -146,9 +146,6 @@ TEST(Plant, ErrorShrinksWithTheStep) {
     double order = 0.0;
     for (const double divisor : {1.0, 2.0, 4.0, 8.0}) {
       const double error = std::abs(joint_after_a_second(actuator, first_s / divisor) - reference);
-      RecordProperty(
-          "error_" + std::string(actuator) + "_" + std::to_string(1e6 * first_s / divisor),
-          std::to_string(error));
       EXPECT_LT(error, divisor == 1.0 ? 2e-3 : 0.7 * last)
           << actuator << ", divided by " << divisor;
       order = std::log2(last / error);
