@@ -13,7 +13,7 @@ namespace {
 
 std::vector<ExperimentEntry> table() {
   std::vector<ExperimentEntry> all;
-  for (const auto entries : {series_elastic_experiments()})
+  for (const auto entries : {series_elastic_experiments(), rubber_clutch_experiments()})
     all.insert(all.end(), entries.begin(), entries.end());
   return all;
 }

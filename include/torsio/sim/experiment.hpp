@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
 
@@ -56,5 +57,8 @@ struct SweepProtocol {
 /// @throws UsageError for an unknown name, or a value that the experiment cannot take; Cancelled if
 /// `progress` asks to stop.
 [[nodiscard]] Recording simulate(const ExperimentSpec& spec, const Progress& progress = {});
+/// The same with an actuator of one's own: `spec.actuator` is not looked at.
+[[nodiscard]] Recording simulate(const DataSheet& sheet, const ExperimentSpec& spec,
+                                 const Progress& progress = {});
 
 }  // namespace torsio
