@@ -31,6 +31,14 @@ std::vector<ExperimentInfo> experiments() {
   return infos;
 }
 
+std::vector<ExperimentInfo> experiments(const DataSheet& sheet) {
+  std::vector<ExperimentInfo> infos;
+  for (const ExperimentEntry& entry : entries()) {
+    if (entry.family == sheet.family) infos.push_back(entry.info);
+  }
+  return infos;
+}
+
 const ExperimentEntry& experiment_entry(std::string_view name, const DataSheet& sheet) {
   std::vector<std::string_view> known;
   for (const ExperimentEntry& entry : entries()) {

@@ -62,7 +62,7 @@ constexpr double kArm_m = 0.0567;
 constexpr double kWall_rad = rad_from_deg(45.0);
 constexpr double kWallStiffness_Nm_rad = 1e5 * kArm_m * kArm_m;
 constexpr double kWallDamping_Nms_rad = 0.8;
-constexpr double kBeyondWall_rad = rad_from_deg(26.0);
+constexpr double kBeyondWall_rad = rad_from_deg(27.0);
 
 /// A straight way to an angle, and a stand there.
 struct Leg {

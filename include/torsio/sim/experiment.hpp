@@ -36,6 +36,8 @@ struct ExperimentInfo {
 
 /// What can be done on the benches. A name may stand there for more than one family.
 [[nodiscard]] std::vector<ExperimentInfo> experiments();
+/// Those of one actuator.
+[[nodiscard]] std::vector<ExperimentInfo> experiments(const DataSheet& sheet);
 
 /// How the sweeps of one actuator are made: the lever with its 9 kg mass goes to and fro between
 /// +-amplitude (SPEC section 4.7). Levers of dfki-28, for which SPEC names none, are ours: its
