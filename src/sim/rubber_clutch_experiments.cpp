@@ -32,7 +32,8 @@ constexpr double kFrequency_Hz = 0.4;
 constexpr double kHighestFrequency_Hz = 1.0;
 constexpr double kPointPeriods = 8.0;
 
-constexpr std::array kGrid_deg = {4.0, 5.0, 6.0, 7.0, 8.0, 9.0};
+constexpr std::array kGrid_rad = {rad_from_deg(4.0), rad_from_deg(5.0), rad_from_deg(6.0),
+                                  rad_from_deg(7.0), rad_from_deg(8.0), rad_from_deg(9.0)};
 constexpr std::array kGrid_Hz = {0.1, 0.4, 0.7, 1.0};
 constexpr double kGridPeriods = 3.0;
 constexpr double kGridRest_s = 2.0;
@@ -169,8 +170,7 @@ BenchProgram along(const DataSheet& sheet, const Load& load, Path path) {
 std::vector<SinePoint> whole_grid() {
   std::vector<SinePoint> points;
   for (const double frequency_Hz : kGrid_Hz)
-    for (const double amplitude_deg : kGrid_deg)
-      points.push_back({rad_from_deg(amplitude_deg), frequency_Hz});
+    for (const double amplitude_rad : kGrid_rad) points.push_back({amplitude_rad, frequency_Hz});
   return points;
 }
 
@@ -211,7 +211,7 @@ Multisine drawn_multisine(const ExperimentSpec& spec) {
     largest = std::max(largest, std::abs(trial.step()));
   for (double& amplitude : tones.amplitudes)
     amplitude *= spec.amplitude.value_or(drawn_rad) / largest;
-  return Multisine(std::move(tones), kBenchRate_Hz);
+  return {std::move(tones), kBenchRate_Hz};
 }
 
 BenchProgram multisine(const DataSheet& sheet, const ExperimentSpec& spec) {

@@ -8,6 +8,7 @@
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/sim/plant.hpp"
 
 namespace torsio {
 namespace {
@@ -144,6 +145,15 @@ TEST(PieceSpread, VariantsOfOnePieceShareItsDraws) {
               << name << " " << row;
         }
       }
+    }
+  }
+}
+
+TEST(PieceSpread, EveryPieceMakesAPlant) {
+  for (const DataSheet& sheet : data_sheets()) {
+    for (unsigned serial = 0; serial < 200; ++serial) {
+      const std::string name = fmt::format("{}#{}", sheet.name, serial);
+      EXPECT_NO_THROW(Plant{plant_parameters(data_sheet(name))}) << name;
     }
   }
 }
