@@ -19,8 +19,11 @@ void TextTable::row(std::vector<std::string> cells) {
 
 namespace {
 
+constexpr std::size_t kLongestNumber = 24;  // with its unit; beyond, words begin with a number
+
 /// Whether a cell reads as a number; a missing one does not tell.
 bool is_numeric(const std::string& cell) {
+  if (cell.size() > kLongestNumber) return false;
   return cell.empty() || cell == "nan" ||
          std::string_view("0123456789+-.<").find(cell.front()) != std::string_view::npos;
 }
