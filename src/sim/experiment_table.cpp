@@ -13,7 +13,10 @@ namespace {
 
 std::vector<ExperimentEntry> table() {
   std::vector<ExperimentEntry> all;
-  for (const auto entries : {series_elastic_experiments()})
+  for (const auto entries : {
+           series_elastic_experiments(),
+           elastomer_experiments(),
+       })
     all.insert(all.end(), entries.begin(), entries.end());
   return all;
 }
