@@ -150,7 +150,8 @@ BenchProgram random_walk(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 BenchProgram multisine(const DataSheet& sheet, const ExperimentSpec& spec) {
-  // Two a factor of about 2.2; no one is a small multiple of another.
+  // Spread evenly over the decades; none is an odd multiple of another, where a cubic output curve
+  // would answer.
   const std::vector<double> frequencies_Hz = {0.05, 0.11, 0.23, 0.52, 1.1, 2.3, 4.7, 7.9};
   const double each_Nm = spec.amplitude.value_or(4.0) / static_cast<double>(frequencies_Hz.size());
   return torque_tracking(

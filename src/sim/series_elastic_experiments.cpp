@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 
 #include "experiment_table.hpp"
 #include "torque_references.hpp"
@@ -73,13 +74,15 @@ double torque_amplitude(const DataSheet& sheet, const ExperimentSpec& spec) {
 
 /// What the joint does under a torque that is exactly the reference.
 /// @throws UsageError if it comes further than `kUpright_rad`.
-void check_free_output(const DataSheet& sheet, const ExperimentSpec& spec, const Load& load,
-                       auto reference) {
+void check_swing(const DataSheet& sheet, const ExperimentSpec& spec, const Load& load,
+                 auto reference) {
   const double inertia_kg_m2 = load.inertia_kg_m2 + sheet.joint.inertia_kg_m2.value;
   const double period_s = 1.0 / kBenchRate_Hz;
   double angle_rad = 0.0;
   double speed_rad_s = 0.0;
-  for (double left_s = spec.duration_s.value_or(kTorqueTest_s); left_s > 0.0; left_s -= period_s) {
+  const double duration_s = spec.duration_s.value_or(kTorqueTest_s);
+  const auto ticks = static_cast<std::size_t>(std::lround(duration_s * kBenchRate_Hz));
+  for (std::size_t tick = 0; tick < ticks; ++tick) {
     const double torque_Nm = reference.step() - load.gravity_Nm * std::sin(angle_rad) -
                              sheet.joint.viscous_Nms_rad.value * speed_rad_s;
     speed_rad_s += period_s * torque_Nm / inertia_kg_m2;
@@ -101,7 +104,7 @@ BenchProgram torque_tracking(const DataSheet& sheet, const ExperimentSpec& spec,
   Load load{.is_locked = true};
   if (spec.lever_m) {
     load = lever(kMass_kg, *spec.lever_m, spec.inclination_rad);
-    check_free_output(sheet, spec, load, reference);
+    check_swing(sheet, spec, load, reference);
   } else if (spec.inclination_rad != 0.0) {
     throw UsageError({.place = fmt::format("{} inclination", spec.experiment),
                       .problem = "the output is locked",

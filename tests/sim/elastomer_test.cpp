@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <set>
@@ -60,19 +61,19 @@ double best_fit(const std::vector<double>& measured, const std::vector<double>& 
 /// Model (a) of paper 003 with its printed parameters, (d1|k1)-(d2|k2)-k3 in Nm, deg and s (SPEC
 /// sections 2.1 and 3.6), from rest; the twist is linear between samples.
 std::vector<double> model_a(const std::vector<double>& twist_deg) {
-  constexpr double kDamping[] = {2.172, 13.46};
-  constexpr double kStiffness[] = {3.803, 0.564};
+  constexpr std::array kDamping = {2.172, 13.46};
+  constexpr std::array kStiffness = {3.803, 0.564};
   constexpr double kSeries = 1.737;
   constexpr int kParts = 50;
   constexpr double kPart_s = 1.0 / (kLog_Hz * kParts);
-  double creep[] = {0.0, 0.0};
+  std::array creep = {0.0, 0.0};
   double before_deg = 0.0;
   std::vector<double> torque_Nm;
   for (const double now_deg : twist_deg) {
     for (int part = 0; part < kParts; ++part) {
       const double at_deg = before_deg + (now_deg - before_deg) * (part + 0.5) / kParts;
       const double carried_Nm = kSeries * (at_deg - creep[0] - creep[1]);
-      for (int j : {0, 1})
+      for (std::size_t j = 0; j < creep.size(); ++j)
         creep[j] += kPart_s * (carried_Nm - kStiffness[j] * creep[j]) / kDamping[j];
     }
     before_deg = now_deg;
@@ -144,8 +145,8 @@ TEST(Triangles, ModelAOfThePaperFitsThemAsInThePrototype) {
   const std::vector<double>& measured = recording.channel("torque_Nm").values;
   EXPECT_NEAR(best_fit(measured, model_a(twist_deg)), 90.6, 2.5);
   const test::Line line = test::straight_line(twist_deg, measured);
-  std::vector<double> on_line;
-  for (const double angle : twist_deg) on_line.push_back(line.intercept + line.slope * angle);
+  std::vector<double> on_line = twist_deg;
+  for (double& value : on_line) value = line.intercept + line.slope * value;
   EXPECT_NEAR(best_fit(measured, on_line), 73.6, 2.5);
 }
 
@@ -188,8 +189,10 @@ TEST(SlowCycles, CreepingGlueLosesItsShareEachCycle) {
     const double sound_Nm = sound.step(twist_rad[i], (twist_rad[i] - before_rad) * kLog_Hz);
     // The lowest point of a cycle: what the cycle before has cost is gone.
     if (i % kSlowCycle != 3 * kSlowCycle / 4) continue;
-    const auto cycles = static_cast<double>(i / kSlowCycle);
-    EXPECT_NEAR(torque(recording)[i] / sound_Nm, std::pow(0.997, cycles), 0.003) << cycles;
+    const std::size_t cycles = i / kSlowCycle;
+    EXPECT_NEAR(torque(recording)[i] / sound_Nm, std::pow(0.997, static_cast<double>(cycles)),
+                0.003)
+        << cycles;
   }
 }
 

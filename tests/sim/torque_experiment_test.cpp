@@ -27,13 +27,14 @@ namespace {
 constexpr double kRate_Hz = 1000.0;
 constexpr std::size_t kSettled = 2000;
 
-struct Error_Nm {
+/// [Nm]
+struct TrackingError {
   double mad = 0.0;
   double std = 0.0;  ///< of |e|
   double rmse = 0.0;
 };
 
-Error_Nm error_of(const std::vector<double>& wanted, const std::vector<double>& torque) {
+TrackingError error_of(const std::vector<double>& wanted, const std::vector<double>& torque) {
   double sum = 0.0;
   double squares = 0.0;
   for (std::size_t i = kSettled; i < torque.size(); ++i) {
@@ -65,14 +66,14 @@ Recording torque_run(const std::string& actuator, const std::string& experiment,
       {.actuator = actuator, .experiment = experiment, .seed = seed, .with_truth = true});
 }
 
-Error_Nm chirp_error(const ExperimentSpec& spec, double amplitude_Nm) {
+TrackingError chirp_error(const ExperimentSpec& spec, double amplitude_Nm) {
   const Recording recording = simulate(spec);
   return error_of(wanted_chirp(amplitude_Nm, recording.size()),
                   recording.channel("truth_torque_Nm").values);
 }
 
 /// The chirp with the output locked, tracked with a line that a sweep gave.
-Error_Nm chirp_error_with_sweep_line(const char* actuator, double amplitude_Nm) {
+TrackingError chirp_error_with_sweep_line(const char* actuator, double amplitude_Nm) {
   const DataSheet sheet = data_sheet(actuator);
   const test::Line line = test::spring_line(
       simulate({.actuator = actuator, .lever_m = sweep_protocol(actuator).train_lever_m.back()}));
@@ -97,10 +98,10 @@ Error_Nm chirp_error_with_sweep_line(const char* actuator, double amplitude_Nm) 
 
 // The prototype has 1.32±0.51 and 1.49±1.14 Nm (SPEC section 6).
 TEST(Chirp, WithALineFromASweepErrsAsThePrototypeDoes) {
-  const Error_Nm fifty = chirp_error_with_sweep_line("dfki-50", 13.0);
+  const TrackingError fifty = chirp_error_with_sweep_line("dfki-50", 13.0);
   EXPECT_NEAR(fifty.mad, 1.32, 0.25);
   EXPECT_NEAR(fifty.std, 0.51, 0.25);
-  const Error_Nm hundred_twenty = chirp_error_with_sweep_line("dfki-120", 20.0);
+  const TrackingError hundred_twenty = chirp_error_with_sweep_line("dfki-120", 20.0);
   EXPECT_NEAR(hundred_twenty.mad, 1.49, 0.25);
   EXPECT_NEAR(hundred_twenty.std, 1.14, 0.25);
 }
@@ -117,7 +118,7 @@ TEST(Chirp, ErrsByTheSpringsFrictionUnderTheLineOfTheDataSheet) {
   for (const Case& of : {Case{"dfki-28", 5.6, 0.79, 0.90}, Case{"dfki-50", 13.0, 1.57, 1.69},
                          Case{"dfki-120", 20.0, 1.61, 2.01}, Case{"dfki-300", 60.0, 3.44, 3.69}}) {
     SCOPED_TRACE(of.actuator);
-    const Error_Nm error =
+    const TrackingError error =
         chirp_error({.actuator = of.actuator, .experiment = "chirp", .seed = 5, .with_truth = true},
                     of.amplitude_Nm);
     EXPECT_NEAR(error.mad, of.mad_Nm, 0.1 * of.mad_Nm);
@@ -139,7 +140,7 @@ TEST(Chirp, LeverSwingsFreely) {
   EXPECT_LT(swing_deg(locked), 0.01);
   EXPECT_GT(swing_deg(free), 30.0);
   EXPECT_LT(swing_deg(free), 60.0);
-  const Error_Nm error =
+  const TrackingError error =
       error_of(wanted_chirp(13.0, free.size()), free.channel("truth_torque_Nm").values);
   EXPECT_NEAR(error.mad, 1.47, 0.15);  // the prototype's own line: 1.29
 }
