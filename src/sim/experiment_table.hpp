@@ -51,6 +51,7 @@ struct ExperimentEntry {
 [[nodiscard]] std::span<const ExperimentEntry> series_elastic_experiments() noexcept;
 [[nodiscard]] std::span<const ExperimentEntry> harmonic_drive_experiments() noexcept;
 [[nodiscard]] std::span<const ExperimentEntry> rubber_clutch_experiments() noexcept;
+[[nodiscard]] std::span<const ExperimentEntry> elastomer_experiments() noexcept;
 
 /// @throws UsageError that lists the names known for this family.
 [[nodiscard]] const ExperimentEntry& experiment_entry(std::string_view name,

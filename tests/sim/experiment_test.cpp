@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "support/straight_line.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -14,43 +15,9 @@
 namespace torsio {
 namespace {
 
-struct Line {
-  double slope = 0.0;
-  double intercept = 0.0;
-  double rmse = 0.0;
-};
-
-std::vector<double> deflection_deg(const Recording& recording) {
-  const auto& gear = recording.channel("gear_angle_rad").values;
-  const auto& joint = recording.channel("joint_angle_rad").values;
-  std::vector<double> deflection(gear.size());
-  for (std::size_t i = 0; i < gear.size(); ++i) deflection[i] = deg_from_rad(gear[i] - joint[i]);
-  return deflection;
-}
-
-/// Straight line of the torque over the deflection [deg], the first two seconds left out.
-Line straight_line(const Recording& recording) {
-  const std::vector<double> x = deflection_deg(recording);
-  const std::vector<double>& y = recording.channel("torque_Nm").values;
-  constexpr std::size_t kFirst = 2000;
-  const auto n = static_cast<double>(x.size() - kFirst);
-  double mean_x = 0.0;
-  double mean_y = 0.0;
-  for (std::size_t i = kFirst; i < x.size(); ++i) {
-    mean_x += x[i] / n;
-    mean_y += y[i] / n;
-  }
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
-  for (std::size_t i = kFirst; i < x.size(); ++i) {
-    xx += (x[i] - mean_x) * (x[i] - mean_x);
-    xy += (x[i] - mean_x) * (y[i] - mean_y);
-    yy += (y[i] - mean_y) * (y[i] - mean_y);
-  }
-  const double slope = xy / xx;
-  return {slope, mean_y - slope * mean_x, std::sqrt((yy - slope * xy) / n)};
-}
+using test::deflection_deg;
+using test::Line;
+using test::spring_line;
 
 Recording test_sweep(const std::string& actuator) {
   const SweepProtocol protocol = sweep_protocol(actuator);
@@ -69,7 +36,7 @@ double largest(const std::vector<double>& values) {
 // 19.94 Nm/deg, 1.41 Nm and 52.5 Nm (120): the brackets hold both.
 TEST(Sweep, LoopOfTheFiftyNmBenchIsThatOfThePrototype) {
   const Recording recording = test_sweep("dfki-50");
-  const Line line = straight_line(recording);
+  const Line line = spring_line(recording);
   EXPECT_NEAR(line.slope, 10.37, 0.5);
   EXPECT_NEAR(line.rmse, 1.33, 0.25);
   EXPECT_NEAR(std::abs(largest(recording.channel("torque_Nm").values)), 20.8, 1.2);
@@ -78,7 +45,7 @@ TEST(Sweep, LoopOfTheFiftyNmBenchIsThatOfThePrototype) {
 
 TEST(Sweep, LoopOfTheHundredTwentyNmBenchIsThatOfThePrototype) {
   const Recording recording = test_sweep("dfki-120");
-  const Line line = straight_line(recording);
+  const Line line = spring_line(recording);
   EXPECT_NEAR(line.slope, 20.02, 0.8);
   EXPECT_NEAR(line.rmse, 1.58, 0.25);
   EXPECT_NEAR(std::abs(largest(recording.channel("torque_Nm").values)), 51.1, 2.0);
@@ -104,7 +71,7 @@ TEST(StaticCycle, ReachesTheRatedTorqueAtTheSpringsStiffness) {
     const double rated_Nm = sheet.rating.torque_Nm.value;
     EXPECT_NEAR(std::abs(largest(recording.channel("torque_Nm").values)), rated_Nm,
                 0.03 * rated_Nm + sheet.joint.bearing_friction_Nm.value);
-    const Line line = straight_line(recording);
+    const Line line = spring_line(recording);
     const double stiffness_Nm_deg = rad_from_deg(spring.stiffness_Nm_rad.value);
     EXPECT_NEAR(line.slope, stiffness_Nm_deg, 0.06 * stiffness_Nm_deg) << actuator;
     EXPECT_GT(line.rmse, 0.3 * spring.friction_Nm.value) << actuator;
@@ -191,8 +158,9 @@ std::string message_of(const ExperimentSpec& spec) {
 TEST(Simulate, RefusesWhatTheBenchCannotDo) {
   EXPECT_NE(message_of({.actuator = "dfki-51"}).find("dfki-28, dfki-50, dfki-120, dfki-300"),
             std::string::npos);
-  EXPECT_NE(message_of({.experiment = "swep"}).find("one of sweep, static-cycle"),
-            std::string::npos);
+  EXPECT_NE(
+      message_of({.experiment = "swep"}).find("one of sweep, static-cycle, chirp, random-walk"),
+      std::string::npos);
   EXPECT_NE(message_of({.lever_m = 0.8}).find("at most the 50 Nm that dfki-50 is rated for"),
             std::string::npos);
   EXPECT_NE(message_of({.lever_m = -0.1}).find("0 < metres <= 2"), std::string::npos);

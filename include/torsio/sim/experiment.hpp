@@ -19,7 +19,7 @@ struct ExperimentSpec {
   std::string experiment = "sweep";
   std::uint64_t seed = 1;
   std::optional<double> duration_s = {};  ///< none: as long as the experiment's protocol is
-  std::optional<double> lever_m = {};     ///< none: the first of `sweep_protocol`
+  std::optional<double> lever_m = {};     ///< none: the first of `sweep_protocol`, or locked
   double inclination_rad = 0.0;           ///< of the lever's plane of motion from the vertical
   std::optional<double> amplitude = {};   ///< Nm or rad, as the experiment has it; none: its own
   std::optional<double> frequency_Hz = {};
