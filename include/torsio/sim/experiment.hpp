@@ -7,8 +7,10 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/actuator/wear.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
+#include "torsio/sim/fault_schedule.hpp"
 
 namespace torsio {
 
@@ -24,6 +26,8 @@ struct ExperimentSpec {
   std::optional<double> frequency_Hz = {};
   bool is_impedance_zero = false;  ///< of the joint's controller; false: high
   bool with_truth = false;         ///< add the `truth_*` channels, which no sensor sees
+  OperatingConditions conditions = {};
+  FaultSchedule faults = {};
 };
 
 struct ExperimentInfo {
@@ -53,6 +57,10 @@ struct SweepProtocol {
 /// The recording has the channels `motor_angle_rad` (of the rotor) `gear_angle_rad joint_angle_rad
 /// motor_current_A torque_Nm` at 1 kHz; `torque_Nm` is a 125 Hz load cell, held between its
 /// samples, which `Channel::fresh` marks, and 2 ms late. Equal specs give equal recordings.
+///
+/// Faults act on what the bench's loop sees and on what is logged; truth is what it is. Where a
+/// sensor tells NaN, the loop goes on with that sensor's last number, as a drive does that drops
+/// invalid frames; the log has the NaN.
 /// @throws UsageError for an unknown name, or a value that the experiment cannot take; Cancelled if
 /// `progress` asks to stop.
 [[nodiscard]] Recording simulate(const ExperimentSpec& spec, const Progress& progress = {});
