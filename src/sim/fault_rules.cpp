@@ -61,14 +61,14 @@ constexpr auto kRules = std::to_array<FaultRule>({
      .part = kFriction,
      .amount_key = "to",
      .amount_unit = "1",
-     .highest = 10.0,
+     .highest = kLargestFactor,
      .factor = &PlantCondition::friction_factor},
     {.name = "drift",
      .kind = FaultKind::drift,
      .part = kTorqueConstant,
      .amount_key = "to",
      .amount_unit = "1",
-     .highest = 10.0,
+     .highest = kLargestFactor,
      .factor = &PlantCondition::torque_constant_factor},
 });
 

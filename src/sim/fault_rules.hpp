@@ -8,6 +8,10 @@
 
 namespace torsio {
 
+/// Of one drift and of all together: with ten times the friction the plant's steps still follow its
+/// bristles, whose rate grows with the root.
+constexpr double kLargestFactor = 10.0;
+
 /// What can happen to whom: the one table that the reader and the injector go by.
 struct FaultRule {
   std::string_view name;  ///< as a schedule writes it

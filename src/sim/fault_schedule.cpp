@@ -104,7 +104,8 @@ PlantCondition FaultInjector::condition(double time_s, const PlantCondition& sou
     } else {
       const double since_s = std::max(time_s - fault.window.start_s, 0.0);
       const double done = since_s < fault.over_s ? since_s / fault.over_s : 1.0;
-      condition.*fault.factor *= 1.0 + (fault.amount - 1.0) * done;
+      double& factor = condition.*fault.factor;
+      factor = std::min(factor * (1.0 + (fault.amount - 1.0) * done), kLargestFactor);
     }
   }
   return condition;

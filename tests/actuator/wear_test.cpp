@@ -7,6 +7,7 @@
 
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
@@ -26,6 +27,12 @@ TEST(Wear, ChangesNothingByDefault) {
       EXPECT_EQ(after[i].value.origin, before[i].value.origin) << before[i].name;
     }
   }
+}
+
+TEST(Wear, TakesTheLimitsAsTheyAreTyped) {
+  for (const char* text : {"-40degC", "85degC"})
+    check({.temperature_K = si_quantity(text, "K", "test")});
+  EXPECT_EQ(friction_factor(si_quantity("25degC", "K", "test")), 1.0);
 }
 
 TEST(Wear, FrictionFallsWithTheTemperature) {

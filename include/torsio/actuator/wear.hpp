@@ -7,9 +7,9 @@ namespace torsio {
 /// In what state an actuator is run. All laws here are assumed (A): SPEC section 4.1 asks for a
 /// temperature factor and names its source for the trend (Wolf & Iskandar), but gives no numbers.
 struct OperatingConditions {
-  static constexpr double kReference_K = 298.15;  ///< 25 degC: the data sheets' temperature
-  static constexpr double kColdest_K = 233.15;    ///< -40 degC
-  static constexpr double kHottest_K = 358.15;    ///< 85 degC
+  static constexpr double kReference_K = 273.15 + 25.0;  ///< the data sheets' temperature
+  static constexpr double kColdest_K = 273.15 - 40.0;
+  static constexpr double kHottest_K = 273.15 + 85.0;
   static constexpr double kFastest_warm_up_s = 1.0;
 
   double temperature_K = kReference_K;  ///< of the gear's lubricant at the start

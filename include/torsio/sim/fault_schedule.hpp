@@ -45,7 +45,8 @@ struct ScheduledFault {
 };
 
 /// Plain data: what goes wrong in a run. Several at once combine: those of one sensor act in this
-/// order, each on what the one before left; factors multiply; of two stops the nearer one counts.
+/// order, each on what the one before left; factors multiply, up to 10; of two stops the nearer one
+/// counts.
 struct FaultSchedule {
   std::vector<ScheduledFault> faults;
 };
