@@ -10,15 +10,12 @@
 #include <string>
 #include <utility>
 
+#include "core/all_finite.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
-
-bool all_finite(std::span<const double> values) noexcept {
-  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
-}
 
 /// An error bar that says something; NaN for one that does not.
 double evidence(double std_dev) noexcept {

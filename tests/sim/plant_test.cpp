@@ -71,7 +71,7 @@ Load tenth_of_the_rating(const DataSheet& sheet) {
 TEST(NaturalFrequencies, AreThoseOfThreeEqualBodiesInAChain) {
   PlantParameters plant;
   plant.first = Gear::Parameters{.ratio = 10.0, .stiffness_Nm_rad = 400.0};
-  plant.second = Spring::Parameters{.elastic = {.stiffness_Nm_rad = 400.0}};
+  plant.second = Gear::Parameters{.ratio = 1.0, .stiffness_Nm_rad = 400.0};
   plant.rotor_inertia_kg_m2 = 1e-2;
   plant.middle_inertia_kg_m2 = 1.0;
   plant.joint_inertia_kg_m2 = 1.0;
