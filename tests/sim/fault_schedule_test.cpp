@@ -348,6 +348,60 @@ TEST(SimulateWithFaults, ABottomedSpringStopsAtItsStop) {
   EXPECT_LT(largest(faulty, "truth_spring_deflection_rad"), 1.1 * stop_rad);
 }
 
+TEST(SimulateWithFaults, AColdOldPieceInWhichEverythingFailsStaysFinite) {
+  std::vector<ScheduledFault> everything = {
+      {.what = "friction", .kind = FaultKind::drift, .amount = 10.0, .over_s = 0.5},
+      {.what = "friction", .kind = FaultKind::drift, .amount = 10.0, .over_s = 0.5},
+      {.what = "torque-constant", .kind = FaultKind::drift, .start_s = 1.0, .amount = 10.0},
+      {.what = "spring",
+       .kind = FaultKind::bottom,
+       .start_s = 0.5,
+       .amount = 1e-3,
+       .stop_stiffness_Nm_rad = 1e4},
+      {.what = "spring", .kind = FaultKind::broken, .start_s = 2.0},
+      {.what = "motor_angle_rad", .kind = FaultKind::jump, .start_s = 2.2, .amount = 1e6},
+      {.what = "motor_angle_rad", .kind = FaultKind::nan, .start_s = 2.5}};
+  for (const char* actuator : {"dfki-28", "dfki-50:bouc-wen", "dfki-120:lugre", "dfki-300"}) {
+    ExperimentSpec spec = faulty_sweep(everything);
+    spec.actuator = actuator;
+    spec.conditions = {.temperature_K = OperatingConditions::kColdest_K, .age = 1.0};
+    const Recording recording = simulate(spec);
+    for (const Channel& channel : recording.channels()) {
+      if (channel.name == "motor_angle_rad") continue;
+      EXPECT_TRUE(std::ranges::all_of(channel.values, [](double v) { return std::isfinite(v); }))
+          << actuator << " " << channel.name;
+    }
+    EXPECT_LT(largest(recording, "truth_joint_speed_rad_s"), 100.0) << actuator;
+  }
+}
+
+TEST(SimulateWithWear, ColdAndWarmingPiecesRubAsTheirTemperatureSays) {
+  const auto friction_Nm = [](const OperatingConditions& conditions) {
+    const Recording recording =
+        simulate({.duration_s = 4.0, .with_truth = true, .conditions = conditions});
+    return recording.channel("truth_motor_friction_Nm").values[3000];
+  };
+  const double reference = friction_Nm({});
+  EXPECT_NEAR(friction_Nm({.temperature_K = 273.15}) / reference, 1.517, 0.05);
+  // 50 K with a time constant of 1 s: 47.5 K after three.
+  EXPECT_NEAR(friction_Nm({.warm_up_K = 50.0, .warm_up_time_s = 1.0}) / reference, 0.453, 0.03);
+}
+
+TEST(SimulateWithWear, AnOldSpringGivesMore) {
+  const auto deflection_rad = [](double age) {
+    return largest(simulate({.actuator = "dfki-120",
+                             .experiment = "static-cycle",
+                             .duration_s = 6.0,
+                             .with_truth = true,
+                             .conditions = {.age = age}}),
+                   "truth_spring_deflection_rad");
+  };
+  // 120 Nm = K x + f + μ K x, and half the play on top of x [deg].
+  const double fresh_deg = (120.0 - 0.957) / 1.0317 / 19.8 + 0.01;
+  const double old_deg = (120.0 - 2.0 * 0.957) / (1.0 + 2.0 * 0.0317) / (0.9 * 19.8) + 0.03;
+  EXPECT_NEAR(deflection_rad(1.0) / deflection_rad(0.0), old_deg / fresh_deg, 0.002);
+}
+
 TEST(SimulateWithFaults, AWeakMotorNeedsMoreCurrent) {
   const Recording sound = simulate(faulty_sweep({}));
   const Recording faulty = simulate(
