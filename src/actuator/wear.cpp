@@ -81,9 +81,9 @@ void check(const OperatingConditions& conditions) {
   const double last_K = conditions.temperature_K + conditions.warm_up_K;
   require(is_possible(conditions.temperature_K), "temperature", range, conditions.temperature_K);
   require(is_possible(last_K), "temperature after the warm-up", range, last_K);
-  require(conditions.warm_up_time_s >= Limits::kFastest_warm_up_s &&
+  require(conditions.warm_up_time_s >= Limits::kShortestWarmUp_s &&
               std::isfinite(conditions.warm_up_time_s),
-          "warm-up time", fmt::format("at least {:g} s", Limits::kFastest_warm_up_s),
+          "warm-up time", fmt::format("at least {:g} s", Limits::kShortestWarmUp_s),
           conditions.warm_up_time_s);
   require(conditions.age >= 0.0 && conditions.age <= 1.0, "age", "0 to 1", conditions.age);
 }

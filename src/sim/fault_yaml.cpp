@@ -14,7 +14,7 @@ namespace {
 
 /// One of the names, or a complaint that lists them.
 std::string chosen(const YamlValue& yaml, const std::vector<std::string>& known) {
-  const std::string text = yaml.text();
+  std::string text = yaml.text();
   if (std::ranges::find(known, text) == known.end())
     yaml.refuse("one of " + joined(known), did_you_mean(text, known));
   return text;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <variant>
 
+#include "torsio/core/dispatch.hpp"
 #include "torsio/sim/plant.hpp"
 
 namespace torsio {
@@ -136,12 +137,10 @@ LuGreFriction::Parameters friction_of(const FrictionSheet& friction, double rati
 
 /// A stage without a ratio transmits one to one.
 double ratio_of(const auto& stage) {
-  return std::visit(
-      [](const auto& of) {
-        if constexpr (requires { of.ratio; }) return of.ratio;
-        return 1.0;
-      },
-      stage);
+  return dispatch(stage, [](const auto& of) {
+    if constexpr (requires { of.ratio; }) return of.ratio;
+    return 1.0;
+  });
 }
 
 double stiffness_of(const auto& stage) {
@@ -181,10 +180,11 @@ std::array<double, 2> natural_frequencies(const PlantParameters& parameters) {
 PlantParameters plant_parameters(const DataSheet& sheet) {
   PlantParameters plant;
   plant.motor = motor_of(sheet);
-  plant.first =
-      std::visit([](const auto& of) -> decltype(plant.first) { return stage_of(of); }, sheet.first);
-  plant.second = std::visit([](const auto& of) -> decltype(plant.second) { return stage_of(of); },
-                            sheet.second);
+  plant.first = std::visit(
+      [](const auto& of) -> decltype(PlantParameters::first) { return stage_of(of); }, sheet.first);
+  plant.second =
+      std::visit([](const auto& of) -> decltype(PlantParameters::second) { return stage_of(of); },
+                 sheet.second);
   // The friction sits where the gear is driven.
   if (std::holds_alternative<GearSheet>(sheet.second)) {
     plant.middle_friction = friction_of(sheet.friction, ratio_of(plant.second));

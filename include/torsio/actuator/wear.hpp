@@ -10,7 +10,7 @@ struct OperatingConditions {
   static constexpr double kReference_K = 273.15 + 25.0;  ///< the data sheets' temperature
   static constexpr double kColdest_K = 273.15 - 40.0;
   static constexpr double kHottest_K = 273.15 + 85.0;
-  static constexpr double kFastest_warm_up_s = 1.0;
+  static constexpr double kShortestWarmUp_s = 1.0;
 
   double temperature_K = kReference_K;  ///< of the gear's lubricant at the start
   double warm_up_K = 0.0;               ///< by how much it rises in the end
