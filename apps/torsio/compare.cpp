@@ -57,7 +57,7 @@ void add_compare(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("-o,--output", flags->output, "write the best model to this file");
   verb->add_option("--report", flags->report, "write the tables as a page for a browser");
-  verb->add_option("--seed", flags->seed, "seed of everything random")->capture_default_str();
+  add_seed(*verb, flags->seed, "seed of everything random");
   verb->add_flag("--allow-leak", flags->allow_leak,
                  "accept an input that the target was computed from; rows say so");
   verb->add_option("--json", flags->json.destination,

@@ -1,6 +1,8 @@
 #include "data_flags.hpp"
 
+#include <charconv>
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "output.hpp"
@@ -20,7 +22,20 @@ torsio::LoadOptions load_options(const DataFlags& flags, const torsio::Progress&
   return options;
 }
 
+/// CLI11 alone would read "-1" as a number near 2^64, and cut longer ones.
+std::string refuse_unless_whole(const std::string& text) {
+  std::uint64_t seed = 0;
+  const char* const end = text.data() + text.size();
+  const auto [at, code] = std::from_chars(text.data(), end, seed);
+  if (code == std::errc{} && at == end) return {};
+  return "expected a whole number from 0 to 18446744073709551615, found '" + text + "'";
+}
+
 }  // namespace
+
+void add_seed(CLI::App& verb, std::uint64_t& seed, const char* help) {
+  verb.add_option("--seed", seed, help)->check(refuse_unless_whole)->capture_default_str();
+}
 
 void DataFlags::add_recordings(CLI::App& verb, const char* help) {
   verb.add_option("REC", recordings, help);

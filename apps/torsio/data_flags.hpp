@@ -34,3 +34,6 @@ struct DataFlags {
 };
 
 inline constexpr std::uint64_t kDefaultSeed = 1;
+
+/// `--seed`, for every verb that draws random numbers.
+void add_seed(CLI::App& verb, std::uint64_t& seed, const char* help);

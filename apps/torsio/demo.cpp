@@ -93,7 +93,7 @@ void add_demo(CLI::App& app) {
   verb->add_option("--models", flags->models, "as for compare")->capture_default_str();
   verb->add_option("-o,--output", flags->output, "where the best model goes")
       ->capture_default_str();
-  verb->add_option("--seed", flags->seed, "seed of everything random")->capture_default_str();
+  add_seed(*verb, flags->seed, "seed of everything random");
   verb->add_option("--json", flags->json.destination,
                    "write compare's document to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

@@ -96,7 +96,7 @@ void add_fit(CLI::App& app) {
   verb->add_option("-o,--output", flags->output, "model file; untouched unless the fit succeeds");
   verb->add_option("--serial", flags->device_serial,
                    "serial number of the joint that the model belongs to");
-  verb->add_option("--seed", flags->seed, "seed of everything random")->capture_default_str();
+  add_seed(*verb, flags->seed, "seed of everything random");
   verb->add_flag("--allow-leak", flags->allow_leak,
                  "accept an input that the target was computed from; rows say so");
   verb->add_flag("--list", flags->list, "show the families and their settings");

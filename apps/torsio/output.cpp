@@ -5,7 +5,9 @@
 #include <span>
 
 #include "torsio/core/error.hpp"
-#include "torsio/files/whole_file.hpp"
+#include "torsio/files/output_file.hpp"
+
+bool is_standard_output(std::string_view path) { return path == "-" || path == "/dev/stdout"; }
 
 void print(std::string_view text) {
   const std::size_t written = std::fwrite(text.data(), 1, text.size(), stdout);
@@ -19,7 +21,7 @@ void remark(std::string_view text) {
 
 void JsonOutput::write(std::string_view document) const {
   if (destination.empty()) return;
-  if (destination == "-") {
+  if (is_standard_output(destination)) {
     print(document);
   } else {
     write_text(destination, document);
@@ -33,5 +35,7 @@ void require_folder_of(const std::string& path) {
 }
 
 void write_text(const std::string& path, std::string_view text) {
-  torsio::write_whole_file(path, std::as_bytes(std::span(text)));
+  torsio::OutputFile file(path);
+  file.write(std::as_bytes(std::span(text)));
+  file.commit();
 }

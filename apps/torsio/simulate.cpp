@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "data_flags.hpp"
 #include "output.hpp"
@@ -9,11 +12,15 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
+#include "torsio/report/svg_plot.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/sim/experiment.hpp"
+#include "torsio/sim/plant.hpp"
 #include "verbs.hpp"
 
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 struct SimulateFlags {
   std::string actuator;
@@ -25,24 +32,39 @@ struct SimulateFlags {
   std::string amplitude;
   std::string frequency;
   std::string impedance = "high";
+  std::string faults;
+  std::string temperature;
+  std::string warm_up;
+  std::string warm_up_time;
+  std::string age;
   std::string describe;
+  std::string plot;
   std::uint64_t seed = kDefaultSeed;
   bool with_truth = false;
   bool list = false;
   JsonOutput json;
 };
 
+/// The first one is the default.
+std::vector<std::string_view> variants(const torsio::DataSheet& sheet) {
+  std::vector<std::string_view> names(sheet.variants.begin(), sheet.variants.end());
+  std::erase(names, "");
+  return names;
+}
+
 std::string bench_list() {
   torsio::TextTable actuators;
-  actuators.header({"actuator", "what it is"});
+  actuators.header({"actuator", "variants (NAME:VARIANT)", "what it is"});
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
-    actuators.row({std::string(sheet.name), std::string(sheet.title)});
+    actuators.row({std::string(sheet.name), fmt::format("{}", fmt::join(variants(sheet), ", ")),
+                   std::string(sheet.title)});
   torsio::TextTable experiments;
   experiments.header({"experiment", "actuators", "what is done"});
   for (const torsio::ExperimentInfo& info : torsio::experiments())
     experiments.row(
         {std::string(info.name), std::string(info.actuators), std::string(info.description)});
-  return actuators.text() + "\n" + experiments.text();
+  return actuators.text() + "\nA piece of its own, by serial number: NAME#03\n\n" +
+         experiments.text();
 }
 
 std::string description(const torsio::DataSheet& sheet) {
@@ -51,9 +73,16 @@ std::string description(const torsio::DataSheet& sheet) {
   for (const torsio::SheetRow& row : torsio::describe(sheet))
     table.row({row.name, fmt::format("{:.6g}", row.value.value), std::string(row.unit),
                std::string(1, static_cast<char>(row.value.origin))});
+  const torsio::PlantParameters plant = torsio::plant_parameters(sheet);
+  const auto [low_Hz, high_Hz] = torsio::natural_frequencies(plant);
   return fmt::format(
-      "{}: {}\n{}origin: P printed in a paper, D derived from printed numbers, A assumed\n",
-      torsio::full_name(sheet), sheet.title, table.text());
+      "{}: {}\n{}origin: P printed in a paper, D derived from printed numbers, A assumed\n"
+      "longest step: {:.3g} us\n"
+      "natural frequencies, both ends free: {:.4g} Hz, {:.4g} Hz\n"
+      "faults can happen to the sensors {} and to {}\n",
+      torsio::full_name(sheet), sheet.title, table.text(), 1e6 * torsio::Plant::step_limit(plant),
+      low_Hz, high_Hz, fmt::join(torsio::fault_sensors(sheet), ", "),
+      fmt::join(torsio::fault_parts(sheet), ", "));
 }
 
 /// Nm or rad, as the experiment has it.
@@ -63,6 +92,18 @@ std::string_view amplitude_unit(const SimulateFlags& flags) {
     if (info.name == flags.experiment && !info.amplitude_unit.empty()) return info.amplitude_unit;
   }
   return "Nm";
+}
+
+torsio::OperatingConditions conditions(const SimulateFlags& flags) {
+  torsio::OperatingConditions of;
+  const auto set = [](double& value, const std::string& text, const char* unit, const char* flag) {
+    if (!text.empty()) value = torsio::si_quantity(text, unit, flag);
+  };
+  set(of.temperature_K, flags.temperature, "K", "--temperature");
+  set(of.warm_up_K, flags.warm_up, "K", "--warm-up");
+  set(of.warm_up_time_s, flags.warm_up_time, "s", "--warm-up-time");
+  set(of.age, flags.age, "1", "--age");
+  return of;
 }
 
 torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
@@ -80,24 +121,38 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
   if (!flags.frequency.empty())
     spec.frequency_Hz = torsio::si_quantity(flags.frequency, "Hz", "--frequency");
   spec.is_impedance_zero = flags.impedance == "zero";
+  spec.conditions = conditions(flags);
+  if (!flags.faults.empty())
+    spec.faults = torsio::read_fault_schedule(flags.faults, torsio::data_sheet(flags.actuator));
   return spec;
 }
-
-using Json = nlohmann::ordered_json;
 
 Json list_json() {
   Json document{{"actuators", Json::array()}, {"experiments", Json::array()}};
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
-    document["actuators"].push_back({{"name", sheet.name}, {"title", sheet.title}});
+    document["actuators"].push_back(
+        {{"name", sheet.name}, {"variants", variants(sheet)}, {"title", sheet.title}});
   for (const torsio::ExperimentInfo& info : torsio::experiments())
     document["experiments"].push_back(
-        {{"name", info.name}, {"actuators", info.actuators}, {"description", info.description}});
+        {{"name", info.name},
+         {"actuators", info.actuators},
+         {"amplitude_unit",
+          info.amplitude_unit.empty() ? Json(nullptr) : Json(info.amplitude_unit)},
+         {"description", info.description}});
   return document;
 }
 
 Json sheet_json(const torsio::DataSheet& sheet) {
-  Json document{
-      {"name", torsio::full_name(sheet)}, {"title", sheet.title}, {"parameters", Json::array()}};
+  const torsio::PlantParameters plant = torsio::plant_parameters(sheet);
+  Json document{{"name", torsio::full_name(sheet)},
+                {"title", sheet.title},
+                {"variant", sheet.variant.empty() ? Json(nullptr) : Json(sheet.variant)},
+                {"variants", variants(sheet)},
+                {"longest_step_s", torsio::Plant::step_limit(plant)},
+                {"natural_frequencies_Hz", torsio::natural_frequencies(plant)},
+                {"fault_sensors", torsio::fault_sensors(sheet)},
+                {"fault_parts", torsio::fault_parts(sheet)},
+                {"parameters", Json::array()}};
   for (const torsio::SheetRow& row : torsio::describe(sheet))
     document["parameters"].push_back(
         {{"name", row.name},
@@ -107,14 +162,34 @@ Json sheet_json(const torsio::DataSheet& sheet) {
   return document;
 }
 
-Json recording_json(const SimulateFlags& flags, const torsio::Recording& recording) {
-  Json document{{"actuator", flags.actuator},  {"experiment", flags.experiment},
-                {"seed", flags.seed},          {"recording", flags.output},
-                {"samples", recording.size()}, {"sample_rate_Hz", recording.sample_rate_Hz()},
+Json recording_json(const SimulateFlags& flags, const torsio::ExperimentSpec& spec,
+                    const torsio::Recording& recording) {
+  Json document{{"actuator", flags.actuator},
+                {"experiment", flags.experiment},
+                {"seed", flags.seed},
+                {"conditions",
+                 {{"temperature_K", spec.conditions.temperature_K},
+                  {"warm_up_K", spec.conditions.warm_up_K},
+                  {"warm_up_time_s", spec.conditions.warm_up_time_s},
+                  {"age", spec.conditions.age}}},
+                {"faults", spec.faults.faults.size()},
+                {"recording", flags.output},
+                {"samples", recording.size()},
+                {"sample_rate_Hz", recording.sample_rate_Hz()},
                 {"channels", Json::array()}};
   for (const torsio::Channel& channel : recording.channels())
     document["channels"].push_back(channel.name);
   return document;
+}
+
+/// The torque over the twist.
+std::string loop_picture(const SimulateFlags& flags, const torsio::Recording& recording) {
+  std::vector<double> twist_deg =
+      torsio::measured_twist(torsio::data_sheet(flags.actuator), recording);
+  for (double& twist : twist_deg) twist = torsio::deg_from_rad(twist);
+  return torsio::svg_plot({{"", twist_deg, recording.channel("torque_Nm").values}},
+                          {"deflection [deg]", "torque [Nm]"},
+                          fmt::format("{} {}", flags.actuator, flags.experiment));
 }
 
 /// What a person or, with --json, a machine is shown.
@@ -134,14 +209,17 @@ void run(const SimulateFlags& flags) {
                               .expected = "ACTUATOR EXPERIMENT -o FILE",
                               .advice = "torsio simulate --list shows what there is; example: "
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
-  if (flags.output == "-" && flags.json.destination == "-")
+  if (is_standard_output(flags.output) && is_standard_output(flags.json.destination))
     throw torsio::UsageError(
         {.place = "torsio simulate", .problem = "-o and --json cannot both be standard output"});
-  require_folder_of(flags.output);
+  for (const std::string& output : {flags.output, flags.json.destination, flags.plot})
+    DataFlags().check_output(output, {flags.faults});
+  const torsio::ExperimentSpec spec = experiment_spec(flags);
   ProgressBar bar;
-  const torsio::Recording recording = torsio::simulate(experiment_spec(flags), bar.listener());
+  const torsio::Recording recording = torsio::simulate(spec, bar.listener());
   torsio::write_csv(recording, flags.output);
-  flags.json.write(recording_json(flags, recording).dump(2) + "\n");
+  if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, recording));
+  flags.json.write(recording_json(flags, spec, recording).dump(2) + "\n");
   remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),
                      recording.sample_rate_Hz()));
 }
@@ -164,10 +242,23 @@ void add_simulate(CLI::App& app) {
   verb->add_option("--impedance", flags->impedance, "of the joint's controller: high or zero")
       ->check(CLI::IsMember({"high", "zero"}))
       ->capture_default_str();
-  verb->add_option("--seed", flags->seed, "seed of every sensor's noise")->capture_default_str();
+  verb->add_option("--faults", flags->faults,
+                   "YAML schedule of what fails when (docs/faults.md); --describe shows what can");
+  verb->add_option("--temperature", flags->temperature,
+                   "of the gear, -40degC to 85degC (default 25degC): friction falls as it rises");
+  verb->add_option("--warm-up", flags->warm_up,
+                   "by how much the gear gets warmer: 20K (default 0)");
+  verb->add_option("--warm-up-time", flags->warm_up_time,
+                   "time constant of the warm-up (default 20min)");
+  verb->add_option(
+      "--age", flags->age,
+      "0 (default) to 1: the served share of the life; softer, more friction and play");
+  add_seed(*verb, flags->seed, "seed of every sensor's noise, and of what the experiment draws");
   verb->add_flag("--truth", flags->with_truth, "add the truth_ channels that no sensor sees");
-  verb->add_flag("--list", flags->list, "show actuators and experiments");
-  verb->add_option("--describe", flags->describe, "show an actuator's data sheet");
+  verb->add_option("--plot", flags->plot, "draw the torque over the twist into an SVG file");
+  verb->add_flag("--list", flags->list, "show actuators with their variants, and experiments");
+  verb->add_option("--describe", flags->describe,
+                   "show a data sheet: dfki-50, dfki-50:bouc-wen, dfki-50#03");
   verb->add_option(
       "--json", flags->json.destination,
       "write what was recorded, or the list, as JSON to a file, or - for standard output");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/trimmed.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -70,12 +71,6 @@ constexpr auto kUnits = std::to_array<Unit>({
     {"K", "K"},
     {"degC", "K", 1.0, 273.15},
 });
-
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
-  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
-  return text;
-}
 
 }  // namespace
 

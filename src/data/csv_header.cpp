@@ -6,6 +6,7 @@
 #include <array>
 #include <map>
 
+#include "core/trimmed.hpp"
 #include "data/decimal.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
@@ -23,13 +24,6 @@ char detect_separator(std::string_view line) {
       if (!quoted && c == kSeparators.at(i)) ++count.at(i);
   }
   return kSeparators.at(static_cast<std::size_t>(std::ranges::max_element(count) - count.begin()));
-}
-
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  return text;
 }
 
 std::vector<std::string> split_names(std::string_view line, char separator,

@@ -10,15 +10,12 @@
 #include <string>
 #include <utility>
 
+#include "core/all_finite.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
-
-bool all_finite(std::span<const double> values) noexcept {
-  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
-}
 
 /// An error bar that says something; NaN for one that does not.
 double evidence(double std_dev) noexcept {
@@ -28,7 +25,7 @@ double evidence(double std_dev) noexcept {
 /// What a feature may leave its range by without being another number: conditions come as float32
 /// from many a bus. A feature that was 0 throughout is measured against one SI unit.
 double tolerance(double lowest, double highest) noexcept {
-  constexpr double kFloatRounding{std::numeric_limits<float>::epsilon()};
+  constexpr auto kFloatRounding = static_cast<double>(std::numeric_limits<float>::epsilon());
   const double magnitude = std::max(std::abs(lowest), std::abs(highest));
   return kFloatRounding * (magnitude > 0.0 ? magnitude : 1.0);
 }

@@ -42,11 +42,15 @@ OutputFile::OutputFile(fs::path place, int descriptor)
 OutputFile OutputFile::standard_output() { return {"standard output", ::dup(STDOUT_FILENO)}; }
 
 OutputFile::OutputFile(const fs::path& path) : place_(path) {
+  // Behind a link such as /dev/stdout no name may stand ("pipe:[1234]"): the kernel follows it.
   std::error_code code;
-  target_ = fs::is_symlink(path, code) ? fs::weakly_canonical(path) : path;
-  if (fs::exists(target_, code) && !fs::is_regular_file(target_, code)) {
-    descriptor_ = ::open(target_.c_str(), O_WRONLY | O_CLOEXEC);
+  const fs::file_status status = fs::status(path, code);
+  if (path == "/dev/stdout") {
+    descriptor_ = ::dup(STDOUT_FILENO);  // opened anew, a file would begin at its start
+  } else if (fs::exists(status) && !fs::is_regular_file(status)) {
+    descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
   } else {
+    target_ = fs::is_symlink(path, code) ? fs::weakly_canonical(path) : path;
     temporary_ = temporary_name(target_);
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   }

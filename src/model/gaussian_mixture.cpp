@@ -9,14 +9,11 @@
 #include <numeric>
 #include <span>
 
+#include "core/all_finite.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
-
-bool all_finite(std::span<const double> values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-}
 
 void check_shapes(const GaussianMixture& mixture, const std::string& place) {
   const std::size_t m = mixture.size();

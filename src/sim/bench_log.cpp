@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <utility>
-#include <variant>
+
+#include "experiment_table.hpp"
 
 namespace torsio {
 namespace {
@@ -25,51 +29,22 @@ StageNames stage_names(ActuatorFamily family) {
 
 }  // namespace
 
-BenchLog::BenchLog(const DataSheet& sheet, std::size_t samples, bool with_truth)
-    : rate_Hz_(sheet.sensors.log_rate_Hz.value) {
-  add_sensed_channels(sheet);
+BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth)
+    : rate_Hz_(sheet.sensors.log_rate_Hz.value),
+      ticks_a_sample_(static_cast<std::size_t>(std::lround(kBenchRate_Hz / rate_Hz_))) {
+  const std::size_t samples = ticks / ticks_a_sample_ + 1;
+  for (const SensedChannel& source : sensed_channels(sheet)) {
+    Sensed& of = sensed_.emplace_back(
+        Sensed{.source = source, .channel = {.name = std::string(source.name), .values = {}}});
+    of.channel.values.reserve(samples);
+    of.channel.fresh.reserve(samples);
+  }
   if (with_truth) add_truth_channels(sheet);
-  for (Sensed& of : sensed_) of.channel.values.reserve(samples);
   for (Truth& of : truth_) of.channel.values.reserve(samples);
-  fresh_.reserve(samples);
-}
-
-void BenchLog::sense(std::string name, double Measurement::*value, double scale) {
-  sensed_.push_back({{std::move(name), {}}, value, scale});
 }
 
 void BenchLog::tell(std::string_view name, double (*value)(const Plant& plant)) {
   truth_.push_back({{fmt::format("truth_{}", name), {}}, value});
-}
-
-void BenchLog::add_sensed_channels(const DataSheet& sheet) {
-  switch (sheet.family) {
-    case ActuatorFamily::series_elastic:
-      sense("motor_angle_rad", &Measurement::motor_angle_rad);
-      sense("gear_angle_rad", &Measurement::middle_angle_rad);
-      sense("joint_angle_rad", &Measurement::joint_angle_rad);
-      sense("motor_current_A", &Measurement::motor_current_A);
-      break;
-    case ActuatorFamily::elastomer:
-      sense("motor_angle_rad", &Measurement::motor_angle_rad);
-      sense("spring_deflection_rad", &Measurement::twist_rad);
-      sense("motor_current_A", &Measurement::motor_current_A);
-      break;
-    case ActuatorFamily::rubber_clutch:
-      sense("input_angle_rad", &Measurement::motor_angle_rad,
-            1.0 / total_ratio(plant_parameters(sheet)));
-      sense("joint_angle_rad", &Measurement::joint_angle_rad);
-      sense("motor_current_A", &Measurement::motor_current_A);
-      break;
-    case ActuatorFamily::harmonic_drive:
-      sense("motor_angle_rad", &Measurement::motor_angle_rad);
-      sense("wave_generator_angle_rad", &Measurement::middle_angle_rad);
-      sense("joint_angle_rad", &Measurement::joint_angle_rad);
-      sense("motor_torque_Nm", &Measurement::motor_current_A,
-            sheet.motor.torque_constant_Nm_A.value);
-      break;
-  }
-  sense("torque_Nm", &Measurement::torque_Nm);
 }
 
 void BenchLog::add_truth_channels(const DataSheet& sheet) {
@@ -92,10 +67,14 @@ void BenchLog::add_truth_channels(const DataSheet& sheet) {
   tell("joint_speed_rad_s", [](const Plant& plant) { return plant.state().joint_speed_rad_s; });
 }
 
-void BenchLog::add(const Measurement& measured, bool is_torque_fresh, const Plant& plant,
-                   double torque_Nm) {
-  for (Sensed& of : sensed_) of.channel.values.push_back(of.scale * measured.*of.value);
-  fresh_.push_back(is_torque_fresh ? 1 : 0);
+void BenchLog::add(const Measurement& measured, const Plant& plant, double torque_Nm) {
+  for (Sensed& of : sensed_) of.is_fresh = of.is_fresh || measured.*of.source.is_fresh;
+  if (tick_++ % ticks_a_sample_ != 0) return;
+  for (Sensed& of : sensed_) {
+    of.channel.values.push_back(of.source.scale * measured.*of.source.value);
+    of.channel.fresh.push_back(of.is_fresh ? 1 : 0);
+    of.is_fresh = false;
+  }
   if (truth_.empty()) return;
   truth_torque_Nm_.push_back(torque_Nm);
   for (Truth& of : truth_) of.channel.values.push_back(of.value(plant));
@@ -103,8 +82,13 @@ void BenchLog::add(const Measurement& measured, bool is_torque_fresh, const Plan
 
 Recording BenchLog::finish(std::string name) {
   Recording recording(std::move(name), rate_Hz_);
-  sensed_.back().channel.fresh = std::move(fresh_);
-  for (Sensed& of : sensed_) recording.add(std::move(of.channel));
+  const std::string_view load_cell = sensed_.back().source.name;
+  for (Sensed& of : sensed_) {
+    std::vector<std::uint8_t>& fresh = of.channel.fresh;
+    const bool is_always_fresh = std::ranges::find(fresh, 0) == fresh.end();
+    if (is_always_fresh && of.source.name != load_cell) fresh.clear();
+    recording.add(std::move(of.channel));
+  }
   if (!truth_.empty()) recording.add({"truth_torque_Nm", std::move(truth_torque_Nm_)});
   for (Truth& of : truth_) recording.add(std::move(of.channel));
   return recording;

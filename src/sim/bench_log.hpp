@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "sensed_channels.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/sim/plant.hpp"
@@ -14,35 +14,36 @@
 namespace torsio {
 
 /// What the bench of one actuator writes down: the channels of its paper, and on request the
-/// `truth_` ones. Grows by one sample a call.
+/// `truth_` ones.
 class BenchLog {
  public:
-  BenchLog(const DataSheet& sheet, std::size_t samples, bool with_truth);
+  /// @param ticks of the bench's loop in the whole run; a logger may be slower
+  BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth);
 
-  /// @param is_torque_fresh whether the load cell delivered since the last call
-  void add(const Measurement& measured, bool is_torque_fresh, const Plant& plant, double torque_Nm);
+  /// Call at every tick.
+  void add(const Measurement& measured, const Plant& plant, double torque_Nm);
+  /// A channel whose sensor delivered for each sample has no freshness, except the load cell's.
   [[nodiscard]] Recording finish(std::string name);
 
  private:
   struct Sensed {
+    SensedChannel source;
     Channel channel;
-    double Measurement::*value;
-    double scale = 1.0;
+    bool is_fresh = false;  ///< the sensor delivered since the last sample
   };
   struct Truth {
     Channel channel;
     double (*value)(const Plant& plant);
   };
-  void sense(std::string name, double Measurement::*value, double scale = 1.0);
   void tell(std::string_view name, double (*value)(const Plant& plant));
-  void add_sensed_channels(const DataSheet& sheet);
   void add_truth_channels(const DataSheet& sheet);
 
   double rate_Hz_;
+  std::size_t ticks_a_sample_;
+  std::size_t tick_ = 0;
   std::vector<Sensed> sensed_;  ///< the torque is the last
   std::vector<Truth> truth_;
   std::vector<double> truth_torque_Nm_;
-  std::vector<std::uint8_t> fresh_;
 };
 
 }  // namespace torsio

@@ -4,9 +4,12 @@
 
 #include <cmath>
 #include <cstddef>
+#include <span>
+#include <vector>
 
 #include "bench_log.hpp"
 #include "experiment_table.hpp"
+#include "sensed_channels.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
@@ -67,50 +70,85 @@ double load_cell_torque(LoadCell cell, const Plant& plant, const Load& load) {
   return plant.torques().joint_Nm;
 }
 
+/// What the bench's loop acts on: where a sensor tells no number, the last one.
+Measurement with_last_numbers(Measurement measured, const Measurement& last,
+                              std::span<const SensedChannel> channels) {
+  for (const SensedChannel& channel : channels)
+    if (!std::isfinite(measured.*channel.value)) measured.*channel.value = last.*channel.value;
+  return measured;
+}
+
 }  // namespace
 
 Recording simulate(const ExperimentSpec& spec, const Progress& progress) {
   return simulate(data_sheet(spec.actuator), spec, progress);
 }
 
-Recording simulate(const DataSheet& sheet, const ExperimentSpec& spec, const Progress& progress) {
+Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const Progress& progress) {
+  check(spec.conditions);
+  const DataSheet sheet = aged(nominal, spec.conditions.age);
   const ExperimentEntry& entry = experiment_entry(spec.experiment, sheet);
   check(spec, entry, sheet);
   BenchProgram program = entry.program(sheet, spec);
+  const double duration_s = spec.duration_s.value_or(program.duration_s);
+  FaultInjector faults(spec.faults, sheet, duration_s);
+  const auto condition = [&](double time_s) {
+    return faults.condition(
+        time_s, {.friction_factor = friction_factor(temperature(spec.conditions, time_s))});
+  };
+  const bool changes = spec.conditions.warm_up_K != 0.0 || !spec.faults.faults.empty();
   Plant plant(plant_parameters(sheet));
   plant.reset(program.start_angle_rad, program.start);
+  plant.set_condition(condition(0.0));
   Load load = program.start;
   SensorSet sensors(sheet, kBenchRate_Hz, spec.seed);
   sensors.reset(load_cell_torque(program.load_cell, plant, load));
 
-  const double duration_s = spec.duration_s.value_or(program.duration_s);
   const auto ticks = static_cast<std::size_t>(std::lround(duration_s * kBenchRate_Hz));
-  const auto ticks_a_sample =
-      static_cast<std::size_t>(std::lround(kBenchRate_Hz / sheet.sensors.log_rate_Hz.value));
-  BenchLog log(sheet, ticks / ticks_a_sample + 1, spec.with_truth);
-  bool is_torque_fresh = false;
+  const std::vector<SensedChannel> channels = sensed_channels(sheet);
+  Measurement seen;
+  BenchLog log(sheet, ticks, spec.with_truth);
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     if (tick % 1000 == 0) {
       report_progress(progress, static_cast<double>(tick) / static_cast<double>(ticks),
                       "simulating");
     }
+    const double time_s = static_cast<double>(tick) / kBenchRate_Hz;
     const double torque_Nm = load_cell_torque(program.load_cell, plant, load);
-    const Measurement measured = sensors.step(plant, torque_Nm);
-    is_torque_fresh = is_torque_fresh || measured.is_torque_fresh;
-    if (tick % ticks_a_sample == 0) {
-      log.add(measured, is_torque_fresh, plant, torque_Nm);
-      is_torque_fresh = false;
-    }
-    const BenchAction action = program.next(measured);
+    Measurement measured = sensors.step(plant, torque_Nm);
+    if (tick == 0) seen = measured;
+    faults.apply(measured, time_s);
+    log.add(measured, plant, torque_Nm);
+    seen = with_last_numbers(measured, seen, channels);
+    const BenchAction action = program.next(seen);
     load = action.load;
+    if (changes) plant.set_condition(condition(time_s));
     const Fault fault = plant.step(action.command, load, 1.0 / kBenchRate_Hz);
     if (fault != Fault::none)
-      throw Error({.place = fmt::format("{} at {} s", entry.info.name,
-                                        static_cast<double>(tick) / kBenchRate_Hz),
+      throw Error({.place = fmt::format("{} at {} s", entry.info.name, time_s),
                    .problem = fmt::format("the plant refuses its command or load: {}",
                                           torsio::name(fault))});
   }
   return log.finish(fmt::format("{} {} seed {}", full_name(sheet), entry.info.name, spec.seed));
+}
+
+std::vector<double> measured_twist(const DataSheet& sheet, const Recording& recording) {
+  const auto difference = [&](const char* of, double scale, const char* minus) {
+    std::vector<double> twist = recording.channel(of).values;
+    const std::vector<double>& other = recording.channel(minus).values;
+    for (std::size_t i = 0; i < twist.size(); ++i) twist[i] = scale * twist[i] - other[i];
+    return twist;
+  };
+  switch (sheet.family) {
+    case ActuatorFamily::elastomer: return recording.channel("spring_deflection_rad").values;
+    case ActuatorFamily::rubber_clutch:
+      return difference("input_angle_rad", 1.0, "joint_angle_rad");
+    case ActuatorFamily::harmonic_drive:
+      return difference("motor_angle_rad", 1.0 / std::get<TubeSheet>(sheet.first).ratio.value,
+                        "wave_generator_angle_rad");
+    case ActuatorFamily::series_elastic: break;
+  }
+  return difference("gear_angle_rad", 1.0, "joint_angle_rad");
 }
 
 }  // namespace torsio

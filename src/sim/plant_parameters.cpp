@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <variant>
 
+#include "torsio/core/dispatch.hpp"
 #include "torsio/sim/plant.hpp"
 
 namespace torsio {
@@ -134,10 +137,20 @@ LuGreFriction::Parameters friction_of(const FrictionSheet& friction, double rati
 
 /// A stage without a ratio transmits one to one.
 double ratio_of(const auto& stage) {
+  return dispatch(stage, [](const auto& of) {
+    if constexpr (requires { of.ratio; }) return of.ratio;
+    return 1.0;
+  });
+}
+
+double stiffness_of(const auto& stage) {
   return std::visit(
       [](const auto& of) {
-        if constexpr (requires { of.ratio; }) return of.ratio;
-        return 1.0;
+        if constexpr (requires { of.elastic; }) {
+          return of.elastic.stiffness_Nm_rad;
+        } else {
+          return of.stiffness_Nm_rad;
+        }
       },
       stage);
 }
@@ -148,13 +161,30 @@ double total_ratio(const PlantParameters& parameters) noexcept {
   return ratio_of(parameters.first) * ratio_of(parameters.second);
 }
 
+std::array<double, 2> natural_frequencies(const PlantParameters& parameters) {
+  // All seen from the joint; a chain of three free bodies: λ = ω² solves λ² − sum λ + product = 0.
+  const double second_ratio = ratio_of(parameters.second);
+  const double both_ratios = total_ratio(parameters);
+  const double rotor = parameters.rotor_inertia_kg_m2 * both_ratios * both_ratios;
+  const double middle = parameters.middle_inertia_kg_m2 * second_ratio * second_ratio;
+  const double joint = parameters.joint_inertia_kg_m2;
+  const double first = stiffness_of(parameters.first) * second_ratio * second_ratio;
+  const double second = stiffness_of(parameters.second);
+  const double sum = first * (1.0 / rotor + 1.0 / middle) + second * (1.0 / middle + 1.0 / joint);
+  const double product = first * second * (rotor + middle + joint) / (rotor * middle * joint);
+  const double high = 0.5 * (sum + std::sqrt(sum * sum - 4.0 * product));
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  return {std::sqrt(product / high) / kTurn, std::sqrt(high) / kTurn};
+}
+
 PlantParameters plant_parameters(const DataSheet& sheet) {
   PlantParameters plant;
   plant.motor = motor_of(sheet);
-  plant.first =
-      std::visit([](const auto& of) -> decltype(plant.first) { return stage_of(of); }, sheet.first);
-  plant.second = std::visit([](const auto& of) -> decltype(plant.second) { return stage_of(of); },
-                            sheet.second);
+  plant.first = std::visit(
+      [](const auto& of) -> decltype(PlantParameters::first) { return stage_of(of); }, sheet.first);
+  plant.second =
+      std::visit([](const auto& of) -> decltype(PlantParameters::second) { return stage_of(of); },
+                 sheet.second);
   // The friction sits where the gear is driven.
   if (std::holds_alternative<GearSheet>(sheet.second)) {
     plant.middle_friction = friction_of(sheet.friction, ratio_of(plant.second));

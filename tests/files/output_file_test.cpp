@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -54,6 +57,25 @@ TEST(OutputFile, TwoOfOneNameDoNotMix) {
   second.commit();
   first.commit();
   EXPECT_EQ(text_of(folder.path("a")), "first");
+  EXPECT_EQ(folder.files(), 1U);
+}
+
+TEST(OutputFile, WritesStraightIntoADeviceOrPipeThroughALink) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(pipe(ends.data()), 0);
+  // A link to a link of the kernel's to "pipe:[1234]", which is no name.
+  const TemporaryFolder folder;
+  std::filesystem::create_symlink("/dev/fd/" + std::to_string(ends[1]), folder.path("link"));
+  {
+    OutputFile file(folder.path("link"));
+    write(file, "straight");
+    file.commit();
+  }
+  close(ends[1]);
+  std::string text(20, ' ');
+  text.resize(static_cast<std::size_t>(read(ends[0], text.data(), text.size())));
+  close(ends[0]);
+  EXPECT_EQ(text, "straight");
   EXPECT_EQ(folder.files(), 1U);
 }
 

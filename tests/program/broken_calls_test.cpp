@@ -32,6 +32,38 @@ TEST_F(BrokenCalls, OfTheCommandLineExitWithTwo) {
   EXPECT_EQ(torsio("check").exit_code, kCallWasWrong);
 }
 
+TEST_F(BrokenCalls, WithASeedThatIsNoneAreRefusedByEveryVerb) {
+  for (const char* seed : {"-1", "18446744073709551616", "1.5", "one"})
+    for (const char* call :
+         {"simulate dfki-50 sweep -o x.csv", "demo", "fit a.csv --model linear -o m.safetensors",
+          "compare a.csv --test b.csv"})
+      expect_error(torsio(std::string(call) + " --seed " + seed), kCallWasWrong,
+                   "--seed: expected a whole number from 0 to 18446744073709551615, found '" +
+                       std::string(seed) + "'");
+}
+
+TEST_F(BrokenCalls, WithABadFaultScheduleFailBeforeTheRun) {
+  const std::string call = "simulate dfki-50 sweep --duration 4s -o x.csv --faults faults.yaml";
+  expect_error(torsio(call), kCallWasWrong, "faults.yaml: cannot be opened");
+  folder_.file("faults.yaml", "faults:\n  - {sensor: gear_angel_rad, fault: freeze, at: 1s}\n");
+  expect_error(torsio(call), kCallWasWrong, "faults.yaml: line 2 (faults[0].sensor)");
+  folder_.file("faults.yaml", "faults:\n  - {sensor: gear_angle_rad, fault: freeze, at: 5s}\n");
+  expect_error(torsio(call), kCallWasWrong, "a time within the run, before 4 s");
+  expect_error(torsio("simulate dfki-50 sweep -o faults.yaml --faults faults.yaml"), kCallWasWrong,
+               "would replace a file that is read");
+  EXPECT_EQ(contents("x.csv"), "");
+}
+
+TEST_F(BrokenCalls, WithConditionsOutOfRangeNameTheRange) {
+  const std::string call = "simulate dfki-50 sweep --duration 1s -o x.csv ";
+  expect_error(torsio(call + "--temperature 200degC"), kCallWasWrong, "-40 to 85 degC");
+  expect_error(torsio(call + "--temperature 40Nm"), kCallWasWrong, "--temperature: expected");
+  expect_error(torsio(call + "--warm-up 100K"), kCallWasWrong, "temperature after the warm-up");
+  expect_error(torsio(call + "--warm-up-time 0s"), kCallWasWrong,
+               "warm-up time: expected at least");
+  expect_error(torsio(call + "--age 2"), kCallWasWrong, "age: expected 0 to 1, found 2");
+}
+
 TEST_F(BrokenCalls, NameTheFileThatIsMissing) {
   for (const char* call :
        {"check nowhere.csv", "fit nowhere.csv --model linear -o m.safetensors",

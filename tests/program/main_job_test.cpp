@@ -105,6 +105,58 @@ TEST_F(MainJob, TellsMachinesWhatItSimulated) {
   EXPECT_EQ(nlohmann::json::parse(outcome.out).at("samples"), 2000);
   const auto list = nlohmann::json::parse(torsio("simulate --list --json -").out);
   EXPECT_EQ(list.at("actuators").size(), 7U);
+  EXPECT_EQ(list.at("actuators").at(1).at("variants").size(), 3U);
+  const auto sheet =
+      nlohmann::json::parse(torsio("simulate --describe dfki-50:bouc-wen#03 --json -").out);
+  EXPECT_EQ(sheet.at("name"), "dfki-50:bouc-wen#03");
+  EXPECT_EQ(sheet.at("variant"), "bouc-wen");
+  EXPECT_GT(sheet.at("longest_step_s"), 1e-5);
+  EXPECT_LT(sheet.at("natural_frequencies_Hz").at(0), sheet.at("natural_frequencies_Hz").at(1));
+}
+
+TEST_F(MainJob, RecordsAnActuatorThatFailsAndWears) {
+  folder_.file("faults.yaml",
+               "faults:\n"
+               "  - {sensor: gear_angle_rad, fault: nan, at: 500ms, for: 100ms}\n"
+               "  - {sensor: joint_angle_rad, fault: silent, at: 1s}\n"
+               "  - {part: friction, fault: drift, at: 0s, to: 1.3, over: 2s}\n");
+  const std::string call = "simulate dfki-50 sweep --duration 2s ";
+  const Outcome outcome = torsio(
+      call + "--faults faults.yaml --temperature 40degC --warm-up 10K --age 0.5 -o a.csv --json -");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json.at("faults"), 3);
+  EXPECT_EQ(json.at("conditions").at("temperature_K"), 313.15);
+  EXPECT_NE(contents("a.csv").find("joint_angle_fresh_1"), std::string::npos);
+  EXPECT_NE(contents("a.csv").find(",nan,"), std::string::npos);
+  // What stands for the defaults changes nothing.
+  ASSERT_EQ(torsio(call + "-o b.csv").exit_code, 0);
+  ASSERT_EQ(torsio(call + "--temperature 25degC --warm-up 0K --age 0 -o c.csv").exit_code, 0);
+  EXPECT_EQ(contents("c.csv"), contents("b.csv"));
+}
+
+TEST_F(MainJob, WritesItsDocumentIntoDevicesAndPipes) {
+  const std::string call = "{torsio} simulate dfki-50 sweep --duration 1s -o a.csv --json ";
+  for (const std::string& to :
+       {call + "/dev/stdout", call + "/dev/stdout | cat", call + "/dev/fd/3 3>&1 | cat",
+        "mkfifo pipe; cat pipe & " + call + "pipe; wait"}) {
+    const Outcome outcome = shell(to);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    ASSERT_TRUE(nlohmann::json::accept(outcome.out)) << to << "\n" << outcome.out << outcome.err;
+    EXPECT_EQ(nlohmann::json::parse(outcome.out).at("samples"), 1000);
+  }
+  EXPECT_EQ(shell(call + "/dev/null").exit_code, 0);
+  EXPECT_EQ(shell(call + "/dev/full").exit_code, 1);
+}
+
+TEST_F(MainJob, DrawsTheLoopOfEveryFamily) {
+  for (const char* call : {"dfki-50:lugre#07 sweep", "elastomer triangles", "rubber-clutch slip",
+                           "harmonic-drive:soft human-torque"}) {
+    const Outcome outcome =
+        torsio(std::string("simulate ") + call + " --duration 2s -o a.csv --plot loop.svg");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_NE(contents("loop.svg").find("deflection [deg]"), std::string::npos) << call;
+  }
 }
 
 TEST_F(MainJob, WritesAPageForTheBrowser) {

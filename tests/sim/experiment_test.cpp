@@ -158,9 +158,9 @@ std::string message_of(const ExperimentSpec& spec) {
 TEST(Simulate, RefusesWhatTheBenchCannotDo) {
   EXPECT_NE(message_of({.actuator = "dfki-51"}).find("dfki-28, dfki-50, dfki-120, dfki-300"),
             std::string::npos);
-  EXPECT_NE(
-      message_of({.experiment = "swep"}).find("one of sweep, static-cycle, chirp, random-walk"),
-      std::string::npos);
+  EXPECT_NE(message_of({.experiment = "swep"})
+                .find("one of sweep, static-cycle, hold, chirp, random-walk"),
+            std::string::npos);
   EXPECT_NE(message_of({.lever_m = 0.8}).find("at most the 50 Nm that dfki-50 is rated for"),
             std::string::npos);
   EXPECT_NE(message_of({.lever_m = -0.1}).find("0 < metres <= 2"), std::string::npos);

@@ -63,6 +63,19 @@ TEST(Plant, GearModeHasItsNaturalFrequency) {
   }
 }
 
+TEST(NaturalFrequencies, AreThoseOfThreeEqualBodiesInAChain) {
+  PlantParameters plant;
+  plant.first = Gear::Parameters{.ratio = 10.0, .stiffness_Nm_rad = 400.0};
+  plant.second = Gear::Parameters{.ratio = 1.0, .stiffness_Nm_rad = 400.0};
+  plant.rotor_inertia_kg_m2 = 1e-2;
+  plant.middle_inertia_kg_m2 = 1.0;
+  plant.joint_inertia_kg_m2 = 1.0;
+  const auto [low_Hz, high_Hz] = natural_frequencies(plant);
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  EXPECT_NEAR(low_Hz, 20.0 / kTurn, 1e-12);
+  EXPECT_NEAR(high_Hz, 20.0 * std::sqrt(3.0) / kTurn, 1e-12);
+}
+
 TEST(Plant, StaysWhereResetPutIt) {
   for (const DataSheet& sheet : data_sheets()) {
     Plant plant(plant_parameters(sheet));

@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/actuator/wear.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
+#include "torsio/sim/fault_schedule.hpp"
 
 namespace torsio {
 
@@ -25,6 +27,8 @@ struct ExperimentSpec {
   std::optional<double> frequency_Hz = {};
   bool is_impedance_zero = false;  ///< of the joint's controller; false: high
   bool with_truth = false;         ///< add the `truth_*` channels, which no sensor sees
+  OperatingConditions conditions = {};
+  FaultSchedule faults = {};
 };
 
 struct ExperimentInfo {
@@ -56,11 +60,21 @@ struct SweepProtocol {
 /// The recording has the channels `motor_angle_rad` (of the rotor) `gear_angle_rad joint_angle_rad
 /// motor_current_A torque_Nm` at 1 kHz; `torque_Nm` is a 125 Hz load cell, held between its
 /// samples, which `Channel::fresh` marks, and 2 ms late. Equal specs give equal recordings.
+///
+/// Faults act on what the bench's loop sees and on what is logged; truth is what it is. Where a
+/// sensor tells NaN, the loop goes on with that sensor's last number, as a drive does that drops
+/// invalid frames; the log has the NaN.
 /// @throws UsageError for an unknown name, or a value that the experiment cannot take; Cancelled if
 /// `progress` asks to stop.
 [[nodiscard]] Recording simulate(const ExperimentSpec& spec, const Progress& progress = {});
 /// The same with an actuator of one's own: `spec.actuator` is not looked at.
 [[nodiscard]] Recording simulate(const DataSheet& sheet, const ExperimentSpec& spec,
                                  const Progress& progress = {});
+
+/// The twist [rad] of the actuator's elastic element as its sensors tell it: gear minus joint, the
+/// coupling's own sensor, input minus joint, or the tube's two ends.
+/// @throws Error if the recording is of another family.
+[[nodiscard]] std::vector<double> measured_twist(const DataSheet& sheet,
+                                                 const Recording& recording);
 
 }  // namespace torsio

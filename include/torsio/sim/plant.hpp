@@ -75,6 +75,10 @@ struct PlantParameters {
 /// @returns turns of the rotor a turn of the joint
 [[nodiscard]] double total_ratio(const PlantParameters& parameters) noexcept;
 
+/// @returns the two natural frequencies [Hz], the lower first: both ends free, no load on the joint,
+/// elastic curves at the origin, nothing rubbing or relaxing
+[[nodiscard]] std::array<double, 2> natural_frequencies(const PlantParameters& parameters);
+
 struct PlantState {
   double rotor_angle_rad = 0.0;
   double rotor_speed_rad_s = 0.0;

@@ -18,8 +18,14 @@ struct Measurement {
   double joint_angle_rad = 0.0;
   double twist_rad = 0.0;  ///< of the second stage, where a sensor of its own tells it
   double motor_current_A = 0.0;
-  double torque_Nm = 0.0;        ///< load cell: held between its samples, late
-  bool is_torque_fresh = false;  ///< the load cell delivered at this tick
+  double torque_Nm = 0.0;  ///< load cell: held between its samples, late
+  // Whether the sensor delivered at this tick; where not, its last value is held.
+  bool is_motor_angle_fresh = true;
+  bool is_middle_angle_fresh = true;
+  bool is_joint_angle_fresh = true;
+  bool is_twist_fresh = true;
+  bool is_motor_current_fresh = true;
+  bool is_torque_fresh = false;
 };
 
 /// The sensors of one actuator with their noise. A tick draws the same numbers whatever the plant

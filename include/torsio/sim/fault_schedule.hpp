@@ -1,0 +1,123 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/realtime.hpp"
+#include "torsio/sim/plant.hpp"
+#include "torsio/sim/sensor_set.hpp"
+
+namespace torsio {
+
+/// What goes wrong. The first seven happen to sensors, the last two to the spring; drift happens to
+/// both sensors and parts.
+enum class FaultKind : std::uint8_t {
+  freeze,  ///< delivers on, always the same value
+  jump,    ///< `amount` too much
+  drift,  ///< of a sensor: `amount` too much for each second since the start; of a part: its factor
+          ///< goes from 1 to `amount` in `over_s` and stays there
+  flip,   ///< the sign is wrong
+  coarse,  ///< nothing finer than `amount` is left
+  silent,  ///< delivers nothing: the last value is held, and not fresh
+  nan,     ///< no number
+  broken,  ///< the spring's torque falls to the share `amount`, 0 for a spring in two pieces
+  bottom,  ///< the spring's deflection meets a stop at `amount` radians, to either side
+};
+
+/// One thing that goes wrong, and when.
+struct ScheduledFault {
+  /// A sensor, by the name of its logged channel ("gear_angle_rad"), or a part: "spring" (of
+  /// actuators with a gear behind their spring, "gear"), "friction", "torque-constant".
+  std::string what;
+  FaultKind kind = FaultKind::freeze;
+  double start_s = 0.0;
+  std::optional<double> duration_s = {};  ///< none: to the end; afterwards all is sound again
+  double amount = 0.0;                    ///< as the kind says; of a sensor in its channel's unit
+  double over_s = 0.0;                    ///< drift of a part
+  double stop_stiffness_Nm_rad = 0.0;     ///< bottom
+  std::string place = {};                 ///< where it was read, for messages
+};
+
+/// Plain data: what goes wrong in a run. Several at once combine: those of one sensor act in this
+/// order, each on what the one before left; factors multiply, up to 10; of two stops the nearer one
+/// counts.
+struct FaultSchedule {
+  std::vector<ScheduledFault> faults;
+};
+
+/// What can go wrong with an actuator: its logged channels, and its parts.
+[[nodiscard]] std::vector<std::string> fault_sensors(const DataSheet& sheet);
+[[nodiscard]] std::vector<std::string> fault_parts(const DataSheet& sheet);
+
+/// Reads a schedule for this actuator; docs/faults.md has the format.
+///
+///     faults:
+///       - {sensor: gear_angle_rad, fault: freeze, at: 5s, for: 2s}
+///       - {part: friction, fault: drift, to: 1.3, over: 60s, at: 0s}
+///
+/// @throws UsageError naming file, line, what was expected (with the known names) and found.
+[[nodiscard]] FaultSchedule read_fault_schedule(const std::string& path, const DataSheet& sheet);
+[[nodiscard]] FaultSchedule parse_fault_schedule(std::string_view text, const std::string& name,
+                                                 const DataSheet& sheet);
+
+/// Makes a schedule happen to what a loop and its logger see, and to a plant.
+///
+/// A sensor that delivers more slowly than the loop (the load cell) shows its fault from its next
+/// delivery on. Neither `apply` nor `condition` allocates, locks or throws.
+class FaultInjector {
+ public:
+  static constexpr std::size_t kMostFaults = 256;
+
+  /// @param run_s how long the run lasts
+  /// @throws UsageError if the actuator has no such sensor or part, if that cannot fail so, for an
+  /// amount out of range, a time that is negative or beyond the run, or too many faults.
+  FaultInjector(const FaultSchedule& schedule, const DataSheet& sheet,
+                double run_s = std::numeric_limits<double>::infinity());
+
+  void reset() noexcept;
+
+  /// Call once a tick, with rising times.
+  void apply(Measurement& measured, double time_s) noexcept TORSIO_REALTIME;
+  /// @param sound the condition without these faults (temperature)
+  [[nodiscard]] PlantCondition condition(
+      double time_s, const PlantCondition& sound = {}) const noexcept TORSIO_REALTIME;
+
+ private:
+  struct Window {
+    double start_s = 0.0;
+    double end_s = 0.0;
+    [[nodiscard]] bool holds(double time_s) const noexcept;
+  };
+  struct SensorFault {
+    FaultKind kind = FaultKind::freeze;
+    Window window;
+    double amount = 0.0;  ///< in the unit of the measurement
+    std::optional<double> held = {};
+  };
+  struct Sensor {
+    double Measurement::*value;
+    bool Measurement::*is_fresh;
+    std::vector<SensorFault> faults = {};
+    std::optional<double> delivered = {};
+  };
+  struct PartFault {
+    double PlantCondition::*factor;  ///< null: a stop
+    Window window;
+    double amount = 0.0;
+    double over_s = 0.0;
+    double stop_stiffness_Nm_rad = 0.0;
+  };
+  void add_sensor_fault(const ScheduledFault& fault, const Window& window, const DataSheet& sheet);
+  static double changed(SensorFault& fault, double value, double time_s) noexcept TORSIO_REALTIME;
+
+  std::vector<Sensor> sensors_;
+  std::vector<PartFault> parts_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/sim/fault_schedule.hpp"
+
+namespace torsio {
+
+/// Of one drift and of all together: with ten times the friction the plant's steps still follow its
+/// bristles, whose rate grows with the root.
+constexpr double kLargestFactor = 10.0;
+
+/// What can happen to whom: the one table that the reader and the injector go by.
+struct FaultRule {
+  std::string_view name;  ///< as a schedule writes it
+  FaultKind kind = FaultKind::freeze;
+  std::string_view part = {};                ///< empty: any sensor
+  std::string_view amount_key = {};          ///< how a schedule names `amount`; empty: none
+  std::string_view amount_unit = {};         ///< of a part; of a sensor it is the channel's
+  double lowest = 0.0;                       ///< of |amount|
+  double highest = 0.0;                      ///< of |amount|
+  double PlantCondition::*factor = nullptr;  ///< that the amount becomes
+};
+
+/// The part's name in `FaultRule::part`, whatever this actuator calls it; empty: no part of it.
+[[nodiscard]] std::string_view common_part_name(std::string_view part, const DataSheet& sheet);
+
+/// Null if it has no such fault.
+[[nodiscard]] const FaultRule* find_fault_rule(std::string_view name,
+                                               std::string_view part) noexcept;
+[[nodiscard]] const FaultRule* find_fault_rule(FaultKind kind, std::string_view part) noexcept;
+
+/// What can happen to a part, or to any sensor: names as a schedule writes them.
+[[nodiscard]] std::vector<std::string> fault_names(std::string_view part);
+
+/// @throws UsageError as the constructor of `FaultInjector` does.
+void check_fault(const ScheduledFault& fault, const DataSheet& sheet, double run_s);
+
+}  // namespace torsio

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/sim/sensor_set.hpp"
+
+namespace torsio {
+
+/// A logged channel and where it stands in a measurement: the one table that the log, and faults by
+/// channel name, go by.
+struct SensedChannel {
+  std::string_view name;
+  double Measurement::*value;
+  bool Measurement::*is_fresh;
+  double scale = 1.0;  ///< channel = scale * measurement
+};
+
+/// What the logger of this actuator writes down; the torque is the last.
+[[nodiscard]] std::vector<SensedChannel> sensed_channels(const DataSheet& sheet);
+
+}  // namespace torsio

@@ -1,0 +1,1 @@
+torsio_fuzzer(fault_schedule torsio::lab)
