@@ -19,10 +19,10 @@ class PlantLanes;
 /// The equations, their order and the division of long steps are those of Plant; the parameters may
 /// differ from plant to plant. What a plant does depends neither on the others nor on how many
 /// there are: its bits are the same in any batch on one instruction set. Against Plant, and between
-/// instruction sets, rounding differs: sine, exponential and hyperbolic tangent are Highway's, 1e-15
-/// of their range from the standard library's, and products are fused where the processor can. Rotor
-/// angles must stay within 4e8 / ripple order, where their sine is still known; beyond it ripple and
-/// kinematic error vanish.
+/// instruction sets, rounding differs: sine, exponential and hyperbolic tangent are Highway's, right
+/// to some 1e-15 of their range, and products are fused where the processor can. After a second of
+/// random commands states and torques are within 1e-12 of their range. Sines are right up to 4e8
+/// (rotor angle times ripple order); beyond it ripple and kinematic error are wrong, but finite.
 class PlantBatch {
  public:
   /// All at rest at angle 0, unloaded.
