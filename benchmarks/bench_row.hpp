@@ -43,5 +43,7 @@ double best_seconds(const Work& work, double at_least_s = 0.5, std::size_t at_le
 
 /// Multiply-adds of doubles that one thread does in a second.
 [[nodiscard]] double multiply_adds_per_second();
+/// Doubles in one vector.
+[[nodiscard]] std::size_t vector_lanes();
 
 }  // namespace torsio::bench

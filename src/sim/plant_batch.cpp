@@ -30,8 +30,8 @@ PlantBatch::PlantBatch(std::span<const PlantParameters> parameters, double longe
   }
 }
 
-PlantBatch::PlantBatch(PlantBatch&&) noexcept = default;
-PlantBatch& PlantBatch::operator=(PlantBatch&&) noexcept = default;
+PlantBatch::PlantBatch(PlantBatch&& other) noexcept = default;
+PlantBatch& PlantBatch::operator=(PlantBatch&& other) noexcept = default;
 PlantBatch::~PlantBatch() = default;
 
 void PlantBatch::reset(double joint_angle_rad, const Load& load) noexcept {

@@ -33,8 +33,8 @@ class PlantBatch {
   /// @throws Error if there is no plant, if their kinds differ or this chain of stages has no kernel
   /// (the message lists those that have), or as Plant does.
   explicit PlantBatch(std::span<const PlantParameters> parameters, double longest_step_s = 0.0);
-  PlantBatch(PlantBatch&&) noexcept;
-  PlantBatch& operator=(PlantBatch&&) noexcept;
+  PlantBatch(PlantBatch&& other) noexcept;
+  PlantBatch& operator=(PlantBatch&& other) noexcept;
   ~PlantBatch();
 
   /// As Plant's: all plants, or one of them. Conditions stay.
