@@ -44,7 +44,7 @@ double steps_per_second(const PlantParameters& parameters) {
 
 /// Additions, multiplications, multiply-adds, divisions, comparisons and conversions of doubles in a
 /// step of dfki-120 with all effects at work: those in the compiled kernel of PlantBatch. Sines and
-/// cosines are 22 each, exponentials 24, and together 70 % of all; a step that needs no Stribeck
+/// cosines are 22 each, exponentials 24, and together some 60 % of all; a step that needs no Stribeck
 /// curve, no play and no moving bristle has 100 fewer.
 constexpr double kOperations = 360.0;
 

@@ -237,6 +237,27 @@ TEST(PlantBatch, DividesAStepThatIsLongerThanItsOwn) {
   for (std::size_t i = 0; i < once.size(); ++i) EXPECT_EQ(numbers(once, i), numbers(ten_times, i));
 }
 
+TEST(PlantBatch, TakesTheManyStepsOfASmallBoucWenKnee) {
+  BatchInputs inputs = batch_inputs("dfki-50:bouc-wen", 0, 9, kTicks);
+  for (std::size_t i = 0; i < inputs.parameters.size(); ++i) {
+    auto& spring = std::get<Spring::Parameters>(inputs.parameters[i].second);
+    spring.friction = BoucWen::Parameters{.constant_Nm = 1e-3 * static_cast<double>(i),
+                                          .knee_rad = 1e-6 * static_cast<double>(1 + i)};
+  }
+  const double step_s = PlantBatch(inputs.parameters).longest_step();
+  EXPECT_LT(largest_difference(run_plants(inputs, step_s), run_batch(inputs, step_s)), kTolerance);
+}
+
+TEST(PlantBatch, ClipsALuGreForceThatOutlastsItsLoad) {
+  BatchInputs inputs = batch_inputs("dfki-28:lugre", 0, 9, kTicks);
+  for (PlantParameters& of : inputs.parameters) {
+    std::get<Spring::Parameters>(of.second).friction =
+        LuGreSlip::Parameters{.load_factor = 0.3, .bristle_rad = 0.03};
+  }
+  const double step_s = PlantBatch(inputs.parameters).longest_step();
+  EXPECT_LT(largest_difference(run_plants(inputs, step_s), run_batch(inputs, step_s)), kTolerance);
+}
+
 TEST(PlantBatch, RefusesStepsAndCountsThatMeanNothing) {
   const BatchInputs inputs = batch_inputs("dfki-28", 0, 2, 1);
   PlantBatch batch(inputs.parameters);
