@@ -6,11 +6,14 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace torsio::bench {
 
 /// A folder of this process; what lies in it is gone at its end.
 [[nodiscard]] const std::filesystem::path& scratch_folder();
+/// Writes them there, raw, for a peer.
+void write_doubles(const char* file, const std::vector<double>& values);
 
 /// One measurement. A value in "<something>/s" is better the larger, any other the smaller.
 struct Row {
@@ -40,5 +43,7 @@ double best_seconds(const Work& work, double at_least_s = 0.5, std::size_t at_le
 
 /// Multiply-adds of doubles that one thread does in a second.
 [[nodiscard]] double multiply_adds_per_second();
+/// Doubles in one vector.
+[[nodiscard]] std::size_t vector_lanes();
 
 }  // namespace torsio::bench

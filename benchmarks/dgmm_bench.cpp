@@ -1,5 +1,4 @@
 #include <cmath>
-#include <fstream>
 #include <vector>
 
 #include "rows.hpp"
@@ -85,13 +84,6 @@ QueryTimes time_queries(std::size_t count) {
   std::vector<Conditional> results(count);
   const double seconds = best_seconds([&] { regression.query(inputs, results); });
   return {seconds / static_cast<double>(count), stream_seconds(static_cast<std::size_t>(bytes))};
-}
-
-void write_doubles(const char* file, const std::vector<double>& values) {
-  std::ofstream out(scratch_folder() / file, std::ios::binary);
-  out.exceptions(std::ios::failbit | std::ios::badbit);
-  out.write(reinterpret_cast<const char*>(values.data()),
-            static_cast<std::streamsize>(values.size() * sizeof(double)));
 }
 
 }  // namespace

@@ -57,6 +57,8 @@ double multiply_add_chains(std::size_t rounds, double* HWY_RESTRICT result) {
   return 10.0 * static_cast<double>(rounds * hn::Lanes(d));
 }
 
+std::size_t double_lanes() { return hn::Lanes(hn::ScalableTag<double>()); }
+
 }  // namespace torsio::bench::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -65,6 +67,7 @@ namespace torsio::bench {
 
 HWY_EXPORT(read_all);
 HWY_EXPORT(multiply_add_chains);
+HWY_EXPORT(double_lanes);
 
 double stream_seconds(std::size_t bytes) {
   const AlignedVector<std::uint64_t> data(bytes / sizeof(std::uint64_t), 1);
@@ -88,6 +91,8 @@ double multiply_adds_per_second() {
   });
   return done / seconds;
 }
+
+std::size_t vector_lanes() { return HWY_DYNAMIC_DISPATCH(double_lanes)(); }
 
 }  // namespace torsio::bench
 #endif

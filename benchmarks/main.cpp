@@ -37,6 +37,20 @@ constexpr std::array kBenches{
     Bench{"em_k100_iteration", em_k100_iteration, Peer{"Armadillo", write_em_inputs}},
     Bench{"csv_load", csv_load, Peer{"numpy.loadtxt"}},
     Bench{"simulate_dfki_120", simulate_dfki_120},
+    Bench{"simulate_single", simulate_single, Peer{"MuJoCo", write_simulate_inputs}},
+    Bench{"simulate_single_bouc_wen", simulate_single_bouc_wen},
+    Bench{"simulate_single_lugre", simulate_single_lugre},
+    Bench{"simulate_no_ripple", simulate_no_ripple},
+    Bench{"simulate_no_gear_error", simulate_no_gear_error},
+    Bench{"simulate_no_play", simulate_no_play},
+    Bench{"simulate_no_hysteresis", simulate_no_hysteresis},
+    Bench{"simulate_no_stribeck", simulate_no_stribeck},
+    Bench{"simulate_no_friction", simulate_no_friction},
+    Bench{"simulate_no_effects", simulate_no_effects},
+    Bench{"simulate_batched", simulate_batched},
+    Bench{"simulate_batched_held", simulate_batched_held},
+    Bench{"simulate_batched_bouc_wen", simulate_batched_bouc_wen},
+    Bench{"simulate_batched_lugre", simulate_batched_lugre},
 };
 
 struct Arguments {
@@ -101,7 +115,7 @@ void print(const Json& row) {
   const auto number = [&](const char* key) {
     return row[key].is_null() ? std::string("-") : fmt::format("{:.5g}", row[key].get<double>());
   };
-  fmt::print("{:<18} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", row["name"].get<std::string>(),
+  fmt::print("{:<26} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", row["name"].get<std::string>(),
              number("value"), row["unit"].get<std::string>(), number("floor"), number("x_floor"),
              number("peer_value"), number("x_peer"),
              row["peer"].is_null() ? "-" : row["peer"].get<std::string>());
@@ -114,7 +128,7 @@ int run(const Arguments& arguments) {
     file.open(arguments.json);
     if (!file) throw std::invalid_argument(arguments.json + ": cannot be written");
   }
-  fmt::print("{:<18} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", "row", "value", "unit", "floor",
+  fmt::print("{:<26} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", "row", "value", "unit", "floor",
              "x_floor", "peer value", "x_peer", "peer");
   Json rows = Json::array();
   for (const Bench& bench : kBenches) {

@@ -10,10 +10,25 @@ Row dgmm_online_216k();
 Row em_k100_iteration();
 Row csv_load();
 Row simulate_dfki_120();
+Row simulate_single();
+Row simulate_single_bouc_wen();
+Row simulate_single_lugre();
+Row simulate_no_ripple();
+Row simulate_no_gear_error();
+Row simulate_no_play();
+Row simulate_no_hysteresis();
+Row simulate_no_stribeck();
+Row simulate_no_friction();
+Row simulate_no_effects();
+Row simulate_batched();
+Row simulate_batched_held();
+Row simulate_batched_bouc_wen();
+Row simulate_batched_lugre();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.
 void write_query_inputs();
 void write_em_inputs();
+void write_simulate_inputs();
 
 }  // namespace torsio::bench

@@ -2,6 +2,8 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
+#include <vector>
 
 #include "bench_row.hpp"
 
@@ -32,6 +34,13 @@ class Folder {
 const std::filesystem::path& scratch_folder() {
   static const Folder folder;
   return folder.path();
+}
+
+void write_doubles(const char* file, const std::vector<double>& values) {
+  std::ofstream out(scratch_folder() / file, std::ios::binary);
+  out.exceptions(std::ios::failbit | std::ios::badbit);
+  out.write(reinterpret_cast<const char*>(values.data()),
+            static_cast<std::streamsize>(values.size() * sizeof(double)));
 }
 
 }  // namespace torsio::bench

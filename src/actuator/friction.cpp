@@ -14,7 +14,8 @@ constexpr auto kPlace = "LuGre friction";
 LuGreFriction::LuGreFriction(const Parameters& parameters)
     : parameters_(parameters),
       inverse_stribeck_squared_(1.0 / (parameters.stribeck_rad_s * parameters.stribeck_rad_s)),
-      inverse_bristle_(1.0 / parameters.bristle_rad) {
+      inverse_bristle_(1.0 / parameters.bristle_rad),
+      is_only_viscous_(parameters.coulomb_Nm == 0.0 && parameters.load_factor == 0.0) {
   require_not_negative(kPlace, "coulomb_Nm", parameters.coulomb_Nm);
   require_not_negative(kPlace, "load_factor", parameters.load_factor);
   require_not_negative(kPlace, "viscous_Nms_rad", parameters.viscous_Nms_rad);

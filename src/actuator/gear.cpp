@@ -1,5 +1,6 @@
 #include "torsio/actuator/gear.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -15,6 +16,7 @@ constexpr auto kPlace = "gear";
 Gear::Gear(const Parameters& parameters)
     : parameters_(parameters),
       inverse_ratio_(1.0 / parameters.ratio),
+      has_error_(parameters.error_rad != std::array{0.0, 0.0}),
       hysteresis_({.constant_Nm = parameters.hysteresis_Nm,
                    .load_factor = 0.0,
                    .share = {1.0},

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <variant>
 
+#include "plant_input.hpp"
 #include "stages.hpp"
 #include "torsio/core/dispatch.hpp"
 #include "torsio/core/error.hpp"
@@ -15,16 +16,6 @@ namespace torsio {
 namespace {
 
 constexpr double kGravity_m_s2 = 9.81;
-constexpr double kMostSmallSteps = 1e6;  // in one step: it must return
-
-bool is_usable(const PlantCommand& command, const Load& load, double dt_s,
-               double longest_dt_s) noexcept {
-  return dt_s > 0.0 && dt_s <= longest_dt_s && load.inertia_kg_m2 >= 0.0 &&
-         !std::isnan(load.wall_angle_rad) &&
-         std::isfinite(command.current_A + load.inertia_kg_m2 + load.gravity_Nm +
-                       load.external_torque_Nm + load.wall_stiffness_Nm_rad +
-                       load.wall_damping_Nms_rad);
-}
 
 void require_inertia(const char* name, double value) {
   if (value > 0.0 && std::isfinite(value)) return;
@@ -115,7 +106,7 @@ double Plant::step_limit(const PlantParameters& parameters) {
 
 void Plant::set_period(double dt_s) noexcept {
   asked_dt_s_ = dt_s;
-  small_steps_ = static_cast<std::size_t>(std::ceil(dt_s / longest_step_s_ * (1.0 - 1e-12)));
+  small_steps_ = small_steps(dt_s, longest_step_s_);
   dt_s_ = dt_s / static_cast<double>(small_steps_);
   motor_.set_period(dt_s_);
   dispatch(first_, [this](auto& stage) { set_stage_period(stage, dt_s_); });
@@ -161,7 +152,7 @@ void Plant::reset(double joint_angle_rad, const Load& load) noexcept {
 }
 
 Fault Plant::step(const PlantCommand& command, const Load& load, double dt_s) noexcept {
-  if (!is_usable(command, load, dt_s, kMostSmallSteps * longest_step_s_))
+  if (!is_usable(dt_s, longest_step_s_) || !is_usable(command, load))
     return Fault::input_not_finite;
   if (dt_s != asked_dt_s_) set_period(dt_s);
   for (std::size_t i = 0; i < small_steps_; ++i) small_step(command, load);

@@ -63,6 +63,13 @@ class CreepChain {
   [[nodiscard]] const Vector& element_stiffness() const noexcept { return spring_; }      ///< kⱼ
   [[nodiscard]] const Vector& element_damping() const noexcept { return damper_; }        ///< dⱼ
 
+  // What `loaded` and `unloaded` work with, for kernels that step many chains at once.
+  [[nodiscard]] const std::array<Vector, kElements>& transition() const noexcept {
+    return transition_;
+  }
+  [[nodiscard]] const Vector& push() const noexcept { return push_; }
+  [[nodiscard]] const Vector& recovery() const noexcept { return recovery_; }
+
  private:
   double relaxed_stiffness_;
   double stiffness_;

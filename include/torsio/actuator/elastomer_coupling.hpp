@@ -58,6 +58,16 @@ class ElastomerCoupling {
   [[nodiscard]] double glue() const noexcept { return glue_; }
   /// @returns g(T) [Nm]
   [[nodiscard]] double output_torque(double linear_Nm) const noexcept TORSIO_REALTIME;
+  /// g(T) = T (1 + T (quadratic + T cubic)) from the lowest T to the highest, constant beyond.
+  struct OutputCurve {
+    double quadratic = 0.0;   ///< [1/Nm]
+    double cubic = 0.0;       ///< [1/Nm²]
+    double lowest_Nm = 0.0;   ///< T
+    double highest_Nm = 0.0;  ///< T
+  };
+  [[nodiscard]] OutputCurve output_curve() const noexcept {
+    return {quadratic_, cubic_, lowest_Nm_, highest_Nm_};
+  }
 
   /// @returns the last step's whole torque [Nm]: none of it depends on the deflection alone
   [[nodiscard]] double friction_torque() const noexcept { return torque_Nm_; }

@@ -33,10 +33,12 @@ class LuGreFriction {
 
   /// @returns the torque against the motion [Nm]
   double step(double speed_rad_s, double load_Nm, double dt_s) noexcept TORSIO_REALTIME {
+    const double viscous_Nm = parameters_.viscous_Nms_rad * speed_rad_s;
+    if (is_only_viscous_) return viscous_Nm;
     double level_Nm = parameters_.coulomb_Nm + parameters_.load_factor * std::abs(load_Nm);
     if (parameters_.static_ratio > 1.0) level_Nm *= stribeck(speed_rad_s);
     if (speed_rad_s != 0.0) relax(speed_rad_s, dt_s);
-    return level_Nm * bristle_ + parameters_.viscous_Nms_rad * speed_rad_s;
+    return level_Nm * bristle_ + viscous_Nm;
   }
 
   /// @returns the stiffness [Nm/rad] at rest under this load
@@ -62,6 +64,7 @@ class LuGreFriction {
   Parameters parameters_;
   double inverse_stribeck_squared_;
   double inverse_bristle_;
+  bool is_only_viscous_;
   double bristle_ = 0.0;  ///< ζ
 };
 

@@ -59,6 +59,7 @@ class Gear {
     double slope = 0.0;      ///< 1 / N + ε′
   };
   [[nodiscard]] Kinematics kinematics(double rotor_angle_rad) const noexcept TORSIO_REALTIME {
+    if (!has_error_) return {rotor_angle_rad * inverse_ratio_, inverse_ratio_};
     // One sine and cosine of 2θ give those of 4θ by the double angle.
     const double sine2 = std::sin(2.0 * rotor_angle_rad);
     const double cosine2 = std::cos(2.0 * rotor_angle_rad);
@@ -84,6 +85,7 @@ class Gear {
  private:
   Parameters parameters_;
   double inverse_ratio_;
+  bool has_error_;
   std::array<double, 2> in_phase_{};    ///< A cos α
   std::array<double, 2> quadrature_{};  ///< A sin α
   MaxwellSlip<1> hysteresis_;

@@ -43,8 +43,9 @@ class Motor {
     reference_A =
         std::min(std::max(reference_A, -parameters_.peak_current_A), parameters_.peak_current_A);
     current_A_ = reference_A + (current_A_ - reference_A) * decay_;
-    return parameters_.torque_constant_Nm_A * current_A_ +
-           ripple_Nm_ * std::sin(parameters_.ripple_order * rotor_angle_rad);
+    const double smooth_Nm = parameters_.torque_constant_Nm_A * current_A_;
+    if (ripple_Nm_ == 0.0) return smooth_Nm;
+    return smooth_Nm + ripple_Nm_ * std::sin(parameters_.ripple_order * rotor_angle_rad);
   }
 
   /// @returns i [A]

@@ -33,6 +33,7 @@ class Spring {
   /// @throws Error as its parts do, or if the viscosity is negative.
   explicit Spring(const Parameters& parameters);
   [[nodiscard]] const ElasticCurve& elastic() const noexcept { return elastic_; }
+  [[nodiscard]] const SpringFriction& friction() const noexcept { return friction_; }
   [[nodiscard]] double viscosity() const noexcept { return viscosity_Nms_rad_; }
 
   /// Relaxed friction at this deflection.
