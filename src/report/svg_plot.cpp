@@ -19,7 +19,7 @@ constexpr double kLeft = 58.0;
 constexpr double kRight = 14.0;
 constexpr double kTop = 32.0;
 constexpr double kBottom = 46.0;
-constexpr double kSeen = 0.4;  // pixels
+constexpr double kSeen = 0.8;  // pixels
 constexpr std::array<std::string_view, 4> kColours = {"#1f5fa8", "#c8501e", "#2d8a4e", "#7a3e9d"};
 
 /// The largest of 1, 2, 5 times a power of ten that divides the width into at least four.
