@@ -65,26 +65,26 @@ std::vector<SheetRow> describe(const DataSheet& sheet) {
   return rows;
 }
 
-DataSheet data_sheet(std::string_view text) {
-  const ActuatorName name = parse(text);
+DataSheet data_sheet(std::string_view name) {
+  const ActuatorName parts = parse(name);
   const auto sheets = data_sheets();
-  const auto found = std::ranges::find(sheets, name.base, &DataSheet::name);
+  const auto found = std::ranges::find(sheets, parts.base, &DataSheet::name);
   if (found == sheets.end()) {
     std::vector<std::string_view> known(sheets.size());
     std::ranges::transform(sheets, known.begin(), &DataSheet::name);
-    refuse("name", one_of(known), name.base);
+    refuse("name", one_of(known), parts.base);
   }
   DataSheet sheet = *found;
-  if (!name.variant.empty()) {
+  if (!parts.variant.empty()) {
     std::vector<std::string_view> known(sheet.variants.begin(), sheet.variants.end());
     std::erase(known, "");
-    if (std::ranges::find(known, name.variant) == known.end()) {
+    if (std::ranges::find(known, parts.variant) == known.end()) {
       refuse(fmt::format("variant of {}", sheet.name),
-             known.empty() ? "none: it has no variants" : one_of(known), name.variant);
+             known.empty() ? "none: it has no variants" : one_of(known), parts.variant);
     }
-    set_variant(sheet, name.variant);
+    set_variant(sheet, parts.variant);
   }
-  sheet.serial = name.serial;
+  sheet.serial = parts.serial;
   spread_piece(sheet);
   return sheet;
 }
