@@ -23,8 +23,7 @@ struct CompareFlags {
 };
 
 void run(const CompareFlags& flags) {
-  for (const std::string& output : {flags.output, flags.report, flags.json.destination})
-    flags.data.check_output(output, flags.test);
+  flags.data.check_outputs({flags.output, flags.report, flags.json.destination}, flags.test);
   ProgressBar bar;
   const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, bar.listener());
   const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());

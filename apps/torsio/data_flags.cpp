@@ -22,6 +22,19 @@ torsio::LoadOptions load_options(const DataFlags& flags, const torsio::Progress&
   return options;
 }
 
+/// Whether both paths are one place that holds one document: a file, or standard output. Devices and
+/// pipes may take several.
+bool is_same_file(const std::string& one, const std::string& other) {
+  if (one.empty() || other.empty()) return false;
+  if (is_standard_output(one) || is_standard_output(other))
+    return is_standard_output(one) && is_standard_output(other);
+  std::error_code absent;
+  if (std::filesystem::exists(one, absent) && !std::filesystem::is_regular_file(one, absent))
+    return false;
+  return std::filesystem::weakly_canonical(one, absent) ==
+         std::filesystem::weakly_canonical(other, absent);
+}
+
 /// CLI11 alone would read "-1" as a number near 2^64, and cut longer ones.
 std::string refuse_unless_whole(const std::string& text) {
   std::uint64_t seed = 0;
@@ -85,16 +98,25 @@ std::vector<std::string> DataFlags::wanted_inputs() const {
   return inputs.empty() ? std::vector<std::string>{} : torsio::split_inputs(inputs);
 }
 
-void DataFlags::check_output(const std::string& output,
-                             const std::vector<std::string>& more_inputs) const {
-  require_folder_of(output);
+void DataFlags::check_outputs(const std::vector<std::string>& outputs,
+                              const std::vector<std::string>& more_inputs) const {
   std::vector<std::string> inputs_read = recordings;
   inputs_read.insert(inputs_read.end(), more_inputs.begin(), more_inputs.end());
-  for (const std::string& input : inputs_read) {
-    std::error_code absent;
-    if (!output.empty() && std::filesystem::equivalent(input, output, absent))
-      throw torsio::UsageError({.place = output,
+  inputs_read.push_back(mapping);
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (outputs[i].empty()) continue;
+    require_folder_of(outputs[i]);
+    for (const std::string& input : inputs_read) {
+      if (!is_same_file(input, outputs[i])) continue;
+      throw torsio::UsageError({.place = outputs[i],
                                 .problem = "this output would replace a file that is read",
                                 .advice = "Give the output another name."});
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!is_same_file(outputs[j], outputs[i])) continue;
+      throw torsio::UsageError({.place = outputs[i],
+                                .problem = "two outputs would be written to it",
+                                .advice = "Give each output a name of its own."});
+    }
   }
 }

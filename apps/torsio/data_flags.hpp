@@ -28,9 +28,10 @@ struct DataFlags {
   /// The recordings as test data, except where a manifest gives roles.
   [[nodiscard]] torsio::Dataset load_as_test(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
-  /// Refuses an output that would replace one of the recordings, or has no folder to stand in.
-  void check_output(const std::string& output,
-                    const std::vector<std::string>& more_inputs = {}) const;
+  /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that
+  /// are one and the same file, or that have no folder to stand in.
+  void check_outputs(const std::vector<std::string>& outputs,
+                     const std::vector<std::string>& more_inputs = {}) const;
 };
 
 inline constexpr std::uint64_t kDefaultSeed = 1;

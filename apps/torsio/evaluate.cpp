@@ -67,8 +67,7 @@ void warn_of_doubts(const torsio::ModelFile& file, const torsio::Dataset& datase
 }
 
 void run(const EvaluateFlags& flags) {
-  flags.data.check_output(flags.predictions, {flags.model});
-  flags.data.check_output(flags.json.destination, {flags.model});
+  flags.data.check_outputs({flags.predictions, flags.json.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   if (flags.data.recordings.empty()) {
     if (flags.json.wants_tables()) print(torsio::model_description(file));

@@ -61,8 +61,7 @@ void run(const FitFlags& flags) {
         {.place = "torsio fit",
          .expected = "recordings, --model FAMILY and -o FILE",
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
-  flags.data.check_output(flags.output, flags.validation);
-  flags.data.check_output(flags.json.destination, flags.validation);
+  flags.data.check_outputs({flags.output, flags.json.destination}, flags.validation);
   ProgressBar bar;
   const torsio::Dataset dataset = flags.data.load(flags.validation, {}, bar.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());

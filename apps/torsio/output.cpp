@@ -21,11 +21,7 @@ void remark(std::string_view text) {
 
 void JsonOutput::write(std::string_view document) const {
   if (destination.empty()) return;
-  if (is_standard_output(destination)) {
-    print(document);
-  } else {
-    write_text(destination, document);
-  }
+  write_text(destination, document);
 }
 
 void require_folder_of(const std::string& path) {
@@ -35,6 +31,7 @@ void require_folder_of(const std::string& path) {
 }
 
 void write_text(const std::string& path, std::string_view text) {
+  if (is_standard_output(path)) return print(text);
   torsio::OutputFile file(path);
   file.write(std::as_bytes(std::span(text)));
   file.commit();

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -85,13 +86,17 @@ std::string description(const torsio::DataSheet& sheet) {
       fmt::join(torsio::fault_parts(sheet), ", "));
 }
 
-/// Nm or rad, as the experiment has it.
+/// Nm or rad, as the experiment has it. @throws UsageError if it has none.
 std::string_view amplitude_unit(const SimulateFlags& flags) {
-  for (const torsio::ExperimentInfo& info :
-       torsio::experiments(torsio::data_sheet(flags.actuator))) {
-    if (info.name == flags.experiment && !info.amplitude_unit.empty()) return info.amplitude_unit;
+  const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
+  for (const torsio::ExperimentInfo& info : torsio::experiments(sheet)) {
+    if (info.name != flags.experiment) continue;
+    if (!info.amplitude_unit.empty()) return info.amplitude_unit;
+    throw torsio::UsageError({.place = flags.experiment + " --amplitude",
+                              .expected = "none: this experiment has an amplitude of its own",
+                              .found = flags.amplitude});
   }
-  return "Nm";
+  return "Nm";  // an unknown experiment is refused with the list of the known ones
 }
 
 torsio::OperatingConditions conditions(const SimulateFlags& flags) {
@@ -162,16 +167,26 @@ Json sheet_json(const torsio::DataSheet& sheet) {
   return document;
 }
 
+/// null: the experiment's own.
+Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
 Json recording_json(const SimulateFlags& flags, const torsio::ExperimentSpec& spec,
                     const torsio::Recording& recording) {
   Json document{{"actuator", flags.actuator},
                 {"experiment", flags.experiment},
                 {"seed", flags.seed},
+                {"duration_s", static_cast<double>(recording.size()) / recording.sample_rate_Hz()},
+                {"lever_m", optional(spec.lever_m)},
+                {"inclination_rad", spec.inclination_rad},
+                {"amplitude", optional(spec.amplitude)},
+                {"frequency_Hz", optional(spec.frequency_Hz)},
+                {"impedance", flags.impedance},
                 {"conditions",
                  {{"temperature_K", spec.conditions.temperature_K},
                   {"warm_up_K", spec.conditions.warm_up_K},
                   {"warm_up_time_s", spec.conditions.warm_up_time_s},
                   {"age", spec.conditions.age}}},
+                {"fault_schedule", flags.faults},
                 {"faults", spec.faults.faults.size()},
                 {"recording", flags.output},
                 {"samples", recording.size()},
@@ -201,6 +216,10 @@ void show(const SimulateFlags& flags, const std::string& text, const Json& docum
 void run(const SimulateFlags& flags) {
   if (flags.list) return show(flags, bench_list(), list_json());
   if (!flags.describe.empty()) {
+    if (!flags.actuator.empty())
+      throw torsio::UsageError({.place = "torsio simulate --describe",
+                                .expected = "one name and nothing to simulate",
+                                .found = flags.actuator});
     const torsio::DataSheet sheet = torsio::data_sheet(flags.describe);
     return show(flags, description(sheet), sheet_json(sheet));
   }
@@ -209,11 +228,7 @@ void run(const SimulateFlags& flags) {
                               .expected = "ACTUATOR EXPERIMENT -o FILE",
                               .advice = "torsio simulate --list shows what there is; example: "
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
-  if (is_standard_output(flags.output) && is_standard_output(flags.json.destination))
-    throw torsio::UsageError(
-        {.place = "torsio simulate", .problem = "-o and --json cannot both be standard output"});
-  for (const std::string& output : {flags.output, flags.json.destination, flags.plot})
-    DataFlags().check_output(output, {flags.faults});
+  DataFlags().check_outputs({flags.output, flags.json.destination, flags.plot}, {flags.faults});
   const torsio::ExperimentSpec spec = experiment_spec(flags);
   ProgressBar bar;
   const torsio::Recording recording = torsio::simulate(spec, bar.listener());

@@ -8,7 +8,7 @@
 namespace torsio {
 
 Dataset sweep_dataset(std::string_view actuator, std::uint64_t seed, const Progress& progress) {
-  const SweepProtocol protocol = sweep_protocol(actuator);
+  const SweepProtocol protocol = sweep_protocol(data_sheet(actuator));
   Dataset dataset;
   const auto record = [&](double lever_m, double inclination_rad, Role role) {
     Recording sweep = simulate({.actuator = std::string(actuator),

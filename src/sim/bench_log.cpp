@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "experiment_table.hpp"
+#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -27,11 +28,20 @@ StageNames stage_names(ActuatorFamily family) {
   return {"gear", "spring"};
 }
 
+/// @throws Error if the bench does not come to a whole number of ticks a sample.
+std::size_t whole_ticks_a_sample(double rate_Hz) {
+  const double ticks = std::round(kBenchRate_Hz / rate_Hz);
+  if (ticks >= 1.0 && std::abs(ticks * rate_Hz - kBenchRate_Hz) < 1e-6 * kBenchRate_Hz)
+    return static_cast<std::size_t>(ticks);
+  throw Error({.place = "data sheet: log_rate_Hz",
+               .expected = fmt::format("{} Hz divided by a whole number", kBenchRate_Hz),
+               .found = fmt::format("{} Hz", rate_Hz)});
+}
+
 }  // namespace
 
 BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth)
-    : rate_Hz_(sheet.sensors.log_rate_Hz.value),
-      ticks_a_sample_(static_cast<std::size_t>(std::lround(kBenchRate_Hz / rate_Hz_))) {
+    : rate_Hz_(sheet.sensors.log_rate_Hz.value), ticks_a_sample_(whole_ticks_a_sample(rate_Hz_)) {
   const std::size_t samples = ticks / ticks_a_sample_ + 1;
   for (const SensedChannel& source : sensed_channels(sheet)) {
     Sensed& of = sensed_.emplace_back(

@@ -17,6 +17,7 @@ namespace torsio {
 namespace {
 
 constexpr double kLongest_s = 36000.0;
+constexpr double kLowest_Hz = 0.001;  // a thousand seconds a period
 
 void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataSheet& sheet) {
   const auto require = [&](bool holds, const char* option, const std::string& expected,
@@ -41,21 +42,25 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
   const double inclination_deg = deg_from_rad(spec.inclination_rad);
   require(entry.has_lever || spec.inclination_rad == 0.0, "inclination",
           "none: this experiment has no lever", text(inclination_deg));
-  require(std::abs(inclination_deg) <= 90.0, "inclination", "-90 to 90 deg", text(inclination_deg));
+  require(std::abs(inclination_deg) <= 90.0, "inclination", "-90 to 90 deg",
+          fmt::format("{:.6g} deg (a number without unit is radians)", inclination_deg));
   if (spec.amplitude) {
     require(!entry.info.amplitude_unit.empty(), "amplitude",
             "none: this experiment has an amplitude of its own", text(*spec.amplitude));
     const double highest = entry.highest_amplitude *
                            (entry.info.amplitude_unit == "Nm" ? sheet.rating.torque_Nm.value : 1.0);
+    const auto shown = [&](double value) {
+      return entry.info.amplitude_unit == "rad" ? fmt::format("{:.6g} deg", deg_from_rad(value))
+                                                : fmt::format("{:.6g} Nm", value);
+    };
     require(*spec.amplitude > 0.0 && *spec.amplitude <= highest, "amplitude",
-            fmt::format("0 < {} <= {:.4g}", entry.info.amplitude_unit, highest),
-            text(*spec.amplitude));
+            "above 0 and at most " + shown(highest), shown(*spec.amplitude));
   }
   if (spec.frequency_Hz) {
     require(entry.has_frequency, "frequency", "none: this experiment has a frequency of its own",
             text(*spec.frequency_Hz));
-    require(*spec.frequency_Hz >= 0.0 && *spec.frequency_Hz <= 10.0, "frequency", "0 to 10 Hz",
-            text(*spec.frequency_Hz));
+    require(*spec.frequency_Hz >= kLowest_Hz && *spec.frequency_Hz <= 10.0, "frequency",
+            fmt::format("{} to 10 Hz", kLowest_Hz), text(*spec.frequency_Hz));
   }
   require(entry.has_impedance || !spec.is_impedance_zero, "impedance",
           "none: no impedance controller runs in this experiment", "zero");
@@ -63,7 +68,7 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
 
 double load_cell_torque(LoadCell cell, const Plant& plant, const Load& load) {
   switch (cell) {
-    case LoadCell::external: return load.external_torque_Nm;
+    case LoadCell::external: return -load.external_torque_Nm;
     case LoadCell::wall: return plant.torques().wall_Nm;
     case LoadCell::joint: break;
   }

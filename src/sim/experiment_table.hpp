@@ -22,7 +22,7 @@ struct BenchAction {
 /// What the load cell feels.
 enum class LoadCell {
   joint,     ///< the torque between joint and load
-  external,  ///< the external torque: it sits in the hand that pushes
+  external,  ///< what the joint does to the hand that pushes it, so that it rises with the twist
   wall,      ///< the obstacle that the load runs against
 };
 

@@ -32,11 +32,6 @@ double current(const ImpedanceLoop& loop, const Measurement& measured) {
 
 BenchProgram human_torque(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double frequency_Hz = spec.frequency_Hz.value_or(kHumanFrequency_Hz);
-  if (frequency_Hz == 0.0)
-    throw UsageError({.place = "human-torque frequency",
-                      .expected = "0 < Hz <= 10",
-                      .found = "0",
-                      .advice = "for a constant torque take the experiment hold"});
   return {.start = {},
           .load_cell = LoadCell::external,
           .duration_s = 600.0,

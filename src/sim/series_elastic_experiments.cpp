@@ -26,7 +26,7 @@ constexpr double kUpright_rad = rad_from_deg(60.0);  // a lever driven further m
 
 /// The lever with its mass. @throws UsageError if it is too heavy.
 Load bench_lever(const DataSheet& sheet, const ExperimentSpec& spec) {
-  const double length_m = spec.lever_m.value_or(sweep_protocol(sheet.name).train_lever_m.front());
+  const double length_m = spec.lever_m.value_or(sweep_protocol(sheet).train_lever_m.front());
   const Load load = lever(kMass_kg, length_m, spec.inclination_rad);
   if (std::abs(load.gravity_Nm) > sheet.rating.torque_Nm.value) {
     throw UsageError(
@@ -41,7 +41,7 @@ Load bench_lever(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
-  const SweepProtocol protocol = sweep_protocol(sheet.name);
+  const SweepProtocol protocol = sweep_protocol(sheet);
   const Load load = bench_lever(sheet, spec);
   // One period and a quarter: to one end, to the other, back to the first and to the middle.
   const double duration_s = 5.0 * protocol.amplitude_rad / kSweepSpeed_rad_s;
@@ -190,22 +190,23 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
 
 std::span<const ExperimentEntry> series_elastic_experiments() noexcept { return kTable; }
 
-SweepProtocol sweep_protocol(std::string_view actuator) {
-  const DataSheet& sheet = data_sheet(actuator);
-  SweepProtocol protocol{.amplitude_rad = rad_from_deg(170.0),
-                         .train_lever_m = {0.35, 0.60, 0.80},
-                         .test_lever_m = 0.72,
-                         .test_inclination_rad = rad_from_deg(37.8)};
-  if (sheet.name == "dfki-50") {
-    protocol.train_lever_m = {0.10, 0.17, 0.24};
-    protocol.test_lever_m = 0.29;
-  }
-  if (sheet.name == "dfki-28") {
-    protocol.amplitude_rad = rad_from_deg(60.0);
-    protocol.train_lever_m = {0.08, 0.14, 0.20};
-    protocol.test_lever_m = 0.23;
-  }
-  return protocol;
+SweepProtocol sweep_protocol(const DataSheet& sheet) {
+  if (sheet.family != ActuatorFamily::series_elastic)
+    throw UsageError({.place = "sweep",
+                      .expected = fmt::format("one of {}", kActuators),
+                      .found = std::string(sheet.name),
+                      .advice = "the other actuators have no lever to sweep"});
+  const double incline_rad = rad_from_deg(37.8);
+  if (sheet.name == "dfki-28") return {rad_from_deg(60.0), {0.08, 0.14, 0.20}, 0.23, incline_rad};
+  if (sheet.name == "dfki-50") return {rad_from_deg(170.0), {0.10, 0.17, 0.24}, 0.29, incline_rad};
+  if (sheet.name == "dfki-120" || sheet.name == "dfki-300")
+    return {rad_from_deg(170.0), {0.35, 0.60, 0.80}, 0.72, incline_rad};
+  // A sheet of the user's own: levers that take the same shares of its rating.
+  const double rated_m = sheet.rating.torque_Nm.value / lever(kMass_kg, 1.0).gravity_Nm;
+  return {rad_from_deg(170.0),
+          {0.2 * rated_m, 0.35 * rated_m, 0.5 * rated_m},
+          0.45 * rated_m,
+          incline_rad};
 }
 
 }  // namespace torsio

@@ -167,7 +167,10 @@ class Checker {
         const Rest rest = longest_rest(channel);
         const double duration_s =
             static_cast<double>(rest.end - rest.begin) / recording.sample_rate_Hz();
-        if (duration_s < kFrozen_s || rest.deliveries < kFrozenDeliveries ||
+        // A silent sensor delivers nothing where it should have delivered many times.
+        const double expected_deliveries =
+            share_fresh(channel) * static_cast<double>(rest.end - rest.begin);
+        if (duration_s < kFrozen_s || expected_deliveries < kFrozenDeliveries ||
             rest.end - rest.begin == channel.values.size())
           return;
         for (const std::string& other : channels_) {
@@ -321,7 +324,10 @@ class Checker {
     if (leak.empty()) {
       add(Verdict::pass, "leak", "", "the target was not computed from an input");
     } else {
-      add(Verdict::fail, "leak", "", fmt::format("{} was computed from {}", dataset_.target, leak),
+      add(Verdict::fail, "leak", "",
+          leak.starts_with("truth_")
+              ? fmt::format("{} is truth that no sensor sees", leak)
+              : fmt::format("{} was computed from {}", dataset_.target, leak),
           "Leave it out of --inputs: a model would learn the formula, not the spring.");
     }
   }
@@ -355,7 +361,7 @@ class Checker {
   static constexpr std::size_t kFewSamples = 100;
   static constexpr double kSaturatedShare = 0.005;
   static constexpr double kFrozen_s = 0.2;
-  static constexpr std::size_t kFrozenDeliveries = 10;
+  static constexpr double kFrozenDeliveries = 10.0;
   static constexpr double kMovedMeanwhile = 0.4;  ///< of another channel's range
   static constexpr double kJumpShare = 0.02;
   static constexpr double kJumpOverOthers = 5.0;

@@ -76,6 +76,7 @@ ResidualTable residual_table(AnyModel model, const TrainingData& data) {
   const std::size_t regions = std::min(all.size() / kResidualsPerRegion, kMostResidualRegions);
   if (regions == 0) return {};
   std::ranges::stable_sort(all, {}, &Residual::value);
+  if (!(all.front().value < all.back().value)) return {};  // one output: no regions
   ResidualTable table;
   table.edges.push_back(all.front().value);
   std::size_t begin = 0;

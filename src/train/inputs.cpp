@@ -15,6 +15,8 @@
 namespace torsio {
 namespace {
 
+constexpr std::string_view kTruth = "truth_";
+
 struct CanonicalChannel {
   const char* name;
   const char* expression;
@@ -157,18 +159,19 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
   const std::vector<ChannelDefinition> definitions = known_definitions(dataset);
   std::vector<std::string> inputs = wanted;
   if (inputs.empty() && !dataset.input_sets.empty()) inputs = dataset.input_sets.front().second;
-  if (inputs.empty()) {
+  if (inputs.empty() && is_computable(dataset, definitions, kDefaultInputs[0])) {
     for (const char* input : kDefaultInputs)
       if (is_computable(dataset, definitions, input)) inputs.emplace_back(input);
   }
   const Recording& first = dataset.records.front().recording;
   if (inputs.empty())
-    throw UsageError(
-        {.place = first.name(),
-         .expected = "spring_deflection_rad, or gear_angle_rad and joint_angle_rad",
-         .found = fmt::format("{}", fmt::join(channel_names(first), ", ")),
-         .advice = "Name the model's inputs with --inputs, or rename channels with --mapping."});
-  const FeatureSpec spec = as_asked([&] {
+    throw UsageError({.place = first.name(),
+                      .expected = "spring_deflection_rad, or gear_angle_rad and joint_angle_rad",
+                      .found = fmt::format("{}", fmt::join(channel_names(first), ", ")),
+                      .advice =
+                          "Name the model's inputs with --inputs, or bring the deflection in with "
+                          "--mapping: derive or rename it there."});
+  FeatureSpec spec = as_asked([&] {
     return FeatureSpec{inputs, needed_definitions(definitions, inputs)};
   });
   const FeaturePipeline pipeline =
@@ -206,7 +209,8 @@ std::vector<double> first_feature(const Recording& recording, const FeatureSpec&
 std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
   const FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
   for (const std::string& input : pipeline.raw_inputs())
-    if (std::ranges::find(dataset.target_computed_from, input) !=
+    if (input.starts_with(kTruth) ||
+        std::ranges::find(dataset.target_computed_from, input) !=
             dataset.target_computed_from.end() ||
         is_straight_line(dataset, input))
       return input;
@@ -217,8 +221,10 @@ std::string refuse_leak(const Dataset& dataset, const FeatureSpec& spec, bool al
   std::string leak = find_leak(dataset, spec);
   if (!leak.empty() && !allow_leak)
     throw UsageError({.place = leak,
-                      .problem = dataset.target +
-                                 " was computed from this input: a model would learn the formula",
+                      .problem = leak.starts_with(kTruth)
+                                     ? "no sensor sees this channel of a simulation"
+                                     : dataset.target + " was computed from this input: a model "
+                                                        "would learn the formula",
                       .advice = "Leave it out of --inputs, or accept rows that are marked as leaks "
                                 "with --allow-leak."});
   return leak;

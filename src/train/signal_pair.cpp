@@ -81,10 +81,15 @@ Rest longest_rest(const Channel& channel) {
   for (std::size_t i = 0; i < channel.values.size(); ++i) {
     if (i == 0 || channel.values[i] != channel.values[i - 1]) rest = {.begin = i, .end = i};
     rest.end = i + 1;
-    if (channel.is_fresh(i)) ++rest.deliveries;
     if (rest.end - rest.begin > longest.end - longest.begin) longest = rest;
   }
   return longest;
+}
+
+double share_fresh(const Channel& channel) {
+  if (channel.fresh.empty()) return 1.0;
+  const auto fresh = std::ranges::count_if(channel.fresh, [](auto mark) { return mark != 0; });
+  return static_cast<double>(fresh) / static_cast<double>(channel.fresh.size());
 }
 
 double share_moved(const Channel& channel, const Rest& meanwhile) {

@@ -50,9 +50,11 @@ struct Jump {
 struct Rest {
   std::size_t begin = 0;
   std::size_t end = 0;
-  std::size_t deliveries = 0;  ///< of the sensor in it
 };
 [[nodiscard]] Rest longest_rest(const Channel& channel);
+
+/// The share of all samples at which the sensor delivered.
+[[nodiscard]] double share_fresh(const Channel& channel);
 
 /// The share of its whole range that a channel passes through meanwhile.
 [[nodiscard]] double share_moved(const Channel& channel, const Rest& meanwhile);

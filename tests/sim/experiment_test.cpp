@@ -20,7 +20,7 @@ using test::Line;
 using test::spring_line;
 
 Recording test_sweep(const std::string& actuator) {
-  const SweepProtocol protocol = sweep_protocol(actuator);
+  const SweepProtocol protocol = sweep_protocol(data_sheet(actuator));
   return simulate({.actuator = actuator,
                    .seed = 9,
                    .lever_m = protocol.test_lever_m,
@@ -57,7 +57,7 @@ TEST(Sweep, LeverReachesBothEnds) {
     const Recording recording = simulate({.actuator = actuator});
     const auto [low, high] =
         std::ranges::minmax_element(recording.channel("joint_angle_rad").values);
-    const double amplitude_deg = deg_from_rad(sweep_protocol(actuator).amplitude_rad);
+    const double amplitude_deg = deg_from_rad(sweep_protocol(data_sheet(actuator)).amplitude_rad);
     EXPECT_NEAR(deg_from_rad(*high), amplitude_deg, 5.0) << actuator;
     EXPECT_NEAR(deg_from_rad(*low), -amplitude_deg, 5.0) << actuator;
   }
@@ -82,7 +82,7 @@ TEST(Hold, LeverSagsByTheDeflectionThatItsTorqueAsksFor) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
     const Recording recording =
         simulate({.actuator = actuator, .experiment = "hold", .duration_s = 10.0});
-    const double lever_Nm = 9.0 * 9.81 * sweep_protocol(actuator).train_lever_m.front();
+    const double lever_Nm = 9.0 * 9.81 * sweep_protocol(data_sheet(actuator)).train_lever_m.front();
     const DataSheet sheet = data_sheet(actuator);
     const auto& spring = std::get<SpringSheet>(sheet.second);
     EXPECT_NEAR(recording.channel("torque_Nm").values.back(), lever_Nm,

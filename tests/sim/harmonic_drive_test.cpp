@@ -293,8 +293,8 @@ TEST(HumanTorque, TakesFiveToFiftyNewtonMetresAtAFrequency) {
     return std::string();
   };
   EXPECT_EQ(refused({.amplitude = 50.0}), "");
-  EXPECT_NE(refused({.amplitude = 51.0}).find("0 < Nm <= 50"), std::string::npos);
-  EXPECT_NE(refused({.frequency_Hz = 0.0}).find("0 < Hz <= 10"), std::string::npos);
+  EXPECT_NE(refused({.amplitude = 51.0}).find("at most 50 Nm"), std::string::npos);
+  EXPECT_NE(refused({.frequency_Hz = 0.0}).find("0.001 to 10 Hz"), std::string::npos);
   EXPECT_NE(refused({.lever_m = 0.1}).find("has no lever"), std::string::npos);
 }
 
@@ -315,7 +315,7 @@ TEST(HarmonicDriveHold, StaysAtRestAndYieldsALittleToAConstantTorque) {
   EXPECT_LT(range(tube_twist_deg(alone)), 15.0 * kOutputCode_deg);
   spec.amplitude = 20.0;
   const Recording pushed_on = simulate(spec);
-  EXPECT_NEAR(pushed_on.channel("torque_Nm").values.back(), 20.0, 0.2);
+  EXPECT_NEAR(pushed_on.channel("torque_Nm").values.back(), -20.0, 0.2);
   const double yielded_deg = deg_from_rad(pushed_on.channel("joint_angle_rad").values.back());
   EXPECT_GT(yielded_deg, 0.05);
   EXPECT_LT(yielded_deg, 0.25);

@@ -76,7 +76,8 @@ TrackingError chirp_error(const ExperimentSpec& spec, double amplitude_Nm) {
 TrackingError chirp_error_with_sweep_line(const char* actuator, double amplitude_Nm) {
   const DataSheet sheet = data_sheet(actuator);
   const test::Line line = test::spring_line(
-      simulate({.actuator = actuator, .lever_m = sweep_protocol(actuator).train_lever_m.back()}));
+      simulate({.actuator = actuator,
+                .lever_m = sweep_protocol(data_sheet(actuator)).train_lever_m.back()}));
   const PlantParameters parts = plant_parameters(sheet);
   const Load locked{.is_locked = true};
   Plant plant(parts);
@@ -162,7 +163,7 @@ TEST(Chirp, RefusesWhatTipsTheLeverOver) {
   spec.amplitude = 4.0;
   EXPECT_EQ(message(spec), "");
   spec.amplitude = 20.0;
-  EXPECT_NE(message(spec).find("0 < Nm <= 17.5"), std::string::npos);
+  EXPECT_NE(message(spec).find("at most 17.5 Nm"), std::string::npos);
 }
 
 // The references have equal RMS for every seed. The friction of dfki-28's spring is so large a part

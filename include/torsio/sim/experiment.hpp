@@ -52,14 +52,15 @@ struct SweepProtocol {
   double test_lever_m = 0.0;
   double test_inclination_rad = 0.0;
 };
-/// @throws UsageError for an unknown actuator.
-[[nodiscard]] SweepProtocol sweep_protocol(std::string_view actuator);
+/// A sheet of another name gets levers that take those shares of its rating.
+/// @throws UsageError unless the actuator is series-elastic.
+[[nodiscard]] SweepProtocol sweep_protocol(const DataSheet& sheet);
 
 /// Runs an experiment on a simulated bench.
 ///
-/// The recording has the channels `motor_angle_rad` (of the rotor) `gear_angle_rad joint_angle_rad
-/// motor_current_A torque_Nm` at 1 kHz; `torque_Nm` is a 125 Hz load cell, held between its
-/// samples, which `Channel::fresh` marks, and 2 ms late. Equal specs give equal recordings.
+/// The recording has the channels and the rate of the actuator's family (docs/actuators.md); a load
+/// cell that is slower than the log is held between its samples, which `Channel::fresh` marks. Its
+/// torque rises with the twist. Equal specs give equal recordings.
 ///
 /// Faults act on what the bench's loop sees and on what is logged; truth is what it is. Where a
 /// sensor tells NaN, the loop goes on with that sensor's last number, as a drive does that drops
@@ -68,7 +69,7 @@ struct SweepProtocol {
 /// `progress` asks to stop.
 [[nodiscard]] Recording simulate(const ExperimentSpec& spec, const Progress& progress = {});
 /// The same with an actuator of one's own: `spec.actuator` is not looked at.
-[[nodiscard]] Recording simulate(const DataSheet& sheet, const ExperimentSpec& spec,
+[[nodiscard]] Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec,
                                  const Progress& progress = {});
 
 /// The twist [rad] of the actuator's elastic element as its sensors tell it: gear minus joint, the
