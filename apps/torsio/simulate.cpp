@@ -53,12 +53,13 @@ std::string description(const torsio::DataSheet& sheet) {
                std::string(1, static_cast<char>(row.value.origin))});
   return fmt::format(
       "{}: {}\n{}origin: P printed in a paper, D derived from printed numbers, A assumed\n",
-      sheet.name, sheet.title, table.text());
+      torsio::full_name(sheet), sheet.title, table.text());
 }
 
 /// Nm or rad, as the experiment has it.
 std::string_view amplitude_unit(const SimulateFlags& flags) {
-  for (const torsio::ExperimentInfo& info : torsio::experiments()) {
+  for (const torsio::ExperimentInfo& info :
+       torsio::experiments(torsio::data_sheet(flags.actuator))) {
     if (info.name == flags.experiment && !info.amplitude_unit.empty()) return info.amplitude_unit;
   }
   return "Nm";
@@ -95,7 +96,8 @@ Json list_json() {
 }
 
 Json sheet_json(const torsio::DataSheet& sheet) {
-  Json document{{"name", sheet.name}, {"title", sheet.title}, {"parameters", Json::array()}};
+  Json document{
+      {"name", torsio::full_name(sheet)}, {"title", sheet.title}, {"parameters", Json::array()}};
   for (const torsio::SheetRow& row : torsio::describe(sheet))
     document["parameters"].push_back(
         {{"name", row.name},

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "actuators.hpp"
+#include "piece_spread.hpp"
 #include "sheet_values.hpp"
 #include "torsio/core/error.hpp"
 
@@ -84,6 +85,7 @@ DataSheet data_sheet(std::string_view text) {
     set_variant(sheet, name.variant);
   }
   sheet.serial = name.serial;
+  spread_piece(sheet);
   return sheet;
 }
 

@@ -144,6 +144,7 @@ void visit_values(Sheet& of, const Visit& visit) {
   visit("motor_encoder_zero", "rad", of.motor_zero_rad);
   visit("middle_encoder_zero", "rad", of.middle_zero_rad);
   visit("joint_encoder_zero", "rad", of.joint_zero_rad);
+  visit("twist_sensor_zero", "rad", of.twist_zero_rad);
   visit("current_noise", "A", of.current_noise_A);
   visit("torque_sensor_range", "Nm", of.torque_range_Nm);
   visit("torque_sensor_noise_share", "", of.torque_noise_share);

@@ -150,6 +150,47 @@ void RandomWalk::reset() noexcept {
   output_ = lowpass_.step(0.0);  // at rest, instead of in the steady state of the first white step
 }
 
+QuasiPeriodic::QuasiPeriodic(const Parameters& parameters, double sample_rate_Hz)
+    : parameters_(parameters), sample_rate_Hz_(sample_rate_Hz), random_(parameters.seed) {
+  require_finite("quasi-periodic", "amplitude", parameters.amplitude);
+  const auto require_spread = [](std::string_view name, double spread) {
+    require(spread >= 0.0 && spread <= 0.3, "quasi-periodic", name, "0 to 0.3", spread);
+  };
+  require_spread("amplitude spread", parameters.amplitude_spread);
+  require_spread("period spread", parameters.period_spread);
+  // Of the shortest period: at most three spreads, which leave a tenth of it.
+  require_frequency("quasi-periodic",
+                    parameters.frequency_Hz / (1.0 - 3.0 * parameters.period_spread),
+                    sample_rate_Hz);
+  reset();
+}
+
+void QuasiPeriodic::reset() noexcept {
+  random_ = Random(parameters_.seed);
+  turns_ = 0.0;
+  begin_period();
+}
+
+void QuasiPeriodic::begin_period() noexcept {
+  const auto spread = [this](double share) {
+    return 1.0 + share * std::clamp(random_.normal(), -3.0, 3.0);
+  };
+  amplitude_ = parameters_.amplitude * spread(parameters_.amplitude_spread);
+  turns_a_sample_ =
+      parameters_.frequency_Hz / (sample_rate_Hz_ * spread(parameters_.period_spread));
+}
+
+double QuasiPeriodic::step() noexcept {
+  const double output = amplitude_ * std::sin(kTurn * turns_);
+  turns_ += turns_a_sample_;
+  if (turns_ >= 1.0) {
+    const double late = (turns_ - 1.0) / turns_a_sample_;  // in samples
+    begin_period();
+    turns_ = late * turns_a_sample_;
+  }
+  return output;
+}
+
 Steps::Steps(Parameters parameters, double sample_rate_Hz) : levels_(std::move(parameters.levels)) {
   require_positive("steps", "sample rate", sample_rate_Hz);
   if (levels_.empty())

@@ -70,7 +70,10 @@ double load_cell_torque(LoadCell cell, const Plant& plant, const Load& load) {
 }  // namespace
 
 Recording simulate(const ExperimentSpec& spec, const Progress& progress) {
-  const DataSheet sheet = data_sheet(spec.actuator);
+  return simulate(data_sheet(spec.actuator), spec, progress);
+}
+
+Recording simulate(const DataSheet& sheet, const ExperimentSpec& spec, const Progress& progress) {
   const ExperimentEntry& entry = experiment_entry(spec.experiment, sheet);
   check(spec, entry, sheet);
   BenchProgram program = entry.program(sheet, spec);

@@ -13,7 +13,8 @@ namespace {
 
 std::vector<ExperimentEntry> table() {
   std::vector<ExperimentEntry> all;
-  for (const auto entries : {series_elastic_experiments()})
+  for (const auto entries :
+       {series_elastic_experiments(), rubber_clutch_experiments(), harmonic_drive_experiments()})
     all.insert(all.end(), entries.begin(), entries.end());
   return all;
 }
@@ -28,6 +29,14 @@ const std::vector<ExperimentEntry>& entries() {
 std::vector<ExperimentInfo> experiments() {
   std::vector<ExperimentInfo> infos(entries().size());
   std::ranges::transform(entries(), infos.begin(), &ExperimentEntry::info);
+  return infos;
+}
+
+std::vector<ExperimentInfo> experiments(const DataSheet& sheet) {
+  std::vector<ExperimentInfo> infos;
+  for (const ExperimentEntry& entry : entries()) {
+    if (entry.family == sheet.family) infos.push_back(entry.info);
+  }
   return infos;
 }
 

@@ -49,6 +49,8 @@ struct ExperimentEntry {
 
 /// One list a family, each in its own file.
 [[nodiscard]] std::span<const ExperimentEntry> series_elastic_experiments() noexcept;
+[[nodiscard]] std::span<const ExperimentEntry> harmonic_drive_experiments() noexcept;
+[[nodiscard]] std::span<const ExperimentEntry> rubber_clutch_experiments() noexcept;
 
 /// @throws UsageError that lists the names known for this family.
 [[nodiscard]] const ExperimentEntry& experiment_entry(std::string_view name,

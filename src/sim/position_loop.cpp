@@ -5,20 +5,23 @@
 namespace torsio {
 namespace {
 
-constexpr double kBandwidth_rad_s = 25.0;
-constexpr double kPositionGain = 8.0;  // 1/s
-constexpr double kIntegralGain = 8.0;  // 1/s
-constexpr double kSpeedCutoff_Hz = 60.0;
+constexpr double kPositionGainShare = 0.32;  // of the bandwidth
+constexpr double kCutoff_Hz_s_rad = 2.4;     // of the speed's low-pass
+constexpr double kHighestCutoffShare = 0.2;  // of the sample rate
 
 }  // namespace
 
-PositionLoop::PositionLoop(const PlantParameters& plant, double sample_rate_Hz)
+PositionLoop::PositionLoop(const PlantParameters& plant, double sample_rate_Hz,
+                           double bandwidth_rad_s)
     : sample_rate_Hz_(sample_rate_Hz),
       inverse_ratio_(1.0 / total_ratio(plant)),
-      speed_gain_A_s_rad_(plant.rotor_inertia_kg_m2 * total_ratio(plant) * kBandwidth_rad_s /
+      speed_gain_A_s_rad_(plant.rotor_inertia_kg_m2 * total_ratio(plant) * bandwidth_rad_s /
                           plant.motor.torque_constant_Nm_A),
-      integral_limit_(plant.motor.peak_current_A / (speed_gain_A_s_rad_ * kIntegralGain)),
-      speed_filter_(kSpeedCutoff_Hz, sample_rate_Hz) {}
+      position_gain_(kPositionGainShare * bandwidth_rad_s),
+      integral_limit_(plant.motor.peak_current_A / (speed_gain_A_s_rad_ * position_gain_)),
+      speed_filter_(
+          std::min(kCutoff_Hz_s_rad * bandwidth_rad_s, kHighestCutoffShare * sample_rate_Hz),
+          sample_rate_Hz) {}
 
 void PositionLoop::reset() noexcept {
   speed_filter_.reset();
@@ -37,9 +40,9 @@ double PositionLoop::step(double wanted_rad, double rotor_angle_rad) noexcept {
   const double wanted_speed = (wanted_rad - last_wanted_rad_) * sample_rate_Hz_;
   last_angle_rad_ = angle_rad;
   last_wanted_rad_ = wanted_rad;
-  const double error = kPositionGain * (wanted_rad - angle_rad) + wanted_speed - speed;
+  const double error = position_gain_ * (wanted_rad - angle_rad) + wanted_speed - speed;
   integral_ = std::clamp(integral_ + error / sample_rate_Hz_, -integral_limit_, integral_limit_);
-  return speed_gain_A_s_rad_ * (error + kIntegralGain * integral_);
+  return speed_gain_A_s_rad_ * (error + position_gain_ * integral_);
 }
 
 }  // namespace torsio

@@ -13,7 +13,7 @@ Encoder encoder_of(const SensorSheet& sheet, const SheetValue& bits, const Sheet
 
 std::optional<Encoder> twist_sensor_of(const SensorSheet& sheet, Random& random) {
   if (sheet.twist_sensor_bits.value == 0.0) return {};
-  return encoder_of(sheet, sheet.twist_sensor_bits, assumed(0.0), random);
+  return encoder_of(sheet, sheet.twist_sensor_bits, sheet.twist_zero_rad, random);
 }
 
 }  // namespace

@@ -18,20 +18,27 @@ constexpr double kSweepSpeed_rad_s = rad_from_deg(10.0);
 constexpr double kSweepAcceleration_rad_s2 = rad_from_deg(30.0);
 constexpr double kCycle_Hz = 0.05;
 constexpr double kCycles = 3.0;
+constexpr double kHold_rad = rad_from_deg(90.0);
 
-BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
-  const SweepProtocol protocol = sweep_protocol(sheet.name);
-  const double length_m = spec.lever_m.value_or(protocol.train_lever_m.front());
+/// The lever with its mass. @throws UsageError if it is too heavy.
+Load bench_lever(const DataSheet& sheet, const ExperimentSpec& spec) {
+  const double length_m = spec.lever_m.value_or(sweep_protocol(sheet.name).train_lever_m.front());
   const Load load = lever(kMass_kg, length_m, spec.inclination_rad);
   if (std::abs(load.gravity_Nm) > sheet.rating.torque_Nm.value) {
     throw UsageError(
-        {.place = "sweep",
+        {.place = spec.experiment,
          .problem = "the lever is too heavy for the actuator",
          .expected = fmt::format("at most the {} Nm that {} is rated for",
                                  sheet.rating.torque_Nm.value, sheet.name),
          .found = fmt::format("{:.1f} Nm ({} kg at {} m)", load.gravity_Nm, kMass_kg, length_m),
          .advice = "take a shorter lever, or incline it"});
   }
+  return load;
+}
+
+BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
+  const SweepProtocol protocol = sweep_protocol(sheet.name);
+  const Load load = bench_lever(sheet, spec);
   // One period and a quarter: to one end, to the other, back to the first and to the middle.
   const double duration_s = 5.0 * protocol.amplitude_rad / kSweepSpeed_rad_s;
   return {.start = load,
@@ -59,6 +66,18 @@ BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/
       }};
 }
 
+BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
+  const Load load = bench_lever(sheet, spec);
+  return {.start = load,
+          .start_angle_rad = kHold_rad,
+          .duration_s = 60.0,
+          .next = [load, loop = PositionLoop(plant_parameters(sheet), kBenchRate_Hz)](
+                      const Measurement& measured) mutable -> BenchAction {
+            return {.command = {.current_A = loop.step(kHold_rad, measured.motor_angle_rad)},
+                    .load = load};
+          }};
+}
+
 constexpr auto kTable = std::to_array<ExperimentEntry>({
     {.info =
          {.name = "sweep",
@@ -72,6 +91,12 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
               .description =
                   "rotor held, a torque ramp of +-rated torque pulls on the output at 0.05 Hz"},
      .program = static_cycle},
+    {.info = {.name = "hold",
+              .actuators = kActuators,
+              .description =
+                  "the position loop holds a lever with 9 kg level, 90 deg from hanging"},
+     .has_lever = true,
+     .program = hold},
 });
 
 }  // namespace

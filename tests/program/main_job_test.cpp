@@ -104,7 +104,7 @@ TEST_F(MainJob, TellsMachinesWhatItSimulated) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(nlohmann::json::parse(outcome.out).at("samples"), 2000);
   const auto list = nlohmann::json::parse(torsio("simulate --list --json -").out);
-  EXPECT_EQ(list.at("actuators").size(), 4U);
+  EXPECT_EQ(list.at("actuators").size(), 7U);
 }
 
 TEST_F(MainJob, WritesAPageForTheBrowser) {

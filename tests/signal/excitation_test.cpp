@@ -40,6 +40,7 @@ TEST(Excitation, RepeatsAfterResetAndInCopies) {
   expect_repeatable(TrapezoidSweep({}, kRate_Hz));
   expect_repeatable(Multisine({{1.0, 3.0}, {0.5, 0.25}, 4}, kRate_Hz));
   expect_repeatable(RandomWalk({}, kRate_Hz));
+  expect_repeatable(QuasiPeriodic({}, kRate_Hz));
   expect_repeatable(Steps({{1.0, -2.0, 3.0}, 0.7}, kRate_Hz));
 }
 
@@ -141,6 +142,49 @@ TEST(RandomWalk, HasTheRmsThatWasAskedForBelowItsCutOff) {
   EXPECT_NEAR(std::sqrt(speed_square / square), kTurn, 0.05 * kTurn);
 }
 
+TEST(QuasiPeriodic, SpreadsAmplitudesAndPeriodsAroundTheirMeans) {
+  QuasiPeriodic hand({.amplitude = 20.0, .frequency_Hz = 0.4, .seed = 6}, kRate_Hz);
+  const std::vector<double> values = samples(hand, 10'000'000);
+  std::vector<double> periods_s;
+  std::vector<double> peaks;
+  double peak = 0.0;
+  double began_s = 0.0;
+  for (std::size_t n = 1; n < values.size(); ++n) {
+    peak = std::max(peak, std::abs(values[n]));
+    EXPECT_LT(std::abs(values[n] - values[n - 1]), 0.12) << "a jump at " << n;
+    if (!(values[n - 1] < 0.0 && values[n] >= 0.0)) continue;
+    const double crossed_s =
+        (static_cast<double>(n) - values[n] / (values[n] - values[n - 1])) / kRate_Hz;
+    periods_s.push_back(crossed_s - began_s);
+    peaks.push_back(peak);
+    began_s = crossed_s;
+    peak = 0.0;
+  }
+  const auto count = static_cast<double>(periods_s.size());
+  EXPECT_NEAR(count, 4000.0, 30.0);
+  const auto expect_spread = [&](const std::vector<double>& of, double mean, double share) {
+    double sum = 0.0;
+    double squares = 0.0;
+    for (const double value : of) sum += value;
+    for (const double value : of) squares += (value - sum / count) * (value - sum / count);
+    // Four standard errors; the cut at 3 takes 0.7 % of the spread.
+    EXPECT_NEAR(sum / count, mean, 4.0 * share * mean / std::sqrt(count));
+    EXPECT_NEAR(std::sqrt(squares / count) / mean, share, 0.06 * share);
+    for (const double value : of) EXPECT_LE(std::abs(value / mean - 1.0), 3.01 * share);
+  };
+  expect_spread(peaks, 20.0, 0.15);
+  expect_spread(periods_s, 2.5, 0.12);
+}
+
+TEST(QuasiPeriodic, IsASineWithoutSpread) {
+  QuasiPeriodic sine(
+      {.amplitude = 2.0, .frequency_Hz = 3.0, .amplitude_spread = 0.0, .period_spread = 0.0},
+      kRate_Hz);
+  const std::vector<double> values = samples(sine, 5000);
+  for (std::size_t n = 0; n < values.size(); ++n)
+    ASSERT_NEAR(values[n], 2.0 * std::sin(kTurn * 3.0 * static_cast<double>(n) / kRate_Hz), 1e-9);
+}
+
 TEST(Steps, HoldEachLevelForExactlyItsTime) {
   Steps steps({.levels = {1.0, -2.0, 5.0}, .hold_s = 0.1}, kRate_Hz);
   const std::vector<double> values = samples(steps, 1000);
@@ -165,6 +209,10 @@ TEST(Excitation, RefusesParametersOutOfRange) {
   EXPECT_THROW(Multisine({{600.0}, {1.0}, 1}, kRate_Hz), UsageError);
   EXPECT_THROW(RandomWalk({.rms = -1.0}, kRate_Hz), UsageError);
   EXPECT_THROW(RandomWalk({.cutoff_Hz = 500.0}, kRate_Hz), UsageError);
+  EXPECT_THROW(QuasiPeriodic({.amplitude = kNan}, kRate_Hz), UsageError);
+  EXPECT_THROW(QuasiPeriodic({.period_spread = 0.31}, kRate_Hz), UsageError);
+  EXPECT_THROW(QuasiPeriodic({.amplitude_spread = -0.1}, kRate_Hz), UsageError);
+  EXPECT_THROW(QuasiPeriodic({.frequency_Hz = 60.0, .period_spread = 0.3}, kRate_Hz), UsageError);
   EXPECT_THROW(Steps({}, kRate_Hz), UsageError);
   EXPECT_THROW(Steps({{1.0}, 0.0}, kRate_Hz), UsageError);
   EXPECT_THROW(Steps({{kNan}, 1.0}, kRate_Hz), UsageError);

@@ -111,6 +111,24 @@ TEST(StaticCycle, ReachesTheRatedTorqueAtTheSpringsStiffness) {
   }
 }
 
+TEST(Hold, LeverSagsByTheDeflectionThatItsTorqueAsksFor) {
+  for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
+    const Recording recording =
+        simulate({.actuator = actuator, .experiment = "hold", .duration_s = 10.0});
+    const double lever_Nm = 9.0 * 9.81 * sweep_protocol(actuator).train_lever_m.front();
+    const DataSheet sheet = data_sheet(actuator);
+    const auto& spring = std::get<SpringSheet>(sheet.second);
+    EXPECT_NEAR(recording.channel("torque_Nm").values.back(), lever_Nm,
+                0.03 * lever_Nm + sheet.joint.bearing_friction_Nm.value);
+    // The loop holds the rotor; gear and spring yield.
+    const double sag_rad =
+        lever_Nm * (1.0 / spring.stiffness_Nm_rad.value +
+                    1.0 / std::get<GearSheet>(sheet.first).stiffness_Nm_rad.value);
+    const double angle_deg = deg_from_rad(recording.channel("joint_angle_rad").values.back());
+    EXPECT_NEAR(angle_deg, 90.0 - deg_from_rad(sag_rad), 0.3) << actuator;
+  }
+}
+
 TEST(Simulate, HasTheCanonicalChannelsAtOneKilohertz) {
   const Recording recording = simulate({.duration_s = 0.5});
   EXPECT_EQ(recording.size(), 500U);

@@ -150,6 +150,7 @@ struct SensorSheet {
   SheetValue motor_zero_rad = assumed(0.0);  ///< what the encoder tells too much
   SheetValue middle_zero_rad = assumed(0.0);
   SheetValue joint_zero_rad = assumed(0.0);
+  SheetValue twist_zero_rad = assumed(0.0);
   SheetValue current_noise_A = assumed(0.02);
   SheetValue torque_range_Nm;
   SheetValue torque_noise_share = assumed(0.0005 / 3.0);  ///< 0.05 % class read as three sigma

@@ -135,6 +135,37 @@ class RandomWalk {
   double output_ = 0.0;
 };
 
+/// A sine of which every period has an amplitude and a length of its own, as of a hand that pushes
+/// to and fro:
+///
+///     y = A_n sin(2 pi (t - t_n) / T_n),   t_n <= t < t_n + T_n = t_(n+1)
+///     A_n = A (1 + s_A g),   T_n = (1 + s_T g') / f
+///
+/// g and g' are standard normal, cut off at 3. Starts at 0, without jumps. SPEC 4.5, "human torque".
+class QuasiPeriodic {
+ public:
+  struct Parameters {
+    double amplitude = 1.0;
+    double frequency_Hz = 0.4;
+    double amplitude_spread = 0.15;  ///< s_A, 0 to 0.3
+    double period_spread = 0.12;     ///< s_T, 0 to 0.3
+    std::uint64_t seed = 1;
+  };
+  QuasiPeriodic(const Parameters& parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept;
+
+ private:
+  void begin_period() noexcept;
+
+  Parameters parameters_;
+  double sample_rate_Hz_;
+  Random random_;
+  double amplitude_ = 0.0;  ///< of this period
+  double turns_a_sample_ = 0.0;
+  double turns_ = 0.0;  ///< of this period that have passed
+};
+
 /// Each level for the hold time, one after the other, and again from the first.
 class Steps {
  public:

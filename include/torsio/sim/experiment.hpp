@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
 
@@ -35,6 +36,8 @@ struct ExperimentInfo {
 
 /// What can be done on the benches. A name may stand there for more than one family.
 [[nodiscard]] std::vector<ExperimentInfo> experiments();
+/// Those of one actuator.
+[[nodiscard]] std::vector<ExperimentInfo> experiments(const DataSheet& sheet);
 
 /// How the sweeps of one actuator are made: the lever with its 9 kg mass goes to and fro between
 /// +-amplitude (SPEC section 4.7). Levers of dfki-28, for which SPEC names none, are ours: its
@@ -56,5 +59,8 @@ struct SweepProtocol {
 /// @throws UsageError for an unknown name, or a value that the experiment cannot take; Cancelled if
 /// `progress` asks to stop.
 [[nodiscard]] Recording simulate(const ExperimentSpec& spec, const Progress& progress = {});
+/// The same with an actuator of one's own: `spec.actuator` is not looked at.
+[[nodiscard]] Recording simulate(const DataSheet& sheet, const ExperimentSpec& spec,
+                                 const Progress& progress = {});
 
 }  // namespace torsio

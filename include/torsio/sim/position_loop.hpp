@@ -10,13 +10,20 @@ namespace torsio {
 /// something to record.
 ///
 ///     e = k_p (q* − θ_m / N) + q̇* − v,   i = k_v (e + k_i ∫ e dt)
-///     k_v = J_m N ω_c / k_t,  ω_c = 25 rad/s,  k_p = k_i = 8 1/s
+///     k_v = J_m N ω_c / k_t,  k_p = k_i = 0.32 ω_c
 ///
-/// v is the difference of θ_m / N behind a 60 Hz low-pass, q̇* the difference of q*; the integral
-/// stops at the peak current. Source: SPEC section 4.7.
+/// v is the difference of θ_m / N behind a low-pass at 2.4 Hz a rad/s of ω_c (but at most a fifth of
+/// the sample rate), q̇* the difference of q*; the integral stops at the peak current. With the
+/// 25 rad/s of the levers k_p = k_i = 8 1/s and the low-pass lies at 60 Hz. Source: SPEC section
+/// 4.7; how the gains go with the bandwidth is ours.
 class PositionLoop {
  public:
-  PositionLoop(const PlantParameters& plant, double sample_rate_Hz);
+  static constexpr double kDefaultBandwidth_rad_s = 25.0;
+
+  /// @param bandwidth_rad_s ω_c of the speed loop
+  /// @throws UsageError if it is not positive, or so low that the low-pass cannot follow.
+  PositionLoop(const PlantParameters& plant, double sample_rate_Hz,
+               double bandwidth_rad_s = kDefaultBandwidth_rad_s);
 
   void reset() noexcept;
 
@@ -28,6 +35,7 @@ class PositionLoop {
   double sample_rate_Hz_;
   double inverse_ratio_;
   double speed_gain_A_s_rad_;
+  double position_gain_;  ///< k_p = k_i [1/s]
   double integral_limit_;
   Lowpass speed_filter_;
   double integral_ = 0.0;

@@ -1,0 +1,112 @@
+#include <fmt/format.h>
+
+#include <array>
+
+#include "experiment_table.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/signal/excitation.hpp"
+#include "torsio/sim/impedance_loop.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::string_view kActuators = "harmonic-drive";
+constexpr double kHumanTorque_Nm = 20.0;
+constexpr double kHumanFrequency_Hz = 0.4;
+constexpr double kHighestHumanTorque_Nm = 50.0;
+constexpr double kRating_Nm = 292.0;  // highest amplitudes are shares of it
+constexpr double kCycle_Hz = 0.05;
+constexpr double kCycles = 3.0;
+
+ImpedanceLoop impedance_loop(const DataSheet& sheet, bool is_zero) {
+  return {
+      plant_parameters(sheet), is_zero ? ImpedanceLoop::kZero : ImpedanceLoop::kHigh,
+      sheet.variant == "rigid" ? ImpedanceLoop::Twist::tube_and_gear : ImpedanceLoop::Twist::tube};
+}
+
+double current(const ImpedanceLoop& loop, const Measurement& measured) {
+  return loop.step(0.0, measured.motor_angle_rad, measured.middle_angle_rad,
+                   measured.joint_angle_rad);
+}
+
+BenchProgram human_torque(const DataSheet& sheet, const ExperimentSpec& spec) {
+  const double frequency_Hz = spec.frequency_Hz.value_or(kHumanFrequency_Hz);
+  if (frequency_Hz == 0.0)
+    throw UsageError({.place = "human-torque frequency",
+                      .expected = "0 < Hz <= 10",
+                      .found = "0",
+                      .advice = "for a constant torque take the experiment hold"});
+  return {.start = {},
+          .load_cell = LoadCell::external,
+          .duration_s = 600.0,
+          .next = [loop = impedance_loop(sheet, spec.is_impedance_zero),
+                   // Not the numbers that the sensors' noise is made of.
+                   hand = QuasiPeriodic({.amplitude = spec.amplitude.value_or(kHumanTorque_Nm),
+                                         .frequency_Hz = frequency_Hz,
+                                         .seed = Random(spec.seed).bits()},
+                                        kBenchRate_Hz)](
+                      const Measurement& measured) mutable -> BenchAction {
+            return {.command = {.current_A = current(loop, measured)},
+                    .load = {.external_torque_Nm = hand.step()}};
+          }};
+}
+
+BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
+  return {
+      .start = {},
+      .load_cell = LoadCell::external,
+      .duration_s = kCycles / kCycle_Hz,
+      .next = [ramp = Triangle(
+                   {.amplitude = sheet.sensors.torque_range_Nm.value, .frequency_Hz = kCycle_Hz},
+                   kBenchRate_Hz)](const Measurement&) mutable -> BenchAction {
+        return {.command = {.is_motor_held = true}, .load = {.external_torque_Nm = ramp.step()}};
+      }};
+}
+
+BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
+  return {.start = {},
+          .load_cell = LoadCell::external,
+          .duration_s = 60.0,
+          .next = [loop = impedance_loop(sheet, spec.is_impedance_zero),
+                   load = Load{.external_torque_Nm = spec.amplitude.value_or(0.0)}](
+                      const Measurement& measured) -> BenchAction {
+            return {.command = {.current_A = current(loop, measured)}, .load = load};
+          }};
+}
+
+constexpr auto kTable = std::to_array<ExperimentEntry>({
+    {.info = {.name = "human-torque",
+              .actuators = kActuators,
+              .description =
+                  "a hand pushes the output to and fro, about +-20 Nm at 0.4 Hz, against "
+                  "the impedance controller",
+              .amplitude_unit = "Nm"},
+     .family = ActuatorFamily::harmonic_drive,
+     .highest_amplitude = kHighestHumanTorque_Nm / kRating_Nm,
+     .has_frequency = true,
+     .has_impedance = true,
+     .program = human_torque},
+    {.info = {.name = "static-cycle",
+              .actuators = kActuators,
+              .description =
+                  "rotor held, a torque ramp over the load cell's range of +-100 Nm pulls "
+                  "on the output at 0.05 Hz"},
+     .family = ActuatorFamily::harmonic_drive,
+     .program = static_cycle},
+    {.info = {.name = "hold",
+              .actuators = kActuators,
+              .description = "the impedance controller holds the output, against a constant torque "
+                             "if an amplitude is given",
+              .amplitude_unit = "Nm"},
+     .family = ActuatorFamily::harmonic_drive,
+     .highest_amplitude = kHighestHumanTorque_Nm / kRating_Nm,
+     .has_impedance = true,
+     .program = hold},
+});
+
+}  // namespace
+
+std::span<const ExperimentEntry> harmonic_drive_experiments() noexcept { return kTable; }
+
+}  // namespace torsio

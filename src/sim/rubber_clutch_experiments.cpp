@@ -1,0 +1,329 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "experiment_table.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/signal/excitation.hpp"
+#include "torsio/sim/position_loop.hpp"
+
+// The bench of 002 (SPEC sections 4.4 and 4.7): the input angle is position controlled, the output
+// is clamped, but for the collision and the static cycle.
+
+namespace torsio {
+namespace {
+
+constexpr std::string_view kActuators = "rubber-clutch";
+/// The rubber alone, on the rotor's inertia, swings at 30 rad/s: a lever's loop would follow it.
+constexpr double kBandwidth_rad_s = 200.0;
+
+constexpr double kAmplitude_rad = rad_from_deg(9.0);
+constexpr double kFrequency_Hz = 0.4;
+constexpr double kHighestFrequency_Hz = 1.0;
+constexpr double kPointPeriods = 8.0;
+
+constexpr std::array kGrid_rad = {rad_from_deg(4.0), rad_from_deg(5.0), rad_from_deg(6.0),
+                                  rad_from_deg(7.0), rad_from_deg(8.0), rad_from_deg(9.0)};
+constexpr std::array kGrid_Hz = {0.1, 0.4, 0.7, 1.0};
+constexpr double kGridPeriods = 3.0;
+constexpr double kGridRest_s = 2.0;
+
+constexpr double kLowestMultisine_rad = rad_from_deg(4.0);
+constexpr double kMultisine_s = 40.0;  // its period
+constexpr std::size_t kTones = 5;
+constexpr std::size_t kTonesToChoose = 8;  // for each: 40 of them, 1/40 Hz apart, reach 1 Hz
+constexpr double kFadeIn_s = 2.0;
+
+constexpr double kSlow_rad_s = 1.0 / 60.0;
+constexpr double kSlowEnd_rad = rad_from_deg(15.0);  // cable and rubber slip before
+constexpr double kFast_rad_s = rad_from_deg(10.0);
+constexpr double kSlipEnd_rad = rad_from_deg(20.0);
+constexpr double kStand_s = 2.0;
+constexpr double kHold_s = 30.0;
+
+constexpr double kCycle_Hz = 0.05;
+constexpr double kCycles = 3.0;
+constexpr double kCycleShare = 0.8;  // of the rated torque, at which the clutch would slip
+
+// The rig: 2.5 kg and the arm of 56.7 mm are the paper's. The rest is assumed: the mass sits where
+// the contact is, and the link swings in a horizontal plane (the clutch could not lift it); contact
+// stiffness 1e5 N/m; how far the drive goes on is what the paper's 1.037 Nm without a clutch takes.
+constexpr double kMass_kg = 2.5;
+constexpr double kArm_m = 0.0567;
+constexpr double kWall_rad = rad_from_deg(45.0);
+constexpr double kWallStiffness_Nm_rad = 1e5 * kArm_m * kArm_m;
+constexpr double kWallDamping_Nms_rad = 0.8;
+constexpr double kBeyondWall_rad = rad_from_deg(27.0);
+
+/// A straight way to an angle, and a stand there.
+struct Leg {
+  double to_rad = 0.0;
+  double speed_rad_s = 0.0;
+  double stand_s = 0.0;
+};
+
+/// From 0 along its legs; stays at the last.
+class Path {
+ public:
+  explicit Path(std::vector<Leg> legs) : legs_(std::move(legs)) {}
+
+  [[nodiscard]] double duration() const noexcept {
+    double sum_s = 0.0;
+    double from_rad = 0.0;
+    for (const Leg& leg : legs_) {
+      sum_s += std::abs(leg.to_rad - from_rad) / leg.speed_rad_s + leg.stand_s;
+      from_rad = leg.to_rad;
+    }
+    return sum_s;
+  }
+
+  double step() noexcept {
+    const double now_rad = angle_rad_;
+    if (leg_ == legs_.size()) return now_rad;
+    const Leg& leg = legs_[leg_];
+    if (angle_rad_ == leg.to_rad) {
+      stood_s_ += 1.0 / kBenchRate_Hz;
+      if (stood_s_ < leg.stand_s) return now_rad;
+      stood_s_ = 0.0;
+      if (++leg_ == legs_.size()) return now_rad;
+    }
+    const double most_rad = legs_[leg_].speed_rad_s / kBenchRate_Hz;
+    angle_rad_ += std::clamp(legs_[leg_].to_rad - angle_rad_, -most_rad, most_rad);
+    return now_rad;
+  }
+
+ private:
+  std::vector<Leg> legs_;
+  std::size_t leg_ = 0;
+  double angle_rad_ = 0.0;
+  double stood_s_ = 0.0;
+};
+
+struct SinePoint {
+  double amplitude_rad = 0.0;
+  double frequency_Hz = 0.0;
+};
+
+/// One sine after the other, each for some periods behind a rest at 0.
+class SineWalk {
+ public:
+  SineWalk(std::vector<SinePoint> points, double periods, double rest_s)
+      : points_(std::move(points)), periods_(periods), rest_s_(rest_s) {}
+
+  [[nodiscard]] double duration() const noexcept {
+    return std::accumulate(points_.begin(), points_.end(), 0.0,
+                           [this](double sum_s, const SinePoint& point) {
+                             return sum_s + rest_s_ + periods_ / point.frequency_Hz;
+                           });
+  }
+
+  double step() noexcept {
+    if (point_ == points_.size()) return 0.0;
+    const auto [amplitude_rad, frequency_Hz] = points_[point_];
+    const double turns = frequency_Hz * (clock_.next_s() - rest_s_);
+    if (turns < 0.0) return 0.0;
+    if (turns < periods_) return amplitude_rad * std::sin(2.0 * std::numbers::pi * turns);
+    ++point_;
+    clock_.reset();
+    return 0.0;
+  }
+
+ private:
+  std::vector<SinePoint> points_;
+  double periods_;
+  double rest_s_;
+  std::size_t point_ = 0;
+  SampleClock clock_{kBenchRate_Hz};
+};
+
+/// The loop turns the input along the reference.
+template <class Reference>
+BenchProgram turning(const DataSheet& sheet, const Load& load, double duration_s,
+                     Reference reference) {
+  return {.start = load,
+          .duration_s = duration_s,
+          .next = [load, reference = std::move(reference),
+                   loop = PositionLoop(plant_parameters(sheet), kBenchRate_Hz, kBandwidth_rad_s)](
+                      const Measurement& measured) mutable -> BenchAction {
+            return {.command = {.current_A = loop.step(reference.step(), measured.motor_angle_rad)},
+                    .load = load};
+          }};
+}
+
+constexpr Load kClamped{.is_locked = true};
+
+BenchProgram along(const DataSheet& sheet, const Load& load, Path path) {
+  const double duration_s = path.duration();
+  return turning(sheet, load, duration_s, std::move(path));
+}
+
+std::vector<SinePoint> whole_grid() {
+  std::vector<SinePoint> points;
+  for (const double frequency_Hz : kGrid_Hz)
+    for (const double amplitude_rad : kGrid_rad) points.push_back({amplitude_rad, frequency_Hz});
+  return points;
+}
+
+BenchProgram grid(const DataSheet& sheet, const ExperimentSpec& spec) {
+  if (!spec.amplitude && !spec.frequency_Hz) {
+    SineWalk walk(whole_grid(), kGridPeriods, kGridRest_s);
+    const double duration_s = walk.duration();
+    return turning(sheet, kClamped, duration_s, std::move(walk));
+  }
+  const double frequency_Hz = spec.frequency_Hz.value_or(kFrequency_Hz);
+  if (!(frequency_Hz > 0.0 && frequency_Hz <= kHighestFrequency_Hz)) {
+    throw UsageError({.place = "grid frequency",
+                      .expected = fmt::format("0 < Hz <= {}", kHighestFrequency_Hz),
+                      .found = fmt::format("{}", frequency_Hz),
+                      .advice = "an angle that stands is the experiment hold"});
+  }
+  const SinePoint point{spec.amplitude.value_or(kAmplitude_rad), frequency_Hz};
+  return turning(sheet, kClamped, kPointPeriods / frequency_Hz,
+                 SineWalk({point}, std::numeric_limits<double>::infinity(), 0.0));
+}
+
+/// One tone in each fifth of the band, each with a share of the whole of its own. Frequencies,
+/// shares and the largest angle are drawn; all tones return after the same period, so that the
+/// largest angle is that of any duration.
+Multisine drawn_multisine(const ExperimentSpec& spec) {
+  Random random(spec.seed);
+  const double drawn_rad =
+      kLowestMultisine_rad + (kAmplitude_rad - kLowestMultisine_rad) * random.uniform();
+  Multisine::Parameters tones{.frequencies_Hz = {}, .amplitudes = {}, .seed = random.bits()};
+  for (std::size_t tone = 0; tone < kTones; ++tone) {
+    const std::size_t turns = 1 + kTonesToChoose * tone + random.below(kTonesToChoose);
+    tones.frequencies_Hz.push_back(static_cast<double>(turns) / kMultisine_s);
+    tones.amplitudes.push_back(0.5 + 0.5 * random.uniform());
+  }
+  Multisine trial(tones, kBenchRate_Hz);
+  double largest = 0.0;
+  for (int tick = 0; tick < static_cast<int>(kMultisine_s * kBenchRate_Hz); ++tick)
+    largest = std::max(largest, std::abs(trial.step()));
+  for (double& amplitude : tones.amplitudes)
+    amplitude *= spec.amplitude.value_or(drawn_rad) / largest;
+  return {std::move(tones), kBenchRate_Hz};
+}
+
+BenchProgram multisine(const DataSheet& sheet, const ExperimentSpec& spec) {
+  struct FadingIn {
+    Multisine sum;
+    SampleClock clock{kBenchRate_Hz};
+    double step() noexcept { return std::min(clock.next_s() / kFadeIn_s, 1.0) * sum.step(); }
+  };
+  return turning(sheet, kClamped, kMultisine_s, FadingIn{drawn_multisine(spec)});
+}
+
+BenchProgram slow_cycles(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
+  const Leg up{.to_rad = kSlowEnd_rad, .speed_rad_s = kSlow_rad_s};
+  const Leg down{.to_rad = -kSlowEnd_rad, .speed_rad_s = kSlow_rad_s};
+  const Leg home{.to_rad = 0.0, .speed_rad_s = kSlow_rad_s};
+  return along(sheet, kClamped, Path({up, down, up, down, home}));
+}
+
+BenchProgram slip(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
+  const Leg up{.to_rad = kSlipEnd_rad, .speed_rad_s = kFast_rad_s, .stand_s = kStand_s};
+  const Leg down{.to_rad = -kSlipEnd_rad, .speed_rad_s = kFast_rad_s, .stand_s = kStand_s};
+  const Leg home{.to_rad = 0.0, .speed_rad_s = kFast_rad_s, .stand_s = kStand_s};
+  return along(sheet, kClamped, Path({up, down, home}));
+}
+
+BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
+  return along(sheet, kClamped,
+               Path({{.to_rad = spec.amplitude.value_or(kAmplitude_rad),
+                      .speed_rad_s = kFast_rad_s,
+                      .stand_s = kHold_s}}));
+}
+
+BenchProgram collision(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
+  Load link = lever(kMass_kg, kArm_m);
+  link.gravity_Nm = 0.0;
+  link.wall_angle_rad = kWall_rad;
+  link.wall_stiffness_Nm_rad = kWallStiffness_Nm_rad;
+  link.wall_damping_Nms_rad = kWallDamping_Nms_rad;
+  BenchProgram program = along(
+      sheet, link,
+      Path(
+          {{.to_rad = kWall_rad + kBeyondWall_rad, .speed_rad_s = kFast_rad_s, .stand_s = kStand_s},
+           {.to_rad = 0.0, .speed_rad_s = kFast_rad_s}}));
+  program.load_cell = LoadCell::wall;
+  return program;
+}
+
+BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
+  return {.start = {},
+          .duration_s = kCycles / kCycle_Hz,
+          .next = [ramp = Triangle({.amplitude = kCycleShare * sheet.rating.torque_Nm.value,
+                                    .frequency_Hz = kCycle_Hz},
+                                   kBenchRate_Hz)](const Measurement&) mutable -> BenchAction {
+            return {.command = {.is_motor_held = true},
+                    .load = {.external_torque_Nm = ramp.step()}};
+          }};
+}
+
+constexpr auto kTable = std::to_array<ExperimentEntry>({
+    {.info = {.name = "grid",
+              .actuators = kActuators,
+              .description =
+                  "input angle on a sine; without --amplitude and --frequency 24 of them: "
+                  "4 to 9 deg at 0.1 to 1 Hz",
+              .amplitude_unit = "rad"},
+     .family = ActuatorFamily::rubber_clutch,
+     .highest_amplitude = kAmplitude_rad,
+     .has_frequency = true,
+     .program = grid},
+    {.info = {.name = "multisine",
+              .actuators = kActuators,
+              .description = "input angle on five sines below 1 Hz that reach 4 to 9 deg together, "
+                             "drawn from the seed",
+              .amplitude_unit = "rad"},
+     .family = ActuatorFamily::rubber_clutch,
+     .highest_amplitude = kAmplitude_rad,
+     .program = multisine},
+    {.info = {.name = "slow-cycles",
+              .actuators = kActuators,
+              .description = "input angle at 1 rad/min until the clutch slips, both ways, twice"},
+     .family = ActuatorFamily::rubber_clutch,
+     .program = slow_cycles},
+    {.info = {.name = "slip",
+              .actuators = kActuators,
+              .description =
+                  "10 deg/s to 20 deg, beyond where the clutch slips, a stand, and back, "
+                  "both ways"},
+     .family = ActuatorFamily::rubber_clutch,
+     .program = slip},
+    {.info = {.name = "collision",
+              .actuators = kActuators,
+              .description = "a link with 2.5 kg swings at 10 deg/s against a wall, and the drive "
+                             "goes on; torque_Nm is that of the contact"},
+     .family = ActuatorFamily::rubber_clutch,
+     .program = collision},
+    {.info = {.name = "hold",
+              .actuators = kActuators,
+              .description = "input angle to 9 deg at 10 deg/s; the rubber relaxes for 30 s",
+              .amplitude_unit = "rad"},
+     .family = ActuatorFamily::rubber_clutch,
+     .highest_amplitude = kAmplitude_rad,
+     .program = hold},
+    {.info = {.name = "static-cycle",
+              .actuators = kActuators,
+              .description = "rotor held, a torque ramp of +-80 % of the rated torque pulls on the "
+                             "output at 0.05 Hz"},
+     .family = ActuatorFamily::rubber_clutch,
+     .program = static_cycle},
+});
+
+}  // namespace
+
+std::span<const ExperimentEntry> rubber_clutch_experiments() noexcept { return kTable; }
+
+}  // namespace torsio
