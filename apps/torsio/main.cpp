@@ -33,6 +33,7 @@ int run(int argc, char** argv) {
   add_evaluate(app);
   add_compare(app);
   add_crossvalidate(app);
+  add_attribute(app);
   catch_interrupts();
   try {
     app.parse(argc, argv);

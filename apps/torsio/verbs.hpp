@@ -12,3 +12,4 @@ void add_evaluate(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);
+void add_attribute(CLI::App& app);
