@@ -293,6 +293,7 @@ Attribution attribute(const AnyModel& model, const TrainingData& data,
   AnyModel own = model;
   std::vector<double> scratch(data.input_count());
   std::vector<double> background_values;
+  background_values.reserve(background.size());
   for (const End& end : background)
     background_values.push_back(windows.told(own, end, end, 0, scratch).value);
   attribution.expected_value =
