@@ -120,3 +120,15 @@ void DataFlags::check_outputs(const std::vector<std::string>& outputs,
     }
   }
 }
+
+std::map<std::string, std::string> parse_settings(const std::vector<std::string>& settings) {
+  std::map<std::string, std::string> options;
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos)
+      throw torsio::UsageError(
+          {.place = "--set", .expected = "option=value", .found = "'" + setting + "'"});
+    options[setting.substr(0, equals)] = setting.substr(equals + 1);
+  }
+  return options;
+}

@@ -2,6 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,3 +39,6 @@ inline constexpr std::uint64_t kDefaultSeed = 1;
 
 /// `--seed`, for every verb that draws random numbers.
 void add_seed(CLI::App& verb, std::uint64_t& seed, const char* help);
+/// What `--set option=value` said, each time it was given.
+[[nodiscard]] std::map<std::string, std::string> parse_settings(
+    const std::vector<std::string>& settings);

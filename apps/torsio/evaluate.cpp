@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "data_flags.hpp"
+#include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "report_text.hpp"
@@ -45,27 +46,6 @@ torsio::Recording prediction_recording(const torsio::Estimator& estimator,
   return result;
 }
 
-/// What makes a score mean less than it says.
-void warn_of_doubts(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
-  const auto& trained = file.card.training_files;
-  for (const torsio::DatasetRecord& record : dataset.records) {
-    const torsio::Recording& recording = record.recording;
-    const bool is_known = std::ranges::any_of(trained, [&](const torsio::Source& source) {
-      return !source.sha256.empty() && source.sha256 == recording.source.sha256;
-    });
-    if (is_known)
-      remark("warning: the model was trained on " + recording.name() +
-             "; its score is no held-out one");
-    for (const std::string& channel : file.settings.zeroed_channels) {
-      const bool is_zeroed = std::ranges::any_of(
-          recording.zeros, [&](const torsio::ZeroRule& zero) { return zero.channel == channel; });
-      if (!is_zeroed)
-        remark("warning: the model expects " + channel + " with its zero taken, but " +
-               recording.name() + " has it as measured: use the mapping that it was trained with");
-    }
-  }
-}
-
 void run(const EvaluateFlags& flags) {
   flags.data.check_outputs({flags.predictions, flags.json.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
@@ -83,7 +63,8 @@ void run(const EvaluateFlags& flags) {
                               .expected = "one recording",
                               .found = std::to_string(dataset.records.size()),
                               .advice = "Call evaluate once for each recording."});
-  warn_of_doubts(file, dataset);
+  warn_of_seen_recordings(file, dataset);
+  warn_of_missing_zeros(file, dataset);
   const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
   if (!flags.predictions.empty()) {
     const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());

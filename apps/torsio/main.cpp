@@ -32,6 +32,8 @@ int run(int argc, char** argv) {
   add_fit(app);
   add_evaluate(app);
   add_compare(app);
+  add_crossvalidate(app);
+  add_attribute(app);
   catch_interrupts();
   try {
     app.parse(argc, argv);

@@ -91,6 +91,43 @@ TEST_F(BrokenCalls, LeaveTheOutputUntouchedWhenTheFitFails) {
   EXPECT_EQ(contents("m.safetensors"), "precious");
 }
 
+TEST_F(BrokenCalls, OfCrossValidationSayWhatFoldsThereCanBe) {
+  record();
+  const std::string call = "crossvalidate a.csv --models linear ";
+  expect_error(torsio(call + "--by support_m"), kCallWasWrong, "no channel is constant");
+  expect_error(torsio(call + "--by record"), kCallWasWrong, "at least two recordings");
+  expect_error(torsio(call + "--by record --folds 3"), kCallWasWrong, "excludes");
+  expect_error(torsio(call + "--folds 1"), kCallWasWrong, "at least 2");
+  expect_error(torsio(call + "--folds 1000000"), kCallWasWrong, "at most 40000");
+  expect_error(torsio(call + "--embargo 100s"), kCallWasWrong, "shorter --embargo");
+  expect_error(torsio(call + "--embargo 3Nm"), kCallWasWrong, "--embargo");
+  expect_error(torsio(call + "--set components=3"), kCallWasWrong, "components");
+  expect_error(torsio("crossvalidate a.csv --set rates=true"), kCallWasWrong, "--models");
+  expect_error(torsio("crossvalidate a.csv a.csv"), kCallWasWrong, "given twice");
+  expect_error(torsio("crossvalidate"), kCallWasWrong, "at least one recording");
+  expect_error(torsio(call + "--json no/such/folder/x.json"), kCallWasWrong, "no/such/folder");
+}
+
+TEST_F(BrokenCalls, OfAttributionSayWhatIsMissing) {
+  record();
+  ASSERT_EQ(torsio("fit a.csv --model polynomial -o m.safetensors").exit_code, 0);
+  const std::string call = "attribute m.safetensors ";
+  expect_error(torsio("attribute"), kCallWasWrong, "MODEL");
+  expect_error(torsio("attribute m.safetensors"), kCallWasWrong, "at least one recording");
+  expect_error(torsio("attribute nowhere.safetensors a.csv"), kWorkFailed, "nowhere");
+  expect_error(torsio(call + "a.csv --windows 0"), kCallWasWrong, "--windows");
+  expect_error(torsio(call + "a.csv --window 0s"), kCallWasWrong, "--window");
+  expect_error(torsio(call + "a.csv --window 3Nm"), kCallWasWrong, "--window");
+  expect_error(torsio(call + "a.csv --window 100s"), kWorkFailed, "shorter window");
+  expect_error(torsio(call + "a.csv --json m.safetensors"), kCallWasWrong, "replace");
+  folder_.file("b.csv", "t_s,torque_Nm\n0,1\n0.001,2\n0.002,3\n");
+  expect_error(torsio(call + "b.csv"), kWorkFailed, "gear_angle_rad");
+  expect_error(shell("timeout --signal=INT --preserve-status 2 {torsio} " + call +
+                     "a.csv --windows 20000 --background 2000 --window 0.1s --json x.json"),
+               kWorkFailed, "stopped on request");
+  EXPECT_EQ(contents("x.json"), "");
+}
+
 TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
   record();
   folder_.file("m.safetensors", "precious");

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/aligned_vector.hpp"
+#include "torsio/model/model.hpp"
+#include "torsio/model/network_layers.hpp"
+
+namespace torsio {
+
+/// A static network: dense layers one behind the other, the last one linear with one output,
+/// evaluated in float32. Source: paper 001, SPEC section 3.2. Cost: its weights streamed once from
+/// cache.
+class Mlp {
+ public:
+  static constexpr std::string_view kFamily = "mlp";
+
+  struct Parameters {
+    NetworkScaling scaling;
+    std::vector<DenseLayer> layers;
+
+    template <class Self, class Visit>
+    static void visit_fields(Self& self, Visit&& visit) {
+      visit("scaling", self.scaling);
+      visit("layers", self.layers);
+    }
+    bool operator==(const Parameters&) const = default;
+  };
+
+  /// @throws Error if there is no layer, shapes do not fit together, the last layer has not one output
+  /// or is not linear, an activation is unknown, a number is not finite.
+  explicit Mlp(const Parameters& parameters);
+
+  [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
+  [[nodiscard]] std::size_t input_count() const noexcept;
+  [[nodiscard]] std::size_t parameter_count() const noexcept;
+
+  void reset() noexcept {}
+  Estimate step(Features features) noexcept TORSIO_REALTIME;
+
+  /// What the last layer saw in the last step: what an adaptation of that layer learns from.
+  [[nodiscard]] std::span<const float> last_layer_input() const noexcept;
+
+ private:
+  Parameters parameters_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/matrix.hpp"
+#include "torsio/signal/normaliser.hpp"
+
+namespace torsio {
+
+/// What stands behind a dense layer. The numbers are stored in model files: never reorder.
+enum class Activation : std::uint8_t { linear = 0, relu = 1, tanh = 2, softsign = 3, elu = 4 };
+
+[[nodiscard]] std::string_view name(Activation activation) noexcept;
+/// @throws UsageError that lists the names if there is none of that name.
+[[nodiscard]] Activation activation_of(std::string_view name);
+
+/// y = f(W x + b). Plain data, like the layers below.
+struct DenseLayer {
+  FloatMatrix weights;      ///< outputs x inputs
+  std::vector<float> bias;  ///< outputs
+  std::size_t activation = 0;
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("weights", self.weights);
+    visit("bias", self.bias);
+    visit("activation", self.activation);
+  }
+  bool operator==(const DenseLayer&) const = default;
+};
+
+/// A long short-term memory of H cells, gates stacked in the order i, f, g, o (PyTorch's):
+///
+///     a = W x + R h₋ + b
+///     c = σ(a_f) c₋ + σ(a_i) tanh(a_g),   h = σ(a_o) tanh(c)
+///
+/// Source: paper 004 Eqs. 3-8, SPEC section 3.4.
+struct LstmLayer {
+  FloatMatrix input_weights;      ///< W: 4H x inputs
+  FloatMatrix recurrent_weights;  ///< R: 4H x H
+  std::vector<float> bias;        ///< b: 4H
+
+  [[nodiscard]] std::size_t units() const noexcept { return recurrent_weights.columns; }
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("input_weights", self.input_weights);
+    visit("recurrent_weights", self.recurrent_weights);
+    visit("bias", self.bias);
+  }
+  bool operator==(const LstmLayer&) const = default;
+};
+
+/// A gated recurrent unit of H cells, gates stacked in the order r, z, n (PyTorch's):
+///
+///     r = σ(W_r x + R_r h₋ + b_r),   z = σ(W_z x + R_z h₋ + b_z)
+///     n = tanh(W_n x + b_n + r (R_n h₋ + b_Rn)),   h = (1 − z) n + z h₋
+///
+/// Source: SPEC section 3.4.
+struct GruLayer {
+  FloatMatrix input_weights;          ///< W: 3H x inputs
+  FloatMatrix recurrent_weights;      ///< R: 3H x H
+  std::vector<float> input_bias;      ///< b: 3H
+  std::vector<float> recurrent_bias;  ///< 3H; only its last third differs from a second b
+
+  [[nodiscard]] std::size_t units() const noexcept { return recurrent_weights.columns; }
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("input_weights", self.input_weights);
+    visit("recurrent_weights", self.recurrent_weights);
+    visit("input_bias", self.input_bias);
+    visit("recurrent_bias", self.recurrent_bias);
+  }
+  bool operator==(const GruLayer&) const = default;
+};
+
+/// What a network sees and says is standardised: x = (feature - centre) / scale, and the target is
+/// target.centre + target.scale y.
+struct NetworkScaling {
+  Normaliser::Parameters inputs;
+  double target_centre = 0.0;
+  double target_scale = 1.0;
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("inputs", self.inputs);
+    visit("target_centre", self.target_centre);
+    visit("target_scale", self.target_scale);
+  }
+  bool operator==(const NetworkScaling&) const = default;
+};
+
+/// No layer wider, no network deeper: a file that says so is refused before memory is taken.
+inline constexpr std::size_t kMostUnits = 65536;
+inline constexpr std::size_t kMostLayers = 64;
+
+}  // namespace torsio

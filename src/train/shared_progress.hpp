@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "torsio/core/progress.hpp"
+
+namespace torsio {
+
+/// Progress of work on several threads, told by one of them at a time.
+class SharedProgress {
+ public:
+  /// The work's units are told as fractions of [begin, end).
+  SharedProgress(const Progress& progress, double begin, double end, std::size_t units,
+                 std::string doing)
+      : progress_(progress),
+        begin_(begin),
+        per_unit_((end - begin) / static_cast<double>(units)),
+        doing_(std::move(doing)) {}
+
+  /// A unit is done. @throws Cancelled if the listener asks to stop.
+  void tick() {
+    if (!progress_) return;
+    const std::scoped_lock lock(guard_);
+    report_progress(progress_, begin_ + per_unit_ * static_cast<double>(++done_), doing_);
+  }
+
+ private:
+  const Progress& progress_;
+  double begin_;
+  double per_unit_;
+  std::string doing_;
+  std::size_t done_ = 0;
+  std::mutex guard_;
+};
+
+}  // namespace torsio
