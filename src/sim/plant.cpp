@@ -90,10 +90,10 @@ double Plant::step_limit(const PlantParameters& parameters) {
   const double first_Nm_rad = dispatch(first, stiffness);
   const double second_Nm_rad = dispatch(second, stiffness);
   const double rotor_Nm_rad = first_Nm_rad / (first_ratio * first_ratio) +
-                              LuGreFriction(parameters.rotor_friction).stiffness(load_Nm);
+                              LuGreFriction(parameters.rotor_friction).steepest();
   const double middle_Nm_rad = first_Nm_rad + second_Nm_rad / (second_ratio * second_ratio) +
-                               LuGreFriction(parameters.middle_friction).stiffness(load_Nm);
-  const double joint_Nm_rad = second_Nm_rad + LuGreFriction(parameters.bearing).stiffness(0.0);
+                               LuGreFriction(parameters.middle_friction).steepest();
+  const double joint_Nm_rad = second_Nm_rad + LuGreFriction(parameters.bearing).steepest();
   const double rotor = parameters.rotor_inertia_kg_m2;
   const double middle = parameters.middle_inertia_kg_m2;
   const double joint = parameters.joint_inertia_kg_m2;

@@ -164,7 +164,7 @@ void PlantLanes::start(std::size_t at, const Plant& plant) noexcept {
     lane(rows.motor.current_A) = plant.current();
     lane(rows.motor.torque_Nm) = torques.motor_Nm;
     for (FrictionRows* friction : {&rows.rotor_friction, &rows.middle_friction, &rows.bearing}) {
-      lane(friction->bristle) = 0.0;
+      lane(friction->force_Nm) = 0.0;
       lane(friction->torque_Nm) = 0.0;
     }
     lane(rows.first.output_Nm) = torques.first_Nm;
