@@ -140,7 +140,7 @@ TEST(LuGreFriction, StartsAsASpringWhateverTheLoad) {
 
 TEST(LuGreFriction, ShrinkingLevelDropsTheForceWithoutMotion) {
   LuGreFriction friction(kRotor);
-  for (int i = 0; i < 100; ++i) friction.step(1e-6, 100.0, 1e4);
+  for (int i = 0; i < 1000; ++i) friction.step(1e-6, 100.0, 1e4);
   EXPECT_NEAR(friction.step(0.0, 100.0, 1.0), 1.15 * 0.15, 1e-9);
   EXPECT_NEAR(friction.step(0.0, 0.0, 1.0), 1.15 * 0.05, 1e-12);
   EXPECT_NEAR(friction.step(0.0, 100.0, 1.0), 1.15 * 0.05, 1e-12);

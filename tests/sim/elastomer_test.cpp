@@ -278,6 +278,7 @@ TEST(Elastomer, NoEnergyAppearsFromNothingInTriangles) {
     TorqueLoop loop(parts, coupling.chain().stiffness(), 1000.0);
     Triangle wanted({5.0, 1.0}, 1000.0);
     double largest_loss_J = 0.0;
+    double deepest_fall_J = 0.0;
     for (int tick = 0; tick < 20000; ++tick) {
       const PlantCommand command{.current_A = loop.step(wanted.step(), plant.torques().joint_Nm,
                                                         plant.state().rotor_angle_rad)};
@@ -289,8 +290,9 @@ TEST(Elastomer, NoEnergyAppearsFromNothingInTriangles) {
       ASSERT_LE(std::abs(audit.residual()), 1e-6 + 1e-3 * elapsed_s * (1e-2 + audit.throughput()))
           << name << " at " << elapsed_s << " s";
       largest_loss_J = std::max(largest_loss_J, audit.hysteretic_loss());
-      ASSERT_GE(audit.hysteretic_loss(), largest_loss_J - 2e-3) << name << " gave energy";
+      deepest_fall_J = std::max(deepest_fall_J, largest_loss_J - audit.hysteretic_loss());
     }
+    EXPECT_LT(deepest_fall_J, 1e-4 * audit.hysteretic_loss()) << name << " gave energy";
     EXPECT_GT(audit.hysteretic_loss(), 0.1) << name;
     EXPECT_LT(std::abs(audit.residual()), 1e-5 * audit.throughput()) << name;
   }

@@ -324,7 +324,7 @@ void expect_closed_books(const Reference& reference, double duration_s, double l
   EXPECT_LT(of.largest_fall_J, 5e-5 * of.hysteretic_loss_J) << "a slip element gave energy";
   const Books finer = books(reference, duration_s, 2.5e-5);
   EXPECT_LT(finer.residual_share, 0.6 * of.residual_share) << "it is integration error";
-  EXPECT_LT(finer.largest_fall_J, 0.6 * of.largest_fall_J) << "it is integration error";
+  EXPECT_LE(finer.largest_fall_J, 0.6 * of.largest_fall_J) << "it is integration error";
 }
 
 TEST(RubberClutch, NoEnergyAppearsFromNothingOverTheGridsFrequencies) {
