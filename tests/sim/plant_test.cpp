@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -198,7 +197,6 @@ TEST(Plant, PeakCurrentGivesTheRatedTorqueAtALockedOutput) {
       highest_Nm = std::max(highest_Nm, plant.torques().joint_Nm);
     }
     const double settled_Nm = plant.torques().joint_Nm;
-    std::printf("SETTLED %s %.3f highest %.3f\n", sheet.name.data(), settled_Nm, highest_Nm);
     RecordProperty("settled_Nm_" + std::string(sheet.name), std::to_string(settled_Nm));
     RecordProperty("highest_Nm_" + std::string(sheet.name), std::to_string(highest_Nm));
     // The clutch slides at less than what it held.
@@ -257,7 +255,6 @@ TEST(Plant, ErrorShrinksWithTheStep) {
       EXPECT_LT(error, divisor == 1.0 ? 2e-3 : 0.7 * last)
           << actuator << ", divided by " << divisor;
       order = std::log2(last / error);
-      std::printf("ORDER %s /%g %.3e (%.2f)\n", actuator, divisor, error, order);
       last = error;
     }
     RecordProperty("order_" + std::string(actuator), std::to_string(order));
