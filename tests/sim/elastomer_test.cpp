@@ -22,6 +22,10 @@
 namespace torsio {
 namespace {
 
+/// What the two stages have lost: their ports of Plant::work_ports. The other friction, which loses
+/// far more, would hide their falls.
+double stage_loss(const EnergyAudit& audit) { return audit.port_loss(8) + audit.port_loss(9); }
+
 constexpr double kLog_Hz = 200.0;
 constexpr std::size_t kSlowCycle = 4000;  // samples
 
@@ -289,11 +293,11 @@ TEST(Elastomer, NoEnergyAppearsFromNothingInTriangles) {
       const double elapsed_s = 1e-3 * (tick + 1);
       ASSERT_LE(std::abs(audit.residual()), 1e-6 + 1e-3 * elapsed_s * (1e-2 + audit.throughput()))
           << name << " at " << elapsed_s << " s";
-      largest_loss_J = std::max(largest_loss_J, audit.hysteretic_loss());
-      deepest_fall_J = std::max(deepest_fall_J, largest_loss_J - audit.hysteretic_loss());
+      largest_loss_J = std::max(largest_loss_J, stage_loss(audit));
+      deepest_fall_J = std::max(deepest_fall_J, largest_loss_J - stage_loss(audit));
     }
-    EXPECT_LT(deepest_fall_J, 1e-4 * audit.hysteretic_loss()) << name << " gave energy";
-    EXPECT_GT(audit.hysteretic_loss(), 0.1) << name;
+    EXPECT_LT(deepest_fall_J, 1e-4 * stage_loss(audit)) << name << " gave energy";
+    EXPECT_GT(stage_loss(audit), 0.1) << name;
     EXPECT_LT(std::abs(audit.residual()), 1e-5 * audit.throughput()) << name;
   }
 }
