@@ -78,7 +78,7 @@ double ElastomerCoupling::step(double deflection_rad, double deflection_rate_rad
   last_deflection_rad_ = deflection_rad;
   if (parameters_.creep_per_cycle > 0.0) {
     count_cycle(deflection_rad);
-    // Here the torque does not jump, and what is stored falls.
+    // Here what is stored falls, and the torque jumps by no more than the slip elements' share.
     if (carried_Nm_ * before_Nm <= 0.0) glue_ = glue_after_cycle_;
   }
   torque_Nm_ = glue_ * (carried_Nm_ + slip_Nm);

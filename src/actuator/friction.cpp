@@ -13,8 +13,8 @@ constexpr auto kPlace = "LuGre friction";
 
 LuGreFriction::LuGreFriction(const Parameters& parameters)
     : parameters_(parameters),
-      inverse_stribeck_squared_(1.0 / (parameters.stribeck_rad_s * parameters.stribeck_rad_s)),
-      inverse_bristle_(1.0 / parameters.bristle_rad),
+      stribeck_(parameters.static_ratio, parameters.stribeck_rad_s),
+      stiffness_Nm_rad_(parameters.static_ratio * parameters.coulomb_Nm / parameters.bristle_rad),
       is_only_viscous_(parameters.coulomb_Nm == 0.0 && parameters.load_factor == 0.0) {
   require_not_negative(kPlace, "coulomb_Nm", parameters.coulomb_Nm);
   require_not_negative(kPlace, "load_factor", parameters.load_factor);
@@ -23,11 +23,8 @@ LuGreFriction::LuGreFriction(const Parameters& parameters)
   require_positive(kPlace, "bristle_rad", parameters.bristle_rad);
   require(parameters.static_ratio >= 1.0 && std::isfinite(parameters.static_ratio), kPlace,
           "static_ratio >= 1", parameters.static_ratio);
-}
-
-double LuGreFriction::stiffness(double load_Nm) const noexcept {
-  return (parameters_.coulomb_Nm + parameters_.load_factor * std::abs(load_Nm)) *
-         parameters_.static_ratio * inverse_bristle_;
+  require(parameters.coulomb_Nm > 0.0 || parameters.load_factor == 0.0, kPlace,
+          "coulomb_Nm > 0 beside a load_factor", parameters.coulomb_Nm);
 }
 
 }  // namespace torsio

@@ -13,7 +13,7 @@ constexpr auto kPlace = "LuGre slip";
 
 LuGreSlip::LuGreSlip(const Parameters& parameters)
     : parameters_(parameters),
-      inverse_stribeck_squared_(1.0 / (parameters.stribeck_rad_s * parameters.stribeck_rad_s)),
+      stribeck_(parameters.static_ratio, parameters.stribeck_rad_s),
       per_bristle_(1.0 / parameters.bristle_rad),
       limit_Nm_(parameters.constant_Nm) {
   require_not_negative(kPlace, "constant_Nm", parameters.constant_Nm);

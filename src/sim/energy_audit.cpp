@@ -6,7 +6,8 @@
 namespace torsio {
 
 EnergyAudit::EnergyAudit(const Plant& plant, const Load& load)
-    : last_ports_(plant.work_ports(load)),
+    : first_ports_(plant.work_ports(load)),
+      last_ports_(first_ports_),
       first_stored_(plant.stored_energy(load)),
       stored_(first_stored_) {}
 
@@ -18,6 +19,7 @@ void EnergyAudit::observe(const Plant& plant, const Load& load, double dt_s) noe
     // A constant torque over the step works through the mean of the speeds before and after.
     const double work_J = (port.torque_Nm + port.viscous_Nms_rad * last_rad_s) * 0.5 * dt_s *
                           (last_rad_s + port.speed_rad_s);
+    work_J_[i] += work_J;
     switch (port.kind) {
       case WorkPort::Kind::input:
         input_J_ += work_J;

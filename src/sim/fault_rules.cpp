@@ -77,17 +77,10 @@ std::string_view second_stage_name(const DataSheet& sheet) {
   return sheet.family == ActuatorFamily::harmonic_drive ? "gear" : kSpring;
 }
 
-/// The stiffest stop that the bench's steps still follow: half a radian of the mode of the two
-/// bodies that it throws against each other.
+/// That the bench's steps still follow.
 double stiffest_stop(const DataSheet& sheet) {
   const PlantParameters plant = plant_parameters(sheet);
-  const double second_ratio =
-      std::visit([](const auto& parts) { return ratio(make_stage(parts)); }, plant.second);
-  const double middle_kg_m2 = plant.middle_inertia_kg_m2 * second_ratio * second_ratio;
-  const double both_kg_m2 =
-      middle_kg_m2 * plant.joint_inertia_kg_m2 / (middle_kg_m2 + plant.joint_inertia_kg_m2);
-  const double step_s = std::min(Plant::step_limit(plant), Plant::kDefaultStep_s);
-  return 0.25 * both_kg_m2 / (step_s * step_s);
+  return Plant::stiffest_stop(plant, std::min(Plant::step_limit(plant), Plant::kDefaultStep_s));
 }
 
 std::string text(double value, std::string_view unit) {

@@ -38,6 +38,55 @@ double wall_torque(const Load& load, double angle_rad, double speed_rad_s) noexc
                   load.wall_stiffness_Nm_rad * depth_rad + load.wall_damping_Nms_rad * speed_rad_s);
 }
 
+struct StepLimits {
+  double stiffness_s = 0.0;
+  double damping_s = 0.0;
+};
+
+StepLimits step_limits(const PlantParameters& parameters) {
+  // The largest row sum of M^-1 K bounds its largest eigenvalue. The speeds are scaled so that
+  // each body moves as much as the next one.
+  const auto first = made<FirstStage>(parameters.first);
+  const auto second = made<SecondStage>(parameters.second);
+  const double load_Nm = parameters.rated_torque_Nm;
+  const auto stiffness = [&](const auto& stage) { return steepest(stage, load_Nm); };
+  const auto damping = [](const auto& stage) { return strongest_damping(stage); };
+  const auto ratio_of = [](const auto& stage) { return ratio(stage); };
+  const double first_ratio = dispatch(first, ratio_of);
+  const double second_ratio = dispatch(second, ratio_of);
+  const double first_Nm_rad = dispatch(first, stiffness);
+  const double second_Nm_rad = dispatch(second, stiffness);
+  const double rotor_Nm_rad = first_Nm_rad / (first_ratio * first_ratio) +
+                              LuGreFriction(parameters.rotor_friction).steepest();
+  const double middle_Nm_rad = first_Nm_rad + second_Nm_rad / (second_ratio * second_ratio) +
+                               LuGreFriction(parameters.middle_friction).steepest();
+  const double joint_Nm_rad = second_Nm_rad + LuGreFriction(parameters.bearing).steepest();
+  const double rotor = parameters.rotor_inertia_kg_m2;
+  const double middle = parameters.middle_inertia_kg_m2;
+  const double joint = parameters.joint_inertia_kg_m2;
+  // Off-diagonal terms couple two neighbours: sqrt(k/m1 * k/m2) each, which their sum bounds.
+  const double coupled = first_Nm_rad / (first_ratio * std::sqrt(middle * rotor)) +
+                         second_Nm_rad / (second_ratio * std::sqrt(middle * joint));
+  const double own = std::max({rotor_Nm_rad / rotor, middle_Nm_rad / middle, joint_Nm_rad / joint});
+
+  const double first_Nms = dispatch(first, damping);
+  const double second_Nms = dispatch(second, damping);
+  const double rates_1_s = std::max(
+      {(first_Nms / (first_ratio * first_ratio) + parameters.rotor_friction.viscous_Nms_rad) /
+           rotor,
+       (first_Nms + second_Nms / (second_ratio * second_ratio) +
+        parameters.middle_friction.viscous_Nms_rad) /
+           middle,
+       (second_Nms + parameters.bearing.viscous_Nms_rad + parameters.joint_viscous_Nms_rad) /
+           joint});
+  return {.stiffness_s = 0.25 / std::sqrt(own + coupled), .damping_s = 0.5 / rates_1_s};
+}
+
+bool is_finite(const PlantState& s) noexcept {
+  return std::isfinite(s.rotor_angle_rad + s.rotor_speed_rad_s + s.middle_angle_rad +
+                       s.middle_speed_rad_s + s.joint_angle_rad + s.joint_speed_rad_s);
+}
+
 }  // namespace
 
 Load lever(double mass_kg, double length_m, double inclination_rad) {
@@ -65,43 +114,34 @@ Plant::Plant(const PlantParameters& parameters, double longest_step_s)
   require_inertia("rotor_inertia_kg_m2", parameters.rotor_inertia_kg_m2);
   require_inertia("middle_inertia_kg_m2", parameters.middle_inertia_kg_m2);
   require_inertia("joint_inertia_kg_m2", parameters.joint_inertia_kg_m2);
-  const double limit_s = step_limit(parameters);
+  const StepLimits limits = step_limits(parameters);
+  const double limit_s = std::min(limits.stiffness_s, limits.damping_s);
   if (longest_step_s == 0.0) longest_step_s_ = std::min(limit_s, kDefaultStep_s);
   if (!(longest_step_s_ > 0.0 && longest_step_s_ <= limit_s)) {
+    const bool is_stiff = limits.stiffness_s <= limits.damping_s;
     throw Error({.place = "plant",
-                 .problem = "the step does not suit the stiffest mode",
+                 .problem = is_stiff ? "the step does not suit the stiffest mode"
+                                     : "the step does not suit the strongest damping",
                  .expected = fmt::format("0 s < step <= {:.3g} s", limit_s),
                  .found = fmt::format("{:.3g} s", longest_step_s_),
-                 .advice = "shorten the step, or soften the stiffest spring"});
+                 .advice = is_stiff ? "shorten the step, or soften the stiffest spring"
+                                    : "shorten the step, or lower the viscous terms"});
   }
+  stiffest_stop_Nm_rad_ = stiffest_stop(parameters, longest_step_s_);
   reset();
 }
 
 double Plant::step_limit(const PlantParameters& parameters) {
-  // The largest row sum of M^-1 K bounds its largest eigenvalue. The speeds are scaled so that
-  // each body moves as much as the next one.
-  const auto first = made<FirstStage>(parameters.first);
-  const auto second = made<SecondStage>(parameters.second);
-  const double load_Nm = parameters.rated_torque_Nm;
-  const auto stiffness = [&](const auto& stage) { return steepest(stage, load_Nm); };
-  const auto ratio_of = [](const auto& stage) { return ratio(stage); };
-  const double first_ratio = dispatch(first, ratio_of);
-  const double second_ratio = dispatch(second, ratio_of);
-  const double first_Nm_rad = dispatch(first, stiffness);
-  const double second_Nm_rad = dispatch(second, stiffness);
-  const double rotor_Nm_rad = first_Nm_rad / (first_ratio * first_ratio) +
-                              LuGreFriction(parameters.rotor_friction).stiffness(load_Nm);
-  const double middle_Nm_rad = first_Nm_rad + second_Nm_rad / (second_ratio * second_ratio) +
-                               LuGreFriction(parameters.middle_friction).stiffness(load_Nm);
-  const double joint_Nm_rad = second_Nm_rad + LuGreFriction(parameters.bearing).stiffness(0.0);
-  const double rotor = parameters.rotor_inertia_kg_m2;
-  const double middle = parameters.middle_inertia_kg_m2;
-  const double joint = parameters.joint_inertia_kg_m2;
-  // Off-diagonal terms couple two neighbours: sqrt(k/m1 * k/m2) each, which their sum bounds.
-  const double coupled = first_Nm_rad / (first_ratio * std::sqrt(middle * rotor)) +
-                         second_Nm_rad / (second_ratio * std::sqrt(middle * joint));
-  const double own = std::max({rotor_Nm_rad / rotor, middle_Nm_rad / middle, joint_Nm_rad / joint});
-  return 0.25 / std::sqrt(own + coupled);
+  const StepLimits limits = step_limits(parameters);
+  return std::min(limits.stiffness_s, limits.damping_s);
+}
+
+double Plant::stiffest_stop(const PlantParameters& parameters, double step_s) {
+  const double second_ratio =
+      std::visit([](const auto& of) { return ratio(make_stage(of)); }, parameters.second);
+  const double middle_kg_m2 = parameters.middle_inertia_kg_m2 * second_ratio * second_ratio;
+  const double joint_kg_m2 = parameters.joint_inertia_kg_m2;
+  return 0.25 * middle_kg_m2 * joint_kg_m2 / ((middle_kg_m2 + joint_kg_m2) * step_s * step_s);
 }
 
 void Plant::set_period(double dt_s) noexcept {
@@ -113,7 +153,13 @@ void Plant::set_period(double dt_s) noexcept {
   dispatch(second_, [this](auto& stage) { set_stage_period(stage, dt_s_); });
 }
 
-void Plant::reset(const PlantState& state) noexcept {
+Fault Plant::reset(const PlantState& state) noexcept {
+  if (!is_finite(state)) return Fault::input_not_finite;
+  start(state);
+  return Fault::none;
+}
+
+void Plant::start(const PlantState& state) noexcept {
   state_ = state;
   torques_ = {};
   motor_.reset();
@@ -126,7 +172,8 @@ void Plant::reset(const PlantState& state) noexcept {
   bearing_.reset();
 }
 
-void Plant::reset(double joint_angle_rad, const Load& load) noexcept {
+Fault Plant::reset(double joint_angle_rad, const Load& load) noexcept {
+  if (!std::isfinite(joint_angle_rad) || !is_usable({}, load)) return Fault::input_not_finite;
   const double torque_Nm =
       load.is_locked ? 0.0 : load.gravity_Nm * std::sin(joint_angle_rad) - load.external_torque_Nm;
   PlantState rest{.joint_angle_rad = joint_angle_rad};
@@ -138,7 +185,8 @@ void Plant::reset(double joint_angle_rad, const Load& load) noexcept {
   rest.rotor_angle_rad = dispatch(first_, [&](const auto& stage) {
     return input_angle(stage, rest.middle_angle_rad, middle_Nm);
   });
-  reset(rest);
+  if (!is_finite(rest)) return Fault::input_not_finite;
+  start(rest);
   const double rotor_Nm = middle_Nm * dispatch(first_, [&](const auto& stage) {
                             return kinematics(stage, rest.rotor_angle_rad).slope;
                           });
@@ -149,14 +197,18 @@ void Plant::reset(double joint_angle_rad, const Load& load) noexcept {
               .second_Nm = torque_Nm,
               .second_on_middle_Nm = middle_Nm,
               .joint_Nm = torque_Nm};
+  return Fault::none;
 }
 
 Fault Plant::step(const PlantCommand& command, const Load& load, double dt_s) noexcept {
   if (!is_usable(dt_s, longest_step_s_) || !is_usable(command, load))
     return Fault::input_not_finite;
   if (dt_s != asked_dt_s_) set_period(dt_s);
+  if (!is_soft_enough(load, parameters_.joint_inertia_kg_m2, dt_s_)) return Fault::input_not_finite;
   for (std::size_t i = 0; i < small_steps_; ++i) small_step(command, load);
-  return Fault::none;
+  if (is_finite(state_)) return Fault::none;
+  reset();
+  return Fault::model_not_finite;
 }
 
 void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
@@ -221,9 +273,17 @@ StageTorques Plant::step_second() noexcept {
   return torques;
 }
 
-void Plant::set_condition(const PlantCondition& condition) noexcept {
+Fault Plant::set_condition(const PlantCondition& condition) noexcept {
+  const auto is_factor = [](double value) { return value >= 0.0 && value <= 1e3; };
+  if (!is_factor(condition.friction_factor) || !is_factor(condition.torque_constant_factor) ||
+      !is_factor(condition.second_stage_factor) || !(condition.stop_twist_rad >= 0.0) ||
+      !(condition.stop_stiffness_Nm_rad >= 0.0 &&
+        condition.stop_stiffness_Nm_rad <= stiffest_stop_Nm_rad_ * (1.0 + 1e-9))) {
+    return Fault::input_not_finite;
+  }
   condition_ = condition;
   is_sound_ = condition.second_stage_factor == 1.0 && std::isinf(condition.stop_twist_rad);
+  return Fault::none;
 }
 
 }  // namespace torsio

@@ -34,22 +34,31 @@ PlantBatch::PlantBatch(PlantBatch&& other) noexcept = default;
 PlantBatch& PlantBatch::operator=(PlantBatch&& other) noexcept = default;
 PlantBatch::~PlantBatch() = default;
 
-void PlantBatch::reset(double joint_angle_rad, const Load& load) noexcept {
-  for (std::size_t i = 0; i < size(); ++i) reset(i, joint_angle_rad, load);
+Fault PlantBatch::reset(double joint_angle_rad, const Load& load) noexcept {
+  Fault worst = Fault::none;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Fault fault = reset(i, joint_angle_rad, load);
+    if (fault != Fault::none) worst = fault;
+  }
+  return worst;
 }
 
-void PlantBatch::reset(std::size_t plant, double joint_angle_rad, const Load& load) noexcept {
-  plants_[plant].reset(joint_angle_rad, load);
-  lanes_->start(plant, plants_[plant]);
+Fault PlantBatch::reset(std::size_t plant, double joint_angle_rad, const Load& load) noexcept {
+  const Fault fault = plants_[plant].reset(joint_angle_rad, load);
+  if (fault == Fault::none) lanes_->start(plant, plants_[plant]);
+  return fault;
 }
 
-void PlantBatch::reset(std::size_t plant, const PlantState& state) noexcept {
-  plants_[plant].reset(state);
-  lanes_->start(plant, plants_[plant]);
+Fault PlantBatch::reset(std::size_t plant, const PlantState& state) noexcept {
+  const Fault fault = plants_[plant].reset(state);
+  if (fault == Fault::none) lanes_->start(plant, plants_[plant]);
+  return fault;
 }
 
-void PlantBatch::set_condition(std::size_t plant, const PlantCondition& condition) noexcept {
-  lanes_->set_condition(plant, condition);
+Fault PlantBatch::set_condition(std::size_t plant, const PlantCondition& condition) noexcept {
+  const Fault fault = plants_[plant].set_condition(condition);
+  if (fault == Fault::none) lanes_->set_condition(plant, condition);
+  return fault;
 }
 
 Fault PlantBatch::step(std::span<const PlantCommand> commands, std::span<const Load> loads,
@@ -66,8 +75,13 @@ Fault PlantBatch::step(std::span<const PlantCommand> commands, std::span<const L
     for (std::size_t lane = 0; lane < lanes_->padded_size(); ++lane)
       lanes_->set_period(lane, plants_[std::min(lane, size() - 1)], small_dt_s);
   }
-  return lanes_->step(commands, loads, steps, small_dt_s, faults_) ? Fault::none
-                                                                   : Fault::input_not_finite;
+  if (lanes_->step(commands, loads, steps, small_dt_s, faults_)) return Fault::none;
+  Fault worst = Fault::model_not_finite;
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (faults_[i] == Fault::model_not_finite) reset(i, 0.0, {});
+    if (faults_[i] == Fault::input_not_finite) worst = Fault::input_not_finite;
+  }
+  return worst;
 }
 
 PlantState PlantBatch::state(std::size_t plant) const noexcept { return lanes_->state(plant); }

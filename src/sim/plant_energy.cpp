@@ -50,6 +50,7 @@ double Plant::second_friction_torque() const noexcept {
 std::array<WorkPort, Plant::kWorkPorts> Plant::work_ports(const Load& load) const noexcept {
   using enum WorkPort::Kind;
   const auto damping = [](const auto& stage) { return viscosity(stage); };
+  const auto stored = [](const auto& stage) { return friction_energy(stage); };
   const Twist first = first_twist_of(first_, state_);
   const Twist second = second_twist_of(second_, state_);
   const double rotor = state_.rotor_speed_rad_s;
@@ -57,22 +58,22 @@ std::array<WorkPort, Plant::kWorkPorts> Plant::work_ports(const Load& load) cons
   return {{
       {input, torques_.motor_Nm, rotor},
       {input, load.external_torque_Nm, joint},
-      {loss, torques_.rotor_friction_Nm, rotor},
-      {loss, torques_.middle_friction_Nm, state_.middle_speed_rad_s},
-      {loss, torques_.bearing_Nm, joint},
+      {hysteretic, torques_.rotor_friction_Nm, rotor, 0.0, rotor_friction_.energy()},
+      {hysteretic, torques_.middle_friction_Nm, state_.middle_speed_rad_s, 0.0,
+       middle_friction_.energy()},
+      {hysteretic, torques_.bearing_Nm, joint, 0.0, bearing_.energy()},
       {loss, 0.0, joint, parameters_.joint_viscous_Nms_rad},
       {loss, 0.0, first.rate_rad_s, dispatch(first_, damping)},
       {loss, 0.0, second.rate_rad_s, dispatch(second_, damping)},
-      {hysteretic, first_friction_torque(), first.rate_rad_s},
-      {hysteretic, second_friction_torque(), second.rate_rad_s},
-      {hysteretic, torques_.wall_Nm, joint},
+      {hysteretic, first_friction_torque(), first.rate_rad_s, 0.0, dispatch(first_, stored)},
+      {hysteretic, second_friction_torque(), second.rate_rad_s, 0.0, dispatch(second_, stored)},
+      {hysteretic, torques_.wall_Nm, joint, 0.0, wall_energy(load, state_.joint_angle_rad)},
   }};
 }
 
 StoredEnergy Plant::stored_energy(const Load& load) const noexcept {
-  const auto stored = [](const auto& stage) { return friction_energy(stage); };
-  const double hysteretic_J = dispatch(first_, stored) + dispatch(second_, stored) +
-                              wall_energy(load, state_.joint_angle_rad);
+  double hysteretic_J = 0.0;
+  for (const WorkPort& port : work_ports(load)) hysteretic_J += port.stored_J;
   const double kinetic_J =
       parameters_.rotor_inertia_kg_m2 * half_square(state_.rotor_speed_rad_s) +
       parameters_.middle_inertia_kg_m2 * half_square(state_.middle_speed_rad_s) +

@@ -38,10 +38,50 @@ std::string kind(const PlantParameters& of) {
   return std::visit(Named{}, of.first) + " + " + std::visit(Named{}, of.second);
 }
 
+/// Whether these rows are those of a part.
+template <class Rows>
+struct Feeds {
+  static bool from(const auto& parts) {
+    return std::holds_alternative<typename PartOf<Rows>::Type::Parameters>(parts);
+  }
+};
+template <class Friction>
+struct Feeds<SpringRows<Friction>> {
+  static bool from(const auto& parts) {
+    const auto* spring = std::get_if<Spring::Parameters>(&parts);
+    return spring != nullptr && Feeds<Friction>::from(spring->friction);
+  }
+};
+template <bool kBonded>
+struct Feeds<ElastomerRows<kBonded>> {
+  static bool from(const auto& parts) {
+    const auto* coupling = std::get_if<ElastomerCoupling::Parameters>(&parts);
+    return coupling != nullptr && coupling->bonded == kBonded;
+  }
+};
+
 template <class Chain>
-bool use_if(bool is_it, PlantBlocks& blocks, std::size_t count) {
-  if (is_it) blocks = AlignedVector<Chain>((count + kPlantLanes - 1) / kPlantLanes);
-  return is_it;
+struct Kernel;
+template <class First, class Second>
+struct Kernel<ChainRows<First, Second>> {
+  static bool takes(const PlantParameters& plant) {
+    return Feeds<First>::from(plant.first) && Feeds<Second>::from(plant.second);
+  }
+};
+
+/// The number of the kernel that steps a plant, which is that of its blocks; their count if none.
+template <class... Chains>
+std::size_t kernel_of(const BlocksOf<Chains...>& /*blocks*/, const PlantParameters& plant) {
+  std::size_t kernel = 0;
+  static_cast<void>(((Kernel<Chains>::takes(plant) || (++kernel, false)) || ...));
+  return kernel;
+}
+
+template <class... Chains>
+void make_blocks(BlocksOf<Chains...>& blocks, std::size_t kernel, std::size_t plants) {
+  const std::size_t count = (plants + kPlantLanes - 1) / kPlantLanes;
+  std::size_t at = 0;
+  static_cast<void>(((at++ == kernel && (blocks = AlignedVector<Chains>(count), true)) || ...));
 }
 
 PlantBlocks blocks_for(std::span<const PlantParameters> parameters) {
@@ -49,32 +89,26 @@ PlantBlocks blocks_for(std::span<const PlantParameters> parameters) {
     throw Error(
         {.place = kPlace, .problem = "nothing to simulate", .expected = "plants", .found = "none"});
   }
-  const std::string first = kind(parameters.front());
+  PlantBlocks blocks;
+  const PlantParameters& first = parameters.front();
+  const std::size_t kernel = kernel_of(blocks, first);
   for (std::size_t i = 1; i < parameters.size(); ++i) {
-    const std::string other = kind(parameters[i]);
-    if (other == first) continue;
+    if (kernel_of(blocks, parameters[i]) == kernel) continue;
     throw Error({.place = kPlace,
                  .problem = "plants of different kinds",
-                 .expected = fmt::format("{}, as plant 0 is", first),
-                 .found = fmt::format("{} at plant {}", other, i),
+                 .expected = fmt::format("{}, as plant 0 is", kind(first)),
+                 .found = fmt::format("{} at plant {}", kind(parameters[i]), i),
                  .advice = "make one batch a kind"});
   }
-  const std::size_t count = parameters.size();
-  PlantBlocks blocks;
-  if (use_if<MaxwellChain>(first == "gear + Maxwell-slip spring", blocks, count) ||
-      use_if<BoucWenChain>(first == "gear + Bouc-Wen spring", blocks, count) ||
-      use_if<LuGreChain>(first == "gear + LuGre spring", blocks, count) ||
-      use_if<BondedChain>(first == "gear + bonded elastomer", blocks, count) ||
-      use_if<UnbondedChain>(first == "gear + unbonded elastomer", blocks, count) ||
-      use_if<ClutchChain>(first == "slip clutch + rubber spring", blocks, count) ||
-      use_if<GearChain>(first == "gear + gear", blocks, count)) {
+  if (kernel < std::variant_size_v<PlantBlocks>) {
+    make_blocks(blocks, kernel, parameters.size());
     return blocks;
   }
   throw Error({.place = kPlace,
                .problem = "a chain of stages that only Plant takes",
                .expected = "gear + (Maxwell-slip, Bouc-Wen or LuGre spring, bonded or unbonded "
                            "elastomer, gear), or slip clutch + rubber spring",
-               .found = first});
+               .found = kind(first)});
 }
 
 template <class Blocks>
@@ -94,6 +128,13 @@ void set_input(Chain& rows, Lane lane, const PlantCommand& command, const Load& 
   lane(rows.wall_angle_rad) = load.wall_angle_rad;
   lane(rows.wall_stiffness) = load.wall_stiffness_Nm_rad;
   lane(rows.wall_damping) = load.wall_damping_Nms_rad;
+}
+
+template <class Chain>
+bool is_finite(const Chain& rows, Lane lane) noexcept {
+  return std::isfinite(lane(rows.rotor.angle_rad) + lane(rows.rotor.speed_rad_s) +
+                       lane(rows.middle.angle_rad) + lane(rows.middle.speed_rad_s) +
+                       lane(rows.joint.angle_rad) + lane(rows.joint.speed_rad_s));
 }
 
 /// Steps a block and then takes one lane after the other back to what it was, where it has a fault.
@@ -164,7 +205,7 @@ void PlantLanes::start(std::size_t at, const Plant& plant) noexcept {
     lane(rows.motor.current_A) = plant.current();
     lane(rows.motor.torque_Nm) = torques.motor_Nm;
     for (FrictionRows* friction : {&rows.rotor_friction, &rows.middle_friction, &rows.bearing}) {
-      lane(friction->bristle) = 0.0;
+      lane(friction->force_Nm) = 0.0;
       lane(friction->torque_Nm) = 0.0;
     }
     lane(rows.first.output_Nm) = torques.first_Nm;
@@ -200,7 +241,9 @@ bool PlantLanes::step(std::span<const PlantCommand> commands, std::span<const Lo
       const std::size_t end = std::min(begin + kTogether, faults.size());
       bool is_sound = true;
       for (std::size_t at = begin; at < end; ++at) {
-        const bool took = is_usable(commands[at], loads[at]);
+        const double joint_kg_m2 = lane_of(at)(block_of(blocks, at).joint_inertia);
+        const bool took =
+            is_usable(commands[at], loads[at]) && is_soft_enough(loads[at], joint_kg_m2, dt_s);
         faults[at] = took ? Fault::none : Fault::input_not_finite;
         if (took) set_input(block_of(blocks, at), lane_of(at), commands[at], loads[at]);
         is_sound &= took;
@@ -209,11 +252,16 @@ bool PlantLanes::step(std::span<const PlantCommand> commands, std::span<const Lo
       if (is_sound) {
         const std::size_t count = (end - begin + kPlantLanes - 1) / kPlantLanes;
         plant_kernels::step(&block_of(blocks, begin), count, steps, dt_s);
-        continue;
+      } else {
+        for (std::size_t at = begin; at < end; at += kPlantLanes) {
+          step_around_faults(block_of(blocks, at), steps, dt_s,
+                             faults.subspan(at, std::min(kPlantLanes, end - at)));
+        }
       }
-      for (std::size_t at = begin; at < end; at += kPlantLanes) {
-        step_around_faults(block_of(blocks, at), steps, dt_s,
-                           faults.subspan(at, std::min(kPlantLanes, end - at)));
+      for (std::size_t at = begin; at < end; ++at) {
+        if (is_finite(block_of(blocks, at), lane_of(at))) continue;
+        faults[at] = Fault::model_not_finite;
+        took_all = false;
       }
     }
     return took_all;

@@ -24,8 +24,9 @@ class PlantLanes {
   void start(std::size_t at, const Plant& plant) noexcept;
   void set_condition(std::size_t at, const PlantCondition& condition) noexcept;
 
-  /// Takes inputs, steps, and says in `faults` what it did not take.
-  /// @returns whether it took all
+  /// Takes inputs, steps, and says in `faults` what it did not take, and whose state is no longer
+  /// finite.
+  /// @returns whether there is no fault
   bool step(std::span<const PlantCommand> commands, std::span<const Load> loads, std::size_t steps,
             double dt_s, std::span<Fault> faults) noexcept;
 

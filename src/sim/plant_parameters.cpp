@@ -143,16 +143,15 @@ double ratio_of(const auto& stage) {
   });
 }
 
-double stiffness_of(const auto& stage) {
-  return std::visit(
-      [](const auto& of) {
-        if constexpr (requires { of.elastic; }) {
-          return of.elastic.stiffness_Nm_rad;
-        } else {
-          return of.stiffness_Nm_rad;
-        }
-      },
-      stage);
+/// Beyond the play, without friction, glassy.
+double stiffness_of(const Gear::Parameters& of) { return of.stiffness_Nm_rad; }
+double stiffness_of(const SlipClutch::Parameters& of) { return of.stiffness_Nm_rad; }
+double stiffness_of(const Spring::Parameters& of) { return of.elastic.stiffness_Nm_rad; }
+double stiffness_of(const ElastomerCoupling::Parameters& of) {
+  return ElastomerCoupling(of).chain().stiffness();
+}
+double stiffness_of(const RubberSpring::Parameters& of) {
+  return of.elastic_share * of.stiffness_Nm_rad + sum(of.branches.stiffness_Nm_rad);
 }
 
 }  // namespace
@@ -168,8 +167,9 @@ std::array<double, 2> natural_frequencies(const PlantParameters& parameters) {
   const double rotor = parameters.rotor_inertia_kg_m2 * both_ratios * both_ratios;
   const double middle = parameters.middle_inertia_kg_m2 * second_ratio * second_ratio;
   const double joint = parameters.joint_inertia_kg_m2;
-  const double first = stiffness_of(parameters.first) * second_ratio * second_ratio;
-  const double second = stiffness_of(parameters.second);
+  const auto stiffness = [](const auto& stage) { return stiffness_of(stage); };
+  const double first = dispatch(parameters.first, stiffness) * second_ratio * second_ratio;
+  const double second = dispatch(parameters.second, stiffness);
   const double sum = first * (1.0 / rotor + 1.0 / middle) + second * (1.0 / middle + 1.0 / joint);
   const double product = first * second * (rotor + middle + joint) / (rotor * middle * joint);
   const double high = 0.5 * (sum + std::sqrt(sum * sum - 4.0 * product));

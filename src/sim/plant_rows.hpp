@@ -26,9 +26,10 @@ struct MotorRows {
 /// LuGreFriction.
 struct FrictionRows {
   Row coulomb_Nm, load_factor, viscous;
-  Row static_excess;  ///< F_s / F_c − 1
-  Row inverse_stribeck_squared, inverse_bristle;
-  Row bristle, torque_Nm;
+  Row static_excess;  ///< r − 1
+  Row inverse_stribeck_squared;
+  Row stiffness;  ///< σ₀
+  Row force_Nm, torque_Nm;
 };
 
 /// MaxwellSlip.

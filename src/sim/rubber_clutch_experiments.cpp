@@ -196,7 +196,7 @@ BenchProgram grid(const DataSheet& sheet, const ExperimentSpec& spec) {
 /// shares and the largest angle are drawn; all tones return after the same period, so that the
 /// largest angle is that of any duration.
 Multisine drawn_multisine(const ExperimentSpec& spec) {
-  Random random(spec.seed);
+  Random random(~spec.seed);  // the sensors draw from `seed` itself
   const double drawn_rad =
       kLowestMultisine_rad + (kAmplitude_rad - kLowestMultisine_rad) * random.uniform();
   Multisine::Parameters tones{.frequencies_Hz = {}, .amplitudes = {}, .seed = random.bits()};

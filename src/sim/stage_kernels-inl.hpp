@@ -75,26 +75,27 @@ HWY_INLINE V step_motor(MotorRows& rows, std::size_t at, V wanted_A, V angle, V 
 HWY_INLINE V step_friction(FrictionRows& rows, std::size_t at, V speed, V load, V dt) {
   const V viscous = hn::Mul(get(rows.viscous, at), speed);
   const V coulomb = get(rows.coulomb_Nm, at);
-  const V load_factor = get(rows.load_factor, at);
-  // The sum is 0 where both are: then the bristle has no effect.
-  if (hn::AllTrue(D(), hn::Eq(hn::Add(coulomb, load_factor), zero()))) return viscous;
-  const V level =
-      hn::Mul(hn::MulAdd(load_factor, hn::Abs(load), coulomb),
-              stribeck(speed, get(rows.static_excess, at), get(rows.inverse_stribeck_squared, at)));
-  V bristle = get(rows.bristle, at);
-  const V target = hn::CopySignToAbs(of(1.0), speed);
-  const V distance = hn::Sub(bristle, target);
+  if (hn::AllTrue(D(), hn::Eq(coulomb, zero()))) return viscous;
+  const V level = hn::MulAdd(get(rows.load_factor, at), hn::Abs(load), coulomb);
+  const V excess = get(rows.static_excess, at);
+  const V limit = hn::Mul(level, stribeck(speed, excess, get(rows.inverse_stribeck_squared, at)));
+  V force = get(rows.force_Nm, at);
+  const V target = hn::CopySignToAbs(limit, speed);
+  const V distance = hn::Sub(force, target);
   const auto is_moving = hn::Ne(speed, zero());
-  const auto is_far = hn::Ge(hn::Abs(distance), of(1e-15));
-  bristle = hn::IfThenElse(is_moving, target, bristle);
+  const auto is_far = hn::Ge(hn::Abs(distance), hn::Mul(of(1e-15), limit));
+  force = hn::IfThenElse(is_moving, target, force);
   const auto relaxes = hn::And(is_moving, is_far);
   if (!hn::AllFalse(D(), relaxes)) {
-    const V travel = hn::Mul(hn::Mul(hn::Abs(speed), dt), get(rows.inverse_bristle, at));
-    bristle = hn::IfThenElse(relaxes, hn::MulAdd(distance, hn::Exp(D(), hn::Neg(travel)), target),
-                             bristle);
+    const V travel = hn::Mul(hn::Mul(hn::Abs(speed), dt), get(rows.stiffness, at));
+    // A lane without dry friction has neither limit nor stiffness.
+    const V over = hn::Div(travel, hn::IfThenElse(hn::Gt(limit, zero()), limit, of(1.0)));
+    force =
+        hn::IfThenElse(relaxes, hn::MulAdd(distance, hn::Exp(D(), hn::Neg(over)), target), force);
   }
-  put(bristle, rows.bristle, at);
-  return hn::MulAdd(level, bristle, viscous);
+  force = within(force, hn::MulAdd(excess, level, level));
+  put(force, rows.force_Nm, at);
+  return hn::Add(force, viscous);
 }
 
 template <std::size_t kElements>

@@ -85,7 +85,7 @@ inline void set_parts(FrictionRows& rows, Lane lane, const LuGreFriction::Parame
   lane(rows.viscous) = of.viscous_Nms_rad;
   lane(rows.static_excess) = of.static_ratio - 1.0;
   lane(rows.inverse_stribeck_squared) = 1.0 / (of.stribeck_rad_s * of.stribeck_rad_s);
-  lane(rows.inverse_bristle) = 1.0 / of.bristle_rad;
+  lane(rows.stiffness) = LuGreFriction(of).stiffness();
 }
 
 template <std::size_t kElements>

@@ -98,6 +98,13 @@ double viscosity(const Stage& stage) noexcept {
   return 0.0;  // the clutch's hysteresis torque holds its damping
 }
 
+/// All that damps it while nothing slips.
+template <class Stage>
+double strongest_damping(const Stage& stage) noexcept {
+  if constexpr (Reducing<Stage>) return stage.parameters().damping_Nms_rad;
+  return viscosity(stage);
+}
+
 /// The energy [J] of the elastic part at this twist, and that of the hysteretic one.
 template <class Stage>
 double elastic_energy(const Stage& stage, double twist_rad) noexcept {

@@ -78,23 +78,50 @@ TYPED_TEST(SpringFrictionLaws, LoopIsAsWideAsTwiceTheLimit) {
   }
 }
 
-TYPED_TEST(SpringFrictionLaws, LossNeverFalls) {
+struct Fall {
+  double deepest_J = 0.0;  ///< of work less F² / 2k, below what it had reached
+  double lost_J = 0.0;     ///< at the end
+  double most_stored_J = 0.0;
+};
+
+/// On a random walk inside a spring whose torque presses the surfaces.
+template <class Friction>
+Fall fall_of_loss(Friction friction, double spring_Nm_rad, std::uint64_t seed) {
+  double last_Nm = 0.0;
+  double work_J = 0.0;
+  double most_lost_J = 0.0;
+  double x_rad = 0.0;
+  Fall fall;
+  for (const Motion& now : random_motion(seed, 0.01 * kKnee_rad)) {
+    x_rad += now.increment_rad;
+    const double force_Nm = friction.step(now.increment_rad, now.rate_rad_s, spring_Nm_rad * x_rad);
+    work_J += 0.5 * (last_Nm + force_Nm) * now.increment_rad;
+    last_Nm = force_Nm;
+    fall.lost_J = work_J - friction.energy();
+    most_lost_J = std::max(most_lost_J, fall.lost_J);
+    fall.deepest_J = std::max(fall.deepest_J, most_lost_J - fall.lost_J);
+    fall.most_stored_J = std::max(fall.most_stored_J, friction.energy());
+  }
+  return fall;
+}
+
+TYPED_TEST(SpringFrictionLaws, LossNeverFallsUnderAConstantLimit) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    auto friction = friction_of<TypeParam>(1.5, 0.0);
-    double last_Nm = 0.0;
-    double work_J = 0.0;
-    double most_J = 0.0;
-    double deepest_fall_J = 0.0;
-    for (const Motion& now : random_motion(seed, 0.01 * kKnee_rad)) {
-      const double force_Nm = friction.step(now.increment_rad, now.rate_rad_s, 0.0);
-      work_J += 0.5 * (last_Nm + force_Nm) * now.increment_rad;
-      last_Nm = force_Nm;
-      const double lost_J = work_J - friction.energy();
-      deepest_fall_J = std::max(deepest_fall_J, most_J - lost_J);
-      most_J = std::max(most_J, lost_J);
-    }
-    EXPECT_LT(deepest_fall_J, 1e-6 * 1.5 * kKnee_rad) << "seed " << seed;
-    EXPECT_GT(most_J, 1.5 * kKnee_rad) << "seed " << seed;
+    const Fall fall = fall_of_loss(friction_of<TypeParam>(1.5, 0.0), 0.0, seed);
+    EXPECT_LT(fall.deepest_J, 1e-6 * 1.5 * kKnee_rad) << "seed " << seed;
+    EXPECT_GT(fall.lost_J, 1.5 * kKnee_rad) << "seed " << seed;
+  }
+}
+
+// Where the limit follows the load, F² / 2k(load) is no exact storage function: on a stroke that
+// sticks while the load falls, k falls with it and F² / 2k seems to rise. It is no energy: what a
+// closed path takes is never negative. Measured: up to 0.7 % of the most that is stored (2.1e-5 J),
+// whatever the step.
+TYPED_TEST(SpringFrictionLaws, LossFallsByAShareOfWhatIsStoredWhereTheLimitFollowsTheLoad) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Fall fall = fall_of_loss(friction_of<TypeParam>(1.5, 0.05), 500.0, seed);
+    EXPECT_LT(fall.deepest_J, 0.01 * fall.most_stored_J) << "seed " << seed;
+    EXPECT_GT(fall.lost_J, 1.5 * kKnee_rad) << "seed " << seed;
   }
 }
 

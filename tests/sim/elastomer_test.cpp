@@ -22,6 +22,10 @@
 namespace torsio {
 namespace {
 
+/// What the two stages have lost: their ports of Plant::work_ports. The other friction, which loses
+/// far more, would hide their falls.
+double stage_loss(const EnergyAudit& audit) { return audit.port_loss(8) + audit.port_loss(9); }
+
 constexpr double kLog_Hz = 200.0;
 constexpr std::size_t kSlowCycle = 4000;  // samples
 
@@ -278,6 +282,7 @@ TEST(Elastomer, NoEnergyAppearsFromNothingInTriangles) {
     TorqueLoop loop(parts, coupling.chain().stiffness(), 1000.0);
     Triangle wanted({5.0, 1.0}, 1000.0);
     double largest_loss_J = 0.0;
+    double deepest_fall_J = 0.0;
     for (int tick = 0; tick < 20000; ++tick) {
       const PlantCommand command{.current_A = loop.step(wanted.step(), plant.torques().joint_Nm,
                                                         plant.state().rotor_angle_rad)};
@@ -288,10 +293,11 @@ TEST(Elastomer, NoEnergyAppearsFromNothingInTriangles) {
       const double elapsed_s = 1e-3 * (tick + 1);
       ASSERT_LE(std::abs(audit.residual()), 1e-6 + 1e-3 * elapsed_s * (1e-2 + audit.throughput()))
           << name << " at " << elapsed_s << " s";
-      largest_loss_J = std::max(largest_loss_J, audit.hysteretic_loss());
-      ASSERT_GE(audit.hysteretic_loss(), largest_loss_J - 2e-3) << name << " gave energy";
+      largest_loss_J = std::max(largest_loss_J, stage_loss(audit));
+      deepest_fall_J = std::max(deepest_fall_J, largest_loss_J - stage_loss(audit));
     }
-    EXPECT_GT(audit.hysteretic_loss(), 0.1) << name;
+    EXPECT_LT(deepest_fall_J, 1e-4 * stage_loss(audit)) << name << " gave energy";
+    EXPECT_GT(stage_loss(audit), 0.1) << name;
     EXPECT_LT(std::abs(audit.residual()), 1e-5 * audit.throughput()) << name;
   }
 }

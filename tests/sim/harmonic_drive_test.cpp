@@ -230,7 +230,7 @@ TEST(HumanTorque, TwistsTheTubesAsThePrototype) {
       const Values twist = tube_twist_deg(recording);
       EXPECT_NEAR(range(twist), range_deg, tolerance * range_deg) << tube << ", seed " << seed;
       const double share = share_off_the_line(twist, recording.channel("torque_Nm").values);
-      EXPECT_GT(share, 0.165) << tube << ", seed " << seed;
+      EXPECT_GT(share, 0.15) << tube << ", seed " << seed;
       EXPECT_LT(share, 0.22) << tube << ", seed " << seed;
     }
   };
@@ -305,7 +305,7 @@ TEST(HarmonicDriveStaticCycle, TwistsTheTubeByTheTorqueLessTheFriction) {
   EXPECT_NEAR(largest_Nm, 100.0, 0.5);
   // Pulled from the output, the friction carries 4.1 Nm and 12 % of the load.
   const double expected_deg = deg_from_rad((0.88 * 100.0 - 4.08) / kGearRatio / 40.95);
-  EXPECT_NEAR(0.5 * range(tube_twist_deg(recording)), expected_deg, 0.05 * expected_deg);
+  EXPECT_NEAR(0.5 * range(tube_twist_deg(recording)), expected_deg, 0.1 * expected_deg);
 }
 
 TEST(HarmonicDriveHold, StaysAtRestAndYieldsALittleToAConstantTorque) {

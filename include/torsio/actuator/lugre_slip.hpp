@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "torsio/actuator/stribeck.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {
@@ -16,7 +17,7 @@ namespace torsio {
 /// X g / f; the step uses that exact exponential, so that at constant rate and load no increment is
 /// too large. The bristle's stiffness f / X must not depend on the rate, as it would with the plain
 /// displacement X: loaded slowly and released fast, a stiffness that falls with the rate gives
-/// energy. The force is the state (LuGreFriction keeps F / g), clipped to ± r f after the update,
+/// energy. The force is the state, clipped to ± r f after the update,
 /// so that a shrinking limit dissipates instead of pushing. Source: Canudas de Wit et al. 1995; SPEC
 /// section 4.6.
 class LuGreSlip {
@@ -44,7 +45,7 @@ class LuGreSlip {
   /// @returns F [Nm], of the sign of a spring: positive after a positive displacement
   double step(double increment_rad, double rate_rad_s, double load_Nm) noexcept TORSIO_REALTIME {
     limit_Nm_ = limit(load_Nm);
-    const double over_limit = stribeck(rate_rad_s);  // g / f
+    const double over_limit = stribeck_(rate_rad_s);  // g / f
     const double target_Nm = std::copysign(limit_Nm_ * over_limit, increment_rad);
     force_Nm_ +=
         (force_Nm_ - target_Nm) * std::expm1(-std::abs(increment_rad) * per_bristle_ / over_limit);
@@ -70,14 +71,8 @@ class LuGreSlip {
     return parameters_.constant_Nm + parameters_.load_factor * std::abs(load_Nm);
   }
 
-  [[nodiscard]] double stribeck(double rate_rad_s) const noexcept {
-    const double exponent = rate_rad_s * rate_rad_s * inverse_stribeck_squared_;
-    if (exponent > 40.0) return 1.0;  // exp(-40) is below the last bit of 1
-    return 1.0 + (parameters_.static_ratio - 1.0) * std::exp(-exponent);
-  }
-
   Parameters parameters_;
-  double inverse_stribeck_squared_;
+  StribeckCurve stribeck_;
   double per_bristle_;  ///< 1 / X
   double force_Nm_ = 0.0;
   double limit_Nm_ = 0.0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 #include "torsio/sim/plant.hpp"
 
@@ -12,8 +13,10 @@ namespace torsio {
 ///     residual = E − E(0) − W_in + W_lost
 ///
 /// The residual is what came from nothing (positive) or vanished (negative): integration error
-/// alone. What hysteretic elements lose is their work minus what they store, so that it is a check
-/// of its own: it must never fall. Source: SPEC section 4.6.
+/// alone. What a hysteretic element loses is its work minus what it stores, so that it is a check of
+/// its own for each: it must never fall, but for integration error and for what load-dependent slip
+/// elements keep: with k(load), F²/2k is not all that a later, stiffer or softer path can recover.
+/// Source: SPEC section 4.6.
 class EnergyAudit {
  public:
   /// Opens the books at the plant's present state.
@@ -29,12 +32,19 @@ class EnergyAudit {
   [[nodiscard]] double hysteretic_loss() const noexcept {
     return hysteretic_work_J_ - (stored_.hysteretic_J - first_stored_.hysteretic_J);
   }
+  /// @param port below Plant::kWorkPorts, of Plant::work_ports
+  /// @returns its work [J] less what it stores
+  [[nodiscard]] double port_loss(std::size_t port) const noexcept {
+    return work_J_[port] - (last_ports_[port].stored_J - first_ports_[port].stored_J);
+  }
   [[nodiscard]] double residual() const noexcept {
     return stored_.all_J - first_stored_.all_J - input_J_ + lost();
   }
 
  private:
+  std::array<WorkPort, Plant::kWorkPorts> first_ports_;
   std::array<WorkPort, Plant::kWorkPorts> last_ports_;
+  std::array<double, Plant::kWorkPorts> work_J_{};
   StoredEnergy first_stored_;
   StoredEnergy stored_;
   double input_J_ = 0.0;

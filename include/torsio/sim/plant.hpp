@@ -75,8 +75,9 @@ struct PlantParameters {
 /// @returns turns of the rotor a turn of the joint
 [[nodiscard]] double total_ratio(const PlantParameters& parameters) noexcept;
 
-/// @returns the two natural frequencies [Hz], the lower first: both ends free, no load on the joint,
-/// elastic curves at the origin, nothing rubbing or relaxing
+/// @returns the two natural frequencies [Hz], the lower first, of the plant itself: both ends free,
+/// no load on the joint, without damping. Springs are taken beyond their play and below their second
+/// stage, dry friction as absent, viscoelastic branches as glassy: nothing relaxes within a period.
 [[nodiscard]] std::array<double, 2> natural_frequencies(const PlantParameters& parameters);
 
 struct PlantState {
@@ -119,12 +120,14 @@ struct WorkPort {
   double torque_Nm = 0.0;        ///< over the last step
   double speed_rad_s = 0.0;      ///< after it
   double viscous_Nms_rad = 0.0;  ///< adds this times the speed before the step to the torque
+  double stored_J = 0.0;         ///< what a hysteretic element keeps of its work
 };
 
 /// What is stored in a plant and its load.
 struct StoredEnergy {
   double all_J = 0.0;
-  double hysteretic_J = 0.0;  ///< the share in slip and viscoelastic elements and in the obstacle
+  double hysteretic_J =
+      0.0;  ///< the share in bristles, slip and viscoelastic elements and the obstacle
 };
 
 /// Any of the actuators: a chain of three bodies and two stages.
@@ -147,27 +150,38 @@ class Plant {
 
   /// @param longest_step_s a longer step is divided into equal ones; none: `step_limit`, but at most
   /// `kDefaultStep_s`
-  /// @throws Error if an inertia is not positive, or the step is too long for the stiffest mode
-  /// (the message names the limit).
+  /// @throws Error if an inertia is not positive, or the step is too long for the stiffest mode or
+  /// the strongest damping (the message names which, and the limit).
   explicit Plant(const PlantParameters& parameters, double longest_step_s = 0.0);
 
   /// The longest step [s] that these parts allow: a quarter radian of the stiffest mode, with all
-  /// friction sticking under the rated torque.
+  /// friction sticking under the rated torque, and half a time constant of any body under its
+  /// viscous terms, which are taken explicitly.
   [[nodiscard]] static double step_limit(const PlantParameters& parameters);
+  /// The stiffest stop [Nm/rad] that such steps follow: half a radian of the mode of the two bodies
+  /// that it throws against each other.
+  [[nodiscard]] static double stiffest_stop(const PlantParameters& parameters, double step_s);
 
   /// At rest at this joint angle, the stages and the motor current carrying the load, all friction
   /// relaxed.
-  void reset(double joint_angle_rad = 0.0, const Load& load = {}) noexcept;
+  /// @returns Fault::input_not_finite, and the plant stays as it is, if angle or load are not finite
+  /// or have no finite rest
+  Fault reset(double joint_angle_rad = 0.0, const Load& load = {}) noexcept;
   /// In any state, without current, all friction relaxed.
-  void reset(const PlantState& state) noexcept;
+  /// @returns Fault::input_not_finite, and the plant stays as it is, if it is not finite
+  Fault reset(const PlantState& state) noexcept;
 
   /// Wear and failures from now on; `reset` leaves them.
-  void set_condition(const PlantCondition& condition) noexcept;
+  /// @returns Fault::input_not_finite, and the condition stays as it is, if a factor is outside 0 to
+  /// 1000, the stop's twist negative, or its stiffness negative or above `stiffest_stop`
+  Fault set_condition(const PlantCondition& condition) noexcept;
   [[nodiscard]] const PlantCondition& condition() const noexcept { return condition_; }
 
-  /// Advances the plant. A value that is not finite, a negative inertia or a dt that is not
-  /// positive or longer than 10^6 of the longest steps is `Fault::input_not_finite`, and nothing
-  /// moves.
+  /// Advances the plant. A value that is not finite, a negative inertia, a wall whose stiffness or
+  /// damping is negative or too large for the steps (half a radian of its mode with the joint, half
+  /// a time constant), or a dt that is not positive or longer than 10^6 of the longest steps is
+  /// `Fault::input_not_finite`, and nothing moves. If finite input ends in a state that is not
+  /// finite, that is `Fault::model_not_finite`, and the plant is back at rest at angle 0.
   [[nodiscard]] Fault step(const PlantCommand& command, const Load& load,
                            double dt_s) noexcept TORSIO_REALTIME;
 
@@ -192,6 +206,7 @@ class Plant {
 
  private:
   void set_period(double dt_s) noexcept;
+  void start(const PlantState& state) noexcept;
   void small_step(const PlantCommand& command, const Load& load) noexcept;
   StageTorques step_second() noexcept;
 
@@ -207,6 +222,7 @@ class Plant {
   PlantCondition condition_;
   bool is_sound_ = true;  ///< no part of the condition is about the second stage
   double longest_step_s_;
+  double stiffest_stop_Nm_rad_;
   double asked_dt_s_ = 0.0;
   double dt_s_ = 0.0;
   std::size_t small_steps_ = 1;

@@ -37,16 +37,18 @@ class PlantBatch {
   PlantBatch& operator=(PlantBatch&& other) noexcept;
   ~PlantBatch();
 
-  /// As Plant's: all plants, or one of them. Conditions stay.
-  void reset(double joint_angle_rad = 0.0, const Load& load = {}) noexcept;
-  void reset(std::size_t plant, double joint_angle_rad, const Load& load) noexcept;
-  void reset(std::size_t plant, const PlantState& state) noexcept;
-  void set_condition(std::size_t plant, const PlantCondition& condition) noexcept;
+  /// As Plant's: all plants, or one of them. Conditions stay. Everywhere `plant` < `size()` is a
+  /// precondition that nothing checks.
+  Fault reset(double joint_angle_rad = 0.0, const Load& load = {}) noexcept;
+  Fault reset(std::size_t plant, double joint_angle_rad, const Load& load) noexcept;
+  Fault reset(std::size_t plant, const PlantState& state) noexcept;
+  Fault set_condition(std::size_t plant, const PlantCondition& condition) noexcept;
 
   /// Advances all plants, each under its own command and load, which are held while a step longer
   /// than `longest_step` is divided.
   /// @returns Fault::input_not_finite if a plant got what Plant refuses: `fault` tells which, they
-  /// stay as they are, and the others move. A dt that Plant refuses is a fault of all of them. Spans
+  /// stay as they are, and the others move. Fault::model_not_finite if there is none of these, but
+  /// one whose state is no longer finite: it is back at rest, as Plant's. A dt that Plant refuses is a fault of all of them. Spans
   /// of another size than `size()` are Fault::input_count_wrong, and nothing moves.
   [[nodiscard]] Fault step(std::span<const PlantCommand> commands, std::span<const Load> loads,
                            double dt_s) noexcept TORSIO_REALTIME;
