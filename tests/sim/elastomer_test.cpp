@@ -265,7 +265,7 @@ TEST(Elastomer, RefusesWhatItsBenchCannotDo) {
   spec.frequency_Hz = 4.1;
   EXPECT_NE(message(spec).find("0.4 to 4 Hz"), std::string::npos);
   spec = {.actuator = "elastomer", .experiment = "triangles", .amplitude = 6.1};
-  EXPECT_NE(message(spec).find("0 < Nm <= 6"), std::string::npos);
+  EXPECT_NE(message(spec).find("at most 6 Nm"), std::string::npos);
   EXPECT_NE(message({.actuator = "elastomer", .experiment = "sweep"}).find("one of triangles"),
             std::string::npos);
 }
