@@ -1,8 +1,10 @@
 #include "torsio/model/lstm.hpp"
 
+#include <utility>
+
 namespace torsio {
 
-Lstm::Lstm(const Parameters& parameters)
-    : parameters_(parameters), network_(parameters_, 1, kFamily) {}
+Lstm::Lstm(Parameters parameters)
+    : parameters_(std::move(parameters)), network_(parameters_, 1, kFamily) {}
 
 }  // namespace torsio

@@ -1,13 +1,14 @@
 #include "torsio/model/mlp.hpp"
 
 #include <string>
+#include <utility>
 
 #include "model/network_checks.hpp"
 
 namespace torsio {
 
-Mlp::Mlp(const Parameters& parameters)
-    : parameters_(parameters),
+Mlp::Mlp(Parameters parameters)
+    : parameters_(std::move(parameters)),
       layers_(parameters_.layers,
               checked_input_count(parameters_.scaling, std::string(kFamily) + ": scaling"),
               std::string(kFamily) + ": layers"),

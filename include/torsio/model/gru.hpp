@@ -25,7 +25,7 @@ class Gru {
   /// @throws Error if there is no layer, shapes do not fit together, the last layer has not one output
   /// or is not linear, an activation is unknown, a number is not finite, or a scale or the period is
   /// not positive.
-  explicit Gru(const Parameters& parameters);
+  explicit Gru(Parameters parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] std::size_t input_count() const noexcept { return network_.input_count(); }

@@ -33,7 +33,7 @@ class Mlp {
 
   /// @throws Error if there is no layer, shapes do not fit together, the last layer has not one output
   /// or is not linear, an activation is unknown, a number is not finite, or a scale is not positive.
-  explicit Mlp(const Parameters& parameters);
+  explicit Mlp(Parameters parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] std::size_t input_count() const noexcept {
