@@ -51,6 +51,11 @@ constexpr std::array kBenches{
     Bench{"simulate_batched_held", simulate_batched_held},
     Bench{"simulate_batched_bouc_wen", simulate_batched_bouc_wen},
     Bench{"simulate_batched_lugre", simulate_batched_lugre},
+    Bench{"lstm250_step", lstm250_step, Peer{"libtorch", write_lstm250}},
+    Bench{"lstm32_step", lstm32_step, Peer{"libtorch", write_lstm32}},
+    Bench{"gru64_step", gru64_step, Peer{"libtorch", write_gru64}},
+    Bench{"mlp_step", mlp_step, Peer{"libtorch", write_mlp}},
+    Bench{"lstm250_x12_step", lstm250_x12_step, Peer{"libtorch", write_lstm250}},
 };
 
 struct Arguments {

@@ -13,6 +13,7 @@
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
+#include "torsio/model/network_bank.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
@@ -81,6 +82,23 @@ TYPED_TEST(EveryFamily, StepNeverTouchesTheHeap) {
               (void)model.step(overflowing);
               model.reset();
               (void)model.step(features.row(0));
+            }),
+            0U);
+}
+
+TEST(NetworkBank, StepAndStatesNeverTouchTheHeap) {
+  constexpr std::size_t kJoints = 7;
+  Lstm network = example<Lstm>();
+  LstmBank bank(network.parameters(), kJoints);
+  const Matrix features = example_features(50, kJoints * bank.input_count());
+  std::vector<Estimate> estimates(kJoints);
+  std::vector<float> state(network.state_size());
+  EXPECT_EQ(heap_calls_during([&] {
+              for (std::size_t n = 0; n < features.rows; ++n) bank.step(features.row(n), estimates);
+              bank.reset(3);
+              bank.reset();
+              network.get_state(state);
+              network.reset(state);
             }),
             0U);
 }
