@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <concepts>
 #include <cstdint>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -34,13 +37,36 @@ const std::vector<T>& values_of(const Tensor& tensor, const std::string& place,
 }
 
 void check_numbers(const Tensor& tensor, const std::string& place, bool may_be_nan) {
-  const auto* values = std::get_if<std::vector<double>>(&tensor.values);
-  if (values == nullptr) return;
-  const auto bad = std::ranges::find_if_not(*values, [&](double value) {
-    return std::isfinite(value) || (may_be_nan && std::isnan(value));
-  });
-  if (bad != values->end())
-    refuse(place, "finite numbers", fmt::format("{} at index {}", *bad, bad - values->begin()));
+  std::visit(
+      [&]<class Number>(const std::vector<Number>& values) {
+        if constexpr (std::floating_point<Number>) {
+          const auto bad = std::ranges::find_if_not(values, [&](Number value) {
+            return std::isfinite(value) || (may_be_nan && std::isnan(value));
+          });
+          if (bad != values.end())
+            refuse(place, "finite numbers",
+                   fmt::format("{} at index {}", *bad, bad - values.begin()));
+        }
+      },
+      tensor.values);
+}
+
+template <class Number>
+Tensor table_tensor(const Table2d<Number>& table) {
+  return {.shape = {table.rows, table.columns}, .values = table.values};
+}
+
+template <class Number>
+void read_table(const Tensor& tensor, const std::string& place, std::string_view wanted,
+                Table2d<Number>& table) {
+  table.values = values_of<Number>(tensor, place, 2, wanted);
+  // An empty table has a shape that no file size bounds; a family may take memory by it.
+  const std::size_t longest = std::max(tensor.shape[0], tensor.shape[1]);
+  if (table.values.empty() && longest > kLongestEmpty)
+    refuse(place, fmt::format("an empty table of at most {} rows or columns", kLongestEmpty),
+           shape_text(tensor.shape));
+  table.rows = tensor.shape[0];
+  table.columns = tensor.shape[1];
 }
 
 }  // namespace
@@ -55,9 +81,11 @@ Tensor tensor_of(std::size_t value) {
 Tensor tensor_of(const std::vector<double>& values) {
   return {.shape = {values.size()}, .values = values};
 }
-Tensor tensor_of(const Matrix& values) {
-  return {.shape = {values.rows, values.columns}, .values = values.values};
+Tensor tensor_of(const std::vector<float>& values) {
+  return {.shape = {values.size()}, .values = values};
 }
+Tensor tensor_of(const Matrix& values) { return table_tensor(values); }
+Tensor tensor_of(const FloatMatrix& values) { return table_tensor(values); }
 
 void read_tensor(const Tensor& tensor, const std::string& place, double& value) {
   value = values_of<double>(tensor, place, 0, "one F64 of shape []").front();
@@ -81,15 +109,40 @@ void read_tensor(const Tensor& tensor, const std::string& place, std::vector<dou
   values = values_of<double>(tensor, place, 1, "F64 of shape [n]");
 }
 
+void read_tensor(const Tensor& tensor, const std::string& place, std::vector<float>& values) {
+  values = values_of<float>(tensor, place, 1, "F32 of shape [n]");
+}
+
 void read_tensor(const Tensor& tensor, const std::string& place, Matrix& values) {
-  values.values = values_of<double>(tensor, place, 2, "F64 of shape [rows, columns]");
-  // An empty table has a shape that no file size bounds; a family may take memory by it.
-  const std::size_t longest = std::max(tensor.shape[0], tensor.shape[1]);
-  if (values.values.empty() && longest > kLongestEmpty)
-    refuse(place, fmt::format("an empty table of at most {} rows or columns", kLongestEmpty),
-           shape_text(tensor.shape));
-  values.rows = tensor.shape[0];
-  values.columns = tensor.shape[1];
+  read_table(tensor, place, "F64 of shape [rows, columns]", values);
+}
+
+void read_tensor(const Tensor& tensor, const std::string& place, FloatMatrix& values) {
+  read_table(tensor, place, "F32 of shape [rows, columns]", values);
+}
+
+std::size_t list_size(const Safetensors& contents, const std::string& name, std::string_view file) {
+  const std::string prefix = name + ".";
+  std::vector<bool> seen;
+  for (auto at = contents.tensors.lower_bound(prefix);
+       at != contents.tensors.end() && at->first.starts_with(prefix); ++at) {
+    const std::string_view rest = std::string_view(at->first).substr(prefix.size());
+    std::size_t index = 0;
+    const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), index);
+    // Whatever else it is, it is no element; somebody else asks for it, or nobody does.
+    if (error != std::errc() || end == rest.data() + rest.size() || *end != '.') continue;
+    if (index >= kMostElements)
+      refuse(fmt::format("{}: /{}", file, at->first),
+             fmt::format("at most {} elements of {}", kMostElements, name),
+             fmt::format("one of index {}", index));
+    if (index >= seen.size()) seen.resize(index + 1);
+    seen[index] = true;
+  }
+  const auto missing = std::ranges::find(seen, false);
+  if (missing != seen.end())
+    refuse(fmt::format("{}: /{}.{}", file, name, missing - seen.begin()), "a tensor of that name",
+           fmt::format("none, but {}.{}", name, seen.size() - 1));
+  return seen.size();
 }
 
 Tensor take_tensor(Safetensors& contents, const std::string& name, std::string_view file,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <utility>
 #include <variant>
 
@@ -49,6 +50,30 @@ void check_nothing_left(const Safetensors& contents, std::string_view place,
                .expected = fmt::format("only tensors of the family {}", family),
                .found = "one that it does not have",
                .advice = "The file does not hold what its card says: fit the model again."});
+}
+
+/// Clocks that differ by less are one: a recording's rate is measured.
+constexpr double kSameRate = 1e-3;
+
+/// A discrete model runs at the rate it was trained at; what is static is taken to any other.
+void check_sample_rate(const ModelFile& model) {
+  std::visit(
+      [&](const auto& parameters) {
+        if constexpr (requires { parameters.sample_period_s; }) {
+          const double own_Hz = 1.0 / parameters.sample_period_s;
+          const double rate_Hz = model.settings.sample_rate_Hz;
+          if (std::abs(rate_Hz - own_Hz) <= kSameRate * own_Hz) return;
+          throw Error({.place = "sample rate",
+                       .expected = fmt::format("{:.6g} Hz, at which the {} was trained", own_Hz,
+                                               family_of(model.parameters)),
+                       .found = fmt::format("{:.6g} Hz", rate_Hz),
+                       .advice = fmt::format(
+                           "A network with memory runs at no other rate: resample the recording "
+                           "(--rate {:.6g}), or train a model at this one.",
+                           own_Hz)});
+        }
+      },
+      model.parameters);
 }
 
 /// Checks what only the estimator itself can: that settings and model fit together.
@@ -109,7 +134,9 @@ ModelFile load_model(const std::filesystem::path& path, std::string_view expecte
 }
 
 Estimator make_estimator(const ModelFile& model) {
-  return {model.settings, AnyModel(model.parameters)};
+  AnyModel checked(model.parameters);
+  check_sample_rate(model);
+  return {model.settings, std::move(checked)};
 }
 
 Estimator load_estimator(const std::filesystem::path& path, std::string_view expected_serial) {

@@ -32,7 +32,8 @@ struct ElementType {
   std::string_view name;
   std::size_t bytes;
 };
-constexpr auto kElementTypes = std::to_array<ElementType>({{"F64", 8}, {"I64", 8}, {"U8", 1}});
+constexpr auto kElementTypes =
+    std::to_array<ElementType>({{"F64", 8}, {"I64", 8}, {"F32", 4}, {"U8", 1}});
 static_assert(kElementTypes.size() == std::variant_size_v<Tensor::Values>);
 
 [[noreturn]] void refuse(std::string place, std::string expected, std::string found) {
@@ -89,7 +90,7 @@ Entry parse_entry(const std::string& name, const json& value, const std::string&
   const auto* const known = std::ranges::find_if(
       kElementTypes, [&](const ElementType& known_type) { return type == known_type.name; });
   if (known == kElementTypes.end())
-    refuse(place + "/dtype", R"("F64", "I64" or "U8")", type.dump());
+    refuse(place + "/dtype", R"("F64", "I64", "F32" or "U8")", type.dump());
   entry.type = static_cast<std::size_t>(known - kElementTypes.begin());
   entry.shape = sizes(member(value, "shape", place), kMostDimensions, place + "/shape");
   const auto offsets = sizes(member(value, "data_offsets", place), 2, place + "/data_offsets");
@@ -147,6 +148,7 @@ Tensor::Values copied_values(std::size_t type, std::span<const std::byte> bytes)
   switch (type) {
     case 0: return copied<double>(bytes);
     case 1: return copied<std::int64_t>(bytes);
+    case 2: return copied<float>(bytes);
     default: return copied<std::uint8_t>(bytes);
   }
 }

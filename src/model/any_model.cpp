@@ -12,7 +12,7 @@ namespace torsio {
 namespace {
 
 static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial> &&
-              Model<Dgmm>);
+              Model<Dgmm> && Model<Mlp> && Model<Lstm> && Model<Gru>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

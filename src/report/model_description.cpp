@@ -29,6 +29,14 @@ Leaf leaf_of(const std::string& name, const Matrix& matrix) {
 Leaf leaf_of(const std::string& name, const std::vector<double>& values) {
   return {name, fmt::format("{}", values.size()), values};
 }
+Leaf leaf_of(const std::string& name, const FloatMatrix& matrix) {
+  return {name,
+          fmt::format("{} x {}", matrix.rows, matrix.columns),
+          {matrix.values.begin(), matrix.values.end()}};
+}
+Leaf leaf_of(const std::string& name, const std::vector<float>& values) {
+  return {name, fmt::format("{}", values.size()), {values.begin(), values.end()}};
+}
 template <class Number>
 Leaf leaf_of(const std::string& name, const Number& value) {
   return {name, "1", {static_cast<double>(value)}};

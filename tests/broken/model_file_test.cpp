@@ -199,6 +199,74 @@ TEST(BrokenModelFile, WithNumbersThatAreNotFinite) {
   EXPECT_EQ(with("residuals.std_dev", kNaN), "") << "an error bar may lack evidence";
 }
 
+/// What is said of a network's file after `spoil` has been at its contents.
+std::string complaint_about_network(const std::function<void(Safetensors&)>& spoil) {
+  Safetensors contents =
+      parse_safetensors(model_bytes(test::example_model_file(test::example<Lstm>())), "elbow");
+  spoil(contents);
+  return complaint(safetensors_bytes(contents));
+}
+
+TEST(BrokenModelFile, WithLayersThatAreNotOneBehindTheOther) {
+  EXPECT_EQ(complaint_about_network([](Safetensors&) {}), "");
+  const auto rename = [](const std::string& from, const std::string& to) {
+    return complaint_about_network([&](Safetensors& contents) {
+      for (const char* field : {"input_weights", "recurrent_weights", "bias"}) {
+        auto node = contents.tensors.extract(from + field);
+        node.key() = to + field;
+        contents.tensors.insert(std::move(node));
+      }
+    });
+  };
+  EXPECT_THAT(rename("model.layers.1.", "model.layers.2."),
+              HasSubstr("elbow: /model.layers.1: expected a tensor of that name, found none, but "
+                        "model.layers.2"));
+  EXPECT_THAT(rename("model.layers.1.", "model.layers.64."),
+              AllOf(HasSubstr("expected at most 64 elements of model.layers"),
+                    HasSubstr("found one of index 64")));
+  EXPECT_THAT(rename("model.layers.1.", "model.layers.18446744073709551616."),
+              HasSubstr("expected only tensors of the family lstm"));
+  EXPECT_THAT(rename("model.layers.1.", "model.layers.01."),
+              HasSubstr("/model.layers.1.input_weights: expected a tensor, found none"));
+  EXPECT_THAT(rename("model.layers.1.", "model.layers.x."),
+              HasSubstr("/model.layers.x.bias: expected only tensors of the family lstm"));
+  EXPECT_THAT(rename("model.layers.1.", "model.layers."),
+              HasSubstr("expected only tensors of the family lstm"));
+  EXPECT_THAT(complaint_about_network([](Safetensors& contents) {
+                std::erase_if(contents.tensors, [](const auto& named) {
+                  return named.first.starts_with("model.layers.");
+                });
+              }),
+              HasSubstr("elbow: lstm: layers: expected 1 to 64 layers, found 0"));
+}
+
+TEST(BrokenModelFile, WithWeightsThatLie) {
+  const auto with = [](const char* name, const Tensor& tensor) {
+    return complaint_about_network(
+        [&](Safetensors& contents) { contents.tensors.at(name) = tensor; });
+  };
+  EXPECT_THAT(with("model.layers.1.bias", {{12}, std::vector<double>(12)}),
+              HasSubstr("elbow: /model.layers.1.bias: expected F32 of shape [n], found another "
+                        "element type"));
+  EXPECT_THAT(with("model.layers.1.bias", {{3, 4}, std::vector<float>(12)}),
+              HasSubstr("expected F32 of shape [n], found shape [3, 4]"));
+  EXPECT_THAT(with("model.layers.1.bias", {{11}, std::vector<float>(11)}),
+              HasSubstr("elbow: lstm: layers.1.bias: expected 12 numbers, found 11"));
+  EXPECT_THAT(with("model.layers.1.recurrent_weights", {{3, 12}, std::vector<float>(36)}),
+              HasSubstr("elbow: lstm: layers.1.recurrent_weights: expected 4 rows for each of"));
+  EXPECT_THAT(with("model.head.0.weights", {{0, 1U << 30U}, std::vector<float>{}}),
+              HasSubstr("/model.head.0.weights: expected an empty table of at most 65536"));
+  EXPECT_THAT(with("model.head.0.weights", {{4, 1U << 10U}, std::vector<float>(4U << 10U)}),
+              HasSubstr("elbow: lstm: head.0.weights: expected 4 x 3, found 4 x 1024"));
+  std::vector<float> unmeasured(12, 0.0F);
+  unmeasured[5] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(with("model.layers.1.bias", {{12}, unmeasured}),
+              HasSubstr("elbow: /model.layers.1.bias: expected finite numbers, found nan at "
+                        "index 5"));
+  EXPECT_THAT(with("model.sample_period_s", {{}, std::vector{0.01}}),
+              HasSubstr("elbow: sample rate: expected 100 Hz, at which the lstm was trained"));
+}
+
 TEST(BrokenModelFile, WithTensorsThatOverlapOrRunOut) {
   // fallback.intercept, fallback.residual_std: 8 bytes each, the first two of the file.
   EXPECT_THAT(complaint_about_header(R"("data_offsets":[8,16])", R"("data_offsets":[0,08])"),

@@ -13,7 +13,7 @@ with open(sys.argv[1], "rb") as file:
 header = json.loads(content[8 : 8 + header_length])
 data = content[8 + header_length :]
 card = json.loads(header.pop("__metadata__")["torsio"])
-types = {"F64": ("d", 8), "I64": ("q", 8), "U8": ("B", 1)}
+types = {"F64": ("d", 8), "I64": ("q", 8), "F32": ("f", 4), "U8": ("B", 1)}
 
 end = 0
 for name, tensor in sorted(header.items(), key=lambda item: item[1]["data_offsets"]):

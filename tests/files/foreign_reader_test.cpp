@@ -37,6 +37,12 @@ TEST(ForeignReader, OpensAModelFile) {
   EXPECT_EQ(read("model.rate_scale"), "[] [0.05] linear_coulomb\n");
   EXPECT_EQ(read("model.rate_feature"), "[] [1] linear_coulomb\n");
   EXPECT_EQ(read("model.coefficients.scheduled"), "[] [1] linear_coulomb\n");
+
+  auto network = test::example<Lstm>().parameters();
+  network.layers[1].bias.assign(12, 0.25F);
+  save_model(folder.path("m.safetensors"), test::example_model_file(Lstm(network)));
+  EXPECT_EQ(read("model.layers.1.bias"),
+            "[12] [0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25] lstm\n");
 }
 
 }  // namespace

@@ -138,5 +138,30 @@ TEST(ModelFile, RunsAtAnotherRateIfTheUserSaysSo) {
   EXPECT_EQ(make_estimator(model).settings().sample_rate_Hz, 250.0);
 }
 
+TEST(ModelFile, OfANetworkWithMemoryRunsAtItsOwnRateOnly) {
+  ModelFile model = example_model_file(example<Gru>());
+  model.settings.sample_rate_Hz = 1000.0 * (1.0 + 1e-4);  // as a clock measures it
+  EXPECT_NO_THROW((void)make_estimator(model));
+  model.settings.sample_rate_Hz = 250.0;
+  EXPECT_THAT(error_message([&] { (void)make_estimator(model); }),
+              testing::AllOf(HasSubstr("sample rate: expected 1000 Hz, at which the gru was "
+                                       "trained, found 250 Hz"),
+                             HasSubstr("resample the recording (--rate 1000)")));
+  model = example_model_file(example<Mlp>());
+  model.settings.sample_rate_Hz = 250.0;
+  EXPECT_NO_THROW((void)make_estimator(model));
+}
+
+TEST(ModelFile, KeepsTheLayersOfANetworkByTheirNumber) {
+  const Safetensors contents =
+      parse_safetensors(model_bytes(example_model_file(example<Mlp>())), "m");
+  EXPECT_EQ(contents.tensors.at("model.layers.1.weights").shape, (std::vector<std::size_t>{5, 7}));
+  EXPECT_TRUE(std::holds_alternative<std::vector<float>>(
+      contents.tensors.at("model.layers.2.bias").values));
+  EXPECT_FALSE(contents.tensors.contains("model.layers.3.bias"));
+  const ModelFile loaded = parse_model(model_bytes(example_model_file(example<Lstm>())), "m");
+  EXPECT_EQ(std::get<Lstm::Parameters>(loaded.parameters), example<Lstm>().parameters());
+}
+
 }  // namespace
 }  // namespace torsio

@@ -39,6 +39,7 @@ Safetensors example() {
   contents.tensors["bias"] = {.shape = {}, .values = std::vector{std::numbers::pi}};
   contents.tensors["none"] = {.shape = {0, 7}, .values = std::vector<double>{}};
   contents.tensors["count"] = {.shape = {1}, .values = std::vector<std::int64_t>{-3}};
+  contents.tensors["b_floats"] = {.shape = {3}, .values = std::vector{0.1F, -0.0F, 1e-40F}};
   contents.tensors["a_flag"] = {.shape = {}, .values = std::vector<std::uint8_t>{1}};
   return contents;
 }
@@ -71,7 +72,8 @@ TEST(Safetensors, AlignEveryTensorToItsElements) {
   std::memcpy(&header, bytes.data(), 8);
   EXPECT_EQ(header % 8, 0U);
   const std::string text(reinterpret_cast<const char*>(bytes.data()) + 8, header);
-  EXPECT_LT(text.find("weights"), text.find("a_flag")) << "bytes stand behind the doubles";
+  EXPECT_LT(text.find("weights"), text.find("b_floats")) << "floats stand behind the doubles";
+  EXPECT_LT(text.find("b_floats"), text.find("a_flag")) << "bytes stand behind the floats";
 }
 
 TEST(Safetensors, RefuseValuesThatDoNotFillTheirShape) {
@@ -116,7 +118,7 @@ TEST(Safetensors, RefuseDeepNestingAndKeysThatComeTwice) {
 
 TEST(Safetensors, RefuseTypesAndShapesThatTheyDoNotKnow) {
   EXPECT_THAT(complaint(R"({"x":{"dtype":"F16","shape":[1],"data_offsets":[0,2]}})", 2),
-              HasSubstr(R"(/x/dtype: expected "F64", "I64" or "U8", found "F16")"));
+              HasSubstr(R"(/x/dtype: expected "F64", "I64", "F32" or "U8", found "F16")"));
   EXPECT_THAT(complaint(R"({"x":{"dtype":"F64","shape":[-1],"data_offsets":[0,8]}})", 8),
               HasSubstr("/x/shape: expected whole numbers from 0, found -1"));
   EXPECT_THAT(complaint(R"({"x":{"dtype":"F64","shape":[1.0],"data_offsets":[0,8]}})", 8),

@@ -15,6 +15,8 @@
 ///
 ///     INSTANTIATE_TYPED_TEST_SUITE_P(Linear, ModelLaws, Linear);
 ///
+/// and, if it is `Invertible`, the same with `InverseLaws`.
+///
 /// Laws of fitters stand in fit_laws_test.cpp. That NaN in gives a fault and a finite value out, and
 /// that offline equals streaming, are laws of the estimator; that saving and loading changes no bit
 /// is one of the model files.
@@ -103,7 +105,18 @@ TYPED_TEST_P(ModelLaws, NeverClaimsCertainty) {
   }
 }
 
-TYPED_TEST_P(ModelLaws, InvertLeadsBackToTheFirstInput) {
+REGISTER_TYPED_TEST_SUITE_P(ModelLaws, IsAModelAndItsStepNeverThrows, ResetMakesARunRepeatable,
+                            StartsAsAfterAReset, TwoInstancesDoNotShareState,
+                            ACopyGoesOnAsItsOriginal, ParametersAreAllThatItNeeds,
+                            SaysAFiniteValueForInputsFarOutsideItsRange, NeverClaimsCertainty);
+
+/// What a family that is `Invertible` owes besides.
+template <class M>
+class InverseLaws : public ModelLaws<M> {};
+
+TYPED_TEST_SUITE_P(InverseLaws);
+
+TYPED_TEST_P(InverseLaws, InvertLeadsBackToTheFirstInput) {
   static_assert(Invertible<TypeParam>);
   for (std::size_t n = 0; n < this->features_.rows; ++n) {
     const auto row = this->features_.row(n);
@@ -117,7 +130,7 @@ TYPED_TEST_P(ModelLaws, InvertLeadsBackToTheFirstInput) {
   }
 }
 
-TYPED_TEST_P(ModelLaws, InvertDoesNotDependOnTheFirstInput) {
+TYPED_TEST_P(InverseLaws, InvertDoesNotDependOnTheFirstInput) {
   std::vector<double> features(this->model_.input_count(), 0.1);
   const double target = this->model_.step(features).value;
   const double expected = this->model_.invert(target, features).value;
@@ -129,7 +142,7 @@ TYPED_TEST_P(ModelLaws, InvertDoesNotDependOnTheFirstInput) {
   }
 }
 
-TYPED_TEST_P(ModelLaws, InvertSaysAFiniteValueWhateverItIsGiven) {
+TYPED_TEST_P(InverseLaws, InvertSaysAFiniteValueWhateverItIsGiven) {
   for (const double target : {0.0, 1e300, HUGE_VAL, kNotMeasured})
     for (const double given : {0.0, 1e300, HUGE_VAL, kNotMeasured})
       for (const double other : {0.0, 1e300, HUGE_VAL, kNotMeasured}) {
@@ -142,11 +155,8 @@ TYPED_TEST_P(ModelLaws, InvertSaysAFiniteValueWhateverItIsGiven) {
       }
 }
 
-REGISTER_TYPED_TEST_SUITE_P(ModelLaws, IsAModelAndItsStepNeverThrows, ResetMakesARunRepeatable,
-                            StartsAsAfterAReset, TwoInstancesDoNotShareState,
-                            ACopyGoesOnAsItsOriginal, ParametersAreAllThatItNeeds,
-                            SaysAFiniteValueForInputsFarOutsideItsRange, NeverClaimsCertainty,
-                            InvertLeadsBackToTheFirstInput, InvertDoesNotDependOnTheFirstInput,
+REGISTER_TYPED_TEST_SUITE_P(InverseLaws, InvertLeadsBackToTheFirstInput,
+                            InvertDoesNotDependOnTheFirstInput,
                             InvertSaysAFiniteValueWhateverItIsGiven);
 
 }  // namespace torsio::test

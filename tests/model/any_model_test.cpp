@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "support/example_models.hpp"
 #include "torsio/core/error.hpp"
@@ -26,9 +27,12 @@ void expect_same_behaviour(Family model) {
     const double expected = model.step(features.row(n)).value;
     EXPECT_EQ(any.step(features.row(n)).value, expected);
     EXPECT_EQ(again.step(features.row(n)).value, expected);
-    EXPECT_EQ(any.invert(expected, features.row(n)).value,
-              model.invert(expected, features.row(n)).value);
+    if constexpr (Invertible<Family>) {
+      EXPECT_EQ(any.invert(expected, features.row(n)).value,
+                model.invert(expected, features.row(n)).value);
+    }
   }
+  EXPECT_EQ(any.can_invert(), Invertible<Family>);
 }
 
 TEST(AnyModel, BehavesAsTheFamilyInIt) {
@@ -36,12 +40,22 @@ TEST(AnyModel, BehavesAsTheFamilyInIt) {
   expect_same_behaviour(example<LinearCoulomb>());
   expect_same_behaviour(example<Polynomial>());
   expect_same_behaviour(example<Dgmm>());
+  expect_same_behaviour(example<Mlp>());
+  expect_same_behaviour(example<Lstm>());
+  expect_same_behaviour(example<Gru>());
 }
 
 TEST(AnyModel, GivesEmptyParametersByFamilyName) {
   const AnyModel::Parameters parameters = parameters_of_family("polynomial");
   EXPECT_TRUE(std::holds_alternative<Polynomial::Parameters>(parameters));
   EXPECT_EQ(family_of(parameters), "polynomial");
+}
+
+TEST(AnyModel, SaysThatAFamilyCannotInvert) {
+  AnyModel any = example<Mlp>();
+  const Estimate told = any.invert(1.0, std::vector{0.3, 0.1});
+  EXPECT_EQ(told.fault, Fault::model_not_finite);
+  EXPECT_EQ(told.value, 0.3);
 }
 
 TEST(AnyModel, NamesTheKnownFamiliesWhenOneIsUnknown) {

@@ -25,11 +25,15 @@ std::string dump(const Parameters& parameters) {
   for_each_leaf(parameters, [&](const std::string& path, const auto& leaf) {
     using Leaf = std::remove_cvref_t<decltype(leaf)>;
     text += '\n' + path;
-    if constexpr (std::same_as<Leaf, Matrix>) {
+    const auto numbers = [&](const auto& values) {
+      for (const auto value : values) number(static_cast<double>(value));
+    };
+    if constexpr (std::same_as<Leaf, Matrix> || std::same_as<Leaf, FloatMatrix>) {
       text += ' ' + std::to_string(leaf.rows) + 'x' + std::to_string(leaf.columns);
-      for (const double value : leaf.values) number(value);
-    } else if constexpr (std::same_as<Leaf, std::vector<double>>) {
-      for (const double value : leaf) number(value);
+      numbers(leaf.values);
+    } else if constexpr (std::same_as<Leaf, std::vector<double>> ||
+                         std::same_as<Leaf, std::vector<float>>) {
+      numbers(leaf);
     } else {
       number(static_cast<double>(leaf));
     }

@@ -4,11 +4,15 @@
 #include <cstddef>
 #include <vector>
 
+#include "support/random_network.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
+#include "torsio/model/lstm.hpp"
+#include "torsio/model/mlp.hpp"
 #include "torsio/model/polynomial.hpp"
 
 namespace torsio::test {
@@ -85,6 +89,21 @@ inline Dgmm example<Dgmm>() {
                       .thin_log_density = -5.0,
                       .thin_log_density_inverse = -5.0};
   return Dgmm(parameters);
+}
+
+template <>
+inline Mlp example<Mlp>() {
+  return Mlp(random_network<Mlp>({.hidden = {7, 5}, .activation = Activation::tanh}, 4));
+}
+
+template <>
+inline Lstm example<Lstm>() {
+  return Lstm(random_network<Lstm>({.units = {5, 3}, .hidden = {4}, .warm_up_samples = 3}, 5));
+}
+
+template <>
+inline Gru example<Gru>() {
+  return Gru(random_network<Gru>({.units = {5, 3}, .hidden = {4}, .warm_up_samples = 3}, 6));
 }
 
 template <>

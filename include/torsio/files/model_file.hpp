@@ -64,7 +64,9 @@ void save_model(const std::filesystem::path& path, const ModelFile& model);
 [[nodiscard]] ModelFile load_model(const std::filesystem::path& path,
                                    std::string_view expected_serial = {});
 
-/// The estimator of a model. @throws Error if settings and model do not fit together.
+/// The estimator of a model, at the rate in its settings. Filters are re-discretised for any rate; a
+/// network with memory is not. @throws Error if settings and model do not fit together, or such a
+/// network would run at another rate than its own (0.1 % apart counts as the same).
 [[nodiscard]] Estimator make_estimator(const ModelFile& model);
 
 /// `load_model` and `make_estimator` in one: what a robot calls.

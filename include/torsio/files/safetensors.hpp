@@ -14,10 +14,10 @@ namespace torsio {
 /// A header longer than this is refused before it is read.
 inline constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20;
 
-/// Numbers with a shape, row-major. The element type is the file's: F64, I64 or U8.
+/// Numbers with a shape, row-major. The element type is the file's: F64, I64, F32 or U8.
 struct Tensor {
-  using Values =
-      std::variant<std::vector<double>, std::vector<std::int64_t>, std::vector<std::uint8_t>>;
+  using Values = std::variant<std::vector<double>, std::vector<std::int64_t>, std::vector<float>,
+                              std::vector<std::uint8_t>>;
 
   std::vector<std::size_t> shape;  ///< empty for a single number
   Values values;                   ///< as many as the product of `shape`

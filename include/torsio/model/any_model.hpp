@@ -8,8 +8,11 @@
 #include <variant>
 
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
+#include "torsio/model/lstm.hpp"
+#include "torsio/model/mlp.hpp"
 #include "torsio/model/model.hpp"
 #include "torsio/model/polynomial.hpp"
 
@@ -27,7 +30,10 @@ struct FamilyList {
 using KnownFamilies = FamilyList<Linear,         //
                                  LinearCoulomb,  //
                                  Polynomial,     //
-                                 Dgmm>;
+                                 Dgmm,           //
+                                 Mlp,            //
+                                 Lstm,           //
+                                 Gru>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`
 /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "torsio/core/aligned_vector.hpp"
+#include "torsio/model/dense_stack.hpp"
 #include "torsio/model/model.hpp"
 #include "torsio/model/network_layers.hpp"
 
@@ -13,7 +14,7 @@ namespace torsio {
 
 /// A static network: dense layers one behind the other, the last one linear with one output,
 /// evaluated in float32. Source: paper 001, SPEC section 3.2. Cost: its weights streamed once from
-/// cache.
+/// cache. Nothing is allocated after construction.
 class Mlp {
  public:
   static constexpr std::string_view kFamily = "mlp";
@@ -31,21 +32,30 @@ class Mlp {
   };
 
   /// @throws Error if there is no layer, shapes do not fit together, the last layer has not one output
-  /// or is not linear, an activation is unknown, a number is not finite.
+  /// or is not linear, an activation is unknown, a number is not finite, or a scale is not positive.
   explicit Mlp(const Parameters& parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
-  [[nodiscard]] std::size_t input_count() const noexcept;
-  [[nodiscard]] std::size_t parameter_count() const noexcept;
+  [[nodiscard]] std::size_t input_count() const noexcept {
+    return parameters_.scaling.inputs.centre.size();
+  }
+  [[nodiscard]] std::size_t parameter_count() const noexcept {
+    return weight_count(parameters_.layers);
+  }
 
   void reset() noexcept {}
+  /// A value that is not finite is given back as it is.
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
   /// What the last layer saw in the last step: what an adaptation of that layer learns from.
-  [[nodiscard]] std::span<const float> last_layer_input() const noexcept;
+  [[nodiscard]] std::span<const float> last_layer_input() const noexcept {
+    return layers_.last_layer_input(input_.data());
+  }
 
  private:
   Parameters parameters_;
+  DenseStack layers_;
+  AlignedVector<float> input_;  ///< standardised, padded
 };
 
 }  // namespace torsio

@@ -92,6 +92,17 @@ struct NetworkScaling {
   bool operator==(const NetworkScaling&) const = default;
 };
 
+/// Numbers of a layer that training may change.
+[[nodiscard]] std::size_t weight_count(const DenseLayer& layer) noexcept;
+[[nodiscard]] std::size_t weight_count(const LstmLayer& layer) noexcept;
+[[nodiscard]] std::size_t weight_count(const GruLayer& layer) noexcept;
+template <class Layer>
+[[nodiscard]] std::size_t weight_count(const std::vector<Layer>& layers) noexcept {
+  std::size_t count = 0;
+  for (const Layer& layer : layers) count += weight_count(layer);
+  return count;
+}
+
 /// No layer wider, no network deeper: a file that says so is refused before memory is taken.
 inline constexpr std::size_t kMostUnits = 65536;
 inline constexpr std::size_t kMostLayers = 64;

@@ -1,0 +1,121 @@
+#include "model/network_checks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kActivations = static_cast<std::size_t>(Activation::elu) + 1;
+
+[[noreturn]] void refuse(std::string place, std::string expected, std::string found) {
+  throw Error(
+      {.place = std::move(place), .expected = std::move(expected), .found = std::move(found)});
+}
+
+template <class Number>
+void check_finite(std::span<const Number> values, const std::string& place) {
+  const auto bad =
+      std::ranges::find_if_not(values, [](Number value) { return std::isfinite(value); });
+  if (bad != values.end())
+    refuse(place, "finite numbers", fmt::format("{} at index {}", *bad, bad - values.begin()));
+}
+
+void check_shape(const FloatMatrix& matrix, std::size_t rows, std::size_t columns,
+                 const std::string& place) {
+  const std::size_t count = matrix.values.size();
+  if (matrix.rows != rows || matrix.columns != columns)
+    refuse(place, fmt::format("{} x {}", rows, columns),
+           fmt::format("{} x {}", matrix.rows, matrix.columns));
+  if (count != rows * columns)
+    refuse(place, fmt::format("{} numbers", rows * columns), fmt::format("{}", count));
+  check_finite(std::span(matrix.values), place);
+}
+
+void check_length(const std::vector<float>& values, std::size_t length, const std::string& place) {
+  if (values.size() != length)
+    refuse(place, fmt::format("{} numbers", length), fmt::format("{}", values.size()));
+  check_finite(std::span(values), place);
+}
+
+/// Before anything is multiplied.
+std::size_t checked_units(std::size_t rows, std::size_t gates, const std::string& place) {
+  if (rows == 0 || rows % gates != 0 || rows / gates > kMostUnits)
+    refuse(place,
+           gates == 1 ? fmt::format("1 to {} rows", kMostUnits)
+                      : fmt::format("{} rows for each of 1 to {} units", gates, kMostUnits),
+           fmt::format("{} rows", rows));
+  return rows / gates;
+}
+
+}  // namespace
+
+std::size_t checked_input_count(const NetworkScaling& scaling, const std::string& place) {
+  const auto& [centre, scale] = scaling.inputs;
+  if (centre.empty() || centre.size() > kMostUnits)
+    refuse(place + ".inputs.centre", fmt::format("1 to {} inputs", kMostUnits),
+           fmt::format("{}", centre.size()));
+  if (scale.size() != centre.size())
+    refuse(place + ".inputs.scale", fmt::format("{} numbers", centre.size()),
+           fmt::format("{}", scale.size()));
+  check_finite(std::span(centre), place + ".inputs.centre");
+  for (std::size_t j = 0; j < scale.size(); ++j)
+    check_positive(scale[j], fmt::format("{}.inputs.scale[{}]", place, j));
+  check_finite(std::span(&scaling.target_centre, 1), place + ".target_centre");
+  check_positive(scaling.target_scale, place + ".target_scale");
+  return centre.size();
+}
+
+void check_layer_count(std::size_t count, const std::string& place) {
+  if (count == 0 || count > kMostLayers)
+    refuse(place, fmt::format("1 to {} layers", kMostLayers), fmt::format("{}", count));
+}
+
+void check_layer(const DenseLayer& layer, std::size_t inputs, const std::string& place) {
+  const std::size_t units = checked_units(layer.weights.rows, 1, place + ".weights");
+  check_shape(layer.weights, units, inputs, place + ".weights");
+  check_length(layer.bias, units, place + ".bias");
+  if (layer.activation >= kActivations)
+    refuse(place + ".activation", fmt::format("a number below {}", kActivations),
+           fmt::format("{}", layer.activation));
+}
+
+void check_layer(const LstmLayer& layer, std::size_t inputs, const std::string& place) {
+  constexpr std::size_t kGates = 4;
+  const std::string recurrent = place + ".recurrent_weights";
+  const std::size_t units = checked_units(layer.recurrent_weights.rows, kGates, recurrent);
+  check_shape(layer.recurrent_weights, kGates * units, units, recurrent);
+  check_shape(layer.input_weights, kGates * units, inputs, place + ".input_weights");
+  check_length(layer.bias, kGates * units, place + ".bias");
+}
+
+void check_layer(const GruLayer& layer, std::size_t inputs, const std::string& place) {
+  constexpr std::size_t kGates = 3;
+  const std::string recurrent = place + ".recurrent_weights";
+  const std::size_t units = checked_units(layer.recurrent_weights.rows, kGates, recurrent);
+  check_shape(layer.recurrent_weights, kGates * units, units, recurrent);
+  check_shape(layer.input_weights, kGates * units, inputs, place + ".input_weights");
+  check_length(layer.input_bias, kGates * units, place + ".input_bias");
+  check_length(layer.recurrent_bias, kGates * units, place + ".recurrent_bias");
+}
+
+void check_last_layer(const DenseLayer& layer, const std::string& place) {
+  if (layer.weights.rows != 1)
+    refuse(place + ".weights", "one output of the last layer",
+           fmt::format("{}", layer.weights.rows));
+  if (layer.activation != static_cast<std::size_t>(Activation::linear))
+    refuse(place + ".activation", "a linear last layer",
+           std::string(name(static_cast<Activation>(layer.activation))));
+}
+
+void check_positive(double value, const std::string& place) {
+  if (!std::isfinite(value) || value <= 0.0)
+    refuse(place, "a positive, finite number", fmt::format("{}", value));
+}
+
+}  // namespace torsio
