@@ -37,6 +37,11 @@ constexpr std::array kBenches{
     Bench{"em_k100_iteration", em_k100_iteration, Peer{"Armadillo", write_em_inputs}},
     Bench{"csv_load", csv_load, Peer{"numpy.loadtxt"}},
     Bench{"simulate_dfki_120", simulate_dfki_120},
+    Bench{"lstm250_step", lstm250_step, Peer{"libtorch", write_lstm250}},
+    Bench{"lstm32_step", lstm32_step, Peer{"libtorch", write_lstm32}},
+    Bench{"gru64_step", gru64_step, Peer{"libtorch", write_gru64}},
+    Bench{"mlp_step", mlp_step, Peer{"libtorch", write_mlp}},
+    Bench{"lstm250_x12_step", lstm250_x12_step, Peer{"libtorch", write_lstm250}},
 };
 
 struct Arguments {

@@ -10,10 +10,19 @@ Row dgmm_online_216k();
 Row em_k100_iteration();
 Row csv_load();
 Row simulate_dfki_120();
+Row lstm250_step();
+Row lstm32_step();
+Row gru64_step();
+Row mlp_step();
+Row lstm250_x12_step();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.
 void write_query_inputs();
 void write_em_inputs();
+void write_lstm250();
+void write_lstm32();
+void write_gru64();
+void write_mlp();
 
 }  // namespace torsio::bench

@@ -30,12 +30,15 @@ std::size_t lane_count() { return kLanes; }
 
 HWY_INLINE Vector set(float value) { return hn::Set(kTag, value); }
 
-// Not by Max and Min: what these make of NaN differs between machines. Here it stays.
+// NaN stays: Max and Min of vectors give back their second argument where one is NaN, or else NaN;
+// those of a single number do not.
 HWY_INLINE Vector at_least(Vector x, float limit) {
-  return hn::IfThenElse(hn::Lt(x, set(limit)), set(limit), x);
+  if constexpr (kLanes == 1) return hn::IfThenElse(hn::Lt(x, set(limit)), set(limit), x);
+  return hn::Max(set(limit), x);
 }
 HWY_INLINE Vector at_most(Vector x, float limit) {
-  return hn::IfThenElse(hn::Gt(x, set(limit)), set(limit), x);
+  if constexpr (kLanes == 1) return hn::IfThenElse(hn::Gt(x, set(limit)), set(limit), x);
+  return hn::Min(set(limit), x);
 }
 
 // x P(x^2) / Q(x^2) on |x| <= 9, where tanh is 1 to float32: a minimax fit of the relative error,
@@ -139,6 +142,8 @@ HWY_INLINE void step_layer(const PackedView& layer, const JointStates& joints) {
     std::size_t joint = 0;
     for (; joint + kJointsAtOnce <= joints.count; joint += kJointsAtOnce)
       step_tile<Cell, 1, kJointsAtOnce>(layer, joints, block, joint);
+    for (; joint + 2 <= joints.count; joint += 2)
+      step_tile<Cell, 1, 2>(layer, joints, block, joint);
     for (; joint < joints.count; ++joint) step_tile<Cell, 1, 1>(layer, joints, block, joint);
   }
 }
