@@ -83,3 +83,15 @@ void DataFlags::check_output(const std::string& output,
                                 .advice = "Give the output another name."});
   }
 }
+
+std::map<std::string, std::string> parse_settings(const std::vector<std::string>& settings) {
+  std::map<std::string, std::string> options;
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos)
+      throw torsio::UsageError(
+          {.place = "--set", .expected = "option=value", .found = "'" + setting + "'"});
+    options[setting.substr(0, equals)] = setting.substr(equals + 1);
+  }
+  return options;
+}

@@ -2,6 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,3 +35,7 @@ struct DataFlags {
 };
 
 inline constexpr std::uint64_t kDefaultSeed = 1;
+
+/// What `--set option=value` said, each time it was given.
+[[nodiscard]] std::map<std::string, std::string> parse_settings(
+    const std::vector<std::string>& settings);

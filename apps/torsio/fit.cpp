@@ -42,18 +42,6 @@ std::string family_list() {
   return text;
 }
 
-std::map<std::string, std::string> parse_settings(const std::vector<std::string>& settings) {
-  std::map<std::string, std::string> options;
-  for (const std::string& setting : settings) {
-    const std::size_t equals = setting.find('=');
-    if (equals == std::string::npos)
-      throw torsio::UsageError(
-          {.place = "--set", .expected = "option=value", .found = "'" + setting + "'"});
-    options[setting.substr(0, equals)] = setting.substr(equals + 1);
-  }
-  return options;
-}
-
 void run(const FitFlags& flags) {
   if (flags.list) return print(family_list());
   if (flags.data.recordings.empty() || flags.family.empty() || flags.output.empty())

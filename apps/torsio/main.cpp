@@ -32,6 +32,7 @@ int run(int argc, char** argv) {
   add_fit(app);
   add_evaluate(app);
   add_compare(app);
+  add_crossvalidate(app);
   catch_interrupts();
   try {
     app.parse(argc, argv);

@@ -7,7 +7,10 @@
 
 #include "torsio/report/text_table.hpp"
 
-std::string comparison_text(const torsio::Results& results) {
+namespace {
+
+/// Target, what the split means, and the inputs.
+std::string heading(const torsio::Results& results) {
   std::string text = fmt::format("target {}{}\n", results.target,
                                  results.label.empty() ? "" : ", " + results.label);
   if (results.input_sets.empty()) {
@@ -18,6 +21,13 @@ std::string comparison_text(const torsio::Results& results) {
   }
   if (results.non_causal_zero)
     text += "zero: non-causal (taken from the middle of each whole record)\n";
+  return text;
+}
+
+}  // namespace
+
+std::string comparison_text(const torsio::Results& results) {
+  std::string text = heading(results);
   for (const torsio::Role role : {torsio::Role::validation, torsio::Role::test}) {
     const bool has_rows = std::ranges::any_of(
         results.rows, [&](const torsio::ResultRow& row) { return row.split == role; });
@@ -26,6 +36,15 @@ std::string comparison_text(const torsio::Results& results) {
                         torsio::name(role), results.unit, torsio::ranked_table(results, role));
   }
   return text;
+}
+
+std::string cross_validation_text(const torsio::CrossValidation& validation) {
+  return heading(validation.results) +
+         fmt::format(
+             "\nheld-out errors in {}, free run, mean +- standard deviation over {} folds, "
+             "best first\n{}",
+             validation.results.unit, validation.plan.folds.size(),
+             torsio::cross_validation_table(validation));
 }
 
 std::string evaluation_text(const torsio::Results& results) {

@@ -10,4 +10,5 @@ void add_check(CLI::App& app);
 void add_fit(CLI::App& app);
 void add_evaluate(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);

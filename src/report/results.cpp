@@ -4,17 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
+#include "report/result_parts.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 Json row_json(const ResultRow& row, bool non_causal_zero) {
   const Metrics& metrics = row.score.metrics;
@@ -24,27 +21,24 @@ Json row_json(const ResultRow& row, bool non_causal_zero) {
             {"split", name(row.split)},
             {"recording", row.recording ? Json(*row.recording) : Json(nullptr)},
             {"mode", "free_run"},
-            {"rmse", number(metrics.rmse)},
-            {"mad", number(metrics.mad)},
-            {"std_abs", number(metrics.std_abs)},
-            {"max_abs", number(metrics.max_abs)},
-            {"fit_percent", number(metrics.fit_percent)},
+            {"rmse", json_number(metrics.rmse)},
+            {"mad", json_number(metrics.mad)},
+            {"std_abs", json_number(metrics.std_abs)},
+            {"max_abs", json_number(metrics.max_abs)},
+            {"fit_percent", json_number(metrics.fit_percent)},
             {"samples", metrics.samples},
             {"initialised_samples", row.score.initialised_samples},
             {"guarded_samples", row.score.guarded_samples},
-            {"step_ns_p50", number(row.score.step_ns_p50)},
-            {"step_ns_p999", number(row.score.step_ns_p999)},
-            {"fit_seconds", number(row.fit_seconds)},
+            {"step_ns_p50", json_number(row.score.step_ns_p50)},
+            {"step_ns_p999", json_number(row.score.step_ns_p999)},
+            {"fit_seconds", json_number(row.fit_seconds)},
             {"parameter_count", row.parameter_count},
             {"status", row.status},
             {"reason", text_or_null(row.reason)}};
+  if (!row.fold.empty()) json["fold"] = row.fold;
   if (row.leak) json["leak"] = true;
   if (non_causal_zero) json["zero"] = "non_causal";
   return json;
-}
-
-std::string model_label(const ResultRow& row) {
-  return row.variant.empty() ? row.family : row.family + "[" + row.variant + "]";
 }
 
 bool is_same_model(const ResultRow& a, const ResultRow& b) {
@@ -83,7 +77,16 @@ double rmse_on(const Results& results, const ResultRow& model, const std::string
   return kNotMeasured;
 }
 
-/// Three decimals, until they would fill the line.
+}  // namespace
+
+Json json_number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+std::string model_label(std::string_view family, std::string_view variant) {
+  return variant.empty() ? std::string(family) : fmt::format("{}[{}]", family, variant);
+}
+
 std::string error_text(double value) {
   return std::abs(value) < 1e6 ? fmt::format("{:.3f}", value) : fmt::format("{:.3g}", value);
 }
@@ -93,9 +96,7 @@ std::string seconds_text(double seconds) {
   return seconds < 0.01 ? "<0.01" : fmt::format("{:.2f}", seconds);
 }
 
-}  // namespace
-
-std::string results_json(const Results& results) {
+Json results_document(const Results& results) {
   Json document{{"target", results.target}, {"unit", results.unit}, {"inputs", results.inputs}};
   if (!results.input_sets.empty()) {
     Json sets = Json::object();
@@ -106,7 +107,11 @@ std::string results_json(const Results& results) {
   document["results"] = Json::array();
   for (const ResultRow& row : results.rows)
     document["results"].push_back(row_json(row, results.non_causal_zero));
-  return document.dump(2) + "\n";
+  return document;
+}
+
+std::string results_json(const Results& results) {
+  return results_document(results).dump(2) + "\n";
 }
 
 std::string ranked_table(const Results& results, Role split) {
@@ -122,13 +127,13 @@ std::string ranked_table(const Results& results, Role split) {
   std::string failures;
   for (const ResultRow* row : ranking(results, split)) {
     if (row->status != "ok") {
-      failures += fmt::format("  {}{}: {}: {}\n", model_label(*row),
+      failures += fmt::format("  {}{}: {}: {}\n", model_label(row->family, row->variant),
                               row->input_set.empty() ? "" : " (" + row->input_set + ")",
                               row->status, row->reason);
       continue;
     }
     const Metrics& metrics = row->score.metrics;
-    std::vector<std::string> cells{model_label(*row)};
+    std::vector<std::string> cells{model_label(row->family, row->variant)};
     if (has_sets) cells.push_back(row->input_set);
     for (const double value : {metrics.rmse, metrics.mad, metrics.max_abs})
       cells.push_back(error_text(value));

@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <iterator>
+#include <limits>
 #include <set>
 
 #include "torsio/core/error.hpp"
-#include "torsio/core/units.hpp"
 #include "torsio/train/families.hpp"
 #include "torsio/train/inputs.hpp"
+#include "train/fit_and_score.hpp"
 
 namespace torsio {
 namespace {
@@ -89,57 +90,6 @@ std::vector<FamilyChoice> all_choices(const Dataset& dataset,
   return choices;
 }
 
-ResultRow row_for(const ModelFile& file, Role split, const Score& score) {
-  ResultRow row;
-  row.family = file.card.fitted_as;
-  row.split = split;
-  row.score = score;
-  row.parameter_count = AnyModel(file.parameters).parameter_count();
-  if (!std::isfinite(row.score.metrics.rmse)) {
-    row.status = "failed";
-    row.reason = "no sample of this split could be scored";
-  } else if (row.score.guarded_samples > 0) {
-    row.reason = fmt::format("{:.1f} % of the samples were answered by a guard",
-                             100.0 * static_cast<double>(row.score.guarded_samples) /
-                                 static_cast<double>(row.score.metrics.samples));
-  }
-  return row;
-}
-
-/// The rows of one model: on each role, on each recording and on all of the role together.
-std::vector<ResultRow> rows_for(const ModelFile& file, const Estimator& estimator,
-                                const Dataset& dataset, const Progress& progress) {
-  std::vector<ResultRow> rows;
-  for (const Role role : kRoles) {
-    if (!dataset.has_role(role)) continue;
-    const SplitScore scores = evaluate(estimator, dataset, role, progress);
-    rows.push_back(row_for(file, role, scores.together));
-    for (const auto& of_recording : scores.recordings) {
-      rows.push_back(row_for(file, role, of_recording.score));
-      rows.back().recording = of_recording.recording;
-    }
-  }
-  return rows;
-}
-
-Results empty_results(const Dataset& dataset) {
-  Results results;
-  results.target = dataset.target;
-  results.unit = unit_label(dataset.target);
-  results.label = dataset.label;
-  for (const DatasetRecord& record : dataset.records)
-    for (const ZeroRule& zero : record.recording.zeros) results.non_causal_zero |= zero.mid_range;
-  return results;
-}
-
-ResultRow failed_row(const ModelChoice& choice, const Error& error) {
-  ResultRow row;
-  row.family = choice.family;
-  row.status = "failed";
-  row.reason = error.what();
-  return row;
-}
-
 const ResultRow* whole_split(const std::vector<ResultRow>& rows, Role role) {
   for (const ResultRow& row : rows)
     if (row.split == role && !row.recording && row.status == "ok") return &row;
@@ -160,15 +110,6 @@ void refuse_seen_test_records(const Dataset& dataset) {
            .problem = "this file is both trained and judged on",
            .advice = "Hold another recording out, or split one with `split:` in a manifest."});
   }
-}
-
-/// A model's share of the whole work's progress.
-Progress part_of(const Progress& progress, std::size_t index, std::size_t count,
-                 const std::string& doing) {
-  if (!progress) return {};
-  return [&progress, index, count, doing](double fraction, std::string_view) {
-    return progress((static_cast<double>(index) + fraction) / static_cast<double>(count), doing);
-  };
 }
 
 }  // namespace
@@ -209,44 +150,24 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
   Results& results = comparison.results;
   const Role judge = dataset.has_role(Role::validation) ? Role::validation : Role::test;
   double best_rmse = std::numeric_limits<double>::infinity();
+  InputSets input_sets(dataset, allow_leak);
   for (std::size_t i = 0; i < choices.size(); ++i) {
     const ModelChoice& choice = choices[i];
-    if (results.inputs.empty()) results.inputs = choice.features.inputs;
-    if (results.input_sets.empty() || results.input_sets.back().first != choice.input_set)
-      results.input_sets.emplace_back(choice.input_set, choice.features.inputs);
-    const std::string leak = refuse_leak(dataset, choice.features, allow_leak);
-    std::vector<ResultRow> rows;
-    try {
-      const Progress part = part_of(progress, i, choices.size(), choice.family);
-      TrainedModel trained = train_model(dataset, choice, seed, part);
-      const Estimator estimator = make_estimator(trained.file);
-      rows = rows_for(trained.file, estimator, dataset, part);
-      for (ResultRow& row : rows) row.fit_seconds = trained.fit_seconds;
-      const ResultRow* judged = whole_split(rows, judge);
-      if (judged != nullptr && judged->score.metrics.rmse < best_rmse) {
-        best_rmse = judged->score.metrics.rmse;
-        note_held_out_scores(trained.file.card, rows);
-        if (judge == Role::test)
-          trained.file.card.held_out +=
-              fmt::format("; this score chose the model among {}", choices.size());
-        comparison.best = std::move(trained);
-      }
-    } catch (const Cancelled&) {
-      throw;
-    } catch (const UsageError&) {
-      throw;  // a setting is wrong; what merely cannot be fitted to these data is another Error
-    } catch (const Error& error) {
-      rows = {failed_row(choice, error)};
+    note_inputs(results, choice);
+    const Progress part = part_of(progress, i, choices.size(), choice.family);
+    ScoredModel scored = fit_and_score(dataset, input_sets, choice, seed, kRoles, part);
+    const ResultRow* judged = whole_split(scored.rows, judge);
+    if (judged != nullptr && judged->score.metrics.rmse < best_rmse) {
+      best_rmse = judged->score.metrics.rmse;
+      ModelCard& card = scored.trained->file.card;
+      note_held_out_scores(card, scored.rows);
+      if (judge == Role::test)
+        card.held_out += fmt::format("; this score chose the model among {}", choices.size());
+      comparison.best = std::move(scored.trained);
     }
-    for (ResultRow& row : rows) {
-      row.variant = choice.variant();
-      row.input_set = choice.input_set;
-      row.leak = !leak.empty();
-      results.rows.push_back(std::move(row));
-    }
+    std::ranges::move(scored.rows, std::back_inserter(results.rows));
   }
-  if (results.input_sets.size() == 1 && results.input_sets.front().first.empty())
-    results.input_sets.clear();
+  forget_only_set(results);
   return comparison;
 }
 
@@ -261,7 +182,7 @@ Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Prog
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
   const Estimator estimator = estimator_at(file, dataset.sample_rate_Hz());
-  results.rows = rows_for(file, estimator, dataset, progress);
+  results.rows = rows_for(file, estimator, dataset, kRoles, progress);
   return results;
 }
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
 #include <set>
 #include <utility>
 
@@ -82,32 +81,44 @@ std::string ModelChoice::variant() const {
   return text;
 }
 
-TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std::uint64_t seed,
-                         const Progress& progress) {
+LearningData learning_data(const Dataset& dataset, const FeatureSpec& features) {
+  LearningData data{.training = training_data(dataset, features), .validation = {}};
+  refuse_constant_target(data.training);
+  if (dataset.has_role(Role::validation))
+    data.validation = training_data(dataset, features, Role::validation);
+  return data;
+}
+
+TrainedModel train_model(const Dataset& dataset, const LearningData& data,
+                         const ModelChoice& choice, std::uint64_t seed, const Progress& progress) {
   const FamilyInfo& family = find_family(choice.family);
   const Options options(family.options, choice.options);
   ModelCard card = card_for(dataset, choice, options, seed);
-  const TrainingData data = training_data(dataset, choice.features);
-  refuse_constant_target(data);
-  std::optional<TrainingData> validation;
-  if (dataset.has_role(Role::validation))
-    validation = training_data(dataset, choice.features, Role::validation);
 
   const auto start = std::chrono::steady_clock::now();
-  FittedModel fitted = family.fit(data, options, seed, progress);
+  FittedModel fitted = family.fit(data.training, options, seed, progress);
   const std::chrono::duration<double> fit_time = std::chrono::steady_clock::now() - start;
 
-  TrainedModel trained{.file = {.card = std::move(card),
-                                .settings = guarded_settings(choice.features, data, fitted.model,
-                                                             validation ? &*validation : nullptr),
-                                .parameters = fitted.model.parameters()},
-                       .notes = std::move(fitted.notes),
-                       .fit_seconds = fit_time.count()};
-  const FeaturePipeline pipeline(choice.features, data.sample_rate_Hz);
+  TrainedModel trained{
+      .file = {.card = std::move(card),
+               .settings = guarded_settings(choice.features, data.training, fitted.model,
+                                            data.validation ? &*data.validation : nullptr),
+               .parameters = fitted.model.parameters()},
+      .notes = std::move(fitted.notes),
+      .fit_seconds = fit_time.count()};
+  const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
   for (const ZeroRule& zero : trained.file.card.zeros)
     if (std::ranges::find(pipeline.raw_inputs(), zero.channel) != pipeline.raw_inputs().end())
       trained.file.settings.zeroed_channels.push_back(zero.channel);
   return trained;
+}
+
+TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std::uint64_t seed,
+                         const Progress& progress) {
+  // A wrong setting or records that disagree are told before the data are run through the filters.
+  (void)Options(find_family(choice.family).options, choice.options);
+  (void)training_zeros(dataset);
+  return train_model(dataset, learning_data(dataset, choice.features), choice, seed, progress);
 }
 
 }  // namespace torsio

@@ -59,6 +59,23 @@ TEST_F(BrokenCalls, LeaveTheOutputUntouchedWhenTheFitFails) {
   EXPECT_EQ(contents("m.safetensors"), "precious");
 }
 
+TEST_F(BrokenCalls, OfCrossValidationSayWhatFoldsThereCanBe) {
+  record();
+  const std::string call = "crossvalidate a.csv --models linear ";
+  expect_error(torsio(call + "--by support_m"), kCallWasWrong, "no channel is constant");
+  expect_error(torsio(call + "--by record"), kCallWasWrong, "at least two recordings");
+  expect_error(torsio(call + "--by record --folds 3"), kCallWasWrong, "excludes");
+  expect_error(torsio(call + "--folds 1"), kCallWasWrong, "at least 2");
+  expect_error(torsio(call + "--folds 1000000"), kCallWasWrong, "at most 40000");
+  expect_error(torsio(call + "--embargo 100s"), kCallWasWrong, "shorter --embargo");
+  expect_error(torsio(call + "--embargo 3Nm"), kCallWasWrong, "--embargo");
+  expect_error(torsio(call + "--set components=3"), kCallWasWrong, "components");
+  expect_error(torsio("crossvalidate a.csv --set rates=true"), kCallWasWrong, "--models");
+  expect_error(torsio("crossvalidate a.csv a.csv"), kCallWasWrong, "given twice");
+  expect_error(torsio("crossvalidate"), kCallWasWrong, "at least one recording");
+  expect_error(torsio(call + "--json no/such/folder/x.json"), kCallWasWrong, "no/such/folder");
+}
+
 TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
   record();
   folder_.file("m.safetensors", "precious");

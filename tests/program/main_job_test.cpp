@@ -53,6 +53,27 @@ TEST_F(MainJob, RanksEveryFamilyOnHeldOutRecords) {
   EXPECT_EQ(torsio("evaluate best.safetensors b.csv").exit_code, 0);
 }
 
+TEST_F(MainJob, CrossValidatesWithoutAHeldOutRecording) {
+  record();
+  const Outcome by_record =
+      torsio("crossvalidate a.csv b.csv --by record --models linear --json -");
+  ASSERT_EQ(by_record.exit_code, 0) << by_record.err;
+  const auto json = nlohmann::json::parse(by_record.out);
+  // The fold that holds b out is what fit and evaluate do with the two.
+  ASSERT_EQ(torsio("fit a.csv --model linear -o joint.safetensors").exit_code, 0);
+  const auto by_hand =
+      nlohmann::json::parse(torsio("evaluate joint.safetensors b.csv --json -").out);
+  const auto& row = json.at("results").at(2);
+  EXPECT_EQ(row.at("fold"), "b");
+  EXPECT_EQ(row.at("rmse"), by_hand.at("results").at(0).at("rmse"));
+
+  const Outcome blocks = torsio("crossvalidate a.csv --models linear,polynomial --set rates=true");
+  ASSERT_EQ(blocks.exit_code, 0) << blocks.err;
+  EXPECT_NE(blocks.out.find("5 contiguous blocks within one recording"), std::string::npos)
+      << blocks.out;
+  EXPECT_NE(blocks.out.find("polynomial[rates=true]"), std::string::npos) << blocks.out;
+}
+
 TEST_F(MainJob, DemoWritesComparesDocument) {
   record();
   const Outcome compare = torsio("compare a.csv --test b.csv --models linear --json -");
@@ -118,7 +139,8 @@ TEST_F(MainJob, ListsAndDescribes) {
   EXPECT_NE(torsio("simulate --describe dfki-50").out.find("gear_ratio"), std::string::npos);
   EXPECT_NE(torsio("fit --list").out.find("dgmm"), std::string::npos);
   EXPECT_EQ(torsio("--help").exit_code, 0);
-  for (const char* verb : {"demo", "simulate", "check", "fit", "evaluate", "compare"})
+  for (const char* verb :
+       {"demo", "simulate", "check", "fit", "evaluate", "compare", "crossvalidate"})
     EXPECT_NE(torsio(std::string(verb) + " --help").out.find("Example"), std::string::npos) << verb;
 }
 

@@ -19,6 +19,7 @@ struct ResultRow {
   std::string variant = {};    ///< the settings, "schedule=support_m"; may be empty
   std::string input_set = {};  ///< name of the manifest's input set; may be empty
   Role split = Role::test;
+  std::string fold = {};                      ///< of a cross-validation; else empty
   std::optional<std::string> recording = {};  ///< empty: the whole split together
   Score score = {};
   double fit_seconds = kNotMeasured;  ///< not measured where the model came from a file

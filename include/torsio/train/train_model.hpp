@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
+#include "torsio/train/training_data.hpp"
 
 namespace torsio {
 
@@ -38,5 +40,19 @@ struct TrainedModel {
 /// channels are zeroed, UsageError for a wrong setting, Cancelled if `progress` asks to stop.
 [[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                                        std::uint64_t seed, const Progress& progress = {});
+
+/// What the models of one input set learn from: the dataset after the feature pipeline.
+struct LearningData {
+  TrainingData training;
+  std::optional<TrainingData> validation;  ///< if any record has that role
+};
+/// @throws Error as `training_data`, or if the target never changes.
+[[nodiscard]] LearningData learning_data(const Dataset& dataset, const FeatureSpec& features);
+
+/// `train_model` for several models that share their inputs.
+/// @param data `learning_data(dataset, choice.features)`.
+[[nodiscard]] TrainedModel train_model(const Dataset& dataset, const LearningData& data,
+                                       const ModelChoice& choice, std::uint64_t seed,
+                                       const Progress& progress = {});
 
 }  // namespace torsio

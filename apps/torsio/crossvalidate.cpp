@@ -1,0 +1,100 @@
+#include <algorithm>
+#include <utility>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "report_text.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/report/cross_validation.hpp"
+#include "torsio/train/comparison.hpp"
+#include "torsio/train/families.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct CrossValidateFlags {
+  DataFlags data;
+  std::string models = "all";
+  std::vector<std::string> settings;
+  std::size_t folds = torsio::FoldScheme{}.folds;
+  std::string by;
+  std::string embargo = "1s";
+  std::uint64_t seed = kDefaultSeed;
+  bool allow_leak = false;
+  JsonOutput json;
+};
+
+std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
+                                            const torsio::Dataset& dataset) {
+  auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
+  const auto settings = parse_settings(flags.settings);
+  if (settings.empty()) return choices;
+  if (flags.models == "all")
+    throw torsio::UsageError({.place = "--set",
+                              .expected = "models that have the setting, named with --models",
+                              .found = "--models all"});
+  for (torsio::ModelChoice& choice : choices) {
+    for (const auto& [option, value] : settings) choice.options[option] = value;
+    // Refuses what the family does not know before any work is done.
+    (void)torsio::Options(torsio::find_family(choice.family).options, choice.options);
+  }
+  return choices;
+}
+
+void run(const CrossValidateFlags& flags) {
+  flags.data.check_output(flags.json.destination);
+  const torsio::FoldScheme scheme{.folds = flags.folds,
+                                  .embargo_s = torsio::si_quantity(flags.embargo, "s", "--embargo"),
+                                  .by = flags.by};
+  ProgressBar bar;
+  torsio::Dataset dataset = flags.data.load({}, {}, bar.listener());
+  const auto choices = choices_of(flags, dataset);
+  const torsio::CrossValidation validation = torsio::cross_validate(
+      std::move(dataset), choices, scheme, flags.seed, flags.allow_leak, bar.listener());
+  flags.json.write(torsio::cross_validation_json(validation));
+  if (std::ranges::none_of(validation.ranking,
+                           [](const torsio::FoldSummary& summary) { return summary.folds > 0; }))
+    throw torsio::Error({.problem = first_failure(validation.results)});
+  if (flags.json.wants_tables()) print(cross_validation_text(validation));
+}
+
+}  // namespace
+
+void add_crossvalidate(CLI::App& app) {
+  auto flags = std::make_shared<CrossValidateFlags>();
+  CLI::App* verb = app.add_subcommand(
+      "crossvalidate", "rank models by training them several times, each time holding out a part");
+  verb->footer(
+      "Example: torsio crossvalidate sweep*.csv --folds 5 --models linear,dgmm\n"
+      "         torsio crossvalidate bench.yaml --by support_m --models dgmm --set components=100\n"
+      "Whole recordings are dealt to the folds; with fewer recordings than folds, each recording "
+      "is\n"
+      "cut into contiguous blocks. Of a manifest only what has the role train is dealt. Cost: one\n"
+      "compare for each fold.");
+  flags->data.add_recordings(*verb, "recordings, or a manifest with roles");
+  flags->data.add_mapping(*verb);
+  flags->data.add_target_and_inputs(*verb);
+  verb->add_option("--models", flags->models,
+                   "all, or families with settings: linear,polynomial:degree=7:branch=true")
+      ->capture_default_str();
+  verb->add_option("--set", flags->settings, "a setting of every model named, option=value")
+      ->allow_extra_args(false);
+  CLI::Option* folds =
+      verb->add_option("--folds", flags->folds, "number of folds")->capture_default_str();
+  verb->add_option("--by", flags->by,
+                   "record: hold out one recording at a time; a condition (support_m): all "
+                   "recordings of one value at a time")
+      ->excludes(folds);
+  verb->add_option("--embargo", flags->embargo,
+                   "time between a held-out block and what is learned from; whole recordings need "
+                   "none")
+      ->capture_default_str();
+  verb->add_option("--seed", flags->seed, "seed of everything random")->capture_default_str();
+  verb->add_flag("--allow-leak", flags->allow_leak,
+                 "accept an input that the target was computed from; rows say so");
+  verb->add_option("--json", flags->json.destination,
+                   "write the results as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "torsio/train/cross_validation.hpp"
+
+namespace torsio {
+
+/// The document of `results_json` with each row's `fold`, and `folds` (what each holds out) and
+/// `summary` (mean and standard deviation over the folds, best model first) beside `results`; ends
+/// with a line feed.
+[[nodiscard]] std::string cross_validation_json(const CrossValidation& validation);
+
+/// One line a model, best first, with its mean +- standard deviation over the folds; then what each
+/// fold holds out.
+[[nodiscard]] std::string cross_validation_table(const CrossValidation& validation);
+
+}  // namespace torsio

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+#include "torsio/train/results.hpp"
+
+// What the tables and documents of scores are made of.
+namespace torsio {
+
+/// A number that is not finite is null.
+[[nodiscard]] nlohmann::ordered_json json_number(double value);
+[[nodiscard]] nlohmann::ordered_json text_or_null(const std::string& text);
+/// `results_json` before it becomes text.
+[[nodiscard]] nlohmann::ordered_json results_document(const Results& results);
+
+/// "polynomial[branch=false]"
+[[nodiscard]] std::string model_label(std::string_view family, std::string_view variant);
+/// Three decimals, until they would fill the line.
+[[nodiscard]] std::string error_text(double value);
+[[nodiscard]] std::string seconds_text(double seconds);
+
+}  // namespace torsio
