@@ -42,6 +42,9 @@ constexpr std::array kBenches{
     Bench{"gru64_step", gru64_step, Peer{"libtorch", write_gru64}},
     Bench{"mlp_step", mlp_step, Peer{"libtorch", write_mlp}},
     Bench{"lstm250_x12_step", lstm250_x12_step, Peer{"libtorch", write_lstm250}},
+    Bench{"lstm250_train_batch", lstm250_train_batch, Peer{"PyTorch"}},
+    Bench{"lstm250_train_2threads", lstm250_train_2threads},
+    Bench{"mlp_epoch", mlp_epoch, Peer{"scikit-learn"}},
 };
 
 struct Arguments {
@@ -106,7 +109,7 @@ void print(const Json& row) {
   const auto number = [&](const char* key) {
     return row[key].is_null() ? std::string("-") : fmt::format("{:.5g}", row[key].get<double>());
   };
-  fmt::print("{:<18} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", row["name"].get<std::string>(),
+  fmt::print("{:<22} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", row["name"].get<std::string>(),
              number("value"), row["unit"].get<std::string>(), number("floor"), number("x_floor"),
              number("peer_value"), number("x_peer"),
              row["peer"].is_null() ? "-" : row["peer"].get<std::string>());
@@ -119,7 +122,7 @@ int run(const Arguments& arguments) {
     file.open(arguments.json);
     if (!file) throw std::invalid_argument(arguments.json + ": cannot be written");
   }
-  fmt::print("{:<18} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", "row", "value", "unit", "floor",
+  fmt::print("{:<22} {:>10} {:<8} {:>10} {:>8} {:>11} {:>7}  {}\n", "row", "value", "unit", "floor",
              "x_floor", "peer value", "x_peer", "peer");
   Json rows = Json::array();
   for (const Bench& bench : kBenches) {

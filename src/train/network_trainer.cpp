@@ -197,6 +197,7 @@ class Training {
         validation_(validation),
         context_(context),
         state_(std::move(state)),
+        last_loss_(state_.best_loss),
         batches_((training.starts.size() + settings.batch - 1) / settings.batch) {}
 
   TrainedNetwork run() {
@@ -243,11 +244,9 @@ class Training {
 
   bool run_epoch() {
     const std::vector<std::size_t> windows = order();
-    const std::string doing =
-        state_.epoch == 0
-            ? fmt::format("epoch 1 of {}", settings_.epochs)
-            : fmt::format("epoch {} of {}, loss {:.4g}, best {:.4g}", state_.epoch + 1,
-                          settings_.epochs, state_.last_loss, state_.best_loss);
+    std::string doing = fmt::format("epoch {} of {}", state_.epoch + 1, settings_.epochs);
+    if (state_.best_epoch > 0)
+      doing += fmt::format(", loss {:.4g}, best {:.4g}", last_loss_, state_.best_loss);
     for (; state_.batch < batches_; ++state_.batch) {
       report(doing);
       const std::size_t begin = state_.batch * settings_.batch;
@@ -268,8 +267,8 @@ class Training {
     ++state_.epoch;
     state_.batch = 0;
     state_.epoch_loss = 0.0;
-    state_.last_loss = loss;
-    if (loss < state_.best_loss) {  // false for NaN
+    last_loss_ = loss;
+    if (std::isfinite(loss) && (state_.best_epoch == 0 || loss < state_.best_loss)) {
       state_.best_loss = loss;
       state_.best_epoch = state_.epoch;
       state_.best = state_.weights;
@@ -282,6 +281,7 @@ class Training {
   const WindowSet& validation_;
   const FitContext& context_;
   TrainingCheckpoint state_;
+  double last_loss_;  ///< after the last whole epoch
   std::size_t batches_;
 };
 

@@ -161,6 +161,13 @@ TrainingCheckpoint stopped_at(std::size_t calls, const Fit& fit) {
   return kept;
 }
 
+/// Of a single record whose last fifth is held out behind an embargo of a hundredth.
+std::size_t batches_an_epoch(const TrainingData& data, std::size_t batch) {
+  const std::size_t samples = data.sequences.front().target.size();
+  const std::size_t learned = samples - samples / 5 - samples / 100;
+  return (learned + batch - 1) / batch;
+}
+
 TEST(FitNetwork, ResumedIsBitForBitWhatItWouldHaveBeen) {
   const TrainingData data = delayed_sines(4, 500, 3);
   for (const Optimiser optimiser : {Optimiser::adam, Optimiser::adamw}) {
@@ -272,6 +279,17 @@ TEST(FitNetwork, AnExplodingLossKeepsTheBestOrSaysSo) {
   options.training = {.epochs = 30, .learning_rate = 1e30, .clip = 0.0, .patience = 0};
   EXPECT_THAT(test::error_message([&] { (void)fit_mlp(data, options); }),
               HasSubstr("no longer finite in epoch 1"));
+
+  // Later, there is a best: weights so large that the next step overflows.
+  options.training = {.epochs = 30, .learning_rate = 1e-3, .patience = 0};
+  const auto mlp = [&](const FitContext& context) { return fit_mlp(data, options, context); };
+  const std::size_t after_two_epochs = 2 + 2 * batches_an_epoch(data, options.training.batch);
+  TrainingCheckpoint kept = stopped_at(after_two_epochs, mlp);
+  ASSERT_EQ(kept.epoch, 2U);
+  kept.weights.assign(kept.weights.size(), 1e30F);
+  const Fitted<Mlp> fitted = mlp({.seed = 6, .resume = &kept});
+  EXPECT_THAT(fitted.notes, testing::Contains(HasSubstr("no longer finite in epoch 3")));
+  EXPECT_LT(free_run_rmse(Mlp(fitted.parameters), data, 0), spread(data));
 }
 
 TEST(FitNetwork, SequenceToOneLearnsFromTheLastSampleOfAWindow) {

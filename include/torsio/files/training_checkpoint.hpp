@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <limits>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -16,8 +16,7 @@ struct TrainingCheckpoint {
   std::size_t updates = 0;     ///< of the weights, in all
   double epoch_loss = 0.0;     ///< sum over the batches of the epoch begun
   std::size_t best_epoch = 0;  ///< counted from 1; 0: no epoch has ended yet
-  double best_loss = std::numeric_limits<double>::infinity();
-  double last_loss = std::numeric_limits<double>::infinity();  ///< after the last whole epoch
+  double best_loss = 0.0;
   std::vector<float> weights;
   std::vector<float> mean;    ///< the optimiser's, of the gradient
   std::vector<float> square;  ///< the optimiser's, of the gradient's square
@@ -31,7 +30,6 @@ struct TrainingCheckpoint {
     visit("epoch_loss", self.epoch_loss);
     visit("best_epoch", self.best_epoch);
     visit("best_loss", self.best_loss);
-    visit("last_loss", self.last_loss);
     visit("weights", self.weights);
     visit("mean", self.mean);
     visit("square", self.square);
@@ -39,5 +37,13 @@ struct TrainingCheckpoint {
   }
   bool operator==(const TrainingCheckpoint&) const = default;
 };
+
+/// Writes a checkpoint whole or not at all, as safetensors with the recipe for metadata.
+void save_checkpoint(const std::filesystem::path& path, const TrainingCheckpoint& checkpoint);
+
+/// Reads one from an untrusted file.
+/// @throws Error naming the tensor: not a checkpoint, a tensor missing, unknown, of the wrong type or
+/// shape, or not finite.
+[[nodiscard]] TrainingCheckpoint load_checkpoint(const std::filesystem::path& path);
 
 }  // namespace torsio
