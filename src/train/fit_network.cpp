@@ -167,10 +167,14 @@ std::vector<std::string> notes_of(const Material& material, const TrainedNetwork
                               trained.best_epoch, trained.epochs, rmse, data.target,
                               is_validated ? material.decided_by : "the training windows"));
   if (!trained.end.empty()) notes.push_back(fmt::format("training ended: {}", trained.end));
+  if (trained.best_loss >= 1.0)
+    notes.emplace_back(
+        "the network is no better than a constant: try a smaller learning_rate, more epochs or "
+        "other inputs");
   if (trained.end.empty() && trained.best_epoch == epochs)
-    notes.push_back("the last epoch was the best: more epochs may do better");
+    notes.emplace_back("the last epoch was the best: more epochs may do better");
   if (!is_validated)
-    notes.push_back("too little data to hold any out: nothing guarded against overfitting");
+    notes.emplace_back("too little data to hold any out: nothing guarded against overfitting");
   return notes;
 }
 

@@ -14,7 +14,9 @@ namespace {
 
 using Kind = OptionInfo::Kind;
 
-constexpr OptionInfo kLearningRate{"learning_rate", Kind::number, "0.001", 1e-12, 1e3, "of Adam"};
+constexpr OptionInfo learning_rate(std::string_view default_value) {
+  return {"learning_rate", Kind::number, default_value, 1e-12, 1e3, "of Adam"};
+}
 constexpr OptionInfo kOptimiser{"optimiser", Kind::text, "adam", 0, 0, "adam or adamw"};
 constexpr OptionInfo kWeightDecay{
     "weight_decay",
@@ -41,7 +43,7 @@ constexpr std::array kMlpOptions{
                "linear, relu, tanh, softsign or elu, of the hidden layers"},
     OptionInfo{"epochs", Kind::integer, "30", 1, 1e6, "at most"},
     OptionInfo{"batch", Kind::integer, "256", 1, 1e6, "samples an update"},
-    kLearningRate,
+    learning_rate("0.001"),
     kSchedule,
     kOptimiser,
     kWeightDecay,
@@ -62,7 +64,7 @@ constexpr std::array kRecurrentOptions{
                "sequence: every output behind the burn-in is judged; last: only the window's last"},
     OptionInfo{"epochs", Kind::integer, "30", 1, 1e6, "at most"},
     OptionInfo{"batch", Kind::integer, "64", 1, 1e6, "windows an update"},
-    kLearningRate,
+    learning_rate("0.003"),
     kSchedule,
     kOptimiser,
     kWeightDecay,

@@ -23,6 +23,9 @@ namespace {
 constexpr std::size_t kChunkWithState = 16;
 constexpr std::size_t kChunkStatic = 256;
 
+// The target is standardised: a constant has a loss of 1.
+constexpr double kExplodedLoss = 1e6;
+
 constexpr double kBeta1 = 0.9;
 constexpr double kBeta2 = 0.999;
 
@@ -204,7 +207,7 @@ class Training {
     std::string end;
     while (state_.epoch < settings_.epochs && end.empty()) {
       if (!run_epoch()) {
-        end = fmt::format("the loss was no longer finite in epoch {}", state_.epoch + 1);
+        end = fmt::format("the loss exploded in epoch {}", state_.epoch + 1);
       } else {
         end_epoch();
         if (settings_.patience > 0 && state_.epoch - state_.best_epoch >= settings_.patience &&
@@ -213,7 +216,7 @@ class Training {
       }
     }
     if (state_.best_epoch == 0)
-      throw Error({.problem = end.empty() ? "no loss was finite" : end,
+      throw Error({.problem = end.empty() ? "no epoch had a finite loss" : end,
                    .advice = "Try a smaller learning_rate, a smaller clip, or look for outliers "
                              "with torsio check."});
     return {.weights = std::move(state_.best),
@@ -254,7 +257,7 @@ class Training {
       const double rate = learning_rate_at(settings_, state_.updates, settings_.epochs * batches_);
       const double loss =
           trainer_.update(state_, training_, std::span(windows).subspan(begin, size), rate);
-      if (!std::isfinite(loss)) return false;
+      if (!(loss < kExplodedLoss)) return false;  // or not a number
       state_.epoch_loss += loss;
     }
     return true;
@@ -268,7 +271,7 @@ class Training {
     state_.batch = 0;
     state_.epoch_loss = 0.0;
     last_loss_ = loss;
-    if (std::isfinite(loss) && (state_.best_epoch == 0 || loss < state_.best_loss)) {
+    if (loss < (state_.best_epoch == 0 ? kExplodedLoss : state_.best_loss)) {  // false for NaN
       state_.best_loss = loss;
       state_.best_epoch = state_.epoch;
       state_.best = state_.weights;

@@ -38,7 +38,7 @@ class CheckpointFile : public testing::Test {
     return parse_safetensors(read_whole_file(path_, 1 << 20), "checkpoint");
   }
 
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
   std::string path_ = folder_.path("joint.checkpoint");
 };
 

@@ -54,7 +54,7 @@ struct RecurrentOptions {
   std::vector<std::size_t> head = {};  ///< dense layers before the output
   Activation head_activation = Activation::relu;
   TrainingWindows windows = {};
-  NetworkTraining training = {};
+  NetworkTraining training = {.learning_rate = 3e-3};
 };
 
 /// Trains a network on standardised inputs and target by mean square error and backpropagation
@@ -68,8 +68,8 @@ struct RecurrentOptions {
 /// forget bias 1. Windows lie within one record and hold no input that is not finite.
 ///
 /// Source: papers 001 and 004, SPEC 3.2 and 3.4. Deterministic for a seed, whatever the number of
-/// threads. A loss that is no longer finite ends the training; the best weights so far are kept
-/// and a note says so.
+/// threads. A loss that explodes (a million times that of a constant, or not finite) ends the training; the
+/// best weights so far are kept and a note says so.
 /// @throws Error if no stretch of the records is as long as a window, the target is constant or not
 /// finite in a sample to learn from, the network is larger than a model file or the memory, or the
 /// loss explodes in the first epoch; UsageError if an option is out of range or `context.resume` is
