@@ -2,6 +2,7 @@
 
 #include "rows.hpp"
 #include "torsio/sim/experiment.hpp"
+#include "torsio/sim/plant.hpp"
 
 namespace torsio::bench {
 
