@@ -1,6 +1,7 @@
 #include "train/float_gemm.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 // Highway compiles this file once for each instruction set; the order of its headers matters.
 // clang-format off
@@ -145,7 +146,7 @@ void pack_columns(const float* values, std::size_t stride, std::size_t rows, std
     const float* from = values + j;
     if (width == kWidth) {
       for (std::size_t k = 0; k < rows; ++k, to += kWidth, from += stride)
-        std::copy_n(from, kWidth, to);
+        std::memcpy(to, from, kWidth * sizeof(float));  // of known size: no call
       continue;
     }
     for (std::size_t k = 0; k < rows; ++k, to += kWidth, from += stride)
