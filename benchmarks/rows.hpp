@@ -29,6 +29,9 @@ Row lstm32_step();
 Row gru64_step();
 Row mlp_step();
 Row lstm250_x12_step();
+Row lstm250_train_batch();
+Row lstm250_train_2threads();
+Row mlp_epoch();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.

@@ -52,7 +52,8 @@ void add_compare(CLI::App& app) {
   verb->add_option("--test", flags->test, "held-out recordings: they rank the models");
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
   verb->add_option("--models", flags->models,
-                   "all, or families with settings: linear,polynomial:degree=7:branch=true")
+                   "all (but lstm and gru), or families with settings: "
+                   "linear,polynomial:degree=7:branch=true")
       ->capture_default_str();
   verb->add_option("-o,--output", flags->output, "write the best model to this file");
   verb->add_option("--report", flags->report, "write the tables as a page for a browser");

@@ -1,11 +1,15 @@
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <utility>
+
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/files/training_checkpoint.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/train/comparison.hpp"
 #include "torsio/train/families.hpp"
@@ -24,7 +28,11 @@ struct FitFlags {
   std::uint64_t seed = kDefaultSeed;
   bool allow_leak = false;
   bool list = false;
+  bool resume = false;
   JsonOutput json;
+
+  /// Where a fit that was stopped leaves how far it was.
+  [[nodiscard]] std::string checkpoint() const { return output + ".checkpoint"; }
 };
 
 std::string family_list() {
@@ -42,6 +50,30 @@ std::string family_list() {
   return text;
 }
 
+/// `train_model` from the start or from the checkpoint; stopped, it leaves a checkpoint.
+torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset,
+                           const torsio::ModelChoice& choice, torsio::Progress progress) {
+  torsio::TrainingCheckpoint start;
+  torsio::FitContext context{.seed = flags.seed, .progress = std::move(progress)};
+  if (flags.resume) {
+    start = torsio::load_checkpoint(flags.checkpoint());
+    context.resume = &start;
+  }
+  bool is_kept = false;
+  context.keep = [&](const torsio::TrainingCheckpoint& reached) {
+    torsio::save_checkpoint(flags.checkpoint(), reached);
+    is_kept = true;
+  };
+  try {
+    return torsio::train_model(dataset, choice, context);
+  } catch (const torsio::Cancelled&) {
+    if (!is_kept) throw;
+    throw torsio::Error(
+        {.problem = "stopped on request; the best so far is kept in " + flags.checkpoint(),
+         .advice = "The same call with --resume goes on from there."});
+  }
+}
+
 void run(const FitFlags& flags) {
   if (flags.list) return print(family_list());
   if (flags.data.recordings.empty() || flags.family.empty() || flags.output.empty())
@@ -55,13 +87,14 @@ void run(const FitFlags& flags) {
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   (void)torsio::refuse_leak(dataset, features, flags.allow_leak);
   const torsio::ModelChoice choice{flags.family, parse_settings(flags.settings), "", features};
-  torsio::TrainedModel trained = torsio::train_model(dataset, choice, flags.seed, bar.listener());
+  torsio::TrainedModel trained = train(flags, dataset, choice, bar.listener());
   trained.file.card.device_serial = flags.device_serial;
   const torsio::Results results = torsio::evaluate_model(trained.file, dataset, bar.listener());
   torsio::note_held_out_scores(trained.file.card, results.rows);
   if (flags.json.wants_tables()) print(evaluation_text(results));
   flags.json.write(torsio::results_json(results));
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
+  if (flags.resume) std::filesystem::remove(flags.checkpoint());
   for (const std::string& note : trained.notes) remark("note: " + note);
   remark(fmt::format("{} written in {:.2f} s of fitting", flags.output, trained.fit_seconds));
 }
@@ -86,6 +119,8 @@ void add_fit(CLI::App& app) {
   add_seed(*verb, flags->seed, "seed of everything random");
   verb->add_flag("--allow-leak", flags->allow_leak,
                  "accept an input that the target was computed from; rows say so");
+  verb->add_flag("--resume", flags->resume,
+                 "go on from <output>.checkpoint, which a network's stopped fit leaves");
   verb->add_flag("--list", flags->list, "show the families and their settings");
   verb->add_option("--json", flags->json.destination,
                    "write the scores as JSON to a file, or - for standard output");

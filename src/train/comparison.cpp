@@ -81,6 +81,7 @@ std::vector<FamilyChoice> all_choices(const Dataset& dataset,
   const std::string condition = schedulable_condition(dataset, inputs);
   std::vector<FamilyChoice> choices;
   for (const FamilyInfo& family : families()) {
+    if (family.only_if_named) continue;
     const std::string family_name(family.name);
     choices.push_back({family_name, {}});
     if (is_on_by_default(family, "branch")) choices.push_back({family_name, {{"branch", "false"}}});

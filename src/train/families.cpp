@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <utility>
+#include <vector>
 
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/train/fit_dgmm.hpp"
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
+#include "train/network_families.hpp"
 
 namespace torsio {
 namespace {
@@ -69,24 +71,23 @@ FittedModel fitted_model(Fitted<Family> fitted) {
   return {Family(fitted.parameters), std::move(fitted.notes)};
 }
 
-FittedModel linear(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
-                   const Progress& progress) {
-  report_progress(progress, 0.0, "fitting linear");
+FittedModel linear(const TrainingData& data, const Options& options, const FitContext& context) {
+  report_progress(context.progress, 0.0, "fitting linear");
   return fitted_model(
       fit_linear(data, {.rates = options.boolean("rates"), .schedule = options.text("schedule")}));
 }
 
-FittedModel linear_coulomb(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
-                           const Progress& progress) {
-  report_progress(progress, 0.0, "fitting linear_coulomb");
+FittedModel linear_coulomb(const TrainingData& data, const Options& options,
+                           const FitContext& context) {
+  report_progress(context.progress, 0.0, "fitting linear_coulomb");
   return fitted_model(fit_linear_coulomb(data, {.rates = options.boolean("rates"),
                                                 .schedule = options.text("schedule"),
                                                 .rate_scale = options.number("rate_scale")}));
 }
 
-FittedModel polynomial(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
-                       const Progress& progress) {
-  report_progress(progress, 0.0, "fitting polynomial");
+FittedModel polynomial(const TrainingData& data, const Options& options,
+                       const FitContext& context) {
+  report_progress(context.progress, 0.0, "fitting polynomial");
   return fitted_model(fit_polynomial(data, {.degree = options.integer("degree"),
                                             .branch = options.boolean("branch"),
                                             .dead_band = options.number("dead_band"),
@@ -94,8 +95,7 @@ FittedModel polynomial(const TrainingData& data, const Options& options, std::ui
                                             .schedule = options.text("schedule")}));
 }
 
-FittedModel dgmm(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
-                 const Progress& progress) {
+FittedModel dgmm(const TrainingData& data, const Options& options, const FitContext& context) {
   return fitted_model(
       fit_dgmm(data,
                {.online = {.components = options.integer("components"),
@@ -108,19 +108,19 @@ FittedModel dgmm(const TrainingData& data, const Options& options, std::uint64_t
                 .em_iterations = options.integer("em_iterations"),
                 .clamp = options.number("clamp"),
                 .background_weight = options.number("background_weight")},
-               progress));
+               context.progress));
 }
 
-FittedModel dgmm_paper(const TrainingData& data, const Options& options, std::uint64_t /*seed*/,
-                       const Progress& progress) {
+FittedModel dgmm_paper(const TrainingData& data, const Options& options,
+                       const FitContext& context) {
   return fitted_model(fit_dgmm_paper(data,
                                      {.components = options.integer("components"),
                                       .learning_rate = options.number("learning_rate"),
                                       .spread = options.number("spread")},
-                                     progress));
+                                     context.progress));
 }
 
-constexpr std::array kFamilies{
+constexpr std::array kShallowFamilies{
     FamilyInfo{Linear::kFamily, "spring with a bias: b + sum k x", kLinearOptions, linear},
     FamilyInfo{LinearCoulomb::kFamily, "spring with a bias and friction: b + sum k x + c tanh(r/v)",
                kLinearCoulombOptions, linear_coulomb},
@@ -135,14 +135,23 @@ constexpr std::array kFamilies{
 
 }  // namespace
 
-std::span<const FamilyInfo> families() noexcept { return kFamilies; }
+std::span<const FamilyInfo> families() noexcept {
+  static const std::vector<FamilyInfo> all = [] {
+    std::vector<FamilyInfo> list(kShallowFamilies.begin(), kShallowFamilies.end());
+    const auto networks = network_families();
+    list.insert(list.end(), networks.begin(), networks.end());
+    return list;
+  }();
+  return all;
+}
 
 const FamilyInfo& find_family(std::string_view name) {
-  const auto* const family = std::ranges::find(kFamilies, name, &FamilyInfo::name);
-  if (family != kFamilies.end()) return *family;
+  const auto all = families();
+  const auto family = std::ranges::find(all, name, &FamilyInfo::name);
+  if (family != all.end()) return *family;
   std::vector<std::string> names;
-  names.reserve(kFamilies.size());
-  for (const FamilyInfo& each : kFamilies) names.emplace_back(each.name);
+  names.reserve(all.size());
+  for (const FamilyInfo& each : all) names.emplace_back(each.name);
   throw UsageError({.problem = "no model family is called \"" + std::string(name) + '"',
                     .expected = "one of " + joined(names),
                     .advice = did_you_mean(name, names)});

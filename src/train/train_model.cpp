@@ -89,14 +89,17 @@ LearningData learning_data(const Dataset& dataset, const FeatureSpec& features) 
   return data;
 }
 
-TrainedModel train_model(const Dataset& dataset, const LearningData& data,
-                         const ModelChoice& choice, std::uint64_t seed, const Progress& progress) {
+namespace {
+
+TrainedModel train(const Dataset& dataset, const LearningData& data, const ModelChoice& choice,
+                   FitContext context) {
   const FamilyInfo& family = find_family(choice.family);
   const Options options(family.options, choice.options);
-  ModelCard card = card_for(dataset, choice, options, seed);
+  ModelCard card = card_for(dataset, choice, options, context.seed);
+  if (context.validation == nullptr && data.validation) context.validation = &*data.validation;
 
   const auto start = std::chrono::steady_clock::now();
-  FittedModel fitted = family.fit(data.training, options, seed, progress);
+  FittedModel fitted = family.fit(data.training, options, context);
   const std::chrono::duration<double> fit_time = std::chrono::steady_clock::now() - start;
 
   TrainedModel trained{
@@ -113,12 +116,30 @@ TrainedModel train_model(const Dataset& dataset, const LearningData& data,
   return trained;
 }
 
+}  // namespace
+
+TrainedModel train_model(const Dataset& dataset, const LearningData& data,
+                         const ModelChoice& choice, std::uint64_t seed, const Progress& progress) {
+  return train(dataset, data, choice, {.seed = seed, .progress = progress});
+}
+
 TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std::uint64_t seed,
                          const Progress& progress) {
+  return train_model(dataset, choice, {.seed = seed, .progress = progress});
+}
+
+TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
+                         const FitContext& context) {
   // A wrong setting or records that disagree are told before the data are run through the filters.
-  (void)Options(find_family(choice.family).options, choice.options);
+  const FamilyInfo& family = find_family(choice.family);
+  (void)Options(family.options, choice.options);
   (void)training_zeros(dataset);
-  return train_model(dataset, learning_data(dataset, choice.features), choice, seed, progress);
+  if (context.resume != nullptr && !family.can_resume)
+    throw UsageError(
+        {.place = "--resume",
+         .problem = choice.family + " is fitted within seconds and keeps no checkpoint",
+         .advice = "Leave --resume away."});
+  return train(dataset, learning_data(dataset, choice.features), choice, context);
 }
 
 }  // namespace torsio

@@ -64,7 +64,7 @@ class FitLaws : public testing::TestWithParam<FitCase> {
  protected:
   FittedModel fit(const Progress& progress = {}) {
     const auto& [family, options] = GetParam();
-    return family->fit(data_, Options(family->options, options), 5, progress);
+    return family->fit(data_, Options(family->options, options), {.seed = 5, .progress = progress});
   }
 
   TrainingData data_ = two_springs();

@@ -212,5 +212,29 @@ TEST_F(MainJob, ListsAndDescribes) {
     EXPECT_NE(torsio(std::string(verb) + " --help").out.find("Example"), std::string::npos) << verb;
 }
 
+TEST_F(MainJob, AStoppedFitOfANetworkGoesOnWhereItWas) {
+  record();
+  const std::string fit =
+      "fit a.csv --model lstm --set layers=8 --set stride=10 --set epochs=4 --set batch=16";
+  ASSERT_EQ(torsio(fit + " -o whole.safetensors").exit_code, 0);
+  // Stopped at once, after a while, and after a longer while: wherever that is.
+  const std::string stop = "timeout --preserve-status -s INT ";
+  Outcome stopped;
+  for (const char* seconds : {"0.3", "0.6", "1.2", "2.4"}) {
+    stopped = shell(stop + seconds + " {torsio} " + fit + " -o part.safetensors");
+    if (stopped.exit_code != 0 && !contents("part.safetensors.checkpoint").empty()) break;
+  }
+  if (stopped.exit_code == 0) GTEST_SKIP() << "the fit was over before it could be stopped";
+  EXPECT_NE(stopped.err.find("part.safetensors.checkpoint"), std::string::npos) << stopped.err;
+  EXPECT_TRUE(contents("part.safetensors").empty());
+
+  EXPECT_EQ(torsio(fit + " --seed 9 --resume -o part.safetensors").exit_code, 2);
+  EXPECT_EQ(torsio("fit a.csv --model linear --resume -o part.safetensors").exit_code, 2);
+  const Outcome resumed = torsio(fit + " --resume -o part.safetensors");
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(contents("part.safetensors"), contents("whole.safetensors"));
+  EXPECT_TRUE(contents("part.safetensors.checkpoint").empty());
+}
+
 }  // namespace
 }  // namespace torsio::test

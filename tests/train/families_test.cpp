@@ -30,7 +30,7 @@ TEST(Families, FindThemselvesAndFitModelsOfTheirName) {
     const FamilyInfo& found = find_family(family.name);
     EXPECT_EQ(&found, &family);
     const FittedModel fitted =
-        found.fit(test::noisy_spring(), Options(found.options, {}), 1, Progress{});
+        found.fit(test::noisy_spring(), Options(found.options, {}), {.seed = 1});
     // A second way to train a family carries its name in front: dgmm_paper fits a dgmm.
     EXPECT_TRUE(family.name.starts_with(fitted.model.family())) << family.name;
   }
@@ -50,12 +50,13 @@ TEST(Families, NameTheNearestWhenOneIsUnknown) {
 TEST(Families, PassTheirOptionsOn) {
   const TrainingData data = test::noisy_spring();
   const FamilyInfo& coulomb = find_family("linear_coulomb");
-  const auto given = coulomb.fit(data, Options(coulomb.options, {{"rate_scale", "0.25"}}), 1, {});
+  const auto given =
+      coulomb.fit(data, Options(coulomb.options, {{"rate_scale", "0.25"}}), {.seed = 1});
   EXPECT_EQ(given.model.get_if<LinearCoulomb>()->parameters().rate_scale, 0.25);
   const FamilyInfo& polynomial = find_family("polynomial");
   const auto cubic = polynomial.fit(
       data, Options(polynomial.options, {{"degree", "3"}, {"branch", "false"}, {"rates", "true"}}),
-      1, {});
+      {.seed = 1});
   EXPECT_EQ(cubic.model.parameter_count(), 5U);
 }
 

@@ -15,8 +15,8 @@ namespace torsio {
 
 /// Reads `--models`: `all`, or families separated by commas, each with settings behind colons
 /// (`linear,polynomial:degree=7:branch=true`). Each is paired with every input set. `all` is every
-/// family, `polynomial` also without branches, and, where a condition takes several values in
-/// training, the scheduled variants over it.
+/// family that is not `only_if_named`, `polynomial` also without branches, and, where a condition
+/// takes several values in training, the scheduled variants over it.
 /// @throws UsageError for a family or setting that does not exist.
 [[nodiscard]] std::vector<ModelChoice> model_choices(const Dataset& dataset,
                                                      std::string_view models,

@@ -1,13 +1,12 @@
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "torsio/core/progress.hpp"
 #include "torsio/model/any_model.hpp"
+#include "torsio/train/fit_context.hpp"
 #include "torsio/train/options.hpp"
 #include "torsio/train/training_data.hpp"
 
@@ -26,7 +25,9 @@ struct FamilyInfo {
   std::string_view summary;  ///< one line
   std::span<const OptionInfo> options;
   /// Deterministic for a seed. @throws Error if the data do not suffice, Cancelled.
-  FittedModel (*fit)(const TrainingData&, const Options&, std::uint64_t seed, const Progress&);
+  FittedModel (*fit)(const TrainingData&, const Options&, const FitContext&);
+  bool can_resume = false;     ///< uses `FitContext::resume` and `keep`
+  bool only_if_named = false;  ///< too slow for "all families"
 };
 
 /// Every family that can be trained, cheapest first.

@@ -10,6 +10,7 @@
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
+#include "torsio/train/fit_context.hpp"
 #include "torsio/train/training_data.hpp"
 
 namespace torsio {
@@ -54,5 +55,11 @@ struct LearningData {
 [[nodiscard]] TrainedModel train_model(const Dataset& dataset, const LearningData& data,
                                        const ModelChoice& choice, std::uint64_t seed,
                                        const Progress& progress = {});
+
+/// `train_model` of a fit that can be stopped and resumed. The validation records of the dataset are
+/// the context's, unless it has some.
+/// @throws UsageError also if there is something to resume and the family keeps no checkpoints.
+[[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
+                                       const FitContext& context);
 
 }  // namespace torsio

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace torsio {
+
+/// Where a long training stood when it was stopped: the next update is the one that would have come
+/// without the stop, to the last bit. Plain data.
+struct TrainingCheckpoint {
+  std::string recipe;  ///< data, settings and seed in words: another recipe cannot go on from here
+  std::size_t epoch = 0;       ///< whole epochs done
+  std::size_t batch = 0;       ///< batches of the next epoch done
+  std::size_t updates = 0;     ///< of the weights, in all
+  double epoch_loss = 0.0;     ///< sum over the batches of the epoch begun
+  std::size_t best_epoch = 0;  ///< counted from 1; 0: no epoch has ended yet
+  double best_loss = 0.0;
+  std::vector<float> weights;
+  std::vector<float> mean;    ///< the optimiser's, of the gradient
+  std::vector<float> square;  ///< the optimiser's, of the gradient's square
+  std::vector<float> best;    ///< weights of the best epoch
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("epoch", self.epoch);
+    visit("batch", self.batch);
+    visit("updates", self.updates);
+    visit("epoch_loss", self.epoch_loss);
+    visit("best_epoch", self.best_epoch);
+    visit("best_loss", self.best_loss);
+    visit("weights", self.weights);
+    visit("mean", self.mean);
+    visit("square", self.square);
+    visit("best", self.best);
+  }
+  bool operator==(const TrainingCheckpoint&) const = default;
+};
+
+/// Writes a checkpoint whole or not at all, as safetensors with the recipe for metadata.
+void save_checkpoint(const std::filesystem::path& path, const TrainingCheckpoint& checkpoint);
+
+/// Reads one from an untrusted file.
+/// @throws Error naming the tensor: not a checkpoint, a tensor missing, unknown, of the wrong type or
+/// shape, or not finite.
+[[nodiscard]] TrainingCheckpoint load_checkpoint(const std::filesystem::path& path);
+
+}  // namespace torsio

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/files/training_checkpoint.hpp"
+#include "torsio/train/training_data.hpp"
+
+namespace torsio {
+
+/// What surrounds a fit besides its data and options. Fits that end within seconds need only the
+/// first two.
+struct FitContext {
+  std::uint64_t seed = 0;
+  Progress progress = {};
+  /// Decides when to stop; null: a fitter that needs such records holds out some of its own.
+  const TrainingData* validation = nullptr;
+  /// Go on from here; null: from the start.
+  const TrainingCheckpoint* resume = nullptr;
+  /// Called before `Cancelled` is thrown, by fitters that can go on later.
+  std::function<void(const TrainingCheckpoint&)> keep = {};
+};
+
+}  // namespace torsio
