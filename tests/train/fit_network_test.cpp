@@ -249,9 +249,9 @@ TEST(FitNetwork, RefusesANetworkThatFitsNoFileOrMemory) {
                 (void)fit_mlp(data, {.layers = {60000, 60000}});
               }),
               HasSubstr("MiB"));
-  // Every 16 windows of a batch have a gradient of their own: here 80 GB of them.
+  // Every 16 windows of a batch have a gradient of their own: here more than a terabyte of them.
   RecurrentOptions options = small_memory();
-  options.layers = {1000};
+  options.layers = {3900};
   options.windows.stride = 1;
   options.training.batch = 1'000'000;
   EXPECT_THAT(test::error_message([&] { (void)fit_lstm(delayed_sines(3, 40'000, 2), options); }),
