@@ -136,7 +136,7 @@ HWY_EXPORT(add_packed_any);
 namespace {
 
 constexpr std::size_t kGroup = 8;
-constexpr std::size_t kRowsPerBlock = 256;
+constexpr std::size_t kRowsPerBlock = 192;
 
 // Columns in groups of `group`, [group][row][group]; missing columns are 0.
 template <std::size_t kWidth>
