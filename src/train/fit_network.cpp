@@ -1,13 +1,11 @@
 #include "torsio/train/fit_network.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <thread>
 #include <utility>
 
 #include "torsio/core/error.hpp"
@@ -59,29 +57,26 @@ void check(const TrainingWindows& windows) {
           fmt::format("{}", windows.burn_in));
 }
 
-/// A network that no model file may hold, or whose training no memory here does, is refused before
-/// any of that is taken.
-void check_size(const TrainingNetwork& network, const NetworkTraining& training,
-                std::size_t window) {
+void check_fits_a_file(const TrainingNetwork& network) {
   const std::size_t bytes = network.parameter_count() * sizeof(float);
-  if (bytes > kMostModelFileBytes)
-    throw UsageError(
-        {.place = "layers",
-         .expected = fmt::format("a network of at most {} MiB, as model files are",
-                                 kMostModelFileBytes >> 20),
-         .found = fmt::format("{} parameters, {} MiB", network.parameter_count(), bytes >> 20),
-         .advice = "Take fewer or smaller layers."});
-  const double threads = std::max(1U, std::thread::hardware_concurrency());
-  const double rows = static_cast<double>(std::min<std::size_t>(training.batch, 256));
-  const double need = threads * static_cast<double>(network.pass_bytes(window, 1)) * rows +
-                      8.0 * static_cast<double>(bytes) * std::max(1.0, rows / 16.0);
+  if (bytes <= kMostModelFileBytes) return;
+  throw UsageError(
+      {.place = "layers",
+       .expected = fmt::format("a network of at most {} MiB, as model files are",
+                               kMostModelFileBytes >> 20),
+       .found = fmt::format("{} parameters, {} MiB", network.parameter_count(), bytes >> 20),
+       .advice = "Take fewer or smaller layers."});
+}
+
+void check_fits_the_memory(const NetworkTrainer& trainer, const WindowSet& training) {
+  const double need = trainer.bytes(training.steps, training.starts.size());
   const double have =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-  if (need > have)
-    throw Error({.problem = "the training does not fit into this machine's memory",
-                 .expected = fmt::format("at most {:.1f} GB", have * 1e-9),
-                 .found = fmt::format("about {:.1f} GB", need * 1e-9),
-                 .advice = "Take fewer or smaller layers, shorter windows or smaller batches."});
+  if (need <= have) return;
+  throw Error({.problem = "the training does not fit into this machine's memory",
+               .expected = fmt::format("at most {:.1f} GB", have * 1e-9),
+               .found = fmt::format("about {:.1f} GB", need * 1e-9),
+               .advice = "Take fewer or smaller layers, shorter windows or smaller batches."});
 }
 
 /// A number that changes with the data.
@@ -188,12 +183,13 @@ std::pair<TrainedNetwork, Material> train(std::string_view family, const Trainin
                                           const PutInitial& put_initial) {
   check(training);
   check(windows);
-  check_size(network, training, windows.length);
+  check_fits_a_file(network);
   report_progress(context.progress, 0.0, fmt::format("fitting {}", family));
   Material material = prepare(data, windows, embargo, context);
+  NetworkTrainer trainer(network, training);
+  check_fits_the_memory(trainer, material.training);
   std::vector<float> weights(network.parameter_count(), 0.0F);
   put_initial(weights.data());
-  NetworkTrainer trainer(network, training);
   const std::string recipe =
       recipe_of(family, network, training, material.training, material.validation, context.seed);
   TrainedNetwork trained = train_network(trainer, training, material.training, material.validation,

@@ -38,12 +38,13 @@ HWY_INLINE void block(const Left& a, const float* HWY_RESTRICT b, std::size_t b_
   const hn::CappedTag<float, kPanel> d;
   using V = hn::Vec<decltype(d)>;
   const std::size_t lanes = hn::Lanes(d);
-  V sum[kBlockRows][kVectors];
+  // Registers: functions of std::array have no target attribute.
+  V sum[kBlockRows][kVectors];  // NOLINT(modernize-avoid-c-arrays)
   for (std::size_t i = 0; i < kBlockRows; ++i)
     for (std::size_t j = 0; j < kVectors; ++j)
       sum[i][j] = accumulate ? hn::LoadU(d, c + i * c_stride + j * lanes) : hn::Zero(d);
   for (std::size_t k = 0; k < depth; ++k) {
-    V right[kVectors];
+    V right[kVectors];  // NOLINT(modernize-avoid-c-arrays)
     for (std::size_t j = 0; j < kVectors; ++j)
       right[j] = hn::LoadU(d, b + j * b_vector_stride + k * kPanel);
     for (std::size_t i = 0; i < kBlockRows; ++i) {
@@ -135,7 +136,7 @@ HWY_EXPORT(add_packed_any);
 namespace {
 
 constexpr std::size_t kGroup = 8;
-constexpr std::size_t kRowsPerBlock = 256;
+constexpr std::size_t kRowsPerBlock = 192;
 
 // Columns in groups of `group`, [group][row][group]; missing columns are 0.
 template <std::size_t kWidth>

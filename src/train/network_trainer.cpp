@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <thread>
 #include <utility>
 
 #include "torsio/core/error.hpp"
@@ -88,6 +89,19 @@ NetworkTrainer::NetworkTrainer(TrainingNetwork network, const NetworkTraining& s
       chunk_rows_(std::ranges::any_of(network_.layers(), &TrainingLayer::has_state)
                       ? kChunkWithState
                       : kChunkStatic) {}
+
+double NetworkTrainer::bytes(std::size_t steps, std::size_t windows) const noexcept {
+  const std::size_t batch = std::min(settings_.batch, windows);
+  const std::size_t chunks = chunks_of(batch);
+  const std::size_t threads = settings_.threads == 0
+                                  ? std::max<std::size_t>(1, std::thread::hardware_concurrency())
+                                  : settings_.threads;
+  // A gradient of each chunk; weights, best weights, their packed copies and the optimiser's state.
+  const auto tables = static_cast<double>(chunks + 8);
+  const auto passes = static_cast<double>(std::min(threads, chunks));
+  return tables * static_cast<double>(network_.parameter_count() * sizeof(float)) +
+         passes * static_cast<double>(network_.pass_bytes(steps, std::min(batch, chunk_rows_)));
+}
 
 std::span<const std::size_t> NetworkTrainer::chunk(std::span<const std::size_t> windows,
                                                    std::size_t index) const noexcept {

@@ -22,6 +22,8 @@ class NetworkTrainer {
   NetworkTrainer(TrainingNetwork network, const NetworkTraining& settings);
 
   [[nodiscard]] const TrainingNetwork& network() const noexcept { return network_; }
+  /// Memory that updates with windows of so many steps take, of so many windows in all.
+  [[nodiscard]] double bytes(std::size_t steps, std::size_t windows) const noexcept;
 
   /// The mean square error of some windows, and its gradient into `gradient()`.
   double loss_and_gradient(const std::vector<float>& weights, const WindowSet& set,
