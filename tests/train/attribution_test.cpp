@@ -195,7 +195,7 @@ TEST(Attribute, TakesEveryFamily) {
   const TrainingData data = test::noisy_spring();
   for (const FamilyInfo& family : families()) {
     SCOPED_TRACE(family.name);
-    const AnyModel model = family.fit(data, Options(family.options, {}), 1, {}).model;
+    const AnyModel model = family.fit(data, Options(family.options, {}), {.seed = 1}).model;
     const Attribution attribution = attribute(model, data, {.windows = 20, .background = 10});
     EXPECT_LT(attribution.additivity_error, 1e-9);
     EXPECT_GT(attribution.inputs[0].share, 0.5) << "it is a spring";
