@@ -97,7 +97,7 @@ HWY_INLINE void step_tile(const PackedView& layer, const JointStates& joints, st
   const float* HWY_RESTRICT weights = layer.weights + block * block_size;
   const float* HWY_RESTRICT inputs = joints.inputs + joint * joints.input_stride;
   const float* HWY_RESTRICT hidden = joints.hidden + joint * joints.state_stride;
-  Vector sums[kBlocks][kJoints][kSums];
+  Vector sums[kBlocks][kJoints][kSums];  // NOLINT(modernize-avoid-c-arrays): registers
   for (std::size_t b = 0; b < kBlocks; ++b)
     for (std::size_t j = 0; j < kJoints; ++j)
       for (std::size_t row = 0; row < kSums; ++row)
@@ -163,6 +163,7 @@ HWY_INLINE void dense_blocks(const PackedView& layer, const float* HWY_RESTRICT 
   constexpr std::size_t kSums = 4;
   const float* HWY_RESTRICT weights = layer.weights;
   for (std::size_t block = 0; block < layer.blocks; ++block) {
+    // NOLINTNEXTLINE(modernize-avoid-c-arrays)
     Vector sums[kSums] = {hn::Load(kTag, weights), hn::Zero(kTag), hn::Zero(kTag), hn::Zero(kTag)};
     weights += kLanes;
     std::size_t column = 0;
@@ -197,6 +198,7 @@ void dense_layer(const PackedView& layer, Activation activation, const float* in
 float dot_product(const float* HWY_RESTRICT weights, const float* HWY_RESTRICT input,
                   std::size_t count) {
   constexpr std::size_t kSums = 4;
+  // NOLINTNEXTLINE(modernize-avoid-c-arrays)
   Vector sums[kSums] = {hn::Zero(kTag), hn::Zero(kTag), hn::Zero(kTag), hn::Zero(kTag)};
   std::size_t at = 0;
   for (; at + kSums * kLanes <= count; at += kSums * kLanes)
