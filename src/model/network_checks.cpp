@@ -53,6 +53,17 @@ std::size_t checked_units(std::size_t rows, std::size_t gates, const std::string
   return rows / gates;
 }
 
+/// Both matrices of a recurrent layer. @returns their rows, gates times units
+template <class Layer>
+std::size_t checked_rows(const Layer& layer, std::size_t gates, std::size_t inputs,
+                         const std::string& place) {
+  const std::string recurrent = place + ".recurrent_weights";
+  const std::size_t units = checked_units(layer.recurrent_weights.rows, gates, recurrent);
+  check_shape(layer.recurrent_weights, gates * units, units, recurrent);
+  check_shape(layer.input_weights, gates * units, inputs, place + ".input_weights");
+  return gates * units;
+}
+
 }  // namespace
 
 std::size_t checked_input_count(const NetworkScaling& scaling, const std::string& place) {
@@ -86,22 +97,14 @@ void check_layer(const DenseLayer& layer, std::size_t inputs, const std::string&
 }
 
 void check_layer(const LstmLayer& layer, std::size_t inputs, const std::string& place) {
-  constexpr std::size_t kGates = 4;
-  const std::string recurrent = place + ".recurrent_weights";
-  const std::size_t units = checked_units(layer.recurrent_weights.rows, kGates, recurrent);
-  check_shape(layer.recurrent_weights, kGates * units, units, recurrent);
-  check_shape(layer.input_weights, kGates * units, inputs, place + ".input_weights");
-  check_length(layer.bias, kGates * units, place + ".bias");
+  const std::size_t rows = checked_rows(layer, 4, inputs, place);
+  check_length(layer.bias, rows, place + ".bias");
 }
 
 void check_layer(const GruLayer& layer, std::size_t inputs, const std::string& place) {
-  constexpr std::size_t kGates = 3;
-  const std::string recurrent = place + ".recurrent_weights";
-  const std::size_t units = checked_units(layer.recurrent_weights.rows, kGates, recurrent);
-  check_shape(layer.recurrent_weights, kGates * units, units, recurrent);
-  check_shape(layer.input_weights, kGates * units, inputs, place + ".input_weights");
-  check_length(layer.input_bias, kGates * units, place + ".input_bias");
-  check_length(layer.recurrent_bias, kGates * units, place + ".recurrent_bias");
+  const std::size_t rows = checked_rows(layer, 3, inputs, place);
+  check_length(layer.input_bias, rows, place + ".input_bias");
+  check_length(layer.recurrent_bias, rows, place + ".recurrent_bias");
 }
 
 void check_last_layer(const DenseLayer& layer, const std::string& place) {

@@ -54,7 +54,7 @@ BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth)
 }
 
 void BenchLog::tell(std::string_view name, double (*value)(const Plant& plant)) {
-  truth_.push_back({{fmt::format("truth_{}", name), {}}, value});
+  truth_.push_back({{fmt::format("{}{}", kTruthPrefix, name), {}}, value});
 }
 
 void BenchLog::add_truth_channels(const DataSheet& sheet) {

@@ -24,7 +24,6 @@ constexpr double kTriangleAmplitude_Nm = 5.0;
 constexpr double kTriangles_s = 30.0;
 constexpr double kCycle_Hz = 0.05;
 constexpr double kSlowCycles = 30.0;
-constexpr double kStaticCycles = 3.0;
 constexpr double kPhase_s = 60.0;  // of `hold`
 constexpr double kHoldRamp_Nm_s = 10.0;
 constexpr double kWalkAmplitude_Nm = 2.0;
@@ -125,14 +124,7 @@ BenchProgram slow_cycles(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 BenchProgram static_cycle(const DataSheet& /*sheet*/, const ExperimentSpec& spec) {
-  const double amplitude_Nm = spec.amplitude.value_or(kTriangleAmplitude_Nm);
-  return {.start = {},
-          .duration_s = kStaticCycles / kCycle_Hz,
-          .next = [ramp = Triangle({amplitude_Nm, kCycle_Hz}, kBenchRate_Hz)](
-                      const Measurement&) mutable -> BenchAction {
-            return {.command = {.is_motor_held = true},
-                    .load = {.external_torque_Nm = ramp.step()}};
-          }};
+  return static_cycle_program(spec.amplitude.value_or(kTriangleAmplitude_Nm));
 }
 
 BenchProgram chirp(const DataSheet& sheet, const ExperimentSpec& spec) {

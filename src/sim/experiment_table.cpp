@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "torsio/core/error.hpp"
+#include "torsio/signal/excitation.hpp"
 
 namespace torsio {
 namespace {
@@ -25,6 +26,19 @@ const std::vector<ExperimentEntry>& entries() {
 }
 
 }  // namespace
+
+BenchProgram static_cycle_program(double amplitude_Nm, LoadCell load_cell) {
+  constexpr double kCycle_Hz = 0.05;
+  constexpr double kCycles = 3.0;
+  return {.start = {},
+          .load_cell = load_cell,
+          .duration_s = kCycles / kCycle_Hz,
+          .next = [ramp = Triangle({.amplitude = amplitude_Nm, .frequency_Hz = kCycle_Hz},
+                                   kBenchRate_Hz)](const Measurement&) mutable -> BenchAction {
+            return {.command = {.is_motor_held = true},
+                    .load = {.external_torque_Nm = ramp.step()}};
+          }};
+}
 
 std::vector<ExperimentInfo> experiments() {
   std::vector<ExperimentInfo> infos(entries().size());

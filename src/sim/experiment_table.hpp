@@ -35,6 +35,11 @@ struct BenchProgram {
   std::function<BenchAction(const Measurement&)> next;
 };
 
+/// The rotor held while three torque triangles of 0.05 Hz pull on the output: the static cycle of
+/// every bench.
+[[nodiscard]] BenchProgram static_cycle_program(double amplitude_Nm,
+                                                LoadCell load_cell = LoadCell::joint);
+
 /// A row of the table of experiments. A name may stand in more than one family.
 struct ExperimentEntry {
   ExperimentInfo info;

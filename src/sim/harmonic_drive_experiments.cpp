@@ -1,9 +1,6 @@
-#include <fmt/format.h>
-
 #include <array>
 
 #include "experiment_table.hpp"
-#include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/signal/excitation.hpp"
 #include "torsio/sim/impedance_loop.hpp"
@@ -16,8 +13,6 @@ constexpr double kHumanTorque_Nm = 20.0;
 constexpr double kHumanFrequency_Hz = 0.4;
 constexpr double kHighestHumanTorque_Nm = 50.0;
 constexpr double kRating_Nm = 292.0;  // highest amplitudes are shares of it
-constexpr double kCycle_Hz = 0.05;
-constexpr double kCycles = 3.0;
 
 ImpedanceLoop impedance_loop(const DataSheet& sheet, bool is_zero) {
   return {
@@ -48,15 +43,7 @@ BenchProgram human_torque(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
-  return {
-      .start = {},
-      .load_cell = LoadCell::external,
-      .duration_s = kCycles / kCycle_Hz,
-      .next = [ramp = Triangle(
-                   {.amplitude = sheet.sensors.torque_range_Nm.value, .frequency_Hz = kCycle_Hz},
-                   kBenchRate_Hz)](const Measurement&) mutable -> BenchAction {
-        return {.command = {.is_motor_held = true}, .load = {.external_torque_Nm = ramp.step()}};
-      }};
+  return static_cycle_program(sheet.sensors.torque_range_Nm.value, LoadCell::external);
 }
 
 BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {

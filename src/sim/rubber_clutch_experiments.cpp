@@ -51,8 +51,6 @@ constexpr double kSlipEnd_rad = rad_from_deg(20.0);
 constexpr double kStand_s = 2.0;
 constexpr double kHold_s = 30.0;
 
-constexpr double kCycle_Hz = 0.05;
-constexpr double kCycles = 3.0;
 constexpr double kCycleShare = 0.8;  // of the rated torque, at which the clutch would slip
 
 // The rig: 2.5 kg and the arm of 56.7 mm are the paper's. The rest is assumed: the mass sits where
@@ -260,14 +258,7 @@ BenchProgram collision(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
 }
 
 BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
-  return {.start = {},
-          .duration_s = kCycles / kCycle_Hz,
-          .next = [ramp = Triangle({.amplitude = kCycleShare * sheet.rating.torque_Nm.value,
-                                    .frequency_Hz = kCycle_Hz},
-                                   kBenchRate_Hz)](const Measurement&) mutable -> BenchAction {
-            return {.command = {.is_motor_held = true},
-                    .load = {.external_torque_Nm = ramp.step()}};
-          }};
+  return static_cycle_program(kCycleShare * sheet.rating.torque_Nm.value);
 }
 
 constexpr auto kTable = std::to_array<ExperimentEntry>({

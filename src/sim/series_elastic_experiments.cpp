@@ -19,8 +19,6 @@ constexpr std::string_view kActuators = "dfki-*";
 constexpr double kMass_kg = 9.0;
 constexpr double kSweepSpeed_rad_s = rad_from_deg(10.0);
 constexpr double kSweepAcceleration_rad_s2 = rad_from_deg(30.0);
-constexpr double kCycle_Hz = 0.05;
-constexpr double kCycles = 3.0;
 constexpr double kHold_rad = rad_from_deg(90.0);
 constexpr double kUpright_rad = rad_from_deg(60.0);  // a lever driven further may tip over
 
@@ -60,14 +58,7 @@ BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
-  return {
-      .start = {},
-      .duration_s = kCycles / kCycle_Hz,
-      .next = [ramp =
-                   Triangle({.amplitude = sheet.rating.torque_Nm.value, .frequency_Hz = kCycle_Hz},
-                            kBenchRate_Hz)](const Measurement&) mutable -> BenchAction {
-        return {.command = {.is_motor_held = true}, .load = {.external_torque_Nm = ramp.step()}};
-      }};
+  return static_cycle_program(sheet.rating.torque_Nm.value);
 }
 
 BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {

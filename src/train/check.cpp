@@ -325,7 +325,7 @@ class Checker {
       add(Verdict::pass, "leak", "", "the target was not computed from an input");
     } else {
       add(Verdict::fail, "leak", "",
-          leak.starts_with("truth_")
+          leak.starts_with(kTruthPrefix)
               ? fmt::format("{} is truth that no sensor sees", leak)
               : fmt::format("{} was computed from {}", dataset_.target, leak),
           "Leave it out of --inputs: a model would learn the formula, not the spring.");

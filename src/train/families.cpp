@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <utility>
 #include <vector>
 
 #include "data/names.hpp"
@@ -10,6 +9,7 @@
 #include "torsio/train/fit_dgmm.hpp"
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
+#include "train/fitted_model.hpp"
 #include "train/network_families.hpp"
 
 namespace torsio {
@@ -65,11 +65,6 @@ constexpr std::array kDgmmPaperOptions{
     OptionInfo{"learning_rate", Kind::number, "0.02", 0, 1, "of the nearest Gaussian's mean"},
     OptionInfo{"spread", Kind::number, "0.15", 1e-6, 100,
                "of every Gaussian in every direction, in standard deviations"}};
-
-template <class Family>
-FittedModel fitted_model(Fitted<Family> fitted) {
-  return {Family(fitted.parameters), std::move(fitted.notes)};
-}
 
 FittedModel linear(const TrainingData& data, const Options& options, const FitContext& context) {
   report_progress(context.progress, 0.0, "fitting linear");

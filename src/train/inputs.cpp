@@ -15,8 +15,6 @@
 namespace torsio {
 namespace {
 
-constexpr std::string_view kTruth = "truth_";
-
 struct CanonicalChannel {
   const char* name;
   const char* expression;
@@ -209,7 +207,7 @@ std::vector<double> first_feature(const Recording& recording, const FeatureSpec&
 std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
   const FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
   for (const std::string& input : pipeline.raw_inputs())
-    if (input.starts_with(kTruth) ||
+    if (input.starts_with(kTruthPrefix) ||
         std::ranges::find(dataset.target_computed_from, input) !=
             dataset.target_computed_from.end() ||
         is_straight_line(dataset, input))
@@ -221,7 +219,7 @@ std::string refuse_leak(const Dataset& dataset, const FeatureSpec& spec, bool al
   std::string leak = find_leak(dataset, spec);
   if (!leak.empty() && !allow_leak)
     throw UsageError({.place = leak,
-                      .problem = leak.starts_with(kTruth)
+                      .problem = leak.starts_with(kTruthPrefix)
                                      ? "no sensor sees this channel of a simulation"
                                      : dataset.target + " was computed from this input: a model "
                                                         "would learn the formula",

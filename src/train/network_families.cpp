@@ -8,6 +8,7 @@
 
 #include "torsio/core/error.hpp"
 #include "torsio/train/fit_network.hpp"
+#include "train/fitted_model.hpp"
 
 namespace torsio {
 namespace {
@@ -136,11 +137,6 @@ RecurrentOptions recurrent_options(const Options& options) {
                       .burn_in = options.integer("burn_in"),
                       .last_only = one_of(options, "mode", kModes)},
           .training = training_of(options)};
-}
-
-template <class Family>
-FittedModel fitted_model(Fitted<Family> fitted) {
-  return {Family(fitted.parameters), std::move(fitted.notes)};
 }
 
 FittedModel mlp(const TrainingData& data, const Options& options, const FitContext& context) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "support/moments.hpp"
 #include "torsio/actuator/current_sensor.hpp"
 #include "torsio/actuator/encoder.hpp"
 #include "torsio/actuator/torque_sensor.hpp"
@@ -13,18 +14,8 @@
 namespace torsio {
 namespace {
 
-struct Moments {
-  double mean = 0.0;
-  double std_dev = 0.0;
-};
-Moments moments(const std::vector<double>& values) {
-  Moments of;
-  for (const double value : values) of.mean += value;
-  of.mean /= static_cast<double>(values.size());
-  for (const double value : values) of.std_dev += (value - of.mean) * (value - of.mean);
-  of.std_dev = std::sqrt(of.std_dev / static_cast<double>(values.size()));
-  return of;
-}
+using test::Moments;
+using test::moments;
 
 TEST(Encoder, NineteenBitsAreThePrintedResolution) {
   Random random(1);

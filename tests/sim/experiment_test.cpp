@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "support/refusal.hpp"
 #include "support/straight_line.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
@@ -146,28 +147,19 @@ TEST(Simulate, SameSeedSameRecordingOtherSeedOtherNoise) {
   }
 }
 
-std::string message_of(const ExperimentSpec& spec) {
-  try {
-    static_cast<void>(simulate(spec));
-  } catch (const UsageError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
 TEST(Simulate, RefusesWhatTheBenchCannotDo) {
-  EXPECT_NE(message_of({.actuator = "dfki-51"}).find("dfki-28, dfki-50, dfki-120, dfki-300"),
+  EXPECT_NE(test::refusal_of({.actuator = "dfki-51"}).find("dfki-28, dfki-50, dfki-120, dfki-300"),
             std::string::npos);
-  EXPECT_NE(message_of({.experiment = "swep"})
+  EXPECT_NE(test::refusal_of({.experiment = "swep"})
                 .find("one of sweep, static-cycle, hold, chirp, random-walk"),
             std::string::npos);
-  EXPECT_NE(message_of({.lever_m = 0.8}).find("at most the 50 Nm that dfki-50 is rated for"),
+  EXPECT_NE(test::refusal_of({.lever_m = 0.8}).find("at most the 50 Nm that dfki-50 is rated for"),
             std::string::npos);
-  EXPECT_NE(message_of({.lever_m = -0.1}).find("0 < metres <= 2"), std::string::npos);
-  EXPECT_NE(message_of({.duration_s = 0.0}).find("duration"), std::string::npos);
-  EXPECT_NE(message_of({.duration_s = std::nan("")}).find("duration"), std::string::npos);
-  EXPECT_NE(message_of({.inclination_rad = 2.0}).find("-90 to 90 deg"), std::string::npos);
-  EXPECT_NE(message_of({.experiment = "static-cycle", .lever_m = 0.2}).find("has no lever"),
+  EXPECT_NE(test::refusal_of({.lever_m = -0.1}).find("0 < metres <= 2"), std::string::npos);
+  EXPECT_NE(test::refusal_of({.duration_s = 0.0}).find("duration"), std::string::npos);
+  EXPECT_NE(test::refusal_of({.duration_s = std::nan("")}).find("duration"), std::string::npos);
+  EXPECT_NE(test::refusal_of({.inclination_rad = 2.0}).find("-90 to 90 deg"), std::string::npos);
+  EXPECT_NE(test::refusal_of({.experiment = "static-cycle", .lever_m = 0.2}).find("has no lever"),
             std::string::npos);
 }
 

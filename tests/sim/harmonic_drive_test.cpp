@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "support/straight_line.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
@@ -183,22 +184,7 @@ double largest(const Values& values) {
 
 /// What the best straight line leaves, as a share of the largest.
 double share_off_the_line(const Values& x, const Values& y) {
-  const auto n = static_cast<double>(x.size());
-  double mean_x = 0.0;
-  double mean_y = 0.0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    mean_x += x[i] / n;
-    mean_y += y[i] / n;
-  }
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    xx += (x[i] - mean_x) * (x[i] - mean_x);
-    xy += (x[i] - mean_x) * (y[i] - mean_y);
-    yy += (y[i] - mean_y) * (y[i] - mean_y);
-  }
-  return std::sqrt((yy - xy * xy / xx) / n) / largest(y);
+  return test::straight_line(x, y).rmse / largest(y);
 }
 
 Recording pushed(const std::string& actuator, double torque_Nm, std::uint64_t seed = 1,

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "support/refusal.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
@@ -360,27 +361,18 @@ TEST(RubberClutch, ErrorShrinksWithTheStep) {
   EXPECT_LT(fine, 0.65 * middle);
 }
 
-std::string message_of(const ExperimentSpec& spec) {
-  try {
-    static_cast<void>(simulate(spec));
-  } catch (const UsageError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
 TEST(RubberClutch, RefusesWhatItsBenchCannotDo) {
   const auto grid = [](std::optional<double> amplitude, std::optional<double> frequency_Hz) {
-    return message_of({.actuator = "rubber-clutch",
-                       .experiment = "grid",
-                       .amplitude = amplitude,
-                       .frequency_Hz = frequency_Hz});
+    return test::refusal_of({.actuator = "rubber-clutch",
+                             .experiment = "grid",
+                             .amplitude = amplitude,
+                             .frequency_Hz = frequency_Hz});
   };
   EXPECT_NE(grid({}, 0.0).find("0.001 to 10 Hz"), std::string::npos);
   EXPECT_NE(grid({}, 1.5).find("0 < Hz <= 1"), std::string::npos);
   EXPECT_NE(grid(rad_from_deg(12.0), {}).find("at most 9 deg"), std::string::npos)
       << "the clutch would slip";
-  EXPECT_NE(message_of({.actuator = "rubber-clutch", .experiment = "sweep"})
+  EXPECT_NE(test::refusal_of({.actuator = "rubber-clutch", .experiment = "sweep"})
                 .find("one of grid, multisine, slow-cycles, slip, collision, hold, static-cycle"),
             std::string::npos);
 }

@@ -10,26 +10,17 @@
 #include <string_view>
 #include <vector>
 
+#include "support/moments.hpp"
 #include "torsio/sim/experiment.hpp"
 
 namespace torsio {
 namespace {
 
+using test::Moments;
+using test::moments;
+
 constexpr double kRate_Hz = 1000.0;
 constexpr int kReadings = 60000;
-
-struct Moments {
-  double mean = 0.0;
-  double std_dev = 0.0;
-};
-Moments moments(const std::vector<double>& values) {
-  Moments of;
-  for (const double value : values) of.mean += value;
-  of.mean /= static_cast<double>(values.size());
-  for (const double value : values) of.std_dev += (value - of.mean) * (value - of.mean);
-  of.std_dev = std::sqrt(of.std_dev / static_cast<double>(values.size()));
-  return of;
-}
 
 /// One encoder of a sheet: what it tells and what is true.
 struct EncoderUnderTest {

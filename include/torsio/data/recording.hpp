@@ -12,6 +12,9 @@
 
 namespace torsio {
 
+/// Channels of a simulation that no sensor sees are called truth_...
+inline constexpr std::string_view kTruthPrefix = "truth_";
+
 /// One measured quantity on the recording's clock, in SI; the name ends in the SI unit.
 struct Channel {
   std::string name;

@@ -39,6 +39,8 @@ struct DenseLayer {
 ///
 /// Source: paper 004 Eqs. 3-8, SPEC section 3.4.
 struct LstmLayer {
+  static constexpr std::string_view kFamily = "lstm";  ///< of a network of such layers
+
   FloatMatrix input_weights;      ///< W: 4H x inputs
   FloatMatrix recurrent_weights;  ///< R: 4H x H
   std::vector<float> bias;        ///< b: 4H
@@ -60,6 +62,8 @@ struct LstmLayer {
 ///
 /// Source: SPEC section 3.4.
 struct GruLayer {
+  static constexpr std::string_view kFamily = "gru";  ///< of a network of such layers
+
   FloatMatrix input_weights;          ///< W: 3H x inputs
   FloatMatrix recurrent_weights;      ///< R: 3H x H
   std::vector<float> input_bias;      ///< b: 3H

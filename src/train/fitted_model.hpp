@@ -1,0 +1,16 @@
+#pragma once
+
+#include <utility>
+
+#include "torsio/train/families.hpp"
+#include "torsio/train/fitted.hpp"
+
+namespace torsio {
+
+/// What a family's fitter gives, as the table of families gives it.
+template <class Family>
+FittedModel fitted_model(Fitted<Family> fitted) {
+  return {Family(std::move(fitted.parameters)), std::move(fitted.notes)};
+}
+
+}  // namespace torsio
