@@ -103,8 +103,14 @@ Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const P
   };
   const bool changes = spec.conditions.warm_up_K != 0.0 || !spec.faults.faults.empty();
   Plant plant(plant_parameters(sheet));
-  plant.reset(program.start_angle_rad, program.start);
-  plant.set_condition(condition(0.0));
+  const auto require_taken = [&](Fault fault, double time_s) {
+    if (fault == Fault::none) return;
+    throw Error({.place = fmt::format("{} at {} s", entry.info.name, time_s),
+                 .problem = fmt::format("the plant refuses its command, load or condition: {}",
+                                        torsio::name(fault))});
+  };
+  require_taken(plant.reset(program.start_angle_rad, program.start), 0.0);
+  require_taken(plant.set_condition(condition(0.0)), 0.0);
   Load load = program.start;
   SensorSet sensors(sheet, kBenchRate_Hz, spec.seed);
   sensors.reset(load_cell_torque(program.load_cell, plant, load));
@@ -123,16 +129,12 @@ Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const P
     Measurement measured = sensors.step(plant, torque_Nm);
     if (tick == 0) seen = measured;
     faults.apply(measured, time_s);
-    log.add(measured, plant, torque_Nm);
+    log.add(measured, {plant, torque_Nm, temperature(spec.conditions, time_s)});
     seen = with_last_numbers(measured, seen, channels);
     const BenchAction action = program.next(seen);
     load = action.load;
-    if (changes) plant.set_condition(condition(time_s));
-    const Fault fault = plant.step(action.command, load, 1.0 / kBenchRate_Hz);
-    if (fault != Fault::none)
-      throw Error({.place = fmt::format("{} at {} s", entry.info.name, time_s),
-                   .problem = fmt::format("the plant refuses its command or load: {}",
-                                          torsio::name(fault))});
+    if (changes) require_taken(plant.set_condition(condition(time_s)), time_s);
+    require_taken(plant.step(action.command, load, 1.0 / kBenchRate_Hz), time_s);
   }
   return log.finish(fmt::format("{} {} seed {}", full_name(sheet), entry.info.name, spec.seed));
 }
