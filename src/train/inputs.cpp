@@ -9,24 +9,12 @@
 #include <map>
 #include <utility>
 
+#include "data/canonical_channels.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
-
-struct CanonicalChannel {
-  const char* name;
-  const char* expression;
-};
-
-// In the order of need: a later one may use an earlier one.
-constexpr auto kCanonicalChannels = std::to_array<CanonicalChannel>({
-    {"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"},
-    {"spring_deflection_rate_rad_s", "rate(spring_deflection_rad)"},
-    {"joint_speed_rad_s", "rate(joint_angle_rad)"},
-    {"motor_speed_rad_s", "rate(motor_angle_rad)"},
-});
 
 constexpr auto kDefaultInputs = std::to_array<const char*>({
     "spring_deflection_rad",
@@ -80,7 +68,7 @@ std::vector<ChannelDefinition> known_definitions(const Dataset& dataset) {
   for (const CanonicalChannel& channel : kCanonicalChannels)
     if (!defines(definitions, channel.name) && !every_record_has(dataset, channel.name) &&
         is_computable(dataset, definitions, channel.expression))
-      definitions.push_back({channel.name, channel.expression});
+      definitions.push_back({std::string(channel.name), std::string(channel.expression)});
   return definitions;
 }
 
@@ -212,6 +200,15 @@ std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
             dataset.target_computed_from.end() ||
         is_straight_line(dataset, input))
       return input;
+  // A difference of two sensors is given away by both of them, not by one.
+  for (const ChannelDefinition& definition : dataset.records.front().recording.definitions) {
+    if (definition.name != dataset.target) continue;
+    const std::vector<std::string> sources = channels_of(definition.expression);
+    const auto is_input = [&](const std::string& source) {
+      return std::ranges::find(pipeline.raw_inputs(), source) != pipeline.raw_inputs().end();
+    };
+    if (std::ranges::all_of(sources, is_input)) return sources.front();
+  }
   return {};
 }
 
