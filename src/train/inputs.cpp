@@ -12,6 +12,7 @@
 #include "data/canonical_channels.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
+#include "train/least_squares.hpp"
 
 namespace torsio {
 namespace {
@@ -128,6 +129,49 @@ bool is_straight_line(const Dataset& dataset, const std::string& input) {
   return n > 2.0 && xx > 0.0 && yy > 0.0 && yy - xy * xy / xx < kUnexplained * yy;
 }
 
+/// Whether the inputs together give the target in the same way: each source of a difference of two
+/// sensors is innocent alone.
+bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
+  constexpr std::size_t kEnough = 2000;  // samples a record
+  constexpr double kUnexplained = 1e-9;
+  std::vector<double> rows;
+  std::vector<double> measured;
+  for (const DatasetRecord& record : dataset.records) {
+    const Recording& recording = record.recording;
+    const Channel& target = recording.channel(dataset.target);
+    FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
+    std::vector<const std::vector<double>*> channels;
+    for (const std::string& input : pipeline.raw_inputs())
+      channels.push_back(&recording.channel(input).values);
+    std::vector<double> raw(channels.size());
+    const std::size_t stride = recording.size() / kEnough + 1;
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[i];
+      if (!std::ranges::all_of(raw, [](double value) { return std::isfinite(value); })) continue;
+      const std::span<const double> features = pipeline.step(raw);
+      if (i % stride != 0 || !target.is_fresh(i) || !std::isfinite(target.values[i])) continue;
+      rows.push_back(1.0);
+      rows.insert(rows.end(), features.begin(), features.end());
+      measured.push_back(target.values[i]);
+    }
+  }
+  Matrix design(measured.size(), spec.inputs.size() + 1);
+  if (design.rows <= design.columns) return false;
+  design.values = std::move(rows);
+  const std::vector<double> plane = least_squares(design, measured).coefficients;
+  double mean = 0.0;
+  for (const double value : measured) mean += value / static_cast<double>(measured.size());
+  double total = 0.0;
+  double missed = 0.0;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    double said = 0.0;
+    for (std::size_t j = 0; j < plane.size(); ++j) said += plane[j] * design(i, j);
+    missed += (measured[i] - said) * (measured[i] - said);
+    total += (measured[i] - mean) * (measured[i] - mean);
+  }
+  return missed < kUnexplained * total;
+}
+
 /// Runs `parse`; here it is the caller who wrote the expressions.
 template <class Parse>
 auto as_asked(const Parse& parse) {
@@ -200,15 +244,7 @@ std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
             dataset.target_computed_from.end() ||
         is_straight_line(dataset, input))
       return input;
-  // A difference of two sensors is given away by both of them, not by one.
-  for (const ChannelDefinition& definition : dataset.records.front().recording.definitions) {
-    if (definition.name != dataset.target) continue;
-    const std::vector<std::string> sources = channels_of(definition.expression);
-    const auto is_input = [&](const std::string& source) {
-      return std::ranges::find(pipeline.raw_inputs(), source) != pipeline.raw_inputs().end();
-    };
-    if (std::ranges::all_of(sources, is_input)) return sources.front();
-  }
+  if (is_plane(dataset, spec)) return fmt::format("{}", fmt::join(spec.inputs, ", "));
   return {};
 }
 

@@ -79,7 +79,9 @@ TEST(FindLeak, SeesADifferenceWhoseSourcesAreBothInputs) {
     return find_leak(dataset, resolve_inputs(dataset, inputs));
   };
   EXPECT_EQ(leak({"torque_Nm", "rate(joint_angle_rad)"}), "");
-  EXPECT_EQ(leak({"torque_Nm", "gear_angle_rad", "rate(joint_angle_rad)"}), "gear_angle_rad");
+  EXPECT_EQ(leak({"torque_Nm", "rate(gear_angle_rad - joint_angle_rad)"}), "");
+  EXPECT_EQ(leak({"gear_angle_rad", "torque_Nm", "joint_angle_rad"}),
+            "gear_angle_rad, torque_Nm, joint_angle_rad");
 }
 
 }  // namespace
