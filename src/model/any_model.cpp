@@ -68,6 +68,16 @@ Estimate AnyModel::step(Features features) noexcept {
   return dispatch(model_, [&](auto& model) { return model.step(features); });
 }
 
+std::span<const float> AnyModel::last_layer_input() const noexcept {
+  return dispatch(model_, [](const auto& model) -> std::span<const float> {
+    if constexpr (requires { model.last_layer_input(); }) {
+      return model.last_layer_input();
+    } else {
+      return {};
+    }
+  });
+}
+
 bool AnyModel::can_invert() const noexcept {
   return dispatch(model_, []<class M>(const M&) { return Invertible<M>; });
 }

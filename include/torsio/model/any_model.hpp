@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -63,6 +64,9 @@ class AnyModel {
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;
+
+  /// What the last layer of a network saw in the last step; empty for other families.
+  [[nodiscard]] std::span<const float> last_layer_input() const noexcept;
 
   [[nodiscard]] bool can_invert() const noexcept;
   /// The first input at which the model says `target`, the others being as given; see the family's
