@@ -23,20 +23,14 @@ auto* dense_layers(Parameters& parameters) {
 }
 
 LastLayerAdapter adapter_of(const AdaptiveModel::Parameters& parameters) {
-  const DenseLayer* const last = last_layer(parameters.network);
-  if (last == nullptr)
-    throw UsageError(
-        {.place = "adaptation",
-         .expected = "a network: mlp, lstm or gru",
-         .found = std::string(family_of(parameters.network)),
-         .advice = "Only a network has a last layer to adapt; fit this family again."});
   const double target_scale = dispatch(parameters.network, [](const auto& own) {
     if constexpr (requires { own.scaling.target_scale; })
       return own.scaling.target_scale;
     else
       return 1.0;
   });
-  return {parameters.adaptation, *last, target_scale, parameters.sample_period_s};
+  return {parameters.adaptation, require_last_layer(parameters.network), target_scale,
+          parameters.sample_period_s};
 }
 
 }  // namespace
@@ -46,6 +40,14 @@ const DenseLayer* last_layer(const AnyModel::Parameters& parameters) noexcept {
     const auto* const layers = dense_layers(own);
     return layers == nullptr || layers->empty() ? nullptr : &layers->back();
   });
+}
+
+const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters) {
+  if (const DenseLayer* const last = last_layer(parameters)) return *last;
+  throw UsageError({.place = "adaptation",
+                    .expected = "a network: mlp, lstm or gru",
+                    .found = std::string(family_of(parameters)),
+                    .advice = "Only a network has a last layer to adapt; fit this family again."});
 }
 
 AdaptiveModel::AdaptiveModel(const Parameters& parameters)

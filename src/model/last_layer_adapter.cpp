@@ -50,7 +50,8 @@ void check(const AdaptationSettings& settings) {
   require(s.oldest_reference_s >= 0.0, "oldest_reference_s", "at least 0", s.oldest_reference_s);
   require(not_negative(s.frozen_after_s), "frozen_after_s", "a number, at least 0",
           s.frozen_after_s);
-  require(s.saturation > 0.0, "saturation", "above 0", s.saturation);
+  require(std::isnan(s.saturation) || s.saturation > 0.0, "saturation", "above 0, or NaN for none",
+          s.saturation);
   require(positive(s.largest_change), "largest_change", "a positive number", s.largest_change);
   require(positive(s.comparison_s), "comparison_s", "a positive number", s.comparison_s);
 }

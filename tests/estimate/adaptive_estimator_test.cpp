@@ -54,7 +54,7 @@ TYPED_TEST(Adapted, LearnsAnOffsetWhateverTheFamily) {
   for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
     AdaptiveEstimator adaptive(settings_without_zeros(), network, {.rule = rule});
     const Estimator frozen(settings_without_zeros(), AnyModel(example<TypeParam>()));
-    EXPECT_LT(run(adaptive, frozen, 3.0), 0.5);
+    EXPECT_LT(run(adaptive, frozen, 3.0), 1.0);
     EXPECT_GT(adaptive.adapter().counts().updates(), 3000U);
     EXPECT_GT(adaptive.adapter().counts().of(Learning::warming_up), 0U);
     EXPECT_EQ(adaptive.adapter().counts().roll_backs, 0U);

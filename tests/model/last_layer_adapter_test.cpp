@@ -56,7 +56,9 @@ double value_of(const DenseLayer& layer, const std::vector<float>& features) {
 /// Nothing stands in the way of an update.
 AdaptationSettings unguarded(AdaptationRule rule = AdaptationRule::nlms) {
   return {.rule = rule,
+          .step_size = 0.05,
           .leak = 0.0,
+          .initial_covariance = 1.0,
           .largest_error = 1e9,
           .frozen_after_s = 0.0,
           .largest_change = 1e6,
@@ -541,7 +543,7 @@ TEST(LastLayerAdapter, RefusesSettingsOutOfRange) {
   EXPECT_THAT(complaint({.largest_error = 0.0}), HasSubstr("largest_error"));
   EXPECT_THAT(complaint({.oldest_reference_s = -1.0}), HasSubstr("oldest_reference_s"));
   EXPECT_THAT(complaint({.frozen_after_s = kInfinity}), HasSubstr("frozen_after_s"));
-  EXPECT_THAT(complaint({.saturation = kNaN}), HasSubstr("saturation"));
+  EXPECT_THAT(complaint({.saturation = 0.0}), HasSubstr("saturation"));
   EXPECT_THAT(complaint({.largest_change = 0.0}), HasSubstr("largest_change"));
   EXPECT_THAT(complaint({.comparison_s = 0.0}), HasSubstr("comparison_s"));
   EXPECT_THAT(error_message([] { LastLayerAdapter({}, layer_of(3, 1), kScale, 0.0); }),

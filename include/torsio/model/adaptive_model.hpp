@@ -11,6 +11,8 @@ namespace torsio {
 
 /// The last layer of a network's parameters, or null: its family is none of `mlp`, `lstm`, `gru`.
 [[nodiscard]] const DenseLayer* last_layer(const AnyModel::Parameters& parameters) noexcept;
+/// The same. @throws UsageError where there is none.
+const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters);
 
 /// A network whose last layer can be adapted while it runs: a `Model`, so that an estimator's guards
 /// go around it (`AdaptiveEstimator`).

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <string_view>
 
@@ -22,22 +21,21 @@ enum class AdaptationRule : std::uint8_t { nlms, rls };
 /// are in the target's unit.
 struct AdaptationSettings {
   AdaptationRule rule = AdaptationRule::nlms;
-  double step_size = 0.05;          ///< NLMS: mu, above 0 and below 2
-  double leak = 1e-5;               ///< NLMS: gamma, share of W - W0 that an update takes back
-  double regularisation = 1e-3;     ///< NLMS: epsilon, beside the square of the features
-  double forgetting = 0.9995;       ///< RLS: lambda, 0.9 to 1
-  double initial_covariance = 1.0;  ///< RLS: delta, P starts as delta I
-  double trace_cap = 1.0;           ///< RLS: tr P stays below this many times that of delta I
-  double sensor_std = 0.0;          ///< one standard deviation of the reference's own noise
-  double dead_zone = 3.0;           ///< errors below this many `sensor_std` teach nothing
+  double step_size = 0.003;          ///< NLMS: mu, above 0 and below 2; docs/decisions/0013
+  double leak = 1e-5;                ///< NLMS: gamma, share of W - W0 that an update takes back
+  double regularisation = 1e-3;      ///< NLMS: epsilon, beside the square of the features
+  double forgetting = 0.9995;        ///< RLS: lambda, 0.9 to 1
+  double initial_covariance = 1e-3;  ///< RLS: delta, P starts as delta I
+  double trace_cap = 1.0;            ///< RLS: tr P stays below this many times that of delta I
+  double sensor_std = 0.0;           ///< one standard deviation of the reference's own noise
+  double dead_zone = 3.0;            ///< errors below this many `sensor_std` teach nothing
   double largest_error =
       kNotMeasured;                 ///< larger ones teach nothing; NaN: the network's target_scale
   double oldest_reference_s = 0.0;  ///< an older value is stale
   double frozen_after_s =
       0.2;  ///< a value that has not changed for so long is stale; 0: it may rest
-  double saturation =
-      std::numeric_limits<double>::infinity();  ///< |reference| that the sensor ends at
-  double largest_change = 0.2;                  ///< rho: |W - W0| stays within this share of |W0|
+  double saturation = kNotMeasured;  ///< |reference| that the sensor ends at; NaN: nowhere
+  double largest_change = 0.2;       ///< rho: |W - W0| stays within this share of |W0|
   double comparison_s =
       10.0;  ///< over which the adapted model must not be worse than the frozen one
 };
