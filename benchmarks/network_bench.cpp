@@ -132,7 +132,7 @@ namespace {
 constexpr std::size_t kAdapted = 250;  // features of the last layer
 
 /// One update on the features that an LSTM 250 tells; the network's own step is not in it.
-/// @param pass_bytes streamed, and `multiply_adds` done in one update, at the least
+/// @param pass_bytes streamed in one update, at the least. @param multiply_adds done in it.
 Row update_row(AdaptationRule rule, std::size_t pass_bytes, double multiply_adds) {
   const auto parameters = plain_network<Lstm>(kLstm250);
   LastLayerAdapter adapter({.rule = rule, .frozen_after_s = 0.0}, parameters.head.back(), 1.0,

@@ -61,6 +61,11 @@ void run(const AdaptFlags& flags) {
   if (!flags.device_serial.empty()) adapted.file.card.device_serial = flags.device_serial;
   if (flags.json.wants_tables()) print(torsio::adaptation_text(adapted, flags.model));
   flags.json.write(torsio::adaptation_json(adapted, flags.model));
+  const torsio::AdaptationScore& held_out = adapted.held_out.back();
+  if (held_out.adapted.rmse > held_out.frozen.rmse)
+    remark(
+        "warning: on what was held out the adapted weights are worse than the frozen ones; try a "
+        "smaller step_size (initial_covariance for rls), or comparison_s as long as a cycle");
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, adapted.file);  // last: untouched unless all else succeeded
   remark(flags.output + " written");
