@@ -100,7 +100,6 @@ TEST_F(BrokenCalls, OfCrossValidationSayWhatFoldsThereCanBe) {
   expect_error(torsio(call + "--folds 1"), kCallWasWrong, "at least 2");
   expect_error(torsio(call + "--folds 1000000"), kCallWasWrong, "at most 40000");
   expect_error(torsio(call + "--embargo 100s"), kCallWasWrong, "shorter --embargo");
-  expect_error(torsio(call + "--test a.csv"), kCallWasWrong, "both trained and judged on");
   expect_error(torsio(call + "--embargo 3Nm"), kCallWasWrong, "--embargo");
   expect_error(torsio(call + "--set components=3"), kCallWasWrong, "components");
   expect_error(torsio("crossvalidate a.csv --set rates=true"), kCallWasWrong, "--models");
@@ -150,6 +149,7 @@ TEST_F(BrokenCalls, OfAdaptationSayWhatIsMissingAndLeaveTheOutputUntouched) {
   expect_error(torsio(call + "--set step_size"), kCallWasWrong, "option=value");
   expect_error(torsio(call + "--held-out 1"), kCallWasWrong, "a share between 0 and 1");
   expect_error(torsio(call + "--held-out 0.2 --test b.csv"), kCallWasWrong, "excludes");
+  expect_error(torsio(call + "--test a.csv"), kCallWasWrong, "both trained and judged on");
   expect_error(torsio(call + "--embargo 3Nm"), kCallWasWrong, "--embargo");
   expect_error(torsio(call + "--embargo 100s"), kWorkFailed, "Give longer recordings");
   expect_error(torsio(call + "--json old.safetensors"), kCallWasWrong, "two outputs");

@@ -169,6 +169,12 @@ TEST_F(MainJob, RunsTheExamples) {
   EXPECT_EQ(own.exit_code, 0) << own.err;
   EXPECT_NE(own.out.find("outside_training_range"), std::string::npos) << own.out;
   EXPECT_NE(own.out.find("input_not_finite"), std::string::npos) << own.out;
+  ASSERT_EQ(torsio("fit a.csv --model mlp -o network.safetensors").exit_code, 0);
+  const Outcome adapt = shell(std::string(TORSIO_EXAMPLES) +
+                              "/example_03_adapt network.safetensors adapted.safetensors");
+  EXPECT_EQ(adapt.exit_code, 0) << adapt.err;
+  EXPECT_NE(adapt.out.find(" updates"), std::string::npos) << adapt.out;
+  EXPECT_EQ(torsio("evaluate adapted.safetensors b.csv").exit_code, 0);
 }
 
 TEST_F(MainJob, TellsMachinesWhatItSimulated) {

@@ -124,6 +124,7 @@ TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
                                 {.rule = rule,
                                  .step_size = 1.0,
                                  .forgetting = 0.9,
+                                 .initial_covariance = 1.0,
                                  .sensor_std = 0.01,
                                  .saturation = 100.0,
                                  .largest_change = 0.1,
