@@ -47,7 +47,8 @@ const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters) {
   throw UsageError({.place = "adaptation",
                     .expected = "a network: mlp, lstm or gru",
                     .found = std::string(family_of(parameters)),
-                    .advice = "Only a network has a last layer to adapt; fit this family again."});
+                    .advice = "Only a single network has a last layer to adapt; fit another "
+                              "family, or an ensemble, again."});
 }
 
 AdaptiveModel::AdaptiveModel(const Parameters& parameters)

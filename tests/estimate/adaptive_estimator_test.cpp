@@ -46,7 +46,7 @@ double run(AdaptiveEstimator& adaptive, Estimator frozen, double wrong_by, int s
     if (n >= samples / 2) sum += std::abs(told - reference);
     (void)adaptive.learn({.value = reference + 1e-6 * (n % 2)});
   }
-  return sum / (samples / 2);
+  return 2.0 * sum / samples;
 }
 
 TYPED_TEST(Adapted, LearnsAnOffsetWhateverTheFamily) {
@@ -115,6 +115,11 @@ TEST(AdaptiveEstimator, RefusesFamiliesWithoutALastLayer) {
                 AdaptiveEstimator(test::example_settings(), example<Polynomial>().parameters(), {});
               }),
               HasSubstr("expected a network: mlp, lstm or gru, found polynomial"));
+  EXPECT_THAT(error_message([] {
+                AdaptiveEstimator(test::example_settings(), example<GruEnsemble>().parameters(),
+                                  {});
+              }),
+              HasSubstr("found gru_ensemble"));
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ std::vector<double> numbers(const DenseLayer& layer) {
 
 /// W h~ in the target's unit.
 double value_of(const DenseLayer& layer, const std::vector<float>& features) {
-  double sum = static_cast<double>(layer.bias.front());
+  auto sum = static_cast<double>(layer.bias.front());
   for (std::size_t j = 0; j < features.size(); ++j)
     sum += static_cast<double>(layer.weights(0, j)) * static_cast<double>(features[j]);
   return kScale * sum;

@@ -27,14 +27,14 @@ using testing::HasSubstr;
 
 /// A small network of the bench whose torque is the reference.
 const ModelFile& bench_model() {
-  static const ModelFile kModel = [] {
+  static const ModelFile model = [] {
     const Dataset dataset = test::bench_dataset();
     const FeatureSpec features = resolve_inputs(dataset, {});
     return train_model(dataset,
                        {.family = "mlp", .options = {{"layers", "16"}}, .features = features}, 1)
         .file;
   }();
-  return kModel;
+  return model;
 }
 
 /// Another piece: its torque is off by an offset, and its spring is softer.
