@@ -56,6 +56,8 @@ constexpr std::array kBenches{
     Bench{"gru64_step", gru64_step, Peer{"libtorch", write_gru64}},
     Bench{"mlp_step", mlp_step, Peer{"libtorch", write_mlp}},
     Bench{"lstm250_x12_step", lstm250_x12_step, Peer{"libtorch", write_lstm250}},
+    Bench{"lstm250_nlms_update", lstm250_nlms_update},
+    Bench{"lstm250_rls_update", lstm250_rls_update},
     Bench{"lstm250_train_batch", lstm250_train_batch, Peer{"PyTorch"}},
     Bench{"lstm250_train_2threads", lstm250_train_2threads},
     Bench{"mlp_epoch", mlp_epoch, Peer{"scikit-learn"}},

@@ -3,11 +3,13 @@
 #include <concepts>
 #include <fstream>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "rows.hpp"
 #include "support/random_network.hpp"
+#include "torsio/model/last_layer_adapter.hpp"
 #include "torsio/model/network_bank.hpp"
 #include "torsio/model/parameters.hpp"
 
@@ -123,6 +125,56 @@ Row lstm250_x12_step() {
   return {.value = seconds / kTimed * 1e6,
           .unit = "us",
           .floor = std::max(arithmetic_s, floor_seconds(weights)) * 1e6};
+}
+
+namespace {
+
+constexpr std::size_t kAdapted = 250;  // features of the last layer
+
+/// One update on the features that an LSTM 250 tells; the network's own step is not in it.
+/// @param pass_bytes streamed in one update, at the least. @param multiply_adds done in it.
+Row update_row(AdaptationRule rule, std::size_t pass_bytes, double multiply_adds) {
+  const auto parameters = plain_network<Lstm>(kLstm250);
+  LastLayerAdapter adapter({.rule = rule, .frozen_after_s = 0.0}, parameters.head.back(), 1.0,
+                           1e-3);
+  Lstm network(parameters);
+  const Matrix inputs = waves(kLstm250.inputs);
+  std::vector<AlignedVector<float>> features;
+  std::vector<double> frozen;
+  for (std::size_t n = 0; n < kTimed; ++n) {
+    frozen.push_back(network.step(inputs.row(n)).value);
+    const auto seen = network.last_layer_input();
+    features.emplace_back(seen.begin(), seen.end());
+  }
+  std::size_t missed = 0;
+  const double seconds = best_seconds(
+      [&] {
+        for (std::size_t n = 0; n < kTimed; ++n) {
+          (void)adapter.step(features[n], frozen[n]);
+          const Learning outcome = adapter.learn({.value = frozen[n] + 0.1 * inputs(n, 0)});
+          if (outcome != Learning::updated && outcome != Learning::limited) ++missed;
+        }
+      },
+      2.0);
+  if (missed > 0) throw std::logic_error("an update was passed over: nothing was measured");
+  return {
+      .value = seconds / kTimed * 1e6,
+      .unit = "us",
+      .floor =
+          std::max(stream_seconds(pass_bytes), multiply_adds / multiply_adds_per_second()) * 1e6};
+}
+
+}  // namespace
+
+Row lstm250_nlms_update() {
+  // Correction, square of the features, the update, and its square; three vectors.
+  return update_row(AdaptationRule::nlms, 3 * kAdapted * sizeof(double), 4.0 * kAdapted);
+}
+
+Row lstm250_rls_update() {
+  // Half of P is read and written; each of its numbers is updated, scaled, and used in two rows.
+  constexpr std::size_t kNumbers = (kAdapted + 1) * (kAdapted + 2) / 2;
+  return update_row(AdaptationRule::rls, 2 * kNumbers * sizeof(double), 4.0 * kNumbers);
 }
 
 }  // namespace torsio::bench

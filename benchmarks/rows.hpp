@@ -29,6 +29,8 @@ Row lstm32_step();
 Row gru64_step();
 Row mlp_step();
 Row lstm250_x12_step();
+Row lstm250_nlms_update();
+Row lstm250_rls_update();
 Row lstm250_train_batch();
 Row lstm250_train_2threads();
 Row mlp_epoch();

@@ -12,5 +12,6 @@ void add_evaluate(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);
+void add_adapt(CLI::App& app);
 void add_attribute(CLI::App& app);
 void add_reproduce(CLI::App& app);

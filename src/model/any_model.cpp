@@ -80,6 +80,16 @@ void AnyModel::correct(double measured) noexcept {
   });
 }
 
+std::span<const float> AnyModel::last_layer_input() const noexcept {
+  return dispatch(model_, [](const auto& model) -> std::span<const float> {
+    if constexpr (requires { model.last_layer_input(); }) {
+      return model.last_layer_input();
+    } else {
+      return {};
+    }
+  });
+}
+
 bool AnyModel::can_invert() const noexcept {
   return dispatch(model_, []<class M>(const M&) { return Invertible<M>; });
 }

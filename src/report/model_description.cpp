@@ -112,6 +112,8 @@ std::string model_description(const ModelFile& model) {
   for (const Source& source : model.card.training_files)
     text += fmt::format("trained on {}{}\n", source.file,
                         source.sha256.empty() ? "" : fmt::format(", sha256 {}", source.sha256));
+  for (const auto& [option, value] : model.card.options)
+    if (option.starts_with("adaptation.")) text += fmt::format("{} {}\n", option, value);
   if (!model.card.metrics.empty()) {
     text += fmt::format("errors on {}:", model.card.held_out);
     for (const auto& [name, value] : model.card.metrics)
@@ -138,6 +140,7 @@ std::string model_description_json(const ModelFile& model) {
                 {"device_serial", model.card.device_serial},
                 {"inputs", Json::array()},
                 {"trained_on", Json::array()},
+                {"options", model.card.options},
                 {"held_out", model.card.held_out},
                 {"metrics", model.card.metrics},
                 {"parameters", Json::object()}};

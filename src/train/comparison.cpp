@@ -97,22 +97,6 @@ const ResultRow* whole_split(const std::vector<ResultRow>& rows, Role role) {
   return nullptr;
 }
 
-/// A file that is both trained and tested on would make every score a lie. (Blocks of one record are another matter.)
-void refuse_seen_test_records(const Dataset& dataset) {
-  std::set<std::string> trained;
-  for (const DatasetRecord& record : dataset.records)
-    if (record.has_role(Role::train)) trained.insert(record.recording.source.sha256);
-  for (const DatasetRecord& record : dataset.records) {
-    const bool is_held_out = !record.has_role(Role::train);
-    if (is_held_out && !record.recording.source.sha256.empty() &&
-        trained.contains(record.recording.source.sha256))
-      throw UsageError(
-          {.place = record.recording.name(),
-           .problem = "this file is both trained and judged on",
-           .advice = "Hold another recording out, or split one with `split:` in a manifest."});
-  }
-}
-
 }  // namespace
 
 std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view models,

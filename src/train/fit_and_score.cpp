@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <set>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -127,6 +128,21 @@ void note_inputs(Results& results, const ModelChoice& choice) {
 void forget_only_set(Results& results) {
   if (results.input_sets.size() == 1 && results.input_sets.front().first.empty())
     results.input_sets.clear();
+}
+
+void refuse_seen_test_records(const Dataset& dataset) {
+  std::set<std::string> trained;
+  for (const DatasetRecord& record : dataset.records)
+    if (record.has_role(Role::train)) trained.insert(record.recording.source.sha256);
+  for (const DatasetRecord& record : dataset.records) {
+    const bool is_held_out = !record.has_role(Role::train);
+    if (is_held_out && !record.recording.source.sha256.empty() &&
+        trained.contains(record.recording.source.sha256))
+      throw UsageError(
+          {.place = record.recording.name(),
+           .problem = "this file is both trained and judged on",
+           .advice = "Hold another recording out, or split one with `split:` in a manifest."});
+  }
 }
 
 Progress part_of(const Progress& progress, std::size_t index, std::size_t count,

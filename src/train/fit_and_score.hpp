@@ -61,6 +61,10 @@ void note_inputs(Results& results, const ModelChoice& choice);
 /// One input set without a name is none.
 void forget_only_set(Results& results);
 
+/// A file that is both trained and tested on would make every score a lie. (Blocks of one record are
+/// another matter.) @throws UsageError naming it.
+void refuse_seen_test_records(const Dataset& dataset);
+
 /// The share of work `index` of `count` in the whole work's progress. `progress` must outlive it.
 [[nodiscard]] Progress part_of(const Progress& progress, std::size_t index, std::size_t count,
                                const std::string& doing);

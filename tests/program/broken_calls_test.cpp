@@ -128,6 +128,73 @@ TEST_F(BrokenCalls, OfAttributionSayWhatIsMissing) {
   EXPECT_EQ(contents("x.json"), "");
 }
 
+TEST_F(BrokenCalls, OfAdaptationSayWhatIsMissingAndLeaveTheOutputUntouched) {
+  record();
+  ASSERT_EQ(
+      torsio("fit a.csv --model mlp --set layers=8 --set epochs=1 -o m.safetensors").exit_code, 0);
+  ASSERT_EQ(torsio("fit a.csv --model linear -o linear.safetensors").exit_code, 0);
+  folder_.file("old.safetensors", "precious");
+  const auto files = [this] { return shell("ls -A").out; };
+  const std::string before = files();
+  const std::string call = "adapt m.safetensors a.csv -o old.safetensors ";
+  expect_error(torsio("adapt"), kCallWasWrong, "MODEL");
+  expect_error(torsio("adapt m.safetensors"), kCallWasWrong, "at least one recording");
+  expect_error(torsio("adapt linear.safetensors a.csv -o old.safetensors"), kCallWasWrong,
+               "expected a network: mlp, lstm or gru, found linear");
+  expect_error(torsio("adapt nowhere.safetensors a.csv"), kWorkFailed, "nowhere");
+  expect_error(torsio("adapt m.safetensors nowhere.csv"), kWorkFailed, "nowhere");
+  expect_error(torsio(call + "--method lms"), kCallWasWrong, "nlms or rls");
+  expect_error(torsio(call + "--set step_size=2"), kCallWasWrong, "option step_size");
+  expect_error(torsio(call + "--set mu=1"), kCallWasWrong, "one of step_size");
+  expect_error(torsio(call + "--set step_size"), kCallWasWrong, "option=value");
+  expect_error(torsio(call + "--held-out 1"), kCallWasWrong, "a share between 0 and 1");
+  expect_error(torsio(call + "--held-out 0.2 --test b.csv"), kCallWasWrong, "excludes");
+  expect_error(torsio(call + "--test a.csv"), kCallWasWrong, "both trained and judged on");
+  expect_error(torsio(call + "--embargo 3Nm"), kCallWasWrong, "--embargo");
+  expect_error(torsio(call + "--embargo 100s"), kWorkFailed, "Give longer recordings");
+  expect_error(torsio(call + "--json old.safetensors"), kCallWasWrong, "two outputs");
+  expect_error(torsio("adapt m.safetensors a.csv -o m.safetensors"), kCallWasWrong, "replace");
+  expect_error(torsio("adapt m.safetensors a.csv -o a.csv"), kCallWasWrong, "replace");
+  expect_error(torsio("adapt m.safetensors a.csv -o no/such/m.safetensors"), kCallWasWrong,
+               "no/such");
+  expect_error(torsio("adapt m.safetensors a.csv -o /dev/full"), kWorkFailed, "/dev/full");
+  expect_error(shell("trap '' XFSZ; ulimit -f 1; {torsio} " + call + ">/dev/null"), kWorkFailed,
+               "old.safetensors: cannot write: File too large");
+  EXPECT_EQ(files(), before);
+  EXPECT_EQ(contents("old.safetensors"), "precious");
+}
+
+TEST_F(BrokenCalls, OfAdaptationNameWhatARecordingLacks) {
+  record();
+  ASSERT_EQ(
+      torsio("fit a.csv --model mlp --set layers=8 --set epochs=1 -o m.safetensors").exit_code, 0);
+  const std::string call = "adapt m.safetensors b.csv --embargo 0s";
+  folder_.file("b.csv", "t_s,torque_Nm\n0,1\n0.001,2\n0.002,3\n0.003,3\n");
+  expect_error(torsio(call), kWorkFailed, "gear_angle_rad");
+  folder_.file("b.csv", "t_s,gear_angle_rad,joint_angle_rad\n0,0,0\n0.001,0,0\n0.002,0,0\n");
+  expect_error(torsio(call), kWorkFailed, "torque_Nm");
+  std::string text = "t_s,gear_angle_rad,joint_angle_rad,torque_Nm\n";
+  for (int i = 0; i < 40; ++i) text += std::to_string(i * 0.001) + ",0.001,0,1\n";
+  folder_.file("b.csv", text);
+  expect_error(torsio(call), kWorkFailed, "not a single sample could be learned from");
+  expect_error(torsio(call), kWorkFailed, "28 warming_up");
+}
+
+TEST_F(BrokenCalls, CtrlCDuringAnAdaptationLeavesTheOutputUntouched) {
+  record();
+  ASSERT_EQ(
+      torsio("fit a.csv --model mlp --set layers=4000 --set epochs=1 -o m.safetensors").exit_code,
+      0);
+  folder_.file("old.safetensors", "precious");
+  // P has 8 million numbers: each update takes milliseconds.
+  expect_error(shell("timeout --foreground --signal=INT --preserve-status 2 {torsio} adapt "
+                     "m.safetensors a.csv "
+                     "--method rls -o old.safetensors --json x.json"),
+               kWorkFailed, "stopped on request");
+  EXPECT_EQ(contents("old.safetensors"), "precious");
+  EXPECT_EQ(contents("x.json"), "");
+}
+
 TEST_F(BrokenCalls, OfReproduceNameWhatThereIs) {
   expect_error(torsio("reproduce 004-tub"), kCallWasWrong, "004-tubes");
   expect_error(torsio("reproduce 004-tubes --repeats 0"), kCallWasWrong, "repeats");

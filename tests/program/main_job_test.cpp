@@ -90,6 +90,41 @@ TEST_F(MainJob, AttributesAModelToItsInputs) {
   EXPECT_EQ(torsio("attribute joint.safetensors b.csv --json -").out, contents("attribution.json"));
 }
 
+TEST_F(MainJob, AdaptsANetworkToAnotherJoint) {
+  const std::string inputs =
+      " --inputs 'motor_angle_rad - wave_generator_angle_rad,motor_torque_Nm'";
+  for (const char* call : {"#01 human-torque --duration 60s -o first.csv",
+                           "#03 human-torque --duration 60s --seed 2 -o third.csv"})
+    ASSERT_EQ(torsio(std::string("simulate 'harmonic-drive:soft'") + call).exit_code, 0);
+  ASSERT_EQ(torsio("fit first.csv --model gru -o joint.safetensors" + inputs).exit_code, 0);
+  const Outcome adapt = torsio(
+      "adapt joint.safetensors third.csv -o third.safetensors --serial three --json out.json");
+  ASSERT_EQ(adapt.exit_code, 0) << adapt.err;
+  for (const char* word : {"as it ran", "held out", "warming_up", "roll-backs"})
+    EXPECT_NE(adapt.out.find(word), std::string::npos) << adapt.out;
+  const auto json = nlohmann::json::parse(contents("out.json"));
+  EXPECT_EQ(json.at("method"), "nlms");
+  EXPECT_GT(json.at("updates"), 3000);
+  EXPECT_EQ(json.at("outcomes").at("warming_up"), 200);
+  const auto& held_out = json.at("held_out").at(0);
+  EXPECT_EQ(held_out.at("samples"), 1800);
+  EXPECT_LT(held_out.at("adapted").at("rmse"), held_out.at("frozen").at("rmse"));
+
+  const Outcome evaluate = torsio("evaluate third.safetensors third.csv");
+  EXPECT_EQ(evaluate.exit_code, 0) << evaluate.err;
+  EXPECT_NE(evaluate.err.find("was trained on third"), std::string::npos) << evaluate.err;
+  EXPECT_NE(torsio("evaluate third.safetensors").out.find("adaptation.method nlms"),
+            std::string::npos);
+  EXPECT_EQ(adapt.err.find("worse than the frozen"), std::string::npos) << adapt.err;
+  EXPECT_NE(torsio("adapt joint.safetensors first.csv --set step_size=1.9")
+                .err.find("worse than the frozen"),
+            std::string::npos);
+  // Nothing is written unless it is asked for.
+  const std::string before = shell("ls -A").out;
+  EXPECT_EQ(torsio("adapt joint.safetensors third.csv --method rls").exit_code, 0);
+  EXPECT_EQ(shell("ls -A").out, before);
+}
+
 TEST_F(MainJob, DemoWritesComparesDocument) {
   record();
   const Outcome compare = torsio("compare a.csv --test b.csv --models linear --json -");
@@ -134,6 +169,12 @@ TEST_F(MainJob, RunsTheExamples) {
   EXPECT_EQ(own.exit_code, 0) << own.err;
   EXPECT_NE(own.out.find("outside_training_range"), std::string::npos) << own.out;
   EXPECT_NE(own.out.find("input_not_finite"), std::string::npos) << own.out;
+  ASSERT_EQ(torsio("fit a.csv --model mlp -o network.safetensors").exit_code, 0);
+  const Outcome adapt = shell(std::string(TORSIO_EXAMPLES) +
+                              "/example_03_adapt network.safetensors adapted.safetensors");
+  EXPECT_EQ(adapt.exit_code, 0) << adapt.err;
+  EXPECT_NE(adapt.out.find(" updates"), std::string::npos) << adapt.out;
+  EXPECT_EQ(torsio("evaluate adapted.safetensors b.csv").exit_code, 0);
 }
 
 TEST_F(MainJob, TellsMachinesWhatItSimulated) {

@@ -12,6 +12,7 @@
 #include "support/every_family.hpp"
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
+#include "torsio/estimate/adaptive_estimator.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/model/network_bank.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
@@ -101,6 +102,52 @@ TEST(NetworkBank, StepAndStatesNeverTouchTheHeap) {
               network.reset(state);
             }),
             0U);
+}
+
+/// A reference that runs into every guard: it swings about the frozen value, small or large.
+ReferenceSample troublesome(int n, double told, double frozen) {
+  const double swing = (n % 2 == 0 ? 1.0 : -1.0) * (n / 500 % 2 == 0 ? 0.5 : 20.0);
+  const double value = n % 7 == 0    ? kNaN
+                       : n % 11 == 0 ? 200.0
+                       : n % 13 == 0 ? told
+                       : n % 17 == 0 ? told + 60.0
+                                     : frozen + swing;
+  return {.value = value, .age_s = n % 19 == 0 ? 1.0 : 0.0};
+}
+
+TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
+  EstimatorSettings settings = test::example_settings();
+  settings.zeroed_channels.clear();
+  for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
+    Estimator frozen(settings, AnyModel(example<Lstm>()));
+    AdaptiveEstimator estimator(settings, example<Lstm>().parameters(),
+                                {.rule = rule,
+                                 .step_size = 1.0,
+                                 .forgetting = 0.9,
+                                 .initial_covariance = 1.0,
+                                 .sensor_std = 0.01,
+                                 .saturation = 100.0,
+                                 .largest_change = 0.1,
+                                 .comparison_s = 0.5});
+    EXPECT_EQ(heap_calls_during([&] {
+                for (int n = 0; n < 4000; ++n) {
+                  const std::array raw{0.1 * std::sin(0.01 * n), 0.0};
+                  const double told = estimator.step(raw).value;
+                  (void)estimator.learn(troublesome(n, told, frozen.step(raw).value));
+                  if (n == 2000) estimator.pause();
+                  if (n == 2100) estimator.resume();
+                }
+                (void)estimator.step(std::array{kNaN, 0.0});
+                (void)estimator.learn({.value = 1.0});
+                estimator.reset();
+              }),
+              0U);
+    const AdaptationCounts counts = estimator.adapter().counts();
+    for (std::size_t outcome = 0; outcome < kLearningOutcomes; ++outcome)
+      EXPECT_GT(counts.outcomes[outcome], 0U) << name(static_cast<Learning>(outcome));
+    EXPECT_GT(counts.roll_backs, 0U);
+    EXPECT_EQ(heap_calls_during([&] { estimator.forget(); }), 0U);
+  }
 }
 
 TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {

@@ -58,6 +58,7 @@ class BasicEstimator {
     return core_.raw_inputs();
   }
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return core_.settings(); }
+  [[nodiscard]] M& model() noexcept { return model_; }
   [[nodiscard]] const M& model() const noexcept { return model_; }
 
   /// Subtracts `value` (SI) from a raw channel from now on, `reset()` or not. Call it while

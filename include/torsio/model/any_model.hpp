@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -75,6 +76,8 @@ class AnyModel {
   [[nodiscard]] bool feeds_back() const noexcept;  ///< its own output, as `FeedsBack` families do
   /// Puts a measurement in the place of the last output; nothing to a model that does not feed back.
   void correct(double measured) noexcept TORSIO_REALTIME;
+  /// What the last layer of a network saw in the last step; empty for other families.
+  [[nodiscard]] std::span<const float> last_layer_input() const noexcept;
 
   [[nodiscard]] bool can_invert() const noexcept;
   /// The first input at which the model says `target`, the others being as given; see the family's

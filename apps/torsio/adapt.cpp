@@ -1,0 +1,109 @@
+#include <fmt/format.h>
+
+#include "data_flags.hpp"
+#include "model_doubts.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/model/adaptive_model.hpp"
+#include "torsio/report/adaptation.hpp"
+#include "torsio/train/adaptation.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct AdaptFlags {
+  std::string model;
+  DataFlags data;
+  std::vector<std::string> test;
+  double held_out = 0.3;
+  std::string embargo = "1s";
+  std::string method = "nlms";
+  std::vector<std::string> settings;
+  std::string output;
+  std::string device_serial;
+  JsonOutput json;
+};
+
+std::string settings_list() {
+  std::string text = "Settings, --set option=value:\n";
+  for (const torsio::OptionInfo& option : torsio::adaptation_options())
+    text += fmt::format("  {}={}  {} ({:g} to {:g})\n", option.name, option.default_value,
+                        option.help, option.minimum, option.maximum);
+  return text;
+}
+
+torsio::Dataset load(const AdaptFlags& flags, const torsio::ModelFile& file,
+                     const torsio::Progress& progress) {
+  DataFlags data = flags.data;
+  data.target = file.settings.target;
+  torsio::Dataset dataset = data.load({}, flags.test, progress);
+  if (!dataset.has_role(torsio::Role::test))
+    torsio::hold_out_ends(dataset, flags.held_out,
+                          torsio::si_quantity(flags.embargo, "s", "--embargo"));
+  return dataset;
+}
+
+void run(const AdaptFlags& flags) {
+  std::vector<std::string> read = flags.test;
+  read.push_back(flags.model);
+  flags.data.check_outputs({flags.output, flags.json.destination}, read);
+  const auto settings = torsio::adaptation_settings(flags.method, parse_settings(flags.settings));
+  const torsio::ModelFile file = torsio::load_model(flags.model);
+  torsio::require_last_layer(file.parameters);  // before recordings are read
+  ProgressBar bar;
+  const torsio::Dataset dataset = load(flags, file, bar.listener());
+  warn_of_seen_recordings(file, dataset);
+  warn_of_missing_zeros(file, dataset);
+  torsio::AdaptedModel adapted = torsio::adapt_model(file, dataset, settings, bar.listener());
+  if (!flags.device_serial.empty()) adapted.file.card.device_serial = flags.device_serial;
+  if (flags.json.wants_tables()) print(torsio::adaptation_text(adapted, flags.model));
+  flags.json.write(torsio::adaptation_json(adapted, flags.model));
+  const torsio::AdaptationScore& held_out = adapted.held_out.back();
+  if (held_out.adapted.rmse > held_out.frozen.rmse)
+    remark(
+        "warning: on what was held out the adapted weights are worse than the frozen ones; try a "
+        "smaller step_size (initial_covariance for rls), or comparison_s as long as a cycle");
+  if (flags.output.empty()) return;
+  torsio::save_model(flags.output, adapted.file);  // last: untouched unless all else succeeded
+  remark(flags.output + " written");
+}
+
+}  // namespace
+
+void add_adapt(CLI::App& app) {
+  auto flags = std::make_shared<AdaptFlags>();
+  CLI::App* verb = app.add_subcommand(
+      "adapt", "replay recordings through a network whose last layer goes on learning");
+  verb->footer(
+      "Example: torsio adapt joint.safetensors other_piece.csv -o other_joint.safetensors\n"
+      "         torsio adapt joint.safetensors warm.csv --test warm2.csv --method rls\n"
+      "Without --test, the last 30 % of each recording are not learned from but scored on; of a\n"
+      "manifest, what has the role train is learned from, what has the role test scored on.\n" +
+      settings_list());
+  verb->add_option("MODEL", flags->model, "model file of an mlp, lstm or gru")->required();
+  flags->data.add_recordings(*verb, "recordings to learn from, in this order, or a manifest");
+  flags->data.add_mapping(*verb);
+  CLI::Option* test = verb->add_option("--test", flags->test, "recordings that are only scored on");
+  verb->add_option("--held-out", flags->held_out,
+                   "share of each recording, at its end, that is only scored on")
+      ->capture_default_str()
+      ->excludes(test);
+  verb->add_option("--embargo", flags->embargo, "time before that part that is used for nothing")
+      ->capture_default_str();
+  verb->add_option("--method", flags->method,
+                   "nlms: cheap, steady; rls: learns in fewer samples, costs the square of the "
+                   "last layer's width")
+      ->capture_default_str();
+  verb->add_option("--set", flags->settings, "a setting, option=value; listed below")
+      ->allow_extra_args(false);
+  verb->add_option("-o,--output", flags->output,
+                   "adapted model file; untouched unless all else succeeds");
+  verb->add_option("--serial", flags->device_serial,
+                   "serial number of the joint that the adapted model belongs to");
+  verb->add_option("--json", flags->json.destination,
+                   "write the results as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

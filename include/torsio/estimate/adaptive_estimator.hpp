@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/realtime.hpp"
+#include "torsio/estimate/estimator.hpp"
+#include "torsio/model/adaptive_model.hpp"
+
+namespace torsio {
+
+/// An `Estimator` around a network that goes on learning, in its last layer, from a reference sensor
+/// as long as there is one. Each tick:
+///
+///     const Estimate torque = estimator.step(raw);         // of the weights before this tick's reference
+///     estimator.learn({.value = load_cell_Nm, .age_s = age_s});
+///
+/// Where the estimate was a guard's and not the network's (`fault` is not `none`), nothing is
+/// learned. Nothing is allocated after construction.
+class AdaptiveEstimator {
+ public:
+  /// @param network of a model file (`ModelFile::parameters`). @throws Error as `Estimator` and
+  /// `AdaptiveModel`.
+  AdaptiveEstimator(const EstimatorSettings& settings, const AnyModel::Parameters& network,
+                    const AdaptationSettings& adaptation);
+
+  [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept {
+    return estimator_.raw_inputs();
+  }
+  [[nodiscard]] const EstimatorSettings& settings() const noexcept { return estimator_.settings(); }
+  /// As the estimator's.
+  void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
+
+  /// Filters and hidden state; what was learned stays.
+  void reset() noexcept;
+  /// Back to the frozen network.
+  void forget() noexcept { estimator_.model().adapter().reset(); }
+  void pause() noexcept { estimator_.model().adapter().pause(); }
+  void resume() noexcept { estimator_.model().adapter().resume(); }
+
+  Estimate step(std::span<const double> raw) noexcept TORSIO_REALTIME;
+  /// @param reference of the tick that `step` was called for last, as it is measured: zeros and units
+  /// of the model's target.
+  Learning learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] const LastLayerAdapter& adapter() const noexcept {
+    return estimator_.model().adapter();
+  }
+  /// The network as it is now, for a model file.
+  [[nodiscard]] AnyModel::Parameters adapted() const { return estimator_.model().adapted(); }
+
+ private:
+  BasicEstimator<AdaptiveModel> estimator_;
+  Fault last_fault_ = Fault::warming_up;
+};
+
+}  // namespace torsio

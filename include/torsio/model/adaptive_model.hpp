@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+
+#include "torsio/core/realtime.hpp"
+#include "torsio/model/any_model.hpp"
+#include "torsio/model/last_layer_adapter.hpp"
+#include "torsio/model/model.hpp"
+
+namespace torsio {
+
+/// The last layer of a network's parameters, or null: its family is none of `mlp`, `lstm`, `gru`.
+[[nodiscard]] const DenseLayer* last_layer(const AnyModel::Parameters& parameters) noexcept;
+/// The same. @throws UsageError where there is none.
+const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters);
+
+/// A network whose last layer can be adapted while it runs: a `Model`, so that an estimator's guards
+/// go around it (`AdaptiveEstimator`).
+class AdaptiveModel {
+ public:
+  struct Parameters {
+    AnyModel::Parameters network;
+    AdaptationSettings adaptation;
+    double sample_period_s = 0.0;
+  };
+
+  /// @throws Error as the network's own family and `LastLayerAdapter`, or UsageError if the family
+  /// has no last layer.
+  explicit AdaptiveModel(const Parameters& parameters);
+
+  /// Those of the frozen network.
+  [[nodiscard]] Parameters parameters() const;
+  [[nodiscard]] std::size_t input_count() const noexcept { return network_.input_count(); }
+  [[nodiscard]] std::size_t parameter_count() const noexcept { return network_.parameter_count(); }
+
+  /// The hidden state; what was learned stays (`adapter().reset()`).
+  void reset() noexcept { network_.reset(); }
+  /// The value of the adapted weights.
+  Estimate step(Features features) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] LastLayerAdapter& adapter() noexcept { return adapter_; }
+  [[nodiscard]] const LastLayerAdapter& adapter() const noexcept { return adapter_; }
+
+  /// The network with the weights as they are now: a model like any other, to be saved.
+  [[nodiscard]] AnyModel::Parameters adapted() const;
+
+ private:
+  AnyModel network_;
+  LastLayerAdapter adapter_;
+  double sample_period_s_;
+};
+
+}  // namespace torsio

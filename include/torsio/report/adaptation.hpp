@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include "torsio/train/adaptation.hpp"
+
+namespace torsio {
+
+/// `{"model","family","target","unit","method","outcomes":{...},"updates","roll_backs",
+/// "covariance_resets","relative_change","as_it_ran":[{"recording","samples","frozen":{"rmse",...},
+/// "adapted":{...}}],"held_out":[...]}`; ends with a line feed.
+/// @param model the model file's name.
+[[nodiscard]] std::string adaptation_json(const AdaptedModel& adapted, const std::string& model);
+
+/// Frozen beside adapted: on the recordings that were learned from, as it ran, and on what was held
+/// out; then what was passed over and why.
+[[nodiscard]] std::string adaptation_text(const AdaptedModel& adapted, const std::string& model);
+
+}  // namespace torsio

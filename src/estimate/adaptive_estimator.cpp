@@ -1,0 +1,30 @@
+#include "torsio/estimate/adaptive_estimator.hpp"
+
+namespace torsio {
+
+AdaptiveEstimator::AdaptiveEstimator(const EstimatorSettings& settings,
+                                     const AnyModel::Parameters& network,
+                                     const AdaptationSettings& adaptation)
+    : estimator_(settings, AdaptiveModel({.network = network,
+                                          .adaptation = adaptation,
+                                          .sample_period_s = 1.0 / settings.sample_rate_Hz})) {}
+
+void AdaptiveEstimator::reset() noexcept {
+  estimator_.reset();
+  last_fault_ = Fault::warming_up;
+}
+
+Estimate AdaptiveEstimator::step(std::span<const double> raw) noexcept {
+  const Estimate told = estimator_.step(raw);
+  last_fault_ = told.fault;
+  return told;
+}
+
+Learning AdaptiveEstimator::learn(const ReferenceSample& reference) noexcept {
+  LastLayerAdapter& adapter = estimator_.model().adapter();
+  if (last_fault_ == Fault::none) return adapter.learn(reference);
+  return adapter.pass_over(last_fault_ == Fault::warming_up ? Learning::warming_up
+                                                            : Learning::no_estimate);
+}
+
+}  // namespace torsio

@@ -1,0 +1,126 @@
+#include "torsio/estimate/adaptive_estimator.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "support/dump.hpp"
+#include "support/error_message.hpp"
+#include "support/example_models.hpp"
+#include "support/example_settings.hpp"
+
+namespace torsio {
+namespace {
+
+using test::dump;
+using test::error_message;
+using test::example;
+using testing::HasSubstr;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+EstimatorSettings settings_without_zeros() {
+  EstimatorSettings settings = test::example_settings();
+  settings.zeroed_channels.clear();
+  return settings;
+}
+
+template <class Network>
+class Adapted : public testing::Test {};
+using Networks = testing::Types<Mlp, Lstm, Gru>;
+TYPED_TEST_SUITE(Adapted, Networks);
+
+std::array<double, 2> raw_at(int n) { return {0.1 * std::sin(0.01 * n), 0.0}; }
+
+/// Steps an estimator and its frozen twin; the reference is the frozen value, wrong by as much.
+/// @returns mean |error| of the adapted one in the second half.
+double run(AdaptiveEstimator& adaptive, Estimator frozen, double wrong_by, int samples = 4000) {
+  double sum = 0.0;
+  for (int n = 0; n < samples; ++n) {
+    const double reference = frozen.step(raw_at(n)).value + wrong_by;
+    const double told = adaptive.step(raw_at(n)).value;
+    if (n >= samples / 2) sum += std::abs(told - reference);
+    (void)adaptive.learn({.value = reference + 1e-6 * (n % 2)});
+  }
+  return 2.0 * sum / samples;
+}
+
+TYPED_TEST(Adapted, LearnsAnOffsetWhateverTheFamily) {
+  const auto network = example<TypeParam>().parameters();
+  for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
+    AdaptiveEstimator adaptive(settings_without_zeros(), network, {.rule = rule});
+    const Estimator frozen(settings_without_zeros(), AnyModel(example<TypeParam>()));
+    EXPECT_LT(run(adaptive, frozen, 3.0), 1.0);
+    EXPECT_GT(adaptive.adapter().counts().updates(), 3000U);
+    EXPECT_GT(adaptive.adapter().counts().of(Learning::warming_up), 0U);
+    EXPECT_EQ(adaptive.adapter().counts().roll_backs, 0U);
+  }
+}
+
+TYPED_TEST(Adapted, TheAdaptedNetworkTellsWhatTheAdaptiveOneDid) {
+  const auto network = example<TypeParam>().parameters();
+  AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
+  (void)run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<TypeParam>())), 3.0);
+  adaptive.pause();
+  adaptive.reset();
+  Estimator kept(settings_without_zeros(), AnyModel(adaptive.adapted()));
+  for (int n = 0; n < 1000; ++n) {
+    const Estimate told = adaptive.step(raw_at(n));
+    const Estimate again = kept.step(raw_at(n));
+    EXPECT_NEAR(told.value, again.value, 1e-4);
+    EXPECT_EQ(told.fault, again.fault);
+  }
+}
+
+TYPED_TEST(Adapted, ResetKeepsWhatWasLearnedAndForgetDoesNot) {
+  const AnyModel::Parameters network = example<TypeParam>().parameters();
+  AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
+  (void)run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<TypeParam>())), 3.0);
+  const std::string learned = dump(adaptive.adapted());
+  adaptive.reset();
+  EXPECT_EQ(adaptive.step(raw_at(0)).fault, Fault::warming_up);
+  EXPECT_EQ(dump(adaptive.adapted()), learned);
+  EXPECT_NE(learned, dump(network));
+  adaptive.forget();
+  EXPECT_EQ(dump(adaptive.adapted()), dump(network));
+}
+
+TYPED_TEST(Adapted, TicksWithoutAnEstimateOfTheNetworkTeachNothing) {
+  const AnyModel::Parameters network = example<TypeParam>().parameters();
+  AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::warming_up);
+  for (int n = 0; n < 1000; ++n) (void)adaptive.step(raw_at(n));
+  (void)adaptive.step(std::array{kNaN, 0.0});
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::no_estimate);
+  EXPECT_EQ(adaptive.step(std::array{50.0, 0.0}).fault, Fault::outside_training_range);
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::no_estimate);
+  EXPECT_EQ(dump(adaptive.adapted()), dump(network));
+}
+
+TEST(AdaptiveEstimator, WaitsForItsZeros) {
+  AdaptiveEstimator adaptive(test::example_settings(), example<Mlp>().parameters(), {});
+  for (int n = 0; n < 1000; ++n) (void)adaptive.step(raw_at(n));
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::no_estimate);
+  adaptive.set_zero("joint_angle_rad", 0.0);
+  (void)adaptive.step(raw_at(1000));
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::updated);
+}
+
+TEST(AdaptiveEstimator, RefusesFamiliesWithoutALastLayer) {
+  EXPECT_THAT(error_message([] {
+                AdaptiveEstimator(test::example_settings(), example<Polynomial>().parameters(), {});
+              }),
+              HasSubstr("expected a network: mlp, lstm or gru, found polynomial"));
+  EXPECT_THAT(error_message([] {
+                AdaptiveEstimator(test::example_settings(), example<GruEnsemble>().parameters(),
+                                  {});
+              }),
+              HasSubstr("found gru_ensemble"));
+}
+
+}  // namespace
+}  // namespace torsio
