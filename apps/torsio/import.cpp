@@ -14,6 +14,9 @@
 #include "torsio/import/weights_json.hpp"
 #include "torsio/report/model_description.hpp"
 #include "verbs.hpp"
+#ifdef TORSIO_HAS_ONNX
+#include "torsio/import/onnx_network.hpp"
+#endif
 
 namespace {
 
@@ -43,12 +46,27 @@ bool is_json(const std::vector<std::byte>& bytes) {
   return first != bytes.end() && *first == std::byte{'{'};
 }
 
-torsio::ForeignNetwork read(const ImportFlags& flags, const torsio::ForeignFile& file) {
-  if (!is_json(file.bytes))
-    throw torsio::Error({.place = flags.file, .expected = "JSON", .found = "something else"});
+torsio::ForeignNetwork read_graph(const ImportFlags& flags, const torsio::ForeignFile& file) {
+  if (!flags.activation.empty())
+    throw torsio::UsageError({.place = "--activation",
+                              .problem = "an ONNX graph has its activations in it",
+                              .advice = "Leave --activation away."});
+#ifdef TORSIO_HAS_ONNX
+  return torsio::parse_onnx(file.bytes, flags.file, flags.graph_output);
+#else
+  throw torsio::Error({.place = flags.file,
+                       .expected = "weights as JSON",
+                       .found = "something else",
+                       .advice = "This torsio was built without ONNX: install libonnx-dev and "
+                                 "libprotobuf-dev and build it again."});
+#endif
+}
+
+torsio::ForeignNetwork read_weights(const ImportFlags& flags, const torsio::ForeignFile& file) {
   if (!flags.graph_output.empty())
-    throw torsio::UsageError(
-        {.place = "--output-name", .problem = "weights in JSON have no graph"});
+    throw torsio::UsageError({.place = "--output-name",
+                              .problem = "weights as JSON have no graph with outputs",
+                              .advice = "Leave --output-name away."});
   std::optional<torsio::Activation> activation;
   if (!flags.activation.empty()) activation = torsio::activation_of(flags.activation);
   return torsio::parse_weights_json(file.bytes, flags.file, activation);
@@ -72,7 +90,8 @@ void run(const ImportFlags& flags) {
                               .advice = kExample});
   flags.data.check_outputs({flags.output, flags.json.destination}, {flags.file});
   const torsio::ForeignFile file = torsio::read_foreign_file(flags.file);
-  const torsio::ForeignNetwork network = read(flags, file);
+  const torsio::ForeignNetwork network =
+      is_json(file.bytes) ? read_weights(flags, file) : read_graph(flags, file);
   ProgressBar bar;
   std::optional<torsio::Dataset> guards;
   if (!flags.data.recordings.empty()) guards = flags.data.load({}, {}, bar.listener());
@@ -95,7 +114,8 @@ void add_import(CLI::App& app) {
   CLI::App* verb =
       app.add_subcommand("import", "make a model file of a network that another program trained");
   verb->footer(kExample);
-  verb->add_option("FILE", flags->file, "PyTorch weights by name as JSON")->required();
+  verb->add_option("FILE", flags->file, "ONNX graph, or PyTorch weights by name as JSON")
+      ->required();
   verb->add_option(
       "--inputs", flags->data.inputs,
       "what goes into the network, in its order: expressions of channels, separated by "

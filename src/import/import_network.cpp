@@ -122,7 +122,9 @@ ImportedModel import_network(const ForeignNetwork& network, const Source& source
     throw UsageError({.place = "--rate",
                       .expected = "the sample rate that the network was trained at",
                       .found = fmt::format("{} Hz", options.sample_rate_Hz)});
-  const std::size_t warm_up = options.warm_up_samples.value_or(network.window.value_or(0));
+  // A window of one sample asks for no others.
+  const std::size_t window = network.window.value_or(1);
+  const std::size_t warm_up = options.warm_up_samples.value_or(window > 1 ? window : 0);
   ImportedModel imported{
       .file = {.card = card_of(options, source),
                .settings = open_settings(options),

@@ -40,12 +40,20 @@ ImportedModel imported(const Json& one) {
                         options);
 }
 
+std::size_t warm_up(const AnyModel::Parameters& parameters) {
+  if (const auto* const lstm = std::get_if<Lstm::Parameters>(&parameters))
+    return lstm->warm_up_samples;
+  const auto* const gru = std::get_if<Gru::Parameters>(&parameters);
+  return gru == nullptr ? 0 : gru->warm_up_samples;
+}
+
 class ImportGolden : public testing::TestWithParam<Json> {};
 
 TEST_P(ImportGolden, StreamsWhatPyTorchTells) {
   const Json& one = GetParam();
   const ImportedModel import = imported(one);
   EXPECT_EQ(family_of(import.file.parameters), one.at("family"));
+  EXPECT_EQ(warm_up(import.file.parameters), one.value("window", std::size_t{0}));
   AnyModel model(import.file.parameters);
   const auto inputs = one.at("inputs").get<std::vector<double>>();
   const auto outputs = one.at("outputs").get<std::vector<double>>();
