@@ -12,7 +12,8 @@ namespace torsio {
 namespace {
 
 static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial> &&
-              Model<Dgmm> && Model<Mlp> && Model<Lstm> && Model<Gru>);
+              Model<Dgmm> && Model<Mlp> && Model<Lstm> && Model<Gru> && Model<MlpEnsemble> &&
+              Model<LstmEnsemble> && Model<GruEnsemble>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

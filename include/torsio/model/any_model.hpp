@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/ensemble.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
@@ -33,7 +34,10 @@ using KnownFamilies = FamilyList<Linear,         //
                                  Dgmm,           //
                                  Mlp,            //
                                  Lstm,           //
-                                 Gru>;
+                                 Gru,            //
+                                 MlpEnsemble,    //
+                                 LstmEnsemble,   //
+                                 GruEnsemble>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`
 /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
