@@ -148,7 +148,7 @@ const Value* Evaluator::find(const std::string& name) const {
   return found == values_.end() ? nullptr : &found->second;
 }
 
-bool Evaluator::has_input(const Node& node, std::size_t index) const {
+bool Evaluator::has_input(const Node& node, std::size_t index) {
   return index < node.inputs.size() && !node.inputs[index].empty();
 }
 

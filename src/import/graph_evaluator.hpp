@@ -31,7 +31,7 @@ class Evaluator {
   // graph_evaluator.cpp: what the value's place in the graph decides
   [[nodiscard]] const Value* find(const std::string& name) const;
   [[nodiscard]] const Value& input(const Node& node, std::size_t index) const;
-  [[nodiscard]] bool has_input(const Node& node, std::size_t index) const;
+  [[nodiscard]] static bool has_input(const Node& node, std::size_t index);
   [[nodiscard]] const Signal& signal(const Node& node, std::size_t index) const;
   [[nodiscard]] const Tensor& constant(const Node& node, std::size_t index) const;
   /// A list of whole numbers, from the input or, as in older operator sets, the attribute; none if
@@ -75,12 +75,12 @@ class Evaluator {
   Value magnitude(const Node& node);
   Value activation(const Node& node);
   Value recurrent(const Node& node);
-  [[nodiscard]] Signal affine(const Node& node, const Signal& signal, std::vector<double> gain,
+  [[nodiscard]] Signal affine(const Node& node, const Signal& from, std::vector<double> gain,
                               std::vector<double> offset);
   /// A constant that is added to or multiplied with each feature, one number a feature.
-  [[nodiscard]] std::vector<double> by_feature(const Node& node, Signal& signal,
+  [[nodiscard]] std::vector<double> by_feature(const Node& node, Signal& from,
                                                const Tensor& tensor) const;
-  [[nodiscard]] Signal dense(const Node& node, const Signal& signal, Matrix weights,
+  [[nodiscard]] Signal dense(const Node& node, const Signal& from, Matrix weights,
                              std::vector<double> bias);
   [[nodiscard]] RecurrentStage recurrent_stage(const Node& node, std::size_t inputs) const;
   void check_recurrent(const Node& node) const;

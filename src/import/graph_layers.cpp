@@ -112,7 +112,10 @@ std::vector<double> Evaluator::by_feature(const Node& node, Signal& from,
   // A constant of more axes adds axes of size 1 in front.
   while (from.axes.size() < tensor.shape.size() && tensor.values.size() <= from.width)
     from.axes.insert(from.axes.begin(), Axis{});
-  if (tensor.values.size() == 1) return std::vector<double>(from.width, tensor.values.front());
+  if (tensor.values.size() == 1) {
+    std::vector<double> same(from.width, tensor.values.front());
+    return same;
+  }
   if (!ends_in_features(from) || tensor.values.size() != from.width || tensor.shape.empty() ||
       tensor.shape.back() != static_cast<std::int64_t>(from.width))
     refuse(graph_, node, fmt::format("one number, or {}: one a channel", from.width),

@@ -131,7 +131,8 @@ class WeightReader {
   /// 0 if there is none.
   [[nodiscard]] std::vector<double> bias(const std::string& name, std::size_t length) {
     const std::optional<Weights> weights = take(name);
-    if (!weights) return std::vector<double>(length, 0.0);
+    std::vector<double> none(length, 0.0);
+    if (!weights) return none;
     if (weights->shape.size() != 1 || weights->values.size() != length)
       refuse(at(name), fmt::format("shape [{}]", length), shape_text(weights->shape));
     return weights->values;
