@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <onnx/onnx_pb.h>
 
+#include <array>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -207,8 +208,8 @@ TEST(OnnxNetwork, ThatMixesSamplesAndChannelsIsRefused) {
   EXPECT_THAT(refusal_after("keras_gru.onnx",
                             [](onnx::GraphProto& graph) {
                               // Rows of a sample and a half.
-                              const std::int64_t rows[] = {-1, 6};
-                              tensor_of(graph, "rows").set_raw_data(rows, sizeof rows);
+                              const std::array<std::int64_t, 2> rows{-1, 6};
+                              tensor_of(graph, "rows").set_raw_data(rows.data(), sizeof rows);
                             }),
               AllOf(HasSubstr("(Reshape)"), HasSubstr("samples and channels apart")));
   EXPECT_THAT(refusal_after("batch_first_lstm.onnx",
