@@ -46,7 +46,8 @@ bool is_json(const std::vector<std::byte>& bytes) {
   return first != bytes.end() && *first == std::byte{'{'};
 }
 
-torsio::ForeignNetwork read_graph(const ImportFlags& flags, const torsio::ForeignFile& file) {
+torsio::ForeignNetwork read_graph(const ImportFlags& flags,
+                                  [[maybe_unused]] const torsio::ForeignFile& file) {
   if (!flags.activation.empty())
     throw torsio::UsageError({.place = "--activation",
                               .problem = "an ONNX graph has its activations in it",
