@@ -14,3 +14,4 @@ void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);
 void add_attribute(CLI::App& app);
 void add_import(CLI::App& app);
+void add_reproduce(CLI::App& app);

@@ -10,6 +10,7 @@
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
 #include "train/fitted_model.hpp"
+#include "train/narx_families.hpp"
 #include "train/network_families.hpp"
 
 namespace torsio {
@@ -135,6 +136,8 @@ std::span<const FamilyInfo> families() noexcept {
     std::vector<FamilyInfo> list(kShallowFamilies.begin(), kShallowFamilies.end());
     const auto networks = network_families();
     list.insert(list.end(), networks.begin(), networks.end());
+    const auto with_feedback = narx_families(list);
+    list.insert(list.end(), with_feedback.begin(), with_feedback.end());
     return list;
   }();
   return all;
