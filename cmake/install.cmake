@@ -1,4 +1,4 @@
-# Two export sets, so that a robot that links runtime and files need not have the lab's libraries.
+# An export set for each of runtime with files, lab and onnx, so that a robot that links runtime and files need not have the lab's libraries.
 include(CMakePackageConfigHelpers)
 set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
 
@@ -9,6 +9,10 @@ if(TORSIO_BUILD_LAB)
   install(TARGETS torsio_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(TARGETS torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT torsioLabTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
+endif()
+if(TORSIO_HAS_ONNX)
+  install(TARGETS torsio_onnx EXPORT torsioOnnxTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT torsioOnnxTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
 endif()
 
 configure_package_config_file(cmake/torsioConfig.cmake.in ${PROJECT_BINARY_DIR}/torsioConfig.cmake

@@ -35,6 +35,7 @@ int run(int argc, char** argv) {
   add_crossvalidate(app);
   add_attribute(app);
   add_adapt(app);
+  add_import(app);
   add_reproduce(app);
   catch_interrupts();
   try {

@@ -14,4 +14,5 @@ void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);
 void add_adapt(CLI::App& app);
 void add_attribute(CLI::App& app);
+void add_import(CLI::App& app);
 void add_reproduce(CLI::App& app);

@@ -32,6 +32,31 @@ TEST_F(BrokenCalls, OfTheCommandLineExitWithTwo) {
   EXPECT_EQ(torsio("check").exit_code, kCallWasWrong);
 }
 
+TEST_F(BrokenCalls, OfImportLeaveTheirOutputAlone) {
+  const std::string weights =
+      "import '" + std::string(TORSIO_SOURCE) + "/tests/golden/import/weights_mlp.json' ";
+  folder_.file("m.safetensors", "old");
+  const std::string to = "-o m.safetensors --rate 100Hz ";
+  expect_error(torsio(weights + "-o m.safetensors"), kCallWasWrong, "--inputs, --rate and -o");
+  expect_error(torsio(weights + to + "--inputs a_rad,b_rad"), kCallWasWrong, "--activation");
+  const std::string call = weights + to + "--activation softsign ";
+  expect_error(torsio(call + "--inputs a_rad,b_rad"), kCallWasWrong, "--inputs: expected 3");
+  expect_error(torsio(weights + to + "--inputs a_rad,b_rad,c_rad --activation sine"), kCallWasWrong,
+               "softsign");
+  const std::string good = call + "--inputs a_rad,b_rad,c_rad ";
+  expect_error(torsio(good + "--input-scale 1,2"), kCallWasWrong, "--input-scale: expected 3");
+  expect_error(torsio(good + "--output-scale 0"), kCallWasWrong, "--output-scale");
+  expect_error(torsio(good + "--target torque"), kWorkFailed, "unit");
+  expect_error(torsio(good + "--output-name y"), kCallWasWrong, "--output-name");
+  folder_.file("net.json", R"({"tensors": {"a.weight": {"shape": [1, 1], "data": [)");
+  expect_error(torsio("import net.json " + to + "--inputs a_rad"), kWorkFailed, "net.json");
+  folder_.file("net.onnx", "\x08\x07");
+  expect_error(torsio("import net.onnx " + to + "--inputs a_rad"), kWorkFailed, "net.onnx");
+  expect_error(torsio("import m.safetensors " + to + "--inputs a_rad"), kCallWasWrong,
+               "would replace a file that is read");
+  EXPECT_EQ(contents("m.safetensors"), "old");
+}
+
 TEST_F(BrokenCalls, WithASeedThatIsNoneAreRefusedByEveryVerb) {
   for (const char* seed : {"-1", "18446744073709551616", "1.5", "one"})
     for (const char* call :

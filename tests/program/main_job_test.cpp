@@ -248,9 +248,34 @@ TEST_F(MainJob, ListsAndDescribes) {
   EXPECT_NE(torsio("simulate --describe dfki-50").out.find("gear_ratio"), std::string::npos);
   EXPECT_NE(torsio("fit --list").out.find("dgmm"), std::string::npos);
   EXPECT_EQ(torsio("--help").exit_code, 0);
-  for (const char* verb :
-       {"demo", "simulate", "check", "fit", "evaluate", "compare", "crossvalidate", "attribute"})
+  for (const char* verb : {"demo", "simulate", "check", "fit", "evaluate", "compare",
+                           "crossvalidate", "attribute", "import"})
     EXPECT_NE(torsio(std::string(verb) + " --help").out.find("Example"), std::string::npos) << verb;
+}
+
+TEST_F(MainJob, ImportsANetworkOfAnotherProgram) {
+  record();
+  const std::string golden = std::string(TORSIO_SOURCE) + "/tests/golden/import/";
+  const std::string call = "import '" + golden +
+                           "weights_lstm.json' --rate 100Hz --inputs \"gear_angle_rad - "
+                           "joint_angle_rad, rate(joint_angle_rad)\" ";
+  const Outcome import = torsio(call + "-o joint.safetensors --json model.json");
+  ASSERT_EQ(import.exit_code, 0) << import.err;
+  EXPECT_NE(import.err.find("no range is guarded"), std::string::npos) << import.err;
+  const auto model = nlohmann::json::parse(contents("model.json"));
+  EXPECT_EQ(model.at("sample_rate_Hz"), 100.0);
+  EXPECT_EQ(model.at("parameters").at("scaling.target_scale").at(0), 20.0);
+  EXPECT_EQ(torsio("evaluate joint.safetensors a.csv --rate 100Hz").exit_code, 0);
+  EXPECT_EQ(torsio("evaluate joint.safetensors a.csv").exit_code, 1) << "at 1 kHz";
+
+  const Outcome guarded =
+      torsio(call + "--guards a.csv -o guarded.safetensors --json guarded.json");
+  ASSERT_EQ(guarded.exit_code, 0) << guarded.err;
+  EXPECT_EQ(guarded.err.find("no range is guarded"), std::string::npos) << guarded.err;
+  const double highest =
+      nlohmann::json::parse(contents("guarded.json")).at("inputs").at(0).at("highest");
+  EXPECT_GT(highest, 0.01);
+  EXPECT_LT(highest, 0.1);
 }
 
 TEST_F(MainJob, AStoppedFitOfANetworkGoesOnWhereItWas) {

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "torsio/core/matrix.hpp"
+#include "torsio/model/any_model.hpp"
+#include "torsio/model/network_layers.hpp"
+
+namespace torsio {
+
+/// A larger file of another program is refused: what it unfolds to in memory is many times its size.
+inline constexpr std::size_t kMostForeignBytes = std::size_t{64} << 20;
+
+/// What a network of another program does one after the other, in double so that stages may be
+/// multiplied into each other without loss.
+/// y_j = gain_j x_j + offset_j
+struct AffineStage {
+  std::vector<double> gain;
+  std::vector<double> offset;
+};
+/// y = W x + b
+struct DenseStage {
+  Matrix weights;  ///< outputs x inputs
+  std::vector<double> bias;
+};
+/// y = f(x)
+struct ActivationStage {
+  Activation function = Activation::linear;
+};
+/// A recurrent layer with the gates in torsio's order (`LstmLayer`, `GruLayer`).
+struct RecurrentStage {
+  enum class Kind { lstm, gru };
+  Kind kind = Kind::lstm;
+  Matrix input_weights;
+  Matrix recurrent_weights;
+  std::vector<double> input_bias;
+  std::vector<double> recurrent_bias;
+};
+using ForeignStage = std::variant<AffineStage, DenseStage, ActivationStage, RecurrentStage>;
+
+/// A network as another program wrote it.
+struct ForeignNetwork {
+  std::string place;       ///< the file's name, for messages
+  std::size_t inputs = 0;  ///< of the first stage
+  std::vector<ForeignStage> stages = {};
+  /// Samples of the window that a graph with memory is fixed to, from the zero state; none if any.
+  std::optional<std::size_t> window = {};
+  std::vector<std::string> notes = {};
+};
+
+/// The network as parameters of `mlp`, `lstm` or `gru`. Scales and offsets before the first layer and
+/// behind the last become its standardisation where they are positive; others, and linear layers
+/// in front of a recurrent one, are multiplied into the next layer.
+/// @throws Error for a network that torsio has no place for: more than one output, an activation in
+/// front of a recurrent layer, LSTM and GRU in one, weights beyond float32.
+[[nodiscard]] AnyModel::Parameters network_parameters(const ForeignNetwork& network,
+                                                      double sample_period_s,
+                                                      std::size_t warm_up_samples);
+
+}  // namespace torsio

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "torsio/core/provenance.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/import/foreign_network.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// What a file of weights does not say about its network.
+struct ImportOptions {
+  FeatureSpec features;              ///< one expression an input of the network, in its order
+  std::string target = "torque_Nm";  ///< what the network tells
+  double sample_rate_Hz = 0.0;       ///< that the network was trained at
+  std::vector<double> input_scale;   ///< the network sees scale * input; empty: 1 each
+  double output_scale = 1.0;         ///< target = scale * what the network says
+  std::optional<std::size_t> warm_up_samples;  ///< until a value is valid; none: the graph's window
+};
+
+/// A file of another program and where it came from.
+struct ForeignFile {
+  std::vector<std::byte> bytes;
+  Source source;
+};
+
+/// @throws Error if the file cannot be read or is larger than `kMostForeignBytes`.
+[[nodiscard]] ForeignFile read_foreign_file(const std::string& path);
+
+struct ImportedModel {
+  ModelFile file;
+  std::vector<std::string> notes;  ///< what its user should know
+};
+
+/// A network of another program inside torsio's estimator. Range guard, linear fallback and error
+/// bar are taken from `guards` (all of its records, whatever their role). Without it the guard is open, the
+/// fallback says 0 and there is no error bar; a note says so.
+/// @throws Error if the network fits no family, or UsageError if the inputs are not as many as the
+/// network has, or a scale is not a finite number other than 0.
+[[nodiscard]] ImportedModel import_network(const ForeignNetwork& network, const Source& source,
+                                           const ImportOptions& options,
+                                           const Dataset* guards = nullptr);
+
+}  // namespace torsio

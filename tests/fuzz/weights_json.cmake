@@ -1,0 +1,1 @@
+torsio_fuzzer(weights_json torsio::lab)

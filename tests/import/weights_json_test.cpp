@@ -1,0 +1,86 @@
+#include "torsio/import/weights_json.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "support/error_message.hpp"
+#include "torsio/import/import_network.hpp"
+
+namespace torsio {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+ForeignNetwork parse(const std::string& text, std::optional<Activation> activation = {}) {
+  return parse_weights_json(std::as_bytes(std::span(text)), "net.json", activation);
+}
+
+std::string tensor(const std::string& name, const std::string& shape, const std::string& data) {
+  return fmt::format(R"("{}": {{"shape": [{}], "data": [{}]}})", name, shape, data);
+}
+
+/// An LSTM of one cell and one input, and a dense layer.
+std::string small_lstm(const std::string& more = {}) {
+  return fmt::format(R"({{"tensors": {{{}, {}, {}{}{}}}}})",
+                     tensor("m.weight_ih_l0", "4, 1", "1, 2, 3, 4"),
+                     tensor("m.weight_hh_l0", "4, 1", "1, 2, 3, 4"),
+                     tensor("h.weight", "1, 1", "2"), more.empty() ? "" : ",", more);
+}
+
+std::string refusal(const std::string& text) {
+  return test::error_message([&] { (void)parse(text); });
+}
+
+TEST(WeightsJson, TakesScalesIntoTheStandardisation) {
+  const ForeignNetwork network = parse(
+      small_lstm(tensor("in_scale", "1, 1, 1", "0.25") + "," + tensor("out_scale", "1", "20")));
+  const auto lstm = std::get<Lstm::Parameters>(network_parameters(network, 0.005, 0));
+  EXPECT_EQ(lstm.scaling.inputs.scale.at(0), 4.0);
+  EXPECT_EQ(lstm.scaling.target_scale, 20.0);
+  EXPECT_EQ(lstm.layers.at(0).input_weights.values, (std::vector<float>{1, 2, 3, 4}));
+  EXPECT_EQ(lstm.layers.at(0).bias, std::vector<float>(4, 0.0F));
+}
+
+TEST(WeightsJson, RefusesWhatItCannotMean) {
+  EXPECT_THAT(refusal("{"), HasSubstr("net.json"));
+  EXPECT_THAT(refusal("{}"), HasSubstr("tensors"));
+  EXPECT_THAT(refusal(R"({"tensors": {}})"), HasSubstr("at least one layer"));
+  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": 3}})"), HasSubstr("a.weight"));
+  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [1, 2], "data": [1]}}})"),
+              AllOf(HasSubstr("a.weight/data"), HasSubstr("[1, 2]")));
+  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "data": [null]}}})"),
+              AllOf(HasSubstr("a.weight/data[0]"), HasSubstr("finite")));
+  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [-1, 1], "data": [1]}}})"),
+              HasSubstr("a.weight/shape"));
+  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [9999999999, 1], "data": [1]}}})"),
+              HasSubstr("a.weight/shape"));
+  EXPECT_THAT(refusal(small_lstm(tensor("m.weight_ih_l0_reverse", "4, 1", "1, 2, 3, 4"))),
+              AllOf(HasSubstr("weight_ih_l0_reverse"), HasSubstr("both directions")));
+  EXPECT_THAT(refusal(small_lstm(tensor("m.bias_ih_l0", "3", "1, 2, 3"))),
+              AllOf(HasSubstr("m.bias_ih_l0"), HasSubstr("[4]"), HasSubstr("[3]")));
+  EXPECT_THAT(refusal(small_lstm(tensor("m.weight_ih_l1", "4, 2", "1, 2, 3, 4, 5, 6, 7, 8") + "," +
+                                 tensor("m.weight_hh_l1", "4, 1", "1, 2, 3, 4"))),
+              AllOf(HasSubstr("m.weight_ih_l1"), HasSubstr("1 columns"), HasSubstr("found 2")));
+  EXPECT_THAT(refusal(R"({"tensors": {)" + tensor("m.weight_ih_l0", "2, 1", "1, 2") + "," +
+                      tensor("m.weight_hh_l0", "2, 2", "1, 2, 3, 4") + "}}"),
+              HasSubstr("4 H x H of an LSTM or 3 H x H of a GRU"));
+  EXPECT_THAT(refusal(small_lstm(tensor("o.weight", "1, 1", "2"))), HasSubstr("--activation"));
+}
+
+TEST(WeightsJson, RefusesTwoOutputsAndWeightsBeyondFloat) {
+  const auto refusal_of_parameters = [](const std::string& shape, const std::string& data) {
+    return test::error_message([&] {
+      (void)network_parameters(parse(R"({"tensors": {)" + tensor("a.weight", shape, data) + "}}"),
+                               1.0, 0);
+    });
+  };
+  EXPECT_THAT(refusal_of_parameters("2, 1", "1, 2"), HasSubstr("one output"));
+  EXPECT_THAT(refusal_of_parameters("1, 1", "1e39"), HasSubstr("float32"));
+}
+
+}  // namespace
+}  // namespace torsio
