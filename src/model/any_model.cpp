@@ -12,7 +12,8 @@ namespace torsio {
 namespace {
 
 static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial> &&
-              Model<Dgmm> && Model<Mlp> && Model<Lstm> && Model<Gru>);
+              Model<Dgmm> && Model<GaussianProcess> && Model<ParametricGp> && Model<Mlp> &&
+              Model<Lstm> && Model<Gru>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

@@ -10,6 +10,7 @@
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
 #include "train/fitted_model.hpp"
+#include "train/gaussian_process_families.hpp"
 #include "train/network_families.hpp"
 
 namespace torsio {
@@ -133,8 +134,8 @@ constexpr std::array kShallowFamilies{
 std::span<const FamilyInfo> families() noexcept {
   static const std::vector<FamilyInfo> all = [] {
     std::vector<FamilyInfo> list(kShallowFamilies.begin(), kShallowFamilies.end());
-    const auto networks = network_families();
-    list.insert(list.end(), networks.begin(), networks.end());
+    for (const auto more : {gaussian_process_families(), network_families()})
+      list.insert(list.end(), more.begin(), more.end());
     return list;
   }();
   return all;

@@ -8,11 +8,13 @@
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
 #include "torsio/model/lstm.hpp"
 #include "torsio/model/mlp.hpp"
+#include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
 
 namespace torsio::test {
@@ -104,6 +106,45 @@ inline Lstm example<Lstm>() {
 template <>
 inline Gru example<Gru>() {
   return Gru(random_network<Gru>({.units = {5, 3}, .hidden = {4}, .warm_up_samples = 3}, 6));
+}
+
+/// Nine points on a spiral.
+inline Matrix example_points() {
+  Matrix points(9, 2);
+  for (std::size_t i = 0; i < points.rows; ++i) {
+    const double t = 0.7 * static_cast<double>(i);
+    points(i, 0) = 0.25 * t * std::cos(t);
+    points(i, 1) = 0.25 * t * std::sin(t);
+  }
+  return points;
+}
+
+inline NetworkScaling example_scaling() {
+  return {.inputs = {.centre = {0.01, 0.0}, .scale = {0.07, 0.3}},
+          .target_centre = 0.5,
+          .target_scale = 40.0};
+}
+
+template <>
+inline GaussianProcess example<GaussianProcess>() {
+  return GaussianProcess({.scaling = example_scaling(),
+                          .kernel = parse_kernel("se_ard+linear", 2),
+                          .noise_variance = 0.01,
+                          .points = example_points(),
+                          .weights = {0.4, -0.2, 0.3, 0.1, -0.5, 0.2, 0.6, -0.1, 0.05},
+                          .with_std_dev = true});
+}
+
+template <>
+inline ParametricGp example<ParametricGp>() {
+  ParametricGp::Parameters parameters{.scaling = example_scaling(),
+                                      .kernel = parse_kernel("se*(linear+periodic*rq)", 2),
+                                      .noise_variance = 0.01,
+                                      .points = example_points(),
+                                      .weights = {0.4, -0.2, 0.3, 0.1, -0.5, 0.2, 0.6, -0.1, 0.05},
+                                      .explained = Matrix(9, 9)};
+  for (std::size_t i = 0; i < 9; ++i) parameters.explained(i, i) = 0.1;
+  return ParametricGp(parameters);
 }
 
 template <>

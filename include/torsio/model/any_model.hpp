@@ -8,12 +8,14 @@
 #include <variant>
 
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
 #include "torsio/model/lstm.hpp"
 #include "torsio/model/mlp.hpp"
 #include "torsio/model/model.hpp"
+#include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
 
 namespace torsio {
@@ -27,12 +29,14 @@ struct FamilyList {
 };
 
 /// Every family that model files and the command line know: one line each.
-using KnownFamilies = FamilyList<Linear,         //
-                                 LinearCoulomb,  //
-                                 Polynomial,     //
-                                 Dgmm,           //
-                                 Mlp,            //
-                                 Lstm,           //
+using KnownFamilies = FamilyList<Linear,           //
+                                 LinearCoulomb,    //
+                                 Polynomial,       //
+                                 Dgmm,             //
+                                 Mlp,              //
+                                 GaussianProcess,  //
+                                 ParametricGp,     //
+                                 Lstm,             //
                                  Gru>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`
