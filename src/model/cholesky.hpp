@@ -29,14 +29,15 @@ class SquareMatrix {
   AlignedVector<double> values_;
 };
 
-/// A = L L^T: reads and writes the lower triangle only.
-/// @returns false, with the triangle spoilt, if A is not positive definite.
-[[nodiscard]] bool cholesky(SquareMatrix& a) noexcept;
+/// A = L L^T: reads the lower triangle only; what stands above it is spoilt.
+/// By halves, so that nearly all of it is products of matrices (double_gemm).
+/// @returns false, with all of it spoilt, if A is not positive definite.
+[[nodiscard]] bool cholesky(SquareMatrix& a);
 
 /// b = A^-1 b.
 void solve(const SquareMatrix& factor, std::span<double> b) noexcept;
 
-/// L becomes A^-1, both triangles.
+/// L becomes the lower triangle of A^-1; what stands above it is spoilt.
 void invert(SquareMatrix& factor);
 
 /// ln det A.
