@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "model/covariance.hpp"
 #include "torsio/core/error.hpp"
 #include "train/kernel_data.hpp"
 #include "train/kernel_search.hpp"
+#include "train/likelihood_search.hpp"
 #include "train/marginal_likelihood.hpp"
 
 namespace torsio {
@@ -40,38 +40,6 @@ void check_count(std::size_t samples, bool with_std_dev) {
        .expected = fmt::format("at most {}{}", most, with_std_dev ? " with an error bar" : ""),
        .found = std::to_string(samples),
        .advice = with_std_dev ? "Set samples lower, or std_dev=false." : ""});
-}
-
-struct Found {
-  std::vector<double> numbers;
-  double value = std::numeric_limits<double>::infinity();
-};
-
-LbfgsResult search(MarginalLikelihood& process, std::vector<double> start,
-                   const KernelSearch& kernel_search, const FitContext& context, double begin,
-                   double end, const char* doing) {
-  return minimise(reported([&](auto x, auto gradient) { return process.evaluate(x, gradient); },
-                           context, begin, end, kernel_search.iterations, doing),
-                  std::move(start), kernel_search.settings);
-}
-
-/// The best of several starts on a part of the samples.
-std::vector<double> searched_start(const Kernel& kernel, const Table& table,
-                                   const GaussianProcessOptions& options,
-                                   const KernelSearch& kernel_search, Random& random,
-                                   const FitContext& context) {
-  Table part = thinned(table, kSearchedSamples, random);
-  MarginalLikelihood process(kernel, std::move(part.features), std::move(part.target));
-  const std::vector<double> first = first_start(kernel);
-  Found best{.numbers = first};
-  const double share = 0.5 / static_cast<double>(options.restarts + 1);
-  for (std::size_t k = 0; k <= options.restarts; ++k) {
-    const auto from = static_cast<double>(k);
-    LbfgsResult result = search(process, k == 0 ? first : moved_start(first, random), kernel_search,
-                                context, share * from, share * (from + 1.0), "searching");
-    if (result.value < best.value) best = {std::move(result.at), result.value};
-  }
-  return best.numbers;
 }
 
 std::vector<std::string> notes_of(MarginalLikelihood& process, double value, std::size_t all,
@@ -116,13 +84,10 @@ Fitted<GaussianProcess> fit_gaussian_process(const TrainingData& data,
   set_start(expression, median_distance(table.features, random));
   const Kernel kernel(expression, data.input_count());
 
-  const KernelSearch kernel_search(kernel, options.iterations);
-  std::vector<double> numbers = first_start(kernel);
-  if (options.iterations > 0)
-    numbers = searched_start(kernel, table, options, kernel_search, random, context);
   MarginalLikelihood process(kernel, table.features, table.target);
-  if (options.iterations > 0 && used > kSearchedSamples)
-    numbers = search(process, std::move(numbers), kernel_search, context, 0.5, 1.0, "fitting").at;
+  const std::vector<double> numbers = likeliest_numbers(
+      process, table, {.restarts = options.restarts, .iterations = options.iterations}, random,
+      context);
   const double value = process.fix(numbers);
   if (!std::isfinite(value)) refuse_covariance(GaussianProcess::kFamily);
 

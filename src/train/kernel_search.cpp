@@ -18,6 +18,7 @@ constexpr double kWidest = 13.8;
 KernelSearch::KernelSearch(const Kernel& kernel, std::size_t most_iterations)
     : iterations(most_iterations) {
   settings.iterations = most_iterations;
+  settings.tolerance = 1e-8;
   settings.lowest.assign(kernel.parameter_count() + 1, -kWidest);
   settings.highest.assign(kernel.parameter_count() + 1, kWidest);
   settings.lowest.back() = kLeastLogNoise;

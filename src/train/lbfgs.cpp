@@ -87,7 +87,7 @@ class Minimiser {
     }
     if (pairs_.empty()) {
       const double length = std::sqrt(dot(d, d));
-      for (double& each : d) each /= std::max(1.0, length);
+      for (double& each : d) each *= std::min(1.0, settings_.first_step / length);
     } else {
       const Pair& last = pairs_.back();
       const double scale = dot(last.step, last.change) / dot(last.change, last.change);
