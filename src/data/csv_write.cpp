@@ -1,9 +1,8 @@
-#include <charconv>
 #include <cmath>
 #include <set>
-#include <span>
 #include <string>
 
+#include "text_sink.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
@@ -11,32 +10,6 @@
 
 namespace torsio {
 namespace {
-
-/// Collects text and hands it on in large pieces.
-class Text {
- public:
-  explicit Text(OutputFile& file) : file_(file) { text_.reserve(kPiece + kLongestNumber); }
-  void add(std::string_view more) {
-    text_ += more;
-    if (text_.size() >= kPiece) flush();
-  }
-  void add(double value) {
-    if (std::isnan(value)) return add("nan");
-    char digits[kLongestNumber];  // NOLINT(modernize-avoid-c-arrays): to_chars wants pointers
-    const auto [end, code] = std::to_chars(std::begin(digits), std::end(digits), value);
-    add(std::string_view(std::begin(digits), end));
-  }
-  void flush() {
-    file_.write(std::as_bytes(std::span(text_)));
-    text_.clear();
-  }
-
- private:
-  static constexpr std::size_t kPiece = std::size_t{1} << 18;
-  static constexpr std::size_t kLongestNumber = 32;
-  OutputFile& file_;
-  std::string text_;
-};
 
 void check_writable(const Recording& recording) {
   std::set<std::string> names;
@@ -65,7 +38,7 @@ std::string freshness_column(std::string_view channel_name) {
 void write_csv(const Recording& recording, const std::string& path) {
   check_writable(recording);
   OutputFile file = path == "-" ? OutputFile::standard_output() : OutputFile(path);
-  Text text(file);
+  TextSink text(file, path.ends_with(".gz"));
   text.add("t_s");
   for (const Channel& channel : recording.channels()) {
     text.add(",");
@@ -84,7 +57,7 @@ void write_csv(const Recording& recording, const std::string& path) {
     }
     text.add("\n");
   }
-  text.flush();
+  text.finish();
   file.commit();
 }
 

@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "data/canonical_channels.hpp"
 #include "data/names.hpp"
 #include "data/whole_samples.hpp"
 #include "torsio/core/error.hpp"
@@ -47,7 +48,19 @@ void refuse_latency_of_inputs(const Mapping& mapping, const std::string& target)
            .advice = "Leave the input late, or name it with --target if it is the target."});
 }
 
-std::vector<Recording> load(const Log& log, const Progress& progress) {
+/// A target that nobody recorded, if it is canonical and its sources are there: for an inverse model
+/// the deflection.
+void derive_target(Recording& recording, const std::string& target) {
+  if (recording.has(target)) return;
+  for (const CanonicalChannel& channel : kCanonicalChannels) {
+    const std::vector<std::string> sources = channels_of(channel.expression);
+    if (channel.name == target &&
+        std::ranges::all_of(sources, [&](const auto& name) { return recording.has(name); }))
+      add_derived(recording, {{std::string(channel.name), std::string(channel.expression)}});
+  }
+}
+
+std::vector<Recording> load(const Log& log, const std::string& target, const Progress& progress) {
   const CsvTable table = read_csv(log.path, {.skip = log.mapping.drop, .progress = progress});
   std::vector<Recording> recordings =
       measured_recordings(table, log.mapping, log.rate_Hz, log.entry.name);
@@ -56,6 +69,7 @@ std::vector<Recording> load(const Log& log, const Progress& progress) {
       recording = resample(recording, log.rate_Hz);
     for (const auto& [name, value] : log.entry.conditions) recording.add_condition(name, value);
     add_derived(recording, log.mapping.derive);
+    derive_target(recording, target);
     recording.source.file = log.entry.file;
   }
   return recordings;
@@ -110,7 +124,7 @@ class Collector {
       if (const auto leak = mapping.computed_from.find(dataset_.target);
           leak != mapping.computed_from.end())
         leaks_.insert(leak->second.begin(), leak->second.end());
-      for (Recording& recording : load(planned.log, options_.progress)) {
+      for (Recording& recording : load(planned.log, dataset_.target, options_.progress)) {
         auto segments =
             segments_of(recording, planned.log.entry, planned.split_of_all, options_.role);
         dataset_.records.push_back(

@@ -55,25 +55,30 @@ void check_nothing_left(const Safetensors& contents, std::string_view place,
 /// Clocks that differ by less are one: a recording's rate is measured.
 constexpr double kSameRate = 1e-3;
 
+/// Of a discrete model [s]; 0 of any other.
+template <class Parameters>
+double sample_period_of(const Parameters& parameters) {
+  if constexpr (requires { parameters.sample_period_s; }) return parameters.sample_period_s;
+  if constexpr (requires { parameters.members; })
+    return parameters.members.empty() ? 0.0 : sample_period_of(parameters.members.front());
+  return 0.0;
+}
+
 /// A discrete model runs at the rate it was trained at; what is static is taken to any other.
 void check_sample_rate(const ModelFile& model) {
-  std::visit(
-      [&](const auto& parameters) {
-        if constexpr (requires { parameters.sample_period_s; }) {
-          const double own_Hz = 1.0 / parameters.sample_period_s;
-          const double rate_Hz = model.settings.sample_rate_Hz;
-          if (std::abs(rate_Hz - own_Hz) <= kSameRate * own_Hz) return;
-          throw Error({.place = "sample rate",
-                       .expected = fmt::format("{:.6g} Hz, at which the {} was trained", own_Hz,
-                                               family_of(model.parameters)),
-                       .found = fmt::format("{:.6g} Hz", rate_Hz),
-                       .advice = fmt::format(
-                           "A network with memory runs at no other rate: resample the recording "
-                           "(--rate {:.6g}), or train a model at this one.",
-                           own_Hz)});
-        }
-      },
-      model.parameters);
+  const double period_s =
+      std::visit([](const auto& of) { return sample_period_of(of); }, model.parameters);
+  if (!(period_s > 0.0)) return;
+  const double own_Hz = 1.0 / period_s;
+  const double rate_Hz = model.settings.sample_rate_Hz;
+  if (std::abs(rate_Hz - own_Hz) <= kSameRate * own_Hz) return;
+  throw Error({.place = "sample rate",
+               .expected = fmt::format("{:.6g} Hz, at which the {} was trained", own_Hz,
+                                       family_of(model.parameters)),
+               .found = fmt::format("{:.6g} Hz", rate_Hz),
+               .advice = fmt::format("A network with memory runs at no other rate: resample the "
+                                     "recording (--rate {:.6g}), or train a model at this one.",
+                                     own_Hz)});
 }
 
 /// Checks what only the estimator itself can: that settings and model fit together.

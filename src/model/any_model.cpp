@@ -13,7 +13,8 @@ namespace {
 
 static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial> &&
               Model<Dgmm> && Model<GaussianProcess> && Model<ParametricGp> && Model<Mlp> &&
-              Model<Lstm> && Model<Gru>);
+              Model<Lstm> && Model<Gru> && Model<MlpEnsemble> && Model<LstmEnsemble> &&
+              Model<GruEnsemble>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

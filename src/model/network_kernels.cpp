@@ -189,8 +189,9 @@ void dense_layer(const PackedView& layer, Activation activation, const float* in
       return run([](Vector x) HWY_ATTR { return hn::Div(x, hn::Add(set(1.0F), hn::Abs(x))); });
     case Activation::elu:
       return run([](Vector x) HWY_ATTR {
-        const Vector below = hn::Expm1(kTag, at_most(x, 0.0F));
-        return hn::IfThenElse(hn::Lt(x, hn::Zero(kTag)), below, x);
+        const auto is_below = hn::Lt(x, hn::Zero(kTag));  // false for NaN, which stays so
+        const Vector below = hn::Expm1(kTag, hn::IfThenElseZero(is_below, x));
+        return hn::IfThenElse(is_below, below, x);
       });
   }
 }

@@ -5,9 +5,11 @@
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <vector>
 
 #include "torsio/core/units.hpp"
+#include "torsio/model/network_layers.hpp"
 #include "torsio/model/parameters.hpp"
 #include "torsio/report/text_table.hpp"
 
@@ -54,9 +56,47 @@ std::vector<Leaf> leaves_of(const ModelFile& model) {
   return leaves;
 }
 
+/// "layers.0" of "layers.0.weights"; empty outside lists.
+std::string_view list_element(std::string_view name) {
+  const std::size_t point = name.rfind('.');
+  if (point == std::string_view::npos) return {};
+  const std::string_view element = name.substr(0, point);
+  const std::string_view index = element.substr(element.rfind('.') + 1);
+  return index.find_first_not_of("0123456789") == std::string_view::npos ? element
+                                                                         : std::string_view();
+}
+
+/// What a field of a list is, without its numbers: they say little one by one.
+std::string outline(const Leaf& leaf) {
+  const std::string field = leaf.name.substr(leaf.name.rfind('.') + 1);
+  if (field == "activation") return std::string(name(static_cast<Activation>(leaf.values.front())));
+  return fmt::format("{} {}", field, leaf.shape);
+}
+
+/// One line a number or table; one line an element of a list (a layer of a network).
+std::string parameter_lines(const std::vector<Leaf>& leaves) {
+  std::vector<std::string> lines;
+  std::string_view last;
+  for (const Leaf& leaf : leaves) {
+    const std::string_view element = list_element(leaf.name);
+    if (!element.empty() && element == last) {
+      lines.back().append(", ").append(outline(leaf));
+    } else if (!element.empty()) {
+      lines.push_back(fmt::format("{}: {}", element, outline(leaf)));
+    } else if (leaf.values.size() <= kReadable) {
+      lines.push_back(fmt::format("{} = {:.6g}", leaf.name, fmt::join(leaf.values, ", ")));
+    } else {
+      lines.push_back(fmt::format("{}: {} numbers", leaf.name, leaf.shape));
+    }
+    last = element;
+  }
+  return fmt::format("{}\n", fmt::join(lines, "\n"));
+}
+
 std::string family_of(const ModelFile& model) {
-  return model.card.fitted_as.empty() ? std::string(family_of(model.parameters))
-                                      : model.card.fitted_as;
+  const std::string own(family_of(model.parameters));
+  const std::string& asked = model.card.fitted_as;
+  return asked.empty() || asked == own ? own : fmt::format("{} ({})", asked, own);
 }
 
 }  // namespace
@@ -86,12 +126,7 @@ std::string model_description(const ModelFile& model) {
   text += fmt::format("\n{}", inputs.text());
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
-  text += "\n";
-  for (const Leaf& leaf : leaves_of(model)) {
-    text += leaf.values.size() <= kReadable
-                ? fmt::format("{} = {:.6g}\n", leaf.name, fmt::join(leaf.values, ", "))
-                : fmt::format("{}: {} numbers\n", leaf.name, leaf.shape);
-  }
+  text += fmt::format("\n{}", parameter_lines(leaves_of(model)));
   return text;
 }
 

@@ -1,15 +1,15 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "sensed_channels.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/sim/plant.hpp"
 #include "torsio/sim/sensor_set.hpp"
+#include "truth_channels.hpp"
 
 namespace torsio {
 
@@ -21,7 +21,7 @@ class BenchLog {
   BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth);
 
   /// Call at every tick.
-  void add(const Measurement& measured, const Plant& plant, double torque_Nm);
+  void add(const Measurement& measured, const BenchTruth& truth);
   /// A channel whose sensor delivered for each sample has no freshness, except the load cell's.
   [[nodiscard]] Recording finish(std::string name);
 
@@ -33,17 +33,14 @@ class BenchLog {
   };
   struct Truth {
     Channel channel;
-    double (*value)(const Plant& plant);
+    std::function<double(const BenchTruth&)> value;
   };
-  void tell(std::string_view name, double (*value)(const Plant& plant));
-  void add_truth_channels(const DataSheet& sheet);
 
   double rate_Hz_;
   std::size_t ticks_a_sample_;
   std::size_t tick_ = 0;
   std::vector<Sensed> sensed_;  ///< the torque is the last
   std::vector<Truth> truth_;
-  std::vector<double> truth_torque_Nm_;
 };
 
 }  // namespace torsio

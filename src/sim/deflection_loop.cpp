@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <variant>
 
 #include "torsio/core/error.hpp"
@@ -45,10 +46,12 @@ DeflectionLoop::DeflectionLoop(const PlantParameters& plant, double sample_rate_
 void DeflectionLoop::reset() noexcept {
   rate_filter_.reset();
   integral_rad_s_ = 0.0;
+  current_A_ = 0.0;
   is_started_ = false;
 }
 
 double DeflectionLoop::step(double wanted_rad, double deflection_rad) noexcept {
+  if (!std::isfinite(wanted_rad + deflection_rad)) return current_A_;
   if (!is_started_) {
     last_deflection_rad_ = deflection_rad;
     is_started_ = true;
@@ -59,8 +62,10 @@ double DeflectionLoop::step(double wanted_rad, double deflection_rad) noexcept {
   const double error_rad = reachable_rad - deflection_rad;
   integral_rad_s_ = std::clamp(integral_rad_s_ + error_rad / sample_rate_Hz_,
                                -integral_limit_rad_s_, integral_limit_rad_s_);
-  return proportional_A_rad_ * (error_rad + kIntegralGain * integral_rad_s_) -
-         derivative_As_rad_ * rate + feed_forward_A_rad_ * reachable_rad;
+  current_A_ = proportional_A_rad_ * (error_rad + kIntegralGain * integral_rad_s_) -
+               derivative_As_rad_ * rate + feed_forward_A_rad_ * reachable_rad;
+  if (!std::isfinite(current_A_)) reset();  // finite numbers, but beyond what the filter holds
+  return current_A_;
 }
 
 }  // namespace torsio

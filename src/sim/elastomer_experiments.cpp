@@ -85,7 +85,7 @@ BenchProgram torque_tracking(const DataSheet& sheet, double duration_s, auto ref
 }
 
 BenchProgram triangles(const DataSheet& sheet, const ExperimentSpec& spec) {
-  const double amplitude_Nm = spec.amplitude.value_or(kTriangleAmplitude_Nm);
+  const double amplitude_Nm = spec.torque_amplitude_Nm.value_or(kTriangleAmplitude_Nm);
   if (!spec.frequency_Hz) {
     // What the prototype of SPEC section 4.3 learns from, in shares of 5 Nm.
     std::vector<Triangles::Piece> pieces = {{0.4, 1.0, 4.0},  {1.0, 0.8, 4.0}, {2.0, 0.6, 6.0},
@@ -112,7 +112,7 @@ BenchProgram slow_cycles(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double creep = std::get<ElastomerSheet>(sheet.second).creep_per_cycle.value;
   const double left = std::pow(1.0 - creep, duration_s * kCycle_Hz);
   const double highest_Nm = left * sheet.rating.torque_Nm.value;
-  const double amplitude_Nm = spec.amplitude.value_or(highest_Nm);
+  const double amplitude_Nm = spec.torque_amplitude_Nm.value_or(highest_Nm);
   if (amplitude_Nm > highest_Nm) {
     throw UsageError({.place = "slow-cycles amplitude",
                       .problem = "the glue would creep until the coupling cannot carry it",
@@ -124,12 +124,12 @@ BenchProgram slow_cycles(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 BenchProgram static_cycle(const DataSheet& /*sheet*/, const ExperimentSpec& spec) {
-  return static_cycle_program(spec.amplitude.value_or(kTriangleAmplitude_Nm));
+  return static_cycle_program(spec.torque_amplitude_Nm.value_or(kTriangleAmplitude_Nm));
 }
 
 BenchProgram chirp(const DataSheet& sheet, const ExperimentSpec& spec) {
   return torque_tracking(sheet, kTorqueTest_s,
-                         Chirp({.amplitude = spec.amplitude.value_or(3.0),
+                         Chirp({.amplitude = spec.torque_amplitude_Nm.value_or(3.0),
                                 .start_Hz = 0.05,
                                 .end_Hz = 8.0,
                                 .duration_s = kTorqueTest_s},
@@ -137,15 +137,17 @@ BenchProgram chirp(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 BenchProgram random_walk(const DataSheet& sheet, const ExperimentSpec& spec) {
-  return torque_tracking(sheet, kTorqueTest_s,
-                         torque_walk(spec.amplitude.value_or(kWalkAmplitude_Nm), spec.seed));
+  return torque_tracking(
+      sheet, kTorqueTest_s,
+      torque_walk(spec.torque_amplitude_Nm.value_or(kWalkAmplitude_Nm), spec.seed));
 }
 
 BenchProgram multisine(const DataSheet& sheet, const ExperimentSpec& spec) {
   // Spread evenly over the decades; none is an odd multiple of another, where a cubic output curve
   // would answer.
   const std::vector<double> frequencies_Hz = {0.05, 0.11, 0.23, 0.52, 1.1, 2.3, 4.7, 7.9};
-  const double each_Nm = spec.amplitude.value_or(4.0) / static_cast<double>(frequencies_Hz.size());
+  const double each_Nm =
+      spec.torque_amplitude_Nm.value_or(4.0) / static_cast<double>(frequencies_Hz.size());
   return torque_tracking(
       sheet, kTorqueTest_s,
       Multisine({.frequencies_Hz = frequencies_Hz,
@@ -156,7 +158,7 @@ BenchProgram multisine(const DataSheet& sheet, const ExperimentSpec& spec) {
 
 /// Creep under a torque, relaxation with the rotor clamped where it came to, recovery without load.
 BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
-  const double amplitude_Nm = spec.amplitude.value_or(3.0);
+  const double amplitude_Nm = spec.torque_amplitude_Nm.value_or(3.0);
   return {.start = kLocked,
           .duration_s = 3.0 * kPhase_s,
           .next = [amplitude_Nm, clock = SampleClock(kBenchRate_Hz),
@@ -181,7 +183,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                              "to 4 Hz and 5 to 2 Nm",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
-     .highest_amplitude = 1.0,
+     .highest_torque_share = 1.0,
      .has_frequency = true,
      .program = triangles},
     {.info =
@@ -191,21 +193,21 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
               "30 triangles at 0.05 Hz, output locked, of 6 Nm or what creeping glue lets reach",
           .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
-     .highest_amplitude = 1.0,
+     .highest_torque_share = 1.0,
      .program = slow_cycles},
     {.info = {.name = "static-cycle",
               .actuators = kActuators,
               .description = "rotor held, a torque ramp of +-5 Nm pulls on the output at 0.05 Hz",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
-     .highest_amplitude = 0.9,
+     .highest_torque_share = 0.9,
      .program = static_cycle},
     {.info = {.name = "chirp",
               .actuators = kActuators,
               .description = "the torque loop follows a chirp of 3 Nm, 0.05 to 8 Hz in 100 s",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
-     .highest_amplitude = 1.0,
+     .highest_torque_share = 1.0,
      .program = chirp},
     {.info = {.name = "random-walk",
               .actuators = kActuators,
@@ -213,7 +215,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                   "the torque loop follows noise below 1 Hz with the RMS of a chirp of 2 Nm",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
-     .highest_amplitude = kWalkAmplitude,
+     .highest_torque_share = kWalkAmplitude,
      .program = random_walk},
     {.info = {.name = "multisine",
               .actuators = kActuators,
@@ -221,7 +223,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                   "the torque loop follows eight sines, 0.05 to 8 Hz and together at most 4 Nm",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
-     .highest_amplitude = 1.0,
+     .highest_torque_share = 1.0,
      .program = multisine},
     {.info = {.name = "hold",
               .actuators = kActuators,
@@ -229,7 +231,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                   "3 Nm are held for 60 s, then the rotor for 60 s, then no torque for 60 s",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
-     .highest_amplitude = 0.9,
+     .highest_torque_share = 0.9,
      .program = hold},
 });
 

@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "bench_log.hpp"
@@ -44,18 +47,23 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
           "none: this experiment has no lever", text(inclination_deg));
   require(std::abs(inclination_deg) <= 90.0, "inclination", "-90 to 90 deg",
           fmt::format("{:.6g} deg (a number without unit is radians)", inclination_deg));
-  if (spec.amplitude) {
+  const auto require_amplitude = [&](const std::optional<double>& value, std::string_view unit,
+                                     double highest, double shown, const char* shown_unit) {
+    if (!value) return;
+    const auto said = [&](double of) { return fmt::format("{:.6g} {}", shown * of, shown_unit); };
     require(!entry.info.amplitude_unit.empty(), "amplitude",
-            "none: this experiment has an amplitude of its own", text(*spec.amplitude));
-    const double highest = entry.highest_amplitude *
-                           (entry.info.amplitude_unit == "Nm" ? sheet.rating.torque_Nm.value : 1.0);
-    const auto shown = [&](double value) {
-      return entry.info.amplitude_unit == "rad" ? fmt::format("{:.6g} deg", deg_from_rad(value))
-                                                : fmt::format("{:.6g} Nm", value);
-    };
-    require(*spec.amplitude > 0.0 && *spec.amplitude <= highest, "amplitude",
-            "above 0 and at most " + shown(highest), shown(*spec.amplitude));
-  }
+            "none: this experiment has an amplitude of its own", said(*value));
+    require(entry.info.amplitude_unit == unit, "amplitude",
+            fmt::format("one in {}", entry.info.amplitude_unit), said(*value));
+    require(*value > 0.0 && *value <= highest, "amplitude", "above 0 and at most " + said(highest),
+            said(*value));
+  };
+  require_amplitude(
+      spec.torque_amplitude_Nm, "Nm",
+      std::min(entry.highest_torque_share * sheet.rating.torque_Nm.value, entry.highest_torque_Nm),
+      1.0, "Nm");
+  require_amplitude(spec.angle_amplitude_rad, "rad", entry.highest_angle_rad, deg_from_rad(1.0),
+                    "deg");
   if (spec.frequency_Hz) {
     require(entry.has_frequency, "frequency", "none: this experiment has a frequency of its own",
             text(*spec.frequency_Hz));
@@ -103,8 +111,14 @@ Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const P
   };
   const bool changes = spec.conditions.warm_up_K != 0.0 || !spec.faults.faults.empty();
   Plant plant(plant_parameters(sheet));
-  plant.reset(program.start_angle_rad, program.start);
-  plant.set_condition(condition(0.0));
+  const auto require_taken = [&](Fault fault, double time_s) {
+    if (fault == Fault::none) return;
+    throw Error({.place = fmt::format("{} at {} s", entry.info.name, time_s),
+                 .problem = fmt::format("the plant refuses its command, load or condition: {}",
+                                        torsio::name(fault))});
+  };
+  require_taken(plant.reset(program.start_angle_rad, program.start), 0.0);
+  require_taken(plant.set_condition(condition(0.0)), 0.0);
   Load load = program.start;
   SensorSet sensors(sheet, kBenchRate_Hz, spec.seed);
   sensors.reset(load_cell_torque(program.load_cell, plant, load));
@@ -123,16 +137,12 @@ Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const P
     Measurement measured = sensors.step(plant, torque_Nm);
     if (tick == 0) seen = measured;
     faults.apply(measured, time_s);
-    log.add(measured, plant, torque_Nm);
+    log.add(measured, {plant, torque_Nm, temperature(spec.conditions, time_s)});
     seen = with_last_numbers(measured, seen, channels);
     const BenchAction action = program.next(seen);
     load = action.load;
-    if (changes) plant.set_condition(condition(time_s));
-    const Fault fault = plant.step(action.command, load, 1.0 / kBenchRate_Hz);
-    if (fault != Fault::none)
-      throw Error({.place = fmt::format("{} at {} s", entry.info.name, time_s),
-                   .problem = fmt::format("the plant refuses its command or load: {}",
-                                          torsio::name(fault))});
+    if (changes) require_taken(plant.set_condition(condition(time_s)), time_s);
+    require_taken(plant.step(action.command, load, 1.0 / kBenchRate_Hz), time_s);
   }
   return log.finish(fmt::format("{} {} seed {}", full_name(sheet), entry.info.name, spec.seed));
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <span>
 
 #include "torsio/actuator/data_sheet.hpp"
@@ -46,7 +47,9 @@ struct ExperimentEntry {
   ActuatorFamily family = ActuatorFamily::series_elastic;
   // Which options it takes.
   bool has_lever = false;
-  double highest_amplitude = 0.0;  ///< in `info.amplitude_unit`; of Nm, a share of the rated torque
+  double highest_torque_share = 1.0;  ///< of the rated torque
+  double highest_torque_Nm = std::numeric_limits<double>::infinity();
+  double highest_angle_rad = 0.0;
   bool has_frequency = false;
   bool has_impedance = false;
   BenchProgram (*program)(const DataSheet& sheet, const ExperimentSpec& spec) = nullptr;

@@ -12,7 +12,6 @@ constexpr std::string_view kActuators = "harmonic-drive";
 constexpr double kHumanTorque_Nm = 20.0;
 constexpr double kHumanFrequency_Hz = 0.4;
 constexpr double kHighestHumanTorque_Nm = 50.0;
-constexpr double kRating_Nm = 292.0;  // highest amplitudes are shares of it
 
 ImpedanceLoop impedance_loop(const DataSheet& sheet, bool is_zero) {
   return {
@@ -32,11 +31,11 @@ BenchProgram human_torque(const DataSheet& sheet, const ExperimentSpec& spec) {
           .duration_s = 600.0,
           .next = [loop = impedance_loop(sheet, spec.is_impedance_zero),
                    // Not the numbers that the sensors' noise is made of.
-                   hand = QuasiPeriodic({.amplitude = spec.amplitude.value_or(kHumanTorque_Nm),
-                                         .frequency_Hz = frequency_Hz,
-                                         .seed = Random(spec.seed).bits()},
-                                        kBenchRate_Hz)](
-                      const Measurement& measured) mutable -> BenchAction {
+                   hand = QuasiPeriodic(
+                       {.amplitude = spec.torque_amplitude_Nm.value_or(kHumanTorque_Nm),
+                        .frequency_Hz = frequency_Hz,
+                        .seed = Random(spec.seed).bits()},
+                       kBenchRate_Hz)](const Measurement& measured) mutable -> BenchAction {
             return {.command = {.current_A = current(loop, measured)},
                     .load = {.external_torque_Nm = hand.step()}};
           }};
@@ -51,7 +50,7 @@ BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
           .load_cell = LoadCell::external,
           .duration_s = 60.0,
           .next = [loop = impedance_loop(sheet, spec.is_impedance_zero),
-                   load = Load{.external_torque_Nm = spec.amplitude.value_or(0.0)}](
+                   load = Load{.external_torque_Nm = spec.torque_amplitude_Nm.value_or(0.0)}](
                       const Measurement& measured) -> BenchAction {
             return {.command = {.current_A = current(loop, measured)}, .load = load};
           }};
@@ -65,7 +64,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                   "the impedance controller",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::harmonic_drive,
-     .highest_amplitude = kHighestHumanTorque_Nm / kRating_Nm,
+     .highest_torque_Nm = kHighestHumanTorque_Nm,
      .has_frequency = true,
      .has_impedance = true,
      .program = human_torque},
@@ -82,7 +81,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                              "if an amplitude is given",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::harmonic_drive,
-     .highest_amplitude = kHighestHumanTorque_Nm / kRating_Nm,
+     .highest_torque_Nm = kHighestHumanTorque_Nm,
      .has_impedance = true,
      .program = hold},
 });

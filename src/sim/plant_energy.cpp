@@ -44,7 +44,8 @@ double Plant::first_friction_torque() const noexcept {
   return dispatch(first_, [](const auto& stage) { return friction_torque(stage); });
 }
 double Plant::second_friction_torque() const noexcept {
-  return dispatch(second_, [](const auto& stage) { return friction_torque(stage); });
+  return condition_.second_stage_factor *
+         dispatch(second_, [](const auto& stage) { return friction_torque(stage); });
 }
 
 std::array<WorkPort, Plant::kWorkPorts> Plant::work_ports(const Load& load) const noexcept {

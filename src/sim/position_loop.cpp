@@ -1,6 +1,7 @@
 #include "torsio/sim/position_loop.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace torsio {
 namespace {
@@ -26,10 +27,12 @@ PositionLoop::PositionLoop(const PlantParameters& plant, double sample_rate_Hz,
 void PositionLoop::reset() noexcept {
   speed_filter_.reset();
   integral_ = 0.0;
+  current_A_ = 0.0;
   is_started_ = false;
 }
 
 double PositionLoop::step(double wanted_rad, double rotor_angle_rad) noexcept {
+  if (!std::isfinite(wanted_rad + rotor_angle_rad)) return current_A_;
   const double angle_rad = rotor_angle_rad * inverse_ratio_;
   if (!is_started_) {
     last_wanted_rad_ = wanted_rad;
@@ -42,7 +45,9 @@ double PositionLoop::step(double wanted_rad, double rotor_angle_rad) noexcept {
   last_wanted_rad_ = wanted_rad;
   const double error = position_gain_ * (wanted_rad - angle_rad) + wanted_speed - speed;
   integral_ = std::clamp(integral_ + error / sample_rate_Hz_, -integral_limit_, integral_limit_);
-  return speed_gain_A_s_rad_ * (error + position_gain_ * integral_);
+  current_A_ = speed_gain_A_s_rad_ * (error + position_gain_ * integral_);
+  if (!std::isfinite(current_A_)) reset();  // finite numbers, but beyond what the filter holds
+  return current_A_;
 }
 
 }  // namespace torsio

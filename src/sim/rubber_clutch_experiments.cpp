@@ -173,7 +173,7 @@ std::vector<SinePoint> whole_grid() {
 }
 
 BenchProgram grid(const DataSheet& sheet, const ExperimentSpec& spec) {
-  if (!spec.amplitude && !spec.frequency_Hz) {
+  if (!spec.angle_amplitude_rad && !spec.frequency_Hz) {
     SineWalk walk(whole_grid(), kGridPeriods, kGridRest_s);
     const double duration_s = walk.duration();
     return turning(sheet, kClamped, duration_s, std::move(walk));
@@ -185,7 +185,7 @@ BenchProgram grid(const DataSheet& sheet, const ExperimentSpec& spec) {
                       .found = fmt::format("{}", frequency_Hz),
                       .advice = "an angle that stands is the experiment hold"});
   }
-  const SinePoint point{spec.amplitude.value_or(kAmplitude_rad), frequency_Hz};
+  const SinePoint point{spec.angle_amplitude_rad.value_or(kAmplitude_rad), frequency_Hz};
   return turning(sheet, kClamped, kPointPeriods / frequency_Hz,
                  SineWalk({point}, std::numeric_limits<double>::infinity(), 0.0));
 }
@@ -208,7 +208,7 @@ Multisine drawn_multisine(const ExperimentSpec& spec) {
   for (int tick = 0; tick < static_cast<int>(kMultisine_s * kBenchRate_Hz); ++tick)
     largest = std::max(largest, std::abs(trial.step()));
   for (double& amplitude : tones.amplitudes)
-    amplitude *= spec.amplitude.value_or(drawn_rad) / largest;
+    amplitude *= spec.angle_amplitude_rad.value_or(drawn_rad) / largest;
   return {std::move(tones), kBenchRate_Hz};
 }
 
@@ -237,7 +237,7 @@ BenchProgram slip(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
 
 BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
   return along(sheet, kClamped,
-               Path({{.to_rad = spec.amplitude.value_or(kAmplitude_rad),
+               Path({{.to_rad = spec.angle_amplitude_rad.value_or(kAmplitude_rad),
                       .speed_rad_s = kFast_rad_s,
                       .stand_s = kHold_s}}));
 }
@@ -269,7 +269,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                   "4 to 9 deg at 0.1 to 1 Hz",
               .amplitude_unit = "rad"},
      .family = ActuatorFamily::rubber_clutch,
-     .highest_amplitude = kAmplitude_rad,
+     .highest_angle_rad = kAmplitude_rad,
      .has_frequency = true,
      .program = grid},
     {.info = {.name = "multisine",
@@ -278,7 +278,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                              "drawn from the seed",
               .amplitude_unit = "rad"},
      .family = ActuatorFamily::rubber_clutch,
-     .highest_amplitude = kAmplitude_rad,
+     .highest_angle_rad = kAmplitude_rad,
      .program = multisine},
     {.info = {.name = "slow-cycles",
               .actuators = kActuators,
@@ -303,7 +303,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
               .description = "input angle to 9 deg at 10 deg/s; the rubber relaxes for 30 s",
               .amplitude_unit = "rad"},
      .family = ActuatorFamily::rubber_clutch,
-     .highest_amplitude = kAmplitude_rad,
+     .highest_angle_rad = kAmplitude_rad,
      .program = hold},
     {.info = {.name = "static-cycle",
               .actuators = kActuators,

@@ -76,7 +76,7 @@ BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
 /// SPEC section 6 asks 13 Nm of dfki-50 and 20 Nm of dfki-120, 0.26 and 0.17 of their ratings; of
 /// the other two we ask the fifth part.
 double torque_amplitude(const DataSheet& sheet, const ExperimentSpec& spec) {
-  if (spec.amplitude) return *spec.amplitude;
+  if (spec.torque_amplitude_Nm) return *spec.torque_amplitude_Nm;
   if (sheet.name == "dfki-50") return 13.0;
   if (sheet.name == "dfki-120") return 20.0;
   return 0.2 * sheet.rating.torque_Nm.value;
@@ -166,14 +166,14 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
                              "output locked, or with a lever and 9 kg free to swing",
               .amplitude_unit = "Nm"},
      .has_lever = true,
-     .highest_amplitude = 1.0,
+     .highest_torque_share = 1.0,
      .program = chirp},
     {.info = {.name = "random-walk",
               .actuators = kActuators,
               .description = "as chirp, the torque being noise below 1 Hz with the same RMS",
               .amplitude_unit = "Nm"},
      .has_lever = true,
-     .highest_amplitude = kWalkAmplitude,
+     .highest_torque_share = kWalkAmplitude,
      .program = random_walk},
 });
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "torsio/core/error.hpp"
 
@@ -40,10 +41,12 @@ TorqueLoop::TorqueLoop(const PlantParameters& plant, double stiffness_Nm_rad, do
 void TorqueLoop::reset() noexcept {
   speed_filter_.reset();
   integral_A_ = 0.0;
+  current_A_ = 0.0;
   is_started_ = false;
 }
 
 double TorqueLoop::step(double wanted_Nm, double torque_Nm, double rotor_angle_rad) noexcept {
+  if (!std::isfinite(wanted_Nm + torque_Nm + rotor_angle_rad)) return current_A_;
   const double angle_rad = rotor_angle_rad * inverse_ratio_;
   if (!is_started_) {
     last_wanted_Nm_ = wanted_Nm;
@@ -57,8 +60,10 @@ double TorqueLoop::step(double wanted_Nm, double torque_Nm, double rotor_angle_r
   const double error_Nm = wanted_Nm - torque_Nm;
   integral_A_ = std::clamp(integral_A_ + integral_A_Nm_s_ * error_Nm / sample_rate_Hz_,
                            -peak_current_A_, peak_current_A_);
-  return feed_forward_A_Nm_ * wanted_Nm + proportional_A_Nm_ * error_Nm + integral_A_ +
-         derivative_As_rad_ * (wanted_speed - speed);
+  current_A_ = feed_forward_A_Nm_ * wanted_Nm + proportional_A_Nm_ * error_Nm + integral_A_ +
+               derivative_As_rad_ * (wanted_speed - speed);
+  if (!std::isfinite(current_A_)) reset();  // finite numbers, but beyond what the filter holds
+  return current_A_;
 }
 
 }  // namespace torsio

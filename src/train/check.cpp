@@ -43,6 +43,7 @@ class Checker {
     check_constant();
     check_saturation();
     check_frozen();
+    check_resolution();
     check_gaps();
     check_delay();
     check_sign();
@@ -185,6 +186,36 @@ class Checker {
           return;
         }
       });
+    });
+  }
+
+  // What the first input is made of may move through much more than it does: codes of a gear's angle
+  // are to be judged by the deflection.
+  void check_resolution() {
+    const auto unit_of = [](const std::string& name) {
+      const auto parts = split_channel_name(name);
+      return parts ? parts->unit->si_suffix : std::string_view();
+    };
+    pass_unless_found("resolution", "no sensor's codes are coarse", [&] {
+      for (std::size_t r = 0; r < pairs_.size(); ++r) {
+        const Recording& recording = dataset_.records[r].recording;
+        const double first_input = extent_of(pairs_[r].input).width();
+        for (const std::string& name : channels_) {
+          if (is_condition(recording, name)) continue;
+          const std::vector<double>& values = recording.channel(name).values;
+          double range = extent_of(values).width();
+          if (first_input > 0.0 && unit_of(name) == unit_of(channels_.front()) &&
+              name != dataset_.target)
+            range = std::min(range, first_input);
+          const double code = finest_step(values);
+          if (!(range > 0.0) || code < kCoarseShare * range) continue;
+          add(Verdict::warn, "resolution", recording.name(),
+              fmt::format(
+                  "{} tells in steps of {:.3g}: {:.0f} of them are all that {} moves through", name,
+                  code, range / code, range == first_input ? spec_.inputs.front() : name),
+              "Has the sensor lost bits, or its log digits? A model cannot see finer.");
+        }
+      }
     });
   }
 
@@ -363,6 +394,7 @@ class Checker {
   static constexpr double kFrozen_s = 0.2;
   static constexpr double kFrozenDeliveries = 10.0;
   static constexpr double kMovedMeanwhile = 0.4;  ///< of another channel's range
+  static constexpr double kCoarseShare = 0.02;    ///< of the range: 50 codes
   static constexpr double kJumpShare = 0.02;
   static constexpr double kJumpOverOthers = 5.0;
   static constexpr double kLongestDelay_s = 0.1;

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/files/model_file.hpp"
+#include "train/fit_ensemble.hpp"
 #include "train/network_initialisation.hpp"
 #include "train/network_trainer.hpp"
 #include "train/network_windows.hpp"
@@ -173,27 +175,57 @@ std::vector<std::string> notes_of(const Material& material, const TrainedNetwork
   return notes;
 }
 
+template <class Family>
+Trained<Family> result_of(typename Family::Parameters parameters, TrainedNetwork trained,
+                          const Material& material, const TrainingData& data, std::size_t epochs) {
+  std::vector<std::string> notes = notes_of(material, trained, data, epochs);
+  const double rmse = std::sqrt(trained.best_loss) * material.scaling.target_scale;
+  return {std::move(parameters), std::move(trained.weights), trained.best_loss, rmse,
+          std::move(notes)};
+}
+
+/// What there is to train: which layers, and how.
+struct Job {
+  std::string_view family;
+  TrainingNetwork network;
+  NetworkTraining training;
+  TrainingWindows windows;
+  std::size_t embargo = 0;
+  EnsembleMember member;
+};
+
+/// The network of a member that an earlier call has come to the end of.
+TrainedNetwork finished_network(const Job& job) {
+  const std::size_t parameters = job.network.parameter_count();
+  if (job.member.finished.size() != parameters)
+    throw Error({.place = "checkpoint",
+                 .expected = fmt::format("{} weights of {}", parameters, job.member.name),
+                 .found = fmt::format("{}", job.member.finished.size())});
+  return {.weights = {job.member.finished.begin(), job.member.finished.end()},
+          .best_loss = job.member.finished_loss,
+          .end = {}};
+}
+
 /// Everything that the three fits share. `put_initial(network, weights)` says where to start.
 template <class PutInitial>
-std::pair<TrainedNetwork, Material> train(std::string_view family, const TrainingData& data,
-                                          const TrainingNetwork& network,
-                                          const NetworkTraining& training,
-                                          const TrainingWindows& windows, std::size_t embargo,
+std::pair<TrainedNetwork, Material> train(const Job& job, const TrainingData& data,
                                           const FitContext& context,
                                           const PutInitial& put_initial) {
-  check(training);
-  check(windows);
-  check_fits_a_file(network);
-  report_progress(context.progress, 0.0, fmt::format("fitting {}", family));
-  Material material = prepare(data, windows, embargo, context);
-  NetworkTrainer trainer(network, training);
+  check(job.training);
+  check(job.windows);
+  check_fits_a_file(job.network);
+  report_progress(context.progress, 0.0, fmt::format("fitting {}", job.family));
+  Material material = prepare(data, job.windows, job.embargo, context);
+  NetworkTrainer trainer(job.network, job.training);
   check_fits_the_memory(trainer, material.training);
-  std::vector<float> weights(network.parameter_count(), 0.0F);
+  std::vector<float> weights(job.network.parameter_count(), 0.0F);
   put_initial(weights.data());
-  const std::string recipe =
-      recipe_of(family, network, training, material.training, material.validation, context.seed);
-  TrainedNetwork trained = train_network(trainer, training, material.training, material.validation,
-                                         std::move(weights), recipe, context);
+  const std::string recipe = recipe_of(job.family, job.network, job.training, material.training,
+                                       material.validation, context.seed) +
+                             job.member.name;
+  if (!job.member.finished.empty()) return {finished_network(job), std::move(material)};
+  TrainedNetwork trained = train_network(trainer, job.training, material.training,
+                                         material.validation, std::move(weights), recipe, context);
   return {std::move(trained), std::move(material)};
 }
 
@@ -231,9 +263,10 @@ struct GruWay {
 };
 
 template <class Way>
-Fitted<typename Way::Family> fit_recurrent(const TrainingData& data,
-                                           const RecurrentOptions& options,
-                                           const FitContext& context) {
+Trained<typename Way::Family> train_recurrent(const TrainingData& data,
+                                              const RecurrentOptions& options,
+                                              const FitContext& context,
+                                              const EnsembleMember& member) {
   check_layers(options.layers, 1);
   check_layers(options.head, 0);
   std::vector<TrainingLayer> layers;
@@ -243,17 +276,21 @@ Fitted<typename Way::Family> fit_recurrent(const TrainingData& data,
     inputs = units;
   }
   append_dense(layers, inputs, options.head, options.head_activation);
-  const TrainingNetwork network(std::move(layers));
+  const Job job{.family = Way::Family::kFamily,
+                .network = TrainingNetwork(std::move(layers)),
+                .training = options.training,
+                .windows = options.windows,
+                .embargo = options.windows.length,
+                .member = member};
+  const TrainingNetwork& network = job.network;
   const std::size_t depth = options.layers.size();
-  const auto [trained, material] = train(
-      Way::Family::kFamily, data, network, options.training, options.windows,
-      options.windows.length, context, [&](float* weights) {
-        Random random(context.seed);
-        for (std::size_t l = 0; l < depth; ++l)
-          put_layer(Way::kInitial(network.layers()[l].inputs, network.layers()[l].units, random),
-                    network, l, weights);
-        put_initial_dense(network, depth, random, weights);
-      });
+  auto [trained, material] = train(job, data, context, [&](float* weights) {
+    Random random(context.seed);
+    for (std::size_t l = 0; l < depth; ++l)
+      put_layer(Way::kInitial(network.layers()[l].inputs, network.layers()[l].units, random),
+                network, l, weights);
+    put_initial_dense(network, depth, random, weights);
+  });
   typename Way::Family::Parameters parameters;
   parameters.scaling = material.scaling;
   for (std::size_t l = 0; l < depth; ++l)
@@ -262,7 +299,8 @@ Fitted<typename Way::Family> fit_recurrent(const TrainingData& data,
     parameters.head.push_back(dense_layer(network, l, trained.weights.data()));
   parameters.sample_period_s = 1.0 / data.sample_rate_Hz;
   parameters.warm_up_samples = options.windows.length;
-  return {std::move(parameters), notes_of(material, trained, data, options.training.epochs)};
+  return result_of<typename Way::Family>(std::move(parameters), std::move(trained), material, data,
+                                         options.training.epochs);
 }
 
 // A static network's samples follow each other closely: a hundredth of a record between those that
@@ -274,35 +312,73 @@ std::size_t static_embargo(const TrainingData& data) {
   return longest / 100;
 }
 
+Trained<Mlp> train_mlp(const TrainingData& data, const MlpOptions& options,
+                       const FitContext& context, const EnsembleMember& member) {
+  check_layers(options.layers, 0);
+  std::vector<TrainingLayer> layers;
+  append_dense(layers, data.input_count(), options.layers, options.activation);
+  const Job job{.family = Mlp::kFamily,
+                .network = TrainingNetwork(std::move(layers)),
+                .training = options.training,
+                .windows = {.length = 1, .stride = 1, .burn_in = 0},
+                .embargo = static_embargo(data),
+                .member = member};
+  auto [trained, material] = train(job, data, context, [&](float* weights) {
+    Random random(context.seed);
+    put_initial_dense(job.network, 0, random, weights);
+  });
+  Mlp::Parameters parameters;
+  parameters.scaling = material.scaling;
+  for (std::size_t l = 0; l < job.network.layers().size(); ++l)
+    parameters.layers.push_back(dense_layer(job.network, l, trained.weights.data()));
+  return result_of<Mlp>(std::move(parameters), std::move(trained), material, data,
+                        options.training.epochs);
+}
+
+template <class Family>
+Fitted<Family> fitted(Trained<Family> trained) {
+  return {std::move(trained.parameters), std::move(trained.notes)};
+}
+
 }  // namespace
 
 Fitted<Mlp> fit_mlp(const TrainingData& data, const MlpOptions& options,
                     const FitContext& context) {
-  check_layers(options.layers, 0);
-  std::vector<TrainingLayer> layers;
-  append_dense(layers, data.input_count(), options.layers, options.activation);
-  const TrainingNetwork network(std::move(layers));
-  const TrainingWindows samples{.length = 1, .stride = 1, .burn_in = 0};
-  const auto [trained, material] = train(Mlp::kFamily, data, network, options.training, samples,
-                                         static_embargo(data), context, [&](float* weights) {
-                                           Random random(context.seed);
-                                           put_initial_dense(network, 0, random, weights);
-                                         });
-  Mlp::Parameters parameters;
-  parameters.scaling = material.scaling;
-  for (std::size_t l = 0; l < network.layers().size(); ++l)
-    parameters.layers.push_back(dense_layer(network, l, trained.weights.data()));
-  return {std::move(parameters), notes_of(material, trained, data, options.training.epochs)};
+  return fitted(train_mlp(data, options, context, {}));
 }
 
 Fitted<Lstm> fit_lstm(const TrainingData& data, const RecurrentOptions& options,
                       const FitContext& context) {
-  return fit_recurrent<LstmWay>(data, options, context);
+  return fitted(train_recurrent<LstmWay>(data, options, context, {}));
 }
 
 Fitted<Gru> fit_gru(const TrainingData& data, const RecurrentOptions& options,
                     const FitContext& context) {
-  return fit_recurrent<GruWay>(data, options, context);
+  return fitted(train_recurrent<GruWay>(data, options, context, {}));
+}
+
+Fitted<MlpEnsemble> fit_mlp_ensemble(const TrainingData& data, const MlpOptions& options,
+                                     std::size_t members, const FitContext& context) {
+  return fit_ensemble<Mlp>(members, context,
+                           [&](const FitContext& own, const EnsembleMember& member) {
+                             return train_mlp(data, options, own, member);
+                           });
+}
+
+Fitted<LstmEnsemble> fit_lstm_ensemble(const TrainingData& data, const RecurrentOptions& options,
+                                       std::size_t members, const FitContext& context) {
+  return fit_ensemble<Lstm>(members, context,
+                            [&](const FitContext& own, const EnsembleMember& member) {
+                              return train_recurrent<LstmWay>(data, options, own, member);
+                            });
+}
+
+Fitted<GruEnsemble> fit_gru_ensemble(const TrainingData& data, const RecurrentOptions& options,
+                                     std::size_t members, const FitContext& context) {
+  return fit_ensemble<Gru>(members, context,
+                           [&](const FitContext& own, const EnsembleMember& member) {
+                             return train_recurrent<GruWay>(data, options, own, member);
+                           });
 }
 
 }  // namespace torsio

@@ -9,24 +9,13 @@
 #include <map>
 #include <utility>
 
+#include "data/canonical_channels.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
+#include "train/least_squares.hpp"
 
 namespace torsio {
 namespace {
-
-struct CanonicalChannel {
-  const char* name;
-  const char* expression;
-};
-
-// In the order of need: a later one may use an earlier one.
-constexpr auto kCanonicalChannels = std::to_array<CanonicalChannel>({
-    {"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"},
-    {"spring_deflection_rate_rad_s", "rate(spring_deflection_rad)"},
-    {"joint_speed_rad_s", "rate(joint_angle_rad)"},
-    {"motor_speed_rad_s", "rate(motor_angle_rad)"},
-});
 
 constexpr auto kDefaultInputs = std::to_array<const char*>({
     "spring_deflection_rad",
@@ -80,7 +69,7 @@ std::vector<ChannelDefinition> known_definitions(const Dataset& dataset) {
   for (const CanonicalChannel& channel : kCanonicalChannels)
     if (!defines(definitions, channel.name) && !every_record_has(dataset, channel.name) &&
         is_computable(dataset, definitions, channel.expression))
-      definitions.push_back({channel.name, channel.expression});
+      definitions.push_back({std::string(channel.name), std::string(channel.expression)});
   return definitions;
 }
 
@@ -138,6 +127,49 @@ bool is_straight_line(const Dataset& dataset, const std::string& input) {
   }
   constexpr double kUnexplained = 1e-9;
   return n > 2.0 && xx > 0.0 && yy > 0.0 && yy - xy * xy / xx < kUnexplained * yy;
+}
+
+/// Whether the inputs together give the target in the same way: each source of a difference of two
+/// sensors is innocent alone.
+bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
+  constexpr std::size_t kEnough = 2000;  // samples a record
+  constexpr double kUnexplained = 1e-9;
+  std::vector<double> rows;
+  std::vector<double> measured;
+  for (const DatasetRecord& record : dataset.records) {
+    const Recording& recording = record.recording;
+    const Channel& target = recording.channel(dataset.target);
+    FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
+    std::vector<const std::vector<double>*> channels;
+    for (const std::string& input : pipeline.raw_inputs())
+      channels.push_back(&recording.channel(input).values);
+    std::vector<double> raw(channels.size());
+    const std::size_t stride = recording.size() / kEnough + 1;
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[i];
+      if (!std::ranges::all_of(raw, [](double value) { return std::isfinite(value); })) continue;
+      const std::span<const double> features = pipeline.step(raw);
+      if (i % stride != 0 || !target.is_fresh(i) || !std::isfinite(target.values[i])) continue;
+      rows.push_back(1.0);
+      rows.insert(rows.end(), features.begin(), features.end());
+      measured.push_back(target.values[i]);
+    }
+  }
+  Matrix design(measured.size(), spec.inputs.size() + 1);
+  if (design.rows <= design.columns) return false;
+  design.values = std::move(rows);
+  const std::vector<double> plane = least_squares(design, measured).coefficients;
+  double mean = 0.0;
+  for (const double value : measured) mean += value / static_cast<double>(measured.size());
+  double total = 0.0;
+  double missed = 0.0;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    double said = 0.0;
+    for (std::size_t j = 0; j < plane.size(); ++j) said += plane[j] * design(i, j);
+    missed += (measured[i] - said) * (measured[i] - said);
+    total += (measured[i] - mean) * (measured[i] - mean);
+  }
+  return missed < kUnexplained * total;
 }
 
 /// Runs `parse`; here it is the caller who wrote the expressions.
@@ -212,6 +244,7 @@ std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
             dataset.target_computed_from.end() ||
         is_straight_line(dataset, input))
       return input;
+  if (is_plane(dataset, spec)) return fmt::format("{}", fmt::join(spec.inputs, ", "));
   return {};
 }
 

@@ -38,6 +38,14 @@ constexpr OptionInfo kPatience{
     "patience", Kind::integer, "5",
     0,          1e6,           "epochs without a better validation loss before it stops; 0: all"};
 
+constexpr OptionInfo kMembers{
+    "members",
+    Kind::integer,
+    "1",
+    1,
+    MlpEnsemble::kMostMembers,
+    "networks of an ensemble, whose mean is told and whose disagreement widens the error bar"};
+
 constexpr std::array kMlpOptions{
     OptionInfo{"layers", Kind::text, "50-20-10", 0, 0, "units of the hidden layers"},
     OptionInfo{"activation", Kind::text, "relu", 0, 0,
@@ -49,7 +57,8 @@ constexpr std::array kMlpOptions{
     kOptimiser,
     kWeightDecay,
     OptionInfo{"clip", Kind::number, "0", 0, 1e12, "greatest norm of the gradient; 0: any"},
-    kPatience};
+    kPatience,
+    kMembers};
 
 constexpr std::array kRecurrentOptions{
     OptionInfo{"layers", Kind::text, "32", 0, 0, "units of the layers with memory: 32, 64-32"},
@@ -70,7 +79,8 @@ constexpr std::array kRecurrentOptions{
     kOptimiser,
     kWeightDecay,
     OptionInfo{"clip", Kind::number, "1", 0, 1e12, "greatest norm of the gradient; 0: any"},
-    kPatience};
+    kPatience,
+    kMembers};
 
 [[noreturn]] void refuse(std::string_view option, std::string expected, const std::string& found) {
   throw UsageError({.place = "option " + std::string(option),
@@ -140,19 +150,24 @@ RecurrentOptions recurrent_options(const Options& options) {
 }
 
 FittedModel mlp(const TrainingData& data, const Options& options, const FitContext& context) {
-  return fitted_model(fit_mlp(data,
-                              {.layers = sizes(options, "layers"),
-                               .activation = activation_of(options.text("activation")),
-                               .training = training_of(options)},
-                              context));
+  const MlpOptions own{.layers = sizes(options, "layers"),
+                       .activation = activation_of(options.text("activation")),
+                       .training = training_of(options)};
+  const std::size_t members = options.integer("members");
+  if (members == 1) return fitted_model(fit_mlp(data, own, context));
+  return fitted_model(fit_mlp_ensemble(data, own, members, context));
 }
 
 FittedModel lstm(const TrainingData& data, const Options& options, const FitContext& context) {
-  return fitted_model(fit_lstm(data, recurrent_options(options), context));
+  const std::size_t members = options.integer("members");
+  if (members == 1) return fitted_model(fit_lstm(data, recurrent_options(options), context));
+  return fitted_model(fit_lstm_ensemble(data, recurrent_options(options), members, context));
 }
 
 FittedModel gru(const TrainingData& data, const Options& options, const FitContext& context) {
-  return fitted_model(fit_gru(data, recurrent_options(options), context));
+  const std::size_t members = options.integer("members");
+  if (members == 1) return fitted_model(fit_gru(data, recurrent_options(options), context));
+  return fitted_model(fit_gru_ensemble(data, recurrent_options(options), members, context));
 }
 
 constexpr std::array kFamilies{

@@ -86,6 +86,15 @@ Rest longest_rest(const Channel& channel) {
   return longest;
 }
 
+double finest_step(const std::vector<double>& values) {
+  double finest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double step = std::abs(values[i] - values[i - 1]);
+    if (step > 0.0) finest = std::min(finest, step);
+  }
+  return std::isfinite(finest) ? finest : 0.0;
+}
+
 double share_fresh(const Channel& channel) {
   if (channel.fresh.empty()) return 1.0;
   const auto fresh = std::ranges::count_if(channel.fresh, [](auto mark) { return mark != 0; });

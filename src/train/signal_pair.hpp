@@ -53,6 +53,10 @@ struct Rest {
 };
 [[nodiscard]] Rest longest_rest(const Channel& channel);
 
+/// The smallest step that a channel makes: the code of a sensor that has codes, next to nothing of
+/// any other; 0 if it never moves.
+[[nodiscard]] double finest_step(const std::vector<double>& values);
+
 /// The share of all samples at which the sensor delivered.
 [[nodiscard]] double share_fresh(const Channel& channel);
 

@@ -186,6 +186,24 @@ TEST(CsvWriter, WritesTheClockFirstAndFreshnessBesideItsChannel) {
       "t_s,angle_rad,torque_Nm,torque_fresh_1\n0.25,0,-0,1\n0.251,0.009999833334166664,nan,0\n");
 }
 
+TEST(CsvWriter, PacksWhatEndsInGzAndAlwaysToTheSameBytes) {
+  const TemporaryFolder folder;
+  const auto written = [&](const char* name) {
+    write_csv(example(20000), folder.path(name));
+    std::ifstream file(folder.path(name), std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const std::string plain = written("a.csv");
+  const std::string packed = written("a.csv.gz");
+  EXPECT_LT(packed.size(), plain.size() / 2);
+  EXPECT_EQ(packed, written("b.csv.gz"));
+  const CsvTable table = read_csv(folder.path("a.csv"));
+  const CsvTable unpacked = read_csv(folder.path("a.csv.gz"));
+  ASSERT_EQ(table.columns.size(), unpacked.columns.size());
+  EXPECT_EQ(table.columns.front().values, unpacked.columns.front().values);
+  EXPECT_EQ(table.columns.back().values, unpacked.columns.back().values);
+}
+
 TEST(CsvWriter, LeavesTheOldFileAndNothingElseWhenItFails) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.csv", "old");

@@ -162,6 +162,19 @@ TEST_F(Manifests, TheUsersWordCountsMore) {
   }
 }
 
+TEST(LoadDataset, TellsACanonicalTargetFromItsSources) {
+  const TemporaryFolder folder;
+  const std::string log =
+      folder.file("a.csv", "t_s,gear_angle_rad,joint_angle_rad\n0,1,0.75\n0.1,2,1.5\n0.2,3,2.25\n");
+  const Dataset dataset =
+      load_dataset({log}, {}, {.mapping = {}, .rate_Hz = {}, .target = "spring_deflection_rad"});
+  EXPECT_EQ(dataset.records.front().recording.channel("spring_deflection_rad").values,
+            (std::vector<double>{0.25, 0.5, 0.75}));
+  EXPECT_THROW(static_cast<void>(load_dataset(
+                   {log}, {}, {.mapping = {}, .rate_Hz = {}, .target = "motor_speed_rad_s"})),
+               Error);
+}
+
 TEST_F(Manifests, ARootMayStandInAnEnvironmentVariable) {
   ASSERT_EQ(setenv("TORSIO_TEST_ROOT", folder_.path("logs").c_str(), 1), 0);
   const Manifest manifest =

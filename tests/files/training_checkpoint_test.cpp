@@ -28,7 +28,9 @@ TrainingCheckpoint example() {
           .weights = {0.1F, -2.0F},
           .mean = {1e-30F, 0.0F},
           .square = {3.0F, 1e-38F},
-          .best = {0.3F, 4.0F}};
+          .best = {0.3F, 4.0F},
+          .finished = {7.0F, -8.0F},
+          .finished_loss = {0.25}};
 }
 
 class CheckpointFile : public testing::Test {

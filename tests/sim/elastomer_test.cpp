@@ -112,7 +112,7 @@ TEST(Triangles, AreFollowedFromTheSlowestToTheFastest) {
   for (const Case& of : {Case{0.4, 5.0, 0.04}, Case{1.0, 5.0, 0.07}, Case{4.0, 2.0, 0.16}}) {
     const Recording recording = simulate({.actuator = "elastomer",
                                           .experiment = "triangles",
-                                          .amplitude = of.amplitude_Nm,
+                                          .torque_amplitude_Nm = of.amplitude_Nm,
                                           .frequency_Hz = of.frequency_Hz,
                                           .with_truth = true});
     Triangle wanted({of.amplitude_Nm, of.frequency_Hz}, kLog_Hz);
@@ -205,12 +205,12 @@ TEST(SlowCycles, AskWhatCreepingGlueStillCarries) {
   const double highest_Nm = 6.0 * std::pow(0.997, 30.0);
   EXPECT_NEAR(largest(torque(recording)), highest_Nm, 0.1);
   EXPECT_LT(largest(deflection_deg(recording)), 9.0);
-  EXPECT_NE(
-      test::error_message([] {
-        static_cast<void>(simulate(
-            {.actuator = "elastomer:creeping", .experiment = "slow-cycles", .amplitude = 6.0}));
-      }).find("at most 5.483 Nm"),
-      std::string::npos);
+  EXPECT_NE(test::error_message([] {
+              static_cast<void>(simulate({.actuator = "elastomer:creeping",
+                                          .experiment = "slow-cycles",
+                                          .torque_amplitude_Nm = 6.0}));
+            }).find("at most 5.483 Nm"),
+            std::string::npos);
 }
 
 TEST(Hold, CreepsRelaxesAndRecovers) {
@@ -264,7 +264,7 @@ TEST(Elastomer, RefusesWhatItsBenchCannotDo) {
   EXPECT_NE(message(spec).find("0.4 to 4 Hz"), std::string::npos);
   spec.frequency_Hz = 4.1;
   EXPECT_NE(message(spec).find("0.4 to 4 Hz"), std::string::npos);
-  spec = {.actuator = "elastomer", .experiment = "triangles", .amplitude = 6.1};
+  spec = {.actuator = "elastomer", .experiment = "triangles", .torque_amplitude_Nm = 6.1};
   EXPECT_NE(message(spec).find("at most 6 Nm"), std::string::npos);
   EXPECT_NE(message({.actuator = "elastomer", .experiment = "sweep"}).find("one of triangles"),
             std::string::npos);

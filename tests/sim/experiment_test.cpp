@@ -155,6 +155,9 @@ TEST(Simulate, RefusesWhatTheBenchCannotDo) {
             std::string::npos);
   EXPECT_NE(test::refusal_of({.lever_m = 0.8}).find("at most the 50 Nm that dfki-50 is rated for"),
             std::string::npos);
+  EXPECT_NE(test::refusal_of({.experiment = "chirp", .angle_amplitude_rad = 0.1})
+                .find("expected one in Nm, found 5.72958 deg"),
+            std::string::npos);
   EXPECT_NE(test::refusal_of({.lever_m = -0.1}).find("0 < metres <= 2"), std::string::npos);
   EXPECT_NE(test::refusal_of({.duration_s = 0.0}).find("duration"), std::string::npos);
   EXPECT_NE(test::refusal_of({.duration_s = std::nan("")}).find("duration"), std::string::npos);

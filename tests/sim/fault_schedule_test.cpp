@@ -329,6 +329,10 @@ TEST(SimulateWithFaults, ABrokenSpringCarriesNothing) {
   const auto& torque = recording.channel("truth_spring_torque_Nm").values;
   EXPECT_NE(torque[999], 0.0);
   EXPECT_TRUE(std::all_of(torque.begin() + 1001, torque.end(), [](double v) { return v == 0.0; }));
+  const auto& friction = recording.channel("truth_spring_friction_Nm").values;
+  EXPECT_NE(friction[999], 0.0);
+  EXPECT_TRUE(
+      std::all_of(friction.begin() + 1001, friction.end(), [](double v) { return v == 0.0; }));
 }
 
 TEST(SimulateWithFaults, ABottomedSpringStopsAtItsStop) {

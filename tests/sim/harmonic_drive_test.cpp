@@ -193,7 +193,7 @@ Recording pushed(const std::string& actuator, double torque_Nm, std::uint64_t se
                    .experiment = "human-torque",
                    .seed = seed,
                    .duration_s = 40.0,
-                   .amplitude = torque_Nm,
+                   .torque_amplitude_Nm = torque_Nm,
                    .is_impedance_zero = is_zero});
 }
 
@@ -278,8 +278,8 @@ TEST(HumanTorque, TakesFiveToFiftyNewtonMetresAtAFrequency) {
     }
     return std::string();
   };
-  EXPECT_EQ(refused({.amplitude = 50.0}), "");
-  EXPECT_NE(refused({.amplitude = 51.0}).find("at most 50 Nm"), std::string::npos);
+  EXPECT_EQ(refused({.torque_amplitude_Nm = 50.0}), "");
+  EXPECT_NE(refused({.torque_amplitude_Nm = 51.0}).find("at most 50 Nm"), std::string::npos);
   EXPECT_NE(refused({.frequency_Hz = 0.0}).find("0.001 to 10 Hz"), std::string::npos);
   EXPECT_NE(refused({.lever_m = 0.1}).find("has no lever"), std::string::npos);
 }
@@ -299,7 +299,7 @@ TEST(HarmonicDriveHold, StaysAtRestAndYieldsALittleToAConstantTorque) {
   const Recording alone = simulate(spec);
   // The wanted twist jumps by K_pp codes of the output's encoder.
   EXPECT_LT(range(tube_twist_deg(alone)), 15.0 * kOutputCode_deg);
-  spec.amplitude = 20.0;
+  spec.torque_amplitude_Nm = 20.0;
   const Recording pushed_on = simulate(spec);
   EXPECT_NEAR(pushed_on.channel("torque_Nm").values.back(), -20.0, 0.2);
   const double yielded_deg = deg_from_rad(pushed_on.channel("joint_angle_rad").values.back());

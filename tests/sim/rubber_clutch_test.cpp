@@ -38,7 +38,7 @@ Recording record(const char* experiment, std::uint64_t seed = 1) {
 Recording sine(double amplitude_deg, double frequency_Hz) {
   return simulate({.actuator = "rubber-clutch",
                    .experiment = "grid",
-                   .amplitude = rad_from_deg(amplitude_deg),
+                   .angle_amplitude_rad = rad_from_deg(amplitude_deg),
                    .frequency_Hz = frequency_Hz,
                    .with_truth = true});
 }
@@ -365,7 +365,7 @@ TEST(RubberClutch, RefusesWhatItsBenchCannotDo) {
   const auto grid = [](std::optional<double> amplitude, std::optional<double> frequency_Hz) {
     return test::refusal_of({.actuator = "rubber-clutch",
                              .experiment = "grid",
-                             .amplitude = amplitude,
+                             .angle_amplitude_rad = amplitude,
                              .frequency_Hz = frequency_Hz});
   };
   EXPECT_NE(grid({}, 0.0).find("0.001 to 10 Hz"), std::string::npos);

@@ -151,7 +151,7 @@ TEST(Chirp, RefusesWhatTipsTheLeverOver) {
     return test::error_message([&] { static_cast<void>(simulate(spec)); });
   };
   ExperimentSpec spec{
-      .actuator = "dfki-120", .experiment = "chirp", .lever_m = 0.8, .amplitude = 70.0};
+      .actuator = "dfki-120", .experiment = "chirp", .lever_m = 0.8, .torque_amplitude_Nm = 70.0};
   EXPECT_NE(message(spec).find("would tip the lever over"), std::string::npos);
   spec.lever_m.reset();
   spec.duration_s = 0.1;
@@ -160,9 +160,9 @@ TEST(Chirp, RefusesWhatTipsTheLeverOver) {
   EXPECT_NE(message(spec).find("the output is locked"), std::string::npos);
   spec = {.actuator = "dfki-50", .experiment = "random-walk", .lever_m = 0.8};
   EXPECT_NE(message(spec).find("would tip the lever over"), std::string::npos);
-  spec.amplitude = 4.0;
+  spec.torque_amplitude_Nm = 4.0;
   EXPECT_EQ(message(spec), "");
-  spec.amplitude = 20.0;
+  spec.torque_amplitude_Nm = 20.0;
   EXPECT_NE(message(spec).find("at most 17.5 Nm"), std::string::npos);
 }
 

@@ -147,6 +147,32 @@ inline ParametricGp example<ParametricGp>() {
   return ParametricGp(parameters);
 }
 
+/// Members of different weights.
+template <class Member>
+Ensemble<Member> example_ensemble() {
+  typename Ensemble<Member>::Parameters parameters;
+  parameters.residual_std = 0.7;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    NetworkShape shape{.hidden = {4}};
+    if constexpr (requires(typename Member::Parameters of) { of.warm_up_samples; })
+      shape.units = {3}, shape.warm_up_samples = 3;
+    parameters.members.push_back(random_network<Member>(shape, seed));
+  }
+  return Ensemble<Member>(parameters);
+}
+template <>
+inline MlpEnsemble example<MlpEnsemble>() {
+  return example_ensemble<Mlp>();
+}
+template <>
+inline LstmEnsemble example<LstmEnsemble>() {
+  return example_ensemble<Lstm>();
+}
+template <>
+inline GruEnsemble example<GruEnsemble>() {
+  return example_ensemble<Gru>();
+}
+
 template <>
 inline AnyModel example<AnyModel>() {
   return example<Polynomial>();

@@ -113,6 +113,25 @@ TEST(Check, DoesNotCallAStandstillFrozen) {
             Verdict::pass);
 }
 
+TEST(Check, WarnsOfCodesThatAreCoarseForTheDeflection) {
+  const auto findings_with_code = [](double code_rad) {
+    return findings_of(with_record(changed("gear_angle_rad", [=](Channel& channel) {
+      for (double& value : channel.values) value = code_rad * std::round(value / code_rad);
+    })));
+  };
+  const Recording sound = bench_recording("sound");
+  const auto& gear = sound.channel("gear_angle_rad").values;
+  const auto& joint = sound.channel("joint_angle_rad").values;
+  double widest_rad = 0.0;  // of the deflection
+  for (std::size_t i = 0; i < gear.size(); ++i)
+    widest_rad = std::max(widest_rad, std::abs(gear[i] - joint[i]));
+  EXPECT_EQ(verdict_of(findings_with_code(0.005 * widest_rad), "resolution"), Verdict::pass);
+  const auto coarse = findings_with_code(0.1 * widest_rad);
+  EXPECT_EQ(verdict_of(coarse, "resolution"), Verdict::warn);
+  EXPECT_NE(first_of(coarse, "resolution").message.find("gear_angle_rad tells in steps of"),
+            std::string::npos);
+}
+
 TEST(Check, WarnsOfAJump) {
   const auto jump = [](Channel& channel) {
     for (std::size_t i = 2000; i < channel.values.size(); ++i) channel.values[i] += 20.0;

@@ -12,6 +12,7 @@
 #include "network_example.hpp"
 #include "support/error_message.hpp"
 #include "support/example_data.hpp"
+#include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -113,6 +114,59 @@ TEST(FitNetwork, GivesTheSameBitsWhateverTheNumberOfThreads) {
     EXPECT_EQ(fit_lstm(data, options, {.seed = 4}).parameters, one) << threads;
   }
   EXPECT_NE(fit_lstm(data, options, {.seed = 5}).parameters, one);
+}
+
+TEST(FitNetwork, AnEnsembleBeginsWithTheSingleNetworkAndItsMembersDiffer) {
+  const TrainingData data = test::noisy_spring(3000);
+  const MlpOptions options{.layers = {8}, .training = {.epochs = 5, .batch = 64, .clip = 0.0}};
+  const auto ensemble = fit_mlp_ensemble(data, options, 3, {.seed = 4});
+  ASSERT_EQ(ensemble.parameters.members.size(), 3U);
+  EXPECT_EQ(ensemble.parameters.members[0], fit_mlp(data, options, {.seed = 4}).parameters);
+  EXPECT_NE(ensemble.parameters.members[1].layers, ensemble.parameters.members[2].layers);
+  EXPECT_THROW((void)fit_mlp_ensemble(data, options, 1), UsageError);
+}
+
+TEST(FitNetwork, AnEnsembleDoubtsMoreFarFromItsData) {
+  const TrainingData data = test::noisy_spring(3000);
+  MlpEnsemble ensemble(
+      fit_mlp_ensemble(data, {.layers = {16}, .training = {.epochs = 20, .batch = 64}}, 4)
+          .parameters);
+  std::vector<double> features(data.input_count(), 0.0);
+  const double near = ensemble.step(features).std_dev;
+  for (std::size_t j = 0; j < features.size(); ++j)
+    features[j] = 20.0 * ensemble.parameters().members[0].scaling.inputs.scale[j];
+  EXPECT_GT(ensemble.step(features).std_dev, 1.5 * near);
+}
+
+TEST(FitNetwork, AResumedEnsembleIsBitForBitWhatItWouldHaveBeen) {
+  const TrainingData data = delayed_sines(3, 400, 3);
+  const auto gru = [&](const FitContext& context) {
+    return fit_gru_ensemble(data, small_memory(), 3, context);
+  };
+  int calls = 0;
+  const auto whole = gru({.seed = 6, .progress = [&](double, std::string_view) {
+                            ++calls;
+                            return true;
+                          }});
+  for (const int stop : {2, calls / 2, calls - 1}) {
+    TrainingCheckpoint kept;
+    int left = stop;
+    EXPECT_THROW((void)gru({.seed = 6,
+                            .progress = [&](double, std::string_view) { return --left > 0; },
+                            .keep = [&](const TrainingCheckpoint& state) { kept = state; }}),
+                 Cancelled);
+    ASSERT_FALSE(kept.recipe.empty()) << stop;
+    const TemporaryFolder folder;
+    save_checkpoint(folder.path("c"), kept);
+    kept = load_checkpoint(folder.path("c"));
+    EXPECT_EQ(gru({.seed = 6, .resume = &kept}).parameters, whole.parameters) << stop;
+    if (stop == calls - 1) {
+      EXPECT_EQ(kept.finished_loss.size(), 2U);
+      kept.finished.pop_back();
+      EXPECT_THROW((void)gru({.seed = 6, .resume = &kept}), Error);
+    }
+    EXPECT_THROW((void)gru({.seed = 7, .resume = &kept}), Error);
+  }
 }
 
 TEST(FitNetwork, KeepsTheWeightsOfTheBestEpochAndStopsWithoutABetterOne) {

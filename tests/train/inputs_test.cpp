@@ -4,6 +4,7 @@
 
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
+#include "torsio/data/mapping.hpp"
 
 namespace torsio {
 namespace {
@@ -67,6 +68,20 @@ TEST(FindLeak, SeesDeclaredAndComputedOnes) {
   EXPECT_EQ(find_leak(dataset, spec), "gear_angle_rad");
   EXPECT_THROW((void)refuse_leak(dataset, spec, false), UsageError);
   EXPECT_EQ(refuse_leak(dataset, spec, true), "gear_angle_rad");
+}
+
+TEST(FindLeak, SeesADifferenceWhoseSourcesAreBothInputs) {
+  Dataset dataset = bench_dataset();
+  dataset.target = "spring_deflection_rad";
+  for (DatasetRecord& record : dataset.records)
+    add_derived(record.recording, {{"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"}});
+  const auto leak = [&](const std::vector<std::string>& inputs) {
+    return find_leak(dataset, resolve_inputs(dataset, inputs));
+  };
+  EXPECT_EQ(leak({"torque_Nm", "rate(joint_angle_rad)"}), "");
+  EXPECT_EQ(leak({"torque_Nm", "rate(gear_angle_rad - joint_angle_rad)"}), "");
+  EXPECT_EQ(leak({"gear_angle_rad", "torque_Nm", "joint_angle_rad"}),
+            "gear_angle_rad, torque_Nm, joint_angle_rad");
 }
 
 }  // namespace

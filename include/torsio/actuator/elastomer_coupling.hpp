@@ -56,6 +56,13 @@ class ElastomerCoupling {
 
   /// @returns c, 1 before the first cycle
   [[nodiscard]] double glue() const noexcept { return glue_; }
+  /// The direction of torque that lobes carry; bonded ones carry both, as `positive`.
+  enum class Side { positive, negative };
+  /// @returns the creep [rad] of the elements of one side's chain
+  [[nodiscard]] const CreepChain::Vector& creep(Side side) const noexcept {
+    return lobes_[side == Side::positive ? 0 : 1].creep_rad;
+  }
+  [[nodiscard]] const MaxwellSlip<3>& slip() const noexcept { return slip_; }
   /// @returns g(T) [Nm]
   [[nodiscard]] double output_torque(double linear_Nm) const noexcept TORSIO_REALTIME;
   /// g(T) = T (1 + T (quadratic + T cubic)) from the lowest T to the highest, constant beyond.

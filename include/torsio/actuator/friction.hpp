@@ -48,6 +48,8 @@ class LuGreFriction {
     return force_Nm_ + viscous_Nm;
   }
 
+  /// @returns F [Nm], the bristle's share of the last step's torque
+  [[nodiscard]] double bristle_torque() const noexcept { return force_Nm_; }
   /// @returns the energy [J] held in the bristle, F² / 2σ₀
   [[nodiscard]] double energy() const noexcept {
     return is_only_viscous_ ? 0.0 : 0.5 * force_Nm_ * force_Nm_ / stiffness_Nm_rad_;

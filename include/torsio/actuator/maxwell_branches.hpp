@@ -42,6 +42,8 @@ class MaxwellBranches {
     return sum_Nm;
   }
 
+  /// @returns zᵢ [Nm]
+  [[nodiscard]] const std::array<double, Count>& forces() const noexcept { return force_Nm_; }
   /// @returns the energy [J] held in the springs, Σ zᵢ² / 2kᵢ
   [[nodiscard]] double energy() const noexcept;
   /// @returns Σ kᵢ [Nm/rad]

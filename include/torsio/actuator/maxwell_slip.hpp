@@ -64,6 +64,8 @@ class MaxwellSlip {
     return sum_Nm;
   }
 
+  /// @returns Fᵢ [Nm]
+  [[nodiscard]] const std::array<double, Count>& forces() const noexcept { return force_Nm_; }
   /// @returns the energy [J] held in the elements, Σ Fᵢ² / 2kᵢ with kᵢ = wᵢ f / Xᵢ of the last step
   [[nodiscard]] double energy() const noexcept {
     double sum = 0.0;

@@ -53,6 +53,8 @@ class RubberSpring {
                                         parameters_.asymmetry_Nm_rad * magnitude *
                                             std::tanh(magnitude / parameters_.blend_rad));
   }
+  [[nodiscard]] const MaxwellBranches<3>& branches() const noexcept { return branches_; }
+  [[nodiscard]] const MaxwellSlip<3>& slip() const noexcept { return slip_; }
   /// @returns the share [Nm] of branches and slip elements in the last step's torque
   [[nodiscard]] double friction_torque() const noexcept { return friction_Nm_; }
   /// @returns the energy [J] of the elastic curve at a deflection, ∫₀ᵘ s τ_el du in closed form

@@ -21,6 +21,9 @@ struct TrainingCheckpoint {
   std::vector<float> mean;    ///< the optimiser's, of the gradient
   std::vector<float> square;  ///< the optimiser's, of the gradient's square
   std::vector<float> best;    ///< weights of the best epoch
+  // Of an ensemble, the members done before this one.
+  std::vector<float> finished;        ///< their weights, one after the other
+  std::vector<double> finished_loss;  ///< their best losses
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
@@ -34,6 +37,8 @@ struct TrainingCheckpoint {
     visit("mean", self.mean);
     visit("square", self.square);
     visit("best", self.best);
+    visit("finished", self.finished);
+    visit("finished_loss", self.finished_loss);
   }
   bool operator==(const TrainingCheckpoint&) const = default;
 };

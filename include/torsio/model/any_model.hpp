@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/ensemble.hpp"
 #include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
@@ -33,11 +34,14 @@ using KnownFamilies = FamilyList<Linear,           //
                                  LinearCoulomb,    //
                                  Polynomial,       //
                                  Dgmm,             //
-                                 Mlp,              //
                                  GaussianProcess,  //
                                  ParametricGp,     //
+                                 Mlp,              //
                                  Lstm,             //
-                                 Gru>;
+                                 Gru,              //
+                                 MlpEnsemble,      //
+                                 LstmEnsemble,     //
+                                 GruEnsemble>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`
 /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch

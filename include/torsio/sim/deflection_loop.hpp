@@ -27,6 +27,7 @@ class DeflectionLoop {
 
   void reset() noexcept;
 
+  /// What is not finite changes nothing: the last current holds.
   /// @returns the motor current [A]
   double step(double wanted_rad, double deflection_rad) noexcept TORSIO_REALTIME;
 
@@ -39,6 +40,7 @@ class DeflectionLoop {
   Lowpass rate_filter_;
   double integral_rad_s_ = 0.0;
   double last_deflection_rad_ = 0.0;
+  double current_A_ = 0.0;
   bool is_started_ = false;
 };
 

@@ -23,7 +23,9 @@ struct ExperimentSpec {
   std::optional<double> duration_s = {};  ///< none: as long as the experiment's protocol is
   std::optional<double> lever_m = {};     ///< none: the first of `sweep_protocol`, or locked
   double inclination_rad = 0.0;           ///< of the lever's plane of motion from the vertical
-  std::optional<double> amplitude = {};   ///< Nm or rad, as the experiment has it; none: its own
+  // Of the excitation, whichever the experiment has (`ExperimentInfo::amplitude_unit`); none: its own.
+  std::optional<double> torque_amplitude_Nm = {};
+  std::optional<double> angle_amplitude_rad = {};
   std::optional<double> frequency_Hz = {};
   bool is_impedance_zero = false;  ///< of the joint's controller; false: high
   bool with_truth = false;         ///< add the `truth_*` channels, which no sensor sees
@@ -35,7 +37,7 @@ struct ExperimentInfo {
   std::string_view name;
   std::string_view actuators;  ///< that have it
   std::string_view description;
-  std::string_view amplitude_unit = {};  ///< of `ExperimentSpec::amplitude`; empty: it takes none
+  std::string_view amplitude_unit = {};  ///< "Nm", "rad", or empty: it takes none
 };
 
 /// What can be done on the benches. A name may stand there for more than one family.

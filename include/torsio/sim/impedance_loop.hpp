@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "torsio/core/realtime.hpp"
 #include "torsio/sim/plant.hpp"
 
@@ -29,14 +31,15 @@ class ImpedanceLoop {
   ImpedanceLoop(const PlantParameters& plant, const Gains& gains, Twist twist);
 
   /// @param wanted_rad θ_a*
-  /// @returns the motor current [A]
+  /// @returns the motor current [A]; 0 if an angle is not finite
   [[nodiscard]] double step(double wanted_rad, double rotor_angle_rad, double middle_angle_rad,
                             double joint_angle_rad) const noexcept TORSIO_REALTIME {
     const double behind_rad =
         twist_ == Twist::tube ? middle_angle_rad : gear_ratio_ * joint_angle_rad;
     const double twist_rad = rotor_angle_rad * inverse_tube_ratio_ - behind_rad;
     const double wanted_twist_rad = gains_.position * (wanted_rad - joint_angle_rad);
-    return gains_.torque_Nm_rad * (wanted_twist_rad - twist_rad) * inverse_torque_constant_;
+    const double torque_Nm = gains_.torque_Nm_rad * (wanted_twist_rad - twist_rad);
+    return std::isfinite(torque_Nm) ? torque_Nm * inverse_torque_constant_ : 0.0;
   }
 
  private:

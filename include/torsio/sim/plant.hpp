@@ -192,6 +192,9 @@ class Plant {
   [[nodiscard]] double current() const noexcept { return motor_.current(); }  ///< [A]
   [[nodiscard]] const FirstStage& first() const noexcept { return first_; }
   [[nodiscard]] const SecondStage& second() const noexcept { return second_; }
+  [[nodiscard]] const LuGreFriction& rotor_friction() const noexcept { return rotor_friction_; }
+  [[nodiscard]] const LuGreFriction& middle_friction() const noexcept { return middle_friction_; }
+  [[nodiscard]] const LuGreFriction& bearing() const noexcept { return bearing_; }
 
   /// @returns twist [rad] and hysteretic torque [Nm] of a stage in the last step
   [[nodiscard]] double first_twist() const noexcept;

@@ -28,6 +28,7 @@ class PositionLoop {
   void reset() noexcept;
 
   /// @param wanted_rad q*, of the joint
+  /// What is not finite changes nothing: the last current holds.
   /// @returns the motor current [A]
   double step(double wanted_rad, double rotor_angle_rad) noexcept TORSIO_REALTIME;
 
@@ -41,6 +42,7 @@ class PositionLoop {
   double integral_ = 0.0;
   double last_wanted_rad_ = 0.0;
   double last_angle_rad_ = 0.0;
+  double current_A_ = 0.0;
   bool is_started_ = false;
 };
 

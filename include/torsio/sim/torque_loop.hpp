@@ -30,6 +30,7 @@ class TorqueLoop {
 
   /// @param wanted_Nm τ*
   /// @param torque_Nm τ, of the load cell
+  /// What is not finite changes nothing: the last current holds.
   /// @returns the motor current [A]
   double step(double wanted_Nm, double torque_Nm, double rotor_angle_rad) noexcept TORSIO_REALTIME;
 
@@ -46,6 +47,7 @@ class TorqueLoop {
   double integral_A_ = 0.0;
   double last_wanted_Nm_ = 0.0;
   double last_angle_rad_ = 0.0;
+  double current_A_ = 0.0;
   bool is_started_ = false;
 };
 

@@ -24,7 +24,7 @@ struct Finding {
 };
 
 /// Can a torque model be learned from these recordings? Looks at each channel that the inputs need
-/// and at the target: values that are missing, constant or saturated; frozen sensors; gaps; the delay and the sign
+/// and at the target: values that are missing, constant or saturated; frozen sensors; coarse codes; gaps; the delay and the sign
 /// between the first input and the target; reversals and speeds; offsets that differ between
 /// records; a target computed from an input; test data outside the training range. Every check
 /// gives at least one finding, PASS ones included, in a fixed order.

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/model/ensemble.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/lstm.hpp"
 #include "torsio/model/mlp.hpp"
@@ -80,5 +81,21 @@ struct RecurrentOptions {
                                     const FitContext& context = {});
 [[nodiscard]] Fitted<Gru> fit_gru(const TrainingData& data, const RecurrentOptions& options,
                                   const FitContext& context = {});
+
+/// So many networks, each from initial weights, a split and an order of its own; the first is the
+/// one that the fit above gives. `residual_std` is the mean of the members' losses on what they did
+/// not learn from.
+/// @throws as above; UsageError unless there are 2 to `Ensemble::kMostMembers`.
+[[nodiscard]] Fitted<MlpEnsemble> fit_mlp_ensemble(const TrainingData& data,
+                                                   const MlpOptions& options, std::size_t members,
+                                                   const FitContext& context = {});
+[[nodiscard]] Fitted<LstmEnsemble> fit_lstm_ensemble(const TrainingData& data,
+                                                     const RecurrentOptions& options,
+                                                     std::size_t members,
+                                                     const FitContext& context = {});
+[[nodiscard]] Fitted<GruEnsemble> fit_gru_ensemble(const TrainingData& data,
+                                                   const RecurrentOptions& options,
+                                                   std::size_t members,
+                                                   const FitContext& context = {});
 
 }  // namespace torsio

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <zlib.h>
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/files/output_file.hpp"
+
+namespace torsio {
+
+/// Text on its way to a file, in large pieces, packed as gzip if asked. Equal text gives equal
+/// bytes: no name and no time of day stand in the header.
+class TextSink {
+ public:
+  TextSink(OutputFile& file, bool packs);
+  ~TextSink();
+  TextSink(const TextSink&) = delete;
+  TextSink& operator=(const TextSink&) = delete;
+
+  void add(std::string_view more);
+  void add(double value);  ///< shortest decimals that read back to the same number
+  /// Call once, at the end.
+  void finish();
+
+ private:
+  void flush(bool is_last);
+  void pack(std::span<const std::byte> bytes, bool is_last);
+
+  OutputFile& file_;
+  std::string text_;
+  std::vector<std::byte> packed_;  ///< empty: plain text
+  z_stream stream_{};
+};
+
+}  // namespace torsio

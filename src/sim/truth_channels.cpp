@@ -1,0 +1,172 @@
+#include "truth_channels.hpp"
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "torsio/core/dispatch.hpp"
+#include "torsio/data/recording.hpp"
+
+namespace torsio {
+namespace {
+
+struct PartNames {
+  std::string_view first;
+  std::string_view middle;  ///< the body between the stages
+  std::string_view second;
+};
+
+PartNames part_names(ActuatorFamily family) {
+  switch (family) {
+    case ActuatorFamily::series_elastic: break;
+    case ActuatorFamily::elastomer: return {"gear", "gear", "coupling"};
+    case ActuatorFamily::rubber_clutch: return {"clutch", "clutch_output", "rubber"};
+    case ActuatorFamily::harmonic_drive: return {"tube", "wave_generator", "gear"};
+  }
+  return {"gear", "gear", "spring"};
+}
+
+/// Collects the channels of one plant.
+class Teller {
+ public:
+  using Value = std::function<double(const BenchTruth&)>;
+
+  void tell(std::string_view part, std::string_view what, Value value) {
+    const std::string_view joint = part.empty() ? "" : "_";
+    channels_.push_back(
+        {fmt::format("{}{}{}{}", kTruthPrefix, part, joint, what), std::move(value)});
+  }
+  /// One channel for each number of an array: `what` holds its place, from 1.
+  template <class Array>
+  void tell_each(std::string_view part, std::string_view what, Array (*values)(const Plant&)) {
+    for (std::size_t i = 0; i < std::tuple_size_v<Array>; ++i) {
+      tell(part, fmt::format(fmt::runtime(what), i + 1),
+           [=](const BenchTruth& truth) { return values(truth.plant)[i]; });
+    }
+  }
+  std::vector<TruthChannel> channels() && { return std::move(channels_); }
+
+ private:
+  std::vector<TruthChannel> channels_;
+};
+
+template <class Stage>
+const Stage& second(const Plant& plant) {
+  return std::get<Stage>(plant.second());
+}
+
+void tell_stages(Teller& to, const PartNames& names) {
+  to.tell(names.second, "torque_Nm",
+          [](const BenchTruth& t) { return t.plant.torques().second_Nm; });
+  to.tell(names.second, "friction_Nm",
+          [](const BenchTruth& t) { return t.plant.second_friction_torque(); });
+  to.tell(names.second, "deflection_rad",
+          [](const BenchTruth& t) { return t.plant.second_twist(); });
+  to.tell(names.first, "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().first_Nm; });
+  to.tell(names.first, "friction_Nm",
+          [](const BenchTruth& t) { return t.plant.first_friction_torque(); });
+  to.tell(names.first, "deflection_rad", [](const BenchTruth& t) { return t.plant.first_twist(); });
+}
+
+void tell_bodies(Teller& to, const PartNames& names) {
+  to.tell("motor", "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().motor_Nm; });
+  to.tell("motor", "current_A", [](const BenchTruth& t) { return t.plant.current(); });
+  to.tell("motor", "angle_rad",
+          [](const BenchTruth& t) { return t.plant.state().rotor_angle_rad; });
+  to.tell("motor", "speed_rad_s",
+          [](const BenchTruth& t) { return t.plant.state().rotor_speed_rad_s; });
+  to.tell(names.middle, "angle_rad",
+          [](const BenchTruth& t) { return t.plant.state().middle_angle_rad; });
+  to.tell(names.middle, "speed_rad_s",
+          [](const BenchTruth& t) { return t.plant.state().middle_speed_rad_s; });
+  to.tell("joint", "angle_rad",
+          [](const BenchTruth& t) { return t.plant.state().joint_angle_rad; });
+  to.tell("joint", "speed_rad_s",
+          [](const BenchTruth& t) { return t.plant.state().joint_speed_rad_s; });
+}
+
+/// The friction of a body against the frame, and its share that is in the bristle.
+void tell_friction(Teller& to, std::string_view place, const LuGreFriction::Parameters& parts,
+                   double PlantTorques::*friction,
+                   const LuGreFriction& (Plant::*block)() const noexcept) {
+  if (parts.coulomb_Nm == 0.0 && parts.viscous_Nms_rad == 0.0) return;
+  to.tell(place, "friction_Nm", [=](const BenchTruth& t) { return t.plant.torques().*friction; });
+  if (parts.coulomb_Nm == 0.0) return;
+  to.tell(place, "bristle_Nm",
+          [=](const BenchTruth& t) { return (t.plant.*block)().bristle_torque(); });
+}
+
+void tell_frictions(Teller& to, const PartNames& names, const PlantParameters& parts) {
+  tell_friction(to, "motor", parts.rotor_friction, &PlantTorques::rotor_friction_Nm,
+                &Plant::rotor_friction);
+  tell_friction(to, names.middle, parts.middle_friction, &PlantTorques::middle_friction_Nm,
+                &Plant::middle_friction);
+  tell_friction(to, "bearing", parts.bearing, &PlantTorques::bearing_Nm, &Plant::bearing);
+}
+
+void tell_clutch(Teller& to) {
+  const auto clutch = [](const BenchTruth& t) -> const SlipClutch& {
+    return std::get<SlipClutch>(t.plant.first());
+  };
+  to.tell("clutch", "slip_rad", [=](const BenchTruth& t) { return clutch(t).slip(); });
+  to.tell("clutch", "is_slipping_1",
+          [=](const BenchTruth& t) { return clutch(t).is_slipping() ? 1.0 : 0.0; });
+}
+
+void tell_coupling(Teller& to, bool is_bonded) {
+  to.tell_each(
+      "coupling", is_bonded ? "creep{}_rad" : "positive_creep{}_rad", +[](const Plant& p) {
+        return second<ElastomerCoupling>(p).creep(ElastomerCoupling::Side::positive);
+      });
+  if (!is_bonded) {
+    to.tell_each(
+        "coupling", "negative_creep{}_rad", +[](const Plant& p) {
+          return second<ElastomerCoupling>(p).creep(ElastomerCoupling::Side::negative);
+        });
+  }
+  to.tell_each(
+      "coupling", "slip{}_Nm",
+      +[](const Plant& p) { return second<ElastomerCoupling>(p).slip().forces(); });
+  to.tell("coupling", "glue_1",
+          [](const BenchTruth& t) { return second<ElastomerCoupling>(t.plant).glue(); });
+}
+
+void tell_rubber(Teller& to) {
+  to.tell_each(
+      "rubber", "branch{}_Nm",
+      +[](const Plant& p) { return second<RubberSpring>(p).branches().forces(); });
+  to.tell_each(
+      "rubber", "slip{}_Nm",
+      +[](const Plant& p) { return second<RubberSpring>(p).slip().forces(); });
+}
+
+}  // namespace
+
+std::vector<TruthChannel> truth_channels(const DataSheet& sheet) {
+  const PartNames names = part_names(sheet.family);
+  const PlantParameters parts = plant_parameters(sheet);
+  Teller to;
+  to.tell("", "torque_Nm", [](const BenchTruth& t) { return t.load_cell_Nm; });
+  tell_stages(to, names);
+  tell_bodies(to, names);
+  tell_frictions(to, names, parts);
+  if (std::holds_alternative<SlipClutch::Parameters>(parts.first)) tell_clutch(to);
+  if (const auto* coupling = std::get_if<ElastomerCoupling::Parameters>(&parts.second))
+    tell_coupling(to, coupling->bonded);
+  if (std::holds_alternative<RubberSpring::Parameters>(parts.second)) tell_rubber(to);
+  // One bristle, or one Bouc-Wen element, is the friction channel itself; four slip elements are not.
+  if (const auto* spring = std::get_if<Spring::Parameters>(&parts.second);
+      spring != nullptr && std::holds_alternative<MaxwellSlip<4>::Parameters>(spring->friction)) {
+    to.tell_each(
+        "spring", "slip{}_Nm", +[](const Plant& p) {
+          return std::get<MaxwellSlip<4>>(second<Spring>(p).friction()).forces();
+        });
+  }
+  to.tell("", "temperature_K", [](const BenchTruth& t) { return t.temperature_K; });
+  return std::move(to).channels();
+}
+
+}  // namespace torsio

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/sim/plant.hpp"
+
+namespace torsio {
+
+/// What a bench really is at one tick, as no sensor tells it.
+struct BenchTruth {
+  const Plant& plant;
+  double load_cell_Nm = 0.0;
+  double temperature_K = 0.0;
+};
+
+/// A `truth_` channel and how it is read.
+struct TruthChannel {
+  std::string name;
+  std::function<double(const BenchTruth&)> value;
+};
+
+/// Torques, motions and every internal state of this actuator (docs/actuators.md).
+[[nodiscard]] std::vector<TruthChannel> truth_channels(const DataSheet& sheet);
+
+}  // namespace torsio
