@@ -18,14 +18,15 @@ void fill_covariance(const Kernel& kernel, const Matrix& points, const PackedPoi
 double factorise_covariance(const Kernel& kernel, const Matrix& points, const PackedPoints& packed,
                             double noise_variance, Jitter jitter, SquareMatrix& factor) {
   constexpr double kSmallest = 1e-12;
-  for (double share = jitter.first; share <= Jitter::kLargest;
-       share = std::max(10.0 * share, kSmallest)) {
+  double share = jitter.first;
+  while (share <= Jitter::kLargest) {
     fill_covariance(kernel, points, packed, noise_variance, factor);
     double trace = 0.0;
     for (std::size_t i = 0; i < factor.size(); ++i) trace += factor(i, i);
     const double added = share * trace / static_cast<double>(factor.size());
     for (std::size_t i = 0; i < factor.size(); ++i) factor(i, i) += added;
     if (cholesky(factor)) return share;
+    share = std::max(10.0 * share, kSmallest);
   }
   return -1.0;
 }

@@ -212,10 +212,9 @@ ParametricGp::Parameters parameters_of(const ParametricGpTrainer& trainer,
   parameters.explained = Matrix(size, size);
   for (std::size_t i = 0; i < size; ++i)
     for (std::size_t j = 0; j < size; ++j) {
-      const auto row = static_cast<Eigen::Index>(i);
-      const auto column = static_cast<Eigen::Index>(j);
-      parameters.explained(i, j) =
-          trainer.inverse()(row, column) - 0.5 * (product(row, column) + product(column, row));
+      const auto k = static_cast<Eigen::Index>(i);
+      const auto l = static_cast<Eigen::Index>(j);
+      parameters.explained(i, j) = trainer.inverse()(k, l) - 0.5 * (product(k, l) + product(l, k));
     }
   return parameters;
 }

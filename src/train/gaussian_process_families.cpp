@@ -23,7 +23,7 @@ constexpr std::string_view kKernelHelp =
 
 constexpr std::array kGaussianProcessOptions{
     OptionInfo{"kernel", Kind::text, "linear_ard+matern52_ard", 0, 0, kKernelHelp},
-    OptionInfo{"samples", Kind::integer, "1000", 0, GaussianProcess::kMostPoints,
+    OptionInfo{"samples", Kind::integer, "500", 0, GaussianProcess::kMostPoints,
                "at most so many training samples, drawn by chance; 0: all"},
     OptionInfo{"restarts", Kind::integer, "3", 0, 1000,
                "of the search for the kernel's numbers, besides the first start"},
@@ -118,7 +118,7 @@ FittedModel gaussian_process(const TrainingData& data, const Options& options,
 
 constexpr std::array kFamilies{
     FamilyInfo{.name = GaussianProcess::kFamily,
-               .summary = "exact Gaussian process over a thousand samples",
+               .summary = "exact Gaussian process over some hundred samples",
                .options = kGaussianProcessOptions,
                .fit = gaussian_process},
     FamilyInfo{.name = ParametricGp::kFamily,

@@ -19,7 +19,7 @@ struct LikelihoodSearch {
 /// `kSearchedSamples` of the samples, and from the best of these on all.
 /// @param table what `process` was made of, standardised.
 [[nodiscard]] std::vector<double> likeliest_numbers(MarginalLikelihood& process, const Table& table,
-                                                    const LikelihoodSearch& search, Random& random,
+                                                    const LikelihoodSearch& wanted, Random& random,
                                                     const FitContext& context);
 
 }  // namespace torsio

@@ -12,8 +12,8 @@ namespace torsio {
 
 struct GaussianProcessOptions {
   std::string kernel = "linear_ard+matern52_ard";  ///< see `parse_kernel`
-  std::size_t samples = 1000;  ///< at most so many training samples, drawn by chance; 0: all
-  std::size_t restarts = 3;    ///< of the search for the kernel's numbers, besides the first start
+  std::size_t samples = 500;  ///< at most so many training samples, drawn by chance; 0: all
+  std::size_t restarts = 3;   ///< of the search for the kernel's numbers, besides the first start
   std::size_t iterations = 100;  ///< of one search, at most; 0: the numbers of the start
   bool std_dev = true;           ///< know the error bar in every step, at N^2 / 2 operations
 };
@@ -31,6 +31,6 @@ struct GaussianProcessOptions {
 [[nodiscard]] Fitted<GaussianProcess> fit_gaussian_process(const TrainingData& data,
                                                            const GaussianProcessOptions& options,
                                                            const FitContext& context = {});
-inline constexpr std::size_t kSearchedSamples = 400;
+inline constexpr std::size_t kSearchedSamples = 300;
 
 }  // namespace torsio
