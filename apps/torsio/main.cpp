@@ -34,6 +34,7 @@ int run(int argc, char** argv) {
   add_compare(app);
   add_crossvalidate(app);
   add_attribute(app);
+  add_reproduce(app);
   catch_interrupts();
   try {
     app.parse(argc, argv);

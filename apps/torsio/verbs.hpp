@@ -13,3 +13,4 @@ void add_compare(CLI::App& app);
 void add_crossvalidate(CLI::App& app);
 void add_demo(CLI::App& app);
 void add_attribute(CLI::App& app);
+void add_reproduce(CLI::App& app);

@@ -128,6 +128,13 @@ TEST_F(BrokenCalls, OfAttributionSayWhatIsMissing) {
   EXPECT_EQ(contents("x.json"), "");
 }
 
+TEST_F(BrokenCalls, OfReproduceNameWhatThereIs) {
+  expect_error(torsio("reproduce 004-tub"), kCallWasWrong, "004-tubes");
+  expect_error(torsio("reproduce 004-tubes --repeats 0"), kCallWasWrong, "repeats");
+  expect_error(torsio("reproduce 004-tubes --json missing/x.json"), kCallWasWrong, "missing");
+  EXPECT_NE(torsio("reproduce --list").out.find("001-models"), std::string::npos);
+}
+
 TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
   record();
   folder_.file("m.safetensors", "precious");

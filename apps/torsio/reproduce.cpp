@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/report/study.hpp"
+#include "torsio/report/text_table.hpp"
+#include "torsio/studies/study.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct ReproduceFlags {
+  std::vector<std::string> items;
+  torsio::StudyOptions options;
+  bool list = false;
+  JsonOutput json;
+};
+
+void list() {
+  torsio::TextTable table;
+  table.header({"item", "paper", "what it asks"});
+  for (const torsio::StudyInfo& info : torsio::studies())
+    table.row({std::string(info.name), std::string(info.paper), std::string(info.title)});
+  print(table.text());
+}
+
+void run(const ReproduceFlags& flags) {
+  if (flags.list) return list();
+  std::vector<const torsio::StudyInfo*> wanted;
+  for (const std::string& item : flags.items) wanted.push_back(&torsio::find_study(item));
+  if (wanted.empty())
+    for (const torsio::StudyInfo& info : torsio::studies()) wanted.push_back(&info);
+  DataFlags().check_outputs({flags.json.destination});
+  auto documents = nlohmann::ordered_json::array();
+  for (const torsio::StudyInfo* info : wanted) {
+    ProgressBar bar;
+    const torsio::Study study = torsio::run_study(*info, flags.options, bar.listener());
+    documents.push_back(nlohmann::ordered_json::parse(torsio::study_json(*info, study)));
+    if (flags.json.wants_tables()) print(torsio::study_text(*info, study) + "\n");
+  }
+  flags.json.write(documents.dump(2) + "\n");
+}
+
+}  // namespace
+
+void add_reproduce(CLI::App& app) {
+  auto flags = std::make_shared<ReproduceFlags>();
+  CLI::App* verb =
+      app.add_subcommand("reproduce", "run the papers' experiments, their figures beside ours");
+  verb->footer(
+      "Example: torsio reproduce 001-models --repeats 1\n"
+      "Without an item all of them run: the best part of an hour on two cores.");
+  verb->add_option("ITEM", flags->items, "which; --list shows them");
+  verb->add_flag("--list", flags->list, "show the experiments");
+  verb->add_flag("--quick", flags->options.is_quick,
+                 "shorter recordings and smaller networks: to see that it runs");
+  verb->add_option("--repeats", flags->options.repeats, "with other seeds")->capture_default_str();
+  add_seed(*verb, flags->options.seed, "of the first repeat");
+  verb->add_option("--json", flags->json.destination,
+                   "write the figures as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+
+namespace torsio {
+
+struct StudyOptions {
+  std::uint64_t seed = 1;
+  std::size_t repeats = 3;  ///< each with plants' noise, weights and folds of its own
+  bool is_quick = false;    ///< shorter recordings and smaller networks: to see that it runs
+};
+
+/// One model under one condition, over all repeats and folds.
+struct StudyRow {
+  std::string condition;
+  std::string model;
+  std::size_t runs = 0;   ///< fits that the statistics are of
+  double rmse = 0.0;      ///< mean, in `Study::unit`
+  double rmse_std = 0.0;  ///< of one run
+  double percent = 0.0;   ///< mean of 100 rmse / (largest |target| of the judged recording)
+  double largest = 0.0;   ///< mean of that largest |target|
+  std::optional<double> paper_rmse = {};
+};
+
+/// A simulated bench that a study used.
+struct StudyPlant {
+  std::string name;
+  std::string fingerprint;  ///< of every number of its data sheet
+};
+
+/// A paper's experiment, run here.
+struct Study {
+  std::string protocol;  ///< what was recorded, trained on and judged on
+  std::string unit;      ///< of the errors
+  StudyOptions options;
+  std::vector<StudyPlant> plants = {};
+  std::vector<StudyRow> rows = {};  ///< condition by condition, in the order of their first fit
+};
+
+struct StudyInfo {
+  std::string_view name;
+  std::string_view paper;  ///< number and table or figure
+  std::string_view title;
+  Study (*run)(const StudyOptions& options, const Progress& progress);
+};
+
+/// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets (SPEC
+/// section 5).
+[[nodiscard]] std::span<const StudyInfo> studies() noexcept;
+/// @throws UsageError that lists them.
+[[nodiscard]] const StudyInfo& find_study(std::string_view name);
+
+/// Deterministic for the options. @throws UsageError unless there are 1 to 100 repeats; Cancelled;
+/// Error if a model cannot be fitted.
+[[nodiscard]] Study run_study(const StudyInfo& study, const StudyOptions& options,
+                              const Progress& progress = {});
+
+}  // namespace torsio

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "torsio/studies/study.hpp"
+
+namespace torsio {
+
+// One function a study, in the file of its paper.
+
+Study spring_models_001(const StudyOptions& options, const Progress& progress);
+Study inverse_models_001(const StudyOptions& options, const Progress& progress);
+Study encoders_004(const StudyOptions& options, const Progress& progress);
+Study torque_levels_004(const StudyOptions& options, const Progress& progress);
+Study impedances_004(const StudyOptions& options, const Progress& progress);
+Study tubes_004(const StudyOptions& options, const Progress& progress);
+
+}  // namespace torsio

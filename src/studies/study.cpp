@@ -1,0 +1,50 @@
+#include "torsio/studies/study.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+
+#include "studies.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::array kStudies{
+    StudyInfo{"001-models", "001, Figure 4", "What models of a spring are wrong by on a new sweep",
+              spring_models_001},
+    StudyInfo{"001-inverse", "001, section 4.2",
+              "The same the other way round, as its controller asks", inverse_models_001},
+    StudyInfo{"004-encoders", "004, Table 4", "Which encoders an LSTM needs to tell the torque",
+              encoders_004},
+    StudyInfo{"004-torque", "004, Table 5", "Trained on 10 to 20 Nm, judged on 5 to 50 Nm",
+              torque_levels_004},
+    StudyInfo{"004-impedance", "004, Table 5",
+              "Trained under one impedance of the joint, judged under another", impedances_004},
+    StudyInfo{"004-tubes", "004, Table 6", "How soft the torsion tube should be", tubes_004}};
+
+}  // namespace
+
+std::span<const StudyInfo> studies() noexcept { return kStudies; }
+
+const StudyInfo& find_study(std::string_view name) {
+  const auto found = std::ranges::find(kStudies, name, &StudyInfo::name);
+  if (found != kStudies.end()) return *found;
+  std::array<std::string_view, kStudies.size()> names{};
+  std::ranges::transform(kStudies, names.begin(), &StudyInfo::name);
+  throw UsageError({.problem = fmt::format("no study is called \"{}\"", name),
+                    .expected = fmt::format("one of {}", fmt::join(names, ", "))});
+}
+
+Study run_study(const StudyInfo& study, const StudyOptions& options, const Progress& progress) {
+  constexpr std::size_t kMostRepeats = 100;
+  if (options.repeats < 1 || options.repeats > kMostRepeats)
+    throw UsageError({.place = "repeats",
+                      .expected = fmt::format("1 to {}", kMostRepeats),
+                      .found = fmt::format("{}", options.repeats)});
+  return study.run(options, progress);
+}
+
+}  // namespace torsio

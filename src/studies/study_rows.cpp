@@ -1,0 +1,108 @@
+#include "study_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+
+void StudyRows::Sum::add(double rmse, double largest_target) {
+  ++runs;
+  const auto n = static_cast<double>(runs);
+  const double distance = rmse - mean;
+  mean += distance / n;
+  squares += distance * (rmse - mean);
+  percent += (100.0 * rmse / largest_target - percent) / n;
+  largest += (largest_target - largest) / n;
+}
+
+void StudyRows::paper(const std::string& condition, const std::string& model, double rmse) {
+  papers_.push_back({{condition, model}, rmse});
+}
+
+void StudyRows::require_fitted(const ResultRow& row) {
+  if (row.status == "ok") return;
+  throw Error({.place = row.fold.empty() ? row.family : row.family + ", " + row.fold,
+               .problem = row.reason});
+}
+
+std::string StudyRows::model_of(const ResultRow& row) {
+  std::string model = row.family;
+  // A network's size is what a reader asks for; the rest of its settings are the study's.
+  if (const auto at = row.variant.find("layers="); at != std::string::npos) {
+    const auto begin = at + std::string_view("layers=").size();
+    model = fmt::format("{} {}", model,
+                        row.variant.substr(begin, row.variant.find(',', begin) - begin));
+  }
+  return row.input_set.empty() ? model : fmt::format("{}, {}", model, row.input_set);
+}
+
+StudyRows::Sum& StudyRows::sum_of(Key key) {
+  const auto found = std::ranges::find(sums_, key, &std::pair<Key, Sum>::first);
+  if (found != sums_.end()) return found->second;
+  return sums_.emplace_back(std::move(key), Sum{}).second;
+}
+
+double StudyRows::largest_target(const Dataset& dataset, const std::string& recording) {
+  double largest = 0.0;
+  for (const DatasetRecord& record : dataset.records) {
+    if (record.recording.name() != recording) continue;
+    for (const double value : record.recording.channel(dataset.target).values)
+      if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  return largest;
+}
+
+std::vector<StudyRow> StudyRows::rows() const {
+  std::vector<StudyRow> rows;
+  for (const auto& [key, sum] : sums_) {
+    StudyRow row{
+        .condition = key.condition,
+        .model = key.model,
+        .runs = sum.runs,
+        .rmse = sum.mean,
+        .rmse_std = sum.runs < 2 ? 0.0 : std::sqrt(sum.squares / static_cast<double>(sum.runs - 1)),
+        .percent = sum.percent,
+        .largest = sum.largest};
+    for (const auto& [paper_key, rmse] : papers_)
+      if (paper_key == key) row.paper_rmse = rmse;
+    rows.push_back(std::move(row));
+  }
+  // Condition by condition, as they were met first.
+  std::vector<std::string> order;
+  for (const StudyRow& row : rows)
+    if (std::ranges::find(order, row.condition) == order.end()) order.push_back(row.condition);
+  std::ranges::stable_sort(rows, {}, [&](const StudyRow& row) {
+    return std::ranges::find(order, row.condition) - order.begin();
+  });
+  return rows;
+}
+
+StudyPlant study_plant(std::string_view actuator) {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const SheetRow& row : describe(data_sheet(actuator)))
+    hash = (hash ^ std::bit_cast<std::uint64_t>(row.value.value)) * 0x100000001b3U;
+  return {std::string(actuator), fmt::format("{:016x}", hash)};
+}
+
+std::uint64_t repeat_seed(const StudyOptions& options, std::size_t k) noexcept {
+  return options.seed + 100 * k;
+}
+
+Progress nth_of(const Progress& progress, std::size_t n, std::size_t count,
+                std::string_view doing) {
+  if (!progress) return {};
+  return [&progress, n, count, name = std::string(doing)](double share, std::string_view at) {
+    return progress((static_cast<double>(n) + share) / static_cast<double>(count),
+                    fmt::format("{}: {}", name, at));
+  };
+}
+
+}  // namespace torsio

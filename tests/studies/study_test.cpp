@@ -1,0 +1,84 @@
+#include "torsio/studies/study.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "torsio/core/error.hpp"
+#include "torsio/report/study.hpp"
+
+namespace torsio {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr StudyOptions kQuick{.seed = 3, .repeats = 1, .is_quick = true};
+
+const StudyRow& row_of(const Study& study, const std::string& condition, const std::string& model) {
+  const auto found = std::ranges::find_if(study.rows, [&](const StudyRow& row) {
+    return row.condition == condition && row.model == model;
+  });
+  if (found == study.rows.end()) throw Error({.problem = condition + " " + model});
+  return *found;
+}
+
+TEST(Studies, OfSpringModelsJudgeEveryModelOnTheNewSweep) {
+  const Study study = run_study(find_study("001-models"), kQuick);
+  ASSERT_EQ(study.plants.size(), 1U);
+  EXPECT_EQ(study.plants.front().fingerprint.size(), 16U);
+  const StudyRow& line = row_of(study, "maxwell-slip", "linear");
+  EXPECT_EQ(line.runs, 1U);
+  EXPECT_NEAR(line.percent, 100.0 * line.rmse / line.largest, 1e-9);
+  EXPECT_LT(row_of(study, "maxwell-slip", "dgmm").rmse, line.rmse);
+  EXPECT_GT(row_of(study, "maxwell-slip", "mlp 50-10-5").rmse, 0.0);
+}
+
+TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
+  const Study study = run_study(find_study("004-torque"), kQuick);
+  EXPECT_LT(row_of(study, "15 Nm", "linear, II").rmse, row_of(study, "50 Nm", "linear, II").rmse);
+  EXPECT_GT(row_of(study, "50 Nm", "lstm 32, II").largest, 40.0);
+  const Study again = run_study(find_study("004-torque"), kQuick);
+  ASSERT_EQ(again.rows.size(), study.rows.size());
+  for (std::size_t i = 0; i < study.rows.size(); ++i)
+    EXPECT_EQ(again.rows[i].rmse, study.rows[i].rmse) << study.rows[i].model;
+}
+
+TEST(Studies, AreFoundByNameAndRefuseNoRepeats) {
+  EXPECT_THROW((void)find_study("004-tub"), UsageError);
+  EXPECT_THROW((void)run_study(find_study("004-tubes"), {.repeats = 0}), UsageError);
+  EXPECT_THROW((void)run_study(find_study("004-tubes"), kQuick,
+                               [](double, std::string_view) { return false; }),
+               Cancelled);
+}
+
+TEST(Studies, ShowTheirFiguresBesideThePapers) {
+  const StudyInfo info{"004-x", "004, Table 0", "a title", nullptr};
+  const Study study{.protocol = "a protocol",
+                    .unit = "Nm",
+                    .options = {.seed = 7, .repeats = 2},
+                    .plants = {{"bench", "0123"}},
+                    .rows = {{.condition = "soft",
+                              .model = "lstm 250",
+                              .runs = 2,
+                              .rmse = 0.5,
+                              .rmse_std = 0.01,
+                              .percent = 2.5,
+                              .largest = 20.0,
+                              .paper_rmse = 0.666},
+                             {.condition = "soft", .model = "linear", .runs = 2, .rmse = 3.0}}};
+  const std::string text = study_text(info, study);
+  EXPECT_THAT(text, HasSubstr("004-x (004, Table 0): a title\na protocol\nseed 7, 2 repeats\n"));
+  EXPECT_THAT(text, HasSubstr("plant bench, data sheet 0123"));
+  EXPECT_THAT(text, testing::ContainsRegex("soft +lstm 250 +0.5 +0.01 +2.5 +20 +2 +0.666"));
+  const auto json = nlohmann::json::parse(study_json(info, study));
+  EXPECT_EQ(json["rows"][0]["paper_rmse"], 0.666);
+  EXPECT_TRUE(json["rows"][1]["paper_rmse"].is_null());
+  EXPECT_EQ(json["plants"][0]["data_sheet"], "0123");
+}
+
+}  // namespace
+}  // namespace torsio
