@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <Eigen/Dense>
 #include <cmath>
@@ -82,6 +83,18 @@ TEST(FitGaussianProcess, RefusesMoreSamplesThanItCanTake) {
   EXPECT_THAT(
       error_message([&] { (void)fit_gaussian_process(data, {.samples = 0, .std_dev = false}); }),
       AllOf(HasSubstr("at most 65536"), HasSubstr("found 70000")));
+}
+
+TEST(FitGaussianProcess, NamesTheNumberOfSamplesThatFitIntoTheMemory) {
+  const double have =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  const auto fits = static_cast<std::size_t>(std::sqrt(have / 16.0));
+  if (fits >= 65'000) GTEST_SKIP() << "all that is ever taken fits into this machine's memory";
+  EXPECT_THAT(error_message([&] {
+                (void)fit_gaussian_process(curve(65'000), {.samples = 0, .std_dev = false});
+              }),
+              AllOf(HasSubstr("at most " + std::to_string(fits) + " samples"),
+                    HasSubstr("found 65000"), HasSubstr("parametric_gp_variational")));
 }
 
 TEST(FitGaussianProcess, PassesItsOptionsOn) {
@@ -204,7 +217,8 @@ TrainingData narx_data(double deflection_unit) {
     for (std::size_t i = 0; i < 7; ++i) features(n - 8, i) = y[n - 1 - i];
     for (std::size_t i = 0; i < 8; ++i) features(n - 8, 7 + i) = deflection_unit * u[n - i];
   }
-  for (std::size_t i = 0; i < 15; ++i) inputs.push_back({.expression = std::string("x").append(std::to_string(i))});
+  for (std::size_t i = 0; i < 15; ++i)
+    inputs.push_back({.expression = std::string("x").append(std::to_string(i))});
   std::size_t next = 8;
   return test::training_data_of(inputs, features, [&](Features) { return y[next++]; });
 }
