@@ -114,7 +114,7 @@ void ParametricGpTrainer::add_noise_gradient(double target, double share) {
 
 void ParametricGpTrainer::add_divergence_gradient(double share) {
   product_.noalias() = inverse_ * s_;
-  weights_.noalias() -= (0.5 * share) * product_ * inverse_;
+  weights_ -= (0.5 * share) * product_.lazyProduct(inverse_);
   weights_.noalias() -= (0.5 * share * alpha_) * alpha_.transpose();
   weights_ += (0.5 * share) * inverse_;
 }
