@@ -48,6 +48,7 @@ void add_compare(CLI::App& app) {
       "Example: torsio compare sweep1.csv sweep2.csv --test other_lever.csv --models all --json -");
   flags->data.add_recordings(*verb, "recordings to train on, or a manifest with roles");
   flags->data.add_mapping(*verb);
+  flags->data.add_initialise(*verb);
   flags->data.add_target_and_inputs(*verb);
   verb->add_option("--test", flags->test, "held-out recordings: they rank the models");
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");

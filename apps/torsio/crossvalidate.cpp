@@ -75,6 +75,7 @@ void add_crossvalidate(CLI::App& app) {
       "compare for each fold.");
   flags->data.add_recordings(*verb, "recordings, or a manifest with roles");
   flags->data.add_mapping(*verb);
+  flags->data.add_initialise(*verb);
   flags->data.add_target_and_inputs(*verb);
   verb->add_option("--models", flags->models,
                    "all, or families with settings: linear,polynomial:degree=7:branch=true")

@@ -67,6 +67,13 @@ void DataFlags::add_target_and_inputs(CLI::App& verb) {
                   "deflection, its filtered rate and the filtered joint speed)");
 }
 
+void DataFlags::add_initialise(CLI::App& verb) {
+  verb.add_option("--initialise", initialise,
+                  "measured samples that a model which feeds its output back is told at the start "
+                  "of a recording, and that are not scored; 0: a cold start")
+      ->capture_default_str();
+}
+
 torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
                                 const std::vector<std::string>& test,
                                 const torsio::Progress& progress) const {
@@ -75,6 +82,7 @@ torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
         {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
   const torsio::LoadOptions options = load_options(*this, progress);
   torsio::Dataset dataset = torsio::load_dataset(recordings, test, options);
+  dataset.initialise_samples = initialise;
   if (validation.empty()) return dataset;
   torsio::Dataset held_out = torsio::load_dataset({}, validation, options);
   for (torsio::DatasetRecord& record : held_out.records) {
@@ -91,7 +99,9 @@ torsio::Dataset DataFlags::load_as_test(const torsio::Progress& progress) const 
         {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
   torsio::LoadOptions options = load_options(*this, progress);
   options.role = torsio::Role::test;
-  return torsio::load_dataset(recordings, {}, options);
+  torsio::Dataset dataset = torsio::load_dataset(recordings, {}, options);
+  dataset.initialise_samples = initialise;
+  return dataset;
 }
 
 std::vector<std::string> DataFlags::wanted_inputs() const {

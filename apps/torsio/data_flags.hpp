@@ -17,10 +17,12 @@ struct DataFlags {
   std::string rate;
   std::string target;
   std::string inputs;
+  std::size_t initialise = torsio::Dataset{}.initialise_samples;
 
   void add_recordings(CLI::App& verb, const char* help);
   void add_mapping(CLI::App& verb);
   void add_target_and_inputs(CLI::App& verb);
+  void add_initialise(CLI::App& verb);
 
   /// The recordings as training data, further ones with other roles.
   [[nodiscard]] torsio::Dataset load(const std::vector<std::string>& validation,

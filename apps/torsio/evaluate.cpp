@@ -89,10 +89,11 @@ void add_evaluate(CLI::App& app) {
       "Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv\n"
       "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "
       "count,\n"
-      "3 warming up, 4 zero not set, 5 outside the training range, 6 model not finite");
+      "3 warming up, 4 zero not set, 5 outside the training range, 6 model not finite, 7 diverged");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
   flags->data.add_mapping(*verb);
+  flags->data.add_initialise(*verb);
   verb->add_option("--predictions", flags->predictions,
                    "write target, estimate, error bar and fault of one recording as CSV");
   verb->add_option("--json", flags->json.destination,

@@ -11,6 +11,7 @@ std::string_view name(Fault fault) noexcept {
     case Fault::zero_not_set: return "zero_not_set";
     case Fault::outside_training_range: return "outside_training_range";
     case Fault::model_not_finite: return "model_not_finite";
+    case Fault::diverged: return "diverged";
   }
   return "unknown";
 }

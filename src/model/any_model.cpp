@@ -14,7 +14,8 @@ namespace {
 static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial> &&
               Model<Dgmm> && Model<GaussianProcess> && Model<ParametricGp> && Model<Mlp> &&
               Model<Lstm> && Model<Gru> && Model<MlpEnsemble> && Model<LstmEnsemble> &&
-              Model<GruEnsemble>);
+              Model<GruEnsemble> && FeedsBack<Narx<Linear>> && FeedsBack<Narx<Dgmm>> &&
+              FeedsBack<Narx<Mlp>>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>
@@ -68,6 +69,16 @@ void AnyModel::reset() noexcept {
 
 Estimate AnyModel::step(Features features) noexcept {
   return dispatch(model_, [&](auto& model) { return model.step(features); });
+}
+
+bool AnyModel::feeds_back() const noexcept {
+  return dispatch(model_, []<class M>(const M&) { return FeedsBack<M>; });
+}
+
+void AnyModel::correct(double measured) noexcept {
+  dispatch(model_, [&]<class M>(M& model) {
+    if constexpr (FeedsBack<M>) model.correct(measured);
+  });
 }
 
 bool AnyModel::can_invert() const noexcept {

@@ -13,14 +13,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json row_json(const ResultRow& row, bool non_causal_zero) {
-  const Metrics& metrics = row.score.metrics;
+/// @param mode of how the past outputs of a model that feeds back are had
+Json row_json(const ResultRow& row, const Metrics& metrics, std::string_view mode,
+              bool non_causal_zero) {
   Json json{{"family", row.family},
             {"variant", text_or_null(row.variant)},
             {"input_set", text_or_null(row.input_set)},
             {"split", name(row.split)},
             {"recording", row.recording ? Json(*row.recording) : Json(nullptr)},
-            {"mode", "free_run"},
+            {"mode", mode},
             {"rmse", json_number(metrics.rmse)},
             {"mad", json_number(metrics.mad)},
             {"std_abs", json_number(metrics.std_abs)},
@@ -105,8 +106,13 @@ Json results_document(const Results& results) {
   }
   if (!results.label.empty()) document["label"] = results.label;
   document["results"] = Json::array();
-  for (const ResultRow& row : results.rows)
-    document["results"].push_back(row_json(row, results.non_causal_zero));
+  for (const ResultRow& row : results.rows) {
+    const auto add = [&](const Metrics& metrics, std::string_view mode) {
+      document["results"].push_back(row_json(row, metrics, mode, results.non_causal_zero));
+    };
+    add(row.score.metrics, "free_run");
+    if (row.score.one_step.samples > 0) add(row.score.one_step, "one_step");
+  }
   return document;
 }
 
@@ -121,6 +127,9 @@ std::string ranked_table(const Results& results, Role split) {
   table.header({"model"});
   if (has_sets) table.header({"inputs"});
   table.header({"RMSE", "MAD", "max|e|", "fit %", "guard %"});
+  const bool has_one_step = std::ranges::any_of(
+      results.rows, [](const ResultRow& row) { return row.score.one_step.samples > 0; });
+  if (has_one_step) table.header({"1 step"});
   for (const std::string& recording : recordings) table.header({"RMSE " + recording});
   table.header({"step ns", "p99.9", "fit s", "parameters"});
 
@@ -140,6 +149,8 @@ std::string ranked_table(const Results& results, Role split) {
     cells.push_back(fmt::format("{:.1f}", metrics.fit_percent));
     cells.push_back(fmt::format("{:.1f}", 100.0 * static_cast<double>(row->score.guarded_samples) /
                                               static_cast<double>(metrics.samples)));
+    if (has_one_step)
+      cells.push_back(row->score.one_step.samples > 0 ? error_text(row->score.one_step.rmse) : "");
     for (const std::string& recording : recordings)
       cells.push_back(error_text(rmse_on(results, *row, recording)));
     cells.push_back(fmt::format("{:.0f}", row->score.step_ns_p50));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "torsio/core/error.hpp"
 
@@ -63,25 +64,35 @@ struct Tally {
   std::vector<double> step_ns;
   std::size_t initialised = 0;
   std::size_t guarded = 0;
+  std::size_t diverged = 0;
+  MetricsAccumulator one_step;
 
+  void add_one_step(const Prediction& prediction, const Channel& target, const Segment& segment) {
+    for (std::size_t i = segment.begin; i < segment.end; ++i)
+      if (target.is_fresh(i) && prediction.estimates[i].fault != Fault::warming_up)
+        one_step.add(prediction.estimates[i].value, target.values[i]);
+  }
   void add(const Prediction& prediction, const Channel& target, const Segment& segment) {
     for (std::size_t i = segment.begin; i < segment.end; ++i) {
       const Estimate& estimate = prediction.estimates[i];
       step_ns.push_back(prediction.step_ns[i]);
       if (!target.is_fresh(i) || !std::isfinite(target.values[i])) continue;
-      if (estimate.fault == Fault::warming_up) {
+      if (estimate.fault == Fault::warming_up || i < prediction.initialised) {
         ++initialised;
         continue;
       }
       if (estimate.fault != Fault::none) ++guarded;
+      if (estimate.fault == Fault::diverged) ++diverged;
       metrics.add(estimate.value, target.values[i]);
     }
   }
 
   [[nodiscard]] Score score() const {
     return {.metrics = metrics.metrics(),
+            .one_step = one_step.metrics(),
             .initialised_samples = initialised,
             .guarded_samples = guarded,
+            .diverged_samples = diverged,
             .step_ns_p50 = quantile(step_ns, 0.5),
             .step_ns_p999 = quantile(step_ns, 0.999)};
   }
@@ -89,7 +100,8 @@ struct Tally {
 
 }  // namespace
 
-Prediction predict(Estimator estimator, const Recording& recording) {
+Prediction predict(Estimator estimator, const Recording& recording,
+                   const Corrections& corrections) {
   for (const std::string& channel : estimator.settings().zeroed_channels)
     estimator.set_zero(channel, 0.0);
   const auto channels = raw_channels(estimator, recording);
@@ -98,6 +110,7 @@ Prediction predict(Estimator estimator, const Recording& recording) {
   prediction.estimates.resize(recording.size());
   prediction.step_ns.resize(recording.size());
   const double clock_cost = clock_cost_ns();
+  std::size_t left = estimator.model().feeds_back() ? corrections.most : 0;
   const DenormalsOff denormals_off;
   estimator.reset();
   for (std::size_t i = 0; i < recording.size(); ++i) {
@@ -105,6 +118,12 @@ Prediction predict(Estimator estimator, const Recording& recording) {
     const auto start = Clock::now();
     prediction.estimates[i] = estimator.step(raw);
     prediction.step_ns[i] = std::max(0.0, nanoseconds(Clock::now() - start) - clock_cost);
+    if (left == 0 || !corrections.target->is_fresh(i) ||
+        !std::isfinite(corrections.target->values[i]))
+      continue;
+    estimator.correct(corrections.target->values[i]);
+    prediction.initialised = i + 1;
+    --left;
   }
   return prediction;
 }
@@ -119,13 +138,19 @@ SplitScore evaluate(const Estimator& estimator, const Dataset& dataset, Role rol
                     static_cast<double>(done++) / static_cast<double>(dataset.records.size()),
                     "scoring");
     if (!record.has_role(role)) continue;
-    const Prediction prediction = predict(estimator, record.recording);
     const Channel& target = record.recording.channel(dataset.target);
+    const Prediction prediction =
+        predict(estimator, record.recording, {&target, dataset.initialise_samples});
+    std::optional<Prediction> one_step;
+    if (estimator.model().feeds_back())
+      one_step = predict(estimator, record.recording, {&target, record.recording.size()});
     Tally own;
     for (const Segment& segment : record.segments) {
       if (segment.role != role) continue;
-      own.add(prediction, target, segment);
-      together.add(prediction, target, segment);
+      for (Tally* tally : {&own, &together}) {
+        tally->add(prediction, target, segment);
+        if (one_step) tally->add_one_step(*one_step, target, segment);
+      }
     }
     split.recordings.push_back({record.recording.name(), own.score()});
   }

@@ -18,13 +18,20 @@ ResultRow row_for(const ModelFile& file, Role split, const Score& score) {
   row.split = split;
   row.score = score;
   row.parameter_count = AnyModel(file.parameters).parameter_count();
+  constexpr double kDiverged = 0.01;  // of the samples; less is a moment at the range's end
+  const auto share = [&](std::size_t samples) {
+    return static_cast<double>(samples) / static_cast<double>(row.score.metrics.samples);
+  };
   if (!std::isfinite(row.score.metrics.rmse)) {
     row.status = "failed";
     row.reason = "no sample of this split could be scored";
+  } else if (share(row.score.diverged_samples) > kDiverged) {
+    row.status = "diverged";
+    row.reason = fmt::format("free run left the output's range in {:.1f} % of the samples",
+                             100.0 * share(row.score.diverged_samples));
   } else if (row.score.guarded_samples > 0) {
     row.reason = fmt::format("{:.1f} % of the samples were answered by a guard",
-                             100.0 * static_cast<double>(row.score.guarded_samples) /
-                                 static_cast<double>(row.score.metrics.samples));
+                             100.0 * share(row.score.guarded_samples));
   }
   return row;
 }

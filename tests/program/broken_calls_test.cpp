@@ -122,7 +122,7 @@ TEST_F(BrokenCalls, OfAttributionSayWhatIsMissing) {
   expect_error(torsio(call + "a.csv --json m.safetensors"), kCallWasWrong, "replace");
   folder_.file("b.csv", "t_s,torque_Nm\n0,1\n0.001,2\n0.002,3\n");
   expect_error(torsio(call + "b.csv"), kWorkFailed, "gear_angle_rad");
-  expect_error(shell("timeout --signal=INT --preserve-status 2 {torsio} " + call +
+  expect_error(shell("timeout --foreground --signal=INT --preserve-status 2 {torsio} " + call +
                      "a.csv --windows 20000 --background 2000 --window 0.1s --json x.json"),
                kWorkFailed, "stopped on request");
   EXPECT_EQ(contents("x.json"), "");
@@ -139,7 +139,7 @@ TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
   record();
   folder_.file("m.safetensors", "precious");
   const Outcome outcome = shell(
-      "timeout --signal=INT --preserve-status 1 {torsio} fit a.csv --model dgmm --set "
+      "timeout --foreground --signal=INT --preserve-status 1 {torsio} fit a.csv --model dgmm --set "
       "components=2000 "
       "--set novelty_distance=0.01 --set em_iterations=10000 -o m.safetensors");
   EXPECT_EQ(outcome.exit_code, kWorkFailed) << outcome.err;
@@ -149,9 +149,9 @@ TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
 
 TEST_F(BrokenCalls, CtrlCStopsTheWaitForAPipe) {
   for (const char* signal : {"INT", "TERM"}) {
-    const Outcome outcome =
-        shell(std::string("rm -f pipe; mkfifo pipe; sleep 4 >pipe & timeout --signal=") + signal +
-              " --preserve-status 1 {torsio} check pipe");
+    const Outcome outcome = shell(
+        std::string("rm -f pipe; mkfifo pipe; sleep 4 >pipe & timeout --foreground --signal=") +
+        signal + " --preserve-status 1 {torsio} check pipe");
     EXPECT_EQ(outcome.exit_code, kWorkFailed) << outcome.err;
     EXPECT_NE(outcome.err.find("stopped on request"), std::string::npos) << outcome.err;
   }

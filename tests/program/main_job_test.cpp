@@ -218,7 +218,7 @@ TEST_F(MainJob, AStoppedFitOfANetworkGoesOnWhereItWas) {
       "fit a.csv --model lstm --set layers=8 --set stride=10 --set epochs=4 --set batch=16";
   ASSERT_EQ(torsio(fit + " -o whole.safetensors").exit_code, 0);
   // Stopped at once, after a while, and after a longer while: wherever that is.
-  const std::string stop = "timeout --preserve-status -s INT ";
+  const std::string stop = "timeout --foreground --preserve-status -s INT ";
   Outcome stopped;
   for (const char* seconds : {"0.3", "0.6", "1.2", "2.4"}) {
     stopped = shell(stop + seconds + " {torsio} " + fit + " -o part.safetensors");

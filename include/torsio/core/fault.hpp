@@ -15,6 +15,7 @@ enum class Fault : std::uint8_t {
   zero_not_set,  ///< a channel whose zero was taken from each training record has none yet (`set_zero`)
   outside_training_range,  ///< an input left its range in training; linear fallback in use
   model_not_finite,        ///< the model produced NaN or infinity; linear fallback in use
+  diverged,  ///< a model that feeds its output back left its range and stays at its end; linear fallback
 };
 
 /// The enumerator's own spelling, for logs and JSON.

@@ -41,6 +41,9 @@ struct Dataset {
   /// Channels that the target was computed from ("torque from motor current"): a leak if used as an
   /// input.
   std::vector<std::string> target_computed_from;
+  /// Measured samples at the start of each recording that a model which feeds back is told; they
+  /// are not scored.
+  std::size_t initialise_samples = 50;
   std::string
       label;  ///< what the split means, printed with its scores: "interpolation within one cycle"
 

@@ -13,6 +13,7 @@
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/model/model.hpp"
+#include "torsio/model/narx.hpp"
 
 namespace torsio {
 
@@ -85,6 +86,14 @@ class BasicEstimator {
     const Estimate told = model_.step(input.features);
     if (!std::isfinite(told.value)) model_.reset();
     return core_.judge(input.features, told);
+  }
+
+  /// A measurement of the last step's target, for a model that feeds its output back: free run
+  /// starts where the joint is, or goes one step ahead if called after each step.
+  void correct(double measured) noexcept TORSIO_REALTIME
+    requires FeedsBack<M>
+  {
+    model_.correct(measured);
   }
 
  private:

@@ -16,6 +16,7 @@
 #include "torsio/model/lstm.hpp"
 #include "torsio/model/mlp.hpp"
 #include "torsio/model/model.hpp"
+#include "torsio/model/narx.hpp"
 #include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
 
@@ -41,7 +42,10 @@ using KnownFamilies = FamilyList<Linear,           //
                                  Gru,              //
                                  MlpEnsemble,      //
                                  LstmEnsemble,     //
-                                 GruEnsemble>;
+                                 GruEnsemble,      //
+                                 Narx<Linear>,     //
+                                 Narx<Dgmm>,       //
+                                 Narx<Mlp>>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`
 /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
@@ -71,6 +75,10 @@ class AnyModel {
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] bool feeds_back() const noexcept;  ///< its own output, as `FeedsBack` families do
+  /// Puts a measurement in the place of the last output; nothing to a model that does not feed back.
+  void correct(double measured) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] bool can_invert() const noexcept;
   /// The first input at which the model says `target`, the others being as given; see the family's

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "torsio/core/error.hpp"
+#include "torsio/core/joined_name.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/lstm.hpp"
 #include "torsio/model/mlp.hpp"
@@ -33,17 +32,8 @@ class Ensemble {
   using Member = M;
   static constexpr std::size_t kMostMembers = 64;
 
- private:
   static constexpr std::string_view kSuffix = "_ensemble";
-  static constexpr auto kName = [] {
-    std::array<char, M::kFamily.size() + kSuffix.size()> name{};
-    std::copy(M::kFamily.begin(), M::kFamily.end(), name.begin());
-    std::copy(kSuffix.begin(), kSuffix.end(), name.begin() + M::kFamily.size());
-    return name;
-  }();
-
- public:
-  static constexpr std::string_view kFamily{kName.data(), kName.size()};
+  static constexpr std::string_view kFamily = JoinedName<M::kFamily, kSuffix>::kName;
 
   struct Parameters {
     std::vector<typename M::Parameters> members;

@@ -17,23 +17,33 @@ namespace torsio {
 /// back).
 struct Score {
   Metrics metrics;
+  Metrics one_step = {};  ///< of a model that feeds back, each past output measured; else 0 samples
   std::size_t initialised_samples = 0;  ///< not scored: filters had not settled
   std::size_t guarded_samples = 0;      ///< scored, but answered by a guard instead of the model
+  std::size_t diverged_samples = 0;     ///< of these, because the model had run away
   double step_ns_p50 = kNotMeasured;    ///< of `Estimator::step`, the clock's own cost taken off
   double step_ns_p999 = kNotMeasured;
 };
 
 /// The estimator's answer to every sample of a recording, streamed through `step` from `reset()`.
 struct Prediction {
+  std::size_t initialised = 0;  ///< samples up to the last one that was corrected
   std::vector<Estimate> estimates;
   std::vector<double> step_ns;
+};
+
+/// What a model that feeds back is told of the target: the first so many fresh samples.
+struct Corrections {
+  const Channel* target = nullptr;
+  std::size_t most = 0;
 };
 
 /// Zeros of `zeroed_channels` are 0 here, whatever was set: a loaded recording had its own
 /// subtracted already.
 /// @throws Error naming the recording, the channel and the sample if a raw input is missing or not
 /// finite, or the recording has another sample rate than the estimator.
-[[nodiscard]] Prediction predict(Estimator estimator, const Recording& recording);
+[[nodiscard]] Prediction predict(Estimator estimator, const Recording& recording,
+                                 const Corrections& corrections = {});
 
 /// Scores of each recording that has segments of `role`, and of all of them together.
 struct SplitScore {

@@ -1,0 +1,9 @@
+#include "laws/model_laws.hpp"
+
+namespace torsio::test {
+
+INSTANTIATE_TYPED_TEST_SUITE_P(NarxLinear, ModelLaws, Narx<Linear>);
+INSTANTIATE_TYPED_TEST_SUITE_P(NarxMlp, ModelLaws, Narx<Mlp>);
+INSTANTIATE_TYPED_TEST_SUITE_P(NarxDgmm, ModelLaws, Narx<Dgmm>);
+
+}  // namespace torsio::test
