@@ -61,6 +61,11 @@ constexpr std::array kBenches{
     Bench{"lstm250_train_batch", lstm250_train_batch, Peer{"PyTorch"}},
     Bench{"lstm250_train_2threads", lstm250_train_2threads},
     Bench{"mlp_epoch", mlp_epoch, Peer{"scikit-learn"}},
+    Bench{"gp_fit_5000", gp_fit_5000, Peer{"scikit-learn", write_gp_5000}},
+    Bench{"gp_mean_5000", gp_mean_5000, Peer{"scikit-learn", write_gp_5000}},
+    Bench{"gp_hyper_2000", gp_hyper_2000, Peer{"scikit-learn", write_gp_2000}},
+    Bench{"pgpr_200k", pgpr_200k},
+    Bench{"pgpr_step", pgpr_step},
 };
 
 struct Arguments {

@@ -34,6 +34,11 @@ Row lstm250_rls_update();
 Row lstm250_train_batch();
 Row lstm250_train_2threads();
 Row mlp_epoch();
+Row gp_fit_5000();
+Row gp_mean_5000();
+Row gp_hyper_2000();
+Row pgpr_200k();
+Row pgpr_step();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.
@@ -44,5 +49,7 @@ void write_lstm250();
 void write_lstm32();
 void write_gru64();
 void write_mlp();
+void write_gp_5000();
+void write_gp_2000();
 
 }  // namespace torsio::bench

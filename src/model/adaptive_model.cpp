@@ -69,7 +69,7 @@ Estimate AdaptiveModel::step(Features features) noexcept {
 AnyModel::Parameters AdaptiveModel::adapted() const {
   AnyModel::Parameters parameters = network_.parameters();
   dispatch(parameters, [&](auto& own) {
-    if constexpr (requires { own.scaling.target_scale; }) {
+    if constexpr (requires { own.layers; }) {
       dense_layers(own)->back() = adapter_.adapted();
     }
   });

@@ -26,7 +26,8 @@ void check_finite(std::span<const Number> values, const std::string& place) {
     refuse(place, "finite numbers", fmt::format("{} at index {}", *bad, bad - values.begin()));
 }
 
-void check_shape(const FloatMatrix& matrix, std::size_t rows, std::size_t columns,
+template <class Number>
+void check_table(const Table2d<Number>& matrix, std::size_t rows, std::size_t columns,
                  const std::string& place) {
   const std::size_t count = matrix.values.size();
   if (matrix.rows != rows || matrix.columns != columns)
@@ -37,7 +38,8 @@ void check_shape(const FloatMatrix& matrix, std::size_t rows, std::size_t column
   check_finite(std::span(matrix.values), place);
 }
 
-void check_length(const std::vector<float>& values, std::size_t length, const std::string& place) {
+template <class Number>
+void check_list(const std::vector<Number>& values, std::size_t length, const std::string& place) {
   if (values.size() != length)
     refuse(place, fmt::format("{} numbers", length), fmt::format("{}", values.size()));
   check_finite(std::span(values), place);
@@ -59,8 +61,8 @@ std::size_t checked_rows(const Layer& layer, std::size_t gates, std::size_t inpu
                          const std::string& place) {
   const std::string recurrent = place + ".recurrent_weights";
   const std::size_t units = checked_units(layer.recurrent_weights.rows, gates, recurrent);
-  check_shape(layer.recurrent_weights, gates * units, units, recurrent);
-  check_shape(layer.input_weights, gates * units, inputs, place + ".input_weights");
+  check_table(layer.recurrent_weights, gates * units, units, recurrent);
+  check_table(layer.input_weights, gates * units, inputs, place + ".input_weights");
   return gates * units;
 }
 
@@ -89,8 +91,8 @@ void check_layer_count(std::size_t count, const std::string& place) {
 
 void check_layer(const DenseLayer& layer, std::size_t inputs, const std::string& place) {
   const std::size_t units = checked_units(layer.weights.rows, 1, place + ".weights");
-  check_shape(layer.weights, units, inputs, place + ".weights");
-  check_length(layer.bias, units, place + ".bias");
+  check_table(layer.weights, units, inputs, place + ".weights");
+  check_list(layer.bias, units, place + ".bias");
   if (layer.activation >= kActivations)
     refuse(place + ".activation", fmt::format("a number below {}", kActivations),
            fmt::format("{}", layer.activation));
@@ -98,13 +100,13 @@ void check_layer(const DenseLayer& layer, std::size_t inputs, const std::string&
 
 void check_layer(const LstmLayer& layer, std::size_t inputs, const std::string& place) {
   const std::size_t rows = checked_rows(layer, 4, inputs, place);
-  check_length(layer.bias, rows, place + ".bias");
+  check_list(layer.bias, rows, place + ".bias");
 }
 
 void check_layer(const GruLayer& layer, std::size_t inputs, const std::string& place) {
   const std::size_t rows = checked_rows(layer, 3, inputs, place);
-  check_length(layer.input_bias, rows, place + ".input_bias");
-  check_length(layer.recurrent_bias, rows, place + ".recurrent_bias");
+  check_list(layer.input_bias, rows, place + ".input_bias");
+  check_list(layer.recurrent_bias, rows, place + ".recurrent_bias");
 }
 
 void check_last_layer(const DenseLayer& layer, const std::string& place) {
@@ -119,6 +121,15 @@ void check_last_layer(const DenseLayer& layer, const std::string& place) {
 void check_positive(double value, const std::string& place) {
   if (!std::isfinite(value) || value <= 0.0)
     refuse(place, "a positive, finite number", fmt::format("{}", value));
+}
+
+void check_shape(const Matrix& matrix, std::size_t rows, std::size_t columns,
+                 const std::string& place) {
+  check_table(matrix, rows, columns, place);
+}
+
+void check_length(const std::vector<double>& values, std::size_t length, const std::string& place) {
+  check_list(values, length, place);
 }
 
 }  // namespace torsio

@@ -12,6 +12,7 @@
 #include "torsio/model/network_layers.hpp"
 #include "torsio/model/parameters.hpp"
 #include "torsio/report/text_table.hpp"
+#include "train/kernel_search.hpp"
 
 namespace torsio {
 namespace {
@@ -93,6 +94,18 @@ std::string parameter_lines(const std::vector<Leaf>& leaves) {
   return fmt::format("{}\n", fmt::join(lines, "\n"));
 }
 
+/// The covariance function of a Gaussian process in words, its numbers included; else nothing.
+std::string kernel_line(const ModelFile& model) {
+  return std::visit(
+      []<class Parameters>(const Parameters& parameters) {
+        if constexpr (requires { parameters.kernel; })
+          return fmt::format("kernel {}\n", description_of(parameters.kernel));
+        else
+          return std::string();
+      },
+      model.parameters);
+}
+
 std::string family_of(const ModelFile& model) {
   const std::string own(family_of(model.parameters));
   const std::string& asked = model.card.fitted_as;
@@ -128,7 +141,9 @@ std::string model_description(const ModelFile& model) {
   text += fmt::format("\n{}", inputs.text());
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
-  text += fmt::format("\n{}", parameter_lines(leaves_of(model)));
+  std::vector<Leaf> leaves = leaves_of(model);
+  std::erase_if(leaves, [](const Leaf& leaf) { return leaf.name.starts_with("kernel."); });
+  text += fmt::format("\n{}{}", kernel_line(model), parameter_lines(leaves));
   return text;
 }
 

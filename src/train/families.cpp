@@ -10,6 +10,7 @@
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
 #include "train/fitted_model.hpp"
+#include "train/gaussian_process_families.hpp"
 #include "train/narx_families.hpp"
 #include "train/network_families.hpp"
 
@@ -134,8 +135,8 @@ constexpr std::array kShallowFamilies{
 std::span<const FamilyInfo> families() noexcept {
   static const std::vector<FamilyInfo> all = [] {
     std::vector<FamilyInfo> list(kShallowFamilies.begin(), kShallowFamilies.end());
-    const auto networks = network_families();
-    list.insert(list.end(), networks.begin(), networks.end());
+    for (const auto more : {gaussian_process_families(), network_families()})
+      list.insert(list.end(), more.begin(), more.end());
     const auto with_feedback = narx_families(list);
     list.insert(list.end(), with_feedback.begin(), with_feedback.end());
     return list;

@@ -115,7 +115,10 @@ constexpr NarxFamily narx_family(std::string_view summary) {
 
 constexpr std::array kNarxFamilies{
     narx_family<Dgmm>("Gaussian mixture that hears its own past output"),
-    narx_family<Mlp>("neural network that hears its own past output")};
+    narx_family<Mlp>("neural network that hears its own past output"),
+    narx_family<GaussianProcess>("exact Gaussian process that hears its own past output"),
+    narx_family<ParametricGp>(
+        "Gaussian process at a few hypothetical inputs that hears its own past output")};
 
 std::vector<OptionInfo> options_with(std::span<const OptionInfo> inner) {
   std::vector<OptionInfo> all(kNarxOptions.begin(), kNarxOptions.end());

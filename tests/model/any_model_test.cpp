@@ -41,6 +41,8 @@ TEST(AnyModel, BehavesAsTheFamilyInIt) {
   expect_same_behaviour(example<Polynomial>());
   expect_same_behaviour(example<Dgmm>());
   expect_same_behaviour(example<Mlp>());
+  expect_same_behaviour(example<GaussianProcess>());
+  expect_same_behaviour(example<ParametricGp>());
   expect_same_behaviour(example<Lstm>());
   expect_same_behaviour(example<Gru>());
 }

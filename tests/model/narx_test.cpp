@@ -49,6 +49,8 @@ TEST(Narx, TakesAMeasurementForItsLastOutput) {
 
 TEST(Narx, StaysAtTheEndOfItsRangeAndSaysSo) {
   auto parameters = test::example<Narx<Linear>>().parameters();
+  parameters.lowest = -200.0;
+  parameters.highest = 200.0;
   parameters.model.coefficients.values.values.back() = 0.6;  // 0.6 + 0.6 > 1: it runs away
   Narx<Linear> model(parameters);
   const std::vector<double> push{0.1, 0.0};
@@ -76,8 +78,8 @@ TEST(Narx, RefusesLagsAndRangesThatMakeNoSense) {
               HasSubstr("narx_linear: expected an inner model of as many inputs as lags make"));
   EXPECT_THAT(complaint([](auto& p) { p.output_lags = 0; }), HasSubstr("1 to 1000 output lags"));
   EXPECT_THAT(complaint([](auto& p) { p.inputs = 0; }), HasSubstr("an input"));
-  EXPECT_THAT(complaint([](auto& p) { p.lowest = 300.0; }), HasSubstr("lowest < highest"));
-  EXPECT_THAT(complaint([](auto& p) { p.start = 300.0; }), HasSubstr("start between them"));
+  EXPECT_THAT(complaint([](auto& p) { p.lowest = 6000.0; }), HasSubstr("lowest < highest"));
+  EXPECT_THAT(complaint([](auto& p) { p.start = 6000.0; }), HasSubstr("start between them"));
   EXPECT_THAT(complaint([](auto& p) { p.sample_period_s = 0.0; }),
               HasSubstr("a positive sample_period_s"));
 }

@@ -25,5 +25,12 @@ TEST(ModelDescription, OfALineTellsItsNumbers) {
               HasSubstr("coefficients.values = 0.5, 600, 0.25\n"));
 }
 
+TEST(ModelDescription, StatesAKernelAsAnExpressionWithItsNumbers) {
+  const std::string text =
+      model_description(test::example_model_file(test::example<ParametricGp>()));
+  EXPECT_THAT(text, HasSubstr("kernel se*(linear+periodic*rq): se (length 1)"));
+  EXPECT_THAT(text, testing::Not(HasSubstr("kernel.nodes")));
+}
+
 }  // namespace
 }  // namespace torsio

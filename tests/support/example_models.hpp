@@ -9,11 +9,13 @@
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
 #include "torsio/model/lstm.hpp"
 #include "torsio/model/mlp.hpp"
+#include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
 
 namespace torsio::test {
@@ -107,6 +109,54 @@ inline Gru example<Gru>() {
   return Gru(random_network<Gru>({.units = {5, 3}, .hidden = {4}, .warm_up_samples = 3}, 6));
 }
 
+/// Nine points on a spiral; further inputs stay at 0.
+inline Matrix example_points(std::size_t inputs) {
+  Matrix points(9, inputs);
+  for (std::size_t i = 0; i < points.rows; ++i) {
+    const double t = 0.7 * static_cast<double>(i);
+    points(i, 0) = 0.25 * t * std::cos(t);
+    points(i, 1) = 0.25 * t * std::sin(t);
+  }
+  return points;
+}
+
+inline NetworkScaling example_scaling(std::size_t inputs) {
+  NetworkScaling scaling{.inputs = {.centre = {0.01, 0.0}, .scale = {0.07, 0.3}},
+                         .target_centre = 0.5,
+                         .target_scale = 40.0};
+  scaling.inputs.centre.resize(inputs, 0.0);
+  scaling.inputs.scale.resize(inputs, 40.0);
+  return scaling;
+}
+
+inline GaussianProcess::Parameters example_gaussian_process(std::size_t inputs) {
+  return {.scaling = example_scaling(inputs),
+          .kernel = parse_kernel("se_ard+linear", inputs),
+          .noise_variance = 0.01,
+          .points = example_points(inputs),
+          .weights = {0.4, -0.2, 0.3, 0.1, -0.5, 0.2, 0.6, -0.1, 0.05},
+          .with_std_dev = true};
+}
+template <>
+inline GaussianProcess example<GaussianProcess>() {
+  return GaussianProcess(example_gaussian_process(2));
+}
+
+inline ParametricGp::Parameters example_parametric_gp(std::size_t inputs) {
+  ParametricGp::Parameters parameters{.scaling = example_scaling(inputs),
+                                      .kernel = parse_kernel("se*(linear+periodic*rq)", inputs),
+                                      .noise_variance = 0.01,
+                                      .points = example_points(inputs),
+                                      .weights = {0.4, -0.2, 0.3, 0.1, -0.5, 0.2, 0.6, -0.1, 0.05},
+                                      .explained = Matrix(9, 9)};
+  for (std::size_t i = 0; i < 9; ++i) parameters.explained(i, i) = 0.1;
+  return parameters;
+}
+template <>
+inline ParametricGp example<ParametricGp>() {
+  return ParametricGp(example_parametric_gp(2));
+}
+
 /// Members of different weights.
 template <class Member>
 Ensemble<Member> example_ensemble() {
@@ -141,8 +191,8 @@ Narx<M> example_narx(typename M::Parameters f, std::size_t input_lags, std::size
                   .input_lags = input_lags,
                   .output_lags = output_lags,
                   .sample_period_s = 1e-3,
-                  .lowest = -200.0,
-                  .highest = 200.0,
+                  .lowest = -5000.0,
+                  .highest = 5000.0,
                   .start = 1.0});
 }
 /// y = 0.5 + 200 u + 0.25 v + 100 u' + 0.1 v' + 0.6 y' - 0.1 y''
@@ -157,6 +207,14 @@ template <>
 inline Narx<Mlp> example<Narx<Mlp>>() {
   return example_narx<Mlp>(
       random_network<Mlp>({.inputs = 5, .hidden = {6}, .activation = Activation::tanh}, 8), 1, 1);
+}
+template <>
+inline Narx<GaussianProcess> example<Narx<GaussianProcess>>() {
+  return example_narx<GaussianProcess>(example_gaussian_process(3), 0, 1);
+}
+template <>
+inline Narx<ParametricGp> example<Narx<ParametricGp>>() {
+  return example_narx<ParametricGp>(example_parametric_gp(3), 0, 1);
 }
 /// The mixture of two inputs and the target, its third dimension a past output.
 template <>

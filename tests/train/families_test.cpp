@@ -32,7 +32,11 @@ TEST(Families, FindThemselvesAndFitModelsOfTheirName) {
     const FittedModel fitted =
         found.fit(test::noisy_spring(), Options(found.options, {}), {.seed = 1});
     // A second way to train a family carries its name in front: dgmm_paper fits a dgmm.
-    EXPECT_TRUE(family.name.starts_with(fitted.model.family())) << family.name;
+    // The field's own name for a line that feeds back is arx.
+    if (family.name == "arx")
+      EXPECT_EQ(fitted.model.family(), "narx_linear");
+    else
+      EXPECT_TRUE(family.name.starts_with(fitted.model.family())) << family.name;
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include "torsio/model/dgmm.hpp"
 #include "torsio/model/ensemble.hpp"
+#include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
@@ -17,6 +18,7 @@
 #include "torsio/model/mlp.hpp"
 #include "torsio/model/model.hpp"
 #include "torsio/model/narx.hpp"
+#include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
 
 namespace torsio {
@@ -30,19 +32,23 @@ struct FamilyList {
 };
 
 /// Every family that model files and the command line know: one line each.
-using KnownFamilies = FamilyList<Linear,         //
-                                 LinearCoulomb,  //
-                                 Polynomial,     //
-                                 Dgmm,           //
-                                 Mlp,            //
-                                 Lstm,           //
-                                 Gru,            //
-                                 MlpEnsemble,    //
-                                 LstmEnsemble,   //
-                                 GruEnsemble,    //
-                                 Narx<Linear>,   //
-                                 Narx<Dgmm>,     //
-                                 Narx<Mlp>>;
+using KnownFamilies = FamilyList<Linear,                 //
+                                 LinearCoulomb,          //
+                                 Polynomial,             //
+                                 Dgmm,                   //
+                                 GaussianProcess,        //
+                                 ParametricGp,           //
+                                 Mlp,                    //
+                                 Lstm,                   //
+                                 Gru,                    //
+                                 MlpEnsemble,            //
+                                 LstmEnsemble,           //
+                                 GruEnsemble,            //
+                                 Narx<Linear>,           //
+                                 Narx<Dgmm>,             //
+                                 Narx<Mlp>,              //
+                                 Narx<GaussianProcess>,  //
+                                 Narx<ParametricGp>>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`
 /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch

@@ -1,0 +1,105 @@
+#include "torsio/train/fit_gaussian_process.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "model/covariance.hpp"
+#include "torsio/core/error.hpp"
+#include "train/kernel_data.hpp"
+#include "train/kernel_search.hpp"
+#include "train/likelihood_search.hpp"
+#include "train/marginal_likelihood.hpp"
+
+namespace torsio {
+namespace {
+
+void check_fits_the_memory(std::size_t samples) {
+  const double have =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  if (MarginalLikelihood::bytes(samples) <= have) return;
+  const auto fits = static_cast<std::size_t>(std::sqrt(have / MarginalLikelihood::bytes(1)));
+  throw Error({.problem = "the matrix of all samples does not fit into this machine's memory",
+               .expected = fmt::format("at most {} samples", fits),
+               .found = fmt::format("{}, which take {:.1f} GB", samples,
+                                    MarginalLikelihood::bytes(samples) * 1e-9),
+               .advice = fmt::format("Set samples={} or less, or take "
+                                     "parametric_gp_variational, which grows with N only.",
+                                     fits)});
+}
+
+void check_count(std::size_t samples, bool with_std_dev) {
+  const std::size_t most =
+      with_std_dev ? GaussianProcess::kMostPointsWithStdDev : GaussianProcess::kMostPoints;
+  if (samples <= most) return;
+  throw UsageError(
+      {.place = "option samples",
+       .expected = fmt::format("at most {}{}", most, with_std_dev ? " with an error bar" : ""),
+       .found = std::to_string(samples),
+       .advice = with_std_dev ? "Set samples lower, or std_dev=false." : ""});
+}
+
+std::vector<std::string> notes_of(MarginalLikelihood& process, double value, std::size_t all,
+                                  std::size_t used, const NetworkScaling& scaling,
+                                  const std::string& target) {
+  std::vector<std::string> notes;
+  if (used < all)
+    notes.push_back(
+        fmt::format("fitted to {} of {} samples, drawn by chance: set samples", used, all));
+  notes.push_back(fmt::format("kernel {}; noise {:.3g} (inputs and target standardised)",
+                              description_of(process.kernel().expression()),
+                              std::sqrt(process.noise_variance())));
+  if (process.jitter() > 0.0)
+    notes.push_back(
+        fmt::format("the matrix took a jitter of {:.0e} of its mean diagonal", process.jitter()));
+  const LeaveOneOut scores = process.leave_one_out();
+  notes.push_back(fmt::format(
+      "log marginal likelihood {:.6g}; leaving one sample out: RMSE {:.4g} in the unit of {}, mean "
+      "log density {:.4g}, {:.1f} % within 95 %",
+      -value, scores.rmse * scaling.target_scale, target,
+      scores.log_density - std::log(scaling.target_scale), 100.0 * scores.covered_95));
+  return notes;
+}
+
+}  // namespace
+
+Fitted<GaussianProcess> fit_gaussian_process(const TrainingData& data,
+                                             const GaussianProcessOptions& options,
+                                             const FitContext& context) {
+  report_progress(context.progress, 0.0, "fitting gaussian_process");
+  KernelExpression expression = parse_kernel(options.kernel, data.input_count());
+  Table table = usable_table(data);
+  const std::size_t all = table.target.size();
+  const std::size_t used = options.samples == 0 ? all : std::min(all, options.samples);
+  check_count(used, options.std_dev);
+  check_fits_the_memory(used);
+  Random random(context.seed);
+  table = thinned(table, used, random);
+  std::vector<std::string> notes = constant_inputs(data, table.features);
+  const NetworkScaling scaling = scaling_of(table);
+  table = standardised(scaling, std::move(table));
+  set_start(expression, median_distance(table.features, random));
+  const Kernel kernel(expression, data.input_count());
+
+  MarginalLikelihood process(kernel, table.features, table.target);
+  const std::vector<double> numbers = likeliest_numbers(
+      process, table, {.restarts = options.restarts, .iterations = options.iterations}, random,
+      context);
+  const double value = process.fix(numbers);
+  if (!std::isfinite(value)) refuse_covariance(GaussianProcess::kFamily);
+
+  GaussianProcess::Parameters parameters{.scaling = scaling,
+                                         .kernel = process.kernel().expression(),
+                                         .noise_variance = process.noise_variance(),
+                                         .points = std::move(table.features),
+                                         .weights = process.weights(),
+                                         .with_std_dev = options.std_dev};
+  for (std::string& note : notes_of(process, value, all, used, scaling, data.target))
+    notes.push_back(std::move(note));
+  return {std::move(parameters), std::move(notes)};
+}
+
+}  // namespace torsio
