@@ -74,9 +74,11 @@ torsio::ForeignNetwork read_weights(const ImportFlags& flags, const torsio::Fore
 }
 
 torsio::ImportOptions options_of(const ImportFlags& flags) {
+  // Not among the braces below: g++ 12 destroys what a throw there has left half made.
+  const double rate_Hz = torsio::si_quantity(flags.data.rate, "Hz", "--rate");
   return {.features = {.inputs = flags.data.wanted_inputs(), .definitions = {}},
           .target = flags.data.target.empty() ? "torque_Nm" : flags.data.target,
-          .sample_rate_Hz = torsio::si_quantity(flags.data.rate, "Hz", "--rate"),
+          .sample_rate_Hz = rate_Hz,
           .input_scale = flags.input_scale,
           .output_scale = flags.output_scale,
           .warm_up_samples = flags.warm_up};

@@ -60,7 +60,8 @@ void TextSink::pack(std::span<const std::byte> bytes, bool is_last) {
   do {
     stream_.next_out = reinterpret_cast<Bytef*>(packed_.data());
     stream_.avail_out = static_cast<uInt>(packed_.size());
-    deflate(&stream_, is_last ? Z_FINISH : Z_NO_FLUSH);
+    if (deflate(&stream_, is_last ? Z_FINISH : Z_NO_FLUSH) == Z_STREAM_ERROR)
+      throw Error({.place = "gzip", .problem = "zlib cannot pack"});
     file_.write(std::span(packed_).first(packed_.size() - stream_.avail_out));
   } while (stream_.avail_out == 0);
 }

@@ -12,6 +12,9 @@
 namespace torsio {
 namespace {
 
+// A layer that passes its inputs on has their number squared in weights.
+constexpr std::size_t kMostIdentity = 1024;
+
 struct ActivatedDense {
   DenseStage map;
   Activation activation = Activation::linear;
@@ -105,6 +108,10 @@ class Assembly {
   void add(const ActivationStage& stage) {
     if (stage.function == Activation::linear) return;
     if (!ends_linear()) {
+      if (width_ > kMostIdentity)
+        throw Error({.problem = "an activation without a layer before it, too wide to make one",
+                     .expected = fmt::format("at most {} units", kMostIdentity),
+                     .found = fmt::format("{}", width_)});
       add(DenseStage{identity(width_), std::vector<double>(width_, 0.0)});
     } else if (pending_) {
       absorb_behind(*std::exchange(pending_, std::nullopt), dense_.back().map);

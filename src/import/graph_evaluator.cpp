@@ -67,6 +67,10 @@ Evaluator::Evaluator(const Graph& graph) : graph_(graph) {
                  .expected = "a last axis of known size: the network's inputs",
                  .found = rank == 0 ? "no axis" : "another shape",
                  .advice = "Export with a fixed number of inputs; only batch and time may vary."});
+  if (*first.shape.back() > static_cast<std::int64_t>(kMostUnits))
+    throw Error({.place = fmt::format("{}: input '{}'", graph.place, first.name),
+                 .expected = fmt::format("at most {} inputs", kMostUnits),
+                 .found = fmt::format("{}", *first.shape.back())});
   Signal signal;
   for (std::size_t i = 0; i < rank; ++i) {
     const bool is_last = i + 1 == rank;

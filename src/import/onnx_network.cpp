@@ -115,7 +115,9 @@ graph::Node node_of(const onnx::NodeProto& proto, const std::string& place) {
 graph::Graph::Input input_of(const onnx::ValueInfoProto& proto) {
   graph::Graph::Input input{proto.name(), {}};
   for (const auto& size : proto.type().tensor_type().shape().dim())
-    input.shape.push_back(size.has_dim_value() ? std::optional(size.dim_value()) : std::nullopt);
+    input.shape.push_back(size.has_dim_value() && size.dim_value() > 0
+                              ? std::optional(size.dim_value())
+                              : std::nullopt);  // -1 and 0 stand for "any" in some exporters
   return input;
 }
 

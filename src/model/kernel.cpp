@@ -114,6 +114,9 @@ void Kernel::prepare() {
       weights_.resize(weights_.size() + node.length_scales.size());
       operands.push_back(n);
     } else {
+      if (!node.length_scales.empty())
+        refuse(n, "length_scales", "none of a sum or product",
+               std::to_string(node.length_scales.size()));
       if (operands.size() < 2)
         refuse(n, "kind", "a sum or product of two kernels", "fewer before it");
       operands.pop_back();

@@ -162,8 +162,10 @@ Learning LastLayerAdapter::pass_over(Learning reason) noexcept {
 
 Learning LastLayerAdapter::judge(const ReferenceSample& reference) noexcept {
   const double value = reference.value;
-  unchanged_ticks_ = value == last_reference_ ? unchanged_ticks_ + 1 : 0;
-  last_reference_ = value;
+  // A slower sensor tells nothing between its samples: that it tells the same again counts.
+  const bool is_new = std::isfinite(value) && value != last_reference_;
+  unchanged_ticks_ = is_new ? 0 : unchanged_ticks_ + 1;
+  if (is_new) last_reference_ = value;
   const Learning doubt = doubt_about(reference);
   if (doubt != Learning::updated) {
     compare(0.0, 0.0);

@@ -61,7 +61,8 @@ Study spring_models_001(const StudyOptions& options, const Progress& progress) {
 
 Study inverse_models_001(const StudyOptions& options, const Progress& progress) {
   return sweep_study(
-      {.protocol = "the same sweeps; the deflection from the torque, its own rate and "
+      {.protocol = "the same sweeps; the deflection from the torque, the deflection's "
+                   "measured rate and "
                    "the joint's speed",
        .unit = "rad",
        .options = options},

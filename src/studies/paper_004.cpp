@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,8 @@ constexpr const char* kAcceleration = "lowpass(rate(rate(joint_angle_rad)), 3Hz)
 constexpr const char* kTwistRate =
     "lowpass(rate(motor_angle_rad / 2 - wave_generator_angle_rad), 10Hz)";
 constexpr const char* kGeneratorSpeed = "lowpass(rate(wave_generator_angle_rad), 10Hz)";
+
+constexpr std::uint64_t kJudged = 50;  // seeds of recordings to be judged on
 
 using InputSet = std::pair<std::string, std::vector<std::string>>;
 const InputSet kSet1{"I", {kTwist, kMotorTorque, kAcceleration}};
@@ -52,7 +55,8 @@ struct Push {
   std::string actuator = "harmonic-drive";
   double torque_Nm = 20.0;
   bool is_impedance_zero = false;
-  std::string condition = {};  ///< what a row of the table is called by
+  std::string condition = {};     ///< what a row of the table is called by
+  std::uint64_t seed_offset = 0;  ///< the same recording in every comparison of a repeat
   Role role = Role::train;
 };
 
@@ -74,7 +78,7 @@ PushData record(const std::vector<Push>& pushes, const StudyOptions& options, st
   for (const Push& push : pushes) {
     Recording recording = simulate({.actuator = push.actuator,
                                     .experiment = "human-torque",
-                                    .seed = seed + data.conditions.size(),
+                                    .seed = seed + push.seed_offset,
                                     .duration_s = options.is_quick ? 60.0 : 150.0,
                                     .torque_amplitude_Nm = push.torque_Nm,
                                     .is_impedance_zero = push.is_impedance_zero},
@@ -91,7 +95,9 @@ void cross_validate_into(StudyRows& rows, const Push& push, const std::vector<In
                          const StudyOptions& options, std::uint64_t seed,
                          const Progress& progress) {
   constexpr std::size_t kFolds = 5;
-  PushData data = record(std::vector<Push>(kFolds, push), options, seed, progress);
+  std::vector<Push> pushes(kFolds, push);
+  for (std::size_t k = 0; k < kFolds; ++k) pushes[k].seed_offset = k;
+  PushData data = record(pushes, options, seed, progress);
   data.dataset.input_sets = sets;
   const auto choices = choices_of(data.dataset, options);
   const CrossValidation validation =
@@ -111,10 +117,12 @@ void compare_into(StudyRows& rows, const std::vector<Push>& pushes, const InputS
 }
 
 std::vector<Push> five_between(double low_Nm, double high_Nm, bool is_impedance_zero) {
-  std::vector<Push> pushes;
-  for (int k = 0; k < 5; ++k)
-    pushes.push_back({.torque_Nm = low_Nm + 0.25 * k * (high_Nm - low_Nm),
-                      .is_impedance_zero = is_impedance_zero});
+  std::vector<Push> pushes(5);
+  for (std::size_t k = 0; k < pushes.size(); ++k) {
+    pushes[k].torque_Nm = low_Nm + 0.25 * static_cast<double>(k) * (high_Nm - low_Nm);
+    pushes[k].is_impedance_zero = is_impedance_zero;
+    pushes[k].seed_offset = k + (is_impedance_zero ? 10U : 0U);
+  }
   return pushes;
 }
 
@@ -151,6 +159,7 @@ Study torque_levels_004(const StudyOptions& options, const Progress& progress) {
     for (const double level_Nm : kLevels_Nm)
       pushes.push_back({.torque_Nm = level_Nm,
                         .condition = fmt::format("{:g} Nm", level_Nm),
+                        .seed_offset = kJudged + pushes.size(),
                         .role = Role::test});
     compare_into(rows, pushes, kSet2, options, repeat_seed(options, k),
                  nth_of(progress, k, options.repeats, "torque levels"));
@@ -192,6 +201,7 @@ Study impedances_004(const StudyOptions& options, const Progress& progress) {
             {.torque_Nm = 15.0,
              .is_impedance_zero = is_zero,
              .condition = fmt::format("trained {}, judged {}", of.name, is_zero ? "zero" : "high"),
+             .seed_offset = kJudged + (is_zero ? 1 : 0),
              .role = Role::test});
       compare_into(rows, pushes, of.set, options, repeat_seed(options, k),
                    nth_of(progress, k * cases.size() + c, options.repeats * cases.size(),

@@ -30,7 +30,7 @@ constexpr std::array kStudies{
 std::span<const StudyInfo> studies() noexcept { return kStudies; }
 
 const StudyInfo& find_study(std::string_view name) {
-  const auto found = std::ranges::find(kStudies, name, &StudyInfo::name);
+  const auto* const found = std::ranges::find(kStudies, name, &StudyInfo::name);
   if (found != kStudies.end()) return *found;
   std::array<std::string_view, kStudies.size()> names{};
   std::ranges::transform(kStudies, names.begin(), &StudyInfo::name);

@@ -239,6 +239,10 @@ void hold_out_ends(Dataset& dataset, double share, double embargo_s) {
                       .found = fmt::format("{}", share)});
   for (DatasetRecord& record : dataset.records) {
     const Recording& recording = record.recording;
+    if (record.segments != whole_record(recording.size(), Role::train))
+      throw UsageError({.place = recording.name(),
+                        .problem = "its manifest gives it roles, but none to be scored on",
+                        .advice = "Give records the role test there, or name them with --test."});
     const auto embargo =
         static_cast<std::size_t>(std::llround(embargo_s * recording.sample_rate_Hz()));
     try {

@@ -47,6 +47,11 @@ Fitted<Ensemble<Member>> fit_ensemble(std::size_t members, const FitContext& con
                       .expected = fmt::format("2 to {}", Ensemble<Member>::kMostMembers),
                       .found = fmt::format("{}", members)});
   const std::size_t known = context.resume == nullptr ? 0 : context.resume->finished_loss.size();
+  if (known >= members)
+    throw UsageError({.place = "checkpoint",
+                      .expected = fmt::format("of an ensemble of {} members", members),
+                      .found = fmt::format("{} members done", known),
+                      .advice = "Resume with the settings of the first call."});
   TrainingCheckpoint done;  // only its `finished` fields
   typename Ensemble<Member>::Parameters parameters;
   double least = std::numeric_limits<double>::infinity();

@@ -4,6 +4,7 @@
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 #include <fmt/format.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,7 @@
 #include <utility>
 
 #include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/metrics.hpp"
@@ -72,7 +74,7 @@ Rest rest_of(const TrainingData& data, const NarxLags& lags, double range, const
 
 /// The outputs of a free run from the first measured samples.
 std::vector<double> simulated(AnyModel& model, const Sequence& sequence) {
-  std::vector<double> outputs(sequence.target.size());
+  std::vector<double> outputs(sequence.target.size(), kNotMeasured);
   model.reset();
   std::size_t corrected = 0;
   for (std::size_t n = 0; n < outputs.size(); ++n) {
@@ -91,10 +93,20 @@ Lists simulated(AnyModel& model, const TrainingData& data) {
   return outputs;
 }
 
+/// Over what came behind the measured start.
 double free_run_rmse(const Lists& outputs, const TrainingData& data) {
   MetricsAccumulator accumulator;
-  for (std::size_t s = 0; s < outputs.size(); ++s)
-    accumulator.add(outputs[s], data.sequences[s].target, data.sequences[s].use);
+  for (std::size_t s = 0; s < outputs.size(); ++s) {
+    const Sequence& sequence = data.sequences[s];
+    std::size_t told = 0;
+    for (std::size_t n = 0; n < outputs[s].size(); ++n) {
+      if (told == kCorrected) {
+        if (sequence.use[n] != 0) accumulator.add(outputs[s][n], sequence.target[n]);
+      } else if (std::isfinite(sequence.target[n])) {
+        ++told;
+      }
+    }
+  }
   return accumulator.metrics().rmse;
 }
 
@@ -186,7 +198,7 @@ FittedModel fit_narx(const TrainingData& data, const NarxOptions& options, const
         inner.fit(narx_data(data, options.lags, outputs.empty() ? nullptr : &outputs), own);
     AnyModel model = inner.wrap(f.model, rest);
     const double rmse = free_run_rmse(simulated(model, judge), judge);
-    if (!best || rmse < least) {
+    if (!best || rmse < least || !std::isfinite(least)) {
       least = rmse;
       best_round = round;
       best = FittedModel{model, std::move(f.notes)};
@@ -281,6 +293,8 @@ std::vector<double> refined(std::vector<double> theta, const TrainingData& data,
   settings.num_threads = 1;
   settings.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
+  // What the search meets is in the summary; Ceres would also tell the terminal.
+  FLAGS_minloglevel = google::GLOG_FATAL;
   ceres::Solve(settings, &problem, &summary);
   report = fmt::format("output error {} after {} iterations",
                        summary.termination_type == ceres::CONVERGENCE ? "converged" : "stopped",
@@ -310,9 +324,10 @@ Fitted<Narx<Linear>> fit_arx(const TrainingData& data, const ArxOptions& options
       refined(parameters.model.coefficients.values.values, data, regressors, options.lags, report);
   const double before = rmse_of(parameters);
   const double after = rmse_of(better);
-  f.notes.push_back(fmt::format(
-      "free run on the training records: RMSE {:.4g} one step ahead, {:.4g} refined; {}{}", before,
-      after, report, after < before ? "" : ": kept as it was"));
+  f.notes.push_back(
+      fmt::format("free run on the training records: RMSE {:.4g} as fitted one step ahead, {:.4g} "
+                  "refined; {}{}",
+                  before, after, report, after < before ? "" : ": kept as it was"));
   return {after < before ? better : parameters, std::move(f.notes)};
 }
 

@@ -77,7 +77,10 @@ TEST(Narx, RefusesLagsAndRangesThatMakeNoSense) {
   EXPECT_THAT(complaint([](auto& p) { p.output_lags = 3; }),
               HasSubstr("narx_linear: expected an inner model of as many inputs as lags make"));
   EXPECT_THAT(complaint([](auto& p) { p.output_lags = 0; }), HasSubstr("1 to 1000 output lags"));
-  EXPECT_THAT(complaint([](auto& p) { p.inputs = 0; }), HasSubstr("an input"));
+  EXPECT_THAT(complaint([](auto& p) { p.inputs = 0; }),
+              HasSubstr("an input that the inner model has"));
+  EXPECT_THAT(complaint([](auto& p) { p.inputs = std::size_t{1} << 63U; }),
+              HasSubstr("an input that the inner model has"));
   EXPECT_THAT(complaint([](auto& p) { p.lowest = 6000.0; }), HasSubstr("lowest < highest"));
   EXPECT_THAT(complaint([](auto& p) { p.start = 6000.0; }), HasSubstr("start between them"));
   EXPECT_THAT(complaint([](auto& p) { p.sample_period_s = 0.0; }),

@@ -21,6 +21,7 @@ struct Segment {
   std::size_t begin = 0;
   std::size_t end = 0;
   Role role = Role::train;
+  bool operator==(const Segment&) const = default;
 };
 
 struct DatasetRecord {

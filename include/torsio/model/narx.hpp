@@ -138,7 +138,8 @@ class Narx {
         throw Error({.place = std::string(kFamily), .expected = expected, .found = found});
     };
     const Parameters& p = parameters_;
-    require(p.inputs >= 1, "an input", std::to_string(p.inputs));
+    require(p.inputs >= 1 && p.inputs <= model_.input_count(), "an input that the inner model has",
+            std::to_string(p.inputs));
     require(p.input_lags <= kMostLags && p.output_lags >= 1 && p.output_lags <= kMostLags,
             "0 to 1000 input lags and 1 to 1000 output lags",
             std::to_string(p.input_lags) + " and " + std::to_string(p.output_lags));
