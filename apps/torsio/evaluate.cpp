@@ -23,11 +23,12 @@ struct EvaluateFlags {
   JsonOutput json;
 };
 
-/// Target, estimate, error bar and fault of every sample of one recording.
+/// Target, estimate, error bar and fault of every sample of one recording: the run that is scored.
 torsio::Recording prediction_recording(const torsio::Estimator& estimator,
                                        const torsio::Recording& recording,
-                                       const std::string& target) {
-  const torsio::Prediction prediction = torsio::predict(estimator, recording);
+                                       const std::string& target, std::size_t initialise) {
+  const torsio::Prediction prediction =
+      torsio::predict(estimator, recording, {&recording.channel(target), initialise});
   const torsio::ChannelName parts = *torsio::split_channel_name(target);
   const std::string unit = "_" + std::string(parts.unit->si_suffix);
   torsio::Channel estimate{"estimated_" + target, {}};
@@ -68,9 +69,9 @@ void run(const EvaluateFlags& flags) {
   const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
   if (!flags.predictions.empty()) {
     const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
-    torsio::write_csv(
-        prediction_recording(estimator, dataset.records.front().recording, dataset.target),
-        flags.predictions);
+    torsio::write_csv(prediction_recording(estimator, dataset.records.front().recording,
+                                           dataset.target, dataset.initialise_samples),
+                      flags.predictions);
   }
   if (flags.json.wants_tables()) print(evaluation_text(results));
   flags.json.write(torsio::results_json(results));

@@ -96,6 +96,9 @@ void run(const FitFlags& flags) {
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   if (flags.resume) std::filesystem::remove(flags.checkpoint());
   for (const std::string& note : trained.notes) remark("note: " + note);
+  for (const torsio::ResultRow& row : results.rows)
+    if (row.status != "ok" && !row.recording)
+      remark(fmt::format("warning: {} on {}: {}", row.status, torsio::name(row.split), row.reason));
   remark(fmt::format("{} written in {:.2f} s of fitting", flags.output, trained.fit_seconds));
 }
 

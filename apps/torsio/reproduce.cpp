@@ -43,9 +43,12 @@ void run(const ReproduceFlags& flags) {
     ProgressBar bar;
     const torsio::Study study = torsio::run_study(*info, flags.options, bar.listener());
     documents.push_back(nlohmann::ordered_json::parse(torsio::study_json(*info, study)));
-    if (flags.json.wants_tables()) print(torsio::study_text(*info, study) + "\n");
+    if (flags.json.wants_tables()) {
+      print(torsio::study_text(*info, study) + "\n");
+      flags.json.write(documents.dump(2) + "\n");  // after each: the next may take an hour
+    }
   }
-  flags.json.write(documents.dump(2) + "\n");
+  if (!flags.json.wants_tables()) flags.json.write(documents.dump(2) + "\n");
 }
 
 }  // namespace

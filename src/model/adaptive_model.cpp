@@ -47,8 +47,8 @@ const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters) {
   throw UsageError({.place = "adaptation",
                     .expected = "a network: mlp, lstm or gru",
                     .found = std::string(family_of(parameters)),
-                    .advice = "Only a single network has a last layer to adapt; fit another "
-                              "family, or an ensemble, again."});
+                    .advice = "Only a single network has a last layer to adapt: fit one, without "
+                              "members. Other families are fitted again."});
 }
 
 AdaptiveModel::AdaptiveModel(const Parameters& parameters)

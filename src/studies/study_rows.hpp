@@ -21,7 +21,7 @@ class StudyRows {
 
   /// The rows of single recordings in a split, each under its condition.
   /// @param condition_of (recording) -> condition
-  /// @throws Error if a fit failed: a study has no holes.
+  /// @throws Error if a fit failed: a study has no holes. A free run that diverged counts with its error.
   template <class ConditionOf>
   void add(const Results& results, const Dataset& dataset, Role split,
            const ConditionOf& condition_of) {

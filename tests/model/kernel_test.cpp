@@ -204,6 +204,13 @@ TEST(KernelText, PointsAtThePlaceOfAMistake) {
   EXPECT_THAT(complaint(many), HasSubstr("at most 64"));
 }
 
+TEST(Kernel, RefusesLengthScalesOfASum) {
+  KernelExpression kernel = parse_kernel("se+se", 2);
+  kernel.nodes.back().length_scales.assign(100000, 1.0);
+  EXPECT_NE(error_message([&] { const Kernel built(kernel, 2); }).find("none of a sum or product"),
+            std::string::npos);
+}
+
 TEST(Kernel, RefusesNumbersThatMakeNone) {
   const auto complaint = [](const std::function<void(KernelExpression&)>& spoil) {
     KernelExpression kernel = parse_kernel("se_ard+rq", 2);

@@ -357,6 +357,19 @@ TEST(LastLayerAdapter, StaleReferencesTeachNothing) {
   }
 }
 
+TEST(LastLayerAdapter, AFrozenReferenceIsStaleWithNothingBetweenItsSamplesToo) {
+  AdaptationSettings settings = unguarded();
+  settings.frozen_after_s = 0.1;
+  Pupil pupil(settings, 5);
+  for (int n = 0; n < 800; ++n) {
+    (void)pupil.step();
+    const bool is_told = n % 8 == 0;
+    const Learning told = pupil.adapter.learn({.value = is_told ? 1.0 : kNaN});
+    if (!is_told) continue;
+    EXPECT_EQ(told, n < 100 ? Learning::updated : Learning::reference_stale) << n;
+  }
+}
+
 TEST(LastLayerAdapter, AFrozenReferenceIsStaleUntilItMoves) {
   AdaptationSettings settings = unguarded();
   settings.frozen_after_s = 0.1;
