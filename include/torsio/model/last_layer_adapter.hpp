@@ -21,7 +21,7 @@ enum class AdaptationRule : std::uint8_t { nlms, rls };
 /// are in the target's unit.
 struct AdaptationSettings {
   AdaptationRule rule = AdaptationRule::nlms;
-  double step_size = 0.003;          ///< NLMS: mu, above 0 and below 2; docs/decisions/0013
+  double step_size = 0.003;          ///< NLMS: mu, above 0 and below 2; docs/decisions/0015
   double leak = 1e-5;                ///< NLMS: gamma, share of W - W0 that an update takes back
   double regularisation = 1e-3;      ///< NLMS: epsilon, beside the square of the features
   double forgetting = 0.9995;        ///< RLS: lambda, 0.9 to 1
