@@ -64,7 +64,7 @@ struct At {
 };
 
 HWY_INLINE V polynomial(const std::array<double, kSeriesTerms>& series_of, V z) {
-  const double* coefficient = &series_of[0];
+  const double* coefficient = series_of.data();
   V sum = constant(coefficient[kSeriesTerms - 1]);
   for (std::size_t n = kSeriesTerms - 1; n-- > 0;)
     sum = hn::MulAdd(sum, z, constant(coefficient[n]));

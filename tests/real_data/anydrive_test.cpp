@@ -62,9 +62,8 @@ TEST(Anydrive, IsImportedWithoutLoss) {
 TEST(Anydrive, StreamsWhatPyTorchTells) {
   TORSIO_NEEDS_DATA("desr_dualcam");
   // Two roundings of float32 at up to 60 Nm; docs/models/lstm.md takes them apart.
-  test::on_each_instruction_set([](const char* name) {
-    EXPECT_LT(deviation().streaming, 3e-5) << name;
-  });
+  test::on_each_instruction_set(
+      [](const char* name) { EXPECT_LT(deviation().streaming, 3e-5) << name; });
 }
 
 }  // namespace
