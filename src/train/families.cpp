@@ -7,6 +7,7 @@
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/train/fit_dgmm.hpp"
+#include "torsio/train/fit_grey_box.hpp"
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
 #include "train/fitted_model.hpp"
@@ -108,6 +109,36 @@ FittedModel dgmm(const TrainingData& data, const Options& options, const FitCont
                context.progress));
 }
 
+constexpr std::array kGreyBoxOptions{
+    kSchedule,
+    OptionInfo{"passive", Kind::boolean, "false", 0, 0,
+               "only friction and relaxation that take energy, as true ones do"},
+    OptionInfo{"residual", Kind::text, "auto", 0, 0,
+               "learned on what the terms leave over: none, mlp, dgmm; auto: mlp if it lowers the "
+               "error on data that it did not see"},
+    OptionInfo{"bound", Kind::number, "3", 0, 1e6,
+               "of the residual, in root mean squares of what is left over"}};
+
+ResidualKind residual_of(const Options& options) {
+  const std::string& text = options.text("residual");
+  if (text == "none") return ResidualKind::none;
+  if (text == "mlp") return ResidualKind::mlp;
+  if (text == "dgmm") return ResidualKind::dgmm;
+  if (text == "auto") return ResidualKind::automatic;
+  throw UsageError({.place = "option residual",
+                    .expected = "one of auto, none, mlp, dgmm",
+                    .found = '"' + text + '"'});
+}
+
+FittedModel grey_box(const TrainingData& data, const Options& options, const FitContext& context) {
+  return fitted_model(fit_grey_box(data,
+                                   {.schedule = options.text("schedule"),
+                                    .passive = options.boolean("passive"),
+                                    .bound = options.number("bound"),
+                                    .residual = residual_of(options)},
+                                   context));
+}
+
 FittedModel dgmm_paper(const TrainingData& data, const Options& options,
                        const FitContext& context) {
   return fitted_model(fit_dgmm_paper(data,
@@ -124,6 +155,9 @@ constexpr std::array kShallowFamilies{
     FamilyInfo{Polynomial::kFamily,
                "curve of the first input, one for each direction: P(x) + sum k x",
                kPolynomialOptions, polynomial},
+    FamilyInfo{GreyBox::kFamily,
+               "torsio's own: elastic curve, slip, relaxation and friction, as the data ask for",
+               kGreyBoxOptions, grey_box},
     FamilyInfo{Dgmm::kFamily, "Gaussian mixture of target and inputs, learned sample by sample",
                kDgmmOptions, dgmm},
     FamilyInfo{"dgmm_paper", "the same as printed in the paper: for comparison only",

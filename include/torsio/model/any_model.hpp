@@ -11,6 +11,7 @@
 #include "torsio/model/dgmm.hpp"
 #include "torsio/model/ensemble.hpp"
 #include "torsio/model/gaussian_process.hpp"
+#include "torsio/model/grey_box.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
@@ -36,6 +37,7 @@ using KnownFamilies = FamilyList<Linear,                 //
                                  LinearCoulomb,          //
                                  Polynomial,             //
                                  Dgmm,                   //
+                                 GreyBox,                //
                                  GaussianProcess,        //
                                  ParametricGp,           //
                                  Mlp,                    //
