@@ -99,6 +99,18 @@ struct Tally {
   }
 };
 
+/// Root mean square over the regions of the residual table; NaN without one.
+double usual_error(const EstimatorSettings& settings) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (const double std_dev : settings.residuals.std_dev) {
+    if (!std::isfinite(std_dev)) continue;
+    sum += std_dev * std_dev;
+    ++count;
+  }
+  return std::sqrt(sum / count);
+}
+
 /// Sets the state of the estimator's model by the first measured samples.
 /// @returns how many samples these are, those between them that were not measured included.
 std::size_t start_with(Estimator& estimator,
@@ -118,7 +130,7 @@ std::size_t start_with(Estimator& estimator,
     std::ranges::copy(pipeline.step(raw), features.row(n).begin());
     if (pipeline.is_settled() && target.is_fresh(n)) measured[n] = target.values[n];
   }
-  start_where_measured(estimator.model(), features, measured);
+  start_where_measured(estimator.model(), features, measured, usual_error(settings));
   return samples;
 }
 

@@ -302,8 +302,8 @@ std::vector<double> GreyBoxSearch::solved(const GreyBoxChoice& choice,
   const double mean = product.trace() / static_cast<double>(count);
   std::vector<std::uint8_t> is_free(own.columns(), 1);
   for (Index j = 0; j < count; ++j) product(j, j) += kRidge * std::max(product(j, j), 1e-3 * mean);
-  if (!choice.is_signed)
-    for (std::size_t j = own.first_slip(); j < own.first_slope(); ++j) is_free[j] = 0;
+  for (std::size_t j = own.first_slip(); j < own.first_slope(); ++j)
+    if (!choice.is_signed || j >= own.first_relaxation()) is_free[j] = 0;
   const Eigen::VectorXd solution = solve_mixed(product, projection, equations.square, is_free);
   return {solution.begin(), solution.end()};
 }
@@ -378,8 +378,7 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& pro
     if (at.slips > 1) with([](auto& c) { --c.slips; });
     if (at.branches + 1 < kBranches.size()) with([](auto& c) { ++c.branches; });
     if (at.smoothing > 0) with([](auto& c) { --c.smoothing; });
-    if (!passive && !at.is_signed && at.slips + at.branches > 0)
-      with([](auto& c) { c.is_signed = true; });
+    if (!passive && !at.is_signed && at.slips > 0) with([](auto& c) { c.is_signed = true; });
     if (!passive && at.slips > 0 && at.forces + 1 < kFinest)
       with([](auto& c) {
         c.is_signed = true;
@@ -434,7 +433,7 @@ std::string GreyBoxSearch::description_of(const GreyBoxChoice& choice) const {
                             : fmt::format(" with forces at {} knots", own.friction_knots.size()));
   if (!own.time_constants_s.empty())
     text += fmt::format(", {} relaxing branches", own.time_constants_s.size());
-  if (choice.is_signed) text += ", forces of any sign (not passive)";
+  if (choice.is_signed) text += ", slip forces of any sign (not passive)";
   if (choice.has_viscous) text += ", viscous friction";
   if (choice.has_coulomb) text += ", dry friction of the rates";
   return text;

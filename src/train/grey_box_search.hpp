@@ -19,7 +19,7 @@ struct GreyBoxChoice {
   std::size_t forces = 0;     ///< 0: the same everywhere; else 2^forces + 1 knots
   std::size_t branches = 0;   ///< 0, 3, 6 time constants
   std::size_t smoothing = 2;  ///< λ = 1e-6, 1e-4, 1e-2
-  bool is_signed = false;     ///< forces and branches of any sign
+  bool is_signed = false;     ///< slip forces of any sign
   bool has_viscous = false;   ///< slopes of rates
   bool has_coulomb = false;   ///< tanh of rates
 

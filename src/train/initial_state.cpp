@@ -15,7 +15,7 @@ namespace {
 /// decides only what the samples leave open.
 class Start {
  public:
-  Start(AnyModel& model, const Matrix& features, std::span<const double> target)
+  Start(AnyModel& model, const Matrix& features, std::span<const double> target, double usual_error)
       : model_(model), features_(features), target_(target) {
     model_.reset();
     rest_.assign(model_.state().begin(), model_.state().end());
@@ -25,6 +25,9 @@ class Start {
     const auto [lowest, highest] = std::ranges::minmax(
         judged_ | std::views::transform([&](std::size_t n) { return target[n]; }));
     spread_ = std::max(highest - lowest, std::max(std::abs(lowest), std::abs(highest)));
+    constexpr double kUnknownShare = 0.01;
+    const double error = usual_error > 0.0 ? usual_error : kUnknownShare * spread_;
+    if (error > 0.0) weight_ = 1.0 / (error * std::sqrt(static_cast<double>(judged_.size())));
   }
 
   [[nodiscard]] const std::vector<double>& rest() const { return rest_; }
@@ -49,24 +52,24 @@ class Start {
       for (std::size_t n = 0; n < judged_.size(); ++n)
         change = std::max(change, std::abs(moved[n] - at_rest[n]));
       if (std::isfinite(change) && change > 0.0 && spread_ > 0.0)
-        typical[j] = spread_ * probe / change;
+        typical[j] = spread_ * weight_ * probe / change;
     }
     return typical;
   }
 
   bool evaluate(std::span<const double> state, std::span<const double> typical,
                 std::span<double> residuals) {
-    constexpr double kRestWeight = 1e-3;
     model_.reset();
     model_.set_state(state);
     std::size_t next = 0;
     for (std::size_t n = 0; n < target_.size(); ++n) {
       if (!all_finite(features_.row(n))) continue;
       const double value = model_.step(features_.row(n)).value;
-      if (next < judged_.size() && judged_[next] == n) residuals[next++] = value - target_[n];
+      if (next < judged_.size() && judged_[next] == n)
+        residuals[next++] = weight_ * (value - target_[n]);
     }
     for (std::size_t j = 0; j < rest_.size(); ++j)
-      residuals[judged_.size() + j] = kRestWeight * (state[j] - rest_[j]) / typical[j];
+      residuals[judged_.size() + j] = (state[j] - rest_[j]) / typical[j];
     return true;
   }
 
@@ -77,12 +80,14 @@ class Start {
   std::vector<double> rest_;
   std::vector<std::size_t> judged_;
   double spread_ = 0.0;  ///< of the measured outputs, about 0
+  double weight_ = 1.0;  ///< of an output's miss
 };
 
 }  // namespace
 
-void start_where_measured(AnyModel& model, const Matrix& features, std::span<const double> target) {
-  Start start(model, features, target);
+void start_where_measured(AnyModel& model, const Matrix& features, std::span<const double> target,
+                          double usual_error) {
+  Start start(model, features, target, usual_error);
   if (!start.is_told()) return;
   const std::vector<double>& rest = start.rest();
   const std::vector<double> typical = start.typical();
