@@ -123,7 +123,7 @@ TEST(GreyBox, BringsAStateOutOfBoundsToItsBoundAndPassesOverWhatIsNoNumber) {
   GreyBox box(plain({0.02, 0.2}));
   box.set_state(std::array{7.0, -0.5});
   EXPECT_THAT(box.state(), testing::ElementsAre(1.0, -0.5));
-  box.set_state(std::array{NAN, 0.25});
+  box.set_state(std::array{std::nan(""), 0.25});
   EXPECT_THAT(box.state(), testing::ElementsAre(1.0, 0.25));
 }
 
@@ -145,6 +145,7 @@ Mlp::Parameters constant_network(std::size_t inputs, double value) {
 TEST(GreyBox, ItsResidualIsBoundedAndFadesOutBeyondItsTrainingData) {
   GreyBox::Parameters parameters = plain({0.1});
   parameters.residual = {.mlp = {constant_network(2, 5.0)},
+                         .dgmm = {},
                          .bound = 2.0,
                          .lowest = {-1.0, -1.0},
                          .highest = {1.0, 1.0}};
@@ -184,7 +185,9 @@ TEST(GreyBox, RefusesAStructureThatMakesNoSense) {
     change(parameters);
     return test::error_message([&] { GreyBox box(parameters); });
   };
-  EXPECT_THAT(refused([](auto& p) { p.terms.curve_knots = {1.0, 0.0, 2.0}; }),
+  EXPECT_THAT(refused([](auto& p) {
+                p.terms.curve_knots = {1.0, 0.0, 2.0};
+              }),
               HasSubstr("curve_knots"));
   EXPECT_THAT(refused([](auto& p) { p.terms.curve_knots = {1.0}; }), HasSubstr("curve_knots"));
   EXPECT_THAT(refused([](auto& p) { p.terms.thresholds = {-0.1}; }), HasSubstr("thresholds"));

@@ -150,11 +150,11 @@ class GreyBoxTerms {
 /// A learned correction to a grey box: a network or a mixture of the inputs and of the slips s_i / r_i,
 /// bounded, and faded out where an input leaves what it was trained on.
 struct GreyBoxResidual {
-  std::vector<Mlp::Parameters> mlp;    ///< at most one of these
-  std::vector<Dgmm::Parameters> dgmm;  ///< two lists holds one
-  double bound = 0.0;                  ///< largest |correction|, target's unit
-  std::vector<double> lowest;          ///< of each of its inputs in training
-  std::vector<double> highest;
+  std::vector<Mlp::Parameters> mlp = {};    ///< at most one of these
+  std::vector<Dgmm::Parameters> dgmm = {};  ///< two lists holds one
+  double bound = 0.0;                       ///< largest |correction|, target's unit
+  std::vector<double> lowest = {};          ///< of each of its inputs in training
+  std::vector<double> highest = {};
   static constexpr double kBorder = 0.1;  ///< of the range: how far beyond it the fading ends
 
   template <class Self, class Visit>

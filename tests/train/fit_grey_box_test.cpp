@@ -1,0 +1,184 @@
+#include "torsio/train/fit_grey_box.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "support/error_message.hpp"
+#include "support/example_data.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/train/model_run.hpp"
+
+namespace torsio {
+namespace {
+
+using testing::HasSubstr;
+using Row = std::span<const double>;
+
+constexpr GreyBoxOptions kBoxAlone{.residual = ResidualKind::none};
+
+/// A slow, uneven to and fro of about +-0.1.
+Matrix wander(std::size_t samples, double start = 0.0) {
+  Matrix features(samples, 1);
+  for (std::size_t n = 0; n < samples; ++n) {
+    const double t = start + 0.004 * static_cast<double>(n);
+    features(n, 0) = 0.06 * std::sin(t) + 0.03 * std::sin(2.7 * t) + 0.015 * std::sin(7.1 * t);
+  }
+  return features;
+}
+
+/// A stiffening spring with two slip elements, and noise of 0.05.
+class TrueSpring {
+ public:
+  explicit TrueSpring(std::uint64_t seed) : random_(seed) {}
+  double torque(double x) {
+    const double limits[] = {0.004, 0.02};
+    const double forces[] = {1.5, 1.0};
+    double sum = 400.0 * x + 2e4 * x * x * x;
+    for (int i = 0; i < 2; ++i) {
+      stops_[i] = std::clamp(stops_[i] + x - last_, -limits[i], limits[i]);
+      sum += forces[i] * stops_[i] / limits[i];
+    }
+    last_ = x;
+    return sum + 0.05 * random_.normal();
+  }
+
+ private:
+  Random random_;
+  double stops_[2] = {0.0, 0.0};
+  double last_ = 0.0;
+};
+
+TrainingData spring_data(std::uint64_t seed, double start = 0.0) {
+  TrueSpring spring(seed);
+  return test::training_data_of({{.expression = "spring_deflection_rad"}}, wander(8000, start),
+                                [&](Row x) { return spring.torque(x[0]); });
+}
+
+TEST(FitGreyBox, FindsAStiffeningSpringWithFrictionToItsNoise) {
+  const Fitted<GreyBox> fitted = fit_grey_box(spring_data(1), kBoxAlone);
+  EXPECT_LT(evaluate(GreyBox(fitted.parameters), spring_data(2, 100.0)).rmse, 0.09);
+  EXPECT_FALSE(fitted.parameters.terms.thresholds.empty());
+  ASSERT_FALSE(fitted.notes.empty());
+  EXPECT_THAT(fitted.notes[0], HasSubstr("slip elements"));
+}
+
+TEST(FitGreyBox, LeavesAStraightLineAStraightLine) {
+  Random random(3);
+  const TrainingData data =
+      test::training_data_of({{.expression = "spring_deflection_rad"}}, wander(8000),
+                             [&](Row x) { return 1.0 + 500.0 * x[0] + 0.1 * random.normal(); });
+  const Fitted<GreyBox> fitted = fit_grey_box(data, kBoxAlone);
+  EXPECT_EQ(fitted.parameters.terms.curve_knots.size(), 2U);
+  EXPECT_TRUE(fitted.parameters.terms.thresholds.empty());
+  EXPECT_TRUE(fitted.parameters.terms.time_constants_s.empty());
+  GreyBox box(fitted.parameters);
+  EXPECT_NEAR(box.step(std::vector{0.02}).value, 11.0, 0.02);
+}
+
+TEST(FitGreyBox, FindsARelaxationIfThereIsOne) {
+  double branch = 0.0;
+  double last = 0.0;
+  const TrainingData data =
+      test::training_data_of({{.expression = "spring_deflection_rad"}}, wander(8000), [&](Row x) {
+        branch = branch * std::exp(-0.001 / 0.1) + (x[0] - last);
+        last = x[0];
+        return 300.0 * x[0] + 200.0 * branch;
+      });
+  const Fitted<GreyBox> fitted = fit_grey_box(data, kBoxAlone);
+  EXPECT_FALSE(fitted.parameters.terms.time_constants_s.empty());
+  EXPECT_LT(evaluate(GreyBox(fitted.parameters), data).rmse, 0.05);
+}
+
+TEST(FitGreyBox, PassiveFrictionAndRelaxationAreNeverNegative) {
+  // Friction of the wrong sign on one side: only signed forces can follow.
+  TrueSpring spring(4);
+  double last = 0.0;
+  const TrainingData data =
+      test::training_data_of({{.expression = "spring_deflection_rad"}}, wander(8000), [&](Row x) {
+        const double sign = x[0] > last ? 1.0 : -1.0;
+        last = x[0];
+        return 400.0 * x[0] + (x[0] > 0.0 ? -sign : sign);
+      });
+  const auto lowest_force = [](const GreyBox::Parameters& p) {
+    const auto row = p.coefficients.values.row(0);
+    const auto first = static_cast<std::ptrdiff_t>(p.terms.first_slip());
+    const auto last_force = static_cast<std::ptrdiff_t>(p.terms.first_slope());
+    return std::ranges::min(std::vector<double>(row.begin() + first, row.begin() + last_force));
+  };
+  const auto passive =
+      fit_grey_box(data, {.passive = true, .residual = ResidualKind::none}).parameters;
+  if (passive.terms.first_slip() < passive.terms.first_slope())
+    EXPECT_GE(lowest_force(passive), 0.0);
+  const auto any = fit_grey_box(data, kBoxAlone).parameters;
+  EXPECT_LT(lowest_force(any), -0.5);
+  EXPECT_LT(evaluate(GreyBox(any), data).rmse, 0.6 * evaluate(GreyBox(passive), data).rmse);
+}
+
+TEST(FitGreyBox, InterpolatesOverAConditionThatItIsScheduledBy) {
+  const auto at = [](double support, std::uint64_t seed) {
+    Random random(seed);
+    Matrix features(4000, 2);
+    const Matrix motion = wander(4000, static_cast<double>(seed));
+    for (std::size_t n = 0; n < 4000; ++n) {
+      features(n, 0) = motion(n, 0);
+      features(n, 1) = support;
+    }
+    return test::training_data_of(
+        {{.expression = "spring_deflection_rad"}, {.expression = "support_m"}}, std::move(features),
+        [&](Row x) {
+          return (300.0 + 4000.0 * x[1]) * x[0] * (1.0 + 30.0 * x[0] * x[0]) +
+                 0.02 * random.normal();
+        });
+  };
+  TrainingData data = at(0.0, 1);
+  for (const double support : {0.01, 0.03, 0.04})
+    data.sequences.push_back(at(support, 7).sequences[0]);
+  const Fitted<GreyBox> fitted =
+      fit_grey_box(data, {.schedule = "support_m", .residual = ResidualKind::none});
+  EXPECT_EQ(fitted.parameters.coefficients.knots.size(), 4U);
+  EXPECT_LT(evaluate(GreyBox(fitted.parameters), at(0.02, 9)).rmse, 0.15);
+}
+
+TEST(FitGreyBox, ANetworkIsKeptOnlyWhereItHelps) {
+  // The second input bends the torque: no term of the box can.
+  const auto data_of = [](double bend) {
+    Random random(6);
+    Matrix features(6000, 2);
+    const Matrix motion = wander(6000);
+    for (std::size_t n = 0; n < 6000; ++n) {
+      features(n, 0) = motion(n, 0);
+      features(n, 1) = std::sin(0.0031 * static_cast<double>(n));
+    }
+    return test::training_data_of(
+        {{.expression = "spring_deflection_rad"}, {.expression = "joint_angle_rad"}},
+        std::move(features),
+        [&](Row x) { return 400.0 * x[0] + bend * x[1] * x[1] + 0.2 * random.normal(); });
+  };
+  const Fitted<GreyBox> straight = fit_grey_box(data_of(0.0), {});
+  EXPECT_TRUE(straight.parameters.residual.mlp.empty());
+  const TrainingData bent = data_of(5.0);
+  const Fitted<GreyBox> learned = fit_grey_box(bent, {});
+  ASSERT_EQ(learned.parameters.residual.mlp.size(), 1U);
+  EXPECT_LT(evaluate(GreyBox(learned.parameters), bent).rmse,
+            0.5 * evaluate(GreyBox(fit_grey_box(bent, kBoxAlone).parameters), bent).rmse);
+}
+
+TEST(FitGreyBox, SaysWhyItCannotBeFitted) {
+  TrainingData still = spring_data(1);
+  for (std::size_t n = 0; n < still.sequences[0].features.rows; ++n)
+    still.sequences[0].features(n, 0) = 0.1;
+  EXPECT_THAT(test::error_message([&] { (void)fit_grey_box(still, kBoxAlone); }),
+              HasSubstr("spring_deflection_rad is constant"));
+  TrainingData few = spring_data(1);
+  std::fill(few.sequences[0].use.begin() + 100, few.sequences[0].use.end(), 0);
+  EXPECT_THAT(test::error_message([&] { (void)fit_grey_box(few, kBoxAlone); }),
+              HasSubstr("too few training samples"));
+}
+
+}  // namespace
+}  // namespace torsio
