@@ -10,9 +10,10 @@
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/files/training_checkpoint.hpp"
-#include "torsio/report/results.hpp"
+#include "torsio/report/fit_report.hpp"
 #include "torsio/train/comparison.hpp"
 #include "torsio/train/families.hpp"
+#include "torsio/train/fit_report.hpp"
 #include "torsio/train/inputs.hpp"
 #include "verbs.hpp"
 
@@ -91,8 +92,9 @@ void run(const FitFlags& flags) {
   trained.file.card.device_serial = flags.device_serial;
   const torsio::Results results = torsio::evaluate_model(trained.file, dataset, bar.listener());
   torsio::note_held_out_scores(trained.file.card, results.rows);
-  if (flags.json.wants_tables()) print(evaluation_text(results));
-  flags.json.write(torsio::results_json(results));
+  const torsio::FitReport report = torsio::fit_report(trained, dataset);
+  if (flags.json.wants_tables()) print(evaluation_text(results) + torsio::fit_report_text(report));
+  flags.json.write(torsio::fit_json(results, report, trained.notes));
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   if (flags.resume) std::filesystem::remove(flags.checkpoint());
   for (const std::string& note : trained.notes) remark("note: " + note);

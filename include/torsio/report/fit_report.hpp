@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "torsio/train/fit_report.hpp"
+#include "torsio/train/results.hpp"
+
+namespace torsio {
+
+/// What is left over and what was found, for a person: correlations of the residuals, the parameters
+/// with standard errors (as far as the family names them).
+[[nodiscard]] std::string fit_report_text(const FitReport& report);
+
+/// `results_json` of the fitted model's scores with `fit_report` and `notes` beside the results.
+[[nodiscard]] std::string fit_json(const Results& results, const FitReport& report,
+                                   const std::vector<std::string>& notes);
+
+}  // namespace torsio

@@ -1,0 +1,74 @@
+#include "torsio/report/fit_report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "report/result_parts.hpp"
+#include "torsio/report/text_table.hpp"
+
+namespace torsio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json report_json(const FitReport& report) {
+  Json correlations = Json::array();
+  for (const ResidualCorrelation& each : report.correlations)
+    correlations.push_back({{"with", each.with},
+                            {"strongest", json_number(each.strongest)},
+                            {"lag_s", json_number(each.lag_s)},
+                            {"bound_99", json_number(each.bound)},
+                            {"share_outside", json_number(each.share_outside)}});
+  Json parameters = Json::array();
+  for (const FittedParameter& each : report.table)
+    parameters.push_back({{"name", each.name},
+                          {"unit", text_or_null(each.unit)},
+                          {"value", json_number(each.value)},
+                          {"std_error", json_number(each.std_error)}});
+  return {{"split", report.split},
+          {"samples", report.samples},
+          {"residual_memory_s", json_number(report.memory_s)},
+          {"effective_samples", json_number(report.effective_samples)},
+          {"correlations", std::move(correlations)},
+          {"parameters", std::move(parameters)}};
+}
+
+}  // namespace
+
+std::string fit_report_text(const FitReport& report) {
+  std::string text;
+  if (!report.correlations.empty()) {
+    text +=
+        fmt::format("\nresiduals on {}: {} samples that tell as much as {:.0f} independent ones",
+                    report.split, report.samples, report.effective_samples);
+    if (std::isfinite(report.memory_s))
+      text += fmt::format("; they are forgotten (1/e) after {:.3g} s", report.memory_s);
+    text += "\n";
+    TextTable table;
+    table.header({"correlation with", "strongest", "at lag s", "99 % bound", "lags outside %"});
+    for (const ResidualCorrelation& each : report.correlations)
+      table.row({each.with, fmt::format("{:+.3f}", each.strongest),
+                 fmt::format("{:.3g}", each.lag_s), fmt::format("{:.3f}", each.bound),
+                 fmt::format("{:.0f}", 100.0 * each.share_outside)});
+    text += table.text();
+  }
+  if (report.table.empty()) return text;
+  TextTable table;
+  table.header({"parameter", "value", "+- std error", "unit"});
+  for (const FittedParameter& each : report.table)
+    table.row({each.name, fmt::format("{:.5g}", each.value),
+               std::isfinite(each.std_error) ? fmt::format("{:.2g}", each.std_error) : "-",
+               each.unit});
+  return text + "\n" + table.text();
+}
+
+std::string fit_json(const Results& results, const FitReport& report,
+                     const std::vector<std::string>& notes) {
+  Json document = results_document(results);
+  document["fit_report"] = report_json(report);
+  document["notes"] = notes;
+  return document.dump(2) + "\n";
+}
+
+}  // namespace torsio

@@ -1,0 +1,162 @@
+#include "torsio/train/fit_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "torsio/train/evaluate.hpp"
+
+namespace torsio {
+namespace {
+
+/// Residuals and features of one record, sample by sample; NaN where nothing is judged.
+struct Run {
+  std::vector<double> residual;
+  Matrix features;
+};
+
+std::optional<Role> judged_role(const Dataset& dataset) {
+  for (const Role role : {Role::test, Role::validation, Role::train})
+    if (dataset.has_role(role)) return role;
+  return std::nullopt;
+}
+
+std::vector<Run> runs_of(const TrainedModel& model, const Dataset& dataset, Role role) {
+  const Estimator estimator = make_estimator(model.file);
+  std::vector<Run> runs;
+  for (const DatasetRecord& record : dataset.records) {
+    if (!record.has_role(role)) continue;
+    const Recording& recording = record.recording;
+    const Channel& target = recording.channel(dataset.target);
+    const Prediction told = predict(estimator, recording, {&target, dataset.initialise_samples});
+    FeaturePipeline pipeline(estimator.settings().features, estimator.settings().sample_rate_Hz);
+    Run& run = runs.emplace_back(Run{std::vector<double>(recording.size(), kNotMeasured),
+                                     Matrix(recording.size(), pipeline.feature_count())});
+    std::vector<double> raw(pipeline.raw_inputs().size());
+    for (std::size_t n = 0; n < recording.size(); ++n) {
+      for (std::size_t j = 0; j < raw.size(); ++j)
+        raw[j] = recording.channel(pipeline.raw_inputs()[j]).values[n];
+      std::ranges::copy(pipeline.step(raw), run.features.row(n).begin());
+    }
+    for (const Segment& segment : record.segments) {
+      if (segment.role != role) continue;
+      for (std::size_t n = std::max(segment.begin, told.initialised); n < segment.end; ++n)
+        if (target.is_fresh(n) && told.estimates[n].fault != Fault::warming_up)
+          run.residual[n] = told.estimates[n].value - target.values[n];
+    }
+  }
+  return runs;
+}
+
+/// Every `stride`-th sample of a signal: that of a slow load cell between its fresh ones is not judged.
+std::size_t stride_of(const std::vector<Run>& runs) {
+  std::size_t judged = 0;
+  std::size_t all = 0;
+  for (const Run& run : runs) {
+    const auto is_judged = [](double e) { return std::isfinite(e); };
+    judged += static_cast<std::size_t>(std::ranges::count_if(run.residual, is_judged));
+    all += run.residual.size();
+  }
+  return judged == 0 ? 1 : std::max<std::size_t>(1, (all + judged / 2) / judged);
+}
+
+template <class Value>
+double mean_of(const std::vector<Run>& runs, const Value& value) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (const Run& run : runs)
+    for (std::size_t n = 0; n < run.residual.size(); ++n)
+      if (std::isfinite(run.residual[n]) && std::isfinite(value(run, n))) {
+        sum += value(run, n);
+        ++count;
+      }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
+/// r_k for k = 0, stride, 2 stride, ...
+template <class Value>
+std::vector<double> correlations(const std::vector<Run>& runs, const Value& value, std::size_t lags,
+                                 std::size_t stride) {
+  const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
+  const double residual_mean = mean_of(runs, residual);
+  const double value_mean = mean_of(runs, value);
+  std::vector<double> products(lags, 0.0);
+  double residual_square = 0.0;
+  double value_square = 0.0;
+  for (const Run& run : runs) {
+    for (std::size_t n = 0; n < run.residual.size(); ++n) {
+      const double e = run.residual[n] - residual_mean;
+      if (!std::isfinite(e)) continue;
+      residual_square += e * e;
+      if (const double x = value(run, n) - value_mean; std::isfinite(x)) value_square += x * x;
+      for (std::size_t k = 0; k < lags && k * stride <= n; ++k) {
+        const double before = value(run, n - k * stride) - value_mean;
+        if (std::isfinite(before)) products[k] += e * before;
+      }
+    }
+  }
+  const double scale = std::sqrt(residual_square * value_square);
+  for (double& product : products) product = scale > 0.0 ? product / scale : 0.0;
+  return products;
+}
+
+ResidualCorrelation summary(std::string with, const std::vector<double>& r, std::size_t first,
+                            double step_s, double bound) {
+  ResidualCorrelation found{.with = std::move(with), .bound = bound};
+  std::size_t outside = 0;
+  for (std::size_t k = first; k < r.size(); ++k) {
+    if (std::abs(r[k]) > bound) ++outside;
+    if (std::abs(r[k]) <= std::abs(found.strongest)) continue;
+    found.strongest = r[k];
+    found.lag_s = static_cast<double>(k) * step_s;
+  }
+  if (r.size() > first)
+    found.share_outside = static_cast<double>(outside) / static_cast<double>(r.size() - first);
+  return found;
+}
+
+}  // namespace
+
+FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
+  FitReport report{.split = {}, .samples = 0, .correlations = {}, .table = model.table};
+  const std::optional<Role> role = judged_role(dataset);
+  if (!role) return report;
+  report.split = name(*role);
+  const std::vector<Run> runs = runs_of(model, dataset, *role);
+  std::size_t longest = 0;
+  for (const Run& run : runs) {
+    const auto is_judged = [](double e) { return std::isfinite(e); };
+    report.samples += static_cast<std::size_t>(std::ranges::count_if(run.residual, is_judged));
+    longest = std::max(longest, run.residual.size());
+  }
+  const std::size_t stride = stride_of(runs);
+  const std::size_t lags = std::min(kMostLags, longest / stride / 10 + 1);
+  if (report.samples < 2 || lags < 2) return report;
+  constexpr double kQuantile = 2.576;  // of |x|, 99 %, standard normal
+  const auto samples = static_cast<double>(report.samples);
+  const double bound = kQuantile / std::sqrt(samples);
+  const double step_s = static_cast<double>(stride) / model.file.settings.sample_rate_Hz;
+
+  const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
+  const std::vector<double> own = correlations(runs, residual, lags, stride);
+  report.correlations.push_back(summary("residual", own, 1, step_s, bound));
+  const auto forgotten = std::ranges::find_if(own, [](double r) { return r < std::exp(-1.0); });
+  if (forgotten != own.end())
+    report.memory_s = static_cast<double>(forgotten - own.begin()) * step_s;
+  const auto end = std::ranges::find_if(own, [](double r) { return r <= 0.0; });
+  report.effective_samples =
+      samples / (1.0 + 2.0 * std::accumulate(own.begin() + 1, std::max(end, own.begin() + 1), 0.0));
+  const std::vector<std::string>& inputs = model.file.settings.features.inputs;
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    const auto input = [j](const Run& run, std::size_t n) { return run.features(n, j); };
+    report.correlations.push_back(
+        summary(inputs[j], correlations(runs, input, lags, stride), 0, step_s, bound));
+  }
+  const double widening = std::sqrt(samples / report.effective_samples);
+  for (FittedParameter& parameter : report.table) parameter.std_error *= widening;
+  return report;
+}
+
+}  // namespace torsio
