@@ -105,6 +105,10 @@ FittedModel fit_narx(const TrainingData& data, const NarxOptions& options, const
             (static_cast<double>(round) + share) / static_cast<double>(rounds + 1), doing);
       };
     }
+    own.error_of = [&](const AnyModel& f) {
+      AnyModel model = inner.wrap(f, rest);
+      return free_run_rmse(simulated(model, judge), judge);
+    };
     FittedModel f =
         inner.fit(narx_data(data, options.lags, outputs.empty() ? nullptr : &outputs), own);
     AnyModel model = inner.wrap(f.model, rest);

@@ -17,6 +17,7 @@
 #include "torsio/model/lstm.hpp"
 #include "torsio/model/mlp.hpp"
 #include "torsio/model/model.hpp"
+#include "torsio/model/multivariate_polynomial.hpp"
 #include "torsio/model/narx.hpp"
 #include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
@@ -45,6 +46,7 @@ using KnownFamilies = FamilyList<Linear,                 //
                                  LstmEnsemble,           //
                                  GruEnsemble,            //
                                  Narx<Linear>,           //
+                                 Narx<MultivariatePolynomial>,  //
                                  Narx<Dgmm>,             //
                                  Narx<Mlp>,              //
                                  Narx<GaussianProcess>,  //
