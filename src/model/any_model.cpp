@@ -14,7 +14,8 @@ namespace {
 static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial> &&
               Model<Dgmm> && Model<GaussianProcess> && Model<ParametricGp> && Model<Mlp> &&
               Model<Lstm> && Model<Gru> && Model<MlpEnsemble> && Model<LstmEnsemble> &&
-              Model<GruEnsemble> && FeedsBack<Narx<Linear>> && FeedsBack<Narx<MultivariatePolynomial>> && FeedsBack<Narx<Dgmm>> &&
+              Model<GruEnsemble> && FeedsBack<Narx<Linear>> &&
+              FeedsBack<Narx<MultivariatePolynomial>> && FeedsBack<Narx<Dgmm>> &&
               FeedsBack<Narx<Mlp>> && FeedsBack<Narx<GaussianProcess>> &&
               FeedsBack<Narx<ParametricGp>>);
 static_assert(Invertible<AnyModel>);
@@ -79,6 +80,22 @@ bool AnyModel::feeds_back() const noexcept {
 void AnyModel::correct(double measured) noexcept {
   dispatch(model_, [&]<class M>(M& model) {
     if constexpr (FeedsBack<M>) model.correct(measured);
+  });
+}
+
+std::span<const double> AnyModel::state() const noexcept {
+  return dispatch(model_, []<class M>(const M& model) -> std::span<const double> {
+    if constexpr (HasState<M>) {
+      return model.state();
+    } else {
+      return {};
+    }
+  });
+}
+
+void AnyModel::set_state(std::span<const double> state) noexcept {
+  dispatch(model_, [&]<class M>(M& model) {
+    if constexpr (HasState<M>) model.set_state(state);
   });
 }
 

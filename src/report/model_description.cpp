@@ -109,8 +109,7 @@ std::string kernel_line(const ModelFile& model) {
 
 /// The difference equation of a polynomial NARX model in words; else nothing.
 std::string equation_line(const ModelFile& model) {
-  const auto* const narx =
-      std::get_if<Narx<MultivariatePolynomial>::Parameters>(&model.parameters);
+  const auto* const narx = std::get_if<Narx<MultivariatePolynomial>::Parameters>(&model.parameters);
   if (narx == nullptr) return {};
   return equation_of(*narx, model.settings.features.inputs, model.settings.target) + "\n";
 }
@@ -152,7 +151,8 @@ std::string model_description(const ModelFile& model) {
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
   std::vector<Leaf> leaves = leaves_of(model);
   std::erase_if(leaves, [](const Leaf& leaf) { return leaf.name.starts_with("kernel."); });
-  text += fmt::format("\n{}{}{}", kernel_line(model), equation_line(model), parameter_lines(leaves));
+  text +=
+      fmt::format("\n{}{}{}", kernel_line(model), equation_line(model), parameter_lines(leaves));
   return text;
 }
 

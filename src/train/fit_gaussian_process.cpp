@@ -66,8 +66,9 @@ Fitted<GaussianProcess> fit_gaussian_process(const TrainingData& data,
                   .count = used,
                   .counted = "samples",
                   .growth = 2.0,
-                  .advice = "Set samples={} or less, or take parametric_gp_variational, which grows "
-                            "with N only."});
+                  .advice =
+                      "Set samples={} or less, or take parametric_gp_variational, which grows "
+                      "with N only."});
   Random random(context.seed);
   table = thinned(table, used, random);
   std::vector<std::string> notes = constant_inputs(data, table.features);

@@ -99,12 +99,9 @@ FittedModel fit_narx(const TrainingData& data, const NarxOptions& options, const
   for (std::size_t round = 0; round <= rounds; ++round) {
     FitContext own{
         .seed = context.seed, .progress = {}, .validation = validation ? &*validation : nullptr};
-    if (context.progress) {
-      own.progress = [&](double share, std::string_view doing) {
-        return context.progress(
-            (static_cast<double>(round) + share) / static_cast<double>(rounds + 1), doing);
-      };
-    }
+    const double share = 1.0 / static_cast<double>(rounds + 1);
+    own.progress = part_of(context.progress, static_cast<double>(round) * share,
+                           static_cast<double>(round + 1) * share);
     own.error_of = [&](const AnyModel& f) {
       AnyModel model = inner.wrap(f, rest);
       return free_run_rmse(simulated(model, judge), judge);
@@ -154,7 +151,8 @@ Fitted<Narx<Linear>> fit_arx(const TrainingData& data, const ArxOptions& options
     return free_run_rmse(simulated(model, data), data);
   };
   report_progress(context.progress, 0.3, "refining arx");
-  Refined refined = refined_in_free_run(line_of(f.parameters), data, regressors, options.lags);
+  Refined refined = refined_in_free_run(line_of(f.parameters), data, regressors, options.lags,
+                                        part_of(context.progress, 0.3, 1.0));
   Narx<Linear>::Parameters better = parameters;
   better.model.coefficients.values.values = std::move(refined.coefficients);
   const double before = rmse_of(parameters);

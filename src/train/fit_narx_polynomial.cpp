@@ -217,8 +217,8 @@ std::string error_reduction_note(const Structure& structure, const NarxPolynomia
 
 }  // namespace
 
-std::string equation_of(const NarxPolynomial::Parameters& parameters, std::span<const std::string> inputs,
-                        std::string_view target) {
+std::string equation_of(const NarxPolynomial::Parameters& parameters,
+                        std::span<const std::string> inputs, std::string_view target) {
   const MultivariatePolynomial::Parameters& f = parameters.model;
   std::string text = regressor_text(target, 0) + " =";
   for (std::size_t j = 0; j < f.powers.rows; ++j) {
@@ -234,8 +234,9 @@ std::string equation_of(const NarxPolynomial::Parameters& parameters, std::span<
   return text;
 }
 
-Fitted<NarxPolynomial> fit_narx_polynomial(const TrainingData& data, const NarxPolynomialOptions& options,
-                                  const FitContext& context) {
+Fitted<NarxPolynomial> fit_narx_polynomial(const TrainingData& data,
+                                           const NarxPolynomialOptions& options,
+                                           const FitContext& context) {
   report_progress(context.progress, 0.0, "fitting narx_polynomial");
   check_lags(options.lags);
   const TargetSpread spread = spread_of(data);
@@ -256,7 +257,8 @@ Fitted<NarxPolynomial> fit_narx_polynomial(const TrainingData& data, const NarxP
   if (options.training == NarxTraining::free_run) {
     report_progress(context.progress, 0.6, "refining narx_polynomial");
     const TrainingData& judge = context.validation == nullptr ? data : *context.validation;
-    Refined refined = refined_in_free_run(f, data, regressors, options.lags);
+    Refined refined =
+        refined_in_free_run(f, data, regressors, options.lags, part_of(context.progress, 0.6, 1.0));
     NarxTerms better = f;
     better.coefficients = std::move(refined.coefficients);
     const double before = free_run_rmse(f, frame, judge);

@@ -340,7 +340,8 @@ Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data, const Parametri
   const bool is_better = refitted_rmse < learned_rmse;
   notes.push_back(fmt::format(
       "RMSE on {}: {:.4g} as learned, {:.4g} by the closed form over all samples, which is {}",
-      context.error_of ? "a free run" : split.judged_on, learned_rmse, refitted_rmse, is_better ? "kept" : "not kept"));
+      context.error_of ? "a free run" : split.judged_on, learned_rmse, refitted_rmse,
+      is_better ? "kept" : "not kept"));
   return {is_better ? std::move(refitted) : std::move(parameters), std::move(notes)};
 }
 

@@ -1,51 +1,49 @@
 #include "train/free_run_refinement.hpp"
 
-#include <ceres/cost_function.h>
-#include <ceres/problem.h>
-#include <ceres/solver.h>
 #include <fmt/format.h>
-#include <glog/logging.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
+#include "core/all_finite.hpp"
 #include "train/memory_check.hpp"
 #include "train/narx_run.hpp"
+#include "train/residual_search.hpp"
 
 namespace torsio {
 namespace {
 
 /// The error of a free run over one sequence, from the measured start.
-class FreeRunError : public ceres::CostFunction {
+class FreeRun {
  public:
-  FreeRunError(const NarxTerms& f, const Sequence& sequence, const Sequence& rows,
-               const NarxLags& lags)
+  FreeRun(const NarxTerms& f, const Sequence& sequence, const Sequence& rows, const NarxLags& lags)
       : f_(f),
         sequence_(sequence),
         rows_(rows),
         lags_(lags),
         columns_(f.terms.size()),
-        first_output_(f.scales.size() - lags.outputs) {
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(columns_));
-    set_num_residuals(static_cast<int>(sequence_.target.size()));
-  }
+        first_output_(f.scales.size() - lags.outputs) {}
 
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override {
-    const double* theta = parameters[0];
-    double* jacobian = jacobians == nullptr ? nullptr : jacobians[0];
-    const std::size_t samples = sequence_.target.size();
+  [[nodiscard]] std::size_t samples() const noexcept { return sequence_.target.size(); }
+
+  /// @param jacobian samples x terms, or empty.
+  /// @returns false where the run runs away.
+  bool errors(std::span<const double> theta, std::span<double> residuals,
+              std::span<double> jacobian) const {
+    const bool with_slopes = !jacobian.empty();
     const std::size_t start = std::max({lags_.inputs, lags_.outputs, kCorrected});
-    std::vector<double> past(samples, 0.0);
-    std::vector<double> slopes(jacobian == nullptr ? 0 : samples * columns_, 0.0);
+    std::vector<double> past(samples(), 0.0);
+    std::vector<double> slopes(with_slopes ? samples() * columns_ : 0, 0.0);
     At at{.regressors = std::vector<double>(f_.scales.size()),
           .terms = std::vector<double>(columns_),
           .by_output = std::vector<double>(lags_.outputs)};
-    std::fill_n(residuals, samples, 0.0);
-    if (jacobian != nullptr) std::fill_n(jacobian, samples * columns_, 0.0);
-    for (std::size_t n = 0; n < samples; ++n) {
+    std::ranges::fill(residuals, 0.0);
+    std::ranges::fill(jacobian, 0.0);
+    for (std::size_t n = 0; n < samples(); ++n) {
       const auto inputs = rows_.features.row(n).first(first_output_);
-      if (n < start || !std::ranges::all_of(inputs, [](double x) { return std::isfinite(x); })) {
+      if (n < start || !all_finite(inputs)) {
         const double measured = sequence_.target[n];
         if (std::isfinite(measured))
           past[n] = measured;
@@ -56,12 +54,11 @@ class FreeRunError : public ceres::CostFunction {
       for (std::size_t i = 0; i < first_output_; ++i) at.regressors[i] = inputs[i] / f_.scales[i];
       for (std::size_t i = 0; i < lags_.outputs; ++i)
         at.regressors[first_output_ + i] = past[n - 1 - i] / f_.scales[first_output_ + i];
-      const double value = evaluate(theta, at, jacobian != nullptr);
-      if (!(std::abs(value) < kLargest)) return false;  // this step of the search runs away
-      past[n] = value;
+      past[n] = evaluate(theta, at, with_slopes);
+      if (!(std::abs(past[n]) < kLargest)) return false;
       const bool is_judged = sequence_.use[n] != 0;
-      if (is_judged) residuals[n] = value - sequence_.target[n];
-      if (jacobian == nullptr) continue;
+      if (is_judged) residuals[n] = past[n] - sequence_.target[n];
+      if (!with_slopes) continue;
       double* slope = slopes.data() + n * columns_;
       std::ranges::copy(at.terms, slope);
       for (std::size_t i = 0; i < lags_.outputs; ++i) {
@@ -69,7 +66,8 @@ class FreeRunError : public ceres::CostFunction {
         const double* before = slopes.data() + (n - 1 - i) * columns_;
         for (std::size_t j = 0; j < columns_; ++j) slope[j] += at.by_output[i] * before[j];
       }
-      if (is_judged) std::copy_n(slope, columns_, jacobian + n * columns_);
+      if (is_judged)
+        std::copy_n(slope, columns_, jacobian.begin() + static_cast<std::ptrdiff_t>(n * columns_));
     }
     return true;
   }
@@ -84,7 +82,7 @@ class FreeRunError : public ceres::CostFunction {
     std::vector<double> by_output;   ///< df/dy_k-i
   };
 
-  double evaluate(const double* theta, At& at, bool with_slopes) const {
+  double evaluate(std::span<const double> theta, At& at, bool with_slopes) const {
     if (with_slopes) std::ranges::fill(at.by_output, 0.0);
     double value = 0.0;
     for (std::size_t j = 0; j < columns_; ++j) {
@@ -131,28 +129,36 @@ void check_memory(const NarxTerms& f, const TrainingData& data) {
 }  // namespace
 
 Refined refined_in_free_run(const NarxTerms& f, const TrainingData& data,
-                            const TrainingData& regressors, const NarxLags& lags) {
+                            const TrainingData& regressors, const NarxLags& lags,
+                            const Progress& progress) {
   check_memory(f, data);
-  Refined result{.coefficients = f.coefficients, .report = {}};
-  ceres::Problem problem;
-  for (std::size_t s = 0; s < data.sequences.size(); ++s)
-    problem.AddResidualBlock(new FreeRunError(f, data.sequences[s], regressors.sequences[s],
-                                              lags),  // the problem owns it
-                             nullptr, result.coefficients.data());
-  ceres::Solver::Options settings;
-  settings.linear_solver_type = ceres::DENSE_QR;
-  settings.max_num_iterations = 100;
-  settings.num_threads = 1;
-  settings.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  // What the search meets is in the summary; Ceres would also tell the terminal.
-  FLAGS_minloglevel = google::GLOG_FATAL;
-  ceres::Solve(settings, &problem, &summary);
-  result.report =
-      fmt::format("output error {} after {} iterations",
-                  summary.termination_type == ceres::CONVERGENCE ? "converged" : "stopped",
-                  summary.iterations.size());
-  return result;
+  std::vector<FreeRun> runs;
+  std::size_t samples = 0;
+  for (std::size_t s = 0; s < data.sequences.size(); ++s) {
+    runs.emplace_back(f, data.sequences[s], regressors.sequences[s], lags);
+    samples += runs.back().samples();
+  }
+  const std::size_t columns = f.terms.size();
+  const auto errors = [&](std::span<const double> theta, std::span<double> residuals,
+                          std::span<double> jacobian) {
+    std::size_t first = 0;
+    for (const FreeRun& run : runs) {
+      const auto slopes =
+          jacobian.empty() ? jacobian : jacobian.subspan(first * columns, run.samples() * columns);
+      if (!run.errors(theta, residuals.subspan(first, run.samples()), slopes)) return false;
+      first += run.samples();
+    }
+    return true;
+  };
+  std::vector<double> residuals(samples);
+  if (!errors(f.coefficients, residuals, {}))
+    return {.coefficients = f.coefficients, .report = "the free run runs away"};
+  SearchResult found =
+      minimise_squares({.residuals = samples, .evaluate = errors, .has_jacobian = true},
+                       f.coefficients, {.progress = progress});
+  return {.coefficients = std::move(found.theta),
+          .report = fmt::format("output error {} after {} iterations",
+                                found.has_converged ? "converged" : "stopped", found.iterations)};
 }
 
 std::string refinement_note(double rmse_before, double rmse_after, const std::string& report,

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "torsio/core/progress.hpp"
 #include "torsio/train/fit_narx.hpp"
 #include "torsio/train/frols.hpp"
 #include "torsio/train/training_data.hpp"
@@ -29,9 +30,10 @@ struct Refined {
 ///
 /// Nothing says that the end is stable elsewhere: compare it with the start. Source: SPEC section 3.3.
 /// @param regressors `narx_data` of `data`.
-/// @throws Error if the derivatives would not fit into memory.
+/// @throws Error if the derivatives would not fit into memory; Cancelled.
 [[nodiscard]] Refined refined_in_free_run(const NarxTerms& f, const TrainingData& data,
-                                          const TrainingData& regressors, const NarxLags& lags);
+                                          const TrainingData& regressors, const NarxLags& lags,
+                                          const Progress& progress = {});
 
 /// What a fitter says about a refinement.
 [[nodiscard]] std::string refinement_note(double rmse_before, double rmse_after,

@@ -3,9 +3,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/not_measured.hpp"
+#include "torsio/core/progress.hpp"
 #include "torsio/model/narx.hpp"
 #include "torsio/train/fit_narx.hpp"
 #include "torsio/train/training_data.hpp"
@@ -69,6 +71,9 @@ template <FeedsBack M>
 
 /// Over what came behind the measured start.
 [[nodiscard]] double free_run_rmse(const OutputLists& outputs, const TrainingData& data);
+
+/// Tells `progress` of a part of the work as of all of it, from `first` to `last`.
+[[nodiscard]] Progress part_of(const Progress& progress, double first, double last);
 
 /// The targets with normal noise.
 [[nodiscard]] OutputLists noisy_targets(const TrainingData& data, double deviation,
