@@ -100,8 +100,8 @@ FittedModel fit_narx(const TrainingData& data, const NarxOptions& options, const
     FitContext own{
         .seed = context.seed, .progress = {}, .validation = validation ? &*validation : nullptr};
     const double share = 1.0 / static_cast<double>(rounds + 1);
-    own.progress = part_of(context.progress, static_cast<double>(round) * share,
-                           static_cast<double>(round + 1) * share);
+    own.progress = share_of(context.progress, static_cast<double>(round) * share,
+                            static_cast<double>(round + 1) * share);
     own.error_of = [&](const AnyModel& f) {
       AnyModel model = inner.wrap(f, rest);
       return free_run_rmse(simulated(model, judge), judge);
@@ -152,7 +152,7 @@ Fitted<Narx<Linear>> fit_arx(const TrainingData& data, const ArxOptions& options
   };
   report_progress(context.progress, 0.3, "refining arx");
   Refined refined = refined_in_free_run(line_of(f.parameters), data, regressors, options.lags,
-                                        part_of(context.progress, 0.3, 1.0));
+                                        share_of(context.progress, 0.3, 1.0));
   Narx<Linear>::Parameters better = parameters;
   better.model.coefficients.values.values = std::move(refined.coefficients);
   const double before = rmse_of(parameters);

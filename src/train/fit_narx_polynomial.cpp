@@ -164,15 +164,11 @@ TrainingData regressors_of(const TrainingData& data, const NarxPolynomialOptions
 Structure chosen_structure(const Split& split, const Table& table,
                            const NarxPolynomialOptions& options,
                            const Narx<Linear>::Parameters& frame, const FitContext& context) {
-  const Progress progress = context.progress ? Progress([&](double share, std::string_view doing) {
-    return context.progress(0.5 * share, doing);
-  })
-                                             : Progress();
   Frols found = frols(table.features, table.target,
                       {.degree = options.degree,
                        .terms = most_terms(options, table.target.size()),
                        .exchange = options.exchange},
-                      progress);
+                      share_of(context.progress, 0.0, 0.5));
   if (found.sizes.empty())
     throw Error({.place = split.training.target,
                  .expected = "a target that some term explains",
@@ -257,8 +253,8 @@ Fitted<NarxPolynomial> fit_narx_polynomial(const TrainingData& data,
   if (options.training == NarxTraining::free_run) {
     report_progress(context.progress, 0.6, "refining narx_polynomial");
     const TrainingData& judge = context.validation == nullptr ? data : *context.validation;
-    Refined refined =
-        refined_in_free_run(f, data, regressors, options.lags, part_of(context.progress, 0.6, 1.0));
+    Refined refined = refined_in_free_run(f, data, regressors, options.lags,
+                                          share_of(context.progress, 0.6, 1.0));
     NarxTerms better = f;
     better.coefficients = std::move(refined.coefficients);
     const double before = free_run_rmse(f, frame, judge);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "torsio/core/error.hpp"
+#include "torsio/model/any_model.hpp"
 #include "train/folds.hpp"
 #include "train/kernel_data.hpp"
 #include "train/kernel_search.hpp"

@@ -11,6 +11,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/train/fit_narx.hpp"
 #include "torsio/train/fit_narx_polynomial.hpp"
+#include "torsio/train/frols.hpp"
 #include "train/fitted_model.hpp"
 #include "train/narx_run.hpp"
 

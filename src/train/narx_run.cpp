@@ -66,7 +66,7 @@ double free_run_rmse(const OutputLists& outputs, const TrainingData& data) {
   return accumulator.metrics().rmse;
 }
 
-Progress part_of(const Progress& progress, double first, double last) {
+Progress share_of(const Progress& progress, double first, double last) {
   if (!progress) return {};
   return [&progress, first, last](double share, std::string_view doing) {
     return progress(first + (last - first) * share, doing);
