@@ -10,6 +10,7 @@
 #include "torsio/core/error.hpp"
 #include "train/kernel_data.hpp"
 #include "train/kernel_search.hpp"
+#include "train/least_samples.hpp"
 #include "train/likelihood_search.hpp"
 #include "train/marginal_likelihood.hpp"
 #include "train/memory_check.hpp"
@@ -57,6 +58,7 @@ Fitted<GaussianProcess> fit_gaussian_process(const TrainingData& data,
                                              const FitContext& context) {
   report_progress(context.progress, 0.0, "fitting gaussian_process");
   KernelExpression expression = parse_kernel(options.kernel, data.input_count());
+  require_samples(data);
   Table table = usable_table(data);
   const std::size_t all = table.target.size();
   const std::size_t used = options.samples == 0 ? all : std::min(all, options.samples);

@@ -27,14 +27,14 @@ void require_usable(const TrainingData& data, const NarxLags& lags) {
        .advice = "Take fewer lags, or give longer records."});
 }
 
-/// One table of regressors for the records, one for the fit.
+/// The regressors of the records, those to learn from, and what a fit makes of them.
 void check_memory(const TrainingData& data, const NarxLags& lags) {
   double samples = 0.0;
   for (const Sequence& sequence : data.sequences)
     samples += static_cast<double>(sequence.target.size());
   const std::size_t regressors = data.input_count() * (lags.inputs + 1) + lags.outputs;
   require_memory({.what = "the table of all samples and lags",
-                  .bytes = 2.0 * sizeof(double) * samples * static_cast<double>(regressors),
+                  .bytes = 4.0 * sizeof(double) * samples * static_cast<double>(regressors),
                   .count = regressors,
                   .counted = "regressors (inputs, their lags, past outputs)",
                   .advice = "Set input_lags and output_lags so that they make {} or less."});
@@ -87,6 +87,7 @@ FittedModel fit_narx(const TrainingData& data, const NarxOptions& options, const
   const Narx<Linear>::Parameters rest = narx_frame(data, options.lags, options.range, spread);
   const std::size_t rounds = options.training == NarxTraining::free_run ? options.rounds : 0;
   const TrainingData& judge = context.validation == nullptr ? data : *context.validation;
+  require_free_run(judge);
   std::optional<TrainingData> validation;
   if (context.validation != nullptr) validation = narx_data(*context.validation, options.lags);
 
@@ -145,6 +146,7 @@ Fitted<Narx<Linear>> fit_arx(const TrainingData& data, const ArxOptions& options
       narx_frame(data, options.lags, options.range, spread_of(data));
   parameters.model = f.parameters;
   if (!options.is_refined) return {parameters, std::move(f.notes)};
+  require_free_run(data);
 
   const auto rmse_of = [&](const Narx<Linear>::Parameters& of) {
     Narx<Linear> model(of);

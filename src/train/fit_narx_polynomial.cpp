@@ -40,22 +40,30 @@ Regressor regressor(std::size_t index, std::size_t inputs, std::size_t input_lag
   return {.is_output = false, .input = index % inputs, .lag = index / inputs};
 }
 
-/// "u_rad[k]", "(a - b)[k-1]".
-std::string regressor_text(std::string_view expression, std::size_t lag) {
-  const bool is_name = std::ranges::all_of(
-      expression, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
-  return fmt::format("{}{}{}[k{}]", is_name ? "" : "(", expression, is_name ? "" : ")",
-                     lag == 0 ? "" : fmt::format("-{}", lag));
+/// Names for an equation: an input that is an expression is u and its number.
+std::vector<std::string> short_names(std::span<const std::string> inputs) {
+  std::vector<std::string> names;
+  for (const std::string& input : inputs) {
+    const bool is_name = std::ranges::all_of(
+        input, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
+    names.push_back(is_name ? input : fmt::format("u{}", names.size() + 1));
+  }
+  return names;
+}
+
+/// "u_rad[k-1]"
+std::string regressor_text(std::string_view name, std::size_t lag) {
+  return fmt::format("{}[k{}]", name, lag == 0 ? "" : fmt::format("-{}", lag));
 }
 
 /// "u_rad[k]^2 torque_Nm[k-1]"; empty for a constant.
 std::string term_text(std::span<const double> powers, std::size_t input_lags,
-                      std::span<const std::string> inputs, std::string_view target) {
+                      std::span<const std::string> names, std::string_view target) {
   std::vector<std::string> factors;
   for (std::size_t i = 0; i < powers.size(); ++i) {
     if (powers[i] == 0.0) continue;
-    const Regressor of = regressor(i, inputs.size(), input_lags);
-    factors.push_back(regressor_text(of.is_output ? target : inputs[of.input], of.lag));
+    const Regressor of = regressor(i, names.size(), input_lags);
+    factors.push_back(regressor_text(of.is_output ? target : names[of.input], of.lag));
     if (powers[i] > 1.0) factors.back() += fmt::format("^{:.0f}", powers[i]);
   }
   return fmt::format("{}", fmt::join(factors, " "));
@@ -197,12 +205,12 @@ Structure chosen_structure(const Split& split, const Table& table,
 }
 
 std::string error_reduction_note(const Structure& structure, const NarxPolynomialOptions& options,
-                                 std::span<const std::string> inputs, const std::string& target) {
+                                 std::span<const std::string> names, const std::string& target) {
   const Matrix powers = powers_of(structure.f.terms, structure.f.scales.size());
   std::vector<std::string> parts;
   double sum = 0.0;
   for (std::size_t j = 0; j < powers.rows; ++j) {
-    const std::string term = term_text(powers.row(j), options.lags.inputs, inputs, target);
+    const std::string term = term_text(powers.row(j), options.lags.inputs, names, target);
     parts.push_back(fmt::format("{} {:.3g}", term.empty() ? "constant" : term,
                                 100.0 * structure.error_reductions[j]));
     sum += structure.error_reductions[j];
@@ -216,17 +224,20 @@ std::string error_reduction_note(const Structure& structure, const NarxPolynomia
 std::string equation_of(const NarxPolynomial::Parameters& parameters,
                         std::span<const std::string> inputs, std::string_view target) {
   const MultivariatePolynomial::Parameters& f = parameters.model;
+  const std::vector<std::string> names = short_names(inputs);
   std::string text = regressor_text(target, 0) + " =";
   for (std::size_t j = 0; j < f.powers.rows; ++j) {
     double coefficient = f.coefficients[j];
     for (std::size_t i = 0; i < f.scales.size(); ++i)
       coefficient /= std::pow(f.scales[i], f.powers(j, i));
-    const std::string term = term_text(f.powers.row(j), parameters.input_lags, inputs, target);
+    const std::string term = term_text(f.powers.row(j), parameters.input_lags, names, target);
     const bool is_negative = std::signbit(coefficient);
     text += fmt::format(" {}{:.4g}{}{}",
                         j == 0 ? (is_negative ? "-" : "") : (is_negative ? "- " : "+ "),
                         std::abs(coefficient), term.empty() ? "" : " ", term);
   }
+  for (std::size_t i = 0; i < inputs.size(); ++i)
+    if (names[i] != inputs[i]) text += fmt::format(", {} = {}", names[i], inputs[i]);
   return text;
 }
 
@@ -235,6 +246,7 @@ Fitted<NarxPolynomial> fit_narx_polynomial(const TrainingData& data,
                                            const FitContext& context) {
   report_progress(context.progress, 0.0, "fitting narx_polynomial");
   check_lags(options.lags);
+  require_free_run(context.validation == nullptr ? data : *context.validation);
   const TargetSpread spread = spread_of(data);
   const Narx<Linear>::Parameters frame = narx_frame(data, options.lags, options.range, spread);
   check_candidates(frame.regressors(), options.degree);
@@ -266,7 +278,7 @@ Fitted<NarxPolynomial> fit_narx_polynomial(const TrainingData& data,
   std::vector<std::string> inputs;
   for (const InputInfo& input : data.inputs) inputs.push_back(input.expression);
   notes.push_back(equation_of(parameters, inputs, data.target));
-  notes.push_back(error_reduction_note(structure, options, inputs, data.target));
+  notes.push_back(error_reduction_note(structure, options, short_names(inputs), data.target));
   return {std::move(parameters), std::move(notes)};
 }
 

@@ -12,6 +12,7 @@
 #include "torsio/core/random.hpp"
 #include "torsio/files/model_file.hpp"
 #include "train/fit_ensemble.hpp"
+#include "train/least_samples.hpp"
 #include "train/memory_check.hpp"
 #include "train/network_initialisation.hpp"
 #include "train/network_trainer.hpp"
@@ -107,6 +108,7 @@ struct Material {
 
 Material prepare(const TrainingData& data, const TrainingWindows& windows, std::size_t embargo,
                  const FitContext& context) {
+  require_samples(data);
   TrainingSplit split;
   if (context.validation != nullptr) {
     split.training = whole_sequences(data);

@@ -141,6 +141,43 @@ double take_out(Products& products, std::size_t place, std::vector<Rotation>& ro
   return given;
 }
 
+struct Placed {
+  std::size_t place;  ///< in the basis
+  double reduction;   ///< of y.y
+};
+
+/// The chosen terms, the one first that explains most of what those before it have left.
+std::vector<Placed> in_order(const Products& products) {
+  const std::size_t count = products.chosen.size();
+  std::vector<std::vector<double>> left(count, std::vector<double>(count));  // in the basis
+  for (std::size_t t = 0; t < count; ++t)
+    for (std::size_t s = 0; s < count; ++s)
+      left[t][s] = products.with_candidates[s][products.chosen[t]];
+  const auto product = [](const std::vector<double>& a, const std::vector<double>& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+  };
+  std::vector<Placed> order;
+  std::vector<std::uint8_t> is_placed(count, 0);
+  while (order.size() < count) {
+    Placed best{.place = count, .reduction = -1.0};
+    for (std::size_t t = 0; t < count; ++t) {
+      if (is_placed[t] != 0) continue;
+      const double along = product(left[t], products.with_target);
+      const double reduction = along * along / product(left[t], left[t]);
+      if (reduction > (1.0 + kBetter) * best.reduction) best = {t, reduction};
+    }
+    is_placed[best.place] = 1;
+    order.push_back(best);
+    const std::vector<double>& axis = left[best.place];
+    for (std::size_t t = 0; t < count; ++t) {
+      if (is_placed[t] != 0) continue;
+      const double share = product(axis, left[t]) / product(axis, axis);
+      for (std::size_t s = 0; s < count; ++s) left[t][s] -= share * axis[s];
+    }
+  }
+  return order;
+}
+
 class Search {
  public:
   Search(const Matrix& regressors, std::span<const double> target, std::size_t degree)
@@ -189,19 +226,12 @@ class Search {
   }
 
   [[nodiscard]] ChosenTerms chosen() const {
-    const std::size_t count = products_.chosen.size();
-    ChosenTerms result{.terms = {}, .coefficients = products_.with_target, .error_reductions = {}};
-    for (std::size_t t = 0; t < count; ++t) {
-      result.terms.push_back(candidates_.monomial(products_.chosen[t]));
-      const double z = products_.with_target[t];
-      result.error_reductions.push_back(z * z / target_square_);
-    }
-    // The directions' products with the chosen terms are a triangle.
-    std::vector<double>& theta = result.coefficients;
-    for (std::size_t s = count; s-- > 0;) {
-      const std::vector<double>& row = products_.with_candidates[s];
-      for (std::size_t t = s + 1; t < count; ++t) theta[s] -= row[products_.chosen[t]] * theta[t];
-      theta[s] /= row[products_.chosen[s]];
+    const std::vector<double> theta = coefficients();
+    ChosenTerms result;
+    for (const auto& [place, reduction] : in_order(products_)) {
+      result.terms.push_back(candidates_.monomial(products_.chosen[place]));
+      result.coefficients.push_back(theta[place]);
+      result.error_reductions.push_back(reduction / target_square_);
     }
     return result;
   }
@@ -243,6 +273,18 @@ class Search {
       if (reduction > (1.0 + kBetter) * best.reduction) best = {j, reduction};
     }
     return best;
+  }
+
+  /// The directions' products with the chosen terms are a triangle.
+  [[nodiscard]] std::vector<double> coefficients() const {
+    std::vector<double> theta = products_.with_target;
+    for (std::size_t s = theta.size(); s-- > 0;) {
+      const std::vector<double>& row = products_.with_candidates[s];
+      for (std::size_t t = s + 1; t < theta.size(); ++t)
+        theta[s] -= row[products_.chosen[t]] * theta[t];
+      theta[s] /= row[products_.chosen[s]];
+    }
+    return theta;
   }
 
   /// @returns false, and never offers it again, if it is not as new as its products said.

@@ -50,6 +50,19 @@ Narx<Linear>::Parameters narx_frame(const TrainingData& data, const NarxLags& la
           .start = 0.0};
 }
 
+void require_free_run(const TrainingData& data) {
+  std::size_t most = 0;
+  for (const Sequence& sequence : data.sequences)
+    most = std::max(most, static_cast<std::size_t>(std::ranges::count_if(
+                              sequence.target, [](double y) { return std::isfinite(y); })));
+  if (most > kCorrected) return;
+  throw Error(
+      {.problem = "the records are too short to judge a free run, which starts from "
+                  "measured samples",
+       .expected = fmt::format("one of more than {} samples of {}", kCorrected, data.target),
+       .found = fmt::format("{} in the longest", most)});
+}
+
 double free_run_rmse(const OutputLists& outputs, const TrainingData& data) {
   MetricsAccumulator accumulator;
   for (std::size_t s = 0; s < outputs.size(); ++s) {

@@ -69,6 +69,9 @@ template <FeedsBack M>
   return outputs;
 }
 
+/// @throws Error if no record goes on behind the measured start.
+void require_free_run(const TrainingData& data);
+
 /// Over what came behind the measured start.
 [[nodiscard]] double free_run_rmse(const OutputLists& outputs, const TrainingData& data);
 

@@ -105,13 +105,14 @@ TEST(FitNarxPolynomial, TellsItsEquationAndWhatEachTermExplains) {
   EXPECT_THAT(fitted.notes, testing::Contains(HasSubstr("error reduction one step ahead in %")));
 }
 
-TEST(FitNarxPolynomial, PutsExpressionsInBrackets) {
+TEST(FitNarxPolynomial, ShortensExpressionsInItsEquation) {
   Model::Parameters parameters{
       .model = {.scales = {2.0, 1.0}, .powers = Matrix(2, 2), .coefficients = {-4.0, 0.5}},
       .inputs = 1};
   parameters.model.powers.values = {2.0, 0.0, 0.0, 0.0};
   const std::array<std::string, 1> inputs{"a_rad - b_rad"};
-  EXPECT_EQ(equation_of(parameters, inputs, "y_1"), "y_1[k] = -1 (a_rad - b_rad)[k]^2 + 0.5");
+  EXPECT_EQ(equation_of(parameters, inputs, "y_1"),
+            "y_1[k] = -1 u1[k]^2 + 0.5, u1 = a_rad - b_rad");
 }
 
 TEST(FitNarxPolynomial, ConstantAndDoubledInputsAreNoTerms) {
@@ -160,6 +161,9 @@ TEST(FitNarxPolynomial, RefusesWhatItCannotDo) {
   EXPECT_THAT(message({.lags = {.inputs = 2, .outputs = 400}, .degree = 1}),
               HasSubstr("longer than the lags of 400 samples"));
   EXPECT_THAT(message({.lags = {.inputs = 100, .outputs = 100}}), HasSubstr("Set degree=2"));
+  EXPECT_THAT(
+      test::error_message([] { (void)fit_narx_polynomial(known_system(40, 0.05, 0.0, 9), {}); }),
+      HasSubstr("one of more than 50 samples of y_1, found 40"));
   EXPECT_THAT(message({.terms = 61}), HasSubstr("at least 305"));
   EXPECT_THROW((void)fit_narx_polynomial(data, {.lags = {.inputs = 0, .outputs = 0}}), UsageError);
   EXPECT_THROW((void)fit_narx_polynomial(data, {.degree = 0}), UsageError);

@@ -43,6 +43,7 @@ struct NarxPolynomialOptions {
     const TrainingData& data, const NarxPolynomialOptions& options, const FitContext& context = {});
 
 /// "torque_Nm[k] = 0.31 torque_Nm[k-1] - 0.02 u_rad[k]^2 torque_Nm[k-2]", in the units of the channels.
+/// Inputs that are expressions are called u1, u2, ..., and what they are stands behind.
 [[nodiscard]] std::string equation_of(const Narx<MultivariatePolynomial>::Parameters& parameters,
                                       std::span<const std::string> inputs, std::string_view target);
 

@@ -19,7 +19,7 @@ struct FrolsOptions {
   bool exchange = true;
 };
 
-/// The terms of one size, in the order of the orthogonal basis.
+/// The terms of one size, the one first that explains most of what those before it have left.
 struct ChosenTerms {
   std::vector<Monomial> terms;
   std::vector<double> coefficients;      ///< least squares, of the scaled regressors' monomials
