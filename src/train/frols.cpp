@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "model/kernel_kernels.hpp"
 #include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/model/multivariate_polynomial.hpp"
@@ -52,7 +53,7 @@ CandidateList candidates_of(std::size_t inputs, std::size_t degree) {
 }
 
 double dot(const AlignedVector<double>& a, const AlignedVector<double>& b) {
-  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+  return kernel_kernels::dot(a.data(), b.data(), a.size());
 }
 
 /// The samples, column by column, filled up with zeros to whole blocks.
@@ -108,6 +109,7 @@ struct Rotation {
   double cosine;
   double sine;
 
+  [[nodiscard]] Rotation back() const { return {direction, cosine, -sine}; }
   template <class Values>
   void apply(Values& a, Values& b) const {
     for (std::size_t n = 0; n < a.size(); ++n) {
@@ -208,20 +210,23 @@ class Search {
   /// Exchanges terms until none would be.
   void exchange() {
     // Every exchange explains more, so this ends by itself; the limit is for what rounding may do.
-    std::size_t left = 10 * products_.chosen.size();
-    for (std::size_t place = 0; place < products_.chosen.size() && left > 0;) {
+    const std::size_t count = products_.chosen.size();
+    std::size_t left = 10 * count;
+    std::size_t place = 0;
+    for (std::size_t kept = 0; kept < count && left > 0;) {
       Products without = products_;
       std::vector<Rotation> rotations;
       const double given = take_out(without, place, rotations);
       const Choice best = best_candidate(without);
       const bool is_better =
           best.reduction > (1.0 + kBetter) * given * given + kNothing * target_square_;
-      if (!is_better || !replace(std::move(without), rotations, best.candidate)) {
-        ++place;
-        continue;
+      if (is_better && replace(std::move(without), rotations, best.candidate)) {
+        kept = 0;  // the next has moved to this place, the new one stands last
+        --left;
+      } else {
+        ++kept;
+        place = (place + 1) % count;
       }
-      place = 0;
-      --left;
     }
   }
 
@@ -312,13 +317,16 @@ class Search {
   /// @returns false, with nothing changed, if the new one cannot be added.
   bool replace(Products without, const std::vector<Rotation>& rotations, std::size_t candidate) {
     Products before = std::exchange(products_, std::move(without));
-    std::vector<AlignedVector<double>> directions = directions_;
     for (const Rotation& rotation : rotations)
       rotation.apply(directions_[rotation.direction], directions_[rotation.direction + 1]);
+    AlignedVector<double> last = std::move(directions_.back());
     directions_.pop_back();
     if (add(candidate)) return true;
     products_ = std::move(before);
-    directions_ = std::move(directions);
+    directions_.push_back(std::move(last));
+    for (std::size_t r = rotations.size(); r-- > 0;)
+      rotations[r].back().apply(directions_[rotations[r].direction],
+                                directions_[rotations[r].direction + 1]);
     return false;
   }
 
