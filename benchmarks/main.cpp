@@ -67,6 +67,7 @@ constexpr std::array kBenches{
     Bench{"pgpr_200k", pgpr_200k},
     Bench{"pgpr_step", pgpr_step},
     Bench{"slip_bank_step", slip_bank_step},
+    Bench{"frols_40k", frols_40k, Peer{"numpy", write_frols_40k}},
 };
 
 struct Arguments {

@@ -40,6 +40,7 @@ Row gp_hyper_2000();
 Row pgpr_200k();
 Row pgpr_step();
 Row slip_bank_step();
+Row frols_40k();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.
@@ -52,5 +53,6 @@ void write_gru64();
 void write_mlp();
 void write_gp_5000();
 void write_gp_2000();
+void write_frols_40k();
 
 }  // namespace torsio::bench

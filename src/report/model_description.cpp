@@ -12,6 +12,7 @@
 #include "torsio/model/network_layers.hpp"
 #include "torsio/model/parameters.hpp"
 #include "torsio/report/text_table.hpp"
+#include "torsio/train/fit_narx_polynomial.hpp"
 #include "train/kernel_search.hpp"
 
 namespace torsio {
@@ -106,6 +107,13 @@ std::string kernel_line(const ModelFile& model) {
       model.parameters);
 }
 
+/// The difference equation of a polynomial NARX model in words; else nothing.
+std::string equation_line(const ModelFile& model) {
+  const auto* const narx = std::get_if<Narx<MultivariatePolynomial>::Parameters>(&model.parameters);
+  if (narx == nullptr) return {};
+  return equation_of(*narx, model.settings.features.inputs, model.settings.target) + "\n";
+}
+
 std::string family_of(const ModelFile& model) {
   const std::string own(family_of(model.parameters));
   const std::string& asked = model.card.fitted_as;
@@ -143,7 +151,8 @@ std::string model_description(const ModelFile& model) {
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
   std::vector<Leaf> leaves = leaves_of(model);
   std::erase_if(leaves, [](const Leaf& leaf) { return leaf.name.starts_with("kernel."); });
-  text += fmt::format("\n{}{}", kernel_line(model), parameter_lines(leaves));
+  text +=
+      fmt::format("\n{}{}{}", kernel_line(model), equation_line(model), parameter_lines(leaves));
   return text;
 }
 

@@ -1,7 +1,6 @@
 #include "torsio/train/fit_gaussian_process.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,25 +10,13 @@
 #include "torsio/core/error.hpp"
 #include "train/kernel_data.hpp"
 #include "train/kernel_search.hpp"
+#include "train/least_samples.hpp"
 #include "train/likelihood_search.hpp"
 #include "train/marginal_likelihood.hpp"
+#include "train/memory_check.hpp"
 
 namespace torsio {
 namespace {
-
-void check_fits_the_memory(std::size_t samples) {
-  const double have =
-      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-  if (MarginalLikelihood::bytes(samples) <= have) return;
-  const auto fits = static_cast<std::size_t>(std::sqrt(have / MarginalLikelihood::bytes(1)));
-  throw Error({.problem = "the matrix of all samples does not fit into this machine's memory",
-               .expected = fmt::format("at most {} samples", fits),
-               .found = fmt::format("{}, which take {:.1f} GB", samples,
-                                    MarginalLikelihood::bytes(samples) * 1e-9),
-               .advice = fmt::format("Set samples={} or less, or take "
-                                     "parametric_gp_variational, which grows with N only.",
-                                     fits)});
-}
 
 void check_count(std::size_t samples, bool with_std_dev) {
   const std::size_t most =
@@ -71,11 +58,19 @@ Fitted<GaussianProcess> fit_gaussian_process(const TrainingData& data,
                                              const FitContext& context) {
   report_progress(context.progress, 0.0, "fitting gaussian_process");
   KernelExpression expression = parse_kernel(options.kernel, data.input_count());
+  require_samples(data);
   Table table = usable_table(data);
   const std::size_t all = table.target.size();
   const std::size_t used = options.samples == 0 ? all : std::min(all, options.samples);
   check_count(used, options.std_dev);
-  check_fits_the_memory(used);
+  require_memory({.what = "the matrix of all samples",
+                  .bytes = MarginalLikelihood::bytes(used),
+                  .count = used,
+                  .counted = "samples",
+                  .growth = 2.0,
+                  .advice =
+                      "Set samples={} or less, or take parametric_gp_variational, which grows "
+                      "with N only."});
   Random random(context.seed);
   table = thinned(table, used, random);
   std::vector<std::string> notes = constant_inputs(data, table.features);

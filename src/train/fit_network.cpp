@@ -1,7 +1,6 @@
 #include "torsio/train/fit_network.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
@@ -13,6 +12,8 @@
 #include "torsio/core/random.hpp"
 #include "torsio/files/model_file.hpp"
 #include "train/fit_ensemble.hpp"
+#include "train/least_samples.hpp"
+#include "train/memory_check.hpp"
 #include "train/network_initialisation.hpp"
 #include "train/network_trainer.hpp"
 #include "train/network_windows.hpp"
@@ -70,17 +71,6 @@ void check_fits_a_file(const TrainingNetwork& network) {
        .advice = "Take fewer or smaller layers."});
 }
 
-void check_fits_the_memory(const NetworkTrainer& trainer, const WindowSet& training) {
-  const double need = trainer.bytes(training.steps, training.starts.size());
-  const double have =
-      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-  if (need <= have) return;
-  throw Error({.problem = "the training does not fit into this machine's memory",
-               .expected = fmt::format("at most {:.1f} GB", have * 1e-9),
-               .found = fmt::format("about {:.1f} GB", need * 1e-9),
-               .advice = "Take fewer or smaller layers, shorter windows or smaller batches."});
-}
-
 /// A number that changes with the data.
 std::uint64_t fingerprint(const WindowSet& set, std::uint64_t start) {
   std::uint64_t hash = start;
@@ -118,6 +108,7 @@ struct Material {
 
 Material prepare(const TrainingData& data, const TrainingWindows& windows, std::size_t embargo,
                  const FitContext& context) {
+  require_samples(data);
   TrainingSplit split;
   if (context.validation != nullptr) {
     split.training = whole_sequences(data);
@@ -217,7 +208,9 @@ std::pair<TrainedNetwork, Material> train(const Job& job, const TrainingData& da
   report_progress(context.progress, 0.0, fmt::format("fitting {}", job.family));
   Material material = prepare(data, job.windows, job.embargo, context);
   NetworkTrainer trainer(job.network, job.training);
-  check_fits_the_memory(trainer, material.training);
+  require_memory({.what = "the training",
+                  .bytes = trainer.bytes(material.training.steps, material.training.starts.size()),
+                  .advice = "Take fewer or smaller layers, shorter windows or smaller batches."});
   std::vector<float> weights(job.network.parameter_count(), 0.0F);
   put_initial(weights.data());
   const std::string recipe = recipe_of(job.family, job.network, job.training, material.training,

@@ -10,9 +10,12 @@
 #include <utility>
 
 #include "torsio/core/error.hpp"
+#include "torsio/model/any_model.hpp"
 #include "train/folds.hpp"
 #include "train/kernel_data.hpp"
 #include "train/kernel_search.hpp"
+#include "train/least_samples.hpp"
+#include "train/memory_check.hpp"
 #include "train/parametric_gp_trainer.hpp"
 #include "train/sparse_posterior.hpp"
 
@@ -120,7 +123,10 @@ class Learner {
     const double share = 1.0 / static_cast<double>(batch.size());
     const bool by_data = options_.mode != ParametricGpMode::nlml && !options_.kernel_plain;
     for (const std::size_t n : batch) {
-      (void)trainer.predict(table.features.row(n));
+      const auto told = trainer.predict(table.features.row(n));
+      // Taken in, it would spoil what was learned.
+      if (!std::isfinite(told.mean) || !(told.variance + trainer.noise_variance() > 0.0))
+        return false;
       if (by_data) trainer.add_data_gradient(table.target[n], share);
       trainer.add_noise_gradient(table.target[n], share);
       trainer.take_in(table.target[n]);
@@ -277,6 +283,18 @@ std::vector<std::string> notes_of(const Descent& descent, const ParametricGpOpti
   return notes;
 }
 
+void check_memory(const VariationalGpOptions& options, const TrainingData& data) {
+  constexpr double kTables = 5.0;  // samples x points that the bound and its gradient take
+  const std::size_t all = data.usable_samples();
+  const std::size_t used = options.samples == 0 ? all : std::min(all, options.samples);
+  require_memory({.what = "the search over all samples and points",
+                  .bytes = kTables * sizeof(double) * static_cast<double>(used) *
+                           static_cast<double>(std::min(options.points, used)),
+                  .count = used,
+                  .counted = "samples",
+                  .advice = "Set samples={} or less, or fewer points."});
+}
+
 }  // namespace
 
 KernelExpression kernel_plain(const PlainKernel& theta) {
@@ -306,6 +324,7 @@ Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data, const Parametri
   KernelExpression expression = options.kernel_plain
                                     ? kernel_plain(*options.kernel_plain)
                                     : parse_kernel(options.kernel, data.input_count());
+  require_samples(data);
   Random random(context.seed);
   const Split split = split_of(data, context);
   std::vector<std::string> notes = constant_inputs(data, split.training.features);
@@ -332,12 +351,16 @@ Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data, const Parametri
       with_posterior(parameters, sparse_posterior(descent.trainer.kernel(), centres,
                                                   descent.trainer.noise_variance(), table.features,
                                                   table.target, SparseNoise::fitc));
-  const double learned_rmse = rmse_of(parameters, split.judging);
-  const double refitted_rmse = rmse_of(refitted, split.judging);
+  const auto error_of = [&](const ParametricGp::Parameters& of) {
+    return context.error_of ? context.error_of(ParametricGp(of)) : rmse_of(of, split.judging);
+  };
+  const double learned_rmse = error_of(parameters);
+  const double refitted_rmse = error_of(refitted);
   const bool is_better = refitted_rmse < learned_rmse;
   notes.push_back(fmt::format(
       "RMSE on {}: {:.4g} as learned, {:.4g} by the closed form over all samples, which is {}",
-      split.judged_on, learned_rmse, refitted_rmse, is_better ? "kept" : "not kept"));
+      context.error_of ? "a free run" : split.judged_on, learned_rmse, refitted_rmse,
+      is_better ? "kept" : "not kept"));
   return {is_better ? std::move(refitted) : std::move(parameters), std::move(notes)};
 }
 
@@ -346,6 +369,8 @@ Fitted<ParametricGp> fit_variational_gp(const TrainingData& data,
                                         const FitContext& context) {
   report_progress(context.progress, 0.0, "fitting parametric_gp_variational");
   KernelExpression expression = parse_kernel(options.kernel, data.input_count());
+  require_samples(data);
+  check_memory(options, data);
   Random random(context.seed);
   Table table = usable_table(data);
   std::vector<std::string> notes = constant_inputs(data, table.features);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -28,6 +29,14 @@ std::vector<Residual> residuals(AnyModel& model, const TrainingData& data) {
         all.push_back({told[n].value, told[n].value - sequence.target[n]});
   }
   return all;
+}
+
+/// Where the region that ends before `end` ends, above all of its outputs but the last.
+double edge_at(const std::vector<Residual>& sorted, std::size_t end) {
+  if (end == sorted.size()) return sorted.back().value;
+  if (sorted[end].value < sorted.back().value) return sorted[end].value;
+  // What follows is one output: half way, for a region has a width.
+  return std::midpoint(sorted[end - 1].value, sorted[end].value);
 }
 
 }  // namespace
@@ -89,7 +98,7 @@ ResidualTable residual_table(AnyModel model, const TrainingData& data) {
     double square_sum = 0.0;
     for (std::size_t n = begin; n < end; ++n) square_sum += all[n].error * all[n].error;
     const double rms = std::sqrt(square_sum / static_cast<double>(end - begin));
-    table.edges.push_back(end < all.size() ? all[end].value : all.back().value);
+    table.edges.push_back(edge_at(all, end));
     // Never 0, which would claim certainty: a model may meet its training data exactly.
     table.std_dev.push_back(std::max(rms, std::numeric_limits<double>::min()));
     begin = end;

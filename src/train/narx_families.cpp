@@ -10,7 +10,10 @@
 
 #include "torsio/core/error.hpp"
 #include "torsio/train/fit_narx.hpp"
+#include "torsio/train/fit_narx_polynomial.hpp"
+#include "torsio/train/frols.hpp"
 #include "train/fitted_model.hpp"
+#include "train/narx_run.hpp"
 
 namespace torsio {
 namespace {
@@ -33,14 +36,36 @@ constexpr std::array kArxOptions{kInputLags, kOutputLags,
                                             "from one step ahead to least error in free run"},
                                  kRange};
 
+constexpr OptionInfo kFeedbackNoise{
+    "feedback_noise",
+    Kind::number,
+    "0.02",
+    0,
+    10,
+    "of training=noise, as a share of the target's standard deviation"};
+
+constexpr std::array kNarxPolynomialOptions{
+    kInputLags,
+    kOutputLags,
+    OptionInfo{"degree", Kind::integer, "3", 1, MultivariatePolynomial::kHighestDegree,
+               "of the terms to choose from"},
+    OptionInfo{"terms", Kind::integer, "0", 0, kMostTerms,
+               "to choose; 0: as many as free run on held-out records wants, up to 20"},
+    OptionInfo{"exchange", Kind::boolean, "true", 0, 0,
+               "swap chosen terms for others wherever that explains more"},
+    OptionInfo{"training", Kind::text, "free_run", 0, 0,
+               "of the coefficients: one_step (on measured past outputs), noise (on these with "
+               "noise), free_run (then refined to least error in free run)"},
+    kFeedbackNoise,
+    kRange};
+
 constexpr std::array kNarxOptions{
     kInputLags,
     kOutputLags,
     OptionInfo{"training", Kind::text, "free_run", 0, 0,
                "what past outputs are while it learns: one_step (measured), noise (measured, with "
                "noise), free_run (its own, in rounds)"},
-    OptionInfo{"feedback_noise", Kind::number, "0.02", 0, 10,
-               "of training=noise, as a share of the target's standard deviation"},
+    kFeedbackNoise,
     OptionInfo{"rounds", Kind::integer, "5", 1, 1000, "of training=free_run"},
     kRange};
 
@@ -66,17 +91,23 @@ FittedModel arx(const TrainingData& data, const Options& options, const FitConte
                               context));
 }
 
+FittedModel narx_polynomial(const TrainingData& data, const Options& options,
+                            const FitContext& context) {
+  return fitted_model(fit_narx_polynomial(data,
+                                          {.lags = lags_of(options),
+                                           .degree = options.integer("degree"),
+                                           .terms = options.integer("terms"),
+                                           .exchange = options.boolean("exchange"),
+                                           .training = training_of(options),
+                                           .noise = options.number("feedback_noise"),
+                                           .range = options.number("output_range")},
+                                          context));
+}
+
 /// f of the family M as a NARX model.
 template <class M>
 AnyModel wrapped(const AnyModel& f, const Narx<Linear>::Parameters& rest) {
-  return Narx<M>(typename Narx<M>::Parameters{.model = f.get_if<M>()->parameters(),
-                                              .inputs = rest.inputs,
-                                              .input_lags = rest.input_lags,
-                                              .output_lags = rest.output_lags,
-                                              .sample_period_s = rest.sample_period_s,
-                                              .lowest = rest.lowest,
-                                              .highest = rest.highest,
-                                              .start = rest.start});
+  return Narx<M>(framed<M>(f.get_if<M>()->parameters(), rest));
 }
 
 template <class M>
@@ -135,6 +166,11 @@ std::vector<FamilyInfo> narx_families(std::span<const FamilyInfo> known) {
        .summary = "line over inputs and its own past output, least error in free run",
        .options = kArxOptions,
        .fit = arx,
+       .only_if_named = true},
+      {.name = Narx<MultivariatePolynomial>::kFamily,
+       .summary = "few products of inputs and its own past output, chosen one by one",
+       .options = kNarxPolynomialOptions,
+       .fit = narx_polynomial,
        .only_if_named = true}};
   for (std::size_t i = 0; i < kNarxFamilies.size(); ++i) {
     const NarxFamily& of = kNarxFamilies[i];

@@ -61,9 +61,11 @@ bool ParametricGpTrainer::factorise() {
 bool ParametricGpTrainer::set_parameters(std::span<const double> parameters) {
   const std::vector<double> before = kernel_.log_parameters();
   const auto numbers = parameters.first(kernel_.parameter_count());
-  const bool is_finite = std::ranges::all_of(
-      parameters, [](double number) { return std::isfinite(number) && std::abs(number) < 300.0; });
-  if (!is_finite) return false;
+  // Beyond, products of several variances leave the range of a double.
+  constexpr double kLargest = 60.0;
+  const bool is_in_range =
+      std::ranges::all_of(parameters, [](double number) { return std::abs(number) <= kLargest; });
+  if (!is_in_range) return false;
   kernel_.set_log_parameters(numbers);
   if (!factorise()) {
     kernel_.set_log_parameters(before);

@@ -21,7 +21,7 @@ class ParametricGpTrainer {
   ParametricGpTrainer(Kernel kernel, Matrix points, double noise_variance);
 
   /// Numbers of the kernel, then ln sigma^2. Factorises K.
-  /// @returns false, with the numbers taken back, if K has no factor or a number is not finite.
+  /// @returns false, with the numbers taken back, if K has no factor or a number is not within -60..60.
   [[nodiscard]] bool set_parameters(std::span<const double> parameters);
   void set_noise_variance(double variance) noexcept { noise_variance_ = variance; }
   [[nodiscard]] std::vector<double> parameters() const;

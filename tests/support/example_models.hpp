@@ -220,6 +220,19 @@ inline Narx<Linear> example<Narx<Linear>>() {
   f.coefficients.values.values = {0.5, 200.0, 0.25, 100.0, 0.1, 0.6, -0.1};
   return example_narx<Linear>(f, 1, 2);
 }
+/// y = 0.5 + 200 u + 100 u' + 0.6 y' - 0.0002 y'' v^2
+template <>
+inline Narx<MultivariatePolynomial> example<Narx<MultivariatePolynomial>>() {
+  MultivariatePolynomial::Parameters f{.scales = {1.0, 5.0, 1.0, 1.0, 100.0, 2.0},
+                                       .powers = Matrix(5, 6),
+                                       .coefficients = {0.5, 200.0, 100.0, 60.0, -0.01}};
+  f.powers(1, 0) = 1.0;
+  f.powers(2, 2) = 1.0;
+  f.powers(3, 4) = 1.0;
+  f.powers(4, 5) = 1.0;
+  f.powers(4, 1) = 2.0;
+  return example_narx<MultivariatePolynomial>(f, 1, 2);
+}
 template <>
 inline Narx<Mlp> example<Narx<Mlp>>() {
   return example_narx<Mlp>(

@@ -144,6 +144,36 @@ TEST(FitParametricGp, EveryModeMakesAModelAndAllButThePapersFindTheCurve) {
             0.03);
 }
 
+TEST(FitParametricGp, LearnsNothingFromASampleAtWhichItsNumbersAreNone) {
+  // Steps of this size throw the kernel's numbers to the ends of the range of a double.
+  for (const auto mode : {ParametricGpMode::nlml, ParametricGpMode::elbo})
+    for (const std::size_t batch : {1U, 10U})
+      EXPECT_NO_THROW((void)fit_parametric_gp(
+          curve(300), {.mode = mode, .updates = 400, .batch = batch, .learning_rate = 200.0}));
+}
+
+TEST(FitParametricGp, TheUseDecidesWhetherTheClosedFormIsKept) {
+  // As if the closed form were worse there, and better.
+  for (const double sign : {1.0, -1.0}) {
+    double told = 0.0;
+    FitContext context{.seed = 1};
+    context.error_of = [&](const AnyModel&) { return told += sign; };
+    const auto fitted = fit_parametric_gp(curve(300), {.updates = 300}, context);
+    EXPECT_THAT(fitted.notes, Contains(AllOf(HasSubstr("RMSE on a free run"),
+                                             HasSubstr(sign > 0.0 ? "is not kept" : "is kept"))));
+  }
+}
+
+TEST(FitGaussianProcess, AsksForAFewSamples) {
+  for (const char* family :
+       {"gaussian_process", "parametric_gp", "parametric_gp_variational", "mlp"}) {
+    const FamilyInfo& info = find_family(family);
+    EXPECT_THAT(error_message([&] { (void)info.fit(curve(9), Options(info.options, {}), {}); }),
+                HasSubstr("at least 10, found 9"))
+        << family;
+  }
+}
+
 TEST(FitParametricGp, LearnsFromBatchesToo) {
   const auto fitted =
       fit_parametric_gp(curve(2000), {.kernel = "se", .updates = 20000, .batch = 16}, {.seed = 2});

@@ -126,6 +126,11 @@ TEST(FitNarx, RefusesWhatItCannotDo) {
   TrainingData constant = data;
   for (double& value : constant.sequences[0].target) value = 1.0;
   EXPECT_THROW((void)fit_named("arx", constant, {}), Error);
+  const TrainingData brief = second_order(40, 0.1, 5);
+  for (const char* family : {"arx", "narx_dgmm", "narx_polynomial"})
+    EXPECT_THAT(test::error_message([&] { (void)fit_named(family, brief, {}); }),
+                HasSubstr("too short to judge a free run"))
+        << family;
 }
 
 }  // namespace

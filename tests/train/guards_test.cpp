@@ -101,8 +101,9 @@ TEST(Guards, RegionsNeverSplitEqualOutputs) {
   for (std::size_t n = 0; n < 1000; ++n) features(n, 0) = n < 700 ? 0.0 : 0.1;
   const auto data = training_data_of(deflection_and_rate(), features, [](Row) { return 0.0; });
   const ResidualTable table = residual_table(spring(100.0), data);
-  EXPECT_EQ(table.edges, (std::vector{0.0, 10.0, 10.0}));
+  EXPECT_EQ(table.edges, (std::vector{0.0, 5.0, 10.0}));
   EXPECT_EQ(table.std_dev.back(), 10.0);
+  EXPECT_LT(table.std_dev.front(), 1e-9);
 }
 
 TEST(Guards, FillTheSettingsAndPreferValidationData) {

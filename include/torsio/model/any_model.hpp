@@ -18,6 +18,7 @@
 #include "torsio/model/lstm.hpp"
 #include "torsio/model/mlp.hpp"
 #include "torsio/model/model.hpp"
+#include "torsio/model/multivariate_polynomial.hpp"
 #include "torsio/model/narx.hpp"
 #include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
@@ -33,23 +34,24 @@ struct FamilyList {
 };
 
 /// Every family that model files and the command line know: one line each.
-using KnownFamilies = FamilyList<Linear,                 //
-                                 LinearCoulomb,          //
-                                 Polynomial,             //
-                                 Dgmm,                   //
-                                 GreyBox,                //
-                                 GaussianProcess,        //
-                                 ParametricGp,           //
-                                 Mlp,                    //
-                                 Lstm,                   //
-                                 Gru,                    //
-                                 MlpEnsemble,            //
-                                 LstmEnsemble,           //
-                                 GruEnsemble,            //
-                                 Narx<Linear>,           //
-                                 Narx<Dgmm>,             //
-                                 Narx<Mlp>,              //
-                                 Narx<GaussianProcess>,  //
+using KnownFamilies = FamilyList<Linear,                        //
+                                 LinearCoulomb,                 //
+                                 Polynomial,                    //
+                                 Dgmm,                          //
+                                 GreyBox,                       //
+                                 GaussianProcess,               //
+                                 ParametricGp,                  //
+                                 Mlp,                           //
+                                 Lstm,                          //
+                                 Gru,                           //
+                                 MlpEnsemble,                   //
+                                 LstmEnsemble,                  //
+                                 GruEnsemble,                   //
+                                 Narx<Linear>,                  //
+                                 Narx<MultivariatePolynomial>,  //
+                                 Narx<Dgmm>,                    //
+                                 Narx<Mlp>,                     //
+                                 Narx<GaussianProcess>,         //
                                  Narx<ParametricGp>>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "torsio/core/matrix.hpp"
+#include "torsio/core/progress.hpp"
+
+namespace torsio {
+
+/// A product of regressors by their indices, in rising order: x_0^2 x_3 is {0, 0, 3}, 1 is {}.
+using Monomial = std::vector<std::size_t>;
+
+struct FrolsOptions {
+  std::size_t degree = 3;  ///< of the candidates, at most
+  std::size_t terms = 8;   ///< to choose, at most
+  /// Swaps a chosen term for another candidate wherever that explains more.
+  bool exchange = true;
+};
+
+/// The terms of one size, the one first that explains most of what those before it have left.
+struct ChosenTerms {
+  std::vector<Monomial> terms;
+  std::vector<double> coefficients;      ///< least squares, of the scaled regressors' monomials
+  std::vector<double> error_reductions;  ///< ERR: share of y.y that the term adds
+};
+
+struct Frols {
+  std::vector<double> scales;      ///< s_i: largest magnitude of each regressor, 1 if that is 0
+  std::size_t candidates = 0;      ///< monomials that there were to choose from
+  std::vector<ChosenTerms> sizes;  ///< with 1, 2, ... terms
+};
+
+/// How many monomials of so many inputs have at most that degree, the constant among them; the
+/// largest std::size_t where that is more than one holds.
+[[nodiscard]] std::size_t monomial_count(std::size_t inputs, std::size_t degree) noexcept;
+
+inline constexpr std::size_t kMostCandidates = 100'000;
+inline constexpr std::size_t kMostTerms = 100;
+
+/// @throws UsageError, with the degree that would do, if there are more than `kMostCandidates`.
+void check_candidates(std::size_t inputs, std::size_t degree);
+
+/// Chooses monomials of the scaled regressors by forward regression with orthogonal least squares: in
+/// every round the candidate that explains most of what is left,
+///
+///     ERR_j = (w_j . y)^2 / (w_j . w_j  y . y),   w_j = phi_j - sum_s q_s (q_s . phi_j)
+///
+/// with q_s the orthonormal basis of those chosen before. Only the inner products with all candidates
+/// are kept, so that a round is one run over the samples against the newest q, in which the
+/// candidates are made on the way and never stored. Candidates that the chosen ones explain to 1e-6
+/// of their length are passed over; it ends early where none is left that explains 1e-15 of y. With
+/// `exchange`, every chosen term is then taken out in turn, and the best candidate put in its place,
+/// until the set stays (Givens rotations take a term out without a run over the samples).
+///
+/// Deterministic. Source: Chen, Billings and Luo 1989 (Int. J. Control 50, 1873); the exchange: Li,
+/// Peng and Bai 2006 (Automatica 42, 1189). Cost: 2 multiply-adds for each candidate, sample and
+/// term; memory: (regressors + terms) x samples.
+/// @param regressors samples x inputs, finite; `target` one a sample.
+/// @throws Error if the target is 0 throughout or there are fewer samples than terms; UsageError for
+/// a degree or number of terms out of range, or more candidates than `kMostCandidates`; Cancelled.
+[[nodiscard]] Frols frols(const Matrix& regressors, std::span<const double> target,
+                          const FrolsOptions& options, const Progress& progress = {});
+
+}  // namespace torsio
