@@ -69,7 +69,7 @@ void DataFlags::add_target_and_inputs(CLI::App& verb) {
 
 void DataFlags::add_initialise(CLI::App& verb) {
   verb.add_option("--initialise", initialise,
-                  "measured samples that a model which feeds its output back is told at the start "
+                  "measured samples that tell a model with memory where it starts, at the start "
                   "of a recording, and that are not scored; 0: a cold start")
       ->capture_default_str();
 }

@@ -82,6 +82,22 @@ void AnyModel::correct(double measured) noexcept {
   });
 }
 
+std::span<const double> AnyModel::state() const noexcept {
+  return dispatch(model_, []<class M>(const M& model) -> std::span<const double> {
+    if constexpr (HasState<M>) {
+      return model.state();
+    } else {
+      return {};
+    }
+  });
+}
+
+void AnyModel::set_state(std::span<const double> state) noexcept {
+  dispatch(model_, [&]<class M>(M& model) {
+    if constexpr (HasState<M>) model.set_state(state);
+  });
+}
+
 std::span<const float> AnyModel::last_layer_input() const noexcept {
   return dispatch(model_, [](const auto& model) -> std::span<const float> {
     if constexpr (requires { model.last_layer_input(); }) {

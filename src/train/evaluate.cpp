@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "torsio/core/error.hpp"
+#include "torsio/train/initial_state.hpp"
 
 namespace torsio {
 namespace {
@@ -98,6 +99,29 @@ struct Tally {
   }
 };
 
+/// Sets the state of the estimator's model by the first measured samples.
+/// @returns how many samples these are, those between them that were not measured included.
+std::size_t start_with(Estimator& estimator,
+                       const std::vector<const std::vector<double>*>& channels,
+                       const Corrections& corrections) {
+  const Channel& target = *corrections.target;
+  std::size_t samples = 0;
+  for (std::size_t left = corrections.most; samples < target.values.size() && left > 0; ++samples)
+    if (target.is_fresh(samples) && std::isfinite(target.values[samples])) --left;
+  const EstimatorSettings& settings = estimator.settings();
+  FeaturePipeline pipeline(settings.features, settings.sample_rate_Hz);
+  Matrix features(samples, pipeline.feature_count());
+  std::vector<double> measured(samples, kNotMeasured);
+  std::vector<double> raw(channels.size());
+  for (std::size_t n = 0; n < samples; ++n) {
+    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[n];
+    std::ranges::copy(pipeline.step(raw), features.row(n).begin());
+    if (pipeline.is_settled() && target.is_fresh(n)) measured[n] = target.values[n];
+  }
+  start_where_measured(estimator.model(), features, measured);
+  return samples;
+}
+
 }  // namespace
 
 Prediction predict(Estimator estimator, const Recording& recording,
@@ -113,6 +137,8 @@ Prediction predict(Estimator estimator, const Recording& recording,
   std::size_t left = estimator.model().feeds_back() ? corrections.most : 0;
   const DenormalsOff denormals_off;
   estimator.reset();
+  if (!estimator.model().state().empty() && corrections.most > 0)
+    prediction.initialised = start_with(estimator, channels, corrections);
   for (std::size_t i = 0; i < recording.size(); ++i) {
     for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[i];
     const auto start = Clock::now();

@@ -10,7 +10,7 @@ namespace torsio {
 /// What a family's fitter gives, as the table of families gives it.
 template <class Family>
 FittedModel fitted_model(Fitted<Family> fitted) {
-  return {Family(std::move(fitted.parameters)), std::move(fitted.notes)};
+  return {Family(std::move(fitted.parameters)), std::move(fitted.notes), std::move(fitted.table)};
 }
 
 }  // namespace torsio

@@ -108,6 +108,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
                                             data.validation ? &*data.validation : nullptr),
                .parameters = fitted.model.parameters()},
       .notes = std::move(fitted.notes),
+      .table = std::move(fitted.table),
       .fit_seconds = fit_time.count()};
   const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
   for (const ZeroRule& zero : trained.file.card.zeros)

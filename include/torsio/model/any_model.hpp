@@ -82,6 +82,10 @@ class AnyModel {
   [[nodiscard]] bool feeds_back() const noexcept;  ///< its own output, as `FeedsBack` families do
   /// Puts a measurement in the place of the last output; nothing to a model that does not feed back.
   void correct(double measured) noexcept TORSIO_REALTIME;
+  /// Memory of `HasState` families; empty for others.
+  [[nodiscard]] std::span<const double> state() const noexcept;
+  /// As the family's own; nothing to a family without. @param state `state().size()` numbers.
+  void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
   /// What the last layer of a network saw in the last step; empty for other families.
   [[nodiscard]] std::span<const float> last_layer_input() const noexcept;
 

@@ -37,4 +37,14 @@ concept Model = std::copyable<M> && requires(M model, const M fixed, Features fe
   { model.step(features) } noexcept -> std::same_as<Estimate>;
 };
 
+/// A model whose memory is a few numbers that mean something (a creep, a bristle, a position), so
+/// that a run may start anywhere. `set_state` takes as many numbers as `state` has, brings those
+/// out of bounds (a force above its slip limit) to the nearest bound and passes over what is not
+/// finite; after `reset()` the state is that of a joint at rest.
+template <class M>
+concept HasState = Model<M> && requires(M model, const M fixed, std::span<const double> state) {
+  { fixed.state() } noexcept -> std::same_as<std::span<const double>>;
+  { model.set_state(state) } noexcept;
+};
+
 }  // namespace torsio

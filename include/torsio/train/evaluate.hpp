@@ -27,12 +27,13 @@ struct Score {
 
 /// The estimator's answer to every sample of a recording, streamed through `step` from `reset()`.
 struct Prediction {
-  std::size_t initialised = 0;  ///< samples up to the last one that was corrected
+  std::size_t initialised = 0;  ///< samples up to the last one that told the model where it starts
   std::vector<Estimate> estimates;
   std::vector<double> step_ns;
 };
 
-/// What a model that feeds back is told of the target: the first so many fresh samples.
+/// What a model with memory is told of the target: the first so many fresh samples. One that feeds
+/// back hears each in turn, one with a state (`HasState`) starts where it fits them best.
 struct Corrections {
   const Channel* target = nullptr;
   std::size_t most = 0;

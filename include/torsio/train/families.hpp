@@ -7,15 +7,17 @@
 
 #include "torsio/model/any_model.hpp"
 #include "torsio/train/fit_context.hpp"
+#include "torsio/train/fitted.hpp"
 #include "torsio/train/options.hpp"
 #include "torsio/train/training_data.hpp"
 
 namespace torsio {
 
-/// A fitted model of any family, and what the user should be told about the fit.
+/// A fitted model of any family, what the user should be told about the fit, and its parameters.
 struct FittedModel {
   AnyModel model;
   std::vector<std::string> notes;
+  std::vector<FittedParameter> table = {};
 };
 
 /// How one family is trained: what `fit --list`, the command line, cross-validation and `compare`

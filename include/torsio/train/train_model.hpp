@@ -11,6 +11,7 @@
 #include "torsio/files/model_file.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 #include "torsio/train/fit_context.hpp"
+#include "torsio/train/fitted.hpp"
 #include "torsio/train/training_data.hpp"
 
 namespace torsio {
@@ -31,6 +32,7 @@ struct ModelChoice {
 struct TrainedModel {
   ModelFile file;
   std::vector<std::string> notes;  ///< what the user should be told about the fit
+  std::vector<FittedParameter> table = {};
   double fit_seconds = 0.0;
 };
 
