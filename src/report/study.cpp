@@ -130,7 +130,7 @@ std::string study_json(const StudyInfo& info, const Study& study) {
          {"percent_of_max_abs", row.percent},
          {"max_abs_target", row.largest},
          {"max_abs", row.max_abs},
-         {"fit_percent", row.fit_percent},
+         {"blank", row.blank},
          {"one_step_rmse", row.one_step ? Json(*row.one_step) : Json(nullptr)},
          {"guarded_percent", row.guarded_percent},
          {"diverged", row.diverged},

@@ -23,7 +23,8 @@ void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
   percent += (100.0 * rmse / largest_target - percent) / n;
   largest += (largest_target - largest) / n;
   max_abs = std::max(max_abs, row.score.metrics.max_abs);
-  fit_percent += (row.score.metrics.fit_percent - fit_percent) / n;
+  constexpr double kBlank = 5.0;
+  if (row.score.metrics.fit_percent < kBlank) ++blank;
   if (row.score.one_step.samples > 0)
     one_step += (row.score.one_step.rmse - one_step) / static_cast<double>(++one_step_runs);
   samples += row.score.metrics.samples;
@@ -80,7 +81,7 @@ std::vector<StudyRow> StudyRows::rows() const {
         .percent = sum.percent,
         .largest = sum.largest,
         .max_abs = sum.max_abs,
-        .fit_percent = sum.fit_percent,
+        .blank = sum.blank,
         .guarded_percent = 100.0 * static_cast<double>(sum.guarded) /
                            static_cast<double>(std::max<std::size_t>(sum.samples, 1)),
         .diverged = sum.diverged};

@@ -53,7 +53,7 @@ class StudyRows {
     double max_abs = 0.0;
     double one_step = 0.0;
     std::size_t one_step_runs = 0;
-    double fit_percent = 0.0;
+    std::size_t blank = 0;
     std::size_t samples = 0;
     std::size_t guarded = 0;
     std::size_t diverged = 0;

@@ -30,7 +30,7 @@ struct StudyRow {
   std::optional<double> paper_rmse = {};
   double max_abs = 0.0;                 ///< largest |error| of all runs
   std::optional<double> one_step = {};  ///< mean RMSE one step ahead, of a model that feeds back
-  double fit_percent = 0.0;             ///< mean of `Metrics::fit_percent`: 0 is the mean torque's
+  std::size_t blank = 0;                ///< of the runs: fit_percent below 5, no more than the mean
   double guarded_percent = 0.0;         ///< of the scored samples, answered by a guard
   std::size_t diverged = 0;             ///< of the runs
 };
