@@ -169,10 +169,9 @@ void compare_into(StudyRows& rows, const Bench& bench, const std::vector<Rival>&
 }
 
 const StudyRow& best_of(const std::vector<StudyRow>& rows, std::string_view named) {
-  const StudyRow* best = nullptr;
-  for (const StudyRow& row : rows)
-    if (row.model.starts_with(named) && (best == nullptr || row.rmse < best->rmse)) best = &row;
-  return *best;
+  return *std::ranges::min_element(rows, {}, [&](const StudyRow& row) {
+    return std::pair(!row.model.starts_with(named), row.rmse);
+  });
 }
 
 /// What the rows of one condition say about the paper's claim.
