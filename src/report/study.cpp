@@ -4,10 +4,85 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
+
+namespace {
+
+std::string number(double value) { return fmt::format("{:.4g}", value); }
+
+/// How a row is told; columns that no row of the study fills are left out.
+struct Column {
+  std::string title;
+  std::string (*cell)(const Study& study, const StudyRow& row);
+};
+
+std::vector<Column> columns_of(const Study& study) {
+  const auto any = [&](const auto& has) { return std::ranges::any_of(study.rows, has); };
+  std::vector<Column> columns{
+      {fmt::format("RMSE {}", study.unit),
+       [](const Study&, const StudyRow& row) { return number(row.rmse); }},
+      {"+-",
+       [](const Study&, const StudyRow& row) {
+         return row.runs > 1 ? fmt::format("{:.2g}", row.rmse_std) : std::string();
+       }},
+      {"% of max",
+       [](const Study&, const StudyRow& row) { return fmt::format("{:.1f}", row.percent); }},
+      {"max", [](const Study&, const StudyRow& row) { return number(row.largest); }}};
+  if (study.full_scale) {
+    columns.push_back({"% of FS", [](const Study& of, const StudyRow& row) {
+                         return fmt::format("{:.2f}", 100.0 * row.rmse / *of.full_scale);
+                       }});
+    columns.push_back(
+        {"max|e|", [](const Study&, const StudyRow& row) { return number(row.max_abs); }});
+    columns.push_back({"% of FS", [](const Study& of, const StudyRow& row) {
+                         return fmt::format("{:.1f}", 100.0 * row.max_abs / *of.full_scale);
+                       }});
+    if (any([](const StudyRow& row) { return row.one_step.has_value(); }))
+      columns.push_back({"1 step", [](const Study&, const StudyRow& row) {
+                           return row.one_step ? number(*row.one_step) : std::string();
+                         }});
+    if (any([](const StudyRow& row) { return row.guarded_percent > 0.0; }))
+      columns.push_back({"guard %", [](const Study&, const StudyRow& row) {
+                           return fmt::format("{:.1f}", row.guarded_percent);
+                         }});
+  }
+  columns.push_back(
+      {"runs", [](const Study&, const StudyRow& row) { return fmt::format("{}", row.runs); }});
+  if (any([](const StudyRow& row) { return row.paper_rmse.has_value(); }))
+    columns.push_back({"paper", [](const Study&, const StudyRow& row) {
+                         return row.paper_rmse ? number(*row.paper_rmse) : std::string();
+                       }});
+  if (any([](const StudyRow& row) { return row.diverged > 0; }))
+    columns.push_back({"", [](const Study&, const StudyRow& row) {
+                         return row.diverged == 0
+                                    ? std::string()
+                                    : fmt::format("diverged in {} of {}", row.diverged, row.runs);
+                       }});
+  return columns;
+}
+
+std::string table_of(const Study& study) {
+  const std::vector<Column> columns = columns_of(study);
+  TextTable table;
+  table.header({"condition", "model"});
+  for (const Column& column : columns) table.header({column.title});
+  std::string last;
+  for (const StudyRow& row : study.rows) {
+    std::vector<std::string> cells{row.condition == last ? "" : row.condition, row.model};
+    for (const Column& column : columns) cells.push_back(column.cell(study, row));
+    table.row(std::move(cells));
+    last = row.condition;
+  }
+  return table.text();
+}
+
+}  // namespace
 
 std::string study_text(const StudyInfo& info, const Study& study) {
   std::string text =
@@ -16,26 +91,17 @@ std::string study_text(const StudyInfo& info, const Study& study) {
                   study.options.is_quick ? ", quick: not the paper's sizes" : "");
   for (const StudyPlant& plant : study.plants)
     text += fmt::format("plant {}, data sheet {}\n", plant.name, plant.fingerprint);
-  const bool has_paper = std::ranges::any_of(
-      study.rows, [](const StudyRow& row) { return row.paper_rmse.has_value(); });
-  TextTable table;
-  table.header(
-      {"condition", "model", fmt::format("RMSE {}", study.unit), "+-", "% of max", "max", "runs"});
-  if (has_paper) table.header({"paper"});
-  std::string last;
-  for (const StudyRow& row : study.rows) {
-    table.row({row.condition == last ? "" : row.condition, row.model,
-               fmt::format("{:.4g}", row.rmse),
-               row.runs > 1 ? fmt::format("{:.2g}", row.rmse_std) : "",
-               fmt::format("{:.1f}", row.percent), fmt::format("{:.4g}", row.largest),
-               fmt::format("{}", row.runs),
-               row.paper_rmse ? fmt::format("{:.4g}", *row.paper_rmse) : ""});
-    last = row.condition;
-  }
-  return fmt::format(
-      "{}\n{}% of max: RMSE over the largest |target| of the judged recording; +-: "
+  text += fmt::format(
+      "\n{}% of max: RMSE over the largest |target| of the judged recording; +-: "
       "standard deviation of a run\n",
-      text, table.text());
+      table_of(study));
+  if (study.full_scale)
+    text += fmt::format(
+        "% of FS: of RMSE or of max|e|, the largest error of all runs, over {:g} {}; 1 step: RMSE "
+        "with each past torque measured, which is no sensor\n",
+        *study.full_scale, study.unit);
+  for (const std::string& note : study.notes) text += note + '\n';
+  return text;
 }
 
 std::string study_json(const StudyInfo& info, const Study& study) {
@@ -49,6 +115,8 @@ std::string study_json(const StudyInfo& info, const Study& study) {
                 {"repeats", study.options.repeats},
                 {"quick", study.options.is_quick},
                 {"plants", Json::array()},
+                {"full_scale", study.full_scale ? Json(*study.full_scale) : Json(nullptr)},
+                {"notes", study.notes},
                 {"rows", Json::array()}};
   for (const StudyPlant& plant : study.plants)
     document["plants"].push_back({{"name", plant.name}, {"data_sheet", plant.fingerprint}});
@@ -61,6 +129,11 @@ std::string study_json(const StudyInfo& info, const Study& study) {
          {"rmse_std", row.rmse_std},
          {"percent_of_max_abs", row.percent},
          {"max_abs_target", row.largest},
+         {"max_abs", row.max_abs},
+         {"blank", row.blank},
+         {"one_step_rmse", row.one_step ? Json(*row.one_step) : Json(nullptr)},
+         {"guarded_percent", row.guarded_percent},
+         {"diverged", row.diverged},
          {"paper_rmse", row.paper_rmse ? Json(*row.paper_rmse) : Json(nullptr)}});
   return document.dump(2) + "\n";
 }

@@ -32,11 +32,12 @@ constexpr double kFrequency_Hz = 0.4;
 constexpr double kHighestFrequency_Hz = 1.0;
 constexpr double kPointPeriods = 8.0;
 
-constexpr std::array kGrid_rad = {rad_from_deg(4.0), rad_from_deg(5.0), rad_from_deg(6.0),
-                                  rad_from_deg(7.0), rad_from_deg(8.0), rad_from_deg(9.0)};
-constexpr std::array kGrid_Hz = {0.1, 0.4, 0.7, 1.0};
-constexpr double kGridPeriods = 3.0;
-constexpr double kGridRest_s = 2.0;
+// The paper's 220 records as 20 frequencies by 11 amplitudes. A whole period of each closes every
+// loop; with that rest behind each, the log has the paper's 202.5 samples a record in the mean.
+constexpr int kGridFrequencies = 20;  // 0.05 to 1 Hz
+constexpr int kGridAmplitudes = 11;   // 4 to 9 deg
+constexpr double kGridPeriods = 1.0;
+constexpr double kGridRest_s = 0.45;
 
 constexpr double kLowestMultisine_rad = rad_from_deg(4.0);
 constexpr double kMultisine_s = 40.0;  // its period
@@ -167,8 +168,9 @@ BenchProgram along(const DataSheet& sheet, const Load& load, Path path) {
 
 std::vector<SinePoint> whole_grid() {
   std::vector<SinePoint> points;
-  for (const double frequency_Hz : kGrid_Hz)
-    for (const double amplitude_rad : kGrid_rad) points.push_back({amplitude_rad, frequency_Hz});
+  for (int f = 1; f <= kGridFrequencies; ++f)
+    for (int a = 0; a < kGridAmplitudes; ++a)
+      points.push_back({rad_from_deg(4.0 + 0.5 * a), f * kHighestFrequency_Hz / kGridFrequencies});
   return points;
 }
 
@@ -265,8 +267,8 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
     {.info = {.name = "grid",
               .actuators = kActuators,
               .description =
-                  "input angle on a sine; without --amplitude and --frequency 24 of them: "
-                  "4 to 9 deg at 0.1 to 1 Hz",
+                  "input angle on a sine; without --amplitude and --frequency 220 of them: "
+                  "4 to 9 deg at 0.05 to 1 Hz",
               .amplitude_unit = "rad"},
      .family = ActuatorFamily::rubber_clutch,
      .highest_angle_rad = kAmplitude_rad,

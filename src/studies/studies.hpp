@@ -8,6 +8,9 @@ namespace torsio {
 
 Study spring_models_001(const StudyOptions& options, const Progress& progress);
 Study inverse_models_001(const StudyOptions& options, const Progress& progress);
+Study sensor_models_002(const StudyOptions& options, const Progress& progress);
+Study slow_loops_002(const StudyOptions& options, const Progress& progress);
+Study collision_002(const StudyOptions& options, const Progress& progress);
 Study encoders_004(const StudyOptions& options, const Progress& progress);
 Study torque_levels_004(const StudyOptions& options, const Progress& progress);
 Study impedances_004(const StudyOptions& options, const Progress& progress);

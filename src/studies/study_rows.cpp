@@ -13,7 +13,8 @@
 
 namespace torsio {
 
-void StudyRows::Sum::add(double rmse, double largest_target) {
+void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
+  const double rmse = row.score.metrics.rmse;
   ++runs;
   const auto n = static_cast<double>(runs);
   const double distance = rmse - mean;
@@ -21,6 +22,14 @@ void StudyRows::Sum::add(double rmse, double largest_target) {
   squares += distance * (rmse - mean);
   percent += (100.0 * rmse / largest_target - percent) / n;
   largest += (largest_target - largest) / n;
+  max_abs = std::max(max_abs, row.score.metrics.max_abs);
+  constexpr double kBlank = 5.0;
+  if (row.score.metrics.fit_percent < kBlank) ++blank;
+  if (row.score.one_step.samples > 0)
+    one_step += (row.score.one_step.rmse - one_step) / static_cast<double>(++one_step_runs);
+  samples += row.score.metrics.samples;
+  guarded += row.score.guarded_samples;
+  if (row.status == "diverged") ++diverged;
 }
 
 void StudyRows::paper(const std::string& condition, const std::string& model, double rmse) {
@@ -70,7 +79,13 @@ std::vector<StudyRow> StudyRows::rows() const {
         .rmse = sum.mean,
         .rmse_std = sum.runs < 2 ? 0.0 : std::sqrt(sum.squares / static_cast<double>(sum.runs - 1)),
         .percent = sum.percent,
-        .largest = sum.largest};
+        .largest = sum.largest,
+        .max_abs = sum.max_abs,
+        .blank = sum.blank,
+        .guarded_percent = 100.0 * static_cast<double>(sum.guarded) /
+                           static_cast<double>(std::max<std::size_t>(sum.samples, 1)),
+        .diverged = sum.diverged};
+    if (sum.one_step_runs > 0) row.one_step = sum.one_step;
     for (const auto& [paper_key, rmse] : papers_)
       if (paper_key == key) row.paper_rmse = rmse;
     rows.push_back(std::move(row));

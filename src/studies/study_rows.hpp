@@ -21,12 +21,24 @@ class StudyRows {
 
   /// The rows of single recordings in a split, each under its condition.
   /// @param condition_of (recording) -> condition
+  /// @param model_of (row) -> what the study calls its model
   /// @throws Error if a fit failed: a study has no holes. A free run that diverged counts with its error.
+  template <class ConditionOf, class ModelOf>
+  void add(const Results& results, const Dataset& dataset, Role split,
+           const ConditionOf& condition_of, const ModelOf& model_of) {
+    for (const ResultRow& row : results.rows) {
+      if (row.split != split) continue;
+      require_fitted(row);
+      if (!row.recording) continue;
+      sum_of({condition_of(*row.recording), model_of(row)})
+          .add(row, largest_target(dataset, *row.recording));
+    }
+  }
+  /// The same with families' own names.
   template <class ConditionOf>
   void add(const Results& results, const Dataset& dataset, Role split,
            const ConditionOf& condition_of) {
-    for (const ResultRow& row : results.rows)
-      if (row.split == split) add_row(row, dataset, condition_of);
+    add(results, dataset, split, condition_of, model_of);
   }
 
   [[nodiscard]] std::vector<StudyRow> rows() const;
@@ -38,7 +50,14 @@ class StudyRows {
     double squares = 0.0;  ///< deviations from the mean
     double percent = 0.0;
     double largest = 0.0;
-    void add(double rmse, double largest_target);
+    double max_abs = 0.0;
+    double one_step = 0.0;
+    std::size_t one_step_runs = 0;
+    std::size_t blank = 0;
+    std::size_t samples = 0;
+    std::size_t guarded = 0;
+    std::size_t diverged = 0;
+    void add(const ResultRow& row, double largest_target);
   };
   struct Key {
     std::string condition;
@@ -50,13 +69,6 @@ class StudyRows {
   static std::string model_of(const ResultRow& row);
   Sum& sum_of(Key key);
 
-  template <class ConditionOf>
-  void add_row(const ResultRow& row, const Dataset& dataset, const ConditionOf& condition_of) {
-    require_fitted(row);
-    if (!row.recording) return;
-    sum_of({condition_of(*row.recording), model_of(row)})
-        .add(row.score.metrics.rmse, largest_target(dataset, *row.recording));
-  }
   static double largest_target(const Dataset& dataset, const std::string& recording);
 
   std::vector<std::pair<Key, Sum>> sums_;

@@ -110,9 +110,11 @@ AnyModel wrapped(const AnyModel& f, const Narx<Linear>::Parameters& rest) {
   return Narx<M>(framed<M>(f.get_if<M>()->parameters(), rest));
 }
 
+/// @param family that trains an M; M's own, or a second way
 template <class M>
-FittedModel narx(const TrainingData& data, const Options& options, const FitContext& context) {
-  const FamilyInfo& inner = find_family(M::kFamily);
+FittedModel narx_by(std::string_view family, const TrainingData& data, const Options& options,
+                    const FitContext& context) {
+  const FamilyInfo& inner = find_family(family);
   return fit_narx(data,
                   {.lags = lags_of(options),
                    .training = training_of(options),
@@ -132,6 +134,18 @@ FittedModel narx(const TrainingData& data, const Options& options, const FitCont
                   context);
 }
 
+template <class M>
+FittedModel narx(const TrainingData& data, const Options& options, const FitContext& context) {
+  return narx_by<M>(M::kFamily, data, options, context);
+}
+
+constexpr std::string_view kVariational = "parametric_gp_variational";
+
+FittedModel narx_variational(const TrainingData& data, const Options& options,
+                             const FitContext& context) {
+  return narx_by<ParametricGp>(kVariational, data, options, context);
+}
+
 struct NarxFamily {
   std::string_view name;
   std::string_view inner;
@@ -149,7 +163,9 @@ constexpr std::array kNarxFamilies{
     narx_family<Mlp>("neural network that hears its own past output"),
     narx_family<GaussianProcess>("exact Gaussian process that hears its own past output"),
     narx_family<ParametricGp>(
-        "Gaussian process at a few hypothetical inputs that hears its own past output")};
+        "Gaussian process at a few hypothetical inputs that hears its own past output"),
+    NarxFamily{"narx_parametric_gp_variational", kVariational,
+               "the same by a variational bound, in closed form", narx_variational}};
 
 std::vector<OptionInfo> options_with(std::span<const OptionInfo> inner) {
   std::vector<OptionInfo> all(kNarxOptions.begin(), kNarxOptions.end());

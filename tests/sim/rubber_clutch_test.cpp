@@ -209,12 +209,13 @@ TEST(RubberClutch, GridWalksAllItsPointsFromRest) {
   for (const double angle_rad : input) {
     const double angle_deg = std::abs(deg_from_rad(angle_rad));
     at_rest = angle_deg < 0.1 ? at_rest + 1 : 0;
-    if (at_rest == 80) peaks_deg.push_back(0.0);
+    if (at_rest == 15) peaks_deg.push_back(0.0);
     peaks_deg.back() = std::max(peaks_deg.back(), angle_deg);
   }
-  ASSERT_EQ(peaks_deg.size(), 25U) << "the first is before the first point";
-  for (std::size_t i = 0; i < 24; ++i)
-    EXPECT_NEAR(peaks_deg[i + 1], 4.0 + static_cast<double>(i % 6), 0.15) << i;
+  ASSERT_EQ(peaks_deg.size(), 221U) << "the first is before the first point";
+  for (std::size_t i = 0; i < 220; ++i)
+    EXPECT_NEAR(peaks_deg[i + 1], 4.0 + 0.5 * static_cast<double>(i % 11), 0.15) << i;
+  EXPECT_NEAR(static_cast<double>(input.size()), 44554.0, 50.0) << "the paper's samples";
   EXPECT_LT(range(slipped(recording)), 1e-4);
 }
 

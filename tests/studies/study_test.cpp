@@ -47,6 +47,39 @@ TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
     EXPECT_EQ(again.rows[i].rmse, study.rows[i].rmse) << study.rows[i].model;
 }
 
+TEST(Studies, OfTheRubberSensorSayWhetherPgprBeatsALine) {
+  const Study study = run_study(find_study("002-table3"), kQuick);
+  EXPECT_EQ(study.full_scale, 0.5);
+  const StudyRow& arx = row_of(study, "multisine", "ARX 5");
+  EXPECT_EQ(arx.runs, 2U);
+  ASSERT_TRUE(arx.one_step.has_value());
+  EXPECT_LT(*arx.one_step, 0.5 * arx.rmse);
+  EXPECT_GT(arx.max_abs, arx.rmse);
+  EXPECT_LT(arx.rmse, row_of(study, "multisine", "line").rmse);
+  EXPECT_FALSE(row_of(study, "multisine", "line").one_step.has_value());
+  EXPECT_EQ(row_of(study, "multisine", "improved PGPR").paper_rmse, 0.0093);
+  const double best_arx = std::min(arx.rmse, row_of(study, "multisine", "ARX 15").rmse);
+  for (const char* model : {"PGPR", "improved PGPR", "improved PGPR, noise"}) {
+    const bool beats = row_of(study, "multisine", model).rmse < best_arx;
+    EXPECT_THAT(study.notes, testing::Contains(testing::StartsWith(
+                                 std::string(model) + (beats ? ": beats a" : ": does not"))));
+  }
+}
+
+TEST(Studies, OfTheRubberSensorAreWorseOnceTheClutchHasSlipped) {
+  for (const char* item : {"002-slow", "002-collision"}) {
+    const Study study = run_study(find_study(item), kQuick);
+    for (const StudyRow& row : study.rows) {
+      const auto holds = row.condition.find(", clutch holds");
+      if (holds == std::string::npos) continue;
+      EXPECT_GT(row_of(study, row.condition.substr(0, holds) + ", has slipped", row.model).rmse,
+                3.0 * row.rmse)
+          << row.condition << ' ' << row.model;
+    }
+    EXPECT_EQ(study.rows.size(), item == std::string("002-slow") ? 8U : 16U);
+  }
+}
+
 TEST(Studies, AreFoundByNameAndRefuseNoRepeats) {
   EXPECT_THROW((void)find_study("004-tub"), UsageError);
   EXPECT_THROW((void)run_study(find_study("004-tubes"), {.repeats = 0}), UsageError);
@@ -78,6 +111,38 @@ TEST(Studies, ShowTheirFiguresBesideThePapers) {
   EXPECT_EQ(json["rows"][0]["paper_rmse"], 0.666);
   EXPECT_TRUE(json["rows"][1]["paper_rmse"].is_null());
   EXPECT_EQ(json["plants"][0]["data_sheet"], "0123");
+  EXPECT_TRUE(json["full_scale"].is_null());
+}
+
+TEST(Studies, OfASensorTellErrorsOfItsFullScaleAndWhatDiverged) {
+  const StudyInfo info{"002-x", "002, Table 0", "a title", nullptr};
+  const Study study{.protocol = "a protocol",
+                    .unit = "Nm",
+                    .options = {},
+                    .rows = {{.condition = "multisine",
+                              .model = "NN",
+                              .runs = 3,
+                              .rmse = 0.01,
+                              .percent = 4.0,
+                              .largest = 0.25,
+                              .max_abs = 0.04,
+                              .one_step = 0.002,
+                              .diverged = 2},
+                             {.condition = "multisine", .model = "line", .runs = 3, .rmse = 0.02}},
+                    .full_scale = 0.5,
+                    .notes = {"a note"}};
+  const std::string text = study_text(info, study);
+  EXPECT_THAT(text, testing::ContainsRegex(
+                        "NN +0.01 +0 +4.0 +0.25 +2.00 +0.04 +8.0 +0.002 +3 +diverged in 2 of 3"));
+  EXPECT_THAT(text, HasSubstr("over 0.5 Nm"));
+  EXPECT_THAT(text, testing::EndsWith("a note\n"));
+  EXPECT_THAT(text, testing::Not(HasSubstr("guard")));
+  const auto json = nlohmann::json::parse(study_json(info, study));
+  EXPECT_EQ(json["full_scale"], 0.5);
+  EXPECT_EQ(json["notes"][0], "a note");
+  EXPECT_EQ(json["rows"][0]["one_step_rmse"], 0.002);
+  EXPECT_EQ(json["rows"][0]["diverged"], 2);
+  EXPECT_TRUE(json["rows"][1]["one_step_rmse"].is_null());
 }
 
 }  // namespace

@@ -119,6 +119,15 @@ TEST(FitNarx, NoiseIsOfTheSeed) {
   EXPECT_NE(fit(1), fit(2));
 }
 
+TEST(FitNarx, FindsTheDifferenceEquationAsAVariationalGaussianProcess) {
+  const TrainingData data = second_order(1000, 0.02, 6);
+  const FittedModel fitted = fit_named(
+      "narx_parametric_gp_variational", data,
+      {{"kernel", "linear_ard"}, {"points", "10"}, {"input_lags", "1"}, {"training", "one_step"}});
+  EXPECT_EQ(fitted.model.family(), "narx_parametric_gp");
+  EXPECT_GT(evaluate(fitted.model, second_order(1000, 0.0, 7)).fit_percent, 95.0);
+}
+
 TEST(FitNarx, RefusesWhatItCannotDo) {
   const TrainingData data = second_order(600, 0.1, 5);
   EXPECT_THROW((void)fit_named("narx_mlp", data, {{"training", "daily"}}), UsageError);

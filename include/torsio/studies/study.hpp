@@ -28,6 +28,11 @@ struct StudyRow {
   double percent = 0.0;   ///< mean of 100 rmse / (largest |target| of the judged recording)
   double largest = 0.0;   ///< mean of that largest |target|
   std::optional<double> paper_rmse = {};
+  double max_abs = 0.0;                 ///< largest |error| of all runs
+  std::optional<double> one_step = {};  ///< mean RMSE one step ahead, of a model that feeds back
+  std::size_t blank = 0;                ///< of the runs: fit_percent below 5, no more than the mean
+  double guarded_percent = 0.0;         ///< of the scored samples, answered by a guard
+  std::size_t diverged = 0;             ///< of the runs
 };
 
 /// A simulated bench that a study used.
@@ -43,6 +48,9 @@ struct Study {
   StudyOptions options;
   std::vector<StudyPlant> plants = {};
   std::vector<StudyRow> rows = {};  ///< condition by condition, in the order of their first fit
+  std::optional<double> full_scale =
+      {};  ///< of the sensor, in `unit`: errors are also told in % of it
+  std::vector<std::string> notes = {};  ///< what the rows say in words, settings behind their names
 };
 
 struct StudyInfo {
