@@ -6,6 +6,7 @@
 #include "torsio/report/html.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/train/comparison.hpp"
+#include "torsio/train/structure_search.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -26,7 +27,16 @@ void run(const CompareFlags& flags) {
   flags.data.check_outputs({flags.output, flags.report, flags.json.destination}, flags.test);
   ProgressBar bar;
   const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, bar.listener());
-  const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
+  std::vector<torsio::ModelChoice> choices;
+  if (flags.models == torsio::kSearch) {
+    const torsio::StructureSearch search = torsio::search_structures(
+        dataset, torsio::search_candidates(dataset, flags.data.wanted_inputs()), flags.seed,
+        flags.allow_leak, bar.listener());
+    if (flags.json.wants_tables()) print(cross_validation_text(search.scores) + "\n");
+    choices = search.winners;
+  } else {
+    choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
+  }
   const auto comparison =
       torsio::compare(dataset, choices, flags.seed, flags.allow_leak, bar.listener());
   flags.json.write(torsio::results_json(comparison.results));
@@ -54,7 +64,8 @@ void add_compare(CLI::App& app) {
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
   verb->add_option("--models", flags->models,
                    "all (but lstm and gru), or families with settings: "
-                   "linear,polynomial:degree=7:branch=true")
+                   "linear,polynomial:degree=7:branch=true; search: orders and structures of each "
+                   "family by cross-validation within the training records, the best then compared")
       ->capture_default_str();
   verb->add_option("-o,--output", flags->output, "write the best model to this file");
   verb->add_option("--report", flags->report, "write the tables as a page for a browser");
