@@ -47,11 +47,6 @@ FamilyChoice parse_choice(std::string_view text) {
   return choice;
 }
 
-bool has_option(const FamilyInfo& family, std::string_view option) {
-  return std::ranges::any_of(family.options,
-                             [&](const OptionInfo& known) { return known.name == option; });
-}
-
 /// A condition among the inputs that takes more than one value in training: parameters may be
 /// interpolated over it.
 std::string schedulable_condition(const Dataset& dataset, const std::vector<std::string>& inputs) {

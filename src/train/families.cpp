@@ -178,6 +178,10 @@ std::span<const FamilyInfo> families() noexcept {
   return all;
 }
 
+bool has_option(const FamilyInfo& family, std::string_view option) noexcept {
+  return std::ranges::find(family.options, option, &OptionInfo::name) != family.options.end();
+}
+
 const FamilyInfo& find_family(std::string_view name) {
   const auto all = families();
   const auto family = std::ranges::find(all, name, &FamilyInfo::name);

@@ -43,10 +43,6 @@ constexpr std::array<std::string_view, 2> kWithFeedback{"arx", "narx_polynomial"
 
 constexpr std::size_t kSearchFolds = 3;
 
-bool has_option(const FamilyInfo& family, std::string_view option) {
-  return std::ranges::find(family.options, option, &OptionInfo::name) != family.options.end();
-}
-
 }  // namespace
 
 std::vector<ModelChoice> search_candidates(const Dataset& dataset,

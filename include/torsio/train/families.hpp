@@ -35,6 +35,8 @@ struct FamilyInfo {
 /// Every family that can be trained, cheapest first.
 [[nodiscard]] std::span<const FamilyInfo> families() noexcept;
 
+[[nodiscard]] bool has_option(const FamilyInfo& family, std::string_view option) noexcept;
+
 /// @throws UsageError with the list and the nearest name if there is none of that name.
 [[nodiscard]] const FamilyInfo& find_family(std::string_view name);
 
