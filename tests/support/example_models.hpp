@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/hysteresis_examples.hpp"
 #include "support/random_network.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/any_model.hpp"
@@ -61,6 +62,41 @@ inline Polynomial example<Polynomial>() {
                                            -1.1, 52.0, 0.5,  10.0,  //
                                            0.0,  0.4};
   return Polynomial(parameters);
+}
+
+template <>
+inline MaxwellSlipModel example<MaxwellSlipModel>() {
+  return example_maxwell_slip();
+}
+
+template <>
+inline PrandtlIshlinskii example<PrandtlIshlinskii>() {
+  return example_prandtl_ishlinskii();
+}
+
+template <>
+inline ImprovedPrandtlIshlinskii example<ImprovedPrandtlIshlinskii>() {
+  return example_improved_prandtl_ishlinskii();
+}
+
+template <>
+inline BoucWenModel example<BoucWenModel>() {
+  return example_bouc_wen();
+}
+
+template <>
+inline NonlinearBacklash example<NonlinearBacklash>() {
+  return example_nonlinear_backlash();
+}
+
+template <>
+inline ImprovedNonlinearBacklash example<ImprovedNonlinearBacklash>() {
+  return example_improved_nonlinear_backlash();
+}
+
+template <>
+inline ExponentialLoading example<ExponentialLoading>() {
+  return example_exponential_loading();
 }
 
 /// A row of five Gaussians along 600 Nm/rad, and one behind them all.
