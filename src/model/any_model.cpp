@@ -18,6 +18,10 @@ static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<
               FeedsBack<Narx<MultivariatePolynomial>> && FeedsBack<Narx<Dgmm>> &&
               FeedsBack<Narx<Mlp>> && FeedsBack<Narx<GaussianProcess>> &&
               FeedsBack<Narx<ParametricGp>>);
+static_assert(HasState<MaxwellSlipModel> && HasState<PrandtlIshlinskii> &&
+              HasState<ImprovedPrandtlIshlinskii> && HasState<BoucWenModel> &&
+              HasState<NonlinearBacklash> && HasState<ImprovedNonlinearBacklash> &&
+              HasState<ExponentialLoading>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

@@ -7,6 +7,7 @@
 
 #include "torsio/core/error.hpp"
 #include "train/least_squares.hpp"
+#include "train/nnls.hpp"
 
 namespace torsio {
 namespace {
@@ -59,6 +60,13 @@ void check_size(std::size_t samples, std::size_t terms, const Groups& groups, st
                .found = std::to_string(samples)});
 }
 
+LeastSquares solve(const Matrix& columns, const std::vector<double>& target,
+                   std::span<const std::uint8_t> is_free) {
+  if (is_free.empty()) return least_squares(columns, target);
+  NonNegativeFit fit = non_negative_least_squares(normal_equations(columns, target), is_free);
+  return {std::move(fit.coefficients), std::move(fit.dropped)};
+}
+
 }  // namespace
 
 Matrix rows_of(const Matrix& matrix, std::span<const std::size_t> samples) {
@@ -101,7 +109,8 @@ Groups groups_by(const std::string& schedule, const TrainingData& data, const Ma
   return groups;
 }
 
-DesignFit fit_design(const Design& design, const Groups& groups) {
+DesignFit fit_design(const Design& design, const Groups& groups,
+                     std::span<const std::uint8_t> is_free) {
   DesignFit fit{groups.frame, {}};
   fit.coefficients.values = Matrix(groups.samples.size(), design.columns.columns);
   const auto terms = design.terms.size() -
@@ -110,7 +119,7 @@ DesignFit fit_design(const Design& design, const Groups& groups) {
   for (std::size_t k = 0; k < groups.samples.size(); ++k) {
     check_size(groups.samples[k].size(), terms, groups, k);
     const Matrix columns = rows_of(design.columns, groups.samples[k]);
-    const LeastSquares solved = least_squares(columns, rows_of(design.target, groups.samples[k]));
+    const LeastSquares solved = solve(columns, rows_of(design.target, groups.samples[k]), is_free);
     std::ranges::copy(solved.coefficients, fit.coefficients.values.row(k).begin());
     for (const std::size_t j : solved.dropped) {
       ++dropped[j].groups;
@@ -125,6 +134,15 @@ DesignFit fit_design(const Design& design, const Groups& groups) {
 bool has_slope(const TrainingData& data, std::size_t input, const Groups& groups, bool rates) {
   const bool schedules = groups.frame.scheduled && groups.frame.feature == input;
   return !schedules && (rates || !data.inputs[input].is_rate);
+}
+
+std::size_t first_rate(const TrainingData& data, std::string_view family) {
+  const auto input = std::ranges::find(data.inputs, true, &InputInfo::is_rate);
+  if (input == data.inputs.end())
+    throw Error({.problem = std::string(family) + " has no input that tells a rate",
+                 .expected = "one such as lowpass(rate(spring_deflection_rad), 10Hz)",
+                 .advice = "Add it to --inputs; the friction follows it."});
+  return static_cast<std::size_t>(input - data.inputs.begin());
 }
 
 void add_slopes(Design& design, std::size_t first, const TrainingData& data, const Matrix& features,

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/core/matrix.hpp"
@@ -40,8 +42,11 @@ struct DesignFit {
 
 /// Least squares in every group. Terms that a group cannot tell apart are dropped there, with a
 /// note.
+/// @param is_free one a column, or empty: coefficients of columns with a 0 are kept from falling
+/// below 0
 /// @throws Error if a group has fewer than `kSamplesPerTerm` samples for each term.
-[[nodiscard]] DesignFit fit_design(const Design& design, const Groups& groups);
+[[nodiscard]] DesignFit fit_design(const Design& design, const Groups& groups,
+                                   std::span<const std::uint8_t> is_free = {});
 inline constexpr std::size_t kSamplesPerTerm = 5;
 
 /// The rows of the design and of the target that belong to `samples`.
@@ -53,6 +58,9 @@ inline constexpr std::size_t kSamplesPerTerm = 5;
 /// not asked to include.
 [[nodiscard]] bool has_slope(const TrainingData& data, std::size_t input, const Groups& groups,
                              bool rates);
+
+/// The first input that tells a rate. @throws Error that names the family if there is none.
+[[nodiscard]] std::size_t first_rate(const TrainingData& data, std::string_view family);
 
 /// Fills the columns `first`... with the inputs that `has_slope`, and names them.
 void add_slopes(Design& design, std::size_t first, const TrainingData& data, const Matrix& features,

@@ -12,6 +12,7 @@
 #include "torsio/train/fit_polynomial.hpp"
 #include "train/fitted_model.hpp"
 #include "train/gaussian_process_families.hpp"
+#include "train/hysteresis_families.hpp"
 #include "train/narx_families.hpp"
 #include "train/network_families.hpp"
 
@@ -158,6 +159,9 @@ constexpr std::array kShallowFamilies{
     FamilyInfo{GreyBox::kFamily,
                "torsio's own: elastic curve, slip, relaxation and friction, as the data ask for",
                kGreyBoxOptions, grey_box},
+};
+
+constexpr std::array kMixtureFamilies{
     FamilyInfo{Dgmm::kFamily, "Gaussian mixture of target and inputs, learned sample by sample",
                kDgmmOptions, dgmm},
     FamilyInfo{"dgmm_paper", "the same as printed in the paper: for comparison only",
@@ -169,7 +173,8 @@ constexpr std::array kShallowFamilies{
 std::span<const FamilyInfo> families() noexcept {
   static const std::vector<FamilyInfo> all = [] {
     std::vector<FamilyInfo> list(kShallowFamilies.begin(), kShallowFamilies.end());
-    for (const auto more : {gaussian_process_families(), network_families()})
+    for (const auto more : {hysteresis_families(), std::span<const FamilyInfo>(kMixtureFamilies),
+                            gaussian_process_families(), network_families()})
       list.insert(list.end(), more.begin(), more.end());
     const auto with_feedback = narx_families(list);
     list.insert(list.end(), with_feedback.begin(), with_feedback.end());

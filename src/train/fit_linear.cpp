@@ -25,15 +25,6 @@ Design affine_design(const TrainingData& data, Table& table, const Groups& group
   return design;
 }
 
-std::size_t first_rate(const TrainingData& data) {
-  const auto input = std::ranges::find(data.inputs, true, &InputInfo::is_rate);
-  if (input == data.inputs.end())
-    throw Error({.problem = "linear_coulomb has no input that tells a rate",
-                 .expected = "one such as lowpass(rate(spring_deflection_rad), 10Hz)",
-                 .advice = "Add it to --inputs; the friction follows its sign."});
-  return static_cast<std::size_t>(input - data.inputs.begin());
-}
-
 /// What is left of the sum of squares of each group once the bias, the slopes and a friction term
 /// with scale v are fitted, up to a constant.
 class FrictionSearch {
@@ -165,7 +156,7 @@ Fitted<LinearCoulomb> fit_linear_coulomb(const TrainingData& data,
                                          const LinearCoulombOptions& options) {
   Fitted<LinearCoulomb> fitted;
   LinearCoulomb::Parameters& parameters = fitted.parameters;
-  parameters.rate_feature = first_rate(data);
+  parameters.rate_feature = first_rate(data, LinearCoulomb::kFamily);
   Table table = usable_table(data);
   const Groups groups = groups_by(options.schedule, data, table.features);
   Design design = affine_design(data, table, groups, options.rates, 1);

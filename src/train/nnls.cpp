@@ -1,8 +1,11 @@
 #include "train/nnls.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
@@ -181,6 +184,31 @@ NormalEquations normal_equations(const Matrix& design, std::span<const double> t
 NonNegativeFit non_negative_least_squares(const NormalEquations& equations,
                                           std::span<const std::uint8_t> is_free) {
   return ActiveSet(equations, is_free).solve();
+}
+
+std::vector<double> standard_errors(const NormalEquations& equations,
+                                    std::span<const double> coefficients) {
+  std::vector<double> errors(coefficients.size(), kNotMeasured);
+  std::vector<Index> used;
+  for (std::size_t j = 0; j < coefficients.size(); ++j)
+    if (coefficients[j] != 0.0) used.push_back(static_cast<Index>(j));
+  if (used.empty() || equations.rows <= used.size()) return errors;
+  const auto count = static_cast<Index>(equations.columns());
+  const Eigen::MatrixXd product =
+      Eigen::Map<const RowMajor>(equations.product.values.data(), count, count)(used, used);
+  const Eigen::VectorXd scale = product.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * product * scale.asDiagonal();
+  const Eigen::FullPivLU<Eigen::MatrixXd> factors(scaled);
+  if (!factors.isInvertible()) return errors;
+  const Eigen::VectorXd spread = factors.inverse().diagonal();
+  const double variance =
+      equations.error(coefficients) / static_cast<double>(equations.rows - used.size());
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    const auto at = static_cast<Index>(i);
+    errors[static_cast<std::size_t>(used[i])] =
+        scale[at] * std::sqrt(variance * std::max(spread[at], 0.0));
+  }
+  return errors;
 }
 
 }  // namespace torsio

@@ -44,4 +44,9 @@ struct NonNegativeFit {
 [[nodiscard]] NonNegativeFit non_negative_least_squares(const NormalEquations& equations,
                                                         std::span<const std::uint8_t> is_free);
 
+/// sqrt(diag(s² (AᵀA)⁻¹)) over the columns whose coefficient is not 0, s² = |A c - y|² / (rows -
+/// columns); NaN for the others, and for all if these columns are dependent.
+[[nodiscard]] std::vector<double> standard_errors(const NormalEquations& equations,
+                                                  std::span<const double> coefficients);
+
 }  // namespace torsio

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/hysteresis_examples.hpp"
 #include "support/random_network.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/any_model.hpp"
@@ -78,6 +79,27 @@ inline GreyBox example<GreyBox>() {
   parameters.coefficients.values.values = {-70.0, 0.5, 80.0, 1.0, 1.5, 2.0, 1.0,
                                            30.0,  0.0, 0.25, 0.0, 1.2};
   return GreyBox(parameters);
+inline MaxwellSlipModel example<MaxwellSlipModel>() {
+  return example_maxwell_slip();
+}
+
+inline PrandtlIshlinskii example<PrandtlIshlinskii>() {
+  return example_prandtl_ishlinskii();
+
+inline ImprovedPrandtlIshlinskii example<ImprovedPrandtlIshlinskii>() {
+  return example_improved_prandtl_ishlinskii();
+
+inline BoucWenModel example<BoucWenModel>() {
+  return example_bouc_wen();
+
+inline NonlinearBacklash example<NonlinearBacklash>() {
+  return example_nonlinear_backlash();
+
+inline ImprovedNonlinearBacklash example<ImprovedNonlinearBacklash>() {
+  return example_improved_nonlinear_backlash();
+
+inline ExponentialLoading example<ExponentialLoading>() {
+  return example_exponential_loading();
 }
 
 /// A row of five Gaussians along 600 Nm/rad, and one behind them all.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "torsio/actuator/bouc_wen_loading.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {
@@ -75,19 +76,11 @@ class BoucWen {
       share = 0.0;
     }
     constexpr double kSettled = 24.0;  // what is missing to 1, exp(-1.5 u), is below its last bit
-    if (share >= 1.0 || travel >= kSettled) return 1.0;
     // 1 - z^1.5 <= 1.5 (1 - z): a step up to 2/3 ends below 1.
     constexpr double kLongestStep = 0.5;
-    const int steps = 1 + static_cast<int>(travel / kLongestStep);
-    const double step = travel / steps;
-    for (int i = 0; i < steps; ++i) {
-      const double middle = share + 0.5 * step * slope(share);
-      share += step * slope(middle);
-    }
-    return std::min(share, 1.0);
+    return bouc_wen_loading(share, travel, kLongestStep, kSettled,
+                            [](double z) { return z * std::sqrt(z); });
   }
-
-  static double slope(double share) noexcept { return 1.0 - share * std::sqrt(share); }
 
   Parameters parameters_;
   double per_knee_;  ///< 1 / X

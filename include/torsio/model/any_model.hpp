@@ -8,11 +8,14 @@
 #include <utility>
 #include <variant>
 
+#include "torsio/model/bouc_wen_model.hpp"
 #include "torsio/model/dgmm.hpp"
 #include "torsio/model/ensemble.hpp"
+#include "torsio/model/exponential_loading.hpp"
 #include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/grey_box.hpp"
 #include "torsio/model/gru.hpp"
+#include "torsio/model/improved_prandtl_ishlinskii.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
 #include "torsio/model/lstm.hpp"
@@ -20,6 +23,8 @@
 #include "torsio/model/model.hpp"
 #include "torsio/model/multivariate_polynomial.hpp"
 #include "torsio/model/narx.hpp"
+#include "torsio/model/nonlinear_backlash.hpp"
+#include "torsio/model/operator_sum.hpp"
 #include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
 
@@ -34,24 +39,31 @@ struct FamilyList {
 };
 
 /// Every family that model files and the command line know: one line each.
-using KnownFamilies = FamilyList<Linear,                        //
-                                 LinearCoulomb,                 //
-                                 Polynomial,                    //
-                                 Dgmm,                          //
-                                 GreyBox,                       //
-                                 GaussianProcess,               //
-                                 ParametricGp,                  //
-                                 Mlp,                           //
-                                 Lstm,                          //
-                                 Gru,                           //
-                                 MlpEnsemble,                   //
-                                 LstmEnsemble,                  //
-                                 GruEnsemble,                   //
-                                 Narx<Linear>,                  //
+using KnownFamilies = FamilyList<Linear,  //
+                                 LinearCoulomb,  //
+                                 Polynomial,  //
+                                 MaxwellSlipModel,  //
+                                 PrandtlIshlinskii,  //
+                                 ImprovedPrandtlIshlinskii,  //
+                                 BoucWenModel,  //
+                                 NonlinearBacklash,  //
+                                 ImprovedNonlinearBacklash,  //
+                                 ExponentialLoading,  //
+                                 Dgmm,  //
+                                 GreyBox,  //
+                                 GaussianProcess,  //
+                                 ParametricGp,  //
+                                 Mlp,  //
+                                 Lstm,  //
+                                 Gru,  //
+                                 MlpEnsemble,  //
+                                 LstmEnsemble,  //
+                                 GruEnsemble,  //
+                                 Narx<Linear>,  //
                                  Narx<MultivariatePolynomial>,  //
-                                 Narx<Dgmm>,                    //
-                                 Narx<Mlp>,                     //
-                                 Narx<GaussianProcess>,         //
+                                 Narx<Dgmm>,  //
+                                 Narx<Mlp>,  //
+                                 Narx<GaussianProcess>,  //
                                  Narx<ParametricGp>>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`

@@ -54,9 +54,10 @@ class SlipBank {
   void set_forces(std::span<const double> forces) noexcept TORSIO_REALTIME;
 
   /// Moves the input by `increment`; one that is no number moves nothing.
-  void move(double increment) noexcept TORSIO_REALTIME {
+  /// @param limit_scale >= 0: the limits of this tick are so many times f_i
+  void move(double increment, double limit_scale = 1.0) noexcept TORSIO_REALTIME {
     const double dx = finite(increment);
-    for (std::size_t i = 0; i < force_.size(); ++i) force_[i] = moved(i, dx);
+    for (std::size_t i = 0; i < force_.size(); ++i) force_[i] = moved(i, dx, limit_scale);
   }
 
   /// sum_i F_i
@@ -70,11 +71,12 @@ class SlipBank {
   }
 
   /// What `sum(weights)` would be if the input moved by `increment`, which it does not.
-  [[nodiscard]] double sum_after(double increment,
-                                 std::span<const double> weights) const noexcept TORSIO_REALTIME {
+  [[nodiscard]] double sum_after(double increment, std::span<const double> weights,
+                                 double limit_scale = 1.0) const noexcept TORSIO_REALTIME {
     const double dx = finite(increment);
-    return weighted(size_,
-                    [this, weights, dx](std::size_t i) { return weights[i] * moved(i, dx); });
+    return weighted(size_, [this, weights, dx, limit_scale](std::size_t i) {
+      return weights[i] * moved(i, dx, limit_scale);
+    });
   }
 
   /// `move`, then `sum`.
@@ -101,8 +103,8 @@ class SlipBank {
     return (lane[0] + lane[2]) + (lane[1] + lane[3]);
   }
 
-  [[nodiscard]] double moved(std::size_t i, double dx) const noexcept {
-    const double limit = limit_[i];
+  [[nodiscard]] double moved(std::size_t i, double dx, double limit_scale) const noexcept {
+    const double limit = limit_[i] * limit_scale;
     const double force = force_[i] + stiffness_[i] * dx;
     const double above = force < -limit ? -limit : force;
     return above > limit ? limit : above;

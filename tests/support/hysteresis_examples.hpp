@@ -1,0 +1,76 @@
+#pragma once
+
+#include <vector>
+
+#include "torsio/model/bouc_wen_model.hpp"
+#include "torsio/model/exponential_loading.hpp"
+#include "torsio/model/improved_prandtl_ishlinskii.hpp"
+#include "torsio/model/nonlinear_backlash.hpp"
+#include "torsio/model/operator_sum.hpp"
+
+namespace torsio::test {
+
+/// Models of two inputs, a deflection of +-0.1 rad and its rate, about 600 Nm/rad and +-6 Nm wide.
+inline MaxwellSlipModel example_maxwell_slip() {
+  MaxwellSlipModel::Parameters parameters;
+  parameters.thresholds = {0.001, 0.004, 0.01, 0.04, 0.09};
+  parameters.coefficients.values = Matrix(1, 8);
+  parameters.coefficients.values.values = {0.5, 550.0, 0.25, 900.0, 400.0, 150.0, 0.0, 30.0};
+  return MaxwellSlipModel(parameters);
+}
+
+/// The same said in plays: k_0 takes what the stops had, the weights turn.
+inline PrandtlIshlinskii example_prandtl_ishlinskii() {
+  PrandtlIshlinskii::Parameters parameters;
+  parameters.thresholds = {0.001, 0.004, 0.01, 0.04, 0.09};
+  parameters.coefficients.values = Matrix(1, 8);
+  parameters.coefficients.values.values = {0.5, 2030.0, 0.25, -900.0, -400.0, -150.0, 0.0, -30.0};
+  return PrandtlIshlinskii(parameters);
+}
+
+inline ImprovedPrandtlIshlinskii example_improved_prandtl_ishlinskii() {
+  return ImprovedPrandtlIshlinskii({.bias = 0.5,
+                                    .slopes = {1500.0, 0.25},
+                                    .weights = {-600.0, -300.0, -30.0},
+                                    .thresholds = {0.002, 0.01, 0.05},
+                                    .knots = {-40.0, -10.0, 15.0},
+                                    .bends = {0.3, -0.2, 0.4},
+                                    .rate_gain = 0.5,
+                                    .rate_feature = 1});
+}
+
+inline BoucWenModel example_bouc_wen() {
+  return BoucWenModel({.stiffness = 1200.0,
+                       .elastic_share = 0.5,
+                       .beta = 3000.0,
+                       .gamma = 1000.0,
+                       .exponent = 1.6,
+                       .bias = 0.5,
+                       .slopes = {0.0, 0.25},
+                       .half_range = 0.11});
+}
+
+inline Envelope example_envelope() {
+  return {.middle = {0.5, 55.0, 1.0, 6.0}, .half_width = {4.0, 0.5, 1.0}, .half_range = 0.11};
+}
+
+inline NonlinearBacklash example_nonlinear_backlash() {
+  return NonlinearBacklash(
+      {.stiffness = 3000.0, .boundaries = example_envelope(), .slopes = {0.0, 0.25}});
+}
+
+inline ImprovedNonlinearBacklash example_improved_nonlinear_backlash() {
+  return ImprovedNonlinearBacklash({.stiffness = 3000.0,
+                                    .boundaries = example_envelope(),
+                                    .slopes = {0.0, 0.25},
+                                    .rate = {.gain = 0.1, .exponent = 0.6, .feature = 1}});
+}
+
+inline ExponentialLoading example_exponential_loading() {
+  return ExponentialLoading({.curves = example_envelope(),
+                             .rising_decay = 60.0,
+                             .falling_decay = 90.0,
+                             .slopes = {0.0, 0.25}});
+}
+
+}  // namespace torsio::test
