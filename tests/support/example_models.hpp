@@ -79,25 +79,39 @@ inline GreyBox example<GreyBox>() {
   parameters.coefficients.values.values = {-70.0, 0.5, 80.0, 1.0, 1.5, 2.0, 1.0,
                                            30.0,  0.0, 0.25, 0.0, 1.2};
   return GreyBox(parameters);
+}
+
+template <>
 inline MaxwellSlipModel example<MaxwellSlipModel>() {
   return example_maxwell_slip();
 }
 
+template <>
 inline PrandtlIshlinskii example<PrandtlIshlinskii>() {
   return example_prandtl_ishlinskii();
+}
 
+template <>
 inline ImprovedPrandtlIshlinskii example<ImprovedPrandtlIshlinskii>() {
   return example_improved_prandtl_ishlinskii();
+}
 
+template <>
 inline BoucWenModel example<BoucWenModel>() {
   return example_bouc_wen();
+}
 
+template <>
 inline NonlinearBacklash example<NonlinearBacklash>() {
   return example_nonlinear_backlash();
+}
 
+template <>
 inline ImprovedNonlinearBacklash example<ImprovedNonlinearBacklash>() {
   return example_improved_nonlinear_backlash();
+}
 
+template <>
 inline ExponentialLoading example<ExponentialLoading>() {
   return example_exponential_loading();
 }
