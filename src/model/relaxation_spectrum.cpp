@@ -108,7 +108,7 @@ RelaxationSpectrum dual(const RelaxationSpectrum& of) {
 }
 
 /// Operators add; branches of one rate are one.
-RelaxationSpectrum sum_of(std::vector<RelaxationSpectrum> parts) {
+RelaxationSpectrum sum_of(const std::vector<RelaxationSpectrum>& parts) {
   RelaxationSpectrum sum;
   std::vector<RelaxationBranch> all;
   for (const RelaxationSpectrum& part : parts) {
@@ -173,7 +173,7 @@ RelaxationSpectrum relaxation_spectrum(const SpringDashpotNetwork& network) {
     std::vector<RelaxationSpectrum> parts(first, open.end());
     open.erase(first, open.end());
     if (is_series) std::ranges::transform(parts, parts.begin(), dual);
-    RelaxationSpectrum joined = sum_of(std::move(parts));
+    RelaxationSpectrum joined = sum_of(parts);
     open.push_back(is_series ? dual(joined) : std::move(joined));
   }
   if (open.size() != 1)

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "torsio/report/text_table.hpp"
 
@@ -18,18 +21,29 @@ std::string study_text(const StudyInfo& info, const Study& study) {
     text += fmt::format("plant {}, data sheet {}\n", plant.name, plant.fingerprint);
   const bool has_paper = std::ranges::any_of(
       study.rows, [](const StudyRow& row) { return row.paper_rmse.has_value(); });
+  const bool has_paper_fit = std::ranges::any_of(
+      study.rows, [](const StudyRow& row) { return row.paper_fit_percent.has_value(); });
   TextTable table;
   table.header(
       {"condition", "model", fmt::format("RMSE {}", study.unit), "+-", "% of max", "max", "runs"});
   if (has_paper) table.header({"paper"});
+  if (has_paper_fit) table.header({"fit %", "paper fit %"});
   std::string last;
   for (const StudyRow& row : study.rows) {
-    table.row({row.condition == last ? "" : row.condition, row.model,
-               fmt::format("{:.4g}", row.rmse),
-               row.runs > 1 ? fmt::format("{:.2g}", row.rmse_std) : "",
-               fmt::format("{:.1f}", row.percent), fmt::format("{:.4g}", row.largest),
-               fmt::format("{}", row.runs),
-               row.paper_rmse ? fmt::format("{:.4g}", *row.paper_rmse) : ""});
+    std::vector<std::string> cells{row.condition == last ? "" : row.condition,
+                                   row.model,
+                                   fmt::format("{:.4g}", row.rmse),
+                                   row.runs > 1 ? fmt::format("{:.2g}", row.rmse_std) : "",
+                                   fmt::format("{:.1f}", row.percent),
+                                   fmt::format("{:.4g}", row.largest),
+                                   fmt::format("{}", row.runs),
+                                   row.paper_rmse ? fmt::format("{:.4g}", *row.paper_rmse) : ""};
+    if (!has_paper) cells.pop_back();
+    if (has_paper_fit) {
+      cells.push_back(fmt::format("{:.2f}", row.fit_percent));
+      cells.push_back(row.paper_fit_percent ? fmt::format("{:.2f}", *row.paper_fit_percent) : "");
+    }
+    table.row(std::move(cells));
     last = row.condition;
   }
   return fmt::format(
@@ -61,7 +75,10 @@ std::string study_json(const StudyInfo& info, const Study& study) {
          {"rmse_std", row.rmse_std},
          {"percent_of_max_abs", row.percent},
          {"max_abs_target", row.largest},
-         {"paper_rmse", row.paper_rmse ? Json(*row.paper_rmse) : Json(nullptr)}});
+         {"paper_rmse", row.paper_rmse ? Json(*row.paper_rmse) : Json(nullptr)},
+         {"fit_percent", row.fit_percent},
+         {"paper_fit_percent",
+          row.paper_fit_percent ? Json(*row.paper_fit_percent) : Json(nullptr)}});
   return document.dump(2) + "\n";
 }
 

@@ -17,6 +17,8 @@ constexpr std::array kStudies{
               spring_models_001},
     StudyInfo{"001-inverse", "001, section 4.2",
               "The same the other way round, as its controller asks", inverse_models_001},
+    StudyInfo{"003-ladder", "003, Tables 2 and 3",
+              "What models of an elastomer coupling explain of its torque", ladder_003},
     StudyInfo{"004-encoders", "004, Table 4", "Which encoders an LSTM needs to tell the torque",
               encoders_004},
     StudyInfo{"004-torque", "004, Table 5", "Trained on 10 to 20 Nm, judged on 5 to 50 Nm",

@@ -13,7 +13,8 @@
 
 namespace torsio {
 
-void StudyRows::Sum::add(double rmse, double largest_target) {
+void StudyRows::Sum::add(const Metrics& metrics, double largest_target) {
+  const double rmse = metrics.rmse;
   ++runs;
   const auto n = static_cast<double>(runs);
   const double distance = rmse - mean;
@@ -21,10 +22,16 @@ void StudyRows::Sum::add(double rmse, double largest_target) {
   squares += distance * (rmse - mean);
   percent += (100.0 * rmse / largest_target - percent) / n;
   largest += (largest_target - largest) / n;
+  fit_percent += (metrics.fit_percent - fit_percent) / n;
 }
 
 void StudyRows::paper(const std::string& condition, const std::string& model, double rmse) {
   papers_.push_back({{condition, model}, rmse});
+}
+
+void StudyRows::paper_fit(const std::string& condition, const std::string& model,
+                          double fit_percent) {
+  paper_fits_.push_back({{condition, model}, fit_percent});
 }
 
 void StudyRows::require_fitted(const ResultRow& row) {
@@ -35,12 +42,16 @@ void StudyRows::require_fitted(const ResultRow& row) {
 
 std::string StudyRows::model_of(const ResultRow& row) {
   std::string model = row.family;
-  // A network's size is what a reader asks for; the rest of its settings are the study's.
-  if (const auto at = row.variant.find("layers="); at != std::string::npos) {
-    const auto begin = at + std::string_view("layers=").size();
+  // A network's size or name is what a reader asks for, and whether its values are the printed
+  // ones; the rest of its settings are the study's.
+  for (const std::string_view setting : {"layers=", "network="}) {
+    const auto at = row.variant.find(setting);
+    if (at == std::string::npos) continue;
+    const auto begin = at + setting.size();
     model = fmt::format("{} {}", model,
                         row.variant.substr(begin, row.variant.find(',', begin) - begin));
   }
+  if (row.variant.find("refine=false") != std::string::npos) model += " as printed";
   return row.input_set.empty() ? model : fmt::format("{}, {}", model, row.input_set);
 }
 
@@ -70,9 +81,12 @@ std::vector<StudyRow> StudyRows::rows() const {
         .rmse = sum.mean,
         .rmse_std = sum.runs < 2 ? 0.0 : std::sqrt(sum.squares / static_cast<double>(sum.runs - 1)),
         .percent = sum.percent,
-        .largest = sum.largest};
+        .largest = sum.largest,
+        .fit_percent = sum.fit_percent};
     for (const auto& [paper_key, rmse] : papers_)
       if (paper_key == key) row.paper_rmse = rmse;
+    for (const auto& [paper_key, fit_percent] : paper_fits_)
+      if (paper_key == key) row.paper_fit_percent = fit_percent;
     rows.push_back(std::move(row));
   }
   // Condition by condition, as they were met first.

@@ -9,6 +9,7 @@
 #include "torsio/train/fit_dgmm.hpp"
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
+#include "torsio/train/fit_viscoelastic.hpp"
 #include "train/fitted_model.hpp"
 #include "train/gaussian_process_families.hpp"
 #include "train/narx_families.hpp"
@@ -68,6 +69,18 @@ constexpr std::array kDgmmPaperOptions{
     OptionInfo{"spread", Kind::number, "0.15", 1e-6, 100,
                "of every Gaussian in every direction, in standard deviations"}};
 
+constexpr std::array kViscoelasticOptions{
+    OptionInfo{
+        "network", Kind::text, "generalised_maxwell(2)", 0, 0,
+        "springs and dashpots, like series(kv(k1, d1), k2), or a name: hooke, maxwell, "
+        "kelvin_voigt, standard_linear_solid, burgers, generalised_maxwell(n), 003a to 003d"},
+    OptionInfo{"refine", Kind::boolean, "true", 0, 0,
+               "false: the given values (k1=300) as they are, the offset alone is fitted"},
+    OptionInfo{"starts", Kind::integer, "10", 1, 1000, "of the search"},
+    OptionInfo{
+        "prior", Kind::number, "0", 0, 1000,
+        "draws the logarithm of each parameter towards its start value, within this; 0: off"}};
+
 FittedModel linear(const TrainingData& data, const Options& options, const FitContext& context) {
   report_progress(context.progress, 0.0, "fitting linear");
   return fitted_model(
@@ -117,6 +130,16 @@ FittedModel dgmm_paper(const TrainingData& data, const Options& options,
                                      context.progress));
 }
 
+FittedModel viscoelastic(const TrainingData& data, const Options& options,
+                         const FitContext& context) {
+  return fitted_model(fit_viscoelastic(data,
+                                       {.network = options.text("network"),
+                                        .starts = options.integer("starts"),
+                                        .prior = options.number("prior"),
+                                        .is_refined = options.boolean("refine")},
+                                       context));
+}
+
 constexpr std::array kShallowFamilies{
     FamilyInfo{Linear::kFamily, "spring with a bias: b + sum k x", kLinearOptions, linear},
     FamilyInfo{LinearCoulomb::kFamily, "spring with a bias and friction: b + sum k x + c tanh(r/v)",
@@ -124,6 +147,11 @@ constexpr std::array kShallowFamilies{
     FamilyInfo{Polynomial::kFamily,
                "curve of the first input, one for each direction: P(x) + sum k x",
                kPolynomialOptions, polynomial},
+    FamilyInfo{.name = Viscoelastic::kFamily,
+               .summary = "network of springs and dashpots that the first input deflects",
+               .options = kViscoelasticOptions,
+               .fit = viscoelastic,
+               .only_if_named = true},
     FamilyInfo{Dgmm::kFamily, "Gaussian mixture of target and inputs, learned sample by sample",
                kDgmmOptions, dgmm},
     FamilyInfo{"dgmm_paper", "the same as printed in the paper: for comparison only",

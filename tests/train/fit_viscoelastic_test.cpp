@@ -142,6 +142,17 @@ TEST(FitViscoelastic, APriorHoldsWhatTheDataLeaveOpen) {
     EXPECT_NEAR(held.table[j].value / other.table[j].value, 1.0, 1e-2) << held.table[j].name;
 }
 
+TEST(FitViscoelastic, TakesValuesAsTheyAre) {
+  const TrainingData data = data_of("003a", 0.0);
+  const auto fitted = fit_viscoelastic(data, {.network = "003a", .is_refined = false});
+  EXPECT_EQ(fitted.parameters.network, parse_network("003a"));
+  EXPECT_NEAR(fitted.parameters.offset, 0.3, 1e-9);
+  EXPECT_THAT(test::error_message([&] {
+                (void)fit_viscoelastic(data, {.network = "kv(k1=3, d1)", .is_refined = false});
+              }),
+              HasSubstr("a value for d1, like d1=1, since refine=false"));
+}
+
 TEST(FitViscoelastic, IsTheSameForASeedAndLeavesOtherInputsAlone) {
   TrainingData data = data_of("003a", 0.05);
   const auto first = fit_viscoelastic(data, {});

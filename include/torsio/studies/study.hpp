@@ -28,6 +28,8 @@ struct StudyRow {
   double percent = 0.0;   ///< mean of 100 rmse / (largest |target| of the judged recording)
   double largest = 0.0;   ///< mean of that largest |target|
   std::optional<double> paper_rmse = {};
+  double fit_percent = 0.0;                      ///< mean of `Metrics::fit_percent` (BF)
+  std::optional<double> paper_fit_percent = {};  ///< what the paper judges by, where it is that
 };
 
 /// A simulated bench that a study used.

@@ -14,6 +14,7 @@ struct ViscoelasticOptions {
   std::string network = "generalised_maxwell(2)";  ///< `parse_network`
   std::size_t starts = 10;                         ///< of the search, 1 or more
   double prior = 0.0;                              ///< see `fit_viscoelastic`; 0: none
+  bool is_refined = true;  ///< false: the given values as they are, the offset alone is fitted
 };
 
 /// Least squares over the free run, from the state at the start of each record that suits it best:
