@@ -68,6 +68,7 @@ constexpr std::array kBenches{
     Bench{"pgpr_step", pgpr_step},
     Bench{"slip_bank_step", slip_bank_step},
     Bench{"frols_40k", frols_40k, Peer{"numpy", write_frols_40k}},
+    Bench{"viscoelastic_step", viscoelastic_step},
 };
 
 struct Arguments {

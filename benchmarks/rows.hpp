@@ -41,6 +41,7 @@ Row pgpr_200k();
 Row pgpr_step();
 Row slip_bank_step();
 Row frols_40k();
+Row viscoelastic_step();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.

@@ -58,10 +58,25 @@ constexpr double kSameRate = 1e-3;
 /// Of a discrete model [s]; 0 of any other.
 template <class Parameters>
 double sample_period_of(const Parameters& parameters) {
-  if constexpr (requires { parameters.sample_period_s; }) return parameters.sample_period_s;
+  if constexpr (requires { requires Parameters::kRunsAtAnyRate; })
+    return 0.0;
+  else if constexpr (requires { parameters.sample_period_s; })
+    return parameters.sample_period_s;
   if constexpr (requires { parameters.members; })
     return parameters.members.empty() ? 0.0 : sample_period_of(parameters.members.front());
   return 0.0;
+}
+
+/// A continuous-time model is discretised anew for the rate that it is to run at.
+AnyModel::Parameters at_rate(AnyModel::Parameters parameters, double sample_rate_Hz) {
+  std::visit(
+      [&]<class P>(P& of) {
+        if constexpr (requires { requires P::kRunsAtAnyRate; })
+          if (of.sample_period_s > 0.0 && sample_rate_Hz > 0.0)
+            of.sample_period_s = 1.0 / sample_rate_Hz;
+      },
+      parameters);
+  return parameters;
 }
 
 /// A discrete model runs at the rate it was trained at; what is static is taken to any other.
@@ -139,7 +154,8 @@ ModelFile load_model(const std::filesystem::path& path, std::string_view expecte
 }
 
 Estimator make_estimator(const ModelFile& model) {
-  AnyModel checked(model.parameters);
+  (void)AnyModel(model.parameters);  // as they are in the file
+  AnyModel checked(at_rate(model.parameters, model.settings.sample_rate_Hz));
   check_sample_rate(model);
   return {model.settings, std::move(checked)};
 }

@@ -58,6 +58,16 @@ std::vector<Column> columns_of(const Study& study) {
     columns.push_back({"paper", [](const Study&, const StudyRow& row) {
                          return row.paper_rmse ? number(*row.paper_rmse) : std::string();
                        }});
+  if (any([](const StudyRow& row) { return row.paper_fit_percent.has_value(); })) {
+    columns.push_back({"fit %", [](const Study&, const StudyRow& row) {
+                         return fmt::format("{:.2f}", row.fit_percent);
+                       }});
+    columns.push_back({"paper fit %", [](const Study&, const StudyRow& row) {
+                         return row.paper_fit_percent
+                                    ? fmt::format("{:.2f}", *row.paper_fit_percent)
+                                    : std::string();
+                       }});
+  }
   if (any([](const StudyRow& row) { return row.diverged > 0; }))
     columns.push_back({"", [](const Study&, const StudyRow& row) {
                          return row.diverged == 0
@@ -134,7 +144,10 @@ std::string study_json(const StudyInfo& info, const Study& study) {
          {"one_step_rmse", row.one_step ? Json(*row.one_step) : Json(nullptr)},
          {"guarded_percent", row.guarded_percent},
          {"diverged", row.diverged},
-         {"paper_rmse", row.paper_rmse ? Json(*row.paper_rmse) : Json(nullptr)}});
+         {"paper_rmse", row.paper_rmse ? Json(*row.paper_rmse) : Json(nullptr)},
+         {"fit_percent", row.fit_percent},
+         {"paper_fit_percent",
+          row.paper_fit_percent ? Json(*row.paper_fit_percent) : Json(nullptr)}});
   return document.dump(2) + "\n";
 }
 

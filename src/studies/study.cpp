@@ -23,6 +23,8 @@ constexpr std::array kStudies{
               "Slow loops, until its clutch slips and after it", slow_loops_002},
     StudyInfo{"002-collision", "002, Figures 8 and 10", "The same in a drop test and a collision",
               collision_002},
+    StudyInfo{"003-ladder", "003, Tables 2 and 3",
+              "What models of an elastomer coupling explain of its torque", ladder_003},
     StudyInfo{"004-encoders", "004, Table 4", "Which encoders an LSTM needs to tell the torque",
               encoders_004},
     StudyInfo{"004-torque", "004, Table 5", "Trained on 10 to 20 Nm, judged on 5 to 50 Nm",

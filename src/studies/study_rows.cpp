@@ -30,10 +30,16 @@ void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
   samples += row.score.metrics.samples;
   guarded += row.score.guarded_samples;
   if (row.status == "diverged") ++diverged;
+  fit_percent += (row.score.metrics.fit_percent - fit_percent) / n;
 }
 
 void StudyRows::paper(const std::string& condition, const std::string& model, double rmse) {
   papers_.push_back({{condition, model}, rmse});
+}
+
+void StudyRows::paper_fit(const std::string& condition, const std::string& model,
+                          double fit_percent) {
+  paper_fits_.push_back({{condition, model}, fit_percent});
 }
 
 void StudyRows::require_fitted(const ResultRow& row) {
@@ -44,12 +50,16 @@ void StudyRows::require_fitted(const ResultRow& row) {
 
 std::string StudyRows::model_of(const ResultRow& row) {
   std::string model = row.family;
-  // A network's size is what a reader asks for; the rest of its settings are the study's.
-  if (const auto at = row.variant.find("layers="); at != std::string::npos) {
-    const auto begin = at + std::string_view("layers=").size();
+  // A network's size or name is what a reader asks for, and whether its values are the printed
+  // ones; the rest of its settings are the study's.
+  for (const std::string_view setting : {"layers=", "network="}) {
+    const auto at = row.variant.find(setting);
+    if (at == std::string::npos) continue;
+    const auto begin = at + setting.size();
     model = fmt::format("{} {}", model,
                         row.variant.substr(begin, row.variant.find(',', begin) - begin));
   }
+  if (row.variant.find("refine=false") != std::string::npos) model += " as printed";
   return row.input_set.empty() ? model : fmt::format("{}, {}", model, row.input_set);
 }
 
@@ -84,10 +94,13 @@ std::vector<StudyRow> StudyRows::rows() const {
         .blank = sum.blank,
         .guarded_percent = 100.0 * static_cast<double>(sum.guarded) /
                            static_cast<double>(std::max<std::size_t>(sum.samples, 1)),
-        .diverged = sum.diverged};
+        .diverged = sum.diverged,
+        .fit_percent = sum.fit_percent};
     if (sum.one_step_runs > 0) row.one_step = sum.one_step;
     for (const auto& [paper_key, rmse] : papers_)
       if (paper_key == key) row.paper_rmse = rmse;
+    for (const auto& [paper_key, fit_percent] : paper_fits_)
+      if (paper_key == key) row.paper_fit_percent = fit_percent;
     rows.push_back(std::move(row));
   }
   // Condition by condition, as they were met first.

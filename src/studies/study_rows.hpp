@@ -18,6 +18,8 @@ class StudyRows {
  public:
   /// What the paper found under this condition.
   void paper(const std::string& condition, const std::string& model, double rmse);
+  /// The same of a paper that judges by the best fit [%].
+  void paper_fit(const std::string& condition, const std::string& model, double fit_percent);
 
   /// The rows of single recordings in a split, each under its condition.
   /// @param condition_of (recording) -> condition
@@ -57,6 +59,7 @@ class StudyRows {
     std::size_t samples = 0;
     std::size_t guarded = 0;
     std::size_t diverged = 0;
+    double fit_percent = 0.0;
     void add(const ResultRow& row, double largest_target);
   };
   struct Key {
@@ -73,6 +76,7 @@ class StudyRows {
 
   std::vector<std::pair<Key, Sum>> sums_;
   std::vector<std::pair<Key, double>> papers_;
+  std::vector<std::pair<Key, double>> paper_fits_;
 };
 
 /// A hash of all numbers in the data sheet of an actuator.

@@ -10,6 +10,7 @@
 #include "torsio/train/fit_grey_box.hpp"
 #include "torsio/train/fit_linear.hpp"
 #include "torsio/train/fit_polynomial.hpp"
+#include "torsio/train/fit_viscoelastic.hpp"
 #include "train/fitted_model.hpp"
 #include "train/gaussian_process_families.hpp"
 #include "train/hysteresis_families.hpp"
@@ -69,6 +70,18 @@ constexpr std::array kDgmmPaperOptions{
     OptionInfo{"learning_rate", Kind::number, "0.02", 0, 1, "of the nearest Gaussian's mean"},
     OptionInfo{"spread", Kind::number, "0.15", 1e-6, 100,
                "of every Gaussian in every direction, in standard deviations"}};
+
+constexpr std::array kViscoelasticOptions{
+    OptionInfo{
+        "network", Kind::text, "generalised_maxwell(2)", 0, 0,
+        "springs and dashpots, like series(kv(k1, d1), k2), or a name: hooke, maxwell, "
+        "kelvin_voigt, standard_linear_solid, burgers, generalised_maxwell(n), 003a to 003d"},
+    OptionInfo{"refine", Kind::boolean, "true", 0, 0,
+               "false: the given values (k1=300) as they are, the offset alone is fitted"},
+    OptionInfo{"starts", Kind::integer, "10", 1, 1000, "of the search"},
+    OptionInfo{
+        "prior", Kind::number, "0", 0, 1000,
+        "draws the logarithm of each parameter towards its start value, within this; 0: off"}};
 
 FittedModel linear(const TrainingData& data, const Options& options, const FitContext& context) {
   report_progress(context.progress, 0.0, "fitting linear");
@@ -149,6 +162,16 @@ FittedModel dgmm_paper(const TrainingData& data, const Options& options,
                                      context.progress));
 }
 
+FittedModel viscoelastic(const TrainingData& data, const Options& options,
+                         const FitContext& context) {
+  return fitted_model(fit_viscoelastic(data,
+                                       {.network = options.text("network"),
+                                        .starts = options.integer("starts"),
+                                        .prior = options.number("prior"),
+                                        .is_refined = options.boolean("refine")},
+                                       context));
+}
+
 constexpr std::array kShallowFamilies{
     FamilyInfo{Linear::kFamily, "spring with a bias: b + sum k x", kLinearOptions, linear},
     FamilyInfo{LinearCoulomb::kFamily, "spring with a bias and friction: b + sum k x + c tanh(r/v)",
@@ -159,6 +182,11 @@ constexpr std::array kShallowFamilies{
     FamilyInfo{GreyBox::kFamily,
                "torsio's own: elastic curve, slip, relaxation and friction, as the data ask for",
                kGreyBoxOptions, grey_box},
+    FamilyInfo{.name = Viscoelastic::kFamily,
+               .summary = "network of springs and dashpots that the first input deflects",
+               .options = kViscoelasticOptions,
+               .fit = viscoelastic,
+               .only_if_named = true},
 };
 
 constexpr std::array kMixtureFamilies{

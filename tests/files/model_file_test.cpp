@@ -138,6 +138,14 @@ TEST(ModelFile, RunsAtAnotherRateIfTheUserSaysSo) {
   EXPECT_EQ(make_estimator(model).settings().sample_rate_Hz, 250.0);
 }
 
+TEST(ModelFile, OfAContinuousTimeModelIsDiscretisedForAnotherRate) {
+  ModelFile model = example_model_file(example<Viscoelastic>());
+  model.settings.sample_rate_Hz = 250.0;
+  const Estimator estimator = make_estimator(model);
+  EXPECT_EQ(estimator.model().get_if<Viscoelastic>()->sample_period(), 4e-3);
+  EXPECT_EQ(std::get<Viscoelastic::Parameters>(model.parameters).sample_period_s, 1e-3);
+}
+
 TEST(ModelFile, OfANetworkWithMemoryRunsAtItsOwnRateOnly) {
   ModelFile model = example_model_file(example<Gru>());
   model.settings.sample_rate_Hz = 1000.0 * (1.0 + 1e-4);  // as a clock measures it

@@ -19,6 +19,7 @@
 #include "torsio/model/mlp.hpp"
 #include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
+#include "torsio/model/viscoelastic.hpp"
 
 namespace torsio::test {
 
@@ -114,6 +115,16 @@ inline ImprovedNonlinearBacklash example<ImprovedNonlinearBacklash>() {
 template <>
 inline ExponentialLoading example<ExponentialLoading>() {
   return example_exponential_loading();
+}
+
+/// Relaxes within 50 ms and 3 s.
+template <>
+inline Viscoelastic example<Viscoelastic>() {
+  return Viscoelastic({.network = parse_network("series(kv(k1=900, d1=60), kv(k2=4000, d2=2000), "
+                                                "parallel(k3=2500, maxwell(k4=300, d4=15)))"),
+                       .offset = 0.5,
+                       .sample_period_s = 1e-3,
+                       .inputs = 2});
 }
 
 /// A row of five Gaussians along 600 Nm/rad, and one behind them all.

@@ -27,6 +27,7 @@
 #include "torsio/model/operator_sum.hpp"
 #include "torsio/model/parametric_gp.hpp"
 #include "torsio/model/polynomial.hpp"
+#include "torsio/model/viscoelastic.hpp"
 
 namespace torsio {
 
@@ -64,7 +65,8 @@ using KnownFamilies = FamilyList<Linear,  //
                                  Narx<Dgmm>,  //
                                  Narx<Mlp>,  //
                                  Narx<GaussianProcess>,  //
-                                 Narx<ParametricGp>>;
+                                 Narx<ParametricGp>,     //
+                                 Viscoelastic>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`
 /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch

@@ -33,6 +33,8 @@ struct StudyRow {
   std::size_t blank = 0;                ///< of the runs: fit_percent below 5, no more than the mean
   double guarded_percent = 0.0;         ///< of the scored samples, answered by a guard
   std::size_t diverged = 0;             ///< of the runs
+  double fit_percent = 0.0;             ///< mean of `Metrics::fit_percent` (BF)
+  std::optional<double> paper_fit_percent = {};  ///< what the paper judges by, where it is that
 };
 
 /// A simulated bench that a study used.
