@@ -26,9 +26,7 @@ void check_sections(const Sections& sections) {
           "sections", "1 to 50 rows of b0 b1 b2 a1 a2",
           std::to_string(sections.rows) + " x " + std::to_string(sections.columns));
   require(all_finite(sections.values), "sections", "finite numbers", "one that is not finite");
-  const double largest = largest_pole(sections);
-  require(largest < 1.0, "sections", "poles inside the unit circle",
-          "one at " + std::to_string(largest));
+  require(is_stable(sections), "sections", "poles inside the unit circle", "one that is not");
 }
 
 HammersteinWiener::Parameters checked(HammersteinWiener::Parameters p) {

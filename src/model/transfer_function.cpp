@@ -182,10 +182,13 @@ std::vector<Complex> zeros(const Sections& sections) {
   return found;
 }
 
-double largest_pole(const Sections& sections) {
-  double largest = 0.0;
-  for (const Complex pole : poles(sections)) largest = std::max(largest, std::abs(pole));
-  return largest;
+bool is_stable(const Sections& sections) noexcept {
+  for (std::size_t i = 0; i < sections.rows; ++i) {
+    const double a1 = sections(i, 3);
+    const double a2 = sections(i, 4);
+    if (!(std::abs(a2) < 1.0 && std::abs(a1) < 1.0 + a2)) return false;
+  }
+  return true;
 }
 
 double dc_gain(const Sections& sections) noexcept {

@@ -48,8 +48,9 @@ struct ContinuousTransfer {
 
 [[nodiscard]] std::vector<std::complex<double>> poles(const Sections& sections);
 [[nodiscard]] std::vector<std::complex<double>> zeros(const Sections& sections);
-/// |pole| of the largest; 0 without poles.
-[[nodiscard]] double largest_pole(const Sections& sections);
+/// Whether all poles are inside the unit circle: |a2| < 1 and |a1| < 1 + a2 in each section, which is exact
+/// where roots next to each other are known to half their digits only.
+[[nodiscard]] bool is_stable(const Sections& sections) noexcept;
 /// G(1).
 [[nodiscard]] double dc_gain(const Sections& sections) noexcept;
 
