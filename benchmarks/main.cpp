@@ -66,6 +66,8 @@ constexpr std::array kBenches{
     Bench{"gp_hyper_2000", gp_hyper_2000, Peer{"scikit-learn", write_gp_2000}},
     Bench{"pgpr_200k", pgpr_200k},
     Bench{"pgpr_step", pgpr_step},
+    Bench{"hw_fit_40k", hw_fit_40k, Peer{"Octave optim", write_hw_40k}},
+    Bench{"hw_step", hw_step},
 };
 
 struct Arguments {

@@ -39,6 +39,8 @@ Row gp_mean_5000();
 Row gp_hyper_2000();
 Row pgpr_200k();
 Row pgpr_step();
+Row hw_fit_40k();
+Row hw_step();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.
@@ -51,5 +53,6 @@ void write_gru64();
 void write_mlp();
 void write_gp_5000();
 void write_gp_2000();
+void write_hw_40k();
 
 }  // namespace torsio::bench

@@ -12,11 +12,11 @@ namespace torsio {
 namespace {
 
 static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<Polynomial> &&
-              Model<Dgmm> && Model<GaussianProcess> && Model<ParametricGp> && Model<Mlp> &&
-              Model<Lstm> && Model<Gru> && Model<MlpEnsemble> && Model<LstmEnsemble> &&
-              Model<GruEnsemble> && FeedsBack<Narx<Linear>> && FeedsBack<Narx<Dgmm>> &&
-              FeedsBack<Narx<Mlp>> && FeedsBack<Narx<GaussianProcess>> &&
-              FeedsBack<Narx<ParametricGp>>);
+              Model<Dgmm> && Model<GaussianProcess> && Model<ParametricGp> &&
+              HasState<HammersteinWiener> && Model<Mlp> && Model<Lstm> && Model<Gru> &&
+              Model<MlpEnsemble> && Model<LstmEnsemble> && Model<GruEnsemble> &&
+              FeedsBack<Narx<Linear>> && FeedsBack<Narx<Dgmm>> && FeedsBack<Narx<Mlp>> &&
+              FeedsBack<Narx<GaussianProcess>> && FeedsBack<Narx<ParametricGp>>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

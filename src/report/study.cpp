@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "torsio/report/text_table.hpp"
 
@@ -21,15 +24,26 @@ std::string study_text(const StudyInfo& info, const Study& study) {
   TextTable table;
   table.header(
       {"condition", "model", fmt::format("RMSE {}", study.unit), "+-", "% of max", "max", "runs"});
+  const bool has_fit = std::ranges::any_of(
+      study.rows, [](const StudyRow& row) { return row.fit_percent.has_value(); });
+  if (has_fit) table.header({"fit %", "paper's"});
   if (has_paper) table.header({"paper"});
   std::string last;
   for (const StudyRow& row : study.rows) {
-    table.row({row.condition == last ? "" : row.condition, row.model,
-               fmt::format("{:.4g}", row.rmse),
-               row.runs > 1 ? fmt::format("{:.2g}", row.rmse_std) : "",
-               fmt::format("{:.1f}", row.percent), fmt::format("{:.4g}", row.largest),
-               fmt::format("{}", row.runs),
-               row.paper_rmse ? fmt::format("{:.4g}", *row.paper_rmse) : ""});
+    std::vector<std::string> cells{row.condition == last ? "" : row.condition,
+                                   row.model,
+                                   fmt::format("{:.4g}", row.rmse),
+                                   row.runs > 1 ? fmt::format("{:.2g}", row.rmse_std) : "",
+                                   fmt::format("{:.1f}", row.percent),
+                                   fmt::format("{:.4g}", row.largest),
+                                   fmt::format("{}", row.runs)};
+    const auto add = [&](bool is_shown, const char* format, const std::optional<double>& value) {
+      if (is_shown) cells.push_back(value ? fmt::format(fmt::runtime(format), *value) : "");
+    };
+    add(has_fit, "{:.2f}", row.fit_percent);
+    add(has_fit, "{:.2f}", row.paper_fit_percent);
+    add(true, "{:.4g}", row.paper_rmse);
+    table.row(cells);
     last = row.condition;
   }
   return fmt::format(
@@ -61,7 +75,10 @@ std::string study_json(const StudyInfo& info, const Study& study) {
          {"rmse_std", row.rmse_std},
          {"percent_of_max_abs", row.percent},
          {"max_abs_target", row.largest},
-         {"paper_rmse", row.paper_rmse ? Json(*row.paper_rmse) : Json(nullptr)}});
+         {"fit_percent", row.fit_percent ? Json(*row.fit_percent) : Json(nullptr)},
+         {"paper_rmse", row.paper_rmse ? Json(*row.paper_rmse) : Json(nullptr)},
+         {"paper_fit_percent",
+          row.paper_fit_percent ? Json(*row.paper_fit_percent) : Json(nullptr)}});
   return document.dump(2) + "\n";
 }
 

@@ -13,7 +13,8 @@
 
 namespace torsio {
 
-void StudyRows::Sum::add(double rmse, double largest_target) {
+void StudyRows::Sum::add(const Metrics& metrics, double largest_target) {
+  const double rmse = metrics.rmse;
   ++runs;
   const auto n = static_cast<double>(runs);
   const double distance = rmse - mean;
@@ -21,10 +22,20 @@ void StudyRows::Sum::add(double rmse, double largest_target) {
   squares += distance * (rmse - mean);
   percent += (100.0 * rmse / largest_target - percent) / n;
   largest += (largest_target - largest) / n;
+  fit_percent += (metrics.fit_percent - fit_percent) / n;
 }
 
 void StudyRows::paper(const std::string& condition, const std::string& model, double rmse) {
   papers_.push_back({{condition, model}, rmse});
+}
+
+void StudyRows::paper_fit(const std::string& condition, const std::string& model, double percent) {
+  paper_fits_.push_back({{condition, model}, percent});
+}
+
+void StudyRows::call(const std::string& family, const std::string& variant,
+                     const std::string& model) {
+  names_.push_back({family, variant, model});
 }
 
 void StudyRows::require_fitted(const ResultRow& row) {
@@ -33,7 +44,9 @@ void StudyRows::require_fitted(const ResultRow& row) {
                .problem = row.reason});
 }
 
-std::string StudyRows::model_of(const ResultRow& row) {
+std::string StudyRows::model_of(const ResultRow& row) const {
+  for (const Name& name : names_)
+    if (name.family == row.family && name.variant == row.variant) return name.model;
   std::string model = row.family;
   // A network's size is what a reader asks for; the rest of its settings are the study's.
   if (const auto at = row.variant.find("layers="); at != std::string::npos) {
@@ -73,6 +86,9 @@ std::vector<StudyRow> StudyRows::rows() const {
         .largest = sum.largest};
     for (const auto& [paper_key, rmse] : papers_)
       if (paper_key == key) row.paper_rmse = rmse;
+    if (!paper_fits_.empty()) row.fit_percent = sum.fit_percent;
+    for (const auto& [paper_key, percent] : paper_fits_)
+      if (paper_key == key) row.paper_fit_percent = percent;
     rows.push_back(std::move(row));
   }
   // Condition by condition, as they were met first.

@@ -18,6 +18,10 @@ class StudyRows {
  public:
   /// What the paper found under this condition.
   void paper(const std::string& condition, const std::string& model, double rmse);
+  /// The same as a best fit; the study then tells its own, too.
+  void paper_fit(const std::string& condition, const std::string& model, double percent);
+  /// What a row of the table is called for a family with these settings, as `ModelChoice::variant` has them.
+  void call(const std::string& family, const std::string& variant, const std::string& model);
 
   /// The rows of single recordings in a split, each under its condition.
   /// @param condition_of (recording) -> condition
@@ -38,7 +42,8 @@ class StudyRows {
     double squares = 0.0;  ///< deviations from the mean
     double percent = 0.0;
     double largest = 0.0;
-    void add(double rmse, double largest_target);
+    double fit_percent = 0.0;
+    void add(const Metrics& metrics, double largest_target);
   };
   struct Key {
     std::string condition;
@@ -47,7 +52,12 @@ class StudyRows {
   };
 
   static void require_fitted(const ResultRow& row);
-  static std::string model_of(const ResultRow& row);
+  struct Name {
+    std::string family;
+    std::string variant;
+    std::string model;
+  };
+  [[nodiscard]] std::string model_of(const ResultRow& row) const;
   Sum& sum_of(Key key);
 
   template <class ConditionOf>
@@ -55,12 +65,14 @@ class StudyRows {
     require_fitted(row);
     if (!row.recording) return;
     sum_of({condition_of(*row.recording), model_of(row)})
-        .add(row.score.metrics.rmse, largest_target(dataset, *row.recording));
+        .add(row.score.metrics, largest_target(dataset, *row.recording));
   }
   static double largest_target(const Dataset& dataset, const std::string& recording);
 
   std::vector<std::pair<Key, Sum>> sums_;
   std::vector<std::pair<Key, double>> papers_;
+  std::vector<std::pair<Key, double>> paper_fits_;
+  std::vector<Name> names_;
 };
 
 /// A hash of all numbers in the data sheet of an actuator.

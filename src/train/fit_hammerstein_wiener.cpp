@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <ranges>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,7 +38,8 @@ void check_options(const HammersteinWienerOptions& options) {
 }
 
 void check_continuous(const HammersteinWienerOptions& options, const WienerShape& shape) {
-  if (!options.is_continuous || (shape.poles > 0 && shape.zeros <= shape.poles)) return;
+  if (options.continuous == ContinuousForm::none || (shape.poles > 0 && shape.zeros <= shape.poles))
+    return;
   throw UsageError({.place = "continuous",
                     .expected = "a pole or more, and no more zeros than poles",
                     .found = fmt::format("{} zeros, {} poles", shape.zeros, shape.poles)});
@@ -193,6 +195,18 @@ double rmse_of(const WienerData& own, double sum_of_squares) {
   return std::sqrt(sum_of_squares / static_cast<double>(own.judged_samples()));
 }
 
+ContinuousFit refine_or_refuse(const WienerData& own, const WienerNumbers& numbers,
+                               std::size_t iterations, const Progress& progress) {
+  ContinuousFit continuous = refined_in_continuous_time(own, numbers, iterations, progress);
+  if (!continuous.fit.has_converged)
+    throw Error({.place = "hammerstein_wiener: continuous",
+                 .problem = "the search in continuous time did not converge",
+                 .expected = fmt::format("an end within {} iterations", iterations),
+                 .found = fmt::format("RMSE {:.4g}", rmse_of(own, continuous.fit.sum_of_squares)),
+                 .advice = "Raise iterations, or take fewer poles."});
+  return continuous;
+}
+
 }  // namespace
 
 Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
@@ -224,35 +238,27 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
   WienerFit fit = fit_or_refuse(own, shape, options.iterations, last);
   const Telling telling(data, own);
   telling.table(fit.numbers, fitted);
-  HammersteinWiener::Parameters discrete = parameters_of(own, fit.numbers, data.input_count());
-  if (!options.is_continuous) {
-    telling.linear_part(discrete, fitted.notes);
-    telling.discrete_as_continuous(discrete, fitted.notes);
-    telling.what_is_held(discrete, fit.numbers, fitted.notes);
-    fitted.parameters = std::move(discrete);
-    return fitted;
+  const double discrete_rmse = rmse_of(own, fit.sum_of_squares);
+  telling.discrete_as_continuous(parameters_of(own, fit.numbers, 1), fitted.notes);
+  if (options.continuous == ContinuousForm::tustin) {
+    fit.numbers = held_between_samples(own, std::move(fit.numbers));
+    fitted.notes.push_back(fmt::format(
+        "its continuous form run by a first-order hold: training RMSE {:.4g}, discrete {:.4g}",
+        rmse_of(own, WienerError(own, fit.numbers).sum_of_squares(fit.numbers)), discrete_rmse));
+  } else if (options.continuous == ContinuousForm::refined) {
+    ContinuousFit continuous = refine_or_refuse(own, fit.numbers, options.iterations, last);
+    fitted.notes.push_back(fmt::format(
+        "refined in continuous time, the curves as they were: X/W = {}; training RMSE {:.4g}, "
+        "discrete {:.4g}",
+        fmt::join(continuous.sections |
+                      std::views::transform([](const auto& each) { return text_of(each); }),
+                  " * "),
+        rmse_of(own, continuous.fit.sum_of_squares), discrete_rmse));
+    fit = std::move(continuous.fit);
   }
-  telling.discrete_as_continuous(discrete, fitted.notes);
-  const ContinuousFit continuous =
-      refined_in_continuous_time(own, fit.numbers, options.iterations, last);
-  if (!continuous.fit.has_converged)
-    throw Error({.place = "hammerstein_wiener: continuous",
-                 .problem = "the search in continuous time did not converge",
-                 .expected = fmt::format("an end within {} iterations", options.iterations),
-                 .found = fmt::format("RMSE {:.4g}", rmse_of(own, continuous.fit.sum_of_squares)),
-                 .advice = "Raise iterations, or take fewer poles."});
-  std::vector<std::string> sections;
-  for (const ContinuousTransfer& section : continuous.sections)
-    sections.push_back(text_of(section));
-  fitted.notes.push_back(
-      fmt::format("refined in continuous time, the curves as they were: X/W = {}; training RMSE "
-                  "{:.4g}, discrete "
-                  "{:.4g}",
-                  fmt::join(sections, " * "), rmse_of(own, continuous.fit.sum_of_squares),
-                  rmse_of(own, fit.sum_of_squares)));
-  fitted.parameters = parameters_of(own, continuous.fit.numbers, data.input_count());
+  fitted.parameters = parameters_of(own, fit.numbers, data.input_count());
   telling.linear_part(fitted.parameters, fitted.notes);
-  telling.what_is_held(fitted.parameters, continuous.fit.numbers, fitted.notes);
+  telling.what_is_held(fitted.parameters, fit.numbers, fitted.notes);
   return fitted;
 }
 

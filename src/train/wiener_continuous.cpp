@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -85,6 +86,19 @@ WienerData inner_data(const WienerData& data, const WienerNumbers& numbers) {
 }
 
 }  // namespace
+
+WienerNumbers held_between_samples(const WienerData& data, WienerNumbers numbers) {
+  for (std::size_t i = 0; i < numbers.sections.rows; ++i) {
+    const auto g = numbers.sections.row(i);
+    const DiscreteTransfer held = first_order_hold(
+        tustin(DiscreteTransfer{{g[0], g[1], g[2]}, {1.0, g[3], g[4]}}, data.sample_period_s),
+        data.sample_period_s);
+    std::ranges::copy(held.numerator, g.begin());
+    std::copy(held.denominator.begin() + 1, held.denominator.end(), g.begin() + 3);
+  }
+  numbers.start = {};
+  return numbers;
+}
 
 ContinuousFit refined_in_continuous_time(const WienerData& data, const WienerNumbers& numbers,
                                          std::size_t iterations, const Progress& progress) {

@@ -41,6 +41,13 @@ std::string text_of(const WienerShape& shape) {
                      shape.output_values - 1);
 }
 
+Progress share_of(const Progress& progress, double begin, double length) {
+  if (!progress) return {};
+  return [&progress, begin, length](double share, std::string_view doing) {
+    return progress(begin + length * share, doing);
+  };
+}
+
 /// The data with one fold left out, or with nothing else.
 WienerData fold_of(WienerData data, std::size_t fold, bool is_held_out) {
   for (WienerRecord& record : data.records)
@@ -53,7 +60,7 @@ WienerData fold_of(WienerData data, std::size_t fold, bool is_held_out) {
 double held_out_error(const WienerData& data, const WienerShape& shape, std::size_t iterations,
                       const Progress& progress) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  const auto whole = fit_shape(data, shape, iterations, progress);
+  const auto whole = fit_shape(data, shape, iterations, share_of(progress, 0.0, 0.5));
   if (!whole || !whole->has_converged) return kNone;
   double sum = 0.0;
   std::size_t samples = 0;
@@ -83,10 +90,10 @@ class ShapeSearch {
     std::vector<double> errors;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const double length = (end - begin) / static_cast<double>(shapes.size());
+      const Progress told = share_of(progress_, begin + static_cast<double>(i) * length, length);
       const Progress part = [&](double share, std::string_view doing) {
-        const double done = (static_cast<double>(i) + share) / static_cast<double>(shapes.size());
-        return !progress_ || progress_(begin + (end - begin) * done,
-                                       fmt::format("{}: {}", text_of(shapes[i]), doing));
+        return !told || told(share, fmt::format("{}: {}", text_of(shapes[i]), doing));
       };
       errors.push_back(held_out_error(data_, shapes[i], iterations_, part));
       least = std::min(least, errors.back());
@@ -143,8 +150,11 @@ std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& sh
   const std::size_t sections = (std::max({shape.zeros, shape.poles, std::size_t{1}}) + 1) / 2;
   const bool has_start = 2 * sections * data.records.size() <= kMostStarts;
   std::optional<WienerFit> best;
-  for (const WienerNumbers& start : wiener_starts(data, shape, has_start)) {
-    WienerFit fit = refined(data, start, iterations, progress);
+  const std::vector<WienerNumbers> starts = wiener_starts(data, shape, has_start);
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const auto begin = static_cast<double>(i) / static_cast<double>(starts.size());
+    WienerFit fit = refined(data, starts[i], iterations,
+                            share_of(progress, begin, 1.0 / static_cast<double>(starts.size())));
     // A search that ended goes before one that did not, whatever its error.
     if (!best || std::pair(!fit.has_converged, fit.sum_of_squares) <
                      std::pair(!best->has_converged, best->sum_of_squares))

@@ -51,6 +51,10 @@ struct ContinuousFit {
   WienerFit fit;
   std::vector<ContinuousTransfer> sections;  ///< whose product X/W is
 };
+/// G by Tustin in continuous time and back by an exact first-order hold, section by section; records from
+/// rest.
+[[nodiscard]] WienerNumbers held_between_samples(const WienerData& data, WienerNumbers numbers);
+
 /// G in continuous time, (a s^2 + b s + c) / (s^2 + d s + e) a section, d, e > 0 by their logarithms, run by
 /// an exact first-order hold; from Tustin's form of G and from slow poles.
 [[nodiscard]] ContinuousFit refined_in_continuous_time(const WienerData& data,

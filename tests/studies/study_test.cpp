@@ -47,6 +47,22 @@ TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
     EXPECT_EQ(again.rows[i].rmse, study.rows[i].rmse) << study.rows[i].model;
 }
 
+TEST(Studies, OfTheElastomerCouplingClimbFromALineToDynamics) {
+  const Study study = run_study(find_study("003-hammerstein-wiener"), kQuick);
+  ASSERT_EQ(study.plants.size(), 2U);
+  for (const char* condition : {"bonded", "unbonded"}) {
+    const StudyRow& line = row_of(study, condition, "linear");
+    const StudyRow& discrete = row_of(study, condition, "HW discrete");
+    EXPECT_LT(discrete.rmse, line.rmse) << condition;
+    EXPECT_GT(discrete.fit_percent.value(), line.fit_percent.value()) << condition;
+  }
+  EXPECT_EQ(row_of(study, "bonded", "HW discrete").paper_fit_percent, 77.73);
+  const std::string text = study_text(find_study("003-hammerstein-wiener"), study);
+  EXPECT_THAT(text, HasSubstr("fit %"));
+  const auto json = nlohmann::json::parse(study_json(find_study("003-hammerstein-wiener"), study));
+  EXPECT_TRUE(json["rows"][0]["fit_percent"].is_number());
+}
+
 TEST(Studies, AreFoundByNameAndRefuseNoRepeats) {
   EXPECT_THROW((void)find_study("004-tub"), UsageError);
   EXPECT_THROW((void)run_study(find_study("004-tubes"), {.repeats = 0}), UsageError);

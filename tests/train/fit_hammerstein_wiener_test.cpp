@@ -6,11 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "hammerstein_wiener_example.hpp"
 #include "support/error_message.hpp"
+#include "torsio/train/families.hpp"
+#include "torsio/train/initial_state.hpp"
 #include "torsio/train/model_run.hpp"
 
 namespace torsio {
@@ -149,7 +153,7 @@ TEST(FitHammersteinWiener, GoesToContinuousTimeAndWarnsOfArtefacts) {
   slow.sections = hammerstein_wiener_of(Paper003::refined).sections;
   HammersteinWienerOptions options = kTrueShape;
   options.zeros = 2;  // as a first-order hold makes of two poles
-  options.is_continuous = true;
+  options.continuous = ContinuousForm::refined;
   const auto refined = fit_hammerstein_wiener(recorded(slow, 8000, 0.002, 8), options);
   EXPECT_THAT(refined.notes, Contains(HasSubstr("refined in continuous time")));
   const auto found = sorted_poles(refined.parameters.sections);
@@ -190,7 +194,7 @@ TEST(FitHammersteinWiener, RefusesWhatTellsNothing) {
   EXPECT_THAT(message(good, wrong), HasSubstr("zeros"));
   auto improper = kTrueShape;
   improper.zeros = 3;
-  improper.is_continuous = true;
+  improper.continuous = ContinuousForm::refined;
   EXPECT_THAT(message(good, improper), HasSubstr("no more zeros than poles"));
   TrainingData unseen = good;
   for (double& u : unseen.sequences[0].features.values)
@@ -207,6 +211,48 @@ TEST(FitHammersteinWiener, SaysThatItDidNotConverge) {
                                              hurried);
               }),
               AllOf(HasSubstr("did not converge"), HasSubstr("within 1 iterations")));
+}
+
+TEST(FitHammersteinWiener, GoesOnFromTheMiddleOfAMovement) {
+  const TrainingData data = recorded(known_hammerstein_wiener(), 600, 0.0, 10);
+  const Sequence& whole = data.sequences.front();
+  constexpr std::size_t kBegin = 300;
+  constexpr std::size_t kTold = 50;
+  Matrix told(kTold, 1);
+  for (std::size_t n = 0; n < kTold; ++n) told(n, 0) = whole.features(kBegin + n, 0);
+  AnyModel model{HammersteinWiener(known_hammerstein_wiener())};
+  start_where_measured(model, told, std::span(whole.target).subspan(kBegin, kTold));
+  for (std::size_t n = kBegin; n < whole.target.size(); ++n) {
+    const double value = model.step(whole.features.row(n)).value;
+    EXPECT_NEAR(value, whole.target[n], 1e-3) << n;
+  }
+}
+
+FittedModel fitted_with(const TrainingData& data, const std::map<std::string, std::string>& given) {
+  const FamilyInfo& family = find_family("hammerstein_wiener");
+  return family.fit(data, Options(family.options, given), {});
+}
+
+TEST(HammersteinWienerFamily, LoadsThePapersCoefficientsAsTheyAre) {
+  TrainingData data = recorded(hammerstein_wiener_of(Paper003::refined), 500, 0.0, 11);
+  data.target = "torque_Nm";
+  const FittedModel loaded = fitted_with(data, {{"published", "refined"}});
+  EXPECT_EQ(evaluate(loaded.model, data).rmse, 0.0);
+  EXPECT_THAT(loaded.notes, Contains(HasSubstr("not fitted: u_1 in rad")));
+  data.sample_rate_Hz = 100.0;
+  EXPECT_THAT(test::error_message([&] {
+                (void)fitted_with(data, {{"published", "tustin"}});
+              }),
+              HasSubstr("expected 200 Hz, found 100 Hz"));
+}
+
+TEST(HammersteinWienerFamily, RefusesWordsThatItDoesNotKnow) {
+  const TrainingData data = recorded(known_hammerstein_wiener(), 500, 0.0, 11);
+  for (const char* option : {"structure", "map", "continuous", "published"})
+    EXPECT_THAT(test::error_message([&] {
+                  (void)fitted_with(data, {{option, "maybe"}});
+                }),
+                AllOf(HasSubstr(option), HasSubstr("\"maybe\"")));
 }
 
 TEST(FitHammersteinWiener, TellsWhatTheDataLeaveOpen) {

@@ -12,6 +12,7 @@
 #include "torsio/model/ensemble.hpp"
 #include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/gru.hpp"
+#include "torsio/model/hammerstein_wiener.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
 #include "torsio/model/lstm.hpp"
@@ -38,6 +39,7 @@ using KnownFamilies = FamilyList<Linear,                 //
                                  Dgmm,                   //
                                  GaussianProcess,        //
                                  ParametricGp,           //
+                                 HammersteinWiener,      //
                                  Mlp,                    //
                                  Lstm,                   //
                                  Gru,                    //

@@ -27,7 +27,10 @@ struct StudyRow {
   double rmse_std = 0.0;  ///< of one run
   double percent = 0.0;   ///< mean of 100 rmse / (largest |target| of the judged recording)
   double largest = 0.0;   ///< mean of that largest |target|
+  std::optional<double> fit_percent =
+      {};  ///< mean best fit, SPEC section 3.10, in studies that ask for it
   std::optional<double> paper_rmse = {};
+  std::optional<double> paper_fit_percent = {};
 };
 
 /// A simulated bench that a study used.

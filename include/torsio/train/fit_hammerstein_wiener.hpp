@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "torsio/model/hammerstein_wiener.hpp"
@@ -9,6 +10,13 @@
 #include "torsio/train/training_data.hpp"
 
 namespace torsio {
+
+/// What becomes of G after the fit in discrete time.
+enum class ContinuousForm : std::uint8_t {
+  none,
+  tustin,   ///< G by Tustin in continuous time, run by an exact first-order hold
+  refined,  ///< second stage: refined in continuous time, the curves as found
+};
 
 struct HammersteinWienerOptions {
   /// Empty: searched for, or 1 zero, 2 poles, degrees 2 and 3, as in paper 003.
@@ -19,7 +27,7 @@ struct HammersteinWienerOptions {
   bool is_piecewise_linear = false;
   std::size_t knots = 5;  ///< of each curve, if piecewise linear
   bool is_searched = true;
-  bool is_continuous = false;  ///< second stage: G refined in continuous time, the curves as found
+  ContinuousForm continuous = ContinuousForm::none;
   std::size_t iterations = 200;  ///< of one search, at most
 };
 
