@@ -69,6 +69,8 @@ constexpr std::array kBenches{
     Bench{"slip_bank_step", slip_bank_step},
     Bench{"frols_40k", frols_40k, Peer{"numpy", write_frols_40k}},
     Bench{"viscoelastic_step", viscoelastic_step},
+    Bench{"hw_fit_40k", hw_fit_40k, Peer{"Octave optim", write_hw_40k}},
+    Bench{"hw_step", hw_step},
 };
 
 struct Arguments {

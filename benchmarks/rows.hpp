@@ -42,6 +42,8 @@ Row pgpr_step();
 Row slip_bank_step();
 Row frols_40k();
 Row viscoelastic_step();
+Row hw_fit_40k();
+Row hw_step();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.
@@ -55,5 +57,6 @@ void write_mlp();
 void write_gp_5000();
 void write_gp_2000();
 void write_frols_40k();
+void write_hw_40k();
 
 }  // namespace torsio::bench

@@ -21,7 +21,7 @@ static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<
 static_assert(HasState<MaxwellSlipModel> && HasState<PrandtlIshlinskii> &&
               HasState<ImprovedPrandtlIshlinskii> && HasState<BoucWenModel> &&
               HasState<NonlinearBacklash> && HasState<ImprovedNonlinearBacklash> &&
-              HasState<ExponentialLoading> &&
+              HasState<ExponentialLoading> && HasState<HammersteinWiener> &&
               HasState<Viscoelastic> && HasState<GreyBox>);
 static_assert(Invertible<AnyModel>);
 

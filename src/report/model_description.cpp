@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "torsio/core/units.hpp"
+#include "torsio/model/hammerstein_wiener.hpp"
 #include "torsio/model/network_layers.hpp"
 #include "torsio/model/parameters.hpp"
 #include "torsio/report/text_table.hpp"
@@ -95,6 +96,22 @@ std::string parameter_lines(const std::vector<Leaf>& leaves) {
   return fmt::format("{}\n", fmt::join(lines, "\n"));
 }
 
+/// The linear part of a Hammerstein-Wiener model in words; else nothing.
+std::string linear_part_lines(const ModelFile& model) {
+  const auto* of = std::get_if<HammersteinWiener::Parameters>(&model.parameters);
+  if (of == nullptr) return {};
+  constexpr std::size_t kReadableOrder = 4;
+  const DiscreteTransfer g = transfer_of(of->sections);
+  std::string text;
+  if (g.denominator.size() > 1 && g.denominator.size() <= kReadableOrder)
+    text += fmt::format("linear part in continuous time, by Tustin: {}\n",
+                        text_of(tustin(g, of->sample_period_s)));
+  if (const std::string warning = continuous_warning(of->sections, of->sample_period_s);
+      !warning.empty())
+    text += fmt::format("{}\n", warning);
+  return text;
+}
+
 /// The covariance function of a Gaussian process in words, its numbers included; else nothing.
 std::string kernel_line(const ModelFile& model) {
   return std::visit(
@@ -151,8 +168,8 @@ std::string model_description(const ModelFile& model) {
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
   std::vector<Leaf> leaves = leaves_of(model);
   std::erase_if(leaves, [](const Leaf& leaf) { return leaf.name.starts_with("kernel."); });
-  text +=
-      fmt::format("\n{}{}{}", kernel_line(model), equation_line(model), parameter_lines(leaves));
+  text += fmt::format("\n{}{}{}{}", kernel_line(model), equation_line(model),
+                      linear_part_lines(model), parameter_lines(leaves));
   return text;
 }
 

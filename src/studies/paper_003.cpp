@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -27,6 +28,14 @@ struct Rung {
 constexpr std::array kLadder{
     Rung{"linear", "linear"},
     Rung{"polynomial", "polynomial"},
+    Rung{"grey_box", "grey_box"},
+    Rung{"hammerstein_wiener:published=discrete", "Hammerstein-Wiener as printed"},
+    Rung{"hammerstein_wiener:published=tustin", "its Tustin form as printed"},
+    Rung{"hammerstein_wiener:published=refined", "refined, as printed"},
+    Rung{"hammerstein_wiener:structure=given", "Hammerstein-Wiener", 77.73},
+    Rung{"hammerstein_wiener:structure=given:continuous=tustin", "its Tustin form"},
+    Rung{"hammerstein_wiener:structure=given:continuous=refined", "refined in continuous time",
+         86.13},
     Rung{"viscoelastic:network=003a:refine=false", "viscoelastic 003a as printed"},
     Rung{"viscoelastic:network=003a", "viscoelastic 003a", 84.76},
     Rung{"viscoelastic:network=003b", "viscoelastic 003b", 84.75},
@@ -106,8 +115,15 @@ Study ladder_003(const StudyOptions& options, const Progress& progress) {
       Ladder ladder = ladder_of(kCouplings[c], seed, options.is_quick);
       const auto choices = model_choices(ladder.dataset, models(), {"spring_deflection_rad"});
       const Results results = compare(ladder.dataset, choices, seed, false, part).results;
-      rows.add(results, ladder.dataset, Role::test,
-               [&](const std::string& recording) { return ladder.condition_of(recording); });
+      rows.add(
+          results, ladder.dataset, Role::test,
+          [&](const std::string& recording) { return ladder.condition_of(recording); },
+          [&](const ResultRow& row) {
+            const auto choice = std::ranges::find_if(choices, [&](const ModelChoice& each) {
+              return each.family == row.family && each.variant() == row.variant;
+            });
+            return std::string(kLadder[static_cast<std::size_t>(choice - choices.begin())].name);
+          });
     }
   }
   study.rows = rows.rows();

@@ -50,16 +50,12 @@ void StudyRows::require_fitted(const ResultRow& row) {
 
 std::string StudyRows::model_of(const ResultRow& row) {
   std::string model = row.family;
-  // A network's size or name is what a reader asks for, and whether its values are the printed
-  // ones; the rest of its settings are the study's.
-  for (const std::string_view setting : {"layers=", "network="}) {
-    const auto at = row.variant.find(setting);
-    if (at == std::string::npos) continue;
-    const auto begin = at + setting.size();
+  // A network's size is what a reader asks for; the rest of its settings are the study's.
+  if (const auto at = row.variant.find("layers="); at != std::string::npos) {
+    const auto begin = at + std::string_view("layers=").size();
     model = fmt::format("{} {}", model,
                         row.variant.substr(begin, row.variant.find(',', begin) - begin));
   }
-  if (row.variant.find("refine=false") != std::string::npos) model += " as printed";
   return row.input_set.empty() ? model : fmt::format("{}, {}", model, row.input_set);
 }
 

@@ -13,6 +13,7 @@
 #include "torsio/train/fit_viscoelastic.hpp"
 #include "train/fitted_model.hpp"
 #include "train/gaussian_process_families.hpp"
+#include "train/hammerstein_wiener_families.hpp"
 #include "train/hysteresis_families.hpp"
 #include "train/narx_families.hpp"
 #include "train/network_families.hpp"
@@ -204,6 +205,8 @@ std::span<const FamilyInfo> families() noexcept {
     for (const auto more : {hysteresis_families(), std::span<const FamilyInfo>(kMixtureFamilies),
                             gaussian_process_families(), network_families()})
       list.insert(list.end(), more.begin(), more.end());
+    const auto hammerstein_wiener = hammerstein_wiener_families();
+    list.insert(list.end(), hammerstein_wiener.begin(), hammerstein_wiener.end());
     const auto with_feedback = narx_families(list);
     list.insert(list.end(), with_feedback.begin(), with_feedback.end());
     return list;

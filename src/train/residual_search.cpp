@@ -215,14 +215,16 @@ SearchResult minimise_squares_from(const ResidualProblem& problem,
 ParameterUncertainty uncertainty_of(const ResidualProblem& problem, std::span<const double> theta,
                                     std::span<const double> typical) {
   const auto count = static_cast<Eigen::Index>(theta.size());
-  const auto samples = static_cast<Eigen::Index>(problem.residuals);
+  const auto residual_count = static_cast<Eigen::Index>(problem.residuals);
+  const Eigen::Index samples =
+      problem.samples > 0 ? static_cast<Eigen::Index>(problem.samples) : residual_count;
   ParameterUncertainty found{.std_error = std::vector<double>(theta.size(), kNotMeasured),
                              .null_directions = {}};
   std::vector<double> residuals(problem.residuals);
   std::vector<double> values(problem.residuals * theta.size());
   if (samples <= count || !evaluate(problem, theta, typical, residuals, values)) return found;
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  Eigen::MatrixXd jacobian = Eigen::Map<const RowMajor>(values.data(), samples, count);
+  Eigen::MatrixXd jacobian = Eigen::Map<const RowMajor>(values.data(), residual_count, count);
   Eigen::VectorXd scale(count);
   for (Eigen::Index j = 0; j < count; ++j)
     scale[j] = typical_of(typical, theta, static_cast<std::size_t>(j));
@@ -234,7 +236,7 @@ ParameterUncertainty uncertainty_of(const ResidualProblem& problem, std::span<co
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeFullV);
   const Eigen::VectorXd& strengths = svd.singularValues();
   const double variance =
-      Eigen::Map<const Eigen::VectorXd>(residuals.data(), samples).squaredNorm() /
+      Eigen::Map<const Eigen::VectorXd>(residuals.data(), residual_count).squaredNorm() /
       static_cast<double>(samples - count);
   constexpr double kWeakest = 1e-6;
   constexpr double kPart = 0.05;

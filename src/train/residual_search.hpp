@@ -19,6 +19,8 @@ struct ResidualProblem {
                      std::span<double> jacobian)>
       evaluate;
   bool has_jacobian = false;  ///< else J is taken from central differences
+  /// That the residuals stand for, where they are the triangle of a longer list; 0: as many.
+  std::size_t samples = 0;
 };
 
 struct SearchOptions {

@@ -47,6 +47,19 @@ TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
     EXPECT_EQ(again.rows[i].rmse, study.rows[i].rmse) << study.rows[i].model;
 }
 
+TEST(Studies, OfTheElastomerCouplingClimbFromALineToDynamics) {
+  const Study study = run_study(find_study("003-ladder"), kQuick);
+  ASSERT_EQ(study.plants.size(), 2U);
+  const StudyRow& line = row_of(study, "bonded, triangles", "linear");
+  for (const char* model : {"Hammerstein-Wiener", "viscoelastic 003a"}) {
+    const StudyRow& row = row_of(study, "bonded, triangles", model);
+    EXPECT_LT(row.rmse, line.rmse) << model;
+    EXPECT_GT(row.fit_percent, line.fit_percent) << model;
+  }
+  EXPECT_EQ(row_of(study, "bonded, triangles", "Hammerstein-Wiener").paper_fit_percent, 77.73);
+  EXPECT_THAT(study_text(find_study("003-ladder"), study), HasSubstr("paper fit %"));
+}
+
 TEST(Studies, OfTheRubberSensorSayWhetherPgprBeatsALine) {
   const Study study = run_study(find_study("002-table3"), kQuick);
   EXPECT_EQ(study.full_scale, 0.5);

@@ -13,6 +13,7 @@
 #include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/grey_box.hpp"
 #include "torsio/model/gru.hpp"
+#include "torsio/model/hammerstein_wiener.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
 #include "torsio/model/lstm.hpp"
@@ -156,6 +157,20 @@ inline Dgmm example<Dgmm>() {
                       .thin_log_density = -5.0,
                       .thin_log_density_inverse = -5.0};
   return Dgmm(parameters);
+}
+
+/// Two sections; of the two inputs it uses the first.
+template <>
+inline HammersteinWiener example<HammersteinWiener>() {
+  return HammersteinWiener(
+      {.inputs = 2,
+       .sample_period_s = 1e-3,
+       .rest_input = 0.01,
+       .input = {.knots = {-0.1, 0.0, 0.1}, .values = {-1.2, 0.0, 1.0}},
+       .sections = sections_of({{1.0, -0.7, 0.2, 0.1}, {1.0, -1.5, 0.8, -0.2}}),
+       .output = {.values = {0.2, 20.0, 0.4, 0.1}},
+       .lowest = -8.0,
+       .highest = 8.0});
 }
 
 template <>

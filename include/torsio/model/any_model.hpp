@@ -15,6 +15,7 @@
 #include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/grey_box.hpp"
 #include "torsio/model/gru.hpp"
+#include "torsio/model/hammerstein_wiener.hpp"
 #include "torsio/model/improved_prandtl_ishlinskii.hpp"
 #include "torsio/model/linear.hpp"
 #include "torsio/model/linear_coulomb.hpp"
@@ -40,32 +41,33 @@ struct FamilyList {
 };
 
 /// Every family that model files and the command line know: one line each.
-using KnownFamilies = FamilyList<Linear,  //
-                                 LinearCoulomb,  //
-                                 Polynomial,  //
-                                 MaxwellSlipModel,  //
-                                 PrandtlIshlinskii,  //
-                                 ImprovedPrandtlIshlinskii,  //
-                                 BoucWenModel,  //
-                                 NonlinearBacklash,  //
-                                 ImprovedNonlinearBacklash,  //
-                                 ExponentialLoading,  //
-                                 Dgmm,  //
-                                 GreyBox,  //
-                                 GaussianProcess,  //
-                                 ParametricGp,  //
-                                 Mlp,  //
-                                 Lstm,  //
-                                 Gru,  //
-                                 MlpEnsemble,  //
-                                 LstmEnsemble,  //
-                                 GruEnsemble,  //
-                                 Narx<Linear>,  //
+using KnownFamilies = FamilyList<Linear,                        //
+                                 LinearCoulomb,                 //
+                                 Polynomial,                    //
+                                 MaxwellSlipModel,              //
+                                 PrandtlIshlinskii,             //
+                                 ImprovedPrandtlIshlinskii,     //
+                                 BoucWenModel,                  //
+                                 NonlinearBacklash,             //
+                                 ImprovedNonlinearBacklash,     //
+                                 ExponentialLoading,            //
+                                 Dgmm,                          //
+                                 GreyBox,                       //
+                                 GaussianProcess,               //
+                                 ParametricGp,                  //
+                                 HammersteinWiener,             //
+                                 Mlp,                           //
+                                 Lstm,                          //
+                                 Gru,                           //
+                                 MlpEnsemble,                   //
+                                 LstmEnsemble,                  //
+                                 GruEnsemble,                   //
+                                 Narx<Linear>,                  //
                                  Narx<MultivariatePolynomial>,  //
-                                 Narx<Dgmm>,  //
-                                 Narx<Mlp>,  //
-                                 Narx<GaussianProcess>,  //
-                                 Narx<ParametricGp>,     //
+                                 Narx<Dgmm>,                    //
+                                 Narx<Mlp>,                     //
+                                 Narx<GaussianProcess>,         //
+                                 Narx<ParametricGp>,            //
                                  Viscoelastic>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`

@@ -1,0 +1,46 @@
+% Hammerstein-Wiener by simulation error with Octave's optim: the same samples, numbers, scaling and start as ours.
+% Usage: octave-cli --no-gui peer_hammerstein_wiener.m FOLDER
+% Prints the seconds of the fastest of its methods that ends at our error.
+pkg load optim
+1;
+
+function values = read (folder, name)
+  file = fopen (fullfile (folder, [name ".f64"]));
+  values = fread (file, Inf, "double");
+  fclose (file);
+end
+
+function y = simulated (p, z, rest, frame)
+  w = z + p(1) * z .^ 2 - (rest + p(1) * rest ^ 2);
+  x = filter ([1 p(2)], [1 p(3) p(4)], w);
+  s = (x - frame(4)) / frame(5);
+  y = p(5) + s .* (p(6) + s .* (p(7) + s .* p(8)));
+end
+
+folder = argv (){1};
+u = read (folder, "input");
+target = read (folder, "target");
+frame = read (folder, "frame");
+start = read (folder, "start");
+answer = read (folder, "answer");
+z = (u - frame(1)) / frame(2);
+rest = (frame(3) - frame(1)) / frame(2);
+model = @(ignored, p) simulated (p, z, rest, frame);
+rmse = @(p) sqrt (mean ((model (z, p) - target) .^ 2));
+
+best = Inf;
+options = optimset ("TolFun", 1e-9, "MaxIter", 200);
+for run = 1:2
+  tic ();
+  p = lsqnonlin (@(p) model (z, p) - target, start, [], [], options);
+  spent = toc ();
+  fprintf (stderr (), "lsqnonlin: %.3f s, RMSE %.6g (ours %.6g)\n", spent, rmse (p), answer);
+  if (rmse (p) <= 1.001 * answer) best = min (best, spent); end
+  tic ();
+  [~, p] = leasqr (z, target, start, model, 1e-9, 200);
+  spent = toc ();
+  fprintf (stderr (), "leasqr: %.3f s, RMSE %.6g\n", spent, rmse (p));
+  if (rmse (p) <= 1.001 * answer) best = min (best, spent); end
+end
+if (isinf (best)) error ("no method of Octave ends at our error"); end
+printf ("%.9g\n", best);

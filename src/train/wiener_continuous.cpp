@@ -1,0 +1,142 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "torsio/core/error.hpp"
+#include "train/wiener_search.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kSmallest = 1e-12;  // of a denominator's coefficient, in 1 / sample period
+
+/// a b c d e of a section, d and e as logarithms; time in sample periods.
+using Coefficients = std::array<double, kSectionColumns>;
+
+ContinuousTransfer transfer_of(std::span<const double> theta) {
+  return {{theta[0], theta[1], theta[2]}, {1.0, std::exp(theta[3]), std::exp(theta[4])}};
+}
+
+Coefficients discrete_of(std::span<const double> theta) {
+  const DiscreteTransfer held = first_order_hold(transfer_of(theta), 1.0);
+  return {held.numerator[0], held.numerator[1], held.numerator[2], held.denominator[1],
+          held.denominator[2]};
+}
+
+/// Each section (five numbers) from a, b, c, ln d, ln e; states as they are.
+WienerChart continuous_chart(std::size_t sections) {
+  return [sections](std::span<const double> theta, std::span<double> packed, Matrix& slopes) {
+    constexpr double kStep = 1e-6;
+    std::ranges::copy(theta, packed.begin());
+    for (std::size_t k = 0; k < slopes.rows; ++k) slopes(k, k) = 1.0;
+    for (std::size_t i = 0; i < sections; ++i) {
+      const std::size_t first = kSectionColumns * i;
+      const auto own = theta.subspan(first, kSectionColumns);
+      std::ranges::copy(discrete_of(own), packed.begin() + static_cast<std::ptrdiff_t>(first));
+      for (std::size_t j = 0; slopes.rows > 0 && j < kSectionColumns; ++j) {
+        Coefficients moved{};
+        std::ranges::copy(own, moved.begin());
+        const double step = kStep * std::max(std::abs(own[j]), j < 3 ? kStep : 1.0);
+        moved[j] = own[j] + step;
+        const Coefficients above = discrete_of(moved);
+        moved[j] = own[j] - step;
+        const Coefficients below = discrete_of(moved);
+        for (std::size_t c = 0; c < kSectionColumns; ++c)
+          slopes(first + c, first + j) = (above[c] - below[c]) / (2.0 * step);
+      }
+    }
+  };
+}
+
+/// Tustin's form of each section; of a section of first order with a fast pole beside it.
+std::vector<double> theta_of(const Sections& sections) {
+  std::vector<double> theta;
+  for (std::size_t i = 0; i < sections.rows; ++i) {
+    const auto g = sections.row(i);
+    const ContinuousTransfer one =
+        tustin(DiscreteTransfer{{g[0], g[1], g[2]}, {1.0, g[3], g[4]}}, 1.0);
+    theta.insert(theta.end(), one.numerator.begin(), one.numerator.end());
+    for (const std::size_t k : {1U, 2U})
+      theta.push_back(std::log(std::max(one.denominator[k], kSmallest)));
+  }
+  return theta;
+}
+
+/// What goes into G and what should come out of it, as the discrete model has it.
+WienerData inner_data(const WienerData& data, const WienerNumbers& numbers) {
+  WienerData inner = data;
+  inner.range = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  inner.rest_input = 0.0;
+  const double at_rest = numbers.input(data.rest_input);
+  for (std::size_t r = 0; r < inner.records.size(); ++r) {
+    WienerRecord& record = inner.records[r];
+    for (double& value : record.input) {
+      value = numbers.input(value) - at_rest;
+      inner.range.lowest = std::min(inner.range.lowest, value);
+      inner.range.highest = std::max(inner.range.highest, value);
+    }
+    record.target = record.input;
+    SectionCascade cascade(numbers.sections);
+    if (numbers.start.rows > 0) cascade.set_state(numbers.start.row(r));
+    cascade.run(record.target);
+  }
+  return inner;
+}
+
+}  // namespace
+
+WienerNumbers held_between_samples(const WienerData& data, WienerNumbers numbers) {
+  for (std::size_t i = 0; i < numbers.sections.rows; ++i) {
+    const auto g = numbers.sections.row(i);
+    const DiscreteTransfer held = first_order_hold(
+        tustin(DiscreteTransfer{{g[0], g[1], g[2]}, {1.0, g[3], g[4]}}, data.sample_period_s),
+        data.sample_period_s);
+    std::ranges::copy(held.numerator, g.begin());
+    std::copy(held.denominator.begin() + 1, held.denominator.end(), g.begin() + 3);
+  }
+  numbers.start = {};
+  return numbers;
+}
+
+ContinuousFit refined_in_continuous_time(const WienerData& data, const WienerNumbers& numbers,
+                                         std::size_t iterations, const Progress& progress) {
+  const std::size_t sections = numbers.sections.rows;
+  const WienerError error(data, numbers, WienerFree::sections);
+  std::vector<Sections> begins{numbers.sections};
+  if (const auto slow = slow_start(inner_data(data, numbers), 2 * sections, 2 * sections);
+      slow && slow->rows == sections)
+    begins.push_back(*slow);
+  std::vector<std::vector<double>> starts;
+  for (const Sections& begin : begins) {
+    starts.push_back(theta_of(begin));
+    starts.back().resize(error.size(), 0.0);  // and from rest
+  }
+  const WienerChart chart = continuous_chart(sections);
+  const SearchResult found =
+      minimise_squares_from(wiener_problem(error, error.size(), chart), starts,
+                            {.most_iterations = iterations, .progress = progress});
+  std::vector<double> packed(error.size());
+  Matrix no_slopes;
+  chart(found.theta, packed, no_slopes);
+  ContinuousFit result{.fit = {.numbers = error.unpack(packed),
+                               .sum_of_squares = found.sum_of_squares,
+                               .has_converged = found.has_converged,
+                               .iterations = found.iterations},
+                       .sections = {}};
+  // From sample periods to seconds: s -> s T.
+  const double period_s = data.sample_period_s;
+  for (std::size_t i = 0; i < sections; ++i) {
+    ContinuousTransfer one =
+        transfer_of(std::span(found.theta).subspan(kSectionColumns * i, kSectionColumns));
+    for (std::vector<double>* of : {&one.numerator, &one.denominator}) {
+      (*of)[1] /= period_s;
+      (*of)[2] /= period_s * period_s;
+    }
+    result.sections.push_back(std::move(one));
+  }
+  return result;
+}
+
+}  // namespace torsio
