@@ -200,16 +200,21 @@ SearchResult minimise_squares(const ResidualProblem& problem, std::vector<double
   refuse_start();
 }
 
+std::vector<SearchResult> minimise_squares_each(const ResidualProblem& problem,
+                                                const std::vector<std::vector<double>>& starts,
+                                                const SearchOptions& options) {
+  std::vector<SearchResult> found;
+  for (const std::vector<double>& start : starts)
+    if (auto one = search(problem, start, options)) found.push_back(*std::move(one));
+  if (found.empty()) refuse_start();
+  std::ranges::stable_sort(found, {}, &SearchResult::sum_of_squares);
+  return found;
+}
+
 SearchResult minimise_squares_from(const ResidualProblem& problem,
                                    const std::vector<std::vector<double>>& starts,
                                    const SearchOptions& options) {
-  std::optional<SearchResult> best;
-  for (const std::vector<double>& start : starts) {
-    auto found = search(problem, start, options);
-    if (found && (!best || found->sum_of_squares < best->sum_of_squares)) best = std::move(found);
-  }
-  if (!best) refuse_start();
-  return *std::move(best);
+  return std::move(minimise_squares_each(problem, starts, options).front());
 }
 
 ParameterUncertainty uncertainty_of(const ResidualProblem& problem, std::span<const double> theta,

@@ -42,6 +42,12 @@ struct SearchResult {
                                             std::vector<double> start,
                                             const SearchOptions& options = {});
 
+/// The minima from several starts, the best first; starts from which r cannot be told are left out.
+/// @throws as `minimise_squares`.
+[[nodiscard]] std::vector<SearchResult> minimise_squares_each(
+    const ResidualProblem& problem, const std::vector<std::vector<double>>& starts,
+    const SearchOptions& options = {});
+
 /// The best of several starts; those from which r cannot be told are passed over.
 /// @throws Error if that holds for all of them.
 [[nodiscard]] SearchResult minimise_squares_from(const ResidualProblem& problem,
