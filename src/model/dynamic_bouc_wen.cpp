@@ -31,6 +31,7 @@ const DynamicBoucWen::Parameters& checked(const DynamicBoucWen::Parameters& p) {
   require(p.loss >= 0.0, "loss", "a number not below 0", p.loss);
   require(true, "skew", "a number", p.skew);
   require(p.exponent >= 1.0, "exponent", "a number not below 1", p.exponent);
+  check_gains(p.gains, kFamily);
   check_sampled_time(p.time, kFamily);
   check_end_stops(p.lowest, p.highest, kFamily);
   // Runge-Kutta of order 4 is stable to 2.78 on either axis; the sum is above the eigenvalue.
@@ -90,7 +91,7 @@ void DynamicBoucWen::advance(std::span<const double> force) noexcept {
 
 Estimate DynamicBoucWen::step(Features features) noexcept {
   const bool is_first = !input_.is_started();
-  const auto force = input_.step(features[0]);
+  const auto force = input_.step(driving_force(parameters_.gains, features));
   if (is_first) return {.value = state_[0]};
   const double before = state_[0];
   if (parameters_.exponent == 1.0)

@@ -28,7 +28,6 @@ void check_signs(const FrictionDrive::Parameters& p) {
                       found);
   };
   require(p.inertia > 0.0, "inertia", "a positive number", p.inertia);
-  require(p.gain != 0.0, "gain", "a number other than 0", p.gain);
   require(p.viscous >= 0.0, "viscous", "a number not below 0", p.viscous);
   require(p.coulomb >= 0.0, "coulomb", "a number not below 0", p.coulomb);
   require(true, "offset", "a number", p.offset);
@@ -39,16 +38,17 @@ void check_signs(const FrictionDrive::Parameters& p) {
           "a number no larger than viscous", p.viscous_asymmetry);
   require(p.viscous_quadratic >= 0.0, "viscous_quadratic", "a number not below 0",
           p.viscous_quadratic);
-  require(p.spring >= 0.0, "spring", "a number not below 0", p.spring);
+  require(true, "spring", "a number", p.spring);
   require(true, "coulomb_slope", "a number", p.coulomb_slope);
 }
 
 const FrictionDrive::Parameters& checked(const FrictionDrive::Parameters& p) {
   check_signs(p);
+  check_gains(p.gains, FrictionDrive::kFamily);
   check_sampled_time(p.time, FrictionDrive::kFamily);
   check_end_stops(p.lowest, p.highest, FrictionDrive::kFamily);
   constexpr double kStable = 2.0;  // of the leapfrog
-  const double turn = std::sqrt((p.spring + bristle_stiffness(p)) / p.inertia) *
+  const double turn = std::sqrt((std::max(p.spring, 0.0) + bristle_stiffness(p)) / p.inertia) *
                       p.time.sample_period_s / static_cast<double>(p.time.substeps);
   require_parameter(turn < kStable, FrictionDrive::kFamily, "substeps",
                     "sub-steps of less than 2 over the fastest rate", turn);
@@ -66,7 +66,7 @@ FrictionDrive::FrictionDrive(const Parameters& parameters)
 
 std::size_t FrictionDrive::parameter_count() const noexcept {
   const Parameters& p = parameters_;
-  std::size_t count = 4;
+  std::size_t count = 3 + input_count();
   if (p.static_ratio > 1.0) count += 2;
   for (const double term :
        {p.bristle, p.viscous_asymmetry, p.viscous_quadratic, p.spring, p.coulomb_slope})
@@ -107,7 +107,7 @@ void FrictionDrive::advance(double force) noexcept {
   const double speed = state_[1];
   const double drag = p.viscous + std::copysign(p.viscous_asymmetry, speed * p.viscous_asymmetry) +
                       p.viscous_quadratic * std::abs(speed);
-  const double driving = p.gain * force - p.offset - p.spring * state_[0] - state_[2];
+  const double driving = force - p.offset - p.spring * state_[0] - state_[2];
   const double half = 0.5 * substep_s_ / p.inertia;
   const double damped = 1.0 + half * drag;
   const double wanted = ((1.0 - half * drag) * speed + 2.0 * half * driving) / damped;
@@ -119,7 +119,7 @@ void FrictionDrive::advance(double force) noexcept {
 
 Estimate FrictionDrive::step(Features features) noexcept {
   const bool is_first = !input_.is_started();
-  const auto forces = input_.step(features[0]);
+  const auto forces = input_.step(driving_force(parameters_.gains, features));
   if (is_first) return {.value = state_[0]};
   const double before = state_[0];
   for (const double force : forces) advance(force);

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -36,7 +38,6 @@ Parameters of(const Oscillator& oscillator, Parameters with) {
 void judge(Oscillator& oscillator, const TrainingData& data, Parameters with) {
   constexpr std::size_t kMostSamples = 8000;
   oscillator.stiffness = 1.0;
-  with.lowest = -HUGE_VAL;
   with = of(oscillator, with);
   with.lowest = -1e300;
   with.highest = 1e300;
@@ -79,18 +80,21 @@ Oscillator best_oscillator(const TrainingData& data, const Parameters& with) {
   return best;
 }
 
-/// What the search sees of `Parameters`: mass, damping, stiffness and, after them, the element's.
-std::vector<double> listed(const Parameters& p, std::size_t count) {
-  std::vector<double> all{p.mass, p.damping, p.stiffness, p.hysteretic_stiffness,
-                          p.loss, p.skew,    p.exponent};
-  all.resize(count);
+/// What the search sees of `Parameters`: the mass on its spring, the element, gains but the first.
+std::vector<double> listed(const Parameters& p, bool with_exponent) {
+  std::vector<double> all{p.mass, p.damping, p.stiffness, p.hysteretic_stiffness, p.loss, p.skew};
+  if (with_exponent) all.push_back(p.exponent);
+  all.insert(all.end(), p.gains.begin() + 1, p.gains.end());
   return all;
 }
 
 Parameters with_listed(Parameters p, std::span<const double> listed) {
-  double* const fields[] = {&p.mass, &p.damping, &p.stiffness, &p.hysteretic_stiffness,
-                            &p.loss, &p.skew,    &p.exponent};
-  for (std::size_t i = 0; i < listed.size(); ++i) *fields[i] = listed[i];
+  const std::array fields{&p.mass, &p.damping, &p.stiffness, &p.hysteretic_stiffness,
+                          &p.loss, &p.skew,    &p.exponent};
+  const std::size_t further = p.gains.size() - 1;
+  const std::size_t own = listed.size() - further;
+  for (std::size_t i = 0; i < own; ++i) *fields[i] = listed[i];
+  std::ranges::copy(listed.last(further), p.gains.begin() + 1);
   return p;
 }
 
@@ -100,9 +104,9 @@ double largest_target(const TrainingData& data) {
   return largest;
 }
 
-/// The first `count` parameters; typical sizes from a mass on a spring of about the same motion.
+/// As `listed`; typical sizes from a mass on a spring of about the same motion.
 std::vector<SearchedParameter> searched(const Parameters& linear, double largest,
-                                        const TrainingData& data, std::size_t count) {
+                                        const TrainingData& data, bool with_exponent) {
   const std::string y = unit_label(data.target);
   const std::string u = unit_label(data.inputs[0].expression);
   const double n = linear.exponent;
@@ -124,12 +128,12 @@ std::vector<SearchedParameter> searched(const Parameters& linear, double largest
       {.name = "loss", .unit = loss_unit, .typical = bend, .lowest = 0.0},
       {.name = "skew", .unit = loss_unit, .typical = bend},
       {.name = "exponent", .unit = "", .typical = 1.0, .lowest = 1.0, .highest = 10.0}};
-  all.resize(count);
+  if (!with_exponent) all.pop_back();
+  std::ranges::move(further_gains(data), std::back_inserter(all));
   return all;
 }
 
 SimulatedModel simulated(std::vector<SearchedParameter> parameters, const Parameters& with) {
-  const std::size_t states = parameters.size() > 3 ? 3 : 2;
   return {.parameters = std::move(parameters),
           .run =
               [with](std::span<const double> values, std::span<const double> state,
@@ -137,12 +141,12 @@ SimulatedModel simulated(std::vector<SearchedParameter> parameters, const Parame
                 return run_from(model_if_valid<DynamicBoucWen>(with_listed(with, values)), state,
                                 sequence, told);
               },
-          .free_states = states};
+          .free_states = 3};
 }
 
 /// The spring shared between the linear and the hysteretic part, bent to either side.
 std::vector<std::vector<double>> hysteretic_starts(const Parameters& linear, double largest,
-                                                   std::size_t count) {
+                                                   bool with_exponent) {
   struct Bend {
     double loss;
     double skew;
@@ -157,7 +161,7 @@ std::vector<std::vector<double>> hysteretic_starts(const Parameters& linear, dou
           p.hysteretic_stiffness / std::pow(p.hysteretic_stiffness * largest, p.exponent);
       p.loss = bend.loss * size;
       p.skew = bend.skew * size;
-      starts.push_back(listed(p, count));
+      starts.push_back(listed(p, with_exponent));
     }
   return starts;
 }
@@ -167,11 +171,14 @@ std::vector<std::vector<double>> hysteretic_starts(const Parameters& linear, dou
 Fitted<DynamicBoucWen> fit_dynamic_bouc_wen(const TrainingData& data,
                                             const DynamicBoucWenOptions& options,
                                             const Progress& progress) {
-  require_one_moving_input(data, DynamicBoucWen::kFamily);
+  require_excitation(data);
   report_progress(progress, 0.0, "fitting dynamic_bouc_wen");
   const EndStops stops = end_stops(data);
   const bool searches_exponent = std::isnan(options.exponent);
+  std::vector<double> gains(data.input_count(), 0.0);
+  gains[0] = 1.0;
   Parameters linear{.exponent = searches_exponent ? 1.5 : options.exponent,
+                    .gains = gains,
                     .time = {.sample_period_s = 1.0 / data.sample_rate_Hz,
                              .substeps = options.substeps,
                              .input_order = options.input_order},
@@ -182,10 +189,10 @@ Fitted<DynamicBoucWen> fit_dynamic_bouc_wen(const TrainingData& data,
   SimulationFitOptions search{.first_horizon = options.first_horizon,
                               .most_iterations = options.iterations,
                               .progress = progress};
-  const std::size_t count = searches_exponent ? 7 : 6;
-  const SimulatedModel model = simulated(searched(linear, largest, data, count), linear);
+  const SimulatedModel model =
+      simulated(searched(linear, largest, data, searches_exponent), linear);
   SimulationFit fit =
-      fit_by_simulation(model, data, hysteretic_starts(linear, largest, count), search);
+      fit_by_simulation(model, data, hysteretic_starts(linear, largest, searches_exponent), search);
   Fitted<DynamicBoucWen> fitted{.parameters = with_listed(linear, fit.parameters),
                                 .notes = std::move(fit.notes),
                                 .table = std::move(fit.table)};

@@ -161,7 +161,7 @@ std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<d
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::DENSE_QR;
   settings.max_num_iterations = static_cast<int>(options.most_iterations);
-  settings.function_tolerance = 1e-9;  // long valleys: a slow step is not yet the end
+  settings.function_tolerance = options.tolerance;
   settings.parameter_tolerance = 1e-10;
   settings.num_threads = 1;
   settings.logging_type = ceres::SILENT;

@@ -26,7 +26,9 @@ struct SearchOptions {
   std::vector<double> lower = {};  ///< bounds, one a parameter, or empty
   std::vector<double> upper = {};
   std::vector<double> typical = {};  ///< size of a change that matters, > 0; empty: |θ|, or 1 at 0
-  Progress progress = {};            ///< told of each iteration, may cancel
+  /// Relative fall of Σ r² below which it has converged; long valleys: a slow step is not the end.
+  double tolerance = 1e-9;
+  Progress progress = {};  ///< told of each iteration, may cancel
 };
 
 struct SearchResult {

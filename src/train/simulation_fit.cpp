@@ -50,11 +50,13 @@ class Unknowns {
       }
   }
 
-  [[nodiscard]] SearchOptions options(std::size_t most_iterations, Progress progress) const {
+  [[nodiscard]] SearchOptions options(std::size_t most_iterations, double tolerance,
+                                      Progress progress) const {
     return {.most_iterations = most_iterations,
             .lower = lower_,
             .upper = upper_,
             .typical = std::vector<double>(scale_.size(), 1.0),
+            .tolerance = tolerance,
             .progress = std::move(progress)};
   }
   [[nodiscard]] std::vector<double> from(std::span<const double> parameters) const {
@@ -114,6 +116,16 @@ class Unknowns {
   std::size_t searched_ = 0;  ///< states of a start
 };
 
+std::pair<double, double> range_of_input(const Table& table, std::size_t input) {
+  double lowest = table.features(0, input);
+  double highest = lowest;
+  for (std::size_t n = 0; n < table.features.rows; ++n) {
+    lowest = std::min(lowest, table.features(n, input));
+    highest = std::max(highest, table.features(n, input));
+  }
+  return {lowest, highest};
+}
+
 std::size_t longest_sequence(const TrainingData& data) {
   std::size_t longest = 0;
   for (const Sequence& sequence : data.sequences)
@@ -135,9 +147,14 @@ void add_table(SimulationFit& fit, const SimulatedModel& model, const ResidualPr
     names.push_back(each.name);
   }
   while (names.size() < theta.size()) names.emplace_back("a start");
-  for (const std::vector<double>& direction : told.null_directions)
+  constexpr double kPart = 0.05;
+  for (const std::vector<double>& direction : told.null_directions) {
+    const auto of_parameters = std::span(direction).first(model.parameters.size());
+    if (std::ranges::none_of(of_parameters, [](double part) { return std::abs(part) > kPart; }))
+      continue;  // starts that leave no trace
     fit.notes.push_back("the data cannot tell " + description_of(direction, names) +
                         " (each over its typical size)");
+  }
 }
 
 }  // namespace
@@ -188,7 +205,8 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
     constexpr std::size_t kToTellStartsApart = 50;
     std::vector<SearchResult> found = minimise_squares_each(
         unknowns.problem(horizon), from,
-        unknowns.options(is_last ? options.most_iterations : kToTellStartsApart, progress));
+        unknowns.options(is_last ? options.most_iterations : kToTellStartsApart, options.tolerance,
+                         progress));
     best = found.front();
     if (is_last) break;
     from.clear();
@@ -248,25 +266,57 @@ double held_out_rmse(const SimulatedModel& model, std::span<const double> parame
                     : std::numeric_limits<double>::infinity();
 }
 
-void require_one_moving_input(const TrainingData& data, std::string_view family) {
-  if (data.input_count() != 1)
-    throw Error({.place = std::string(family),
-                 .expected = "one input, the force that drives",
-                 .found = fmt::format("{} inputs", data.input_count()),
-                 .advice = "Name it: --inputs force_N."});
+void require_excitation(const TrainingData& data) {
   const Table table = usable_table(data);
-  const auto moves = [](std::span<const double> values) {
-    const auto [lowest, highest] = std::ranges::minmax(values);
-    return lowest < highest;
-  };
-  if (!moves(table.features.values))
+  const auto [weakest, strongest] = range_of_input(table, 0);
+  if (!(weakest < strongest))
     throw Error({.place = data.inputs[0].expression,
                  .expected = "a force that changes: nothing else drives the motion",
-                 .found = fmt::format("{} in every training sample", table.features.values[0])});
-  if (!moves(table.target))
+                 .found = fmt::format("{} in every training sample", weakest)});
+  const auto [lowest, highest] = std::ranges::minmax(table.target);
+  if (!(lowest < highest))
     throw Error({.place = data.target,
                  .expected = "a target that moves",
-                 .found = fmt::format("{} in every training sample", table.target[0])});
+                 .found = fmt::format("{} in every training sample", lowest)});
+}
+
+std::vector<SearchedParameter> further_gains(const TrainingData& data) {
+  const Table table = usable_table(data);
+  const auto size_of = [&](std::size_t input) {
+    const auto [lowest, highest] = range_of_input(table, input);
+    return std::max(std::abs(lowest), std::abs(highest));
+  };
+  std::vector<SearchedParameter> gains;
+  for (std::size_t j = 1; j < data.input_count(); ++j)
+    gains.push_back({.name = "gain of " + data.inputs[j].expression,
+                     .unit = "",
+                     .typical = size_of(j) > 0.0 ? size_of(0) / size_of(j) : 1.0});
+  return gains;
+}
+
+TrainingData in_blocks(const TrainingData& data, std::size_t blocks) {
+  std::size_t samples = 0;
+  for (const Sequence& sequence : data.sequences) samples += sequence.target.size();
+  const std::size_t length = std::max<std::size_t>(samples / blocks, 1);
+  TrainingData cut = data;
+  cut.sequences.clear();
+  for (const Sequence& whole : data.sequences) {
+    const std::size_t pieces =
+        std::max<std::size_t>((whole.target.size() + length / 2) / length, 1);
+    for (std::size_t i = 0; i < pieces; ++i) {
+      const std::size_t begin = whole.target.size() * i / pieces;
+      const std::size_t end = whole.target.size() * (i + 1) / pieces;
+      const auto first = static_cast<std::ptrdiff_t>(begin);
+      const auto last = static_cast<std::ptrdiff_t>(end);
+      Sequence& piece = cut.sequences.emplace_back(Sequence{
+          .recording = whole.recording, .features = Matrix(end - begin, data.input_count())});
+      for (std::size_t n = begin; n < end; ++n)
+        std::ranges::copy(whole.features.row(n), piece.features.row(n - begin).begin());
+      piece.target.assign(whole.target.begin() + first, whole.target.begin() + last);
+      piece.use.assign(whole.use.begin() + first, whole.use.begin() + last);
+    }
+  }
+  return cut;
 }
 
 EndStops end_stops(const TrainingData& data) {

@@ -67,6 +67,7 @@ struct SimulationFitOptions {
   std::size_t growth = 4;           ///< of the horizon from one search to the next
   std::size_t kept = 3;             ///< starts that go on to the second horizon
   std::size_t most_iterations = 200;
+  double tolerance = 1e-9;  ///< relative fall of the squares below which a search has converged
   Progress progress = {};
 };
 
@@ -97,9 +98,15 @@ inline constexpr std::size_t kMostSearchedStarts = 30;
 [[nodiscard]] double held_out_rmse(const SimulatedModel& model, std::span<const double> parameters,
                                    const TrainingData& data, std::size_t initialise);
 
-/// What these families ask of their data: one input that moves, a target that moves.
+/// What these families ask of their data: a first input that changes, a target that moves.
 /// @throws Error that says which is missing.
-void require_one_moving_input(const TrainingData& data, std::string_view family);
+void require_excitation(const TrainingData& data);
+
+/// Gains of the inputs after the first, to be searched for, from 0 on.
+[[nodiscard]] std::vector<SearchedParameter> further_gains(const TrainingData& data);
+
+/// The sequences cut into about `blocks` contiguous pieces, each a sequence of its own.
+[[nodiscard]] TrainingData in_blocks(const TrainingData& data, std::size_t blocks);
 
 /// The range of the target, widened by five times its width to each side and to 0.
 struct EndStops {

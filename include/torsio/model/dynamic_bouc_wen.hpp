@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "torsio/model/model.hpp"
 #include "torsio/model/sampled_time.hpp"
@@ -13,11 +14,11 @@ namespace torsio {
 
 /// A mass on a spring and a damper beside a Bouc-Wen element, driven by a force:
 ///
-///     m y'' + c y' + k y + z = u
+///     m y'' + c y' + k y + z = u,   u = sum_j g_j x_j
 ///     z' = a y' - b (g |y'| |z|^(n-1) z + d y' |z|^n)
 ///
-/// u the only input (force, torque, current), y the target (displacement, angle), z the force of the
-/// hysteretic element. Only the products b g (`loss`) and b d (`skew`) can be told. The element is
+/// x the inputs, the first the force, torque or current that drives (g_0 = 1 in a fit), y the target
+/// (displacement, angle), z the force of the hysteretic element. Only the products b g (`loss`) and b d (`skew`) can be told. The element is
 /// passive for a >= 0 and b g >= 0: it loads along dz/dy = a - (b g + b d) |z|^n, unloads along
 /// a + (b g - b d) |z|^n, and gives back what unloading returns, `hysteretic_energy`. Classical
 /// Runge-Kutta of order 4, where a velocity that changes sign makes a kink of order 2; state y, y', z,
@@ -37,6 +38,7 @@ class DynamicBoucWen {
     double loss = 0.0;                  ///< b g >= 0, u^(1-n) / y
     double skew = 0.0;                  ///< b d, u^(1-n) / y
     double exponent = 1.0;              ///< n >= 1
+    std::vector<double> gains = {1.0};  ///< g, one an input
     SampledTime time = {};
     double lowest = 0.0;  ///< of y; 0 lies between them
     double highest = 0.0;
@@ -50,6 +52,7 @@ class DynamicBoucWen {
       visit("loss", self.loss);
       visit("skew", self.skew);
       visit("exponent", self.exponent);
+      visit("gains", self.gains);
       visit("time", self.time);
       visit("lowest", self.lowest);
       visit("highest", self.highest);
@@ -62,8 +65,8 @@ class DynamicBoucWen {
   explicit DynamicBoucWen(const Parameters& parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
-  [[nodiscard]] std::size_t input_count() const noexcept { return 1; }
-  [[nodiscard]] std::size_t parameter_count() const noexcept { return 7; }
+  [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.gains.size(); }
+  [[nodiscard]] std::size_t parameter_count() const noexcept { return 6 + input_count(); }
   [[nodiscard]] double sample_period() const noexcept { return parameters_.time.sample_period_s; }
 
   void reset() noexcept;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "torsio/actuator/stribeck.hpp"
 #include "torsio/model/model.hpp"
@@ -14,11 +15,11 @@ namespace torsio {
 
 /// An inertia with friction, driven by a force:
 ///
-///     J q'' = g u - offset - k q - Fv q' - Fa |q'| - Fq |q'| q' - dry
+///     J q'' = sum_j g_j x_j - offset - k q - Fv q' - Fa |q'| - Fq |q'| q' - dry
 ///     dry   = F(q, q') sgn(q'),   at rest whatever holds the rest, up to F(q, 0)
 ///     F     = Fc max(0, 1 + s q) (1 + (r - 1) exp(-(q' / v_s)²))
 ///
-/// u the only input (force, torque, current), q the target (position, angle). With a bristle, z0 > 0,
+/// x the inputs, the first the force, torque or current that drives, q the target (position, angle). With a bristle, z0 > 0,
 /// dry is instead LuGre's z of stiffness r Fc / z0 (`relaxed_bristle`). In each sub-step: half of the
 /// way, then the velocity from the forces half way (viscous friction by the trapezoid rule, Coulomb's
 /// so that it stops the motion and never turns it round), then the other half: order 2, without a
@@ -31,18 +32,18 @@ class FrictionDrive {
   static constexpr std::string_view kFamily = "friction_drive";
 
   struct Parameters {
-    double inertia = 0.0;            ///< J > 0, force / (q/s²)
-    double gain = 1.0;               ///< g, force / u
-    double viscous = 0.0;            ///< Fv >= 0, force / (q/s)
-    double coulomb = 0.0;            ///< Fc >= 0, force
-    double offset = 0.0;             ///< force
-    double static_ratio = 1.0;       ///< r >= 1
-    double stribeck_speed = 1.0;     ///< v_s > 0, q/s
-    double bristle = 0.0;            ///< z0 >= 0, in q; 0: Coulomb's law
-    double viscous_asymmetry = 0.0;  ///< Fa, force / (q/s); its size at most Fv
-    double viscous_quadratic = 0.0;  ///< Fq >= 0, force / (q/s)²
-    double spring = 0.0;             ///< k >= 0, force / q
-    double coulomb_slope = 0.0;      ///< s, 1 / q
+    double inertia = 0.0;               ///< J > 0, force / (q/s²)
+    double viscous = 0.0;               ///< Fv >= 0, force / (q/s)
+    double coulomb = 0.0;               ///< Fc >= 0, force
+    double offset = 0.0;                ///< force
+    double static_ratio = 1.0;          ///< r >= 1
+    double stribeck_speed = 1.0;        ///< v_s > 0, q/s
+    double bristle = 0.0;               ///< z0 >= 0, in q; 0: Coulomb's law
+    double viscous_asymmetry = 0.0;     ///< Fa, force / (q/s); its size at most Fv
+    double viscous_quadratic = 0.0;     ///< Fq >= 0, force / (q/s)²
+    double spring = 0.0;                ///< k, force / q; negative: an unstable balance
+    double coulomb_slope = 0.0;         ///< s, 1 / q
+    std::vector<double> gains = {1.0};  ///< g, force / input, one an input
     SampledTime time = {};
     double lowest = 0.0;  ///< of q; 0 lies between them
     double highest = 0.0;
@@ -50,7 +51,6 @@ class FrictionDrive {
     template <class Self, class Visit>
     static void visit_fields(Self& self, Visit&& visit) {
       visit("inertia", self.inertia);
-      visit("gain", self.gain);
       visit("viscous", self.viscous);
       visit("coulomb", self.coulomb);
       visit("offset", self.offset);
@@ -61,6 +61,7 @@ class FrictionDrive {
       visit("viscous_quadratic", self.viscous_quadratic);
       visit("spring", self.spring);
       visit("coulomb_slope", self.coulomb_slope);
+      visit("gains", self.gains);
       visit("time", self.time);
       visit("lowest", self.lowest);
       visit("highest", self.highest);
@@ -73,8 +74,8 @@ class FrictionDrive {
   explicit FrictionDrive(const Parameters& parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
-  [[nodiscard]] std::size_t input_count() const noexcept { return 1; }
-  /// Those that a fit may choose: all but the gain.
+  [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.gains.size(); }
+  /// Those that a fit may choose: not the first gain.
   [[nodiscard]] std::size_t parameter_count() const noexcept;
   [[nodiscard]] double sample_period() const noexcept { return parameters_.time.sample_period_s; }
 

@@ -12,7 +12,7 @@ namespace torsio {
 
 struct DynamicBoucWenOptions {
   double exponent = 1.0;  ///< n; NaN: searched for
-  std::size_t substeps = 2;
+  std::size_t substeps = 4;
   std::size_t input_order = 3;
   std::size_t first_horizon = 500;  ///< samples that the first of the growing searches sees
   std::size_t iterations = 200;     ///< at most, of the last search
@@ -22,7 +22,7 @@ struct DynamicBoucWenOptions {
 /// searched for too. First a mass on a spring from a grid of frequencies and dampings; then from it
 /// twelve shares and shapes of the hysteretic part over a short horizon, the best of them over longer
 /// ones. Source of the method: SPEC 3.7, issue 6.
-/// @throws Error unless there is one input, it and the target move, and the search converges;
+/// @throws Error unless the first input and the target move, and the search converges;
 /// Cancelled.
 [[nodiscard]] Fitted<DynamicBoucWen> fit_dynamic_bouc_wen(const TrainingData& data,
                                                           const DynamicBoucWenOptions& options,
