@@ -16,7 +16,7 @@ static_assert(Model<AnyModel> && Model<Linear> && Model<LinearCoulomb> && Model<
               Model<Lstm> && Model<Gru> && Model<MlpEnsemble> && Model<LstmEnsemble> &&
               Model<GruEnsemble> && FeedsBack<Narx<Linear>> && FeedsBack<Narx<Dgmm>> &&
               FeedsBack<Narx<Mlp>> && FeedsBack<Narx<GaussianProcess>> &&
-              FeedsBack<Narx<ParametricGp>>);
+              FeedsBack<Narx<ParametricGp>> && HasState<DynamicBoucWen> && HasState<FrictionDrive>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

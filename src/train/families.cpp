@@ -13,6 +13,7 @@
 #include "train/gaussian_process_families.hpp"
 #include "train/narx_families.hpp"
 #include "train/network_families.hpp"
+#include "train/second_order_families.hpp"
 
 namespace torsio {
 namespace {
@@ -135,7 +136,8 @@ constexpr std::array kShallowFamilies{
 std::span<const FamilyInfo> families() noexcept {
   static const std::vector<FamilyInfo> all = [] {
     std::vector<FamilyInfo> list(kShallowFamilies.begin(), kShallowFamilies.end());
-    for (const auto more : {gaussian_process_families(), network_families()})
+    for (const auto more :
+         {gaussian_process_families(), network_families(), second_order_families()})
       list.insert(list.end(), more.begin(), more.end());
     const auto with_feedback = narx_families(list);
     list.insert(list.end(), with_feedback.begin(), with_feedback.end());

@@ -9,7 +9,9 @@
 #include <variant>
 
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/dynamic_bouc_wen.hpp"
 #include "torsio/model/ensemble.hpp"
+#include "torsio/model/friction_drive.hpp"
 #include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/gru.hpp"
 #include "torsio/model/linear.hpp"
@@ -48,7 +50,9 @@ using KnownFamilies = FamilyList<Linear,                 //
                                  Narx<Dgmm>,             //
                                  Narx<Mlp>,              //
                                  Narx<GaussianProcess>,  //
-                                 Narx<ParametricGp>>;
+                                 Narx<ParametricGp>,     //
+                                 DynamicBoucWen,         //
+                                 FrictionDrive>;
 
 /// A model that can run backwards: from the target to its first input, whose value in `features`
 /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
