@@ -24,11 +24,12 @@ std::string study_text(const StudyInfo& info, const Study& study) {
   if (has_paper) table.header({"paper"});
   std::string last;
   for (const StudyRow& row : study.rows) {
+    const auto if_run = [&](std::string cell) { return row.runs > 0 ? cell : std::string(); };
     table.row({row.condition == last ? "" : row.condition, row.model,
-               fmt::format("{:.4g}", row.rmse),
+               if_run(fmt::format("{:.4g}", row.rmse)),
                row.runs > 1 ? fmt::format("{:.2g}", row.rmse_std) : "",
-               fmt::format("{:.1f}", row.percent), fmt::format("{:.4g}", row.largest),
-               fmt::format("{}", row.runs),
+               if_run(fmt::format("{:.1f}", row.percent)),
+               if_run(fmt::format("{:.4g}", row.largest)), if_run(fmt::format("{}", row.runs)),
                row.paper_rmse ? fmt::format("{:.4g}", *row.paper_rmse) : ""});
     last = row.condition;
   }
@@ -57,7 +58,7 @@ std::string study_json(const StudyInfo& info, const Study& study) {
         {{"condition", row.condition},
          {"model", row.model},
          {"runs", row.runs},
-         {"rmse", row.rmse},
+         {"rmse", row.runs > 0 ? Json(row.rmse) : Json(nullptr)},
          {"rmse_std", row.rmse_std},
          {"percent_of_max_abs", row.percent},
          {"max_abs_target", row.largest},

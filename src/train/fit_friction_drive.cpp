@@ -207,24 +207,23 @@ Candidate candidate(const Parameters& with, const Scale& scale, const TermSet& s
   return made;
 }
 
-std::vector<std::vector<double>> starts_of(const Candidate& made,
-                                           const std::vector<Parameters>& guesses) {
-  std::vector<std::vector<double>> starts;
-  for (const Parameters& guess : guesses) {
-    std::vector<double> start;
-    for (std::size_t i = 0; i < made.fields.size(); ++i)
-      start.push_back(i < 4 ? guess.*made.fields[i].place : made.fields[i].start);
-    start.resize(made.model.parameters.size(), 0.0);
-    starts.push_back(std::move(start));
-  }
-  return starts;
+/// The basic numbers of a guess, its further gains, and the terms where they start.
+std::vector<double> start_of(const Candidate& made, const Parameters& guess) {
+  constexpr std::size_t kBasic = 4;
+  std::vector<double> start;
+  for (std::size_t i = 0; i < made.fields.size(); ++i)
+    start.push_back(i < kBasic ? guess.*made.fields[i].place : made.fields[i].start);
+  start.insert(start.end(), guess.gains.begin() + 1, guess.gains.end());
+  return start;
 }
 
 /// RMSE of free runs through blocks that the fit did not see; infinite where a fit failed.
-double held_out(const Candidate& made, const std::vector<Parameters>& guesses,
-                const TrainingData& blocks, const SimulationFitOptions& search) {
+double held_out(const Candidate& made, const TrainingData& blocks, const Progress& progress) {
   constexpr std::size_t kFolds = 4;
   constexpr std::size_t kInitialise = 50;
+  // Blocks are short, and the basic fit is a good start: one search each, not to the last digit.
+  const SimulationFitOptions search{
+      .first_horizon = longest_sequence(blocks), .tolerance = 1e-4, .progress = progress};
   double sum = 0.0;
   for (std::size_t fold = 0; fold < kFolds; ++fold) {
     TrainingData seen = blocks;
@@ -235,7 +234,7 @@ double held_out(const Candidate& made, const std::vector<Parameters>& guesses,
       (i % kFolds == fold ? unseen : seen).sequences.push_back(blocks.sequences[i]);
     try {
       const SimulationFit fit =
-          fit_by_simulation(made.model, seen, starts_of(made, guesses), search);
+          fit_by_simulation(made.model, seen, {start_of(made, made.with)}, search);
       const double rmse = held_out_rmse(made.model, fit.parameters, unseen, kInitialise);
       sum += rmse * rmse;
     } catch (const Cancelled&) {
@@ -253,14 +252,13 @@ struct Choice {
 };
 
 /// Forward selection: the term that helps most, as long as one helps.
-Choice chosen_terms(const Parameters& with, const Scale& scale,
-                    const std::vector<Parameters>& guesses, const TrainingData& data,
-                    const SimulationFitOptions& search) {
+Choice chosen_terms(const Parameters& with, const Scale& scale, const TrainingData& data,
+                    const Progress& progress) {
   constexpr std::size_t kBlocks = 8;
   constexpr double kWorthIt = 0.98;
   const TrainingData blocks = in_blocks(data, kBlocks);
   const auto score = [&](const TermSet& set) {
-    return held_out(candidate(with, scale, set), guesses, blocks, search);
+    return held_out(candidate(with, scale, set), blocks, progress);
   };
   const std::string unit = scale.target_unit;
   Choice choice;
@@ -327,10 +325,17 @@ Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
                                     .most_iterations = options.iterations,
                                     .tolerance = 1e-6,  // stops and starts make its valley rough
                                     .progress = progress};
+  Candidate made = candidate(guesses.front(), scale, {});
+  std::vector<std::vector<double>> starts;
+  for (const Parameters& guess : guesses) starts.push_back(start_of(made, guess));
+  SimulationFit fit = fit_by_simulation(made.model, data, starts, search);
+  const Parameters basic = made.parameters(fit.parameters);
   Choice choice{.terms = named.value_or(TermSet{}), .notes = {}};
-  if (!named) choice = chosen_terms(guesses.front(), scale, guesses, data, search);
-  const Candidate made = candidate(guesses.front(), scale, choice.terms);
-  SimulationFit fit = fit_by_simulation(made.model, data, starts_of(made, guesses), search);
+  if (!named) choice = chosen_terms(basic, scale, data, progress);
+  if (!choice.terms.empty()) {
+    made = candidate(basic, scale, choice.terms);
+    fit = fit_by_simulation(made.model, data, {start_of(made, basic)}, search);
+  }
   Fitted<FrictionDrive> fitted{.parameters = made.parameters(fit.parameters),
                                .notes = std::move(choice.notes),
                                .table = std::move(fit.table)};

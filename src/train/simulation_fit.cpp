@@ -126,13 +126,6 @@ std::pair<double, double> range_of_input(const Table& table, std::size_t input) 
   return {lowest, highest};
 }
 
-std::size_t longest_sequence(const TrainingData& data) {
-  std::size_t longest = 0;
-  for (const Sequence& sequence : data.sequences)
-    longest = std::max(longest, sequence.target.size());
-  return longest;
-}
-
 void add_table(SimulationFit& fit, const SimulatedModel& model, const ResidualProblem& problem,
                std::span<const double> theta) {
   const std::vector<double> ones(theta.size(), 1.0);
@@ -158,6 +151,13 @@ void add_table(SimulationFit& fit, const SimulatedModel& model, const ResidualPr
 }
 
 }  // namespace
+
+std::size_t longest_sequence(const TrainingData& data) {
+  std::size_t longest = 0;
+  for (const Sequence& sequence : data.sequences)
+    longest = std::max(longest, sequence.target.size());
+  return longest;
+}
 
 std::vector<double> measured_start(const Sequence& sequence, double sample_rate_Hz) {
   constexpr std::size_t kSamples = 10;
@@ -202,7 +202,7 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
       report_progress(options.progress, fraction, fmt::format("{} samples, {}", horizon, doing));
       return true;
     };
-    constexpr std::size_t kToTellStartsApart = 50;
+    constexpr std::size_t kToTellStartsApart = 25;
     std::vector<SearchResult> found = minimise_squares_each(
         unknowns.problem(horizon), from,
         unknowns.options(is_last ? options.most_iterations : kToTellStartsApart, options.tolerance,

@@ -90,6 +90,8 @@ inline constexpr std::size_t kMostSearchedStarts = 30;
                                               const std::vector<std::vector<double>>& starts,
                                               const SimulationFitOptions& options);
 
+[[nodiscard]] std::size_t longest_sequence(const TrainingData& data);
+
 /// Position and velocity of a line through the first measured samples.
 [[nodiscard]] std::vector<double> measured_start(const Sequence& sequence, double sample_rate_Hz);
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "support/driven_record.hpp"
 #include "support/error_message.hpp"
-#include "torsio/core/random.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/train/fit_dynamic_bouc_wen.hpp"
 #include "torsio/train/fit_friction_drive.hpp"
@@ -16,64 +16,12 @@
 namespace torsio {
 namespace {
 
+using test::carriage;
+using test::hysteretic;
+using test::multisine;
+using test::recorded;
 using testing::Contains;
 using testing::HasSubstr;
-
-/// A sum of sines with phases of its own.
-std::vector<double> multisine(std::size_t samples, double rate_Hz, double lowest_Hz,
-                              double highest_Hz, double amplitude) {
-  constexpr int kSines = 20;
-  Random random(3);
-  std::vector<double> force(samples, 0.0);
-  for (int i = 0; i < kSines; ++i) {
-    const double turn =
-        6.283185307179586 * (lowest_Hz + (highest_Hz - lowest_Hz) * i / kSines) / rate_Hz;
-    const double phase = 6.283185307179586 * random.uniform();
-    for (std::size_t n = 0; n < samples; ++n)
-      force[n] += amplitude / std::sqrt(kSines) * std::sin(turn * static_cast<double>(n) + phase);
-  }
-  return force;
-}
-
-template <class M>
-TrainingData recorded(M model, const std::vector<double>& force, double noise) {
-  Random random(5);
-  TrainingData data;
-  data.inputs = {{.expression = "force_N"}};
-  data.target = "position_m";
-  data.sample_rate_Hz = 1.0 / model.sample_period();
-  Sequence sequence{.recording = "bench", .features = Matrix(force.size(), 1)};
-  sequence.features.values = force;
-  for (const double each : force)
-    sequence.target.push_back(model.step({&each, 1}).value + noise * random.normal());
-  sequence.use.assign(force.size(), 1);
-  data.sequences.push_back(std::move(sequence));
-  return data;
-}
-
-DynamicBoucWen hysteretic(double exponent = 1.0) {
-  return DynamicBoucWen({.mass = 2.0,
-                         .damping = 10.0,
-                         .stiffness = 5e4,
-                         .hysteretic_stiffness = 5e4,
-                         .loss = exponent == 1.0 ? 800.0 : 60.0,
-                         .skew = exponent == 1.0 ? -1100.0 : -20.0,
-                         .exponent = exponent,
-                         .time = {.sample_period_s = 1.0 / 750.0, .substeps = 4},
-                         .lowest = -1.0,
-                         .highest = 1.0});
-}
-
-FrictionDrive carriage(double quadratic = 0.0) {
-  return FrictionDrive({.inertia = 95.0,
-                        .viscous = 200.0,
-                        .coulomb = 20.0,
-                        .offset = -3.0,
-                        .viscous_quadratic = quadratic,
-                        .time = {.sample_period_s = 1e-3},
-                        .lowest = -10.0,
-                        .highest = 10.0});
-}
 
 TrainingData carriage_record(double quadratic = 0.0) {
   std::vector<double> force = multisine(6000, 1000.0, 0.3, 3.0, 60.0);
@@ -82,7 +30,7 @@ TrainingData carriage_record(double quadratic = 0.0) {
 }
 
 TEST(FitDynamicBoucWen, FindsWhatMadeTheRecordWithinItsErrorBars) {
-  const TrainingData data = recorded(hysteretic(), multisine(4000, 750.0, 5.0, 100.0, 60.0), 5e-6);
+  const TrainingData data = recorded(hysteretic(), multisine(3000, 750.0, 5.0, 100.0, 60.0), 5e-6);
   const auto fitted = fit_dynamic_bouc_wen(data, {});
   const std::vector<double> truth{2.0, 10.0, 5e4, 5e4, 800.0, -1100.0};
   ASSERT_EQ(fitted.table.size(), truth.size());
@@ -98,7 +46,7 @@ TEST(FitDynamicBoucWen, FindsWhatMadeTheRecordWithinItsErrorBars) {
 
 TEST(FitDynamicBoucWen, FindsTheExponentIfAsked) {
   const TrainingData data =
-      recorded(hysteretic(1.5), multisine(4000, 750.0, 5.0, 100.0, 60.0), 1e-7);
+      recorded(hysteretic(1.5), multisine(1500, 750.0, 5.0, 100.0, 60.0), 1e-7);
   const auto fitted = fit_dynamic_bouc_wen(data, {.exponent = NAN});
   EXPECT_NEAR(fitted.parameters.exponent, 1.5, 0.05);
 }
@@ -115,7 +63,7 @@ TEST(FitDynamicBoucWen, SaysWhichParametersTheRecordCannotTell) {
 }
 
 TEST(FitDynamicBoucWen, SaysWhyItCannotFit) {
-  const std::vector<double> force = multisine(1500, 750.0, 5.0, 100.0, 60.0);
+  const std::vector<double> force = multisine(600, 750.0, 5.0, 100.0, 60.0);
   const TrainingData good = recorded(hysteretic(), force, 5e-6);
   const auto refused = [&](auto change, DynamicBoucWenOptions options = {}) {
     TrainingData data = good;
@@ -128,10 +76,6 @@ TEST(FitDynamicBoucWen, SaysWhyItCannotFit) {
               HasSubstr("a force that changes"));
   EXPECT_THAT(refused([](TrainingData& data) { std::ranges::fill(data.sequences[0].target, 3.0); }),
               HasSubstr("a target that moves"));
-  EXPECT_THAT(refused([](TrainingData& data) {
-                for (double& y : data.sequences[0].target) y = -y;
-              }),
-              testing::AnyOf(HasSubstr("Check the signs"), HasSubstr("no convergence"), ""));
   EXPECT_THAT(refused([](TrainingData& data) {
                 Sequence& sequence = data.sequences[0];
                 sequence.features.values.resize(12);
