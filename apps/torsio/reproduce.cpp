@@ -36,7 +36,8 @@ void run(const ReproduceFlags& flags) {
   std::vector<const torsio::StudyInfo*> wanted;
   for (const std::string& item : flags.items) wanted.push_back(&torsio::find_study(item));
   if (wanted.empty())
-    for (const torsio::StudyInfo& info : torsio::studies()) wanted.push_back(&info);
+    for (const torsio::StudyInfo& info : torsio::studies())
+      if (!info.needs_recordings) wanted.push_back(&info);
   DataFlags().check_outputs({flags.json.destination});
   auto documents = nlohmann::ordered_json::array();
   for (const torsio::StudyInfo* info : wanted) {
@@ -59,7 +60,8 @@ void add_reproduce(CLI::App& app) {
       app.add_subcommand("reproduce", "run the papers' experiments, their figures beside ours");
   verb->footer(
       "Example: torsio reproduce 001-models --repeats 1\n"
-      "Without an item all of them run: the best part of an hour on two cores.");
+      "Without an item all of them run that need no recordings: the best part of an hour on two "
+      "cores. public-benchmarks reads the official records in TORSIO_DATA or ../shared/data.");
   verb->add_option("ITEM", flags->items, "which; --list shows them");
   verb->add_flag("--list", flags->list, "show the experiments");
   verb->add_flag("--quick", flags->options.is_quick,

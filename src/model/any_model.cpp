@@ -22,7 +22,8 @@ static_assert(HasState<MaxwellSlipModel> && HasState<PrandtlIshlinskii> &&
               HasState<ImprovedPrandtlIshlinskii> && HasState<BoucWenModel> &&
               HasState<NonlinearBacklash> && HasState<ImprovedNonlinearBacklash> &&
               HasState<ExponentialLoading> && HasState<HammersteinWiener> &&
-              HasState<Viscoelastic> && HasState<GreyBox>);
+              HasState<Viscoelastic> && HasState<GreyBox> && HasState<DynamicBoucWen> &&
+              HasState<FrictionDrive>);
 static_assert(Invertible<AnyModel>);
 
 template <class... Family>

@@ -17,8 +17,9 @@ namespace torsio {
 
 /// "polynomial[branch=false]"
 [[nodiscard]] std::string model_label(std::string_view family, std::string_view variant);
-/// Three decimals, until they would fill the line.
-[[nodiscard]] std::string error_text(double value);
+/// Three decimals, until they would fill the line; three digits in a table whose smallest error would
+/// be lost in them.
+[[nodiscard]] std::string error_text(double value, double smallest = 1.0);
 [[nodiscard]] std::string seconds_text(double seconds);
 
 }  // namespace torsio

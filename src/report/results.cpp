@@ -88,7 +88,9 @@ std::string model_label(std::string_view family, std::string_view variant) {
   return variant.empty() ? std::string(family) : fmt::format("{}[{}]", family, variant);
 }
 
-std::string error_text(double value) {
+std::string error_text(double value, double smallest) {
+  constexpr double kTooSmallForThreePlaces = 0.005;
+  if (smallest < kTooSmallForThreePlaces && value != 0.0) return fmt::format("{:.3g}", value);
   return std::abs(value) < 1e6 ? fmt::format("{:.3f}", value) : fmt::format("{:.3g}", value);
 }
 
@@ -134,7 +136,11 @@ std::string ranked_table(const Results& results, Role split) {
   table.header({"step ns", "p99.9", "fit s", "parameters"});
 
   std::string failures;
-  for (const ResultRow* row : ranking(results, split)) {
+  const auto ranked = ranking(results, split);
+  double smallest = 1.0;
+  for (const ResultRow* row : ranked)
+    if (row->status == "ok") smallest = std::min(smallest, row->score.metrics.rmse);
+  for (const ResultRow* row : ranked) {
     if (row->status != "ok") {
       failures += fmt::format("  {}{}: {}: {}\n", model_label(row->family, row->variant),
                               row->input_set.empty() ? "" : " (" + row->input_set + ")",
@@ -145,14 +151,15 @@ std::string ranked_table(const Results& results, Role split) {
     std::vector<std::string> cells{model_label(row->family, row->variant)};
     if (has_sets) cells.push_back(row->input_set);
     for (const double value : {metrics.rmse, metrics.mad, metrics.max_abs})
-      cells.push_back(error_text(value));
+      cells.push_back(error_text(value, smallest));
     cells.push_back(fmt::format("{:.1f}", metrics.fit_percent));
     cells.push_back(fmt::format("{:.1f}", 100.0 * static_cast<double>(row->score.guarded_samples) /
                                               static_cast<double>(metrics.samples)));
     if (has_one_step)
-      cells.push_back(row->score.one_step.samples > 0 ? error_text(row->score.one_step.rmse) : "");
+      cells.push_back(
+          row->score.one_step.samples > 0 ? error_text(row->score.one_step.rmse, smallest) : "");
     for (const std::string& recording : recordings)
-      cells.push_back(error_text(rmse_on(results, *row, recording)));
+      cells.push_back(error_text(rmse_on(results, *row, recording), smallest));
     cells.push_back(fmt::format("{:.0f}", row->score.step_ns_p50));
     cells.push_back(fmt::format("{:.0f}", row->score.step_ns_p999));
     cells.push_back(seconds_text(row->fit_seconds));

@@ -20,6 +20,7 @@ std::string number(double value) { return fmt::format("{:.4g}", value); }
 struct Column {
   std::string title;
   std::string (*cell)(const Study& study, const StudyRow& row);
+  bool is_published = false;  ///< told of models that only others ran, too
 };
 
 std::vector<Column> columns_of(const Study& study) {
@@ -55,9 +56,11 @@ std::vector<Column> columns_of(const Study& study) {
   columns.push_back(
       {"runs", [](const Study&, const StudyRow& row) { return fmt::format("{}", row.runs); }});
   if (any([](const StudyRow& row) { return row.paper_rmse.has_value(); }))
-    columns.push_back({"paper", [](const Study&, const StudyRow& row) {
+    columns.push_back({"paper",
+                       [](const Study&, const StudyRow& row) {
                          return row.paper_rmse ? number(*row.paper_rmse) : std::string();
-                       }});
+                       },
+                       true});
   if (any([](const StudyRow& row) { return row.paper_fit_percent.has_value(); })) {
     columns.push_back({"fit %", [](const Study&, const StudyRow& row) {
                          return fmt::format("{:.2f}", row.fit_percent);
@@ -135,7 +138,7 @@ std::string study_json(const StudyInfo& info, const Study& study) {
         {{"condition", row.condition},
          {"model", row.model},
          {"runs", row.runs},
-         {"rmse", row.rmse},
+         {"rmse", row.runs > 0 ? Json(row.rmse) : Json(nullptr)},
          {"rmse_std", row.rmse_std},
          {"percent_of_max_abs", row.percent},
          {"max_abs_target", row.largest},

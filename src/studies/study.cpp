@@ -31,7 +31,9 @@ constexpr std::array kStudies{
               torque_levels_004},
     StudyInfo{"004-impedance", "004, Table 5",
               "Trained under one impedance of the joint, judged under another", impedances_004},
-    StudyInfo{"004-tubes", "004, Table 6", "How soft the torsion tube should be", tubes_004}};
+    StudyInfo{"004-tubes", "004, Table 6", "How soft the torsion tube should be", tubes_004},
+    StudyInfo{"public-benchmarks", "official records",
+              "Bouc-Wen and EMPS: our free runs beside published ones", public_benchmarks, true}};
 
 }  // namespace
 

@@ -55,6 +55,8 @@ std::string StudyRows::model_of(const ResultRow& row) {
     const auto begin = at + std::string_view("layers=").size();
     model = fmt::format("{} {}", model,
                         row.variant.substr(begin, row.variant.find(',', begin) - begin));
+  } else if (!row.variant.empty()) {
+    model = fmt::format("{} {}", model, row.variant);
   }
   return row.input_set.empty() ? model : fmt::format("{}, {}", model, row.input_set);
 }

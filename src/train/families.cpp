@@ -17,6 +17,7 @@
 #include "train/hysteresis_families.hpp"
 #include "train/narx_families.hpp"
 #include "train/network_families.hpp"
+#include "train/second_order_families.hpp"
 
 namespace torsio {
 namespace {
@@ -202,8 +203,9 @@ constexpr std::array kMixtureFamilies{
 std::span<const FamilyInfo> families() noexcept {
   static const std::vector<FamilyInfo> all = [] {
     std::vector<FamilyInfo> list(kShallowFamilies.begin(), kShallowFamilies.end());
-    for (const auto more : {hysteresis_families(), std::span<const FamilyInfo>(kMixtureFamilies),
-                            gaussian_process_families(), network_families()})
+    for (const auto more :
+         {hysteresis_families(), std::span<const FamilyInfo>(kMixtureFamilies),
+          gaussian_process_families(), network_families(), second_order_families()})
       list.insert(list.end(), more.begin(), more.end());
     const auto hammerstein_wiener = hammerstein_wiener_families();
     list.insert(list.end(), hammerstein_wiener.begin(), hammerstein_wiener.end());

@@ -161,7 +161,7 @@ std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<d
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::DENSE_QR;
   settings.max_num_iterations = static_cast<int>(options.most_iterations);
-  settings.function_tolerance = 1e-9;  // long valleys: a slow step is not yet the end
+  settings.function_tolerance = options.tolerance;
   settings.parameter_tolerance = 1e-10;
   settings.num_threads = 1;
   settings.logging_type = ceres::SILENT;
@@ -200,16 +200,21 @@ SearchResult minimise_squares(const ResidualProblem& problem, std::vector<double
   refuse_start();
 }
 
+std::vector<SearchResult> minimise_squares_each(const ResidualProblem& problem,
+                                                const std::vector<std::vector<double>>& starts,
+                                                const SearchOptions& options) {
+  std::vector<SearchResult> found;
+  for (const std::vector<double>& start : starts)
+    if (auto one = search(problem, start, options)) found.push_back(*std::move(one));
+  if (found.empty()) refuse_start();
+  std::ranges::stable_sort(found, {}, &SearchResult::sum_of_squares);
+  return found;
+}
+
 SearchResult minimise_squares_from(const ResidualProblem& problem,
                                    const std::vector<std::vector<double>>& starts,
                                    const SearchOptions& options) {
-  std::optional<SearchResult> best;
-  for (const std::vector<double>& start : starts) {
-    auto found = search(problem, start, options);
-    if (found && (!best || found->sum_of_squares < best->sum_of_squares)) best = std::move(found);
-  }
-  if (!best) refuse_start();
-  return *std::move(best);
+  return std::move(minimise_squares_each(problem, starts, options).front());
 }
 
 ParameterUncertainty uncertainty_of(const ResidualProblem& problem, std::span<const double> theta,

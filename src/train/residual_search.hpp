@@ -28,7 +28,9 @@ struct SearchOptions {
   std::vector<double> lower = {};  ///< bounds, one a parameter, or empty
   std::vector<double> upper = {};
   std::vector<double> typical = {};  ///< size of a change that matters, > 0; empty: |θ|, or 1 at 0
-  Progress progress = {};            ///< told of each iteration, may cancel
+  /// Relative fall of Σ r² below which it has converged; long valleys: a slow step is not the end.
+  double tolerance = 1e-9;
+  Progress progress = {};  ///< told of each iteration, may cancel
 };
 
 struct SearchResult {
@@ -43,6 +45,12 @@ struct SearchResult {
 [[nodiscard]] SearchResult minimise_squares(const ResidualProblem& problem,
                                             std::vector<double> start,
                                             const SearchOptions& options = {});
+
+/// The minima from several starts, the best first; starts from which r cannot be told are left out.
+/// @throws as `minimise_squares`.
+[[nodiscard]] std::vector<SearchResult> minimise_squares_each(
+    const ResidualProblem& problem, const std::vector<std::vector<double>>& starts,
+    const SearchOptions& options = {});
 
 /// The best of several starts; those from which r cannot be told are passed over.
 /// @throws Error if that holds for all of them.

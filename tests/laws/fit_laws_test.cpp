@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "support/driven_record.hpp"
 #include "support/dump.hpp"
 #include "support/example_data.hpp"
 #include "torsio/core/error.hpp"
@@ -60,6 +61,16 @@ TrainingData two_springs() {
   return data;
 }
 
+/// A spring, or for families whose input is a force the motion that one of them made of it.
+TrainingData data_for(const FamilyInfo& family) {
+  constexpr std::size_t kSamples = 600;
+  if (family.name == DynamicBoucWen::kFamily)
+    return recorded(hysteretic(), multisine(kSamples, 750.0, 5.0, 100.0, 60.0), 5e-6);
+  if (family.name == FrictionDrive::kFamily)
+    return recorded(carriage(), multisine(kSamples, 1000.0, 2.0, 20.0, 200.0), 1e-6);
+  return two_springs();
+}
+
 class FitLaws : public testing::TestWithParam<FitCase> {
  protected:
   FittedModel fit(const Progress& progress = {}) {
@@ -67,7 +78,7 @@ class FitLaws : public testing::TestWithParam<FitCase> {
     return family->fit(data_, Options(family->options, options), {.seed = 5, .progress = progress});
   }
 
-  TrainingData data_ = two_springs();
+  TrainingData data_ = data_for(*GetParam().family);
 };
 
 TEST_P(FitLaws, AFitIsDeterministic) {

@@ -115,7 +115,8 @@ TEST(Studies, ShowTheirFiguresBesideThePapers) {
                               .percent = 2.5,
                               .largest = 20.0,
                               .paper_rmse = 0.666},
-                             {.condition = "soft", .model = "linear", .runs = 2, .rmse = 3.0}}};
+                             {.condition = "soft", .model = "linear", .runs = 2, .rmse = 3.0},
+                             {.condition = "published", .model = "theirs", .paper_rmse = 0.25}}};
   const std::string text = study_text(info, study);
   EXPECT_THAT(text, HasSubstr("004-x (004, Table 0): a title\na protocol\nseed 7, 2 repeats\n"));
   EXPECT_THAT(text, HasSubstr("plant bench, data sheet 0123"));
@@ -123,6 +124,8 @@ TEST(Studies, ShowTheirFiguresBesideThePapers) {
   const auto json = nlohmann::json::parse(study_json(info, study));
   EXPECT_EQ(json["rows"][0]["paper_rmse"], 0.666);
   EXPECT_TRUE(json["rows"][1]["paper_rmse"].is_null());
+  EXPECT_THAT(text, testing::ContainsRegex("published +theirs +0.25"));
+  EXPECT_TRUE(json["rows"][2]["rmse"].is_null());
   EXPECT_EQ(json["plants"][0]["data_sheet"], "0123");
   EXPECT_TRUE(json["full_scale"].is_null());
 }

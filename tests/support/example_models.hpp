@@ -10,6 +10,8 @@
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/dynamic_bouc_wen.hpp"
+#include "torsio/model/friction_drive.hpp"
 #include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/grey_box.hpp"
 #include "torsio/model/gru.hpp"
@@ -331,6 +333,42 @@ inline Narx<Dgmm> example<Narx<Dgmm>>() {
   f.mixture.scale.push_back(100.0);
   f.clamp.slope.push_back(0.0);
   return example_narx<Dgmm>(f, 0, 1);
+}
+
+/// Light enough to follow its inputs.
+template <>
+inline DynamicBoucWen example<DynamicBoucWen>() {
+  return DynamicBoucWen({.mass = 1e-6,
+                         .damping = 1e-3,
+                         .stiffness = 1.0,
+                         .hysteretic_stiffness = 0.5,
+                         .loss = 2.0,
+                         .skew = -1.0,
+                         .exponent = 1.5,
+                         .gains = {1.0, 0.2},
+                         .time = {.sample_period_s = 1e-3},
+                         .lowest = -5000.0,
+                         .highest = 5000.0});
+}
+
+/// With every term.
+template <>
+inline FrictionDrive example<FrictionDrive>() {
+  return FrictionDrive({.inertia = 0.01,
+                        .viscous = 0.02,
+                        .coulomb = 0.05,
+                        .offset = 0.01,
+                        .static_ratio = 1.5,
+                        .stribeck_speed = 0.1,
+                        .bristle = 1e-3,
+                        .viscous_asymmetry = 0.01,
+                        .viscous_quadratic = 0.01,
+                        .spring = 0.02,
+                        .coulomb_slope = 0.1,
+                        .gains = {1.0, 0.2},
+                        .time = {.sample_period_s = 1e-3},
+                        .lowest = -5000.0,
+                        .highest = 5000.0});
 }
 
 template <>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "torsio/actuator/bristle.hpp"
 #include "torsio/actuator/stribeck.hpp"
 #include "torsio/core/realtime.hpp"
 
@@ -41,8 +42,8 @@ class LuGreFriction {
     const double viscous_Nm = parameters_.viscous_Nms_rad * speed_rad_s;
     if (is_only_viscous_) return viscous_Nm;
     const double level_Nm = parameters_.coulomb_Nm + parameters_.load_factor * std::abs(load_Nm);
-    if (speed_rad_s != 0.0)
-      relax(speed_rad_s, level_Nm * stribeck_(speed_rad_s), std::abs(speed_rad_s) * dt_s);
+    force_Nm_ = relaxed_bristle(force_Nm_, speed_rad_s, level_Nm * stribeck_(speed_rad_s),
+                                stiffness_Nm_rad_, dt_s);
     const double most_Nm = parameters_.static_ratio * level_Nm;
     force_Nm_ = std::min(std::max(force_Nm_, -most_Nm), most_Nm);
     return force_Nm_ + viscous_Nm;
@@ -62,14 +63,6 @@ class LuGreFriction {
   }
 
  private:
-  void relax(double speed_rad_s, double level_Nm, double travel_rad) noexcept {
-    const double target_Nm = std::copysign(level_Nm, speed_rad_s);
-    const double distance_Nm = force_Nm_ - target_Nm;
-    force_Nm_ = target_Nm;
-    if (std::abs(distance_Nm) < 1e-15 * level_Nm) return;
-    force_Nm_ += distance_Nm * std::exp(-stiffness_Nm_rad_ * travel_rad / level_Nm);
-  }
-
   Parameters parameters_;
   StribeckCurve stribeck_;
   double stiffness_Nm_rad_;  ///< σ₀

@@ -10,8 +10,10 @@
 
 #include "torsio/model/bouc_wen_model.hpp"
 #include "torsio/model/dgmm.hpp"
+#include "torsio/model/dynamic_bouc_wen.hpp"
 #include "torsio/model/ensemble.hpp"
 #include "torsio/model/exponential_loading.hpp"
+#include "torsio/model/friction_drive.hpp"
 #include "torsio/model/gaussian_process.hpp"
 #include "torsio/model/grey_box.hpp"
 #include "torsio/model/gru.hpp"
@@ -41,42 +43,14 @@ struct FamilyList {
 };
 
 /// Every family that model files and the command line know: one line each.
-using KnownFamilies = FamilyList<Linear,                        //
-                                 LinearCoulomb,                 //
-                                 Polynomial,                    //
-                                 MaxwellSlipModel,              //
-                                 PrandtlIshlinskii,             //
-                                 ImprovedPrandtlIshlinskii,     //
-                                 BoucWenModel,                  //
-                                 NonlinearBacklash,             //
-                                 ImprovedNonlinearBacklash,     //
-                                 ExponentialLoading,            //
-                                 Dgmm,                          //
-                                 GreyBox,                       //
-                                 GaussianProcess,               //
-                                 ParametricGp,                  //
-                                 HammersteinWiener,             //
-                                 Mlp,                           //
-                                 Lstm,                          //
-                                 Gru,                           //
-                                 MlpEnsemble,                   //
-                                 LstmEnsemble,                  //
-                                 GruEnsemble,                   //
-                                 Narx<Linear>,                  //
-                                 Narx<MultivariatePolynomial>,  //
-                                 Narx<Dgmm>,                    //
-                                 Narx<Mlp>,                     //
-                                 Narx<GaussianProcess>,         //
-                                 Narx<ParametricGp>,            //
-                                 Viscoelastic>;
-
-/// A model that can run backwards: from the target to its first input, whose value in `features`
-/// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
-/// space, so it is not const.
-template <class M>
-concept Invertible = requires(M& model, double target, Features features) {
-  { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
-};
+@ @FAM @ @
+    /// A model that can run backwards: from the target to its first input, whose value in `features`
+    /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
+    /// space, so it is not const.
+    template <class M>
+    concept Invertible = requires(M& model, double target, Features features) {
+      { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
+    };
 
 /// A model whose family is known only at run time. Dispatch is a switch: no virtual call, nothing
 /// allocated.

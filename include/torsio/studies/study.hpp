@@ -22,7 +22,7 @@ struct StudyOptions {
 struct StudyRow {
   std::string condition;
   std::string model;
-  std::size_t runs = 0;   ///< fits that the statistics are of
+  std::size_t runs = 0;   ///< fits that the statistics are of; 0: only the paper's figure
   double rmse = 0.0;      ///< mean, in `Study::unit`
   double rmse_std = 0.0;  ///< of one run
   double percent = 0.0;   ///< mean of 100 rmse / (largest |target| of the judged recording)
@@ -60,6 +60,7 @@ struct StudyInfo {
   std::string_view paper;  ///< number and table or figure
   std::string_view title;
   Study (*run)(const StudyOptions& options, const Progress& progress);
+  bool needs_recordings = false;  ///< in TORSIO_DATA or ../shared/data: must be named to be run
 };
 
 /// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets (SPEC

@@ -1,0 +1,88 @@
+// The official free-run tests of public benchmarks: thresholds of issue 6, and what was measured.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "real_data/real_data.hpp"
+#include "torsio/data/load.hpp"
+#include "torsio/studies/study.hpp"
+#include "torsio/train/comparison.hpp"
+
+namespace torsio {
+namespace {
+
+/// The scores of one model, fitted as the manifest says, on one test recording.
+ResultRow scored(const Results& results, const std::string& recording) {
+  for (const ResultRow& row : results.rows)
+    if (row.split == Role::test && row.recording.value_or("") == recording) return row;
+  ADD_FAILURE() << "no scores on " << recording;
+  return {};
+}
+
+Results compared(const std::string& manifest, const std::string& models) {
+  const Dataset dataset = load_dataset({manifest_path(manifest)}, {});
+  return compare(dataset, model_choices(dataset, models, {}), 1, false).results;
+}
+
+TEST(BoucWenBenchmark, LoadsItsOfficialRecordsAtTheirRate) {
+  TORSIO_NEEDS_DATA("boucwen");
+  const Dataset dataset = load_dataset({manifest_path("boucwen")}, {});
+  ASSERT_EQ(dataset.records.size(), 3U);
+  EXPECT_EQ(dataset.sample_rate_Hz(), 750.0);
+  EXPECT_EQ(dataset.records[0].recording.size(), 40960U);
+  EXPECT_EQ(dataset.records[1].recording.size(), 8192U);
+  EXPECT_EQ(dataset.records[2].recording.size(), 153000U);
+}
+
+TEST(BoucWenBenchmark, IsSimulatedToThreeMillionthsOfAMetre) {
+  TORSIO_NEEDS_DATA("boucwen");
+  const Results results = compared("boucwen", "dynamic_bouc_wen");
+  for (const std::string test : {"multisine", "sinesweep"}) {
+    const ResultRow row = scored(results, test);
+    EXPECT_EQ(row.status, "ok");
+    EXPECT_EQ(row.score.initialised_samples, 50U);
+    EXPECT_LT(row.score.metrics.rmse, 3e-6) << test;
+    EXPECT_LT(row.score.step_ns_p50, 1000.0);
+  }
+  EXPECT_LT(scored(results, "multisine").score.metrics.rmse, 1.5e-6);  // 1.2e-6
+}
+
+TEST(BoucWenBenchmark, CannotBeSimulatedFromAHeldForce) {
+  TORSIO_NEEDS_DATA("boucwen");
+  const Results held = compared("boucwen", "dynamic_bouc_wen:input_order=0");
+  for (const ResultRow& row : held.rows) {
+    if (row.split == Role::test) EXPECT_TRUE(!(row.score.metrics.rmse < 1e-5)) << row.status;
+  }
+}
+
+TEST(EmpsBenchmark, IsSimulatedByFourNumbers) {
+  TORSIO_NEEDS_DATA("emps");
+  const Dataset dataset = load_dataset({manifest_path("emps")}, {});
+  const auto choices = model_choices(dataset, "friction_drive", {});
+  const TrainedModel trained = train_model(dataset, choices[0], 1);
+  ASSERT_EQ(trained.table.size(), 4U);
+  // Janot, Gautier and Brunot identified 95.1 kg, 203.5 Ns/m, 20.4 N, -3.16 N by inverse dynamics.
+  EXPECT_NEAR(trained.table[0].value, 95.1, 8.0);
+  EXPECT_NEAR(trained.table[1].value, 203.5, 30.0);
+  EXPECT_NEAR(trained.table[2].value, 20.4, 3.0);
+  EXPECT_NEAR(trained.table[3].value, -3.16, 0.4);
+  const ResultRow row = scored(evaluate_model(trained.file, dataset), "pulses");
+  EXPECT_LT(row.score.metrics.rmse, 6.7e-3);
+}
+
+TEST(PublicBenchmarks, StandBesideWhatWasPublished) {
+  TORSIO_NEEDS_DATA("boucwen");
+  const Study study = run_study(find_study("public-benchmarks"), {.repeats = 1, .is_quick = true});
+  const auto has = [&](const std::string& condition, const std::string& model) {
+    return std::ranges::any_of(study.rows, [&](const StudyRow& row) {
+      return row.condition == condition && row.model == model;
+    });
+  };
+  EXPECT_TRUE(has("boucwen test_multisine", "arx"));
+  EXPECT_TRUE(has("boucwen, published", "dynoNet"));
+  EXPECT_TRUE(has("emps emps_val", "arx"));
+}
+
+}  // namespace
+}  // namespace torsio
