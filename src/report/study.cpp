@@ -88,7 +88,8 @@ std::string table_of(const Study& study) {
   std::string last;
   for (const StudyRow& row : study.rows) {
     std::vector<std::string> cells{row.condition == last ? "" : row.condition, row.model};
-    for (const Column& column : columns) cells.push_back(column.cell(study, row));
+    for (const Column& column : columns)
+      cells.push_back(row.runs > 0 || column.is_published ? column.cell(study, row) : "");
     table.row(std::move(cells));
     last = row.condition;
   }

@@ -43,14 +43,44 @@ struct FamilyList {
 };
 
 /// Every family that model files and the command line know: one line each.
-@ @FAM @ @
-    /// A model that can run backwards: from the target to its first input, whose value in `features`
-    /// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
-    /// space, so it is not const.
-    template <class M>
-    concept Invertible = requires(M& model, double target, Features features) {
-      { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
-    };
+using KnownFamilies = FamilyList<Linear,                        //
+                                 LinearCoulomb,                 //
+                                 Polynomial,                    //
+                                 MaxwellSlipModel,              //
+                                 PrandtlIshlinskii,             //
+                                 ImprovedPrandtlIshlinskii,     //
+                                 BoucWenModel,                  //
+                                 NonlinearBacklash,             //
+                                 ImprovedNonlinearBacklash,     //
+                                 ExponentialLoading,            //
+                                 GreyBox,                       //
+                                 Viscoelastic,                  //
+                                 HammersteinWiener,             //
+                                 DynamicBoucWen,                //
+                                 FrictionDrive,                 //
+                                 Dgmm,                          //
+                                 GaussianProcess,               //
+                                 ParametricGp,                  //
+                                 Mlp,                           //
+                                 Lstm,                          //
+                                 Gru,                           //
+                                 MlpEnsemble,                   //
+                                 LstmEnsemble,                  //
+                                 GruEnsemble,                   //
+                                 Narx<Linear>,                  //
+                                 Narx<MultivariatePolynomial>,  //
+                                 Narx<Dgmm>,                    //
+                                 Narx<Mlp>,                     //
+                                 Narx<GaussianProcess>,         //
+                                 Narx<ParametricGp>>;
+
+/// A model that can run backwards: from the target to its first input, whose value in `features`
+/// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
+/// space, so it is not const.
+template <class M>
+concept Invertible = requires(M& model, double target, Features features) {
+  { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
+};
 
 /// A model whose family is known only at run time. Dispatch is a switch: no virtual call, nothing
 /// allocated.
