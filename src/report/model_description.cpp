@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "torsio/core/units.hpp"
@@ -112,12 +113,15 @@ std::string linear_part_lines(const ModelFile& model) {
   return text;
 }
 
-/// The covariance function of a Gaussian process in words, its numbers included; else nothing.
-std::string kernel_line(const ModelFile& model) {
+/// A covariance function or a network of springs and dashpots as their texts, the numbers included;
+/// else nothing.
+std::string structure_line(const ModelFile& model) {
   return std::visit(
       []<class Parameters>(const Parameters& parameters) {
         if constexpr (requires { parameters.kernel; })
           return fmt::format("kernel {}\n", description_of(parameters.kernel));
+        else if constexpr (std::is_same_v<Parameters, Viscoelastic::Parameters>)
+          return fmt::format("network {}\n", text_of(parameters.network, 6));
         else
           return std::string();
       },
@@ -167,8 +171,10 @@ std::string model_description(const ModelFile& model) {
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
   std::vector<Leaf> leaves = leaves_of(model);
-  std::erase_if(leaves, [](const Leaf& leaf) { return leaf.name.starts_with("kernel."); });
-  text += fmt::format("\n{}{}{}{}", kernel_line(model), equation_line(model),
+  std::erase_if(leaves, [](const Leaf& leaf) {
+    return leaf.name.starts_with("kernel.") || leaf.name.starts_with("network.nodes.");
+  });
+  text += fmt::format("\n{}{}{}{}", structure_line(model), equation_line(model),
                       linear_part_lines(model), parameter_lines(leaves));
   return text;
 }

@@ -80,6 +80,8 @@ constexpr std::array kViscoelasticOptions{
         "kelvin_voigt, standard_linear_solid, burgers, generalised_maxwell(n), 003a to 003d"},
     OptionInfo{"refine", Kind::boolean, "true", 0, 0,
                "false: the given values (k1=300) as they are, the offset alone is fitted"},
+    OptionInfo{"at_rest", Kind::boolean, "true", 0, 0,
+               "each record starts relaxed; false: from a state that is fitted too"},
     OptionInfo{"starts", Kind::integer, "10", 1, 1000, "of the search"},
     OptionInfo{
         "prior", Kind::number, "0", 0, 1000,
@@ -170,7 +172,8 @@ FittedModel viscoelastic(const TrainingData& data, const Options& options,
                                        {.network = options.text("network"),
                                         .starts = options.integer("starts"),
                                         .prior = options.number("prior"),
-                                        .is_refined = options.boolean("refine")},
+                                        .is_refined = options.boolean("refine"),
+                                        .is_at_rest = options.boolean("at_rest")},
                                        context));
 }
 

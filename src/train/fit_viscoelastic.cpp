@@ -141,7 +141,7 @@ Fitted<Viscoelastic> fit_viscoelastic(const TrainingData& data, const Viscoelast
   check(options);
   report_progress(context.progress, 0.0, "fitting viscoelastic");
   const SpringDashpotNetwork network = parse_network(options.network);
-  const ViscoelasticError error(data, kMostJudged);
+  const ViscoelasticError error(data, kMostJudged, options.is_at_rest);
   require_varying(error, data);
   ViscoelasticFit fit;
   if (options.is_refined) {

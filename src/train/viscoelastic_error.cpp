@@ -84,8 +84,9 @@ class StartState {
 
 }  // namespace
 
-ViscoelasticError::ViscoelasticError(const TrainingData& data, std::size_t most_judged)
-    : period_s_(1.0 / data.sample_rate_Hz) {
+ViscoelasticError::ViscoelasticError(const TrainingData& data, std::size_t most_judged,
+                                     bool is_at_rest)
+    : is_at_rest_(is_at_rest), period_s_(1.0 / data.sample_rate_Hz) {
   const std::size_t stride = std::max<std::size_t>(
       1, (data.usable_samples() + most_judged - 1) / std::max<std::size_t>(most_judged, 1));
   std::size_t usable = 0;
@@ -147,7 +148,7 @@ void ViscoelasticError::evaluate_with(const RelaxationSpectrum& spectrum, double
   std::size_t next = 0;
   for (const Run& run : runs_) {
     std::array<double, Count> torque{};
-    StartState<Count> start(steps.decay, spectrum.branches.size());
+    StartState<Count> start(steps.decay, is_at_rest_ ? 0 : spectrum.branches.size());
     const std::size_t first = next;
     for (std::size_t n = 0; n < run.input.size(); ++n) {
       const double moved = n == 0 ? 0.0 : run.input[n] - run.input[n - 1];
@@ -158,10 +159,12 @@ void ViscoelasticError::evaluate_with(const RelaxationSpectrum& spectrum, double
       }
       if (run.is_judged[n] != 0) {
         residuals[next] = value - run.target[n];
-        start.add(residuals[next++]);
+        if (!is_at_rest_) start.add(residuals[next]);
+        ++next;
       }
-      start.advance();
+      if (!is_at_rest_) start.advance();
     }
+    if (is_at_rest_) continue;
     start.solve();
     std::size_t at = first;
     for (std::size_t n = 0; n < run.input.size() && !start.is_over(); ++n, start.advance())

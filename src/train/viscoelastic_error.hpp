@@ -10,12 +10,12 @@
 
 namespace torsio {
 
-/// By how much a network misses the target over training records, each run started in the state
-/// from which it misses least.
+/// By how much a network misses the target over training records.
 class ViscoelasticError {
  public:
   /// @param most_judged usable samples; of more every m-th is judged
-  ViscoelasticError(const TrainingData& data, std::size_t most_judged);
+  /// @param is_at_rest each record starts relaxed; else in the state from which it misses least
+  ViscoelasticError(const TrainingData& data, std::size_t most_judged, bool is_at_rest);
 
   [[nodiscard]] std::size_t residuals() const noexcept { return residuals_; }
   [[nodiscard]] double longest_s() const noexcept { return longest_s_; }
@@ -41,6 +41,7 @@ class ViscoelasticError {
   void measure_deviations();
 
   std::vector<Run> runs_;
+  bool is_at_rest_;
   double period_s_;
   double longest_s_ = 0.0;
   std::size_t residuals_ = 0;

@@ -179,9 +179,14 @@ ViscoelasticFit search_network(const ViscoelasticError& error, const SpringDashp
   for (const SearchResult& each : found)
     errors.push_back(fmt::format("{:.4g}", rmse_of(each, problem)));
   SearchResult best = found.front();
-  if (options.prior > 0.0)
-    best = minimise_squares(search.problem(rmse_of(best, problem) / options.prior), best.theta,
-                            search.options(kMostIterations, context.progress));
+  if (options.prior > 0.0) {
+    // Networks may have several optima that only the prior tells apart: the one near the start
+    // values must be among those tried.
+    std::vector<std::vector<double>> from = search.starts(1, context.seed);
+    for (const SearchResult& each : found) from.push_back(each.theta);
+    best = minimise_squares_from(search.problem(rmse_of(best, problem) / options.prior), from,
+                                 search.options(kMostIterations, context.progress));
+  }
   require_converged(best);
   return {.network = search.network_at(search.values_of(best.theta)),
           .offset = best.theta.back(),

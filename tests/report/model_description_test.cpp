@@ -32,5 +32,13 @@ TEST(ModelDescription, StatesAKernelAsAnExpressionWithItsNumbers) {
   EXPECT_THAT(text, testing::Not(HasSubstr("kernel.nodes")));
 }
 
+TEST(ModelDescription, StatesANetworkOfSpringsAsItsText) {
+  const std::string text =
+      model_description(test::example_model_file(test::example<Viscoelastic>()));
+  EXPECT_THAT(text, HasSubstr("network series(kv(k1=900, d1=60), kv(k2=4000, d2=2000), "
+                              "parallel(k3=2500, maxwell(k4=300, d4=15)))\n"));
+  EXPECT_THAT(text, testing::Not(HasSubstr("nodes")));
+}
+
 }  // namespace
 }  // namespace torsio

@@ -47,16 +47,24 @@ TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
     EXPECT_EQ(again.rows[i].rmse, study.rows[i].rmse) << study.rows[i].model;
 }
 
-TEST(Studies, OfTheElastomerCouplingClimbFromALineToDynamics) {
+TEST(Studies, OfTheElastomerCouplingClimbThePapersLadder) {
   const Study study = run_study(find_study("003-ladder"), kQuick);
-  ASSERT_EQ(study.plants.size(), 2U);
   const StudyRow& line = row_of(study, "bonded, triangles", "linear");
-  for (const char* model : {"Hammerstein-Wiener", "viscoelastic 003a"}) {
-    const StudyRow& row = row_of(study, "bonded, triangles", model);
-    EXPECT_LT(row.rmse, line.rmse) << model;
-    EXPECT_GT(row.fit_percent, line.fit_percent) << model;
-  }
-  EXPECT_EQ(row_of(study, "bonded, triangles", "Hammerstein-Wiener").paper_fit_percent, 77.73);
+  const StudyRow& printed = row_of(study, "bonded, triangles", "viscoelastic 003a as printed");
+  const StudyRow& a = row_of(study, "bonded, triangles", "viscoelastic 003a");
+  // SPEC section 4.3: 73.6, 90.6 and, refitted, 93.7 on the prototype's plant.
+  EXPECT_NEAR(line.fit_percent, 73.6, 1.5);
+  EXPECT_NEAR(printed.fit_percent, 90.6, 1.5);
+  EXPECT_NEAR(a.fit_percent, 93.7, 1.5);
+  EXPECT_EQ(a.paper_fit_percent, 84.76);
+  // (b) and (c) can be what (a) is.
+  EXPECT_NEAR(row_of(study, "bonded, triangles", "viscoelastic 003b").fit_percent, a.fit_percent,
+              0.5);
+  EXPECT_NEAR(row_of(study, "bonded, triangles", "viscoelastic 003c").fit_percent, a.fit_percent,
+              0.5);
+  const StudyRow& curves = row_of(study, "bonded, triangles", "Hammerstein-Wiener");
+  EXPECT_LT(curves.rmse, line.rmse);
+  EXPECT_EQ(curves.paper_fit_percent, 77.73);
   EXPECT_THAT(study_text(find_study("003-ladder"), study), HasSubstr("paper fit %"));
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -140,6 +141,30 @@ TEST(FitViscoelastic, APriorHoldsWhatTheDataLeaveOpen) {
       fit_viscoelastic(data, {.network = near, .starts = 6, .prior = 1.0}, {.seed = 5});
   for (std::size_t j = 0; j < held.table.size(); ++j)
     EXPECT_NEAR(held.table[j].value / other.table[j].value, 1.0, 1e-2) << held.table[j].name;
+}
+
+TEST(FitViscoelastic, FindsTheStateOfRecordsThatStartInMotion) {
+  TrainingData data = data_of("003a", 0.0);
+  for (Sequence& sequence : data.sequences) {
+    constexpr std::size_t kLater = 700;
+    const std::size_t samples = sequence.target.size() - kLater;
+    Matrix features(samples, 1);
+    for (std::size_t n = 0; n < samples; ++n) features(n, 0) = sequence.features(n + kLater, 0);
+    sequence.features = features;
+    sequence.target.erase(sequence.target.begin(), sequence.target.begin() + kLater);
+    sequence.use.resize(samples);
+  }
+  const std::vector<double> expected = parse_network("003a").values();
+  const auto largest_error = [&](bool is_at_rest) {
+    const auto fitted =
+        fit_viscoelastic(data, {.network = "003a", .starts = 2, .is_at_rest = is_at_rest});
+    double largest = 0.0;
+    for (std::size_t j = 0; j < expected.size(); ++j)
+      largest = std::max(largest, std::abs(fitted.table[j].value / expected[j] - 1.0));
+    return largest;
+  };
+  EXPECT_GT(largest_error(true), 1e-2);
+  EXPECT_LT(largest_error(false), 1e-4);
 }
 
 TEST(FitViscoelastic, TakesValuesAsTheyAre) {

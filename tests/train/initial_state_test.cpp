@@ -26,16 +26,16 @@ AnyModel two_branches() {
        .inputs = 1});
 }
 
-struct Run {
+struct Measured {
   Matrix features;
   std::vector<double> target;
 };
 
-Run run_from(const std::vector<double>& state, std::size_t samples, double noise) {
+Measured run_from(const std::vector<double>& state, std::size_t samples, double noise) {
   Random random(4);
   AnyModel model = two_branches();
   model.set_state(state);
-  Run run{Matrix(samples, 1), {}};
+  Measured run{Matrix(samples, 1), {}};
   for (std::size_t n = 0; n < samples; ++n) {
     run.features(n, 0) = 0.05 * std::sin(0.02 * static_cast<double>(n));
     run.target.push_back(model.step(run.features.row(n)).value + noise * random.normal());
@@ -46,21 +46,21 @@ Run run_from(const std::vector<double>& state, std::size_t samples, double noise
 const std::vector<double> kState{8.0, -3.0};  // slowest first
 
 TEST(InitialState, IsTheOneThatTheRunWasStartedFrom) {
-  const Run run = run_from(kState, 200, 0.0);
+  const Measured run = run_from(kState, 200, 0.0);
   AnyModel model = two_branches();
   start_where_measured(model, run.features, run.target);
   EXPECT_THAT(model.state(), Pointwise(DoubleNear(1e-4), kState));
 }
 
 TEST(InitialState, IsNearItInNoise) {
-  const Run run = run_from(kState, 200, 0.1);
+  const Measured run = run_from(kState, 200, 0.1);
   AnyModel model = two_branches();
   start_where_measured(model, run.features, run.target);
   EXPECT_THAT(model.state(), Pointwise(DoubleNear(0.2), kState));
 }
 
 TEST(InitialState, PassesOverSamplesThatWereNotMeasured) {
-  Run run = run_from(kState, 200, 0.0);
+  Measured run = run_from(kState, 200, 0.0);
   for (std::size_t n = 0; n < run.target.size(); ++n)
     if (n % 3 != 0) run.target[n] = kNotMeasured;
   AnyModel model = two_branches();
@@ -69,7 +69,7 @@ TEST(InitialState, PassesOverSamplesThatWereNotMeasured) {
 }
 
 TEST(InitialState, StaysAtRestWhereNothingIsTold) {
-  Run run = run_from(kState, 20, 0.0);
+  Measured run = run_from(kState, 20, 0.0);
   for (double& target : run.target) target = kNotMeasured;
   AnyModel model = two_branches();
   model.set_state(kState);
@@ -80,7 +80,7 @@ TEST(InitialState, StaysAtRestWhereNothingIsTold) {
 TEST(InitialState, OfAFamilyWithoutIsAReset) {
   AnyModel model = test::example<AnyModel>();
   EXPECT_TRUE(model.state().empty());
-  const Run run = run_from(kState, 20, 0.0);
+  const Measured run = run_from(kState, 20, 0.0);
   Matrix features(20, model.input_count());
   EXPECT_NO_THROW(start_where_measured(model, features, run.target));
 }

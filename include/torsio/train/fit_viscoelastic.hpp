@@ -15,13 +15,16 @@ struct ViscoelasticOptions {
   std::size_t starts = 10;                         ///< of the search, 1 or more
   double prior = 0.0;                              ///< see `fit_viscoelastic`; 0: none
   bool is_refined = true;  ///< false: the given values as they are, the offset alone is fitted
+  bool is_at_rest = true;  ///< each record starts relaxed; false: from a state that is fitted too
 };
 
-/// Least squares over the free run, from the state at the start of each record that suits it best:
+/// Least squares over the free run:
 ///
-///     min_(p, b, z_0) sum (y_n(p, b, z_0) - target_n)^2,    p_j = 1e-4 s_j + exp(q_j) > 0
+///     min_(p, b) sum (y_n(p, b) - target_n)^2,    p_j = 1e-4 s_j + exp(q_j) > 0
 ///
-/// The states z_0 enter linearly and are eliminated exactly. s: std(target) / std(u) for springs,
+/// Each record starts relaxed at its first deflection, or from the state z_0 that suits it best: z_0 enters
+/// linearly and is eliminated exactly. That lets a slow branch take up what the network cannot
+/// explain, so it is for records that start in motion. s: std(target) / std(u) for springs,
 /// that times the geometric mean of sample period and longest record for dashpots.
 /// Levenberg-Marquardt by Ceres over q and b from several starts (the given values first, then random ones with
 /// relaxation times from two samples to a quarter of the longest record); all are searched a little, the best
