@@ -49,6 +49,19 @@ struct Delayed {
 
 }  // namespace
 
+void fill_basis(const StaticCurve& curve, double x, std::span<double> basis) {
+  if (!curve.knots.empty()) {
+    for (std::size_t i = 0; i < basis.size(); ++i) basis[i] = curve.basis(i, x);
+    return;
+  }
+  const double z = (x - curve.centre) / curve.half_range;
+  double power = 1.0;
+  for (double& each : basis) {
+    each = power;
+    power *= z;
+  }
+}
+
 std::size_t WienerData::judged_samples() const {
   std::size_t count = 0;
   for (const WienerRecord& record : records)
@@ -91,6 +104,20 @@ std::size_t shifting_value(const StaticCurve& input, double rest_input) {
   const auto next = std::ranges::min_element(
       input.knots, {}, [&](double knot) { return std::abs(knot - rest_input); });
   return static_cast<std::size_t>(next - input.knots.begin());
+}
+
+WienerData front_of(const WienerData& data, std::size_t samples) {
+  std::size_t all = 0;
+  for (const WienerRecord& record : data.records) all += record.input.size();
+  WienerData front = data;
+  for (WienerRecord& record : front.records) {
+    const std::size_t kept =
+        all <= samples ? record.input.size() : record.input.size() * samples / all;
+    record.input.resize(kept);
+    record.target.resize(kept);
+    record.judged.resize(kept);
+  }
+  return front;
 }
 
 void SectionCascade::run_section(std::size_t section, bool is_all_pole, std::span<double> signal) {
@@ -144,10 +171,12 @@ WienerError::WienerError(const WienerData& data, WienerNumbers numbers, WienerFr
       names_.push_back(fmt::format("start {} of record {}", s + 1, r + 1));
   for (const WienerRecord& record : data_.records) {
     Matrix& basis = basis_.emplace_back(frame_.input.values.size(), record.input.size());
-    for (std::size_t k = 0; k < basis.rows; ++k) {
-      const double at_rest = frame_.input.basis(k, data_.rest_input);
-      for (std::size_t n = 0; n < basis.columns; ++n)
-        basis(k, n) = frame_.input.basis(k, record.input[n]) - at_rest;
+    std::vector<double> at_rest(basis.rows);
+    std::vector<double> phi(basis.rows);
+    fill_basis(frame_.input, data_.rest_input, at_rest);
+    for (std::size_t n = 0; n < basis.columns; ++n) {
+      fill_basis(frame_.input, record.input[n], phi);
+      for (std::size_t k = 0; k < basis.rows; ++k) basis(k, n) = phi[k] - at_rest[k];
     }
   }
 }
@@ -216,6 +245,7 @@ bool WienerError::pass(const WienerNumbers& numbers, bool with_slopes, const Tak
   Block block = Block::Zero(kBlock, static_cast<Index>(error_at) + 1);
   std::vector<double> work(kBlock);
   std::vector<double> slope(kBlock);
+  std::vector<double> phi_of_x(output_free_);
   for (std::size_t r = 0; r < data_.records.size(); ++r) {
     const WienerRecord& record = data_.records[r];
     const bool has_start = numbers.start.rows > 0;
@@ -270,16 +300,15 @@ bool WienerError::pass(const WienerNumbers& numbers, bool with_slopes, const Tak
           of.start_past[i].shift(w, 1, part(to + 1));
           of.start_past[i].keep(w);
         }
+        for (std::size_t n = 0; n < count && output_free_ > 0; ++n) {
+          fill_basis(numbers.output, x[n], phi_of_x);
+          for (std::size_t k = 0; k < output_free_; ++k) part(output_at + k)[n] = phi_of_x[k];
+        }
         for (std::size_t n = 0; n < count; ++n) slope[n] = numbers.output.slope(x[n]);
         const Eigen::Map<const Eigen::ArrayXd> c(slope.data(), static_cast<Index>(count));
         for (std::size_t k = 0; k < size(); ++k) {
-          if (k >= output_at && k < model_size_) {
-            const auto to = part(k);
-            for (std::size_t n = 0; n < count; ++n)
-              to[n] = numbers.output.basis(k - output_at, x[n]);
-          } else {
+          if (k < output_at || k >= model_size_)
             block.col(static_cast<Index>(k)).head(static_cast<Index>(count)).array() *= c;
-          }
         }
       }
       const auto error = part(error_at);

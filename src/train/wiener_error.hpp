@@ -15,6 +15,9 @@
 
 namespace torsio {
 
+/// All factors `curve.basis(i, x)` at once.
+void fill_basis(const StaticCurve& curve, double x, std::span<double> basis);
+
 /// One record: the samples at which a model is stepped.
 struct WienerRecord {
   std::vector<double> input;
@@ -31,6 +34,9 @@ struct WienerData {
 
   [[nodiscard]] std::size_t judged_samples() const;
 };
+
+/// The first so many samples of each record, about so many together.
+[[nodiscard]] WienerData front_of(const WienerData& data, std::size_t samples);
 
 /// The first input, the target and what may be learned from.
 [[nodiscard]] WienerData wiener_data(const TrainingData& data);

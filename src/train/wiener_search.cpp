@@ -150,7 +150,17 @@ std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& sh
   const std::size_t sections = (std::max({shape.zeros, shape.poles, std::size_t{1}}) + 1) / 2;
   const bool has_start = 2 * sections * data.records.size() <= kMostStarts;
   std::optional<WienerFit> best;
-  const std::vector<WienerNumbers> starts = wiener_starts(data, shape, has_start);
+  std::vector<WienerNumbers> starts = wiener_starts(data, shape, has_start);
+  // Of long records a part tells which start leads farther.
+  constexpr std::size_t kEnough = 10'000;
+  if (starts.size() > 1 && data.judged_samples() > 2 * kEnough) {
+    const WienerData part = front_of(data, kEnough);
+    if (part.judged_samples() > 0) {
+      std::vector<WienerFit> tried;
+      for (const WienerNumbers& start : starts) tried.push_back(refined(part, start, iterations));
+      starts = {std::ranges::min_element(tried, {}, &WienerFit::sum_of_squares)->numbers};
+    }
+  }
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const auto begin = static_cast<double>(i) / static_cast<double>(starts.size());
     WienerFit fit = refined(data, starts[i], iterations,

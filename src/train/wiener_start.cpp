@@ -20,11 +20,12 @@ class ColumnProducts {
  public:
   explicit ColumnProducts(std::size_t columns)
       : products_(Eigen::MatrixXd::Zero(static_cast<Index>(columns) + 1,
-                                        static_cast<Index>(columns) + 1)) {}
+                                        static_cast<Index>(columns) + 1)),
+        rows_(static_cast<Index>(columns) + 1, kRows) {}
 
   void add(std::span<const double> row) {
-    const Eigen::Map<const Eigen::VectorXd> r(row.data(), static_cast<Index>(row.size()));
-    products_.selfadjointView<Eigen::Lower>().rankUpdate(r);
+    std::ranges::copy(row, rows_.col(filled_++).data());
+    if (filled_ == kRows) take_in();
   }
 
   struct Solution {
@@ -32,7 +33,8 @@ class ColumnProducts {
     double sum_of_squares = 0.0;
   };
   /// The last column is the target.
-  [[nodiscard]] Solution solved() const {
+  [[nodiscard]] Solution solved() {
+    take_in();
     const Index n = products_.rows() - 1;
     const Eigen::MatrixXd full = products_.selfadjointView<Eigen::Lower>();
     Eigen::VectorXd scale = full.diagonal().head(n).cwiseSqrt();
@@ -51,7 +53,15 @@ class ColumnProducts {
   }
 
  private:
+  static constexpr Index kRows = 256;  // at once: a product of matrices
+  void take_in() {
+    products_.selfadjointView<Eigen::Lower>().rankUpdate(rows_.leftCols(filled_));
+    filled_ = 0;
+  }
+
   Eigen::MatrixXd products_;
+  Eigen::MatrixXd rows_;  ///< transposed
+  Index filled_ = 0;
 };
 
 /// Calls take(record, sample) for each judged sample that has `lags` before it in its record.
@@ -298,7 +308,7 @@ void fit_output(const WienerData& data, const WienerShape& shape, WienerNumbers&
   std::vector<double> row(count + 1);
   std::size_t at = 0;
   for_each_judged(data, 0, [&](std::size_t r, std::size_t n) {
-    for (std::size_t k = 0; k < count; ++k) row[k] = numbers.output.basis(k, x[at]);
+    fill_basis(numbers.output, x[at], std::span(row).first(count));
     row[count] = data.records[r].target[n];
     products.add(row);
     ++at;
@@ -319,9 +329,11 @@ std::optional<Sections> slow_start(const WienerData& data, std::size_t zeros, st
 
 std::vector<WienerNumbers> wiener_starts(const WienerData& data, const WienerShape& shape,
                                          bool has_start) {
-  const Signals inputs = centred_inputs(data);
-  std::vector<LinearStart> linear{by_steiglitz_mcbride(data, inputs, shape.zeros, shape.poles)};
-  if (shape.poles > 0) linear.push_back(by_time_constants(data, inputs, shape.zeros, shape.poles));
+  constexpr std::size_t kEnough = 5'000;  // samples for a start
+  const WienerData part = front_of(data, kEnough);
+  const Signals inputs = centred_inputs(part);
+  std::vector<LinearStart> linear{by_steiglitz_mcbride(part, inputs, shape.zeros, shape.poles)};
+  if (shape.poles > 0) linear.push_back(by_time_constants(part, inputs, shape.zeros, shape.poles));
   std::vector<std::pair<double, WienerNumbers>> ranked;
   for (const LinearStart& each : linear) {
     if (!std::isfinite(each.sum_of_squares)) continue;
