@@ -126,7 +126,7 @@ TEST(InitialState, OfAMassOnAHystereticSpringIsFoundFromItsFirstSamples) {
   model.set_state(start);
   const TrainingData data = recorded(model, multisine(50, 750.0, 5.0, 100.0, 60.0), 0.0);
   AnyModel found(hysteretic());
-  start_where_measured(found, data.sequences[0].features, data.sequences[0].target);
+  start_where_measured(found, data.sequences[0].features, data.sequences[0].target, 1e-6);
   ASSERT_EQ(found.state().size(), 3U);
   EXPECT_NEAR(found.state()[0], start[0], 1e-7);
   EXPECT_NEAR(found.state()[1], start[1], 1e-4);
@@ -138,7 +138,7 @@ TEST(InitialState, OfADriveIsItsPositionAndSpeed) {
   model.set_state(std::vector<double>{0.2, -0.05, 0.0});
   const TrainingData data = recorded(model, std::vector<double>(50, 10.0), 0.0);
   AnyModel found(carriage());
-  start_where_measured(found, data.sequences[0].features, data.sequences[0].target);
+  start_where_measured(found, data.sequences[0].features, data.sequences[0].target, 1e-6);
   EXPECT_NEAR(found.state()[0], 0.2, 1e-5);
   EXPECT_NEAR(found.state()[1], -0.05, 1e-3);
 }
