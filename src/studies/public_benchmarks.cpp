@@ -1,4 +1,5 @@
 #include <array>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -75,7 +76,9 @@ void run(const Benchmark& benchmark, const std::string& folder, Study& study,
   std::vector<std::string> tests;
   for (const std::string_view test : benchmark.tests)
     if (!test.empty()) tests.push_back(at + std::string(test));
-  LoadOptions load{.target = std::string(benchmark.target), .progress = progress};
+  LoadOptions load;
+  load.target = benchmark.target;
+  load.progress = progress;
   if (benchmark.rate_Hz > 0.0) load.rate_Hz = benchmark.rate_Hz;
   const Dataset dataset = load_dataset({at + std::string(benchmark.train)}, tests, load);
   const std::string_view models = study.options.is_quick ? "linear,arx" : benchmark.models;

@@ -57,6 +57,7 @@ class Start {
   bool evaluate(std::span<const double> state, std::span<const double> typical,
                 std::span<double> residuals) {
     constexpr double kRestWeight = 1e-3;
+    const double weight = kRestWeight * spread_;
     model_.reset();
     model_.set_state(state);
     std::size_t next = 0;
@@ -66,7 +67,7 @@ class Start {
       if (next < judged_.size() && judged_[next] == n) residuals[next++] = value - target_[n];
     }
     for (std::size_t j = 0; j < rest_.size(); ++j)
-      residuals[judged_.size() + j] = kRestWeight * (state[j] - rest_[j]) / typical[j];
+      residuals[judged_.size() + j] = weight * (state[j] - rest_[j]) / typical[j];
     return true;
   }
 

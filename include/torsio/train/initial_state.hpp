@@ -10,7 +10,7 @@ namespace torsio {
 
 /// Puts a model with a state (`HasState`) where its first outputs miss the measured ones least:
 ///
-///     min_s sum_k (y_k(s) - target_k)^2 + 1e-6 |s - s_0|^2
+///     min_s sum_k (y_k(s) - target_k)^2 + 1e-6 spread^2 |s - s_0|^2
 ///
 /// s_0 the state after `reset()`; each state is scaled by what moves the output by the target's spread,
 /// so that the last term only decides what the samples leave open. Levenberg-Marquardt by Ceres. The
