@@ -51,13 +51,21 @@ std::string evaluation_text(const torsio::Results& results) {
   torsio::TextTable table;
   table.header(
       {"split", "RMSE", "MAD", "max|e|", "fit %", "samples", "by a guard", "step ns", "p99.9"});
+  // Four places, or three digits where the smallest error would be lost in them (metres).
+  constexpr double kTooSmallForFourPlaces = 0.0005;
+  const bool is_small = std::ranges::any_of(results.rows, [](const torsio::ResultRow& row) {
+    return row.score.metrics.rmse < kTooSmallForFourPlaces;
+  });
+  const auto error = [&](double value) {
+    return is_small ? fmt::format("{:.3g}", value) : fmt::format("{:.4f}", value);
+  };
   for (const torsio::ResultRow& row : results.rows) {
     const torsio::Metrics& metrics = row.score.metrics;
     std::string split(torsio::name(row.split));
     if (row.recording) split = "  " + *row.recording;
-    table.row({split, fmt::format("{:.4f}", metrics.rmse), fmt::format("{:.4f}", metrics.mad),
-               fmt::format("{:.4f}", metrics.max_abs), fmt::format("{:.1f}", metrics.fit_percent),
-               fmt::format("{}", metrics.samples), fmt::format("{}", row.score.guarded_samples),
+    table.row({split, error(metrics.rmse), error(metrics.mad), error(metrics.max_abs),
+               fmt::format("{:.1f}", metrics.fit_percent), fmt::format("{}", metrics.samples),
+               fmt::format("{}", row.score.guarded_samples),
                fmt::format("{:.0f}", row.score.step_ns_p50),
                fmt::format("{:.0f}", row.score.step_ns_p999)});
   }

@@ -188,16 +188,15 @@ struct Candidate {
 
 Candidate candidate(const Parameters& with, const Scale& scale, const TermSet& set) {
   Candidate made{.fields = basic_fields(with, scale), .model = {}, .with = with};
-  bool has_bristle = false;
   for (const Term* term : set) {
     const std::vector<Field> more = term->fields(with, scale);
     made.fields.insert(made.fields.end(), more.begin(), more.end());
-    has_bristle = has_bristle || term->name == "lugre";
   }
   for (const Field& field : made.fields) made.model.parameters.push_back(field.searched);
   made.model.parameters.insert(made.model.parameters.end(), scale.further_gains.begin(),
                                scale.further_gains.end());
-  made.model.free_states = has_bristle ? 3 : 2;
+  made.model.difference = 1e-3;        // stops and starts make the residuals rough
+  made.model.searches_starts = false;  // nothing brings a drive back: a start would hide a drift
   made.model.run = [with, fields = made.fields](std::span<const double> values,
                                                 std::span<const double> state,
                                                 const Sequence& sequence, std::span<double> told) {
@@ -323,7 +322,7 @@ Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
                     .further_gains = further_gains(data)};
   const SimulationFitOptions search{.first_horizon = options.first_horizon,
                                     .most_iterations = options.iterations,
-                                    .tolerance = 1e-6,  // stops and starts make its valley rough
+                                    .tolerance = 1e-6,
                                     .progress = progress};
   Candidate made = candidate(guesses.front(), scale, {});
   std::vector<std::vector<double>> starts;

@@ -39,6 +39,17 @@ double edge_at(const std::vector<Residual>& sorted, std::size_t end) {
   return std::midpoint(sorted[end - 1].value, sorted[end].value);
 }
 
+/// An equation of motion holds beyond the forces that it was fitted to, and a straight line from force to
+/// displacement nowhere: the guard leaves such a model as much room again on either side.
+void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
+  if (model.get_if<DynamicBoucWen>() == nullptr && model.get_if<FrictionDrive>() == nullptr) return;
+  for (std::size_t j = 0; j < ranges.lowest.size(); ++j) {
+    const double width = ranges.highest[j] - ranges.lowest[j];
+    ranges.lowest[j] -= width;
+    ranges.highest[j] += width;
+  }
+}
+
 }  // namespace
 
 FeatureRanges feature_ranges(const TrainingData& data) {
@@ -114,6 +125,7 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
   settings.sample_rate_Hz = training.sample_rate_Hz;
   settings.target = training.target;
   settings.ranges = feature_ranges(training);
+  widen_for_physics(settings.ranges, model);
   settings.fallback = linear_fallback(training);
   settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
   return settings;

@@ -31,14 +31,13 @@ double typical_of(std::span<const double> typical, std::span<const double> theta
 bool differentiate(const ResidualProblem& problem, std::span<const double> theta,
                    std::span<const double> at_theta, std::span<const double> typical,
                    std::span<double> jacobian) {
-  constexpr double kShare =
-      1e-6;  // cube root of rounding, about: the error of a central difference
   std::vector<double> moved(theta.begin(), theta.end());
   std::vector<double> above(problem.residuals);
   std::vector<double> below(problem.residuals);
   const std::size_t columns = theta.size();
   for (std::size_t j = 0; j < columns; ++j) {
-    const double step = kShare * std::max(std::abs(theta[j]), typical_of(typical, theta, j));
+    const double step =
+        problem.difference * std::max(std::abs(theta[j]), typical_of(typical, theta, j));
     const auto side = [&](double to, std::vector<double>& residuals) {
       moved[j] = to;
       if (problem.evaluate(moved, residuals, {}) && all_finite(residuals)) return to - theta[j];

@@ -18,7 +18,10 @@ struct ResidualProblem {
   std::function<bool(std::span<const double> theta, std::span<double> residuals,
                      std::span<double> jacobian)>
       evaluate;
-  bool has_jacobian = false;  ///< else J is taken from central differences
+  bool has_jacobian = false;  ///< else J is taken from central differences ..
+  /// .. of this half-width, over the larger of typical and |θ|: about the cube root of rounding, which
+  /// a smooth r wants; a rough one wants more.
+  double difference = 1e-6;
   /// That the residuals stand for, where they are the triangle of a longer list; 0: as many.
   std::size_t samples = 0;
 };

@@ -41,7 +41,8 @@ class Unknowns {
       starts_.push_back(measured_start(sequence, data.sample_rate_Hz));
       starts_.back().resize(model.free_states, 0.0);
     }
-    searched_ = data.sequences.size() <= kMostSearchedStarts ? model.free_states : 0;
+    if (model.searches_starts && data.sequences.size() <= kMostSearchedStarts)
+      searched_ = model.free_states;
     for (std::size_t i = 0; i < data.sequences.size(); ++i)
       for (std::size_t j = 0; j < searched_; ++j) {
         scale_.push_back(j == 1 ? spread * data.sample_rate_Hz * kVelocityShare : spread);
@@ -82,11 +83,13 @@ class Unknowns {
   /// Of the first `horizon` samples of each sequence, over the target's spread.
   [[nodiscard]] ResidualProblem problem(std::size_t horizon) const {
     return {.residuals = judged_samples(data_, horizon),
-            .evaluate = [this, horizon, spread = target_spread(data_)](
-                            std::span<const double> unknowns, std::span<double> residuals,
-                            std::span<double> /*jacobian*/) {
-              return evaluate(unknowns, horizon, spread, residuals);
-            }};
+            .evaluate =
+                [this, horizon, spread = target_spread(data_)](std::span<const double> unknowns,
+                                                               std::span<double> residuals,
+                                                               std::span<double> /*jacobian*/) {
+                  return evaluate(unknowns, horizon, spread, residuals);
+                },
+            .difference = model_.difference};
   }
 
  private:

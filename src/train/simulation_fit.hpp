@@ -35,7 +35,10 @@ struct SimulatedModel {
   std::function<bool(std::span<const double> parameters, std::span<const double> state,
                      const Sequence& sequence, std::span<double> values)>
       run;
-  std::size_t free_states = 2;  ///< of the start, searched for: position, velocity, ..
+  double difference = 1e-6;     ///< `ResidualProblem::difference`
+  std::size_t free_states = 2;  ///< of a start: position, velocity, ..
+  /// Beside the parameters; else a fit starts from the first samples' position and velocity.
+  bool searches_starts = true;
 };
 
 /// A model of family M, made from what the search has; nothing if it refuses that.

@@ -52,7 +52,8 @@ TEST(BoucWenBenchmark, CannotBeSimulatedFromAHeldForce) {
   TORSIO_NEEDS_DATA("boucwen");
   const Results held = compared("boucwen", "dynamic_bouc_wen:input_order=0");
   for (const ResultRow& row : held.rows) {
-    if (row.split == Role::test) EXPECT_TRUE(!(row.score.metrics.rmse < 1e-5)) << row.status;
+    if (row.split != Role::test) continue;
+    EXPECT_FALSE(row.score.metrics.rmse < 1e-5) << row.status;
   }
 }
 
@@ -68,7 +69,7 @@ TEST(EmpsBenchmark, IsSimulatedByFourNumbers) {
   EXPECT_NEAR(trained.table[2].value, 20.4, 3.0);
   EXPECT_NEAR(trained.table[3].value, -3.16, 0.4);
   const ResultRow row = scored(evaluate_model(trained.file, dataset), "pulses");
-  EXPECT_LT(row.score.metrics.rmse, 6.7e-3);
+  EXPECT_LT(row.score.metrics.rmse, 6.7e-3);  // 6.2e-3
 }
 
 TEST(PublicBenchmarks, StandBesideWhatWasPublished) {
