@@ -129,6 +129,13 @@ RelaxationSpectrum sum_of(const std::vector<RelaxationSpectrum>& parts) {
   return sum;
 }
 
+bool is_finite(const RelaxationSpectrum& spectrum) {
+  return std::isfinite(spectrum.damping) && std::isfinite(spectrum.stiffness) &&
+         std::ranges::all_of(spectrum.branches, [](const RelaxationBranch& branch) {
+           return std::isfinite(branch.stiffness) && std::isfinite(branch.rate_1_s);
+         });
+}
+
 [[noreturn]] void refuse(std::size_t node, std::string expected, std::string found) {
   throw Error({.place = fmt::format("network: node {}", node),
                .expected = std::move(expected),
@@ -138,7 +145,8 @@ RelaxationSpectrum sum_of(const std::vector<RelaxationSpectrum>& parts) {
 void check_leaf(const SpringDashpotNetwork& network, std::size_t index) {
   const NetworkNode& node = network.nodes[index];
   if (!(node.value >= kSmallestElement && node.value <= kLargestElement))
-    refuse(index, fmt::format("{} from {:g} to {:g}", node.name(), kSmallestElement, kLargestElement),
+    refuse(index,
+           fmt::format("{} from {:g} to {:g}", node.name(), kSmallestElement, kLargestElement),
            fmt::format("{}", node.value));
   for (std::size_t i = 0; i < index; ++i)
     if (network.nodes[i].is_leaf() && network.nodes[i].name() == node.name())
@@ -180,6 +188,8 @@ RelaxationSpectrum relaxation_spectrum(const SpringDashpotNetwork& network) {
     throw Error({.place = "network",
                  .expected = "one network",
                  .found = fmt::format("{} that nothing joins", open.size())});
+  if (!is_finite(open.front()))
+    throw Error({.place = "network", .problem = "its values lie too far apart for a double"});
   return std::move(open.front());
 }
 

@@ -76,8 +76,12 @@ class Search {
             .evaluate = [this, pull](std::span<const double> theta, std::span<double> residuals,
                                      std::span<double> /*jacobian*/) {
               const std::vector<double> values = values_of(theta);
-              error_.evaluate(relaxation_spectrum(network_at(values)), theta.back(),
-                              residuals.first(error_.residuals()));
+              try {
+                error_.evaluate(relaxation_spectrum(network_at(values)), theta.back(),
+                                residuals.first(error_.residuals()));
+              } catch (const Error&) {
+                return false;  // values out of all bounds: the search turns back
+              }
               if (pull > 0.0)
                 for (std::size_t j = 0; j < values.size(); ++j)
                   residuals[error_.residuals() + j] = pull * std::log(values[j] / start_[j]);
@@ -92,7 +96,7 @@ class Search {
     options.typical.push_back(error_.target_deviation());
     for (const double scale : scale_) {
       options.lower.push_back(std::log(1e-3 * kFloor * scale));
-      options.upper.push_back(std::log(kCeiling * scale));
+      options.upper.push_back(std::log(std::min(kCeiling * scale, 0.5 * kLargestElement)));
     }
     options.lower.push_back(-HUGE_VAL);
     options.upper.push_back(HUGE_VAL);

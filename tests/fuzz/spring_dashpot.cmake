@@ -1,0 +1,1 @@
+torsio_fuzzer(spring_dashpot torsio::runtime)
