@@ -22,6 +22,7 @@ Estimate broken_line_inverse(double wanted, const SlipBank& stops, const Increme
   // Two points beyond the last corner on either side tell the slopes out there.
   const double farthest_down = curve(here - reach);
   const double farthest_up = curve(here + reach);
+  if (!std::isfinite(farthest_down) || !std::isfinite(farthest_up)) return no_inverse(features);
   const double sign = farthest_up < farthest_down ? -1.0 : 1.0;
   struct Point {
     double x;
@@ -49,8 +50,9 @@ Estimate broken_line_inverse(double wanted, const SlipBank& stops, const Increme
     narrow(here + (thresholds[i] - stops.forces()[i]));
     narrow(here - (thresholds[i] + stops.forces()[i]));
   }
-  if (above.y == below.y) return {.value = 0.5 * (below.x + above.x)};
-  return {.value = below.x + (above.x - below.x) * (aim - below.y) / (above.y - below.y)};
+  const double share = above.y == below.y ? 0.5 : (aim - below.y) / (above.y - below.y);
+  const double x = below.x + share * (above.x - below.x);
+  return std::isfinite(x) ? Estimate{.value = x} : no_inverse(features);
 }
 
 }  // namespace torsio

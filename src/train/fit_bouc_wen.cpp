@@ -128,7 +128,7 @@ std::vector<FittedParameter> table_of(BoucWenSearch& search, const OperatorData&
 Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const HysteresisSearchOptions& options,
                                   const Progress& progress) {
   const OperatorData runs =
-      operator_data(data, options.rates, 0, kMostResiduals, 6 + data.input_count());
+      operator_data(data, options.rates, 0, kMostResiduals / 4, 6 + data.input_count());
   BoucWenSearch search(runs);
   const ResidualProblem problem{
       .residuals = runs.rows(),
@@ -141,16 +141,15 @@ Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const HysteresisSear
   const double range = std::log(runs.half_range);
   const double highest = range + std::log(4.0);
   std::vector<std::vector<double>> starts;
-  for (const double share : {0.02, 0.1, 0.4})
+  for (const double share : {0.03, 0.3})
     for (const double ratio : {0.8, -0.3}) starts.push_back({range + std::log(share), 1.5, ratio});
-  const SearchResult found =
-      minimise_squares_from(problem, starts,
-                            {.most_iterations = options.most_iterations,
-                             .lower = {range + std::log(1e-4), 1.0, kLeastRatio},
-                             .upper = {highest, kMostExponent, 1.0},
-                             .typical = {1.0, 1.0, 1.0},
-                             .progress = progress});
-  require_convergence(found, BoucWenModel::kFamily);
+  const SearchResult found = converged_search(problem, starts,
+                                              {.most_iterations = options.most_iterations,
+                                               .lower = {range + std::log(1e-4), 1.0, kLeastRatio},
+                                               .upper = {highest, kMostExponent, 1.0},
+                                               .typical = {1.0, 1.0, 1.0},
+                                               .progress = progress},
+                                              BoucWenModel::kFamily);
   std::vector<double> residuals(runs.rows());
   const Shape shape = shape_of(found.theta);
   const LinearSolution linear = search.solve(shape, residuals);

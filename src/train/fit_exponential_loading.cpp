@@ -77,13 +77,13 @@ Fitted<ExponentialLoading> fit_exponential_loading(const TrainingData& data,
   for (const double decays : {1.0, 3.0, 10.0, 50.0})
     starts.push_back({std::log(decays), std::log(decays)});
   const std::vector<double> typical{1.0, 1.0};
-  const SearchResult found = minimise_squares_from(problem, starts,
-                                                   {.most_iterations = options.most_iterations,
-                                                    .lower = {std::log(1e-2), std::log(1e-2)},
-                                                    .upper = {std::log(1e4), std::log(1e4)},
-                                                    .typical = typical,
-                                                    .progress = progress});
-  require_convergence(found, ExponentialLoading::kFamily);
+  const SearchResult found = converged_search(problem, starts,
+                                              {.most_iterations = options.most_iterations,
+                                               .lower = {std::log(1e-2), std::log(1e-2)},
+                                               .upper = {std::log(1e4), std::log(1e4)},
+                                               .typical = typical,
+                                               .progress = progress},
+                                              ExponentialLoading::kFamily);
   std::vector<double> residuals(runs.rows());
   const std::vector<double> c = search.solve(found.theta, residuals).coefficients;
   Fitted<ExponentialLoading> fitted{.parameters = {}, .notes = runs.notes};

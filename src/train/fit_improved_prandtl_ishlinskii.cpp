@@ -186,8 +186,7 @@ Fitted<ImprovedPrandtlIshlinskii> fit_improved_prandtl_ishlinskii(
   SearchOptions search = bounds_of(run, start);
   search.most_iterations = options.most_iterations;
   search.progress = progress;
-  const SearchResult found = minimise_squares(problem, theta, search);
-  require_convergence(found, kFamily);
+  const SearchResult found = converged_search(problem, {theta}, search, kFamily);
   Fitted<ImprovedPrandtlIshlinskii> fitted{run.at(found.theta), runs.notes};
   for (std::size_t j = 1; j < data.input_count(); ++j)
     if (runs.terms[j].empty()) fitted.parameters.slopes[j] = 0.0;

@@ -210,13 +210,13 @@ Fitted<Backlash<kByRate>> fit(const TrainingData& data, const HysteresisSearchOp
           [&](std::span<const double> theta, std::span<double> residuals,
               std::span<double> jacobian) { return run.evaluate(theta, residuals, jacobian); },
       .has_jacobian = true};
-  const SearchResult found = minimise_squares_from(problem, starts.theta,
-                                                   {.most_iterations = options.most_iterations,
-                                                    .lower = starts.lower,
-                                                    .upper = starts.upper,
-                                                    .typical = starts.typical,
-                                                    .progress = progress});
-  require_convergence(found, kFamily);
+  const SearchResult found = converged_search(problem, starts.theta,
+                                              {.most_iterations = options.most_iterations,
+                                               .lower = starts.lower,
+                                               .upper = starts.upper,
+                                               .typical = starts.typical,
+                                               .progress = progress},
+                                              kFamily);
   const std::span theta(found.theta);
   const auto size = static_cast<std::ptrdiff_t>(layout.size);
   Fitted<Backlash<kByRate>> fitted{.parameters = {}, .notes = runs.notes};

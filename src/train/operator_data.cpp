@@ -44,6 +44,21 @@ std::vector<bool> sloped_inputs(const TrainingData& data, bool rates, OperatorDa
   return sloped;
 }
 
+/// Leaves out unused samples on the way between two turns: an operator that hears no rate is where
+/// it is by its turns alone.
+Stretch turns_of(const Stretch& stretch) {
+  Stretch kept;
+  for (std::size_t n = 0; n < stretch.x.size(); ++n) {
+    const double x = stretch.x[n];
+    const bool is_between =
+        n > 0 && n + 1 < stretch.x.size() && (x - kept.x.back()) * (stretch.x[n + 1] - x) >= 0.0;
+    if (stretch.row[n] == Stretch::kUnused && is_between) continue;
+    kept.x.push_back(x);
+    kept.row.push_back(stretch.row[n]);
+  }
+  return kept;
+}
+
 void set_units(OperatorData& result, const TrainingData& data) {
   result.torque_unit = unit_label(data.target);
   result.x_unit = unit_label(data.inputs[0].expression);
@@ -82,6 +97,7 @@ OperatorData operator_data(const TrainingData& data, bool rates, std::size_t rat
       for (std::size_t j = 0; j < features.size(); ++j)
         result.others.values.push_back(sloped[j] ? features[j] : 0.0);
     }
+    if (rate_feature == 0) stretch = turns_of(stretch);
   }
   result.others.rows = result.target.size();
   for (std::size_t j = 0; j < data.input_count(); ++j)
@@ -102,13 +118,22 @@ LinearSolution solve_linear(const Matrix& columns, const std::vector<double>& ta
   return {std::move(fit.coefficients), std::move(fit.dropped)};
 }
 
-void require_convergence(const SearchResult& found, std::string_view family) {
-  if (found.has_converged) return;
-  throw Error({.problem = fmt::format("the search for the parameters of {} did not converge in {} "
-                                      "iterations",
-                                      family, found.iterations),
-               .advice = "Give it more (--set iterations=1000), or records that move the first "
-                         "input over full loops."});
+SearchResult converged_search(const ResidualProblem& problem,
+                              const std::vector<std::vector<double>>& starts, SearchOptions options,
+                              std::string_view family) {
+  constexpr std::size_t kFirstIterations = 6;
+  const std::size_t most = options.most_iterations;
+  options.most_iterations = std::min(most, kFirstIterations);
+  std::vector<double> best = minimise_squares_from(problem, starts, options).theta;
+  options.most_iterations = most;
+  SearchResult found = minimise_squares(problem, std::move(best), options);
+  if (!found.has_converged)
+    throw Error({.problem = fmt::format("the search for the parameters of {} did not converge in "
+                                        "{} iterations",
+                                        family, most),
+                 .advice = "Give it more (--set iterations=1000), or records that move the first "
+                           "input over full loops."});
+  return found;
 }
 
 void note_null_directions(const ParameterUncertainty& uncertainty,

@@ -13,7 +13,8 @@
 
 namespace torsio {
 
-/// A record as an operator meets it: samples without features left out.
+/// A record as an operator meets it: samples without features left out and, where no rate is heard,
+/// unused ones between two turns.
 struct Stretch {
   static constexpr std::size_t kUnused = static_cast<std::size_t>(-1);
   std::vector<double> x;         ///< the first input
@@ -55,8 +56,11 @@ struct LinearSolution {
                                           const std::vector<std::uint8_t>& is_free,
                                           std::span<double> residuals);
 
-/// @throws Error if the search did not converge.
-void require_convergence(const SearchResult& found, std::string_view family);
+/// A few iterations from each start, then the best of them to its end.
+/// @throws Error if that does not converge in `options.most_iterations`.
+[[nodiscard]] SearchResult converged_search(const ResidualProblem& problem,
+                                            const std::vector<std::vector<double>>& starts,
+                                            SearchOptions options, std::string_view family);
 
 /// Notes on parameters that the data do not tell.
 void note_null_directions(const ParameterUncertainty& uncertainty,

@@ -13,7 +13,7 @@
 #include "torsio/train/training_data.hpp"
 
 // Fits of hysteresis operators. The operator runs through every sample of a record that has
-// features; usable samples are learned from, the search of a non-linear family using at most
+// features (between two turns where that changes nothing, only those that are judged); usable samples are learned from, the search of a non-linear family using at most
 // `kMostResiduals` of them, evenly spread. Other inputs get slopes as in `fit_polynomial`.
 //
 // All @throw Error if the first input is constant in the training data or there are too few
@@ -21,7 +21,7 @@
 
 namespace torsio {
 
-inline constexpr std::size_t kMostResiduals = 40000;
+inline constexpr std::size_t kMostResiduals = 10000;
 
 struct OperatorSumOptions {
   std::size_t thresholds = 8;  ///< 1 to `kMostThresholds`
@@ -54,8 +54,9 @@ inline constexpr std::size_t kHighestCurveDegree = 9;
     const TrainingData& data, const HysteresisSearchOptions& options,
     const Progress& progress = {});
 
-/// z_max, n and gamma / beta are searched from six starts; the rest is linear and solved for each
-/// of their values, the hysteresis held at or above 0.
+/// z_max, n and gamma / beta are searched from four starts; the rest is linear and solved for each
+/// of their values, the hysteresis held at or above 0. Learns from a quarter of `kMostResiduals`: its
+/// powers cost.
 [[nodiscard]] Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data,
                                                 const HysteresisSearchOptions& options,
                                                 const Progress& progress = {});
