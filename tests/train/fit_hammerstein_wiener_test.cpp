@@ -143,7 +143,7 @@ TEST(FitHammersteinWiener, KeepsPolesInsideTheUnitCircle) {
 
 TEST(FitHammersteinWiener, GoesToContinuousTimeAndWarnsOfArtefacts) {
   HammersteinWiener::Parameters printed = hammerstein_wiener_of(Paper003::discrete);
-  printed.input.half_range = 1.0 / 8.0;  // u of about 1 is 8 deg
+  printed.input.half_range = 1.0;  // u in degrees: within what the output curve holds
   const TrainingData data = recorded(printed, 4000, 0.02, 8);
   const auto discrete = fit_hammerstein_wiener(data, kTrueShape);
   EXPECT_THAT(discrete.notes, Contains(HasSubstr("beyond Nyquist (628.3 rad/s)")));
