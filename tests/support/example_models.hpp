@@ -80,8 +80,8 @@ inline GreyBox example<GreyBox>() {
                       .rate_scales = {0.0, 0.05},
                       .sample_period_s = 0.001};
   parameters.coefficients.values = Matrix(1, parameters.terms.columns());
-  parameters.coefficients.values.values = {-70.0, 0.5, 80.0, 1.0, 1.5, 2.0, 1.0,
-                                           30.0,  0.0, 0.25, 0.0, 1.2};
+  parameters.coefficients.values.values = {-70.0, 0.5,  80.0, 1.0,  1.5, 2.0,
+                                           1.0,   30.0, 0.0,  0.25, 0.0, 1.2};
   return GreyBox(parameters);
 }
 
@@ -164,15 +164,15 @@ inline Dgmm example<Dgmm>() {
 /// Two sections; of the two inputs it uses the first.
 template <>
 inline HammersteinWiener example<HammersteinWiener>() {
-  return HammersteinWiener(
-      {.inputs = 2,
-       .sample_period_s = 1e-3,
-       .rest_input = 0.01,
-       .input = {.knots = {-0.1, 0.0, 0.1}, .values = {-1.2, 0.0, 1.0}},
-       .sections = sections_of({{1.0, -0.7, 0.2, 0.1}, {1.0, -1.5, 0.8, -0.2}}),
-       .output = {.knots = {}, .values = {0.2, 20.0, 0.4, 0.1}},
-       .lowest = -8.0,
-       .highest = 8.0});
+  HammersteinWiener::Parameters parameters = hammerstein_wiener_of(Paper003::discrete, 2);
+  parameters.sample_period_s = 1e-3;
+  parameters.rest_input = 0.01;
+  parameters.input = {.knots = {-0.1, 0.0, 0.1}, .values = {-1.2, 0.0, 1.0}};
+  parameters.sections = sections_of({{1.0, -0.7, 0.2, 0.1}, {1.0, -1.5, 0.8, -0.2}});
+  parameters.output = {.knots = {}, .values = {0.2, 20.0, 0.4, 0.1}};
+  parameters.lowest = -8.0;
+  parameters.highest = 8.0;
+  return HammersteinWiener(parameters);
 }
 
 template <>

@@ -112,8 +112,9 @@ TEST(FitGreyBox, PassiveFrictionAndRelaxationAreNeverNegative) {
   };
   const auto passive =
       fit_grey_box(data, {.passive = true, .residual = ResidualKind::none}).parameters;
-  if (passive.terms.first_slip() < passive.terms.first_slope())
+  if (passive.terms.first_slip() < passive.terms.first_slope()) {
     EXPECT_GE(lowest_force(passive), 0.0);
+  }
   const auto any = fit_grey_box(data, kBoxAlone).parameters;
   EXPECT_LT(lowest_force(any), -0.5);
   EXPECT_LT(evaluate(GreyBox(any), data).rmse, 0.6 * evaluate(GreyBox(passive), data).rmse);

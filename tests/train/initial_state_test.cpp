@@ -44,18 +44,19 @@ Measured run_from(const std::vector<double>& state, std::size_t samples, double 
 }
 
 const std::vector<double> kState{8.0, -3.0};  // slowest first
+constexpr double kError = 1e-6;               // of a model that is right
 
 TEST(InitialState, IsTheOneThatTheRunWasStartedFrom) {
   const Measured run = run_from(kState, 200, 0.0);
   AnyModel model = two_branches();
-  start_where_measured(model, run.features, run.target);
+  start_where_measured(model, run.features, run.target, kError);
   EXPECT_THAT(model.state(), Pointwise(DoubleNear(1e-4), kState));
 }
 
 TEST(InitialState, IsNearItInNoise) {
   const Measured run = run_from(kState, 200, 0.1);
   AnyModel model = two_branches();
-  start_where_measured(model, run.features, run.target);
+  start_where_measured(model, run.features, run.target, 0.1);
   EXPECT_THAT(model.state(), Pointwise(DoubleNear(0.2), kState));
 }
 
@@ -64,7 +65,7 @@ TEST(InitialState, PassesOverSamplesThatWereNotMeasured) {
   for (std::size_t n = 0; n < run.target.size(); ++n)
     if (n % 3 != 0) run.target[n] = kNotMeasured;
   AnyModel model = two_branches();
-  start_where_measured(model, run.features, run.target);
+  start_where_measured(model, run.features, run.target, kError);
   EXPECT_THAT(model.state(), Pointwise(DoubleNear(1e-4), kState));
 }
 
@@ -73,7 +74,7 @@ TEST(InitialState, StaysAtRestWhereNothingIsTold) {
   for (double& target : run.target) target = kNotMeasured;
   AnyModel model = two_branches();
   model.set_state(kState);
-  start_where_measured(model, run.features, run.target);
+  start_where_measured(model, run.features, run.target, kError);
   EXPECT_THAT(model.state(), ElementsAre(0.0, 0.0));
 }
 
@@ -82,7 +83,7 @@ TEST(InitialState, OfAFamilyWithoutIsAReset) {
   EXPECT_TRUE(model.state().empty());
   const Measured run = run_from(kState, 20, 0.0);
   Matrix features(20, model.input_count());
-  EXPECT_NO_THROW(start_where_measured(model, features, run.target));
+  EXPECT_NO_THROW(start_where_measured(model, features, run.target, kError));
 }
 
 }  // namespace
