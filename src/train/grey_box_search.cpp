@@ -372,8 +372,11 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& pro
       change(candidate);
       if (is_possible(candidate)) next.push_back(candidate);
     };
-    if (at.curve < kFinest) with([](auto& c) { ++c.curve; });
-    if (at.slips + 1 < kSlips.size()) with([](auto& c) { ++c.slips; });
+    // Two at a time as well: three knots show nothing of a curve that stiffens both ways alike.
+    for (std::size_t by = 1; by <= 2; ++by) {
+      if (at.curve + by <= kFinest) with([by](auto& c) { c.curve += by; });
+      if (at.slips + by < kSlips.size()) with([by](auto& c) { c.slips += by; });
+    }
     if (at.slips > 0 && at.forces < kFinest) with([](auto& c) { ++c.forces; });
     if (at.slips > 1) with([](auto& c) { --c.slips; });
     if (at.branches + 1 < kBranches.size()) with([](auto& c) { ++c.branches; });

@@ -108,23 +108,28 @@ constexpr std::array kFamilies{
     FamilyInfo{.name = ImprovedPrandtlIshlinskii::kFamily,
                .summary = "the same behind a bent curve, thresholds growing with the rate",
                .options = kImprovedPrandtlIshlinskiiOptions,
-               .fit = improved_prandtl_ishlinskii},
+               .fit = improved_prandtl_ishlinskii,
+               .only_if_named = true},
     FamilyInfo{.name = BoucWenModel::kFamily,
                .summary = "spring and a smooth hysteresis: b + alpha k x + (1 - alpha) k z",
                .options = kBoucWenOptions,
-               .fit = bouc_wen},
+               .fit = bouc_wen,
+               .only_if_named = true},
     FamilyInfo{.name = NonlinearBacklash::kFamily,
                .summary = "a spring between two curves: clip(y + k dx, f_dc(x), f_ac(x))",
                .options = kBacklashOptions,
-               .fit = nonlinear_backlash},
+               .fit = nonlinear_backlash,
+               .only_if_named = true},
     FamilyInfo{.name = ImprovedNonlinearBacklash::kFamily,
                .summary = "the same, the curves growing with the rate",
                .options = kBacklashOptions,
-               .fit = improved_nonlinear_backlash},
+               .fit = improved_nonlinear_backlash,
+               .only_if_named = true},
     FamilyInfo{.name = ExponentialLoading::kFamily,
                .summary = "nears one of two curves exponentially from the last reversal on",
                .options = kExponentialLoadingOptions,
-               .fit = exponential_loading}};
+               .fit = exponential_loading,
+               .only_if_named = true}};
 
 }  // namespace
 

@@ -108,7 +108,14 @@ TYPED_TEST(HysteresisLaws, AStateOutOfBoundsIsBroughtBackAndNoNumberPassedOver) 
   EXPECT_NEAR(model.step(std::vector{0.0, 0.0}).value, once, 0.02) << "forgotten after a loop";
 }
 
-TYPED_TEST(HysteresisLaws, LosesEnergyOnEveryRepeatedLoop) {
+template <class M>
+class EnergyLaws : public testing::Test {};
+// Not exponential loading: where a path turns before it has neared the other curve, it can give work.
+using Dissipative = testing::Types<MaxwellSlipModel, PrandtlIshlinskii, ImprovedPrandtlIshlinskii,
+                                   BoucWenModel, NonlinearBacklash, ImprovedNonlinearBacklash>;
+TYPED_TEST_SUITE(EnergyLaws, Dissipative);
+
+TYPED_TEST(EnergyLaws, LosesEnergyOnEveryRepeatedLoop) {
   EXPECT_TRUE(rc::check([] {
     auto model = Example<TypeParam>::make();
     // A few turning points, run through again and again until the loop stands.

@@ -116,6 +116,7 @@ TEST(FitGreyBox, PassiveFrictionAndRelaxationAreNeverNegative) {
     EXPECT_GE(lowest_force(passive), 0.0);
   }
   const auto any = fit_grey_box(data, kBoxAlone).parameters;
+  ASSERT_LT(any.terms.first_slip(), any.terms.first_slope());
   EXPECT_LT(lowest_force(any), -0.5);
   EXPECT_LT(evaluate(GreyBox(any), data).rmse, 0.6 * evaluate(GreyBox(passive), data).rmse);
 }

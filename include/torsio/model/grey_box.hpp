@@ -102,7 +102,7 @@ class GreyBoxTerms {
   template <class Term>
   void visit_jump(double x, Term&& term) const noexcept {
     std::array<double, kMostThresholds + kMostTimeConstants> moved;
-    const double dx = x - last_;
+    const double dx = is_started_ ? x - last_ : 0.0;  // a start has no way behind it
     const std::size_t slips = slips_.size();
     for (std::size_t i = 0; i < slips; ++i)
       moved[i] = std::min(std::max(state_[i] + dx * slips_.stiffness()[i], -1.0), 1.0);
