@@ -82,6 +82,8 @@ class Pid {
   /// @returns false, and all stay as they are, if one is negative or not finite
   [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
   [[nodiscard]] const Gains& gains() const noexcept { return gains_; }
+  /// @returns the last command, or what `track` said was applied in its place
+  [[nodiscard]] double command() const noexcept { return last_.command; }
   [[nodiscard]] static bool is_valid(const Gains& gains) noexcept;
 
  private:
