@@ -409,7 +409,7 @@ RC_GTEST_PROP(JointCascade, KeepsToItsCurrentRateWhereNothingDisturbsIt, ()) {
   JointCascade::Settings settings = any_settings();
   const Drive& drive = settings.drive;
   const double gain = drive.inertia() * settings.bandwidth_rad_s / drive.torque_per_current();
-  const double rate_A_s = number(1.0, 3.0) * gain *
+  const double rate_A_s = number(1.01, 3.0) * gain *
                           (0.2 * settings.bandwidth_rad_s * settings.limits.speed_rad_s +
                            drive.peak_current_A * drive.torque_per_current() / drive.inertia());
   settings.limits.current_rate_A_s = rate_A_s;
