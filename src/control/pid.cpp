@@ -148,4 +148,17 @@ bool Pid::set_gains(const Gains& gains) noexcept {
   return true;
 }
 
+LinearSystem linear_pid(const Pid::Gains& gains, double derivative_cutoff_Hz,
+                        double sample_rate_Hz) {
+  const auto gain = [&](double value) { return LinearSystem::gain(value, sample_rate_Hz); };
+  LinearSystem all = gain(gains.proportional);
+  if (gains.integral > 0.0)
+    all = all + gain(gains.integral) * LinearSystem::integrator(sample_rate_Hz);
+  if (gains.derivative > 0.0)
+    all = all +
+          gain(gains.derivative) * (LinearSystem::lowpass(derivative_cutoff_Hz, sample_rate_Hz) *
+                                    LinearSystem::difference(sample_rate_Hz));
+  return all;
+}
+
 }  // namespace torsio

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "torsio/control/handover.hpp"
+#include "torsio/control/linear_system.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/signal/differentiator.hpp"
@@ -109,5 +110,10 @@ class Pid {
   double increment_ = 0.0;  ///< of the integral by the last step's error
   bool is_starting_ = false;
 };
+
+/// From the measurement to minus the command, as `Pid` does it between its limits; terms without a
+/// gain are left out. Allocates.
+[[nodiscard]] LinearSystem linear_pid(const Pid::Gains& gains, double derivative_cutoff_Hz,
+                                      double sample_rate_Hz);
 
 }  // namespace torsio
