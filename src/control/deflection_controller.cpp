@@ -72,17 +72,8 @@ DeflectionController::DeflectionController(const Settings& settings, double samp
 }
 
 void DeflectionController::check_stability() const {
-  for (const JointOutput output : {JointOutput::locked, JointOutput::free}) {
-    const Margins found = margins_of(gains(), output);
-    if (found.is_stable) continue;
-    throw Error({.place = kPlace,
-                 .problem = fmt::format("unstable with its output {}",
-                                        output == JointOutput::locked ? "locked" : "free"),
-                 .expected = "a positive phase margin",
-                 .found = fmt::format("{:.3g} degrees at {:.4g} rad/s",
-                                      deg_from_rad(found.phase_rad), found.crossover_rad_s),
-                 .advice = "Take less bandwidth, smaller gains or a higher sample rate."});
-  }
+  for (const JointOutput output : {JointOutput::locked, JointOutput::free})
+    require_stable(kPlace, open_loop(settings_.joint, feedback(), output), output);
 }
 
 void DeflectionController::reset() noexcept {

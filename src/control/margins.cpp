@@ -9,8 +9,8 @@
 namespace torsio {
 namespace {
 
-constexpr int kGrid = 4000;
-constexpr double kLowestShare = 1e-6;  // of the Nyquist frequency
+constexpr int kGrid = 2000;
+constexpr double kLowestShare = 1e-5;  // of the Nyquist frequency
 /// Above 1, for modes that nothing moves: a joint that stays where it stands.
 constexpr double kStandingStill = 1e-7;
 
@@ -50,13 +50,15 @@ void take_real(const LinearSystem& loop, double frequency_rad_s, Margins& found)
 
 }  // namespace
 
+bool is_stable_closed(const LinearSystem& loop) {
+  return loop.closed().spectral_radius() <= 1.0 + kStandingStill;
+}
+
 Margins margins(const LinearSystem& loop) {
   if (loop.input_count() != 1 || loop.output_count() != 1)
     throw Error({.place = "margins", .expected = "a loop with one input and one output"});
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  Margins found = {.is_stable = loop.closed().spectral_radius() <= 1.0 + kStandingStill,
-                   .phase_rad = kNone,
-                   .gain = kNone};
+  Margins found = {.is_stable = is_stable_closed(loop), .phase_rad = kNone, .gain = kNone};
   const auto excess = [&](double rad_s) { return std::abs(loop.response(rad_s)) - 1.0; };
   const auto imaginary = [&](double rad_s) { return loop.response(rad_s).imag(); };
   const double highest_rad_s = std::numbers::pi * loop.sample_rate_Hz();

@@ -1,11 +1,16 @@
 #include "torsio/control/series_elastic_joint.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <string>
 #include <variant>
 
 #include "actuator/checks.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
@@ -95,6 +100,18 @@ LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& fee
   const LinearSystem all =
       side_by_side(side_by_side(feedback.deflection, feedback.speed), feedback.joint);
   return LinearSystem::delay(rate_Hz) * all * LinearSystem::held(plant, rate_Hz);
+}
+
+void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output) {
+  if (is_stable_closed(loop)) return;
+  const Margins found = margins(loop);
+  throw Error({.place = std::string(place),
+               .problem = fmt::format("unstable with its output {}",
+                                      output == JointOutput::locked ? "locked" : "free"),
+               .expected = "a positive phase margin",
+               .found = fmt::format("{:.3g} degrees at {:.4g} rad/s", deg_from_rad(found.phase_rad),
+                                    found.crossover_rad_s),
+               .advice = "Take less bandwidth, smaller gains or a higher sample rate."});
 }
 
 Passivity passivity(const SeriesElasticJoint& joint, const JointFeedback& feedback) {

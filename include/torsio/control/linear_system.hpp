@@ -62,9 +62,13 @@ class LinearSystem {
 /// Each on inputs of its own, their outputs added. @throws Error if they do not fit.
 [[nodiscard]] LinearSystem side_by_side(const LinearSystem& one, const LinearSystem& other);
 
+/// Whether the loop, closed with the sign turned, comes to rest; what stands still may stay where it
+/// is. @throws Error as `LinearSystem::closed`.
+[[nodiscard]] bool is_stable_closed(const LinearSystem& loop);
+
 /// How far a loop is from instability.
 struct Margins {
-  bool is_stable = false;  ///< the closed loop; what stands still may stay where it is
+  bool is_stable = false;  ///< `is_stable_closed`
   double phase_rad = 0.0;  ///< the least, over all frequencies of gain 1; infinite if there is none
   double crossover_rad_s = 0.0;  ///< where that is
   double gain = 0.0;        ///< the least factor above 1 that makes it unstable; infinite if none
