@@ -123,6 +123,19 @@ JointFeedback DeflectionController::feedback(const Pid::Gains& gains) const {
   return {drive * loop, drive, none};
 }
 
+// The derivative is the measurement's alone.
+LinearSystem DeflectionController::reference_path() const {
+  const LinearSystem loop =
+      linear_pid({.proportional = gains().proportional, .integral = gains().integral},
+                 settings_.rate_cutoff_Hz, sample_rate_Hz_);
+  if (settings_.actuation == Actuation::current)
+    return loop + LinearSystem::gain(feed_forward_A_rad_, sample_rate_Hz_);
+  const LinearSystem rate = LinearSystem::lowpass(settings_.rate_cutoff_Hz, sample_rate_Hz_) *
+                            LinearSystem::difference(sample_rate_Hz_);
+  return linear_pid(settings_.speed_loop, settings_.rate_cutoff_Hz, sample_rate_Hz_) *
+         (loop + rate);
+}
+
 Margins DeflectionController::margins_of(const Pid::Gains& gains, JointOutput output) const {
   return margins(open_loop(settings_.joint, feedback(gains), output));
 }

@@ -75,6 +75,8 @@ class DeflectionController {
   /// What the loop feeds back with these gains. Allocates.
   [[nodiscard]] JointFeedback feedback(const Pid::Gains& gains) const;
   [[nodiscard]] JointFeedback feedback() const { return feedback(gains()); }
+  /// From the wanted deflection to the current, within the limits. Allocates.
+  [[nodiscard]] LinearSystem reference_path() const;
   /// Of the loop with these gains, cut at the current. Allocates.
   [[nodiscard]] Margins margins_of(const Pid::Gains& gains, JointOutput output) const;
 
