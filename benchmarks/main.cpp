@@ -66,6 +66,10 @@ constexpr std::array kBenches{
     Bench{"gp_hyper_2000", gp_hyper_2000, Peer{"scikit-learn", write_gp_2000}},
     Bench{"pgpr_200k", pgpr_200k},
     Bench{"pgpr_step", pgpr_step},
+    Bench{"cascade_step", cascade_step},
+    Bench{"impedance_step", impedance_step},
+    Bench{"torque_loop_linear_step", torque_loop_linear_step},
+    Bench{"torque_loop_dgmm300_step", torque_loop_dgmm300_step},
 };
 
 struct Arguments {

@@ -39,6 +39,10 @@ Row gp_mean_5000();
 Row gp_hyper_2000();
 Row pgpr_200k();
 Row pgpr_step();
+Row cascade_step();
+Row impedance_step();
+Row torque_loop_linear_step();
+Row torque_loop_dgmm300_step();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.

@@ -159,4 +159,13 @@ AnyInverse AnyInverse::of(const EstimatorSettings& settings,
   return ModelInverse(settings, AnyModel(parameters));
 }
 
+void AnyInverse::set_zero(std::string_view channel, double value) {
+  std::visit(
+      [&](auto& inverse) {
+        if constexpr (requires { inverse.set_zero(channel, value); })
+          inverse.set_zero(channel, value);
+      },
+      inverse_);
+}
+
 }  // namespace torsio

@@ -107,6 +107,8 @@ class AnyInverse {
   [[nodiscard]] static AnyInverse of(const EstimatorSettings& settings,
                                      const AnyModel::Parameters& parameters);
 
+  /// As `Estimator::set_zero`; nothing to a line.
+  void set_zero(std::string_view channel, double value);
   void reset() noexcept {
     dispatch(inverse_, [](auto& inverse) { inverse.reset(); });
   }
