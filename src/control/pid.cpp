@@ -38,7 +38,6 @@ Pid::Pid(const Settings& settings, double sample_rate_Hz)
       tracking_s_(settings.tracking_s),
       period_s_(1.0 / checked_rate(sample_rate_Hz)),
       step_limit_(settings.limits.rate_per_s * period_s_),
-      tracking_share_(0.0),
       differentiator_(sample_rate_Hz, settings.derivative_cutoff_Hz),
       handover_(checked_time("handover_s", settings.handover_s), sample_rate_Hz) {
   require_not_negative(kPlace, "proportional gain", gains_.proportional);

@@ -100,7 +100,7 @@ class Pid {
   std::optional<double> tracking_s_;
   double period_s_;
   double step_limit_;      ///< of the command, a tick
-  double tracking_share_;  ///< T / T_t
+  double tracking_share_ = 0.0;  ///< T / T_t
   Differentiator differentiator_;
   Handover handover_;
   Output last_;
