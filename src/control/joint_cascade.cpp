@@ -39,6 +39,19 @@ JointCascade::Gains gains_of(const JointCascade::Settings& settings) {
   return gains;
 }
 
+enum class Loop { none, velocity, torque };
+
+Loop loop_of(JointMode mode) noexcept {
+  switch (mode) {
+    case JointMode::velocity:
+    case JointMode::position: return Loop::velocity;
+    case JointMode::torque:
+    case JointMode::impedance: return Loop::torque;
+    case JointMode::current: break;
+  }
+  return Loop::none;
+}
+
 [[noreturn]] void contradict(std::string problem, std::string expected, std::string found) {
   throw Error({.place = kPlace,
                .problem = std::move(problem),
@@ -133,8 +146,7 @@ bool JointCascade::set_gains(const Gains& gains) noexcept {
 }
 
 bool JointCascade::is_usable(const JointReference& reference) const noexcept {
-  const bool needs_torque =
-      reference.mode == JointMode::torque || reference.mode == JointMode::impedance;
+  const bool needs_torque = loop_of(reference.mode) == Loop::torque;
   return reference.mode <= JointMode::impedance && (settings_.has_torque || !needs_torque) &&
          reference.stiffness_Nm_rad >= 0.0 && reference.damping_Nms_rad >= 0.0;
 }
@@ -152,10 +164,13 @@ JointCascade::Bounds JointCascade::speed_bounds(double angle_rad) const noexcept
           std::clamp(approach(above_rad), -soft_speed_rad_s_, soft_speed_rad_s_)};
 }
 
+// What a loop has learned of the load it keeps where the next mode goes on with it.
 void JointCascade::enter(JointMode mode) noexcept {
   if (mode == reference_.mode) return;
-  velocity_.reset();
-  torque_.reset();
+  if (loop_of(mode) != loop_of(reference_.mode)) {
+    velocity_.reset();
+    torque_.reset();
+  }
   is_switching_ = true;
 }
 
@@ -276,7 +291,7 @@ double JointCascade::within_limits(double wanted_A, const JointState& measured, 
   const double allowed_A = thermal_.allowed_A();
   cut(-allowed_A, allowed_A, allowed_A < drive.peak_current_A ? Limit::thermal : Limit::current);
   if (output.limit != Limit::none) {
-    Pid& loop = reference_.mode >= JointMode::torque ? torque_ : velocity_;
+    Pid& loop = loop_of(reference_.mode) == Loop::torque ? torque_ : velocity_;
     loop.track(loop.command() + current_A - wanted_A);
   }
   return current_A;

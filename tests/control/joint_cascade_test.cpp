@@ -121,6 +121,23 @@ TEST(JointCascade, StaysAtALimitThatItIsPushedIntoAndLetsGoAtOnce) {
   EXPECT_EQ(freed.limit, JointCascade::Limit::none);
 }
 
+TEST(JointCascade, CarriesTheLoadOnWhenAPositionBecomesASpeed) {
+  const JointCascade::Settings settings = settings_of("dfki-50");
+  JointCascade cascade(settings, kRate_Hz);
+  RigidJoint joint(settings.drive);
+  // The cascade is not told of it: only its integral knows.
+  const auto hold = [&](const JointReference& reference, int ticks) {
+    for (int n = 0; n < ticks; ++n) {
+      const auto output = cascade.step(reference, joint.state(0.0));
+      joint.step(output.current_A, settings.limits.load_Nm, 1.0 / kRate_Hz);
+    }
+  };
+  hold({.mode = JointMode::position, .position_rad = 0.3}, 5000);
+  const double before_rad = joint.angle_rad();
+  hold({.mode = JointMode::velocity}, 1000);
+  EXPECT_NEAR(joint.angle_rad(), before_rad, 1e-6);
+}
+
 // FAULTS 30: the loop that was overridden for a minute has not wound up.
 TEST(JointCascade, DoesNotWindUpWhileOverridden) {
   for (const JointMode mode : {JointMode::velocity, JointMode::position, JointMode::torque}) {
