@@ -71,6 +71,10 @@ constexpr std::array kBenches{
     Bench{"viscoelastic_step", viscoelastic_step},
     Bench{"hw_fit_40k", hw_fit_40k, Peer{"Octave optim", write_hw_40k}},
     Bench{"hw_step", hw_step},
+    Bench{"cascade_step", cascade_step},
+    Bench{"impedance_step", impedance_step},
+    Bench{"torque_loop_linear_step", torque_loop_linear_step},
+    Bench{"torque_loop_dgmm300_step", torque_loop_dgmm300_step},
 };
 
 struct Arguments {

@@ -44,6 +44,10 @@ Row frols_40k();
 Row viscoelastic_step();
 Row hw_fit_40k();
 Row hw_step();
+Row cascade_step();
+Row impedance_step();
+Row torque_loop_linear_step();
+Row torque_loop_dgmm300_step();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.

@@ -58,6 +58,29 @@ double Chirp::step() noexcept {
   return amplitude * std::sin(kTurn * turns);
 }
 
+LogSweep::LogSweep(const Parameters& parameters, double sample_rate_Hz)
+    : parameters_(parameters),
+      log_ratio_(std::log(parameters.end_Hz / parameters.start_Hz)),
+      clock_(sample_rate_Hz) {
+  require_finite("log sweep", "amplitude", parameters.amplitude);
+  require_frequency("log sweep", parameters.start_Hz, sample_rate_Hz);
+  require_frequency("log sweep", parameters.end_Hz, sample_rate_Hz);
+  require_positive("log sweep", "start frequency", parameters.start_Hz);
+  require_positive("log sweep", "end frequency", parameters.end_Hz);
+  require_positive("log sweep", "duration", parameters.duration_s);
+}
+
+double LogSweep::step() noexcept {
+  const auto& [amplitude, start_Hz, end_Hz, duration_s] = parameters_;
+  const double time_s = clock_.next_s();
+  const double swept_s = std::min(time_s, duration_s);
+  const double growth = log_ratio_ * swept_s / duration_s;
+  // (e^x - 1) / x, which stays 1 where nothing grows.
+  const double mean_growth = growth != 0.0 ? std::expm1(growth) / growth : 1.0;
+  const double turns = start_Hz * swept_s * mean_growth + end_Hz * (time_s - swept_s);
+  return amplitude * std::sin(kTurn * turns);
+}
+
 Triangle::Triangle(const Parameters& parameters, double sample_rate_Hz)
     : parameters_(parameters), clock_(sample_rate_Hz) {
   require_finite("triangle", "amplitude", parameters.amplitude);
@@ -189,6 +212,27 @@ double QuasiPeriodic::step() noexcept {
     turns_ = late * turns_a_sample_;
   }
   return output;
+}
+
+Replay::Replay(Parameters parameters, double sample_rate_Hz)
+    : parameters_(std::move(parameters)), clock_(sample_rate_Hz) {
+  require_positive("replay", "sample rate", sample_rate_Hz);
+  require_positive("replay", "rate of the values", parameters_.recorded_Hz);
+  if (parameters_.values.empty())
+    throw UsageError({.place = "replay", .expected = "at least one value", .found = "none"});
+  for (const double value : parameters_.values) require_finite("replay", "values", value);
+}
+
+double Replay::step() noexcept {
+  const std::vector<double>& values = parameters_.values;
+  const auto count = static_cast<double>(values.size());
+  double place = clock_.next_s() * parameters_.recorded_Hz;
+  if (parameters_.repeats) place = std::fmod(place, count);
+  if (!parameters_.repeats && place >= count - 1.0) return values.back();
+  const double before = std::floor(place);
+  const auto first = static_cast<std::size_t>(before);
+  const std::size_t second = first + 1 < values.size() ? first + 1 : 0;
+  return std::lerp(values[first], values[second], place - before);
 }
 
 Steps::Steps(Parameters parameters, double sample_rate_Hz) : levels_(std::move(parameters.levels)) {

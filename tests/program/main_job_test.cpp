@@ -165,6 +165,16 @@ TEST_F(MainJob, RunsTheExamples) {
       shell(std::string(TORSIO_EXAMPLES) + "/example_01_estimate_torque joint.safetensors");
   EXPECT_EQ(estimate.exit_code, 0) << estimate.err;
   EXPECT_NE(estimate.out.find("Nm +-"), std::string::npos) << estimate.out;
+  const Outcome control =
+      shell(std::string(TORSIO_EXAMPLES) + "/example_04_torque_control joint.safetensors");
+  EXPECT_EQ(control.exit_code, 0) << control.err;
+  EXPECT_NE(control.out.find("phase margin 61 degrees"), std::string::npos) << control.out;
+  const Outcome margins = shell(std::string(TORSIO_EXAMPLES) + "/example_05_loop_margins");
+  EXPECT_EQ(margins.exit_code, 0) << margins.err;
+  EXPECT_NE(margins.out.find("dfki-300"), std::string::npos) << margins.out;
+  const Outcome fast = shell(std::string(TORSIO_EXAMPLES) + "/example_05_loop_margins 200");
+  EXPECT_EQ(fast.exit_code, 1) << fast.out;
+  EXPECT_NE(fast.err.find("unstable with its output locked"), std::string::npos) << fast.err;
   const Outcome own = shell(std::string(TORSIO_EXAMPLES) + "/example_02_own_model");
   EXPECT_EQ(own.exit_code, 0) << own.err;
   EXPECT_NE(own.out.find("outside_training_range"), std::string::npos) << own.out;

@@ -226,5 +226,51 @@ TEST(Excitation, RefusesParametersOutOfRange) {
   }
 }
 
+// Its phase grows by f0 T / ln r (r^(t/T) - 1) turns: the frequency is f0 r^(t/T).
+TEST(LogSweep, GivesEveryOctaveTheSameTime) {
+  LogSweep sweep({.amplitude = 2.0, .start_Hz = 1.0, .end_Hz = 8.0, .duration_s = 3.0}, 10'000.0);
+  std::vector<double> rising_s;
+  double last = sweep.step();
+  EXPECT_EQ(last, 0.0);
+  for (int n = 1; n < 40'000; ++n) {
+    const double now = sweep.step();
+    if (last < 0.0 && now >= 0.0) rising_s.push_back(n / 10'000.0);
+    last = now;
+  }
+  for (std::size_t k = 0; k < rising_s.size(); ++k) {
+    const double t = rising_s[k];
+    const double turns = t <= 3.0 ? (std::pow(8.0, t / 3.0) - 1.0) * 3.0 / std::log(8.0)
+                                  : 21.0 / std::log(8.0) + 8.0 * (t - 3.0);
+    EXPECT_NEAR(turns, static_cast<double>(k + 1), 2e-3);
+  }
+  EXPECT_EQ(rising_s.size(), 18U);
+}
+
+TEST(LogSweep, StaysAtItsFrequencyWhereBothEndsAreOne) {
+  LogSweep sweep({.start_Hz = 5.0, .end_Hz = 5.0, .duration_s = 1.0}, 1000.0);
+  for (int n = 0; n < 3000; ++n)
+    ASSERT_NEAR(sweep.step(), std::sin(2.0 * std::numbers::pi * 5e-3 * n), 1e-9);
+}
+
+TEST(Replay, GoesThroughTheValuesAtAnotherRate) {
+  Replay replay({.values = {1.0, 3.0, 2.0}, .recorded_Hz = 100.0}, 200.0);
+  for (const double expected : {1.0, 2.0, 3.0, 2.5, 2.0, 2.0, 2.0})
+    EXPECT_NEAR(replay.step(), expected, 1e-12);
+  replay.reset();
+  EXPECT_EQ(replay.step(), 1.0);
+  Replay again({.values = {1.0, 3.0, 2.0}, .recorded_Hz = 100.0, .repeats = true}, 200.0);
+  for (const double expected : {1.0, 2.0, 3.0, 2.5, 2.0, 1.5, 1.0, 2.0})
+    EXPECT_NEAR(again.step(), expected, 1e-12);
+}
+
+TEST(References, RefuseWhatTheyCannotFollow) {
+  EXPECT_THROW(LogSweep({.start_Hz = 0.0}, 1000.0), UsageError);
+  EXPECT_THROW(LogSweep({.end_Hz = 500.0}, 1000.0), UsageError);
+  EXPECT_THROW(LogSweep({.duration_s = 0.0}, 1000.0), UsageError);
+  EXPECT_THROW(Replay({.values = {}}, 1000.0), UsageError);
+  EXPECT_THROW(Replay({.values = {std::nan("")}}, 1000.0), UsageError);
+  EXPECT_THROW(Replay({.values = {1.0}, .recorded_Hz = 0.0}, 1000.0), UsageError);
+}
+
 }  // namespace
 }  // namespace torsio

@@ -47,6 +47,9 @@ class EstimatorCore {
   Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;
   /// The last value that came of good inputs, with the reason why it is held.
   [[nodiscard]] Estimate held(Fault fault) const noexcept TORSIO_REALTIME;
+  /// How far the worst feature has left its range, in widths of its border: 0 inside, above 1
+  /// beyond the border.
+  [[nodiscard]] double excursion(Features features) const noexcept TORSIO_REALTIME;
   /// What may be told to the outside of `told`, the model's answer to `features`.
   Estimate judge(Features features, const Estimate& told) noexcept TORSIO_REALTIME;
 
@@ -57,9 +60,6 @@ class EstimatorCore {
     double border = 0.0;  ///< width, on either side, of where the model hands over to the fallback
   };
 
-  /// How far the worst feature has left its range, in widths of its border: 0 inside, above 1
-  /// beyond the border.
-  [[nodiscard]] double excursion(Features features) const noexcept;
   [[nodiscard]] Estimate model_part(const Estimate& told) const noexcept;
   /// `told` handed over to the fallback by the share `weight` in 0..1.
   [[nodiscard]] Estimate blended(Features features, const Estimate& told,

@@ -48,6 +48,28 @@ class Chirp {
   SampleClock clock_;
 };
 
+/// A sine whose frequency grows (or falls) by the same factor in equal times, from f0 to f1 over the
+/// duration T, and then stays: every octave gets as long as any other.
+///
+///     y(t) = A sin(2 pi f0 T (r^(t/T) - 1) / ln r),   r = f1 / f0
+class LogSweep {
+ public:
+  struct Parameters {
+    double amplitude = 1.0;
+    double start_Hz = 0.1;  ///< > 0
+    double end_Hz = 10.0;   ///< > 0
+    double duration_s = 60.0;
+  };
+  LogSweep(const Parameters& parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept { clock_.reset(); }
+
+ private:
+  Parameters parameters_;
+  double log_ratio_;
+  SampleClock clock_;
+};
+
 /// Straight lines between +A and -A, from 0 upwards.
 class Triangle {
  public:
@@ -164,6 +186,24 @@ class QuasiPeriodic {
   double amplitude_ = 0.0;  ///< of this period
   double turns_a_sample_ = 0.0;
   double turns_ = 0.0;  ///< of this period that have passed
+};
+
+/// What was recorded once more, at the loop's own rate: straight lines between the samples. Behind
+/// the last one it stays there, or begins again.
+class Replay {
+ public:
+  struct Parameters {
+    std::vector<double> values = {};  ///< at least one
+    double recorded_Hz = 1000.0;      ///< rate of the values
+    bool repeats = false;
+  };
+  Replay(Parameters parameters, double sample_rate_Hz);
+  double step() noexcept TORSIO_REALTIME;
+  void reset() noexcept { clock_.reset(); }
+
+ private:
+  Parameters parameters_;
+  SampleClock clock_;
 };
 
 /// Each level for the hold time, one after the other, and again from the first.

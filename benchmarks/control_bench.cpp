@@ -1,0 +1,122 @@
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "rows.hpp"
+#include "torsio/control/joint_cascade.hpp"
+#include "torsio/control/joint_impedance.hpp"
+#include "torsio/control/torque_controller.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/train/online_mixture.hpp"
+
+namespace torsio::bench {
+namespace {
+
+constexpr double kRate_Hz = 1000.0;
+constexpr std::size_t kTicks = 10000;
+
+/// Seconds a tick of `step(t_s)`, which returns a number that is kept.
+template <class Step>
+double seconds_a_tick(const Step& step) {
+  double sum = 0.0;
+  const double seconds = best_seconds([&] {
+    for (std::size_t n = 0; n < kTicks; ++n) sum += step(static_cast<double>(n) / kRate_Hz);
+  });
+  volatile double kept = sum;
+  static_cast<void>(kept);
+  return seconds / static_cast<double>(kTicks);
+}
+
+JointSample swinging(double t_s) {
+  JointSample sample;
+  sample.joint_angle_rad = 0.5 * std::sin(0.6 * t_s);
+  sample.gear_angle_rad = sample.joint_angle_rad + 0.02 * std::sin(5.0 * t_s);
+  sample.motor_angle_rad = 120.0 * sample.gear_angle_rad;
+  return sample;
+}
+
+/// 300 components over torque, deflection, filtered rate, joint speed of a spring with friction.
+Dgmm mixture_300() {
+  Random random(5);
+  Matrix samples(60000, 4);
+  for (std::size_t i = 0; i < samples.rows; ++i) {
+    const double phase = 0.001 * static_cast<double>(i);
+    const double swell = 1.0 + 0.9 * std::sin(0.037 * phase);
+    const double deflection = 0.02 * swell * std::sin(phase) + 1e-4 * random.normal();
+    const double rate = 0.1 * swell * std::cos(phase) + 5e-3 * random.normal();
+    samples(i, 0) = 573.0 * deflection + 1.5 * std::tanh(rate / 0.02) + 0.05 * random.normal();
+    samples(i, 1) = deflection;
+    samples(i, 2) = rate;
+    samples(i, 3) = 0.3 * std::cos(0.6 * phase) + 0.02 * random.normal();
+  }
+  OnlineMixture learner(robust_standardisation(samples, std::vector<double>(4, 1e-4)),
+                        {.components = 300, .novelty_distance = 0.1});
+  for (std::size_t i = 0; i < samples.rows; ++i) learner.learn(samples.row(i));
+  return Dgmm(Dgmm::Parameters{.mixture = learner.mixture(),
+                               .clamp = {.slope = {573.0, 0.0, 0.0}, .width = 2.0}});
+}
+
+EstimatorSettings settings_around_mixture() {
+  return {
+      .features = {.inputs = {"spring_deflection_rad", "lowpass(rate(spring_deflection_rad), 10Hz)",
+                              "lowpass(rate(joint_angle_rad), 10Hz)"},
+                   .definitions = {}},
+      .sample_rate_Hz = kRate_Hz,
+      .target = "torque_Nm",
+      .zeroed_channels = {},
+      .ranges = {.lowest = {-0.05, -1.0, -1.0}, .highest = {0.05, 1.0, 1.0}},
+      .fallback = {.slope = {573.0, 0.0, 0.0}, .residual_std = 1.5},
+      .residuals = {}};
+}
+
+}  // namespace
+
+Row cascade_step() {
+  const Drive drive = drive_of(data_sheet("dfki-50"));
+  JointCascade cascade({.drive = drive,
+                        .limits = {.lowest_rad = -1.0, .highest_rad = 1.0, .speed_rad_s = 2.0},
+                        .has_torque = true},
+                       kRate_Hz);
+  const double seconds = seconds_a_tick([&](double t_s) {
+    const double angle_rad = 0.9 * std::sin(t_s);
+    return cascade
+        .step({.mode = JointMode::position, .position_rad = angle_rad},
+              {.angle_rad = 0.99 * angle_rad, .speed_rad_s = 0.5, .torque_Nm = angle_rad})
+        .current_A;
+  });
+  return {.value = seconds * 1e6, .unit = "us"};
+}
+
+Row impedance_step() {
+  JointImpedance impedance({.gains = {50.0, 2.0}, .torque_Nm = 40.0}, kRate_Hz);
+  const double seconds = seconds_a_tick([&](double t_s) {
+    return impedance.step({.angle_rad = std::sin(t_s)}, {.angle_rad = 0.1, .speed_rad_s = 0.2})
+        .torque_Nm;
+  });
+  return {.value = seconds * 1e6, .unit = "us"};
+}
+
+/// The loop itself, with the line for an inverse.
+Row torque_loop_linear_step() {
+  TorqueController controller(
+      LinearInverse(573.0),
+      TorqueLoopCore::Settings{.deflection = {.joint = series_elastic_joint(data_sheet("dfki-50"))},
+                               .friction = FrictionCompensation{},
+                               .observer_cutoff_Hz = 5.0},
+      kRate_Hz);
+  const double seconds = seconds_a_tick(
+      [&](double t_s) { return controller.step(10.0 * std::sin(t_s), swinging(t_s)).current_A; });
+  return {.value = seconds * 1e6, .unit = "us"};
+}
+
+Row torque_loop_dgmm300_step() {
+  TorqueController controller(ModelInverse(settings_around_mixture(), mixture_300()),
+                              TorqueLoopCore::Settings{.deflection = {.joint = series_elastic_joint(
+                                                                          data_sheet("dfki-50"))}},
+                              kRate_Hz);
+  const double seconds = seconds_a_tick(
+      [&](double t_s) { return controller.step(10.0 * std::sin(t_s), swinging(t_s)).current_A; });
+  return {.value = seconds * 1e6, .unit = "us"};
+}
+
+}  // namespace torsio::bench

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <optional>
+
+#include "torsio/control/pid.hpp"
+#include "torsio/control/series_elastic_joint.hpp"
+#include "torsio/core/fault.hpp"
+#include "torsio/core/realtime.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/signal/differentiator.hpp"
+
+namespace torsio {
+
+/// Turns the spring of a series-elastic actuator to a wanted deflection, by the motor's current:
+///
+///     i = K_p (δ* − δ) + K_i ∫(δ* − δ) − K_d δ̇ + K δ* / (N k_t)
+///     K_p = (J N² ω² − K) / (N k_t),   K_d = 2 ζ ω J N² / (N k_t),   K_i = k_i K_p
+///
+/// (the poles of the locked joint get frequency ω and damping ζ), or by the speed of a drive that has
+/// a loop of its own for that:
+///
+///     θ̇* = ω (δ* − δ) + D[δ*]
+///
+/// δ̇ is low-passed; the current stays within the peak, the integral by the scheme of `Pid`. Source:
+/// SPEC section 3.11.
+class DeflectionController {
+ public:
+  enum class Actuation { current, velocity };
+
+  struct Settings {
+    SeriesElasticJoint joint = {};
+    Actuation actuation = Actuation::current;
+    double bandwidth_rad_s = 50.0;                   ///< ω
+    double damping = 0.9;                            ///< ζ
+    double integral_1_s = 6.0;                       ///< k_i; current only
+    std::optional<Pid::Gains> gains = std::nullopt;  ///< none: as above
+    Pid::Gains speed_loop = {};  ///< of the drive [A s/rad], for the margins; velocity only
+    double rate_cutoff_Hz = 120.0;
+    double largest_deflection_rad = rad_from_deg(9.0);  ///< δ* is cut there
+    Pid::AntiWindup anti_windup = Pid::AntiWindup::conditional;
+    double fault_decay_s = 0.02;  ///< of the command without a usable measurement
+  };
+
+  struct Output {
+    double command = 0.0;                ///< motor current [A], or motor-side speed [rad/s]
+    double wanted_deflection_rad = 0.0;  ///< after its limit
+    double proportional = 0.0;
+    double integral = 0.0;
+    double derivative = 0.0;
+    double feed_forward = 0.0;
+    double handover = 0.0;    ///< after a change of gains or a fault
+    bool is_limited = false;  ///< the deflection or the command was cut
+    Fault fault = Fault::none;
+  };
+
+  /// @throws Error if the joint is impossible, a setting out of range, the spring alone faster than
+  /// the bandwidth, or the loop unstable with its output locked or free (with the margin).
+  DeflectionController(const Settings& settings, double sample_rate_Hz);
+
+  void reset() noexcept;
+
+  /// A wanted deflection that is not finite is a fault, and the last good one stands; so is a
+  /// measurement, and the command fades to 0. Afterwards it goes on from where it is.
+  Output step(double wanted_rad, double deflection_rad) noexcept TORSIO_REALTIME;
+  /// As `Pid::track`: what was applied in the place of the last command.
+  void track(double applied) noexcept TORSIO_REALTIME { pid_.track(applied); }
+
+  /// As `Pid::set_gains`. Whether the new ones are stable is not looked at: `margins_of` tells.
+  [[nodiscard]] bool set_gains(const Pid::Gains& gains) noexcept TORSIO_REALTIME {
+    return pid_.set_gains(gains);
+  }
+  [[nodiscard]] const Pid::Gains& gains() const noexcept { return pid_.gains(); }
+  [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
+
+  /// What the loop feeds back with these gains. Allocates.
+  [[nodiscard]] JointFeedback feedback(const Pid::Gains& gains) const;
+  [[nodiscard]] JointFeedback feedback() const { return feedback(gains()); }
+  /// From the wanted deflection to the current, within the limits. Allocates.
+  [[nodiscard]] LinearSystem reference_path() const;
+  /// Of the loop with these gains, cut at the current. Allocates.
+  [[nodiscard]] Margins margins_of(const Pid::Gains& gains, JointOutput output) const;
+
+  [[nodiscard]] static Pid::Gains gains_for(const Settings& settings);
+
+ private:
+  void check_stability() const;
+
+  Settings settings_;
+  double sample_rate_Hz_;
+  double feed_forward_A_rad_;  ///< 0 if it acts on velocity
+  double fault_keep_;
+  Pid pid_;
+  Differentiator wanted_rate_;
+  double wanted_rad_ = 0.0;
+};
+
+}  // namespace torsio

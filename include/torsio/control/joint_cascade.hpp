@@ -1,0 +1,183 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "torsio/control/drive.hpp"
+#include "torsio/control/handover.hpp"
+#include "torsio/control/pid.hpp"
+#include "torsio/control/thermal_limit.hpp"
+#include "torsio/core/fault.hpp"
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+enum class JointMode : std::uint8_t { current, velocity, position, torque, impedance };
+
+/// What is wanted of a joint in one tick. What a mode does not name it does not read, but every
+/// number must be finite: a reference is taken whole or not at all.
+struct JointReference {
+  JointMode mode = JointMode::current;
+  double position_rad = 0.0;         ///< position, impedance
+  double velocity_rad_s = 0.0;       ///< velocity; feed-forward in position, impedance
+  double acceleration_rad_s2 = 0.0;  ///< feed-forward J N² a in position, velocity
+  double torque_Nm = 0.0;            ///< torque; feed-forward in position, velocity, impedance
+  double current_A = 0.0;            ///< current; feed-forward in every other mode
+  double stiffness_Nm_rad = 0.0;     ///< impedance, >= 0
+  double damping_Nms_rad = 0.0;      ///< impedance, >= 0
+};
+
+/// What a joint tells: angle and speed of the side that the motor moves (rotor over ratio), and the
+/// torque that loads the motor (the spring's).
+struct JointState {
+  double angle_rad = kNotMeasured;
+  double speed_rad_s = kNotMeasured;
+  double torque_Nm = kNotMeasured;  ///< only where the cascade was told that there is one
+};
+
+/// Position P -> velocity PI -> current, torque PID -> current, impedance -> torque; all with
+/// feed-forward, switched without a jump, within limits that hold in every mode.
+///
+///     position    v* = k_q (q* − q) + q̇*, cut to [v_lo, v_hi]
+///     velocity    i = PI(v* − v) + (J N² a* + τ*) / (N k_t) + i*
+///     torque      i = PID(τ* − τ) + τ* / (N k_t) + i*
+///     impedance   τ* = K (q* − q) + D (q̇* − q̇) + τ_ff, then torque
+///
+/// A change of mode or of gains goes on from the last current; the difference fades by the handover.
+///
+/// **Limit override.** Whatever the mode wants, the current stays between those of two speed loops
+/// that sleep behind it and wake where the joint comes near a limit:
+///
+///     k_v (v_lo − v) + τ / (N k_t)  <=  i  <=  k_v (v_hi − v) + τ / (N k_t),   k_v = J N² ω / (N k_t)
+///     v_hi = min(v_max′, ω_p e, √(2 a (e − a / 2ω_p²))),   e = q_max − m − q,   and v_lo alike
+///
+/// with ω_p = ω / 5, half of what the rated current can brake beside the loads as a, and the margins
+/// m = d / (J N² ω ω_p), v_max′ = v_max − d / (J N² ω) that a load d the cascade does not know of may
+/// use up: in a joint that starts within its limits, q <= q_max and v <= v_max for any command and
+/// any such load. Both bounds are continuous in the state and have no memory, so the least of them
+/// wins, there is nothing to wind up, and it lets go where it took over. What follows (current, I²t,
+/// voltage) cuts further. A rate limit acts on what the mode wants; one that is slower than the
+/// override is refused. Without a torque sensor τ is 0 and d is the whole load.
+///
+/// Source: paper 000 section 4 (SPEC section 3.11); the bounds and their proof are ours.
+class JointCascade {
+ public:
+  struct Gains {
+    double position_1_s = 0.0;  ///< k_q
+    Pid::Gains velocity = {};   ///< A s/rad
+    Pid::Gains torque = {};     ///< A/Nm
+  };
+  struct Limits {
+    double lowest_rad = -std::numeric_limits<double>::infinity();
+    double highest_rad = std::numeric_limits<double>::infinity();
+    double speed_rad_s = 0.0;
+    double load_Nm = 0.0;     ///< d: the largest load that is not measured (friction, torque
+                              ///< error, what changes faster than the current follows)
+    double carried_Nm = 0.0;  ///< the largest load that is: none is left of it to brake with
+    double torque_Nm = std::numeric_limits<double>::infinity();  ///< of the wanted torque
+    double current_rate_A_s = std::numeric_limits<double>::infinity();
+    double thermal_time_s = 10.0;  ///< of the winding
+  };
+  struct Settings {
+    Drive drive = {};
+    double bandwidth_rad_s = 50.0;  ///< ω, of the speed loop
+    Limits limits = {};
+    bool has_torque = false;          ///< the state has a torque
+    std::optional<Gains> gains = {};  ///< none: `gains_for`
+    double torque_cutoff_Hz = 120.0;  ///< of the torque's derivative
+    double handover_s = 0.1;
+    double fault_decay_s = 0.02;  ///< of the current without a usable measurement
+  };
+
+  enum class Limit : std::uint8_t {
+    none,
+    position,
+    speed,
+    rate,
+    current,
+    thermal,
+    voltage,
+  };
+
+  struct Output {
+    double current_A = 0.0;
+    double wanted_velocity_rad_s = 0.0;  ///< after the limits; position and velocity
+    double wanted_torque_Nm = 0.0;       ///< after its limit; torque and impedance
+    double proportional_A = 0.0;
+    double integral_A = 0.0;
+    double derivative_A = 0.0;
+    double feed_forward_A = 0.0;
+    double handover_A = 0.0;
+    double thermal_load = 0.0;  ///< 0 cold, 1 as hot as the winding may be
+    Limit limit = Limit::none;  ///< the last that cut the current
+    bool is_reference_refused =
+        false;  ///< not finite, negative impedance, or a mode without a sensor
+    Fault fault = Fault::none;
+  };
+
+  /// k_q = ω / 5; velocity J N² ω / (N k_t), its integral ω / 5 times that; no torque gains.
+  [[nodiscard]] static Gains gains_for(const Drive& drive, double bandwidth_rad_s);
+
+  /// @throws Error if the drive is impossible, a gain negative, or if the limits contradict each
+  /// other: no room between them and their margins, no current left to brake with, a rate that is
+  /// slower than the override.
+  JointCascade(const Settings& settings, double sample_rate_Hz);
+
+  /// No memory, no current, mode `current` with 0 A; a winding as warm as it was.
+  void reset() noexcept;
+
+  /// A reference that is refused leaves the last good one standing (0 A if there was none), with
+  /// `Fault::input_not_finite` if it is not finite. A measurement that is not finite is that fault
+  /// too: the current fades to 0 with `fault_decay_s`, and goes on from there when there is one again.
+  Output step(const JointReference& reference, const JointState& measured) noexcept TORSIO_REALTIME;
+
+  /// All at once, from the next step on, without a jump.
+  /// @returns false, and all stay, if one is negative or not finite
+  [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
+
+  /// @returns m [rad], v_max′ [rad/s]
+  [[nodiscard]] double position_margin() const noexcept { return margin_rad_; }
+  [[nodiscard]] double soft_speed() const noexcept { return soft_speed_rad_s_; }
+
+ private:
+  struct Bounds {
+    double lowest = 0.0;
+    double highest = 0.0;
+  };
+  void check_limits() const;
+  [[nodiscard]] bool is_usable(const JointReference& reference) const noexcept;
+  [[nodiscard]] double approach(double room_rad) const noexcept;
+  [[nodiscard]] Bounds speed_bounds(double angle_rad) const noexcept;
+  void enter(JointMode mode) noexcept;
+  double wanted_current(const JointState& measured, const Bounds& speed, Output& output) noexcept;
+  double within_limits(double wanted_A, const JointState& measured, const Bounds& speed,
+                       Output& output) noexcept;
+  Output fade() noexcept;
+
+  Settings settings_;
+  double period_s_;
+  double amperes_per_Nm_;
+  double speed_gain_A_s_rad_;  ///< k_v, of the override
+  double approach_1_s_;        ///< ω_p
+  double braking_rad_s2_;      ///< a
+  double margin_rad_;
+  double soft_speed_rad_s_;
+  double fault_keep_;
+  double position_1_s_;
+  Pid velocity_;
+  Pid torque_;
+  Handover handover_;
+  ThermalLimit thermal_;
+  JointReference reference_;
+  double current_A_ = 0.0;
+  bool is_switching_ = false;
+};
+
+/// The enumerator's own spelling.
+[[nodiscard]] std::string_view name(JointCascade::Limit limit) noexcept;
+[[nodiscard]] std::string_view name(JointMode mode) noexcept;
+
+}  // namespace torsio

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <limits>
+
+#include "torsio/control/deflection_controller.hpp"
+#include "torsio/control/handover.hpp"
+#include "torsio/core/fault.hpp"
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+/// A spring and a damper at the joint, as a torque to be wanted of a `TorqueController`:
+///
+///     τ* = K (q* − q) + D (q̇* − q̇) + τ_ff,   then limited in size and rate
+///
+/// Source: Hogan, Impedance control (1985). How stiff it may be: `passive_stiffness`.
+class JointImpedance {
+ public:
+  struct Gains {
+    double stiffness_Nm_rad = 0.0;
+    double damping_Nms_rad = 0.0;
+  };
+  struct Settings {
+    Gains gains = {};
+    double torque_Nm = std::numeric_limits<double>::infinity();         ///< limit of τ*
+    double torque_rate_Nm_s = std::numeric_limits<double>::infinity();  ///< limit of τ̇*
+    double handover_s = 0.1;
+    double fault_decay_s = 0.02;  ///< of the torque without a usable measurement
+  };
+  struct Wish {
+    double angle_rad = 0.0;
+    double speed_rad_s = 0.0;
+    double torque_Nm = 0.0;  ///< τ_ff
+  };
+  struct State {
+    double angle_rad = kNotMeasured;
+    double speed_rad_s = kNotMeasured;
+  };
+  struct Output {
+    double torque_Nm = 0.0;
+    double spring_Nm = 0.0;
+    double damper_Nm = 0.0;
+    double feed_forward_Nm = 0.0;
+    double handover_Nm = 0.0;
+    bool is_limited = false;
+    Fault fault = Fault::none;
+  };
+
+  /// @throws Error if a gain is negative or not finite, or a limit or time not positive.
+  JointImpedance(const Settings& settings, double sample_rate_Hz);
+
+  void reset() noexcept;
+
+  /// A wish that is not finite is a fault, and the last good one stands (none yet: no torque); a
+  /// measurement is one too, and the torque fades to 0 and goes on from there.
+  Output step(const Wish& wanted, const State& measured) noexcept TORSIO_REALTIME;
+
+  /// Both at once, from the next step on, without a jump.
+  /// @returns false, and both stay, if one is negative or not finite
+  [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
+  [[nodiscard]] const Gains& gains() const noexcept { return gains_; }
+
+ private:
+  Gains gains_;
+  double most_Nm_;
+  double step_Nm_;
+  double fault_keep_;
+  Handover handover_;
+  Wish wanted_;
+  bool has_wish_ = false;
+  bool is_changing_ = false;
+  double torque_Nm_ = 0.0;
+};
+
+/// What deflection control feeds back when a `JointImpedance` gives its wish through the line
+/// δ* = τ* / K, q̇ being the low-passed difference of q. Allocates.
+[[nodiscard]] JointFeedback impedance_feedback(const DeflectionController& controller,
+                                               const JointImpedance::Gains& gains,
+                                               double speed_cutoff_Hz);
+
+/// The largest stiffness [Nm/rad] that an impedance on deflection control, with this damping, renders
+/// so that the joint is passive up to the frequency and stable with its output free; 0 if it is not
+/// even without. Swept from below in steps of 5 %, up to ten times the spring.
+[[nodiscard]] double passive_stiffness(const DeflectionController& controller,
+                                       double damping_Nms_rad, double passive_to_rad_s,
+                                       double speed_cutoff_Hz);
+
+}  // namespace torsio

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+
+#include "torsio/control/handover.hpp"
+#include "torsio/control/linear_system.hpp"
+#include "torsio/core/fault.hpp"
+#include "torsio/core/realtime.hpp"
+#include "torsio/signal/differentiator.hpp"
+
+namespace torsio {
+
+/// A PID controller whose command may be cut, moved slowly, or taken over by another loop.
+///
+///     e = r − y
+///     u = K_p e + I + K_d D[−y] + f + h,    v = u cut to its limits and to its rate
+///     I[n+1] = I[n] + T K_i e               back calculation: + T / T_t (v − u)
+///                                           conditional: only if v = u, or e leads back to the limits
+///
+/// D is the backward difference, low-passed (of e instead of −y, if asked for), f the feed-forward,
+/// h the handover: what a change of gains or a start from a given command would add as a bump, let
+/// go of with a time constant of its own. The integral is in the unit of the command, so that a new
+/// K_i does not move it. Source: Åström & Hägglund, Advanced PID Control (2006), chapter 3.
+class Pid {
+ public:
+  enum class AntiWindup { back_calculation, conditional };
+  enum class DerivativeOf { measurement, error };
+
+  /// In units of the command over units of the measurement.
+  struct Gains {
+    double proportional = 0.0;
+    double integral = 0.0;    ///< a second
+    double derivative = 0.0;  ///< times a second
+  };
+  struct Limits {
+    double lowest = -std::numeric_limits<double>::infinity();
+    double highest = std::numeric_limits<double>::infinity();
+    double rate_per_s = std::numeric_limits<double>::infinity();  ///< of the command
+  };
+  struct Settings {
+    Gains gains = {};
+    Limits limits = {};
+    AntiWindup anti_windup = AntiWindup::back_calculation;
+    DerivativeOf derivative_of = DerivativeOf::measurement;
+    std::optional<double> derivative_cutoff_Hz = std::nullopt;
+    /// T_t of the back calculation; none: K_p / K_i, the integral's own time
+    std::optional<double> tracking_s = std::nullopt;
+    double handover_s = 0.1;
+  };
+
+  struct Output {
+    double command = 0.0;  ///< v
+    double proportional = 0.0;
+    double integral = 0.0;
+    double derivative = 0.0;
+    double feed_forward = 0.0;
+    double handover = 0.0;
+    bool is_limited = false;  ///< v is not the sum of the terms
+    Fault fault = Fault::none;
+  };
+
+  /// @throws Error if a gain is negative or not finite, the limits leave nothing between them, or a
+  /// rate or time is not positive.
+  Pid(const Settings& settings, double sample_rate_Hz);
+
+  /// No memory; the rate limit starts from the command 0, or the limit next to it.
+  void reset() noexcept;
+  /// No memory, but that the next command is this one (cut to the limits), whatever the terms say.
+  void start(double command) noexcept;
+
+  /// A value that is not finite is `Fault::input_not_finite`: the last command is held and nothing
+  /// remembered. So are finite ones beyond what the terms hold.
+  Output step(double reference, double measurement,
+              double feed_forward = 0.0) noexcept TORSIO_REALTIME;
+
+  /// What was really applied in the place of the last command, where something behind cut it or
+  /// another loop took over. Call it after every `step` while that is so: the integral does not wind
+  /// up, and the rate limit goes on from there. A number that is not finite changes nothing.
+  void track(double applied) noexcept TORSIO_REALTIME;
+
+  /// All gains at once, from the next step on; the command goes on without a jump.
+  /// @returns false, and all stay as they are, if one is negative or not finite
+  [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
+  [[nodiscard]] const Gains& gains() const noexcept { return gains_; }
+  /// @returns the last command, or what `track` said was applied in its place
+  [[nodiscard]] double command() const noexcept { return last_.command; }
+  [[nodiscard]] static bool is_valid(const Gains& gains) noexcept;
+
+ private:
+  void set_tracking_share() noexcept;
+  void integrate(double wanted) noexcept;
+  [[nodiscard]] Output held() const noexcept;
+  [[nodiscard]] double limited(double command) const noexcept;
+
+  Gains gains_;
+  Limits limits_;
+  AntiWindup anti_windup_;
+  DerivativeOf derivative_of_;
+  std::optional<double> tracking_s_;
+  double period_s_;
+  double step_limit_;      ///< of the command, a tick
+  double tracking_share_ = 0.0;  ///< T / T_t
+  Differentiator differentiator_;
+  Handover handover_;
+  Output last_;
+  double integral_ = 0.0;
+  double rate_ = 0.0;       ///< D, of the last step
+  double error_ = 0.0;      ///< of the last step
+  double increment_ = 0.0;  ///< of the integral by the last step's error
+  bool is_starting_ = false;
+};
+
+/// From the measurement to minus the command, as `Pid` does it between its limits; terms without a
+/// gain are left out. Allocates.
+[[nodiscard]] LinearSystem linear_pid(const Pid::Gains& gains, double derivative_cutoff_Hz,
+                                      double sample_rate_Hz);
+
+}  // namespace torsio

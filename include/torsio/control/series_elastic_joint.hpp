@@ -1,0 +1,67 @@
+#pragma once
+
+#include <string_view>
+
+#include "torsio/control/drive.hpp"
+#include "torsio/control/linear_system.hpp"
+
+namespace torsio {
+
+/// A joint behind a spring as controllers are designed on it, all as felt at the joint:
+///
+///     J N² θ̈ + b θ̇ = N k_t i − K δ,   δ = θ − q,   M q̈ + d q̇ = K δ + τ_ext,   T_i i̇ = i* − i
+///
+/// θ is the rotor over the ratio. Dry friction, play and what is not linear in the spring are left out.
+struct SeriesElasticJoint {
+  Drive drive = {};
+  double stiffness_Nm_rad = 0.0;       ///< K
+  double joint_inertia_kg_m2 = 0.0;    ///< M, with what hangs on it
+  double joint_viscous_Nms_rad = 0.0;  ///< d
+
+  /// @throws Error as `Drive::check`, if stiffness or inertia is not positive, or d negative.
+  void check() const;
+};
+
+/// That of a data sheet: the relaxed stiffness of an elastomer, the middle one of rubber; a torsion
+/// tube before the last gear is taken to the joint, and the gear as rigid.
+[[nodiscard]] SeriesElasticJoint series_elastic_joint(const DataSheet& sheet);
+
+/// What the far side of the spring does.
+enum class JointOutput { locked, free };
+
+/// What a controller feeds back in its linear range, as systems from one measurement to the current:
+/// i* = −(C_δ δ + C_θ̇ θ̇ + C_q q), of everything wanted being zero.
+struct JointFeedback {
+  LinearSystem deflection;  ///< C_δ
+  LinearSystem speed;       ///< C_θ̇
+  LinearSystem joint;       ///< C_q
+};
+
+/// The loop cut at the current: feedback, one sample of delay, hold, joint.
+[[nodiscard]] LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& feedback,
+                                     JointOutput output);
+
+/// @throws Error naming the output and the phase margin if the loop is unstable when it is closed.
+void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output);
+
+/// Whether the joint, as its surroundings feel it through the spring, takes up energy.
+struct Passivity {
+  /// Re Z >= 0 from 0 up to here [rad/s]: contact with any passive surroundings cannot build up a
+  /// motion slower than this. The Nyquist frequency if there is no end.
+  double passive_to_rad_s = 0.0;
+  double least_Nms_rad = 0.0;  ///< the most negative Re Z up to the Nyquist frequency, or 0
+  double least_rad_s = 0.0;    ///< where that is
+};
+
+/// The driving-point impedance Z(jω) = −τ / q̇ of spring, drive and controller, swept up to the
+/// Nyquist frequency. With H(s) = exp(−s T) (1 − exp(−s T)) / (s T (1 + T_i s)) N k_t of delay, hold
+/// and current loop (what a sampler folds back is left out):
+///
+///     Z = K / s · (J N² s² + b s + H (s C_θ̇ + C_q)) / (J N² s² + b s + K + H (C_δ + s C_θ̇))
+///
+/// The joint's own inertia and friction are passive and not counted. Two passive systems in contact
+/// are stable; one that is not passive is unstable against some, not against all (Colgate & Hogan
+/// 1988).
+[[nodiscard]] Passivity passivity(const SeriesElasticJoint& joint, const JointFeedback& feedback);
+
+}  // namespace torsio

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "torsio/control/deflection_controller.hpp"
+#include "torsio/control/disturbance_observer.hpp"
+#include "torsio/control/spring_inverse.hpp"
+
+namespace torsio {
+
+/// Makes up for a share of the drive's friction where the spring is to be wound:
+///
+///     i_f = s (F_c tanh(v* / v₀) + F_v v*) / (N k_t),   v* = D[δ*] low-passed
+struct FrictionCompensation {
+  double share = 0.7;         ///< s, 0 to 1; more than there is makes the loop hunt
+  double speed_rad_s = 0.02;  ///< v₀, at the joint
+};
+
+/// What does not depend on the inverse of a `TorqueController`.
+class TorqueLoopCore {
+ public:
+  struct Settings {
+    DeflectionController::Settings deflection = {};
+    double largest_torque_Nm = std::numeric_limits<double>::infinity();  ///< the wish is cut there
+    std::optional<FrictionCompensation> friction = std::nullopt;
+    std::optional<double> observer_cutoff_Hz = std::nullopt;  ///< needs the rotor's angle
+  };
+
+  struct Output {
+    double current_A = 0.0;
+    double wanted_torque_Nm = 0.0;       ///< after its limit
+    double wanted_deflection_rad = 0.0;  ///< of the inverse, after its limit
+    double proportional_A = 0.0;
+    double integral_A = 0.0;
+    double derivative_A = 0.0;
+    double feed_forward_A = 0.0;
+    double friction_A = 0.0;
+    double observer_A = 0.0;
+    double handover_A = 0.0;
+    bool is_limited = false;
+    Fault inverse = Fault::none;  ///< the inverse fell back on its line, which may be used
+    Fault fault = Fault::none;    ///< a reference or a measurement could not be used
+  };
+
+  /// @throws Error as `DeflectionController`, if it does not act on current, if a setting is out of
+  /// range, or if the loop with the observer is unstable (with the margin).
+  TorqueLoopCore(const Settings& settings, double sample_rate_Hz);
+
+  void reset() noexcept;
+  /// The torque to ask the inverse for: finite, and within the limit.
+  double accept(double wanted_Nm) noexcept TORSIO_REALTIME;
+  Output step(const Estimate& wanted_rad, const JointSample& sample) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] const DeflectionController& deflection() const noexcept { return deflection_; }
+  [[nodiscard]] DeflectionController& deflection() noexcept { return deflection_; }
+  /// What the loop feeds back, the observer included. Allocates.
+  [[nodiscard]] JointFeedback feedback() const;
+  [[nodiscard]] Margins margins_of(JointOutput output) const;
+
+ private:
+  void check_stability() const;
+
+  Settings settings_;
+  DeflectionController deflection_;
+  std::optional<DisturbanceObserver> observer_;
+  Differentiator wanted_rate_;
+  double amperes_per_Nm_;
+  double wanted_Nm_ = 0.0;
+  bool is_refused_ = false;
+  double applied_A_ = 0.0;
+};
+
+/// Torque through the spring: inverse model of the spring, deflection control, and optionally friction
+/// compensation and a disturbance observer.
+///
+///     δ* = inverse(τ*),   i = deflection controller(δ*, δ) + i_f + d,   |i| <= i_peak
+///
+/// A wish that is not finite is a fault, and the last good one stands; without a usable measurement
+/// the current fades to 0. Where the inverse falls back on its line the loop goes on and
+/// `Output::inverse` says so. Source: paper 000 section 4, 001 section 6; SPEC section 3.11.
+template <SpringInverse I>
+class TorqueController {
+ public:
+  using Settings = TorqueLoopCore::Settings;
+  using Output = TorqueLoopCore::Output;
+
+  /// @throws Error as `TorqueLoopCore`.
+  TorqueController(I inverse, const Settings& settings, double sample_rate_Hz)
+      : inverse_(std::move(inverse)), core_(settings, sample_rate_Hz) {}
+
+  void reset() noexcept {
+    inverse_.reset();
+    core_.reset();
+  }
+
+  Output step(double wanted_Nm, const JointSample& sample) noexcept TORSIO_REALTIME {
+    const double accepted_Nm = core_.accept(wanted_Nm);
+    return core_.step(inverse_.step(accepted_Nm, sample), sample);
+  }
+
+  [[nodiscard]] I& inverse() noexcept { return inverse_; }
+  [[nodiscard]] const TorqueLoopCore& core() const noexcept { return core_; }
+  /// As `DeflectionController::set_gains`.
+  [[nodiscard]] bool set_gains(const Pid::Gains& gains) noexcept TORSIO_REALTIME {
+    return core_.deflection().set_gains(gains);
+  }
+
+ private:
+  I inverse_;
+  TorqueLoopCore core_;
+};
+
+}  // namespace torsio

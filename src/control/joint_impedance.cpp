@@ -1,0 +1,107 @@
+#include "torsio/control/joint_impedance.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "actuator/checks.hpp"
+#include "passive_sweep.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kPlace = "joint impedance";
+
+JointImpedance::Settings checked(const JointImpedance::Settings& settings, double sample_rate_Hz) {
+  require_positive(kPlace, "sample_rate_Hz", sample_rate_Hz);
+  require_not_negative(kPlace, "stiffness_Nm_rad", settings.gains.stiffness_Nm_rad);
+  require_not_negative(kPlace, "damping_Nms_rad", settings.gains.damping_Nms_rad);
+  require(settings.torque_Nm > 0.0, kPlace, "torque_Nm > 0", settings.torque_Nm);
+  require(settings.torque_rate_Nm_s > 0.0, kPlace, "torque_rate_Nm_s > 0",
+          settings.torque_rate_Nm_s);
+  require_positive(kPlace, "handover_s", settings.handover_s);
+  require_positive(kPlace, "fault_decay_s", settings.fault_decay_s);
+  return settings;
+}
+
+}  // namespace
+
+JointImpedance::JointImpedance(const Settings& settings, double sample_rate_Hz)
+    : gains_(checked(settings, sample_rate_Hz).gains),
+      most_Nm_(settings.torque_Nm),
+      step_Nm_(settings.torque_rate_Nm_s / sample_rate_Hz),
+      fault_keep_(std::exp(-1.0 / (settings.fault_decay_s * sample_rate_Hz))),
+      handover_(settings.handover_s, sample_rate_Hz) {}
+
+void JointImpedance::reset() noexcept {
+  handover_.reset();
+  wanted_ = {};
+  has_wish_ = false;
+  is_changing_ = false;
+  torque_Nm_ = 0.0;
+}
+
+bool JointImpedance::set_gains(const Gains& gains) noexcept {
+  if (!(gains.stiffness_Nm_rad >= 0.0 && gains.damping_Nms_rad >= 0.0 &&
+        std::isfinite(gains.stiffness_Nm_rad) && std::isfinite(gains.damping_Nms_rad)))
+    return false;
+  gains_ = gains;
+  is_changing_ = true;
+  return true;
+}
+
+JointImpedance::Output JointImpedance::step(const Wish& wanted, const State& measured) noexcept {
+  Output output;
+  if (std::isfinite(wanted.angle_rad + wanted.speed_rad_s + wanted.torque_Nm)) {
+    wanted_ = wanted;
+    has_wish_ = true;
+  } else {
+    output.fault = Fault::input_not_finite;
+  }
+  output.spring_Nm = gains_.stiffness_Nm_rad * (wanted_.angle_rad - measured.angle_rad);
+  output.damper_Nm = gains_.damping_Nms_rad * (wanted_.speed_rad_s - measured.speed_rad_s);
+  output.feed_forward_Nm = wanted_.torque_Nm;
+  const double terms_Nm = output.spring_Nm + output.damper_Nm + output.feed_forward_Nm;
+  if (!std::isfinite(terms_Nm) || !has_wish_) {
+    torque_Nm_ *= fault_keep_;
+    if (std::abs(torque_Nm_) < 1e-9) torque_Nm_ = 0.0;
+    is_changing_ = true;
+    return {.torque_Nm = torque_Nm_, .fault = Fault::input_not_finite};
+  }
+  if (is_changing_) {
+    handover_.reset();
+    handover_.add(torque_Nm_ - terms_Nm);
+    is_changing_ = false;
+  }
+  output.handover_Nm = handover_.step();
+  const double all_Nm = terms_Nm + output.handover_Nm;
+  const double moved_Nm = std::clamp(all_Nm, torque_Nm_ - step_Nm_, torque_Nm_ + step_Nm_);
+  torque_Nm_ = std::clamp(moved_Nm, -most_Nm_, most_Nm_);
+  output.torque_Nm = torque_Nm_;
+  output.is_limited = torque_Nm_ != all_Nm;
+  return output;
+}
+
+JointFeedback impedance_feedback(const DeflectionController& controller,
+                                 const JointImpedance::Gains& gains, double speed_cutoff_Hz) {
+  JointFeedback loop = controller.feedback();
+  const double rate_Hz = loop.deflection.sample_rate_Hz();
+  const auto gain = [&](double value) { return LinearSystem::gain(value, rate_Hz); };
+  const double per_Nm = 1.0 / controller.settings().joint.stiffness_Nm_rad;
+  LinearSystem wish = gain(gains.stiffness_Nm_rad * per_Nm);
+  if (gains.damping_Nms_rad > 0.0)
+    wish = wish +
+           gain(gains.damping_Nms_rad * per_Nm) * (LinearSystem::lowpass(speed_cutoff_Hz, rate_Hz) *
+                                                   LinearSystem::difference(rate_Hz));
+  loop.joint = loop.joint + controller.reference_path() * wish;
+  return loop;
+}
+
+double passive_stiffness(const DeflectionController& controller, double damping_Nms_rad,
+                         double passive_to_rad_s, double speed_cutoff_Hz) {
+  const SeriesElasticJoint& joint = controller.settings().joint;
+  return highest_passive(joint, passive_to_rad_s, joint.stiffness_Nm_rad, [&](double stiffness) {
+    return impedance_feedback(controller, {stiffness, damping_Nms_rad}, speed_cutoff_Hz);
+  });
+}
+
+}  // namespace torsio

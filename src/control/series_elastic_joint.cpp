@@ -1,0 +1,140 @@
+#include "torsio/control/series_elastic_joint.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <string>
+#include <variant>
+
+#include "actuator/checks.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+using Complex = std::complex<double>;
+
+double stiffness_of(const SpringSheet& spring) { return spring.stiffness_Nm_rad.value; }
+double stiffness_of(const ElastomerSheet& coupling) { return coupling.stiffness_Nm_rad.value; }
+double stiffness_of(const RubberSheet& rubber) { return rubber.stiffness_Nm_rad.value; }
+
+struct Impedance {
+  const SeriesElasticJoint& joint;
+  const JointFeedback& feedback;
+
+  /// Re Z [Nms/rad]
+  [[nodiscard]] double real_at(double rad_s) const {
+    const Drive& drive = joint.drive;
+    const Complex s(0.0, rad_s);
+    const double period_s = 1.0 / feedback.deflection.sample_rate_Hz();
+    const Complex late = std::exp(-s * period_s);
+    const Complex current = late * (1.0 - late) /
+                            (s * period_s * (1.0 + s * drive.current_time_constant_s)) *
+                            drive.torque_per_current();
+    const Complex inner = s * (drive.inertia() * s + drive.viscous_Nms_rad) +
+                          current * s * feedback.speed.response(rad_s);
+    return (joint.stiffness_Nm_rad / s * (inner + current * feedback.joint.response(rad_s)) /
+            (inner + joint.stiffness_Nm_rad + current * feedback.deflection.response(rad_s)))
+        .real();
+  }
+};
+
+}  // namespace
+
+void SeriesElasticJoint::check() const {
+  drive.check();
+  constexpr auto kPlace = "series-elastic joint";
+  require_positive(kPlace, "stiffness_Nm_rad", stiffness_Nm_rad);
+  require_positive(kPlace, "joint_inertia_kg_m2", joint_inertia_kg_m2);
+  require_not_negative(kPlace, "joint_viscous_Nms_rad", joint_viscous_Nms_rad);
+}
+
+SeriesElasticJoint series_elastic_joint(const DataSheet& sheet) {
+  SeriesElasticJoint joint = {.drive = drive_of(sheet),
+                              .joint_inertia_kg_m2 = sheet.joint.inertia_kg_m2.value,
+                              .joint_viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value};
+  if (const auto* const gear = std::get_if<GearSheet>(&sheet.second)) {
+    const double tube_Nm_rad =
+        std::visit([](const auto& stage) { return stage.stiffness_Nm_rad.value; }, sheet.first);
+    joint.stiffness_Nm_rad = tube_Nm_rad * gear->ratio.value * gear->ratio.value;
+  } else {
+    joint.stiffness_Nm_rad = std::visit(
+        [](const auto& stage) {
+          if constexpr (requires { stiffness_of(stage); }) return stiffness_of(stage);
+          return 0.0;
+        },
+        sheet.second);
+  }
+  return joint;
+}
+
+// States δ, θ̇, i, and with a free output q̇, q; outputs δ, θ̇, q.
+LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& feedback,
+                       JointOutput output) {
+  joint.check();
+  const Drive& drive = joint.drive;
+  const bool is_free = output == JointOutput::free;
+  const std::size_t states = is_free ? 5 : 3;
+  LinearSystem::Matrices plant{Matrix(states, states), Matrix(states, 1), Matrix(3, states),
+                               Matrix(3, 1)};
+  Matrix& a = plant.a;
+  a(0, 1) = 1.0;
+  a(1, 0) = -joint.stiffness_Nm_rad / drive.inertia();
+  a(1, 1) = -drive.viscous_Nms_rad / drive.inertia();
+  a(1, 2) = drive.torque_per_current() / drive.inertia();
+  a(2, 2) = -1.0 / drive.current_time_constant_s;
+  plant.b(2, 0) = 1.0 / drive.current_time_constant_s;
+  plant.c(0, 0) = 1.0;
+  plant.c(1, 1) = 1.0;
+  if (is_free) {
+    a(0, 3) = -1.0;
+    a(3, 0) = joint.stiffness_Nm_rad / joint.joint_inertia_kg_m2;
+    a(3, 3) = -joint.joint_viscous_Nms_rad / joint.joint_inertia_kg_m2;
+    a(4, 3) = 1.0;
+    plant.c(2, 4) = 1.0;
+  }
+  const double rate_Hz = feedback.deflection.sample_rate_Hz();
+  const LinearSystem all =
+      side_by_side(side_by_side(feedback.deflection, feedback.speed), feedback.joint);
+  return LinearSystem::delay(rate_Hz) * all * LinearSystem::held(plant, rate_Hz);
+}
+
+void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output) {
+  if (is_stable_closed(loop)) return;
+  const Margins found = margins(loop);
+  throw Error({.place = std::string(place),
+               .problem = fmt::format("unstable with its output {}",
+                                      output == JointOutput::locked ? "locked" : "free"),
+               .expected = "a positive phase margin",
+               .found = fmt::format("{:.3g} degrees at {:.4g} rad/s", deg_from_rad(found.phase_rad),
+                                    found.crossover_rad_s),
+               .advice = "Take less bandwidth, smaller gains or a higher sample rate."});
+}
+
+Passivity passivity(const SeriesElasticJoint& joint, const JointFeedback& feedback) {
+  joint.check();
+  constexpr int kGrid = 1000;
+  constexpr double kLowestShare = 1e-5;  // of the Nyquist frequency
+  const Impedance impedance{joint, feedback};
+  const double highest_rad_s = std::numbers::pi * feedback.deflection.sample_rate_Hz();
+  Passivity found = {.passive_to_rad_s = highest_rad_s};
+  double last_rad_s = 0.0;
+  for (int n = 0; n <= kGrid; ++n) {
+    const double rad_s =
+        highest_rad_s * std::pow(kLowestShare, 1.0 - static_cast<double>(n) / kGrid);
+    const double real_Nms_rad = impedance.real_at(rad_s);
+    if (!(real_Nms_rad >= 0.0) && found.passive_to_rad_s == highest_rad_s)
+      found.passive_to_rad_s = last_rad_s;
+    if (!(real_Nms_rad >= found.least_Nms_rad)) {
+      found.least_Nms_rad = real_Nms_rad;
+      found.least_rad_s = rad_s;
+    }
+    last_rad_s = rad_s;
+  }
+  return found;
+}
+
+}  // namespace torsio

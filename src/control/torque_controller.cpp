@@ -1,0 +1,112 @@
+#include "torsio/control/torque_controller.hpp"
+
+#include <fmt/format.h>
+
+#include "actuator/checks.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kPlace = "torque controller";
+
+TorqueLoopCore::Settings checked(const TorqueLoopCore::Settings& settings) {
+  if (settings.deflection.actuation != DeflectionController::Actuation::current)
+    throw Error({.place = kPlace, .expected = "a deflection controller that acts on the current"});
+  require(settings.largest_torque_Nm > 0.0, kPlace, "largest_torque_Nm > 0",
+          settings.largest_torque_Nm);
+  if (settings.friction) {
+    require(settings.friction->share >= 0.0 && settings.friction->share <= 1.0, kPlace,
+            "a friction share from 0 to 1", settings.friction->share);
+    require_positive(kPlace, "speed_rad_s of the friction", settings.friction->speed_rad_s);
+  }
+  return settings;
+}
+
+}  // namespace
+
+TorqueLoopCore::TorqueLoopCore(const Settings& settings, double sample_rate_Hz)
+    : settings_(checked(settings)),
+      deflection_(settings.deflection, sample_rate_Hz),
+      wanted_rate_(sample_rate_Hz, settings.deflection.rate_cutoff_Hz),
+      amperes_per_Nm_(1.0 / settings.deflection.joint.drive.torque_per_current()) {
+  if (!settings.observer_cutoff_Hz) return;
+  observer_.emplace(settings.deflection.joint, *settings.observer_cutoff_Hz, sample_rate_Hz);
+  check_stability();
+}
+
+JointFeedback TorqueLoopCore::feedback() const {
+  const JointFeedback loop = deflection_.feedback();
+  return observer_ ? observer_->with(loop) : loop;
+}
+
+Margins TorqueLoopCore::margins_of(JointOutput output) const {
+  return margins(open_loop(settings_.deflection.joint, feedback(), output));
+}
+
+void TorqueLoopCore::check_stability() const {
+  for (const JointOutput output : {JointOutput::locked, JointOutput::free})
+    require_stable(kPlace, open_loop(settings_.deflection.joint, feedback(), output), output);
+}
+
+void TorqueLoopCore::reset() noexcept {
+  deflection_.reset();
+  if (observer_) observer_->reset();
+  wanted_rate_.reset();
+  wanted_Nm_ = 0.0;
+  is_refused_ = false;
+  applied_A_ = 0.0;
+}
+
+double TorqueLoopCore::accept(double wanted_Nm) noexcept {
+  is_refused_ = !std::isfinite(wanted_Nm);
+  if (!is_refused_)
+    wanted_Nm_ = std::clamp(wanted_Nm, -settings_.largest_torque_Nm, settings_.largest_torque_Nm);
+  return wanted_Nm_;
+}
+
+TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
+                                            const JointSample& sample) noexcept {
+  const Drive& drive = settings_.deflection.joint.drive;
+  const double deflection_rad = sample.spring_deflection_rad();
+  const bool is_measured =
+      std::isfinite(deflection_rad) && (!observer_ || std::isfinite(sample.motor_angle_rad));
+  const DeflectionController::Output loop =
+      deflection_.step(wanted_rad.value, is_measured ? deflection_rad : kNotMeasured);
+  Output output = {.current_A = loop.command,
+                   .wanted_torque_Nm = wanted_Nm_,
+                   .wanted_deflection_rad = loop.wanted_deflection_rad,
+                   .proportional_A = loop.proportional,
+                   .integral_A = loop.integral,
+                   .derivative_A = loop.derivative,
+                   .feed_forward_A = loop.feed_forward,
+                   .handover_A = loop.handover,
+                   .is_limited = loop.is_limited,
+                   .inverse = wanted_rad.fault,
+                   .fault = is_refused_ ? Fault::input_not_finite : loop.fault};
+  const double rate_rad_s = wanted_rate_.step(loop.wanted_deflection_rad);
+  if (!is_measured || loop.fault != Fault::none) {
+    if (observer_) observer_->reset();
+    applied_A_ = output.current_A;
+    return output;
+  }
+  if (const auto& friction = settings_.friction)
+    output.friction_A = friction->share * amperes_per_Nm_ *
+                        (drive.coulomb_Nm * std::tanh(rate_rad_s / friction->speed_rad_s) +
+                         drive.viscous_Nms_rad * rate_rad_s);
+  if (observer_)
+    output.observer_A = observer_->step(applied_A_, sample.motor_angle_rad, deflection_rad);
+  const double added_A = output.friction_A + output.observer_A;
+  if (added_A != 0.0) {
+    const double all_A = loop.command + added_A;
+    output.current_A = std::clamp(all_A, -drive.peak_current_A, drive.peak_current_A);
+    if (output.current_A != all_A) {
+      output.is_limited = true;
+      deflection_.track(output.current_A - added_A);
+    }
+  }
+  applied_A_ = output.current_A;
+  return output;
+}
+
+}  // namespace torsio

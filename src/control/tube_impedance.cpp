@@ -1,0 +1,152 @@
+#include "torsio/control/tube_impedance.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <variant>
+
+#include "actuator/checks.hpp"
+#include "passive_sweep.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kPlace = "tube impedance";
+
+TubeImpedance::Settings checked(const TubeImpedance::Settings& settings) {
+  settings.drive.check();
+  require_positive(kPlace, "tube_ratio", settings.tube_ratio);
+  require_positive(kPlace, "tube_Nm_rad", settings.tube_Nm_rad);
+  require_not_negative(kPlace, "position gain", settings.gains.position);
+  require_not_negative(kPlace, "damping gain", settings.gains.damping_s);
+  require_not_negative(kPlace, "torque gain", settings.gains.torque_Nm_rad);
+  require_positive(kPlace, "fault_decay_s", settings.fault_decay_s);
+  return settings;
+}
+
+double gear_ratio_of(const TubeImpedance::Settings& settings) {
+  return settings.drive.ratio / settings.tube_ratio;
+}
+
+}  // namespace
+
+TubeImpedance::Settings TubeImpedance::settings_of(const DataSheet& sheet, const Gains& gains) {
+  const auto* const tube = std::get_if<TubeSheet>(&sheet.first);
+  if (tube == nullptr || !std::holds_alternative<GearSheet>(sheet.second))
+    throw Error({.place = kPlace,
+                 .expected = "an actuator with a torsion tube before a gear",
+                 .found = std::string(sheet.name)});
+  return {.drive = drive_of(sheet),
+          .tube_ratio = tube->ratio.value,
+          .tube_Nm_rad = tube->stiffness_Nm_rad.value,
+          .gains = gains,
+          .joint_inertia_kg_m2 = sheet.joint.inertia_kg_m2.value,
+          .joint_viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value};
+}
+
+TubeImpedance::Gains TubeImpedance::gains_for(const Settings& settings, double stiffness_Nm_rad,
+                                              double damping_Nms_rad, double torque_Nm_rad) {
+  require_positive(kPlace, "torque gain", torque_Nm_rad);
+  require_not_negative(kPlace, "stiffness_Nm_rad", stiffness_Nm_rad);
+  require_not_negative(kPlace, "damping_Nms_rad", damping_Nms_rad);
+  const double per_Nm = (torque_Nm_rad + settings.tube_Nm_rad / settings.tube_ratio) /
+                        (gear_ratio_of(settings) * settings.tube_Nm_rad * torque_Nm_rad);
+  return {.position = stiffness_Nm_rad * per_Nm,
+          .damping_s = damping_Nms_rad * per_Nm,
+          .torque_Nm_rad = torque_Nm_rad};
+}
+
+SeriesElasticJoint TubeImpedance::joint_of(const Settings& settings) {
+  const double gear_ratio = gear_ratio_of(settings);
+  return {.drive = settings.drive,
+          .stiffness_Nm_rad = settings.tube_Nm_rad * gear_ratio * gear_ratio,
+          .joint_inertia_kg_m2 = settings.joint_inertia_kg_m2,
+          .joint_viscous_Nms_rad = settings.joint_viscous_Nms_rad};
+}
+
+// At the joint the twist is θ_s / N_h.
+JointFeedback TubeImpedance::feedback_of(const Settings& settings, double sample_rate_Hz) {
+  const double per_rad = settings.gains.torque_Nm_rad / settings.drive.torque_constant_Nm_A;
+  const LinearSystem wish = linear_pid({.proportional = per_rad * settings.gains.position,
+                                        .derivative = per_rad * settings.gains.damping_s},
+                                       settings.speed_cutoff_Hz, sample_rate_Hz);
+  return {LinearSystem::gain(per_rad * gear_ratio_of(settings), sample_rate_Hz),
+          LinearSystem::gain(0.0, sample_rate_Hz), wish};
+}
+
+TubeImpedance::TubeImpedance(const Settings& settings, double sample_rate_Hz)
+    : settings_(checked(settings)),
+      gear_ratio_(gear_ratio_of(settings)),
+      fault_keep_(std::exp(-1.0 / (settings.fault_decay_s * sample_rate_Hz))),
+      speed_(sample_rate_Hz, settings.speed_cutoff_Hz) {
+  joint_of(settings_).check();
+  if (settings_.relies_on_friction) return;
+  const JointFeedback loop = feedback_of(settings_, sample_rate_Hz);
+  for (const JointOutput output : {JointOutput::locked, JointOutput::free})
+    require_stable(kPlace, open_loop(joint_of(settings_), loop, output), output);
+}
+
+void TubeImpedance::reset() noexcept {
+  speed_.reset();
+  wanted_rad_ = 0.0;
+  wanted_rad_s_ = 0.0;
+  current_A_ = 0.0;
+}
+
+double TubeImpedance::stiffness() const noexcept {
+  const Gains& gains = settings_.gains;
+  if (!(gains.torque_Nm_rad > 0.0)) return 0.0;
+  return gear_ratio_ * settings_.tube_Nm_rad * gains.position * gains.torque_Nm_rad /
+         (gains.torque_Nm_rad + settings_.tube_Nm_rad / settings_.tube_ratio);
+}
+
+TubeImpedance::Output TubeImpedance::step(double wanted_rad, double wanted_rad_s,
+                                          const Angles& measured) noexcept {
+  Output output;
+  if (std::isfinite(wanted_rad + wanted_rad_s)) {
+    wanted_rad_ = wanted_rad;
+    wanted_rad_s_ = wanted_rad_s;
+  } else {
+    output.fault = Fault::input_not_finite;
+  }
+  const Gains& gains = settings_.gains;
+  const double behind_rad =
+      settings_.twist == Twist::tube ? measured.middle_rad : gear_ratio_ * measured.joint_rad;
+  output.twist_rad = measured.rotor_rad / settings_.tube_ratio - behind_rad;
+  if (!std::isfinite(output.twist_rad + measured.joint_rad)) {
+    speed_.reset();
+    current_A_ *= fault_keep_;
+    if (std::abs(current_A_) < 1e-9) current_A_ = 0.0;
+    return {.current_A = current_A_, .fault = Fault::input_not_finite};
+  }
+  output.position_rad = gains.position * (wanted_rad_ - measured.joint_rad);
+  output.damping_rad = gains.damping_s * (wanted_rad_s_ - speed_.step(measured.joint_rad));
+  output.motor_torque_Nm =
+      gains.torque_Nm_rad * (output.position_rad + output.damping_rad - output.twist_rad);
+  const double most_A = settings_.drive.peak_current_A;
+  const double wanted_A = output.motor_torque_Nm / settings_.drive.torque_constant_Nm_A;
+  if (!std::isfinite(wanted_A)) {
+    speed_.reset();
+    current_A_ *= fault_keep_;
+    return {.current_A = current_A_, .fault = Fault::input_not_finite};
+  }
+  current_A_ = std::clamp(wanted_A, -most_A, most_A);
+  output.current_A = current_A_;
+  output.is_limited = current_A_ != wanted_A;
+  return output;
+}
+
+double passive_stiffness(const TubeImpedance::Settings& settings, double damping_Nms_rad,
+                         double passive_to_rad_s, double sample_rate_Hz) {
+  const SeriesElasticJoint joint = TubeImpedance::joint_of(settings);
+  return highest_passive(joint, passive_to_rad_s, joint.stiffness_Nm_rad, [&](double stiffness) {
+    TubeImpedance::Settings stiffer = settings;
+    stiffer.gains = TubeImpedance::gains_for(settings, stiffness, damping_Nms_rad,
+                                             settings.gains.torque_Nm_rad);
+    return TubeImpedance::feedback_of(stiffer, sample_rate_Hz);
+  });
+}
+
+}  // namespace torsio

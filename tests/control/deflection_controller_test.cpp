@@ -1,0 +1,175 @@
+#include "torsio/control/deflection_controller.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "spring_joint.hpp"
+#include "support/error_message.hpp"
+#include "torsio/control/joint_cascade.hpp"
+
+namespace torsio {
+namespace {
+
+using test::SpringJoint;
+using Actuation = DeflectionController::Actuation;
+
+constexpr double kRate_Hz = 1000.0;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::array kActuators = {"dfki-28", "dfki-50", "dfki-120", "dfki-300", "elastomer"};
+
+DeflectionController::Settings settings_of(const char* actuator) {
+  return {.joint = series_elastic_joint(data_sheet(actuator))};
+}
+
+// With P, D and feed-forward alone: J δ'' + (b + D) δ' + (K + P) δ = (K + P) δ*.
+TEST(DeflectionController, AnswersAStepAsTheSecondOrderSystemDoes) {
+  constexpr double kFast_Hz = 100'000.0;
+  constexpr double kStep_rad = 1e-3;
+  DeflectionController::Settings settings = settings_of("dfki-50");
+  settings.joint.drive.current_time_constant_s = 1e-6;
+  settings.joint.drive.viscous_Nms_rad = 0.0;
+  settings.integral_1_s = 0.0;
+  settings.rate_cutoff_Hz = 20'000.0;
+  settings.damping = 0.5;
+  DeflectionController controller(settings, kFast_Hz);
+  SpringJoint joint(settings.joint, JointOutput::locked);
+  const double damped = 50.0 * std::sqrt(0.75);
+  for (int n = 0; n < 30'000; ++n) {
+    const double t = n / kFast_Hz;
+    const double expected =
+        kStep_rad *
+        (1.0 - std::exp(-25.0 * t) * (std::cos(damped * t) + 25.0 / damped * std::sin(damped * t)));
+    ASSERT_NEAR(joint.deflection_rad(), expected, 4e-3 * kStep_rad) << t;
+    joint.step(controller.step(kStep_rad, joint.deflection_rad()).command, 1.0 / kFast_Hz);
+  }
+}
+
+TEST(DeflectionController, HoldsADeflectionAgainstALockedOutput) {
+  for (const char* actuator : kActuators) {
+    const auto settings = settings_of(actuator);
+    DeflectionController controller(settings, kRate_Hz);
+    SpringJoint joint(settings.joint, JointOutput::locked);
+    for (int n = 0; n < 3000; ++n)
+      joint.step(controller.step(0.01, joint.deflection_rad()).command, 1.0 / kRate_Hz);
+    EXPECT_NEAR(joint.deflection_rad(), 0.01, 1e-6) << actuator;
+  }
+}
+
+TEST(DeflectionController, LetsAFreeJointComeToRestAfterAPush) {
+  for (const char* actuator : kActuators) {
+    const auto settings = settings_of(actuator);
+    DeflectionController controller(settings, kRate_Hz);
+    SpringJoint joint(settings.joint, JointOutput::free);
+    double most_J = 0.0;
+    for (int n = 0; n < 20'000; ++n) {
+      const double push_Nm = n < 200 ? 0.02 * settings.joint.stiffness_Nm_rad : 0.0;
+      joint.step(controller.step(0.0, joint.deflection_rad()).command, 1.0 / kRate_Hz, push_Nm);
+      most_J = std::max(most_J, joint.energy_J());
+    }
+    EXPECT_GT(most_J, 0.0);
+    // The drive's friction, which the integral makes up for, weighs like inertia: it coasts long.
+    EXPECT_LT(joint.energy_J(), 0.2 * most_J) << actuator;
+  }
+}
+
+TEST(DeflectionController, ActsOnTheSpeedOfADriveWithALoopOfItsOwn) {
+  for (const char* actuator : kActuators) {
+    auto settings = settings_of(actuator);
+    settings.actuation = Actuation::velocity;
+    const auto drive = JointCascade::gains_for(settings.joint.drive, 200.0);
+    settings.speed_loop = drive.velocity;
+    DeflectionController controller(settings, kRate_Hz);
+    Pid speed_loop({.gains = drive.velocity}, kRate_Hz);
+    SpringJoint joint(settings.joint, JointOutput::locked);
+    for (int n = 0; n < 3000; ++n) {
+      const auto output = controller.step(0.01, joint.deflection_rad());
+      joint.step(speed_loop.step(output.command, joint.speed_rad_s()).command, 1.0 / kRate_Hz);
+    }
+    EXPECT_NEAR(joint.deflection_rad(), 0.01, 1e-6) << actuator;
+  }
+}
+
+TEST(DeflectionController, CutsTheDeflectionAndTheCurrent) {
+  const auto settings = settings_of("dfki-50");
+  DeflectionController controller(settings, kRate_Hz);
+  const auto output = controller.step(1.0, 0.0);
+  EXPECT_EQ(output.wanted_deflection_rad, settings.largest_deflection_rad);
+  EXPECT_EQ(output.command, settings.joint.drive.peak_current_A);
+  EXPECT_TRUE(output.is_limited);
+}
+
+TEST(DeflectionController, KeepsTheLastGoodWishAndFadesWithoutAMeasurement) {
+  const auto settings = settings_of("dfki-50");
+  DeflectionController disturbed(settings, kRate_Hz);
+  DeflectionController sound(settings, kRate_Hz);
+  (void)disturbed.step(0.01, 0.0);
+  (void)sound.step(0.01, 0.0);
+  const auto refused = disturbed.step(kNaN, 0.001);
+  EXPECT_EQ(refused.fault, Fault::input_not_finite);
+  EXPECT_EQ(refused.command, sound.step(0.01, 0.001).command);
+  double last_A = refused.command;
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+    const auto faded = disturbed.step(0.01, bad);
+    EXPECT_EQ(faded.fault, Fault::input_not_finite);
+    EXPECT_NEAR(faded.command, last_A * std::exp(-0.05), 1e-12);
+    last_A = faded.command;
+  }
+  EXPECT_NEAR(disturbed.step(0.01, 0.001).command, last_A, 1e-9) << "goes on from there";
+}
+
+TEST(DeflectionController, RefusesGainsThatAreUnstableAndSaysTheMargin) {
+  const auto refusal = [](auto change) {
+    DeflectionController::Settings settings = settings_of("dfki-50");
+    change(settings);
+    return test::error_message([&] { DeflectionController(settings, kRate_Hz); });
+  };
+  EXPECT_EQ(refusal([](auto&) {}), "");
+  const std::string fast = refusal([](auto& s) { s.bandwidth_rad_s = 200.0; });
+  EXPECT_NE(fast.find("unstable with its output locked"), std::string::npos) << fast;
+  EXPECT_NE(fast.find("found -21.1 degrees at 415.9 rad/s"), std::string::npos) << fast;
+  EXPECT_NE(refusal([](auto& s) { s.bandwidth_rad_s = 20.0; }).find("faster than the loop's"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.gains = Pid::Gains{.proportional = -1.0}; }).find(">= 0"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.joint.stiffness_Nm_rad = 0.0; }), "");
+  EXPECT_NE(refusal([](auto& s) { s.speed_loop.integral = kNaN; }), "");
+  EXPECT_NE(refusal([](auto& s) { s.largest_deflection_rad = kInfinity; }), "");
+  EXPECT_NE(refusal([](auto& s) { s.rate_cutoff_Hz = 500.0; }), "");
+}
+
+// Colgate's and Vallery's limit: at low frequency Re Z has the sign of b (K + a K_p − …) − J a K_i.
+TEST(Passivity, EndsAtZeroWhereTheIntegralOutrunsTheFriction) {
+  DeflectionController::Settings settings = settings_of("dfki-50");
+  const Pid::Gains gains = DeflectionController::gains_for(settings);
+  const Drive& drive = settings.joint.drive;
+  const double a = drive.torque_per_current();
+  const double late_s = 2e-3 + drive.current_time_constant_s;
+  const double critical_Nms_rad =
+      drive.inertia() * a * gains.integral /
+      (settings.joint.stiffness_Nm_rad + a * (gains.proportional - gains.integral * late_s));
+  const auto passive_to = [&](double viscous_Nms_rad) {
+    settings.joint.drive.viscous_Nms_rad = viscous_Nms_rad;
+    const DeflectionController controller(settings, kRate_Hz);
+    return passivity(settings.joint, controller.feedback()).passive_to_rad_s;
+  };
+  EXPECT_EQ(passive_to(0.98 * critical_Nms_rad), 0.0);
+  EXPECT_GT(passive_to(1.02 * critical_Nms_rad), 300.0);
+}
+
+TEST(Passivity, HasNoEndWithoutAController) {
+  const SeriesElasticJoint joint = series_elastic_joint(data_sheet("dfki-50"));
+  const LinearSystem none = LinearSystem::gain(0.0, kRate_Hz);
+  const Passivity found = passivity(joint, {none, none, none});
+  EXPECT_EQ(found.passive_to_rad_s, std::numbers::pi * kRate_Hz);
+  EXPECT_EQ(found.least_Nms_rad, 0.0);
+}
+
+}  // namespace
+}  // namespace torsio

@@ -1,0 +1,233 @@
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "spring_joint.hpp"
+#include "support/error_message.hpp"
+#include "torsio/control/joint_impedance.hpp"
+#include "torsio/control/torque_controller.hpp"
+#include "torsio/control/tube_impedance.hpp"
+#include "torsio/core/random.hpp"
+
+namespace torsio {
+namespace {
+
+using test::SpringJoint;
+
+constexpr double kRate_Hz = 1000.0;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TEST(JointImpedance, IsASpringAndADamper) {
+  JointImpedance impedance({.gains = {.stiffness_Nm_rad = 50.0, .damping_Nms_rad = 2.0}}, kRate_Hz);
+  const auto output = impedance.step({.angle_rad = 0.3, .speed_rad_s = 1.0, .torque_Nm = 0.5},
+                                     {.angle_rad = 0.1, .speed_rad_s = -1.0});
+  EXPECT_DOUBLE_EQ(output.spring_Nm, 10.0);
+  EXPECT_DOUBLE_EQ(output.damper_Nm, 4.0);
+  EXPECT_DOUBLE_EQ(output.torque_Nm, 14.5);
+  EXPECT_FALSE(output.is_limited);
+}
+
+// K, D and the joint's inertia: the frequency and the damping of a swinging joint are those asked for.
+TEST(JointImpedance, MakesAFreeJointSwingAsItsSpringAndDamperDo) {
+  SeriesElasticJoint parts = series_elastic_joint(data_sheet("dfki-50"));
+  parts.joint_inertia_kg_m2 = 5.76;
+  parts.drive.viscous_Nms_rad = 0.0;
+  parts.joint_viscous_Nms_rad = 0.0;
+  TorqueLoopCore::Settings settings = {.deflection = {.joint = parts}};
+  TorqueController controller(LinearInverse(parts.stiffness_Nm_rad), settings, kRate_Hz);
+  constexpr double kFrequency_rad_s = 2.0;
+  constexpr double kDamping = 0.3;
+  JointImpedance impedance(
+      {.gains = {.stiffness_Nm_rad = 5.76 * kFrequency_rad_s * kFrequency_rad_s,
+                 .damping_Nms_rad = 2.0 * kDamping * kFrequency_rad_s * 5.76}},
+      kRate_Hz);
+  SpringJoint joint(parts, JointOutput::free);
+  const double damped = kFrequency_rad_s * std::sqrt(1.0 - kDamping * kDamping);
+  constexpr double kStep_rad = 0.1;
+  for (int n = 0; n < 4000; ++n) {
+    const double t = n / kRate_Hz;
+    const double expected =
+        kStep_rad -
+        kStep_rad * std::exp(-kDamping * kFrequency_rad_s * t) *
+            (std::cos(damped * t) + kDamping * kFrequency_rad_s / damped * std::sin(damped * t));
+    ASSERT_NEAR(joint.joint_rad(), expected, 0.04 * kStep_rad) << t;
+    const auto wish =
+        impedance.step({.angle_rad = kStep_rad},
+                       {.angle_rad = joint.joint_rad(), .speed_rad_s = joint.joint_speed_rad_s()});
+    JointSample sample;
+    sample.gear_angle_rad = joint.angle_rad();
+    sample.joint_angle_rad = joint.joint_rad();
+    joint.step(controller.step(wish.torque_Nm, sample).current_A, 1.0 / kRate_Hz);
+  }
+}
+
+TEST(JointImpedance, FadesWithoutAMeasurementAndKeepsTheLastGoodWish) {
+  JointImpedance impedance({.gains = {.stiffness_Nm_rad = 50.0}}, kRate_Hz);
+  EXPECT_EQ(impedance.step({.angle_rad = kNaN}, {.angle_rad = 0.1, .speed_rad_s = 0.0}).torque_Nm,
+            0.0)
+      << "no wish yet";
+  JointImpedance told({.gains = {.stiffness_Nm_rad = 50.0}}, kRate_Hz);
+  (void)told.step({.angle_rad = 0.3}, {.angle_rad = 0.1, .speed_rad_s = 0.0});
+  const auto refused =
+      told.step({.angle_rad = 0.5, .torque_Nm = kInfinity}, {.angle_rad = 0.1, .speed_rad_s = 0.0});
+  EXPECT_EQ(refused.fault, Fault::input_not_finite);
+  EXPECT_DOUBLE_EQ(refused.torque_Nm, 10.0);
+  const auto lost = told.step({.angle_rad = 0.3}, {});
+  EXPECT_EQ(lost.fault, Fault::input_not_finite);
+  EXPECT_NEAR(lost.torque_Nm, 10.0 * std::exp(-0.05), 1e-12);
+  EXPECT_NEAR(told.step({.angle_rad = 0.3}, {.angle_rad = 0.1, .speed_rad_s = 0.0}).torque_Nm,
+              lost.torque_Nm, 1e-9);
+}
+
+RC_GTEST_PROP(JointImpedance, KeepsToItsLimitsAndChangesItsGainsWithoutABump, ()) {
+  const double most_Nm = 5.0;
+  const double rate_Nm_s = 400.0;
+  JointImpedance impedance({.torque_Nm = most_Nm, .torque_rate_Nm_s = rate_Nm_s}, kRate_Hz);
+  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  double last_Nm = 0.0;
+  for (int n = 0; n < 10'000; ++n) {
+    const bool is_lost = random.uniform() < 0.01;
+    const JointImpedance::Wish wish = {.angle_rad =
+                                           random.uniform() < 0.01 ? kNaN : random.normal()};
+    const JointImpedance::State state = {.angle_rad = is_lost ? kNaN : random.normal(),
+                                         .speed_rad_s = random.normal()};
+    const bool is_changed = random.uniform() < 0.05;
+    if (is_changed)
+      RC_ASSERT(impedance.set_gains({.stiffness_Nm_rad = 100.0 * random.uniform(),
+                                     .damping_Nms_rad = 5.0 * random.uniform()}));
+    const auto output = impedance.step(wish, state);
+    RC_ASSERT(std::abs(output.torque_Nm) <= most_Nm);
+    if (is_lost) {
+      RC_ASSERT(output.fault == Fault::input_not_finite);
+    } else {
+      RC_ASSERT(std::abs(output.torque_Nm - last_Nm) <= rate_Nm_s / kRate_Hz * (1.0 + 1e-9));
+      if (is_changed && n > 0) RC_ASSERT(std::abs(output.torque_Nm - last_Nm) < 1e-9);
+    }
+    last_Nm = output.torque_Nm;
+  }
+}
+
+TEST(JointImpedance, RefusesImpossibleSettings) {
+  const auto refusal = [](const JointImpedance::Settings& settings) {
+    return test::error_message([&] { JointImpedance(settings, kRate_Hz); });
+  };
+  EXPECT_EQ(refusal({}), "");
+  EXPECT_NE(refusal({.gains = {.stiffness_Nm_rad = -1.0}}), "");
+  EXPECT_NE(refusal({.gains = {.damping_Nms_rad = kNaN}}), "");
+  EXPECT_NE(refusal({.torque_Nm = 0.0}), "");
+  EXPECT_NE(refusal({.torque_rate_Nm_s = kNaN}), "");
+  JointImpedance impedance({}, kRate_Hz);
+  EXPECT_FALSE(impedance.set_gains({.stiffness_Nm_rad = -1.0}));
+  EXPECT_FALSE(impedance.set_gains({.damping_Nms_rad = kInfinity}));
+}
+
+TEST(PassiveStiffness, IsBelowTheSpringAndGrowsWithTheDamping) {
+  const SeriesElasticJoint joint = series_elastic_joint(data_sheet("dfki-50"));
+  const DeflectionController controller({.joint = joint}, kRate_Hz);
+  double last_Nm_rad = 0.0;
+  for (const double damping_Nms_rad : {0.0, 1.0, 4.0}) {
+    const double found = passive_stiffness(controller, damping_Nms_rad, 100.0, 40.0);
+    EXPECT_GT(found, last_Nm_rad);
+    EXPECT_LT(found, joint.stiffness_Nm_rad);
+    last_Nm_rad = found;
+    // The next step of the sweep is no longer passive.
+    const auto beyond = impedance_feedback(controller, {1.06 * found, damping_Nms_rad}, 40.0);
+    EXPECT_LT(passivity(joint, beyond).passive_to_rad_s, 100.0);
+  }
+}
+
+// ------------------------------------------------------------------------------------------ tube
+
+TubeImpedance::Settings tube_settings(const TubeImpedance::Gains& gains,
+                                      const char* actuator = "harmonic-drive") {
+  auto settings = TubeImpedance::settings_of(data_sheet(actuator), gains);
+  settings.relies_on_friction = true;
+  return settings;
+}
+
+TEST(TubeImpedance, HasTheCurrentOfPaper004) {
+  TubeImpedance impedance(tube_settings(TubeImpedance::kHigh), kRate_Hz);
+  const TubeImpedance::Angles angles = {.rotor_rad = 0.02, .middle_rad = 0.004, .joint_rad = 0.01};
+  const auto output = impedance.step(0.012, 0.0, angles);
+  const double twist_rad = 0.02 / 2.0 - 0.004;
+  EXPECT_DOUBLE_EQ(output.twist_rad, twist_rad);
+  EXPECT_NEAR(output.current_A, 5.0 * (15.0 * 0.002 - twist_rad) / 0.08, 1e-12);
+  auto behind = tube_settings(TubeImpedance::kHigh);
+  behind.twist = TubeImpedance::Twist::tube_and_gear;
+  EXPECT_DOUBLE_EQ(TubeImpedance(behind, kRate_Hz).step(0.0, 0.0, angles).twist_rad,
+                   0.01 - 51.0 * 0.01);
+}
+
+TEST(TubeImpedance, RendersTheStiffnessThatItsGainsAreMadeFor) {
+  const auto base = tube_settings(TubeImpedance::kZero);
+  for (const double stiffness_Nm_rad : {100.0, 2000.0, 9000.0}) {
+    auto settings = base;
+    settings.relies_on_friction = false;
+    settings.gains = TubeImpedance::gains_for(base, stiffness_Nm_rad, 20.0, 0.5);
+    TubeImpedance impedance(settings, kRate_Hz);
+    EXPECT_NEAR(impedance.stiffness(), stiffness_Nm_rad, 1e-9 * stiffness_Nm_rad);
+    // A joint that is pushed from its place by a steady torque.
+    SpringJoint joint(TubeImpedance::joint_of(settings), JointOutput::free);
+    constexpr double kPush_Nm = 5.0;
+    for (int n = 0; n < 20'000; ++n) {
+      const auto output = impedance.step(0.0, 0.0,
+                                         {.rotor_rad = joint.angle_rad() * 102.0,
+                                          .middle_rad = joint.joint_rad() * 51.0,
+                                          .joint_rad = joint.joint_rad()});
+      joint.step(output.current_A, 1.0 / kRate_Hz, kPush_Nm);
+    }
+    EXPECT_NEAR(
+        joint.joint_rad(),
+        kPush_Nm / stiffness_Nm_rad + kPush_Nm / TubeImpedance::joint_of(settings).stiffness_Nm_rad,
+        0.1 * kPush_Nm / stiffness_Nm_rad);
+  }
+}
+
+TEST(TubeImpedance, FadesWithoutAMeasurement) {
+  TubeImpedance impedance(tube_settings(TubeImpedance::kHigh), kRate_Hz);
+  const TubeImpedance::Angles angles = {.rotor_rad = 0.0, .middle_rad = 0.0, .joint_rad = 0.0};
+  const double last_A = impedance.step(0.01, 0.0, angles).current_A;
+  ASSERT_GT(last_A, 1.0);
+  EXPECT_EQ(impedance.step(kNaN, 0.0, angles).current_A, last_A);
+  EXPECT_EQ(impedance.step(kNaN, 0.0, angles).fault, Fault::input_not_finite);
+  for (auto lost :
+       {TubeImpedance::Angles{kNaN, 0.0, 0.0}, TubeImpedance::Angles{0.0, kInfinity, 0.0},
+        TubeImpedance::Angles{0.0, 0.0, kNaN}}) {
+    const auto output = impedance.step(0.01, 0.0, lost);
+    EXPECT_EQ(output.fault, Fault::input_not_finite);
+    EXPECT_LT(output.current_A, last_A);
+    EXPECT_GT(output.current_A, 0.0);
+  }
+}
+
+TEST(TubeImpedance, RefusesWhatItCannotRender) {
+  const auto refusal = [](auto change) {
+    auto settings = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kZero);
+    change(settings);
+    return test::error_message([&] { TubeImpedance(settings, kRate_Hz); });
+  };
+  EXPECT_EQ(refusal([](auto&) {}), "");
+  const std::string high = refusal([](auto& s) { s.gains = TubeImpedance::kHigh; });
+  EXPECT_NE(high.find("unstable with its output locked"), std::string::npos) << high;
+  EXPECT_NE(refusal([](auto& s) { s.gains.position = -1.0; }), "");
+  EXPECT_NE(refusal([](auto& s) { s.gains.damping_s = kNaN; }), "");
+  EXPECT_NE(refusal([](auto& s) { s.tube_Nm_rad = 0.0; }), "");
+  EXPECT_NE(test::error_message([] {
+              return TubeImpedance::settings_of(data_sheet("dfki-50"), {});
+            }).find("a torsion tube before a gear, found dfki-50"),
+            std::string::npos);
+}
+
+TEST(PassiveStiffness, OfATubeEndsWhereTheLoopIsFast) {
+  const auto slow = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kZero);
+  const auto fast = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kHigh);
+  EXPECT_GT(passive_stiffness(slow, 0.0, 60.0, kRate_Hz), 5000.0);
+  EXPECT_EQ(passive_stiffness(fast, 0.0, 60.0, kRate_Hz), 0.0);
+}
+
+}  // namespace
+}  // namespace torsio
