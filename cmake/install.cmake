@@ -1,10 +1,12 @@
-# An export set for each of runtime with files, lab and onnx, so that a robot that links runtime and files need not have the lab's libraries.
+# An export set for each of runtime with files, realtime, lab and onnx, so that a robot that links runtime and files need not have the lab's libraries.
 include(CMakePackageConfigHelpers)
 set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
 
 install(TARGETS torsio_runtime torsio_files EXPORT torsioTargets FILE_SET HEADERS
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT torsioTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
+install(TARGETS torsio_realtime EXPORT torsioRealtimeTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(EXPORT torsioRealtimeTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
 if(TORSIO_BUILD_LAB)
   install(TARGETS torsio_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(TARGETS torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})

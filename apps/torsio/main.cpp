@@ -37,6 +37,7 @@ int run(int argc, char** argv) {
   add_adapt(app);
   add_import(app);
   add_reproduce(app);
+  add_unpack(app);
   catch_interrupts();
   try {
     app.parse(argc, argv);

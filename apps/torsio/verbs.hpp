@@ -16,3 +16,4 @@ void add_adapt(CLI::App& app);
 void add_attribute(CLI::App& app);
 void add_import(CLI::App& app);
 void add_reproduce(CLI::App& app);
+void add_unpack(CLI::App& app);

@@ -64,6 +64,11 @@ void refuse_binary(std::string_view line, const std::string& place) {
   const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t'; };
   const auto* const at = std::ranges::find_if(line, is_control);
   if (at == line.end()) return;
+  if (line.starts_with("TORSIOB1"))
+    throw Error({.place = place,
+                 .expected = "a header line of text",
+                 .found = "a recorder's sealed blocks",
+                 .advice = "Turn them into CSV first: torsio unpack run.tsr -o run.csv"});
   const bool wide = line.starts_with("\xff\xfe") || line.starts_with("\xfe\xff");
   throw Error({.place = place,
                .expected = "a header line of text",

@@ -64,7 +64,7 @@ std::string printable(std::string_view text) {
 std::string file_stem(std::string_view path) {
   if (path == "-") return "stdin";
   std::string_view stem = path.substr(path.find_last_of('/') + 1);
-  for (const std::string_view ending : {".gz", ".csv", ".yaml", ".yml"})
+  for (const std::string_view ending : {".gz", ".csv", ".tsr", ".yaml", ".yml"})
     if (stem.size() > ending.size() && stem.ends_with(ending)) stem.remove_suffix(ending.size());
   return std::string(stem);
 }

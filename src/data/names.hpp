@@ -17,7 +17,7 @@ namespace torsio {
 /// The text with control bytes escaped and cut to a readable length, for error messages.
 [[nodiscard]] std::string printable(std::string_view text);
 
-/// The file's name without folders and without `.csv`, `.gz`, `.yaml`.
+/// The file's name without folders and without `.csv`, `.gz`, `.tsr`, `.yaml`.
 [[nodiscard]] std::string file_stem(std::string_view path);
 
 }  // namespace torsio

@@ -1,6 +1,6 @@
 # cmake -DBUILD=<build tree> -DSOURCE=<tests/install/stranger> -DWORK=<scratch> -P install_test.cmake
-# Installs torsio into a scratch prefix, builds two strangers' projects against it (one without, one with the lab)
-# and runs them.
+# Installs torsio into a scratch prefix, builds three strangers' projects against it (one without the lab, one with
+# it, one with a real-time loop) and runs them.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -18,7 +18,11 @@ run(${CMAKE_COMMAND} --build ${WORK}/build)
 run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_of_the_lab -B ${WORK}/build_lab -DCMAKE_PREFIX_PATH=${WORK}/prefix)
 run(${CMAKE_COMMAND} --build ${WORK}/build_lab)
 run(${WORK}/build_lab/stranger_of_the_lab)
+run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_in_real_time -B ${WORK}/build_realtime -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+run(${CMAKE_COMMAND} --build ${WORK}/build_realtime)
 set(torsio ${WORK}/prefix/bin/torsio)
+run(${WORK}/build_realtime/stranger_in_real_time ${WORK}/run.tsr)
+run(${torsio} unpack ${WORK}/run.tsr -o ${WORK}/run.csv)
 run(${torsio} simulate dfki-50 sweep --duration 30s -o ${WORK}/sweep.csv)
 run(${torsio} fit ${WORK}/sweep.csv --model linear -o ${WORK}/joint.safetensors)
 run(${WORK}/build/stranger ${WORK}/joint.safetensors)

@@ -1,0 +1,71 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/data/csv.hpp"
+#include "torsio/data/recording_blocks.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct UnpackFlags {
+  std::string recording;
+  std::string output;
+  JsonOutput json;
+};
+
+std::size_t missing_frames(const torsio::RecordingBlocks& blocks) {
+  return blocks.recording.size() - blocks.frames;
+}
+
+std::string text_of(const torsio::RecordingBlocks& blocks, const UnpackFlags& flags) {
+  const torsio::Recording& recording = blocks.recording;
+  std::string text = fmt::format("{}: {} frames of {} channels at {:g} Hz in {} blocks",
+                                 flags.output, blocks.frames, recording.channels().size(),
+                                 recording.sample_rate_Hz(), blocks.blocks);
+  if (missing_frames(blocks) > 0)
+    text += fmt::format("\n{} ticks have no frame and are nan ({} frames were dropped)",
+                        missing_frames(blocks), blocks.dropped);
+  if (!blocks.was_closed) text += "\nthe recorder was not closed: what was not sealed yet is lost";
+  if (blocks.torn_bytes > 0)
+    text += fmt::format("\n{} bytes behind the last sealed block were left out", blocks.torn_bytes);
+  return text;
+}
+
+std::string json_of(const torsio::RecordingBlocks& blocks) {
+  return nlohmann::ordered_json{{"frames", blocks.frames},
+                                {"blocks", blocks.blocks},
+                                {"missing", missing_frames(blocks)},
+                                {"dropped", blocks.dropped},
+                                {"torn_bytes", blocks.torn_bytes},
+                                {"was_closed", blocks.was_closed},
+                                {"sample_rate_Hz", blocks.recording.sample_rate_Hz()}}
+             .dump(2) +
+         "\n";
+}
+
+void run(const UnpackFlags& flags) {
+  DataFlags().check_outputs({flags.output, flags.json.destination}, {flags.recording});
+  const torsio::RecordingBlocks blocks = torsio::read_recording_blocks(flags.recording);
+  if (blocks.frames == 0)
+    throw torsio::Error({.place = flags.recording, .problem = "no block with frames was sealed"});
+  torsio::write_csv(blocks.recording, flags.output);
+  remark(text_of(blocks, flags));
+  flags.json.write(json_of(blocks));
+}
+
+}  // namespace
+
+void add_unpack(CLI::App& app) {
+  auto flags = std::make_shared<UnpackFlags>();
+  CLI::App* verb = app.add_subcommand("unpack", "a recorder's file (.tsr) as CSV");
+  verb->footer("Example: torsio unpack run.tsr -o run.csv.gz");
+  verb->add_option("recording", flags->recording, "what torsio::Recorder wrote")->required();
+  verb->add_option("-o,--output", flags->output, "the CSV file; .gz packs it")->required();
+  verb->add_option("--json", flags->json.destination,
+                   "write what the file holds as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

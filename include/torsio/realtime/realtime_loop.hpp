@@ -1,0 +1,137 @@
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "torsio/core/realtime.hpp"
+#include "torsio/realtime/duration_histogram.hpp"
+#include "torsio/realtime/loop_clock.hpp"
+
+namespace torsio {
+
+struct LoopOptions {
+  double period_s = 1e-3;  ///< from 10 us to 10 s
+  /// Of SCHED_FIFO, 1 to 99; 0: the thread is scheduled like any other. Above 50 it comes before
+  /// the threads of interrupts on a PREEMPT_RT kernel.
+  int priority = 80;
+  bool lock_memory = true;  ///< mlockall: of the whole process, and it stays locked behind the loop
+  int cpu = -1;             ///< the core to stay on; -1: any
+  /// Ends the loop after this many overruns in a row; 0: never.
+  std::uint64_t stop_after_overruns = 0;
+  /// What was asked for above and is not permitted is an Error instead of a remark in the report.
+  bool must_be_granted = false;
+};
+
+/// What a step is told.
+struct Tick {
+  std::int64_t index = 0;        ///< of the period, from 0; jumps where periods were skipped
+  std::int64_t due_ns = 0;       ///< when the period began: start + index * period
+  std::int64_t lateness_ns = 0;  ///< how long after that the step was called
+  std::uint64_t overruns = 0;    ///< so far
+};
+
+/// What the operating system let the loop have.
+struct LoopGrants {
+  bool fifo = false;
+  bool memory_locked = false;
+  bool cpu = false;
+  std::string refused = {};  ///< what was asked for and not given, with the reason; empty: nothing
+};
+
+enum class LoopEnd : std::uint8_t {
+  step_is_done,    ///< the step returned false
+  stop_requested,  ///< `request_stop`, or the token
+  overruns,        ///< `stop_after_overruns` in a row
+};
+
+/// What a loop has to say when it ends.
+struct LoopReport {
+  LoopEnd end = LoopEnd::step_is_done;
+  std::uint64_t steps = 0;
+  std::uint64_t overruns = 0;         ///< steps that ended after the next period had begun
+  std::uint64_t skipped_periods = 0;  ///< periods in which no step began, because of them
+  DurationHistogram lateness;         ///< from the beginning of the period to the step
+  DurationHistogram cpu_time;         ///< of each step
+  LoopGrants grants;
+};
+
+/// A step that cannot throw: `step(tick)` is noexcept and tells whether the loop goes on.
+template <class Step>
+concept LoopStep = requires(Step& step, const Tick& tick) {
+  { step(tick) } noexcept -> std::same_as<bool>;
+};
+
+/// Calls a step at a fixed rate, on its own thread or on the caller's.
+///
+/// Period n begins at start + n * period on a monotonic clock. A step that ends after the next
+/// period has begun is an overrun: it is counted, and the loop goes on with the first period that
+/// has not begun yet, so that there is no burst of steps that catch up. Denormal numbers are off
+/// while it runs, 256 KiB of stack are touched before.
+///
+/// The loop neither allocates nor locks nor writes between the first step and the last. It is over
+/// after `stop_requested`, `overruns` or the step's own end, and never starts again by itself:
+/// bring the drive into its safe state when `run` or `wait` returns.
+class RealtimeLoop {
+ public:
+  /// @param clock for tests; must outlive the loop
+  /// @throws UsageError if the options are out of range.
+  explicit RealtimeLoop(const LoopOptions& options, LoopClock* clock = nullptr);
+  ~RealtimeLoop();  ///< stops and waits
+  RealtimeLoop(const RealtimeLoop&) = delete;
+  RealtimeLoop& operator=(const RealtimeLoop&) = delete;
+
+  /// On the caller's thread, whose scheduling is as before when it returns.
+  /// @throws Error if something is refused that `must_be_granted`.
+  template <LoopStep Step>
+  LoopReport run(Step&& step, const std::stop_token& stop = {}) {
+    using Callee = std::remove_reference_t<Step>;
+    return run_steps({.callee = std::addressof(step),
+                      .call =
+                          [](const void* callee, const Tick& tick) noexcept {
+                            return (*static_cast<Callee*>(const_cast<void*>(callee)))(tick);
+                          }},
+                     stop);
+  }
+
+  /// On a thread of its own. @throws Error if one is running already.
+  template <LoopStep Step>
+  void start(Step step) {
+    refuse_to_start_twice();
+    stop_ = std::stop_source{};
+    running_ = std::async(std::launch::async,
+                          [this, token = stop_.get_token(), own = std::move(step)]() mutable {
+                            return run(own, token);
+                          });
+  }
+  /// Takes effect before the next step: within a period. From any thread.
+  void request_stop() noexcept { stop_.request_stop(); }
+  /// Waits for the end of what was started. @throws Error as `run`, or if nothing was started.
+  LoopReport wait();
+
+ private:
+  struct StepCall {
+    const void* callee = nullptr;
+    bool (*call)(const void* callee, const Tick& tick) noexcept = nullptr;
+  };
+
+  LoopReport run_steps(StepCall step, const std::stop_token& stop);
+  void refuse_to_start_twice() const;
+
+  LoopOptions options_;
+  std::int64_t period_ns_;
+  MonotonicClock monotonic_;
+  LoopClock* clock_;
+  std::stop_source stop_;
+  std::future<LoopReport> running_;
+};
+
+/// The enumerator's own spelling, for logs.
+[[nodiscard]] const char* name(LoopEnd end) noexcept;
+
+}  // namespace torsio

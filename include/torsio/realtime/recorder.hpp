@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+struct RecorderOptions {
+  std::vector<std::string> channels;  ///< names that end in their SI units: "torque_Nm"
+  double period_s = 1e-3;             ///< between two ticks
+  /// What waits in memory while the disk is slow, rounded up to a power of two: 4 s at 1 kHz.
+  std::size_t ring_frames = 4096;
+  std::size_t block_frames = 256;  ///< a block is sealed when it holds these ...
+  double seal_after_s = 0.1;       ///< ... or, with fewer, after this: what a kill can lose
+  /// How often the file is synced: what a power loss can lose. 0: left to the operating system.
+  double sync_after_s = 1.0;
+};
+
+/// What a recorder has done.
+struct RecorderReport {
+  std::uint64_t frames = 0;   ///< in the file
+  std::uint64_t dropped = 0;  ///< because the ring was full, or the disk
+  std::uint64_t blocks = 0;   ///< with frames
+  std::string trouble = {};   ///< what the disk refused last; empty: nothing
+};
+
+/// Writes what a loop saw into a file, without ever keeping the loop waiting.
+///
+/// `push` copies a frame into a lock-free ring; a thread of ordinary priority takes the frames out
+/// and writes them as sealed blocks (docs/realtime.md has the format). A disk that is slow or full
+/// costs frames, which are counted and known in the file, never time of the loop. A file whose
+/// process was killed holds every block that was sealed; `read_recording_blocks` tells them from a
+/// torn end.
+class Recorder {
+ public:
+  /// @throws UsageError if the options are out of range or a channel has no SI unit; Error if the
+  /// file exists already, or cannot be written.
+  Recorder(const std::filesystem::path& path, const RecorderOptions& options);
+  ~Recorder();  ///< as `close`
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// By one thread. `tick`: of the period (`Tick::index`), later than the one before.
+  /// @returns false if the frame was dropped.
+  bool push(std::int64_t tick, std::span<const double> values) noexcept TORSIO_REALTIME;
+  /// Frames that were dropped because the ring was full; by any thread.
+  [[nodiscard]] std::uint64_t dropped() const noexcept;
+
+  /// Writes what is left, seals the file and syncs it. Not beside `push`.
+  RecorderReport close();
+
+ private:
+  class Writer;
+  std::unique_ptr<Writer> writer_;
+};
+
+}  // namespace torsio

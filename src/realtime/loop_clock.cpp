@@ -1,0 +1,29 @@
+#include "torsio/realtime/loop_clock.hpp"
+
+#include <cerrno>
+#include <ctime>
+
+namespace torsio {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+std::int64_t read_ns(clockid_t clock) noexcept {
+  timespec time{};
+  ::clock_gettime(clock, &time);
+  return time.tv_sec * kSecond_ns + time.tv_nsec;
+}
+
+}  // namespace
+
+std::int64_t MonotonicClock::now_ns() noexcept { return read_ns(CLOCK_MONOTONIC); }
+
+void MonotonicClock::sleep_until(std::int64_t point_ns) noexcept {
+  const timespec point{.tv_sec = point_ns / kSecond_ns, .tv_nsec = point_ns % kSecond_ns};
+  while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &point, nullptr) == EINTR) {
+  }
+}
+
+std::int64_t MonotonicClock::cpu_ns() noexcept { return read_ns(CLOCK_THREAD_CPUTIME_ID); }
+
+}  // namespace torsio

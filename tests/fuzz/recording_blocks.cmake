@@ -1,0 +1,1 @@
+torsio_fuzzer(recording_blocks torsio::lab)
