@@ -195,8 +195,7 @@ Candidate candidate(const Parameters& with, const Scale& scale, const TermSet& s
   for (const Field& field : made.fields) made.model.parameters.push_back(field.searched);
   made.model.parameters.insert(made.model.parameters.end(), scale.further_gains.begin(),
                                scale.further_gains.end());
-  made.model.difference = 1e-3;        // stops and starts make the residuals rough
-  made.model.searches_starts = false;  // nothing brings a drive back: a start would hide a drift
+  made.model.difference = 1e-3;  // stops and starts make the residuals rough
   made.model.run = [with, fields = made.fields](std::span<const double> values,
                                                 std::span<const double> state,
                                                 const Sequence& sequence, std::span<double> told) {

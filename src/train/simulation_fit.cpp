@@ -41,8 +41,7 @@ class Unknowns {
       starts_.push_back(measured_start(sequence, data.sample_rate_Hz));
       starts_.back().resize(model.free_states, 0.0);
     }
-    if (model.searches_starts && data.sequences.size() <= kMostSearchedStarts)
-      searched_ = model.free_states;
+    searched_ = data.sequences.size() <= kMostSearchedStarts ? model.free_states : 0;
     for (std::size_t i = 0; i < data.sequences.size(); ++i)
       for (std::size_t j = 0; j < searched_; ++j) {
         scale_.push_back(j == 1 ? spread * data.sample_rate_Hz * kVelocityShare : spread);

@@ -36,9 +36,7 @@ struct SimulatedModel {
                      const Sequence& sequence, std::span<double> values)>
       run;
   double difference = 1e-6;     ///< `ResidualProblem::difference`
-  std::size_t free_states = 2;  ///< of a start: position, velocity, ..
-  /// Beside the parameters; else a fit starts from the first samples' position and velocity.
-  bool searches_starts = true;
+  std::size_t free_states = 2;  ///< of the start, searched for: position, velocity, ..
 };
 
 /// A model of family M, made from what the search has; nothing if it refuses that.

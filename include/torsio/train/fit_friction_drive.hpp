@@ -21,7 +21,7 @@ struct FrictionDriveOptions {
   std::size_t iterations = 200;      ///< at most, of the last search
 };
 
-/// Least squares of free runs, each from the position and velocity of its first samples. The search starts where the
+/// Least squares of free runs, each record's start searched for too. The search starts where the
 /// force is a linear function of acceleration, speed and direction (inverse dynamics, differences over
 /// three widths). "auto": the training records in 8 blocks, each fourth of them held out in turn and
 /// simulated from its own first 50 samples; a term stays if it lowers that error by more than 2 %.
