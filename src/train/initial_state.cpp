@@ -59,6 +59,7 @@ class Start {
 
   bool evaluate(std::span<const double> state, std::span<const double> typical,
                 std::span<double> residuals) {
+    constexpr double kRestWeight = 0.2;  // a drive's speed is not to be drawn to rest
     model_.reset();
     model_.set_state(state);
     std::size_t next = 0;
@@ -69,7 +70,7 @@ class Start {
         residuals[next++] = weight_ * (value - target_[n]);
     }
     for (std::size_t j = 0; j < rest_.size(); ++j)
-      residuals[judged_.size() + j] = (state[j] - rest_[j]) / typical[j];
+      residuals[judged_.size() + j] = kRestWeight * (state[j] - rest_[j]) / typical[j];
     return true;
   }
 

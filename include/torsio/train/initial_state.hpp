@@ -10,7 +10,7 @@ namespace torsio {
 
 /// Puts a model with a state (`HasState`) where its first outputs miss the measured ones least:
 ///
-///     min_s mean_k (y_k(s) - target_k)^2 / e^2 + |s - s_0|^2
+///     min_s mean_k (y_k(s) - target_k)^2 / e^2 + |s - s_0|^2 / 25
 ///
 /// s_0 the state after `reset()`, each state scaled by what moves the output by the target's spread; e
 /// what the model is usually wrong by. Its errors last longer than a few samples, so these count as
