@@ -66,6 +66,8 @@ constexpr std::array kBenches{
     Bench{"gp_hyper_2000", gp_hyper_2000, Peer{"scikit-learn", write_gp_2000}},
     Bench{"pgpr_200k", pgpr_200k},
     Bench{"pgpr_step", pgpr_step},
+    Bench{"mailbox_read", mailbox_read},
+    Bench{"recorder_push", recorder_push},
 };
 
 struct Arguments {

@@ -39,6 +39,8 @@ Row gp_mean_5000();
 Row gp_hyper_2000();
 Row pgpr_200k();
 Row pgpr_step();
+Row mailbox_read();
+Row recorder_push();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.
