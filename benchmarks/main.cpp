@@ -75,6 +75,8 @@ constexpr std::array kBenches{
     Bench{"impedance_step", impedance_step},
     Bench{"torque_loop_linear_step", torque_loop_linear_step},
     Bench{"torque_loop_dgmm300_step", torque_loop_dgmm300_step},
+    Bench{"mailbox_read", mailbox_read},
+    Bench{"recorder_push", recorder_push},
 };
 
 struct Arguments {

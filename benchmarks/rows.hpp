@@ -48,6 +48,8 @@ Row cascade_step();
 Row impedance_step();
 Row torque_loop_linear_step();
 Row torque_loop_dgmm300_step();
+Row mailbox_read();
+Row recorder_push();
 
 /// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
 /// work on the same. The peer of `csv_load` reads the file which that row leaves there.

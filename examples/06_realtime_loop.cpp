@@ -27,7 +27,7 @@ torsio::BasicEstimator<torsio::Linear> spring_torque() {
   torsio::Linear::Parameters parameters;
   parameters.coefficients.values = torsio::Matrix(1, 2);
   parameters.coefficients.values.values = {0.0, 500.0};
-  return torsio::BasicEstimator<torsio::Linear>(settings, torsio::Linear(parameters));
+  return {settings, torsio::Linear(parameters)};
 }
 
 void print(const char* what, const torsio::DurationHistogram& times) {
@@ -43,10 +43,10 @@ void run(const char* recording) {
   torsio::RealtimeLoop loop({.period_s = kPeriod_s, .stop_after_overruns = 1000});
   double deflection_rad = 0.0;
   loop.start([&, estimator = spring_torque()](const torsio::Tick& tick) mutable noexcept {
-    constexpr std::int64_t kStale_ns = 500'000'000;
+    constexpr std::int64_t kStaleInNs = 500'000'000;
     const auto& letter = wanted_Nm.read();
     // No command, or none any more: let go of the spring.
-    const double wanted = letter.age_ns(tick.due_ns) < kStale_ns ? letter.value : 0.0;
+    const double wanted = letter.age_ns(tick.due_ns) < kStaleInNs ? letter.value : 0.0;
     const torsio::Estimate torque = estimator.step(std::array{deflection_rad});
     deflection_rad += kPeriod_s * 0.02 * (wanted - torque.value);  // the drive turns
     recorder.push(tick.index, std::array{wanted, torque.value});

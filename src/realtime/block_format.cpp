@@ -93,32 +93,32 @@ class PayloadReader {
 }  // namespace
 
 void seal(const RecordingHeader& header, std::vector<std::byte>& bytes) {
-  BlockBuilder block(bytes);
-  block.add(kVersion);
-  block.add(static_cast<std::uint32_t>(header.channels.size()));
-  block.add(header.period_s);
+  BlockBuilder builder(bytes);
+  builder.add(kVersion);
+  builder.add(static_cast<std::uint32_t>(header.channels.size()));
+  builder.add(header.period_s);
   for (const std::string& channel : header.channels) {
-    block.add(static_cast<std::uint32_t>(channel.size()));
-    block.add(std::as_bytes(std::span(channel)));
+    builder.add(static_cast<std::uint32_t>(channel.size()));
+    builder.add(std::as_bytes(std::span(channel)));
   }
-  block.seal_as(BlockKind::header);
+  builder.seal_as(BlockKind::header);
 }
 
-void seal(const FrameBlock& frames, std::size_t channels, std::vector<std::byte>& bytes) {
-  BlockBuilder block(bytes);
-  block.add(frames.dropped);
-  block.add(static_cast<std::uint32_t>(frames.ticks.size()));
-  block.add(static_cast<std::uint32_t>(channels));
-  block.add(std::as_bytes(std::span(frames.ticks)));
-  block.add(std::as_bytes(std::span(frames.values)));
-  block.seal_as(BlockKind::frames);
+void seal(const FrameBlock& block, std::size_t channels, std::vector<std::byte>& bytes) {
+  BlockBuilder builder(bytes);
+  builder.add(block.dropped);
+  builder.add(static_cast<std::uint32_t>(block.ticks.size()));
+  builder.add(static_cast<std::uint32_t>(channels));
+  builder.add(std::as_bytes(std::span(block.ticks)));
+  builder.add(std::as_bytes(std::span(block.values)));
+  builder.seal_as(BlockKind::frames);
 }
 
 void seal(const RecordingEnd& end, std::vector<std::byte>& bytes) {
-  BlockBuilder block(bytes);
-  block.add(end.dropped);
-  block.add(end.frames);
-  block.seal_as(BlockKind::end);
+  BlockBuilder builder(bytes);
+  builder.add(end.dropped);
+  builder.add(end.frames);
+  builder.seal_as(BlockKind::end);
 }
 
 std::optional<Seal> read_seal(std::span<const std::byte> bytes) noexcept {

@@ -6,12 +6,12 @@
 namespace torsio {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kSecondInNs = 1'000'000'000;
 
 std::int64_t read_ns(clockid_t clock) noexcept {
   timespec time{};
   ::clock_gettime(clock, &time);
-  return time.tv_sec * kSecond_ns + time.tv_nsec;
+  return time.tv_sec * kSecondInNs + time.tv_nsec;
 }
 
 }  // namespace
@@ -19,7 +19,7 @@ std::int64_t read_ns(clockid_t clock) noexcept {
 std::int64_t MonotonicClock::now_ns() noexcept { return read_ns(CLOCK_MONOTONIC); }
 
 void MonotonicClock::sleep_until(std::int64_t point_ns) noexcept {
-  const timespec point{.tv_sec = point_ns / kSecond_ns, .tv_nsec = point_ns % kSecond_ns};
+  const timespec point{.tv_sec = point_ns / kSecondInNs, .tv_nsec = point_ns % kSecondInNs};
   while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &point, nullptr) == EINTR) {
   }
 }

@@ -48,7 +48,7 @@ const char* name(LoopEnd end) noexcept {
 }
 
 RealtimeLoop::RealtimeLoop(const LoopOptions& options, LoopClock* clock)
-    : options_(options), period_ns_(0), clock_(clock != nullptr ? clock : &monotonic_) {
+    : options_(options), clock_(clock != nullptr ? clock : &monotonic_) {
   check(options_);
   period_ns_ = std::llround(options_.period_s * 1e9);
 }

@@ -23,6 +23,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostRingFrames = std::size_t{1} << 24;
 constexpr double kLongest_s = 3600.0;
+constexpr std::size_t kMostBlockHeadBytes = 64;
 /// How often the writing thread looks into the ring: nobody wakes it, for that could block.
 constexpr auto kPoll = std::chrono::milliseconds(5);
 
@@ -50,14 +51,19 @@ void check_range(const char* what, double value, double least, double most) {
                       .found = fmt::format("{}", value)});
 }
 
+std::size_t bytes_of_frame(const RecorderOptions& options) noexcept {
+  return sizeof(std::int64_t) + options.channels.size() * sizeof(double);
+}
+
 const RecorderOptions& checked(const RecorderOptions& options) {
   check_channels(options.channels);
   check_range("period_s", options.period_s, 1e-6, kLongest_s);
   check_range("ring_frames", static_cast<double>(options.ring_frames), 2.0,
               static_cast<double>(kMostRingFrames));
-  const std::size_t frame_bytes = sizeof(std::int64_t) + options.channels.size() * sizeof(double);
+  const std::size_t frame_bytes = bytes_of_frame(options);
+  const std::size_t most_frames = kMostPayloadBytes / 2 / frame_bytes;
   check_range("block_frames", static_cast<double>(options.block_frames), 1.0,
-              static_cast<double>((kMostPayloadBytes >> 1) / frame_bytes));
+              static_cast<double>(most_frames));
   check_range("seal_after_s", options.seal_after_s, 0.0, kLongest_s);
   check_range("sync_after_s", options.sync_after_s, 0.0, kLongest_s);
   return options;
@@ -88,6 +94,7 @@ class Recorder::Writer {
         file_(path) {
     block_.ticks.reserve(options_.block_frames);
     block_.values.reserve(options_.block_frames * ring_.channels());
+    bytes_.reserve(kMostBlockHeadBytes + options_.block_frames * bytes_of_frame(options_));
     seal({.channels = options_.channels, .period_s = options_.period_s}, bytes_);
     if (!file_.append(bytes_)) {
       const std::string trouble = file_.trouble();

@@ -382,6 +382,13 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& pro
     if (at.branches + 1 < kBranches.size()) with([](auto& c) { ++c.branches; });
     if (at.smoothing > 0) with([](auto& c) { --c.smoothing; });
     if (!passive && !at.is_signed && at.slips > 0) with([](auto& c) { c.is_signed = true; });
+    // Friction of the wrong sign somewhere: no force >= 0 is a step towards it.
+    if (!passive && at.slips == 0)
+      with([](auto& c) {
+        c.is_signed = true;
+        c.slips = 1;
+        c.forces = 2;
+      });
     if (!passive && at.slips > 0 && at.forces + 1 < kFinest)
       with([](auto& c) {
         c.is_signed = true;

@@ -16,7 +16,7 @@ namespace {
 
 using test::SimulatedClock;
 
-constexpr std::int64_t kPeriod_ns = 1'000'000;
+constexpr std::int64_t kPeriodInNs = 1'000'000;
 
 /// Nothing asked of the machine that runs the tests.
 LoopOptions modest() { return {.period_s = 1e-3, .priority = 0, .lock_memory = false}; }
@@ -49,10 +49,10 @@ Steps run_steps_that_take(const std::vector<std::int64_t>& durations_ns,
 }
 
 TEST(RealtimeLoop, BeginsEachPeriodOnTheGrid) {
-  const Steps run = run_steps_that_take({10, 999'000, kPeriod_ns, 10});
+  const Steps run = run_steps_that_take({10, 999'000, kPeriodInNs, 10});
   EXPECT_EQ(run.indices, (std::vector<std::int64_t>{0, 1, 2, 3}));
   EXPECT_EQ(run.began_ns,
-            (std::vector<std::int64_t>{0, kPeriod_ns, 2 * kPeriod_ns, 3 * kPeriod_ns}));
+            (std::vector<std::int64_t>{0, kPeriodInNs, 2 * kPeriodInNs, 3 * kPeriodInNs}));
   EXPECT_EQ(run.report.overruns, 0U);
   EXPECT_EQ(run.report.skipped_periods, 0U);
   EXPECT_EQ(run.report.steps, 4U);
@@ -64,7 +64,7 @@ TEST(RealtimeLoop, AnOverrunIsCountedAndNothingCatchesUp) {
   const Steps run = run_steps_that_take({10, 4'500'000, 10, 1'000'001, 10});
   EXPECT_EQ(run.indices, (std::vector<std::int64_t>{0, 1, 6, 7, 9}));
   for (std::size_t n = 0; n < run.indices.size(); ++n)
-    EXPECT_EQ(run.began_ns[n], run.indices[n] * kPeriod_ns);
+    EXPECT_EQ(run.began_ns[n], run.indices[n] * kPeriodInNs);
   EXPECT_EQ(run.report.overruns, 2U);
   EXPECT_EQ(run.report.skipped_periods, 5U);
 }
@@ -123,8 +123,8 @@ TEST(RealtimeLoop, RunsOnItsOwnThreadByTheMonotonicClock) {
   EXPECT_THROW(loop.start([](const Tick&) noexcept { return false; }), Error);
   MonotonicClock clock;
   const std::int64_t began_ns = clock.now_ns();
-  while (index < 20) clock.sleep_until(clock.now_ns() + kPeriod_ns);
-  EXPECT_GE(clock.now_ns() - began_ns, 19 * kPeriod_ns);
+  while (index < 20) clock.sleep_until(clock.now_ns() + kPeriodInNs);
+  EXPECT_GE(clock.now_ns() - began_ns, 19 * kPeriodInNs);
   loop.request_stop();
   const LoopReport report = loop.wait();
   EXPECT_EQ(report.end, LoopEnd::stop_requested);

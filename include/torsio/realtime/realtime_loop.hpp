@@ -124,7 +124,7 @@ class RealtimeLoop {
   void refuse_to_start_twice() const;
 
   LoopOptions options_;
-  std::int64_t period_ns_;
+  std::int64_t period_ns_ = 0;
   MonotonicClock monotonic_;
   LoopClock* clock_;
   std::stop_source stop_;
