@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "fitted_grey_box.hpp"
 #include "rows.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_impedance.hpp"
@@ -111,6 +112,17 @@ Row torque_loop_linear_step() {
 
 Row torque_loop_dgmm300_step() {
   TorqueController controller(ModelInverse(settings_around_mixture(), mixture_300()),
+                              TorqueLoopCore::Settings{.deflection = {.joint = series_elastic_joint(
+                                                                          data_sheet("dfki-50"))}},
+                              kRate_Hz);
+  const double seconds = seconds_a_tick(
+      [&](double t_s) { return controller.step(10.0 * std::sin(t_s), swinging(t_s)).current_A; });
+  return {.value = seconds * 1e6, .unit = "us"};
+}
+
+/// With the inverse of a grey box: secants from its present state.
+Row torque_loop_grey_box_step() {
+  TorqueController controller(ModelInverse(settings_around_mixture(), fitted_grey_box()),
                               TorqueLoopCore::Settings{.deflection = {.joint = series_elastic_joint(
                                                                           data_sheet("dfki-50"))}},
                               kRate_Hz);

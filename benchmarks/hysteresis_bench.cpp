@@ -1,6 +1,8 @@
+#include <array>
 #include <cmath>
 #include <vector>
 
+#include "fitted_grey_box.hpp"
 #include "rows.hpp"
 #include "torsio/model/slip_bank.hpp"
 
@@ -27,6 +29,19 @@ Row slip_bank_step() {
   // A multiply-add, two comparisons as dear as one, and the sum.
   const double floor_s = 4.0 * kElements / multiply_adds_per_second();
   return {.value = seconds / kSteps * 1e9, .unit = "ns", .floor = floor_s * 1e9};
+}
+
+Row grey_box_step() {
+  constexpr std::size_t kSteps = 10000;
+  GreyBox box = fitted_grey_box();
+  std::vector<double> torques(kSteps);
+  const double seconds = best_seconds([&] {
+    for (std::size_t n = 0; n < kSteps; ++n) {
+      const double phase = 3e-3 * static_cast<double>(n);
+      torques[n] = box.step(std::array{0.025 * std::sin(phase), 0.07 * std::cos(phase), 0.1}).value;
+    }
+  });
+  return {.value = seconds / kSteps * 1e9, .unit = "ns"};
 }
 
 }  // namespace torsio::bench

@@ -67,6 +67,7 @@ constexpr std::array kBenches{
     Bench{"pgpr_200k", pgpr_200k},
     Bench{"pgpr_step", pgpr_step},
     Bench{"slip_bank_step", slip_bank_step},
+    Bench{"grey_box_step", grey_box_step},
     Bench{"frols_40k", frols_40k, Peer{"numpy", write_frols_40k}},
     Bench{"viscoelastic_step", viscoelastic_step},
     Bench{"hw_fit_40k", hw_fit_40k, Peer{"Octave optim", write_hw_40k}},
@@ -75,6 +76,7 @@ constexpr std::array kBenches{
     Bench{"impedance_step", impedance_step},
     Bench{"torque_loop_linear_step", torque_loop_linear_step},
     Bench{"torque_loop_dgmm300_step", torque_loop_dgmm300_step},
+    Bench{"torque_loop_grey_box_step", torque_loop_grey_box_step},
     Bench{"mailbox_read", mailbox_read},
     Bench{"recorder_push", recorder_push},
 };

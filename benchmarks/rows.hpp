@@ -40,6 +40,7 @@ Row gp_hyper_2000();
 Row pgpr_200k();
 Row pgpr_step();
 Row slip_bank_step();
+Row grey_box_step();
 Row frols_40k();
 Row viscoelastic_step();
 Row hw_fit_40k();
@@ -48,6 +49,7 @@ Row cascade_step();
 Row impedance_step();
 Row torque_loop_linear_step();
 Row torque_loop_dgmm300_step();
+Row torque_loop_grey_box_step();
 Row mailbox_read();
 Row recorder_push();
 

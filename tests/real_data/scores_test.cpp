@@ -44,6 +44,9 @@ TEST(DesrFootScores, OfTheDualCamBetweenTrainedSupports) {
   const Model scheduled{"polynomial", "schedule=support_m", "plain"};
   EXPECT_LT(test_rmse(results, scheduled, "dualcam_x10"), 1.47);
   EXPECT_LT(test_rmse(results, scheduled, "dualcam_x35"), 2.98);
+  const Model grey_box{"grey_box", "schedule=support_m", "plain"};
+  EXPECT_LT(test_rmse(results, grey_box, "dualcam_x10"), 0.63);
+  EXPECT_LT(test_rmse(results, grey_box, "dualcam_x35"), 1.58);
 }
 
 TEST(DesrFootScores, WithinOneCycleAndOnAnotherMechanism) {
