@@ -190,6 +190,32 @@ double GreyBox::others(const ScheduledCoefficients::Position& at,
   return value;
 }
 
+/// From where the box is along the curve's mean slope, then by secants: most targets of a loop are a few
+/// knots away, and between knots the box is all but straight. NaN where that does not end soon.
+template <class Error>
+double GreyBox::near_root(const Error& error_at, const ScheduledCoefficients::Position& at,
+                          double wanted) const noexcept {
+  constexpr int kSteps = 8;
+  constexpr double kShare = 1e-13;
+  const std::vector<double>& knots = parameters_.terms.curve_knots;
+  double before = std::min(std::max(terms_.position(), knots.front()), knots.back());
+  double error_before = error_at(before);
+  const double rise =
+      coefficients_.coefficient(at, knots.size() - 1) - coefficients_.coefficient(at, 0);
+  const double enough = kShare * (std::abs(rise) + std::abs(wanted));
+  if (std::abs(error_before) <= enough) return before;
+  double x = before - error_before * (knots.back() - knots.front()) / rise;
+  for (int i = 0; i < kSteps && x >= knots.front() && x <= knots.back(); ++i) {
+    const double error = error_at(x);
+    if (std::abs(error) <= enough) return x;
+    const double next = x - error * (x - before) / (error - error_before);
+    before = x;
+    error_before = error;
+    x = next;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
 Estimate GreyBox::invert(double target, Features features) noexcept {
   const CoefficientSchedule& schedule = coefficients_.schedule();
   if (schedule.scheduled && schedule.feature == 0) return no_inverse(features);
@@ -198,6 +224,8 @@ Estimate GreyBox::invert(double target, Features features) noexcept {
   const auto error_at = [&](double x) { return at_jump(at, x) - wanted; };
   double low = parameters_.terms.curve_knots.front();
   double high = parameters_.terms.curve_knots.back();
+  if (const double near = near_root(error_at, at, wanted); near >= low && near <= high)
+    return {.value = near};
   double error_low = error_at(low);
   double error_high = error_at(high);
   if (!(error_low * error_high <= 0.0)) {

@@ -227,6 +227,9 @@ class GreyBox {
 
  private:
   [[nodiscard]] double at_jump(const ScheduledCoefficients::Position& at, double x) const noexcept;
+  template <class Error>
+  [[nodiscard]] double near_root(const Error& error_at, const ScheduledCoefficients::Position& at,
+                                 double wanted) const noexcept;
   [[nodiscard]] double others(const ScheduledCoefficients::Position& at,
                               Features features) const noexcept;
   [[nodiscard]] double residual(Features features) noexcept;
