@@ -36,6 +36,7 @@ int run(int argc, char** argv) {
   add_attribute(app);
   add_adapt(app);
   add_import(app);
+  add_track(app);
   add_reproduce(app);
   catch_interrupts();
   try {
