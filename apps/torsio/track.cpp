@@ -124,8 +124,7 @@ void run(const TrackFlags& flags) {
   const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
   const torsio::TrackingSpec spec = spec_of(flags, sheet);
   const std::vector<torsio::NamedInverse> models = inverses_of(flags);
-  // Refused before the sweeps for the line are run.
-  (void)torsio::reference_torque(spec.reference, sheet, flags.seed);
+  torsio::check_tracking(sheet, spec, flags.seed);  // before the sweeps for the line are run
   ProgressBar bar;
   const torsio::LinearInverse linear = torsio::sweep_line(sheet, kDefaultSeed, bar.listener());
   std::vector<std::uint64_t> seeds;

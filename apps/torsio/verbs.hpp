@@ -16,4 +16,5 @@ void add_adapt(CLI::App& app);
 void add_attribute(CLI::App& app);
 void add_import(CLI::App& app);
 void add_track(CLI::App& app);
+void add_tune_loop(CLI::App& app);
 void add_reproduce(CLI::App& app);

@@ -202,13 +202,19 @@ void run_into(TrackingRow& row, const DataSheet& sheet, const TrackingSpec& spec
 
 }  // namespace
 
-TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, AnyInverse inverse,
-                  std::uint64_t seed, const Progress& progress) {
+void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed) {
   if (nominal.family != ActuatorFamily::series_elastic)
     throw UsageError({.place = kPlace,
                       .expected = "a series-elastic actuator, dfki-28 to dfki-300",
                       .found = std::string(nominal.name)});
   check(spec.conditions);
+  const DataSheet sheet = aged(nominal, spec.conditions.age);
+  (void)Loop(sheet, spec, LinearInverse(1.0), seed);
+}
+
+TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, AnyInverse inverse,
+                  std::uint64_t seed, const Progress& progress) {
+  check_tracking(nominal, spec, seed);
   const DataSheet sheet = aged(nominal, spec.conditions.age);
   Loop loop(sheet, spec, inverse, seed);
   const bool has_held = loop.run(progress);
@@ -247,6 +253,7 @@ std::vector<TrackingRow> track_models(const DataSheet& sheet, const TrackingSpec
                                       std::span<const NamedInverse> models,
                                       std::span<const std::uint64_t> seeds,
                                       const Progress& progress) {
+  for (const std::uint64_t seed : seeds) check_tracking(sheet, spec, seed);
   std::vector<TrackingRow> rows;
   const std::size_t runs = seeds.size() * (models.size() + 1);
   const auto part = [&](const std::string& doing) {

@@ -33,6 +33,10 @@ struct TrackingSpec {
   FaultSchedule faults = {};
 };
 
+/// Whether it can be run. @throws UsageError if the actuator is not series-elastic, the reference out
+/// of its rating, the lever would tip over, or as `FaultInjector`; Error if the loop would be unstable.
+void check_tracking(const DataSheet& sheet, const TrackingSpec& spec, std::uint64_t seed);
+
 struct TrackingRun {
   TrackingScore score;
   std::optional<double> bandwidth_Hz = {};
@@ -49,8 +53,7 @@ struct TrackingRun {
 /// Follows the reference for its whole length, at 1 kHz, with the gains that the bandwidth gives on
 /// the actuator's data sheet. Equal calls give equal runs.
 /// @param seed of the sensors' noise, and of a random walk
-/// @throws UsageError if the actuator is not series-elastic, the reference out of its rating, the
-/// lever would tip over, or as `FaultInjector`; Error if the loop would be unstable; Cancelled.
+/// @throws as `check_tracking` before the first step; Error if the plant refuses; Cancelled.
 [[nodiscard]] TrackingRun track(const DataSheet& sheet, const TrackingSpec& spec,
                                 AnyInverse inverse, std::uint64_t seed,
                                 const Progress& progress = {});
@@ -87,7 +90,7 @@ struct TrackingRow {
 
 /// `linear` and each of the models under every seed, in this order; a run that fails is a row that
 /// says why.
-/// @throws what `track` throws before its first step; Cancelled.
+/// @throws as `check_tracking`, before the first run; Cancelled.
 [[nodiscard]] std::vector<TrackingRow> track_models(const DataSheet& sheet,
                                                     const TrackingSpec& spec,
                                                     const LinearInverse& linear,
