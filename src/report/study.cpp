@@ -23,7 +23,46 @@ struct Column {
   bool is_published = false;  ///< told of models that only others ran, too
 };
 
+bool is_tracking(const Study& study) {
+  return std::ranges::any_of(study.rows,
+                             [](const StudyRow& row) { return row.tracking.has_value(); });
+}
+
+/// Of a study of torque loops: what the papers judge these by.
+std::vector<Column> tracking_columns(const Study& study) {
+  return {
+      {fmt::format("MAD {}", study.unit),
+       [](const Study&, const StudyRow& row) { return fmt::format("{:.3f}", row.tracking->mad); }},
+      {"+-",
+       [](const Study&, const StudyRow& row) {
+         return row.runs > 1 ? fmt::format("{:.2g}", row.tracking->mad_std) : std::string();
+       }},
+      {"STD |e|", [](const Study&,
+                     const StudyRow& row) { return fmt::format("{:.3f}", row.tracking->std_abs); }},
+      {"RMSE", [](const Study&, const StudyRow& row) { return fmt::format("{:.3f}", row.rmse); }},
+      {"/ linear",
+       [](const Study&, const StudyRow& row) {
+         return fmt::format("{:.3f}", row.tracking->mad_to_linear);
+       }},
+      {"runs", [](const Study&, const StudyRow& row) { return fmt::format("{}", row.runs); }, true},
+      {"stopped",
+       [](const Study&, const StudyRow& row) { return fmt::format("{}", row.tracking->stopped); },
+       true},
+      {"paper's ratio",
+       [](const Study&, const StudyRow& row) {
+         return row.tracking->paper_ratio ? fmt::format("{:.3f}", *row.tracking->paper_ratio)
+                                          : std::string();
+       },
+       true},
+      {"paper's RMSE",
+       [](const Study&, const StudyRow& row) {
+         return row.paper_rmse ? fmt::format("{:.2f}", *row.paper_rmse) : std::string();
+       },
+       true}};
+}
+
 std::vector<Column> columns_of(const Study& study) {
+  if (is_tracking(study)) return tracking_columns(study);
   const auto any = [&](const auto& has) { return std::ranges::any_of(study.rows, has); };
   std::vector<Column> columns{
       {fmt::format("RMSE {}", study.unit),
@@ -105,10 +144,13 @@ std::string study_text(const StudyInfo& info, const Study& study) {
                   study.options.is_quick ? ", quick: not the paper's sizes" : "");
   for (const StudyPlant& plant : study.plants)
     text += fmt::format("plant {}, data sheet {}\n", plant.name, plant.fingerprint);
-  text += fmt::format(
-      "\n{}% of max: RMSE over the largest |target| of the judged recording; +-: "
-      "standard deviation of a run\n",
-      table_of(study));
+  text += '\n' + table_of(study);
+  text +=
+      is_tracking(study)
+          ? "/ linear: MAD over that of the line of the sweeps; +-: standard deviation of a run; "
+            "stopped: runs that diverged\n"
+          : "% of max: RMSE over the largest |target| of the judged recording; +-: standard "
+            "deviation of a run\n";
   if (study.full_scale)
     text += fmt::format(
         "% of FS: of RMSE or of max|e|, the largest error of all runs, over {:g} {}; 1 step: RMSE "
@@ -134,7 +176,7 @@ std::string study_json(const StudyInfo& info, const Study& study) {
                 {"rows", Json::array()}};
   for (const StudyPlant& plant : study.plants)
     document["plants"].push_back({{"name", plant.name}, {"data_sheet", plant.fingerprint}});
-  for (const StudyRow& row : study.rows)
+  for (const StudyRow& row : study.rows) {
     document["rows"].push_back(
         {{"condition", row.condition},
          {"model", row.model},
@@ -152,6 +194,15 @@ std::string study_json(const StudyInfo& info, const Study& study) {
          {"fit_percent", row.fit_percent},
          {"paper_fit_percent",
           row.paper_fit_percent ? Json(*row.paper_fit_percent) : Json(nullptr)}});
+    if (const auto& of = row.tracking)
+      document["rows"].back()["tracking"] = {
+          {"mad", of->mad},
+          {"mad_std", of->mad_std},
+          {"std_abs", of->std_abs},
+          {"mad_to_linear", of->mad_to_linear},
+          {"stopped", of->stopped},
+          {"paper_ratio", of->paper_ratio ? Json(*of->paper_ratio) : Json(nullptr)}};
+  }
   return document.dump(2) + "\n";
 }
 

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "bench.hpp"
 #include "bench_log.hpp"
 #include "experiment_table.hpp"
 #include "sensed_channels.hpp"
@@ -74,15 +75,6 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
           "none: no impedance controller runs in this experiment", "zero");
 }
 
-double load_cell_torque(LoadCell cell, const Plant& plant, const Load& load) {
-  switch (cell) {
-    case LoadCell::external: return -load.external_torque_Nm;
-    case LoadCell::wall: return plant.torques().wall_Nm;
-    case LoadCell::joint: break;
-  }
-  return plant.torques().joint_Nm;
-}
-
 /// What the bench's loop acts on: where a sensor tells no number, the last one.
 Measurement with_last_numbers(Measurement measured, const Measurement& last,
                               std::span<const SensedChannel> channels) {
@@ -104,25 +96,13 @@ Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const P
   check(spec, entry, sheet);
   BenchProgram program = entry.program(sheet, spec);
   const double duration_s = spec.duration_s.value_or(program.duration_s);
-  FaultInjector faults(spec.faults, sheet, duration_s);
-  const auto condition = [&](double time_s) {
-    return faults.condition(
-        time_s, {.friction_factor = friction_factor(temperature(spec.conditions, time_s))});
-  };
-  const bool changes = spec.conditions.warm_up_K != 0.0 || !spec.faults.faults.empty();
-  Plant plant(plant_parameters(sheet));
-  const auto require_taken = [&](Fault fault, double time_s) {
-    if (fault == Fault::none) return;
-    throw Error({.place = fmt::format("{} at {} s", entry.info.name, time_s),
-                 .problem = fmt::format("the plant refuses its command, load or condition: {}",
-                                        torsio::name(fault))});
-  };
-  require_taken(plant.reset(program.start_angle_rad, program.start), 0.0);
-  require_taken(plant.set_condition(condition(0.0)), 0.0);
-  Load load = program.start;
-  SensorSet sensors(sheet, kBenchRate_Hz, spec.seed);
-  sensors.reset(load_cell_torque(program.load_cell, plant, load));
-
+  Bench bench(sheet,
+              {.name = std::string(entry.info.name),
+               .duration_s = duration_s,
+               .seed = spec.seed,
+               .conditions = spec.conditions,
+               .faults = spec.faults},
+              program);
   const auto ticks = static_cast<std::size_t>(std::lround(duration_s * kBenchRate_Hz));
   const std::vector<SensedChannel> channels = sensed_channels(sheet);
   Measurement seen;
@@ -132,17 +112,10 @@ Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const P
       report_progress(progress, static_cast<double>(tick) / static_cast<double>(ticks),
                       "simulating");
     }
-    const double time_s = static_cast<double>(tick) / kBenchRate_Hz;
-    const double torque_Nm = load_cell_torque(program.load_cell, plant, load);
-    Measurement measured = sensors.step(plant, torque_Nm);
-    if (tick == 0) seen = measured;
-    faults.apply(measured, time_s);
-    log.add(measured, {plant, torque_Nm, temperature(spec.conditions, time_s)});
-    seen = with_last_numbers(measured, seen, channels);
-    const BenchAction action = program.next(seen);
-    load = action.load;
-    if (changes) require_taken(plant.set_condition(condition(time_s)), time_s);
-    require_taken(plant.step(action.command, load, 1.0 / kBenchRate_Hz), time_s);
+    const Measurement measured = bench.sense();
+    log.add(measured, bench.truth());
+    seen = with_last_numbers(measured, tick == 0 ? bench.sound() : seen, channels);
+    bench.act(program.next(seen));
   }
   return log.finish(fmt::format("{} {} seed {}", full_name(sheet), entry.info.name, spec.seed));
 }

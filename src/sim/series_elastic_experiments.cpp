@@ -16,24 +16,22 @@ namespace torsio {
 namespace {
 
 constexpr std::string_view kActuators = "dfki-*";
-constexpr double kMass_kg = 9.0;
 constexpr double kSweepSpeed_rad_s = rad_from_deg(10.0);
 constexpr double kSweepAcceleration_rad_s2 = rad_from_deg(30.0);
 constexpr double kHold_rad = rad_from_deg(90.0);
-constexpr double kUpright_rad = rad_from_deg(60.0);  // a lever driven further may tip over
 
 /// The lever with its mass. @throws UsageError if it is too heavy.
 Load bench_lever(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double length_m = spec.lever_m.value_or(sweep_protocol(sheet).train_lever_m.front());
-  const Load load = lever(kMass_kg, length_m, spec.inclination_rad);
+  const Load load = lever(kLeverMass_kg, length_m, spec.inclination_rad);
   if (std::abs(load.gravity_Nm) > sheet.rating.torque_Nm.value) {
-    throw UsageError(
-        {.place = spec.experiment,
-         .problem = "the lever is too heavy for the actuator",
-         .expected = fmt::format("at most the {} Nm that {} is rated for",
-                                 sheet.rating.torque_Nm.value, sheet.name),
-         .found = fmt::format("{:.1f} Nm ({} kg at {} m)", load.gravity_Nm, kMass_kg, length_m),
-         .advice = "take a shorter lever, or incline it"});
+    throw UsageError({.place = spec.experiment,
+                      .problem = "the lever is too heavy for the actuator",
+                      .expected = fmt::format("at most the {} Nm that {} is rated for",
+                                              sheet.rating.torque_Nm.value, sheet.name),
+                      .found = fmt::format("{:.1f} Nm ({} kg at {} m)", load.gravity_Nm,
+                                           kLeverMass_kg, length_m),
+                      .advice = "take a shorter lever, or incline it"});
   }
   return load;
 }
@@ -73,39 +71,8 @@ BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
           }};
 }
 
-/// SPEC section 6 asks 13 Nm of dfki-50 and 20 Nm of dfki-120, 0.26 and 0.17 of their ratings; of
-/// the other two we ask the fifth part.
 double torque_amplitude(const DataSheet& sheet, const ExperimentSpec& spec) {
-  if (spec.torque_amplitude_Nm) return *spec.torque_amplitude_Nm;
-  if (sheet.name == "dfki-50") return 13.0;
-  if (sheet.name == "dfki-120") return 20.0;
-  return 0.2 * sheet.rating.torque_Nm.value;
-}
-
-/// What the joint does under a torque that is exactly the reference.
-/// @throws UsageError if it comes further than `kUpright_rad`.
-void check_swing(const DataSheet& sheet, const ExperimentSpec& spec, const Load& load,
-                 auto reference) {
-  const double inertia_kg_m2 = load.inertia_kg_m2 + sheet.joint.inertia_kg_m2.value;
-  const double period_s = 1.0 / kBenchRate_Hz;
-  double angle_rad = 0.0;
-  double speed_rad_s = 0.0;
-  const double duration_s = spec.duration_s.value_or(kTorqueTest_s);
-  const auto ticks = static_cast<std::size_t>(std::lround(duration_s * kBenchRate_Hz));
-  for (std::size_t tick = 0; tick < ticks; ++tick) {
-    const double torque_Nm = reference.step() - load.gravity_Nm * std::sin(angle_rad) -
-                             sheet.joint.viscous_Nms_rad.value * speed_rad_s;
-    speed_rad_s += period_s * torque_Nm / inertia_kg_m2;
-    angle_rad += period_s * speed_rad_s;
-    if (std::abs(angle_rad) < kUpright_rad) continue;
-    throw UsageError(
-        {.place = spec.experiment,
-         .problem = "the torque would tip the lever over",
-         .expected = fmt::format("no more than {:.0f} deg of swing", deg_from_rad(kUpright_rad)),
-         .found = fmt::format("a torque of {:.4g} Nm on a lever that takes {:.1f} Nm to hold level",
-                              torque_amplitude(sheet, spec), load.gravity_Nm),
-         .advice = "lower the amplitude, lengthen the lever, or leave it out to lock the output"});
-  }
+  return spec.torque_amplitude_Nm ? *spec.torque_amplitude_Nm : usual_torque_amplitude(sheet);
 }
 
 /// A deflection loop follows a torque; the line from torque to deflection is that of the data
@@ -113,8 +80,12 @@ void check_swing(const DataSheet& sheet, const ExperimentSpec& spec, const Load&
 BenchProgram torque_tracking(const DataSheet& sheet, const ExperimentSpec& spec, auto reference) {
   Load load{.is_locked = true};
   if (spec.lever_m) {
-    load = lever(kMass_kg, *spec.lever_m, spec.inclination_rad);
-    check_swing(sheet, spec, load, reference);
+    load = lever(kLeverMass_kg, *spec.lever_m, spec.inclination_rad);
+    check_swing({.place = spec.experiment,
+                 .load = load,
+                 .duration_s = spec.duration_s.value_or(kTorqueTest_s),
+                 .reference = [reference]() mutable { return reference.step(); }},
+                sheet);
   } else if (spec.inclination_rad != 0.0) {
     throw UsageError({.place = fmt::format("{} inclination", spec.experiment),
                       .problem = "the output is locked",
@@ -193,7 +164,7 @@ SweepProtocol sweep_protocol(const DataSheet& sheet) {
   if (sheet.name == "dfki-120" || sheet.name == "dfki-300")
     return {rad_from_deg(170.0), {0.35, 0.60, 0.80}, 0.72, incline_rad};
   // A sheet of the user's own: levers that take the same shares of its rating.
-  const double rated_m = sheet.rating.torque_Nm.value / lever(kMass_kg, 1.0).gravity_Nm;
+  const double rated_m = sheet.rating.torque_Nm.value / lever(kLeverMass_kg, 1.0).gravity_Nm;
   return {rad_from_deg(170.0),
           {0.2 * rated_m, 0.35 * rated_m, 0.5 * rated_m},
           0.45 * rated_m,

@@ -101,6 +101,42 @@ TEST(Studies, OfTheRubberSensorAreWorseOnceTheClutchHasSlipped) {
   }
 }
 
+TEST(Studies, OfTorqueTrackingJudgeInversesInTheLoop) {
+  const Study study = run_study(find_study("007-tracking"), kQuick);
+  const std::string condition = "dfki-50:maxwell-slip, 13 Nm locked, chirp";
+  const StudyRow& line = row_of(study, condition, "linear");
+  ASSERT_TRUE(line.tracking);
+  EXPECT_EQ(line.runs, 1U);
+  EXPECT_EQ(line.tracking->mad_to_linear, 1.0);
+  EXPECT_EQ(line.paper_rmse, 1.77);
+  const StudyRow& mixture = row_of(study, condition, "dgmm, + torque mode");
+  EXPECT_NEAR(mixture.tracking->mad_to_linear, mixture.tracking->mad / line.tracking->mad, 1e-12);
+  EXPECT_LT(mixture.tracking->mad_to_linear, 0.8);
+  EXPECT_LT(mixture.tracking->mad, row_of(study, condition, "dgmm, sweeps").tracking->mad);
+}
+
+TEST(Studies, OfTrackingShowMadAndRatio) {
+  const StudyInfo info{"007-x", "000", "a title", nullptr};
+  const Study study{.protocol = "a protocol",
+                    .unit = "Nm",
+                    .options = {},
+                    .rows = {{.condition = "locked",
+                              .model = "dgmm",
+                              .runs = 3,
+                              .rmse = 1.5,
+                              .tracking = StudyTracking{.mad = 0.9,
+                                                        .mad_std = 0.01,
+                                                        .std_abs = 1.2,
+                                                        .mad_to_linear = 0.6,
+                                                        .paper_ratio = 0.581}}}};
+  EXPECT_THAT(
+      study_text(info, study),
+      testing::ContainsRegex("locked +dgmm +0.900 +0.01 +1.200 +1.500 +0.600 +3 +0 +0.581"));
+  const auto json = nlohmann::json::parse(study_json(info, study));
+  EXPECT_EQ(json["rows"][0]["tracking"]["mad_to_linear"], 0.6);
+  EXPECT_EQ(json["rows"][0]["tracking"]["paper_ratio"], 0.581);
+}
+
 TEST(Studies, AreFoundByNameAndRefuseNoRepeats) {
   EXPECT_THROW((void)find_study("004-tub"), UsageError);
   EXPECT_THROW((void)run_study(find_study("004-tubes"), {.repeats = 0}), UsageError);

@@ -18,6 +18,16 @@ struct StudyOptions {
   bool is_quick = false;    ///< shorter recordings and smaller networks: to see that it runs
 };
 
+/// How a model did in a torque loop; means over the runs, in `Study::unit` (SPEC section 3.10).
+struct StudyTracking {
+  double mad = 0.0;
+  double mad_std = 0.0;  ///< of one run
+  double std_abs = 0.0;
+  double mad_to_linear = 0.0;  ///< MAD over that of the line of the sweeps
+  std::size_t stopped = 0;     ///< runs that diverged or failed, in no mean
+  std::optional<double> paper_ratio = {};
+};
+
 /// One model under one condition, over all repeats and folds.
 struct StudyRow {
   std::string condition;
@@ -35,6 +45,7 @@ struct StudyRow {
   std::size_t diverged = 0;             ///< of the runs
   double fit_percent = 0.0;             ///< mean of `Metrics::fit_percent` (BF)
   std::optional<double> paper_fit_percent = {};  ///< what the paper judges by, where it is that
+  std::optional<StudyTracking> tracking = {};  ///< of all rows of a study, or of none
 };
 
 /// A simulated bench that a study used.

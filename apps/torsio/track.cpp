@@ -1,0 +1,192 @@
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/data/csv.hpp"
+#include "torsio/data/load.hpp"
+#include "torsio/report/tracking.hpp"
+#include "torsio/tracking/tracking.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+constexpr std::size_t kMostSeeds = 100;
+
+struct TrackFlags {
+  std::string actuator = "dfki-120";
+  std::string output = "locked";
+  std::string reference = "chirp";
+  std::string replayed;
+  std::string amplitude;
+  std::string duration;
+  std::string lever;
+  std::string bandwidth;
+  double damping = torsio::TrackingSpec{}.damping;
+  double friction = 0.0;
+  std::string observer;
+  std::vector<std::string> models;
+  std::string faults;
+  std::string record;
+  std::uint64_t seed = kDefaultSeed;
+  std::size_t seeds = 1;
+  JsonOutput json;
+};
+
+torsio::TorqueReference reference_of(const TrackFlags& flags) {
+  torsio::TorqueReference reference{.kind = torsio::find_reference(flags.reference)};
+  const bool is_replay = reference.kind == torsio::TorqueReference::Kind::replay;
+  if (is_replay == flags.replayed.empty())
+    throw torsio::UsageError({.place = "--replay",
+                              .expected = "a recording, with --reference replay",
+                              .advice = "Give both or neither."});
+  if (is_replay) {
+    const std::vector<torsio::Recording> recordings = torsio::load_recordings(flags.replayed);
+    if (recordings.size() != 1)
+      throw torsio::UsageError({.place = "--replay",
+                                .expected = "one recording",
+                                .found = fmt::format("{}", recordings.size())});
+    reference.recorded_Nm = recordings.front().channel("torque_Nm").values;
+    reference.recorded_Hz = recordings.front().sample_rate_Hz();
+  }
+  if (!flags.amplitude.empty())
+    reference.amplitude_Nm = torsio::si_quantity(flags.amplitude, "Nm", "--amplitude");
+  if (!flags.duration.empty())
+    reference.duration_s = torsio::si_quantity(flags.duration, "s", "--duration");
+  return reference;
+}
+
+torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& sheet) {
+  torsio::TrackingSpec spec{
+      .output = flags.output == "free" ? torsio::JointOutput::free : torsio::JointOutput::locked,
+      .reference = reference_of(flags),
+      .damping = flags.damping};
+  if (!flags.lever.empty()) {
+    if (flags.output != "free")
+      throw torsio::UsageError({.place = "--lever",
+                                .problem = "the output is locked",
+                                .advice = "Give --output free, too."});
+    spec.lever_m = torsio::si_quantity(flags.lever, "m", "--lever");
+  }
+  if (!flags.bandwidth.empty())
+    spec.bandwidth_rad_s =
+        2.0 * std::numbers::pi * torsio::si_quantity(flags.bandwidth, "Hz", "--bandwidth");
+  if (flags.friction != 0.0) spec.friction = {.share = flags.friction};
+  if (!flags.observer.empty())
+    spec.observer_cutoff_Hz = torsio::si_quantity(flags.observer, "Hz", "--observer");
+  if (!flags.faults.empty()) spec.faults = torsio::read_fault_schedule(flags.faults, sheet);
+  return spec;
+}
+
+std::vector<torsio::NamedInverse> inverses_of(const TrackFlags& flags) {
+  std::vector<torsio::NamedInverse> models;
+  for (const std::string& path : flags.models) {
+    if (path == "linear") continue;
+    const torsio::ModelFile file = torsio::load_model(path);
+    try {
+      models.push_back({path, torsio::inverse_of(file)});
+    } catch (const torsio::Error& error) {
+      torsio::ErrorReport report = error.report();
+      report.place = fmt::format("{}: {}", path, report.place);
+      throw torsio::UsageError(std::move(report));
+    }
+  }
+  return models;
+}
+
+void check(const TrackFlags& flags) {
+  std::vector<std::string> read = flags.models;
+  read.push_back(flags.faults);
+  read.push_back(flags.replayed);
+  DataFlags().check_outputs({flags.record, flags.json.destination}, read);
+  if (flags.seeds < 1 || flags.seeds > kMostSeeds)
+    throw torsio::UsageError({.place = "--seeds",
+                              .expected = fmt::format("1 to {}", kMostSeeds),
+                              .found = fmt::format("{}", flags.seeds)});
+  if (!flags.record.empty() && flags.models.size() > 1)
+    throw torsio::UsageError({.place = "--record",
+                              .expected = "one --model",
+                              .found = fmt::format("{}", flags.models.size())});
+}
+
+void run(const TrackFlags& flags) {
+  check(flags);
+  const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
+  const torsio::TrackingSpec spec = spec_of(flags, sheet);
+  const std::vector<torsio::NamedInverse> models = inverses_of(flags);
+  torsio::check_tracking(sheet, spec, flags.seed);  // before the sweeps for the line are run
+  ProgressBar bar;
+  const torsio::LinearInverse linear = torsio::sweep_line(sheet, kDefaultSeed, bar.listener());
+  std::vector<std::uint64_t> seeds;
+  for (std::size_t k = 0; k < flags.seeds; ++k) seeds.push_back(flags.seed + k);
+  const std::vector<torsio::TrackingRow> rows =
+      torsio::track_models(sheet, spec, linear, models, seeds, bar.listener());
+  if (!flags.record.empty()) {
+    const torsio::AnyInverse inverse =
+        models.empty() ? torsio::AnyInverse(linear) : models.front().inverse;
+    torsio::TrackingSpec recorded = spec;
+    recorded.measures_bandwidth = false;
+    torsio::write_csv(torsio::track(sheet, recorded, inverse, flags.seed, bar.listener()).record,
+                      flags.record);
+  }
+  if (flags.json.wants_tables()) print(torsio::tracking_text(rows));
+  flags.json.write(torsio::tracking_json(rows));
+  for (const torsio::TrackingRow& row : rows)
+    if (row.status == "failed") throw torsio::Error({.place = row.model, .problem = row.reason});
+}
+
+}  // namespace
+
+void add_track(CLI::App& app) {
+  auto flags = std::make_shared<TrackFlags>();
+  CLI::App* verb = app.add_subcommand(
+      "track", "close a torque loop on a simulated joint and measure how well it follows");
+  verb->footer(
+      "Example: torsio track --actuator dfki-120 --reference chirp --amplitude 20Nm \\\n"
+      "           --model joint.safetensors --seeds 3\n"
+      "The loop turns the spring to the deflection that gives the wanted torque: by a line that\n"
+      "sweeps of this bench gave (\"linear\", always run beside), and by each model, run backwards "
+      "or\n"
+      "trained with --target spring_deflection_rad.");
+  verb->add_option("--actuator", flags->actuator, "dfki-28 to dfki-300, as NAME:VARIANT#SERIAL")
+      ->capture_default_str();
+  verb->add_option("--output", flags->output,
+                   "of the spring: locked, or free with a lever and 9 kg")
+      ->check(CLI::IsMember({"locked", "free"}))
+      ->capture_default_str();
+  verb->add_option("--lever", flags->lever, "free: where the 9 kg hang (default 0.8m)");
+  verb->add_option("--reference", flags->reference, "chirp, random-walk, steps, sweep, replay")
+      ->capture_default_str();
+  verb->add_option("--replay", flags->replayed, "recording whose torque_Nm is to be followed");
+  verb->add_option("--amplitude", flags->amplitude, "of the torque: 20Nm");
+  verb->add_option("--duration", flags->duration, "of the reference: 30s");
+  verb->add_option("--model", flags->models, "model file, or linear; may be given more than once");
+  verb->add_option("--bandwidth", flags->bandwidth,
+                   "that the gains are made for (default 50 rad/s: 7.96Hz); torsio tune-loop");
+  verb->add_option("--damping", flags->damping, "that the gains are made for")
+      ->capture_default_str();
+  verb->add_option("--friction", flags->friction,
+                   "share of the drive's friction to make up for, 0 to 1")
+      ->capture_default_str();
+  verb->add_option("--observer", flags->observer, "cut-off of a disturbance observer: 10Hz");
+  verb->add_option("--faults", flags->faults, "YAML schedule of what fails when (docs/faults.md)");
+  add_seed(*verb, flags->seed, "of the first run's sensor noise, and of a random walk");
+  verb->add_option("--seeds", flags->seeds, "runs of each model, seed after seed")
+      ->capture_default_str();
+  verb->add_option("--record", flags->record,
+                   "write all that the loop saw and each term of its command in the first run of "
+                   "the model as CSV");
+  verb->add_option("--json", flags->json.destination,
+                   "write the results as JSON to a file, or - for standard output");
+  verb->callback([flags] { run(*flags); });
+}

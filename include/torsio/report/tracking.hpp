@@ -1,0 +1,16 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "torsio/tracking/tracking.hpp"
+
+namespace torsio {
+
+/// What was asked, and a table of the models, each the mean over its seeds.
+[[nodiscard]] std::string tracking_text(std::span<const TrackingRow> rows);
+
+/// A JSON object with every row; ends with a line feed.
+[[nodiscard]] std::string tracking_json(std::span<const TrackingRow> rows);
+
+}  // namespace torsio

@@ -1,0 +1,151 @@
+#include "torsio/report/tracking.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "torsio/report/text_table.hpp"
+
+namespace torsio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string_view name(JointOutput output) {
+  return output == JointOutput::locked ? "locked" : "free";
+}
+
+/// Over the runs of one model that came to their end.
+struct Mean {
+  std::size_t count = 0;
+  double sum = 0.0;
+  double squares = 0.0;
+
+  void add(double value) {
+    ++count;
+    sum += value;
+    squares += value * value;
+  }
+  void add(const std::optional<double>& value) {
+    if (value) add(*value);
+  }
+  [[nodiscard]] double mean() const { return sum / static_cast<double>(count); }
+  [[nodiscard]] std::string text(const char* format = "{:.4g}") const {
+    return count == 0 ? std::string("-") : fmt::format(fmt::runtime(format), mean());
+  }
+  [[nodiscard]] std::string spread() const {
+    if (count < 2) return "";
+    const auto n = static_cast<double>(count);
+    return fmt::format("{:.2g}", std::sqrt(std::max(0.0, squares - sum * mean()) / (n - 1.0)));
+  }
+};
+
+struct ModelMeans {
+  Mean mad, std_abs, rmse, to_linear, error_ratio, bandwidth, overshoot, limit_events, faults;
+  std::size_t cycles = 0;
+  std::vector<std::string> remarks;
+
+  void add(const TrackingRow& row) {
+    if (row.status != "ok")
+      remarks.push_back(
+          fmt::format("{}, seed {}: {}: {}", row.model, row.seed, row.status, row.reason));
+    if (row.status != "ok") return;
+    mad.add(row.score.mad);
+    std_abs.add(row.score.std_abs);
+    rmse.add(row.score.rmse);
+    to_linear.add(row.mad_to_linear);
+    error_ratio.add(row.score.error_ratio);
+    bandwidth.add(row.bandwidth_Hz);
+    overshoot.add(row.score.overshoot);
+    limit_events.add(static_cast<double>(row.score.limit_events));
+    faults.add(static_cast<double>(row.score.inverse_faults));
+    if (!row.score.limit_cycle) return;
+    ++cycles;
+    remarks.push_back(fmt::format("{}, seed {}: limit cycle of {:.3g} Hz, {:.2g} Nm", row.model,
+                                  row.seed, row.score.limit_cycle->frequency_Hz,
+                                  row.score.limit_cycle->amplitude));
+  }
+};
+
+Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+Json row_json(const TrackingRow& row) {
+  const TrackingScore& score = row.score;
+  const bool has_score = row.status != "failed";
+  const auto number = [&](double value) { return has_score ? Json(value) : Json(nullptr); };
+  const auto count = [&](std::size_t value) { return has_score ? Json(value) : Json(nullptr); };
+  return {
+      {"actuator", row.actuator},
+      {"variant", row.variant},
+      {"output", name(row.output)},
+      {"reference", row.reference},
+      {"amplitude_Nm", row.amplitude_Nm},
+      {"model", row.model},
+      {"seed", row.seed},
+      {"mad", number(score.mad)},
+      {"std_abs", number(score.std_abs)},
+      {"rmse", number(score.rmse)},
+      {"mad_to_linear", optional(row.mad_to_linear)},
+      {"bandwidth_Hz", optional(row.bandwidth_Hz)},
+      {"limit_events", count(score.limit_events)},
+      {"status", row.status},
+      {"reason", row.reason},
+      {"max_abs", number(score.max_abs)},
+      {"error_ratio", number(score.error_ratio)},
+      {"load_cell_mad", number(score.load_cell_mad)},
+      {"load_cell_rmse", number(score.load_cell_rmse)},
+      {"overshoot", optional(score.overshoot)},
+      {"limited_s", number(score.limited_s)},
+      {"limit_cycle", score.limit_cycle ? Json{{"frequency_Hz", score.limit_cycle->frequency_Hz},
+                                               {"amplitude_Nm", score.limit_cycle->amplitude}}
+                                        : Json(nullptr)},
+      {"inverse_faults", count(score.inverse_faults)},
+      {"loop_faults", count(score.loop_faults)}};
+}
+
+}  // namespace
+
+std::string tracking_text(std::span<const TrackingRow> rows) {
+  if (rows.empty()) return "";
+  const TrackingRow& first = rows.front();
+  std::vector<std::pair<std::string, ModelMeans>> models;
+  for (const TrackingRow& row : rows) {
+    const auto found =
+        std::ranges::find(models, row.model, [](const auto& model) { return model.first; });
+    (found != models.end() ? *found : models.emplace_back(row.model, ModelMeans{})).second.add(row);
+  }
+  const bool has_overshoot = std::ranges::any_of(
+      rows, [](const TrackingRow& row) { return row.score.overshoot.has_value(); });
+  TextTable table;
+  table.header({"model", "MAD Nm", "+-", "STD |e|", "RMSE", "/ linear", "MAD/A", "-3 dB Hz",
+                "limits", "fallback", "cycles"});
+  if (has_overshoot) table.header({"overshoot"});
+  std::string remarks;
+  for (const auto& [model, means] : models) {
+    table.row({model, means.mad.text(), means.mad.spread(), means.std_abs.text(), means.rmse.text(),
+               means.to_linear.text("{:.3f}"), means.error_ratio.text("{:.3f}"),
+               means.bandwidth.text("{:.2f}"), means.limit_events.text("{:.0f}"),
+               means.faults.text("{:.0f}"), fmt::format("{}", means.cycles),
+               means.overshoot.text("{:.2f}")});
+    for (const std::string& remark : means.remarks) remarks += remark + "\n";
+  }
+  return fmt::format(
+      "{} ({}), output {}, {} of {:.4g} Nm, {} run{} a model\n{}{}"
+      "errors: of the joint's torque without noise, the first 2 s left out; limits: how often one "
+      "cut;\nfallback: ticks in which the inverse told its line; cycles: runs with a limit cycle\n",
+      first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,
+      rows.size() / models.size(), rows.size() == models.size() ? "" : "s", table.text(), remarks);
+}
+
+std::string tracking_json(std::span<const TrackingRow> rows) {
+  Json document{{"results", Json::array()}};
+  for (const TrackingRow& row : rows) document["results"].push_back(row_json(row));
+  return document.dump(2) + "\n";
+}
+
+}  // namespace torsio

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "experiment_table.hpp"
+#include "sensed_channels.hpp"
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/actuator/wear.hpp"
+#include "torsio/sim/fault_schedule.hpp"
+#include "torsio/sim/plant.hpp"
+#include "torsio/sim/sensor_set.hpp"
+#include "truth_channels.hpp"
+
+namespace torsio {
+
+/// How a bench is run, apart from what is done on it.
+struct BenchRun {
+  std::string name;  ///< for messages
+  double duration_s = 0.0;
+  std::uint64_t seed = 1;
+  OperatingConditions conditions = {};
+  const FaultSchedule& faults;
+};
+
+/// A plant with its sensors and whatever happens to both, tick by tick.
+class Bench {
+ public:
+  /// @throws Error if the plant refuses its load or condition, UsageError as `FaultInjector`.
+  Bench(const DataSheet& sheet, const BenchRun& run, const BenchProgram& start);
+
+  /// What the sensors tell at this tick, faults included.
+  [[nodiscard]] Measurement sense();
+  /// The same without the faults, as of the last `sense`.
+  [[nodiscard]] const Measurement& sound() const noexcept { return sound_; }
+  /// What no sensor sees, as of the last `sense`.
+  [[nodiscard]] BenchTruth truth() const;
+  /// Until the next tick. @throws Error if the plant refuses.
+  void act(const BenchAction& action);
+
+  [[nodiscard]] double time_s() const noexcept {
+    return static_cast<double>(tick_) / kBenchRate_Hz;
+  }
+
+ private:
+  [[nodiscard]] PlantCondition condition() const noexcept;
+  [[nodiscard]] double load_cell_torque() const;
+  void require_taken(Fault fault) const;
+
+  std::string name_;
+  OperatingConditions conditions_;
+  FaultInjector faults_;
+  bool changes_;
+  LoadCell load_cell_;
+  Plant plant_;
+  SensorSet sensors_;
+  Load load_;
+  std::size_t tick_ = 0;
+  Measurement sound_;
+  double torque_Nm_ = 0.0;  ///< that the load cell feels in this tick
+};
+
+}  // namespace torsio

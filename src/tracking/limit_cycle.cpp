@@ -1,0 +1,85 @@
+#include "torsio/tracking/limit_cycle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "torsio/signal/lowpass.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kLowest_Hz = 3.0;
+constexpr std::size_t kHalfWaves = 10;
+constexpr double kAlike = 1.0 / 3.0;
+constexpr double kKeptUp = 0.8;  // the last half wave over the first: less is a motion that decays
+
+/// What is left above `kLowest_Hz`.
+class Highpass {
+ public:
+  explicit Highpass(double sample_rate_Hz) : lowpass_(kLowest_Hz, sample_rate_Hz) {}
+  double step(double input) noexcept { return input - lowpass_.step(input); }
+
+ private:
+  Lowpass lowpass_;
+};
+
+/// Between two changes of the sign.
+struct HalfWave {
+  double length_s = 0.0;
+  double height = 0.0;
+  double reference_height = 0.0;
+};
+
+std::vector<HalfWave> half_waves(std::span<const double> error, std::span<const double> reference,
+                                 double sample_rate_Hz) {
+  Highpass of_error(sample_rate_Hz);
+  Highpass of_reference(sample_rate_Hz);
+  std::vector<HalfWave> waves;
+  HalfWave wave;
+  bool was_positive = true;
+  for (std::size_t i = 0; i < error.size(); ++i) {
+    const double value = of_error.step(error[i]);
+    const double wanted = of_reference.step(reference[i]);
+    if ((value > 0.0) != was_positive) {
+      waves.push_back(wave);
+      wave = {};
+      was_positive = value > 0.0;
+    }
+    wave.length_s += 1.0 / sample_rate_Hz;
+    wave.height = std::max(wave.height, std::abs(value));
+    wave.reference_height = std::max(wave.reference_height, std::abs(wanted));
+  }
+  return waves;
+}
+
+bool is_alike(double one, double other) { return std::abs(one - other) <= kAlike * other; }
+
+}  // namespace
+
+std::optional<LimitCycle> find_limit_cycle(std::span<const double> error,
+                                           std::span<const double> reference,
+                                           double least_amplitude, double sample_rate_Hz) {
+  const std::vector<HalfWave> waves = half_waves(error, reference, sample_rate_Hz);
+  std::optional<LimitCycle> found;
+  std::size_t run = 0;
+  for (std::size_t i = 0; i < waves.size(); ++i) {
+    const HalfWave& wave = waves[i];
+    const bool counts = wave.height >= least_amplitude &&
+                        wave.reference_height < 0.5 * wave.height &&
+                        wave.length_s <= 0.5 / kLowest_Hz;
+    const bool goes_on = run > 0 && is_alike(wave.length_s, waves[i - 1].length_s) &&
+                         is_alike(wave.height, waves[i - 1].height);
+    run = !counts ? 0 : goes_on ? run + 1 : 1;
+    if (run < kHalfWaves || wave.height < kKeptUp * waves[i + 1 - kHalfWaves].height) continue;
+    if (found && found->amplitude >= wave.height) continue;
+    double length_s = 0.0;
+    for (std::size_t k = i + 1 - kHalfWaves; k <= i; ++k) length_s += waves[k].length_s;
+    found = LimitCycle{.frequency_Hz = 0.5 * static_cast<double>(kHalfWaves) / length_s,
+                       .amplitude = wave.height};
+  }
+  return found;
+}
+
+}  // namespace torsio

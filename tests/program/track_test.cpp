@@ -1,0 +1,80 @@
+// A torque loop as a user types it: tune-loop, track, with a model of one's own.
+#include <nlohmann/json.hpp>
+
+#include "program/program.hpp"
+
+namespace torsio::test {
+namespace {
+
+constexpr int kWorkFailed = 1;
+constexpr int kCallWasWrong = 2;
+
+class TrackVerb : public Program {
+ protected:
+  void expect_error(const Outcome& outcome, int exit_code, const std::string& text) {
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+  }
+};
+
+TEST_F(TrackVerb, ComparesAModelWithTheLineAndRecordsTheLoop) {
+  ASSERT_EQ(torsio("simulate dfki-50 chirp --duration 30s -o a.csv").exit_code, 0);
+  ASSERT_EQ(torsio("fit a.csv --model linear_coulomb -o m.safetensors").exit_code, 0);
+  const std::string call =
+      "track --actuator dfki-50 --duration 8s --model m.safetensors --seeds 2 ";
+  const Outcome table = torsio(call + "--record loop.csv --json rows.json");
+  ASSERT_EQ(table.exit_code, 0) << table.err;
+  for (const char* word : {"chirp of 13 Nm", "linear", "m.safetensors", "-3 dB Hz", "2 runs"})
+    EXPECT_NE(table.out.find(word), std::string::npos) << table.out;
+  const auto json = nlohmann::json::parse(contents("rows.json"));
+  ASSERT_EQ(json.at("results").size(), 4U);
+  EXPECT_EQ(json.at("results").at(3).at("seed"), 2);
+  EXPECT_EQ(json.at("results").at(3).at("status"), "ok");
+  EXPECT_GT(json.at("results").at(3).at("bandwidth_Hz"), 2.0);
+  EXPECT_EQ(torsio(call + "--json -").out, contents("rows.json"));
+  const std::string record = contents("loop.csv");
+  for (const char* column : {"t_s,motor_angle_rad", "truth_torque_Nm", "proportional_current_A",
+                             "rest_current_A", "command_current_A", "inverse_fault_1"})
+    EXPECT_NE(record.find(column), std::string::npos) << column;
+  // What a loop did is a recording like any other, and can be asked for again.
+  EXPECT_EQ(torsio("check loop.csv").exit_code, 0);
+  EXPECT_EQ(
+      torsio("track --actuator dfki-50 --reference replay --replay a.csv --duration 5s").exit_code,
+      0);
+}
+
+TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
+  expect_error(torsio("track --actuator elastomer"), kCallWasWrong, "series-elastic");
+  expect_error(torsio("track --amplitude 130Nm"), kCallWasWrong, "the 120 Nm that dfki-120 is");
+  expect_error(torsio("track --output free --amplitude 70Nm"), kCallWasWrong, "tip the lever over");
+  expect_error(torsio("track --lever 0.5m"), kCallWasWrong, "the output is locked");
+  expect_error(torsio("track --reference replay"), kCallWasWrong, "--replay");
+  expect_error(torsio("track --bandwidth 300Hz"), kWorkFailed, "phase margin");
+  expect_error(torsio("track --seeds 0"), kCallWasWrong, "1 to 100");
+  expect_error(torsio("track --model none.safetensors"), kWorkFailed, "none.safetensors");
+  ASSERT_EQ(torsio("simulate dfki-50 chirp --duration 30s -o a.csv").exit_code, 0);
+  ASSERT_EQ(torsio("fit a.csv --model mlp --set epochs=1 -o m.safetensors").exit_code, 0);
+  expect_error(torsio("track --model m.safetensors"), kCallWasWrong,
+               "m.safetensors: spring inverse: expected a family with an inverse");
+  expect_error(torsio("track --model m.safetensors --json m.safetensors"), kCallWasWrong,
+               "would replace a file that is read");
+}
+
+TEST_F(TrackVerb, TuneLoopProposesGainsWithTheirMarginsOrRefuses) {
+  const Outcome table = torsio("tune-loop --actuator dfki-50 --json gains.json");
+  ASSERT_EQ(table.exit_code, 0) << table.err;
+  for (const char* word : {"proportional", "locked", "free", "phase margin", "passive up to"})
+    EXPECT_NE(table.out.find(word), std::string::npos) << table.out;
+  const auto json = nlohmann::json::parse(contents("gains.json"));
+  // (J N² ω² − K) / (N k_t) of SPEC section 3.11
+  EXPECT_NEAR(json.at("gains").at("proportional_A_rad"), 127.3, 0.1);
+  EXPECT_GT(json.at("margins").at(0).at("phase_deg"), 45.0);
+  EXPECT_GT(json.at("margins").at(1).at("gain"), 2.0);
+  expect_error(torsio("tune-loop --bandwidth 200Hz"), kWorkFailed, "phase margin, found -");
+  expect_error(torsio("tune-loop --bandwidth 1Hz"), kWorkFailed, "faster than the loop");
+  expect_error(torsio("tune-loop --bandwidth 8Nm"), kCallWasWrong, "--bandwidth");
+}
+
+}  // namespace
+}  // namespace torsio::test

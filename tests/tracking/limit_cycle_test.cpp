@@ -1,0 +1,53 @@
+#include "torsio/tracking/limit_cycle.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "torsio/core/random.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kRate_Hz = 1000.0;
+
+std::vector<double> sine(double amplitude, double frequency_Hz, double duration_s) {
+  std::vector<double> values;
+  for (int n = 0; n < duration_s * kRate_Hz; ++n)
+    values.push_back(amplitude * std::sin(2.0 * std::numbers::pi * frequency_Hz * n / kRate_Hz));
+  return values;
+}
+
+TEST(LimitCycle, IsFoundWithItsFrequencyInASlowError) {
+  std::vector<double> error = sine(2.0, 0.2, 10.0);
+  const std::vector<double> cycle = sine(0.5, 11.0, 10.0);
+  for (std::size_t i = 4000; i < 7000; ++i) error[i] += cycle[i];
+  const auto found = find_limit_cycle(error, std::vector<double>(error.size(), 0.0), 0.1, kRate_Hz);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->frequency_Hz, 11.0, 0.5);
+  EXPECT_NEAR(found->amplitude, 0.5, 0.2);
+}
+
+TEST(LimitCycle, IsNoneInSlowMotionSmallMotionNoiseOrADecay) {
+  const std::vector<double> none(10000, 0.0);
+  EXPECT_FALSE(find_limit_cycle(sine(2.0, 1.0, 10.0), none, 0.1, kRate_Hz));
+  EXPECT_FALSE(find_limit_cycle(sine(0.05, 11.0, 10.0), none, 0.1, kRate_Hz));
+  Random random(5);
+  std::vector<double> noise(10000);
+  for (double& value : noise) value = random.normal();
+  EXPECT_FALSE(find_limit_cycle(noise, none, 0.1, kRate_Hz));
+  std::vector<double> decay = sine(2.0, 11.0, 10.0);
+  for (std::size_t i = 0; i < decay.size(); ++i)
+    decay[i] *= std::exp(-2.0 * static_cast<double>(i) / kRate_Hz);
+  EXPECT_FALSE(find_limit_cycle(decay, none, 0.1, kRate_Hz));
+}
+
+TEST(LimitCycle, IsNoneWhereTheReferenceMovesSo) {
+  const std::vector<double> wanted = sine(2.0, 11.0, 10.0);
+  EXPECT_FALSE(find_limit_cycle(wanted, wanted, 0.1, kRate_Hz));
+}
+
+}  // namespace
+}  // namespace torsio
