@@ -126,8 +126,16 @@ Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcep
     return {.value = last_rad_,
             .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};
   if (input.restarted) model_.reset();
-  if (is_stepped_) static_cast<void>(model_.step(input.features));
+  const bool has_state = !model_.state().empty();
+  if (is_stepped_ && !has_state) static_cast<void>(model_.step(input.features));
   Estimate answer = guarded(torque_Nm, input.features);
+  if (has_state) {
+    // Hysteresis follows the deflection that is asked for. Along the measured one it would take a joint
+    // that sticks for a spring that is stiff, and ask for less the longer it sticks.
+    std::ranges::copy(input.features, asked_.begin());
+    if (answer.fault != Fault::warming_up) asked_.front() = answer.value;
+    static_cast<void>(model_.step(asked_));
+  }
   if (!core_.unset_zeros().empty() && answer.fault != Fault::warming_up)
     answer.fault = Fault::zero_not_set;
   // The model's deflection lies off the measured one by the zeros of its channels.
