@@ -115,7 +115,7 @@ LinearSystem LinearSystem::lowpass(double cutoff_Hz, double sample_rate_Hz) {
   matrices.a.values = {-a1, -a2, 1.0, 0.0};
   matrices.b.values = {1.0, 0.0};
   matrices.c.values = {b0 * (2.0 - a1), b0 * (1.0 - a2)};
-  return LinearSystem(std::move(matrices), sample_rate_Hz);
+  return {std::move(matrices), sample_rate_Hz};
 }
 
 std::complex<double> LinearSystem::response(double frequency_rad_s, std::size_t output,

@@ -10,8 +10,10 @@ template <class FeedbackOf>
 double highest_passive(const SeriesElasticJoint& joint, double passive_to_rad_s, double unit_Nm_rad,
                        const FeedbackOf& feedback_of) {
   constexpr double kStep = 1.05;
+  constexpr int kSteps = 189;  // to ten times the unit
   double found = 0.0;
-  for (double stiffness = 1e-3 * unit_Nm_rad; stiffness <= 10.0 * unit_Nm_rad; stiffness *= kStep) {
+  double stiffness = 1e-3 * unit_Nm_rad;
+  for (int n = 0; n < kSteps; ++n, stiffness *= kStep) {
     const JointFeedback loop = feedback_of(stiffness);
     if (!is_stable_closed(open_loop(joint, loop, JointOutput::free)) ||
         !(passivity(joint, loop).passive_to_rad_s >= passive_to_rad_s))

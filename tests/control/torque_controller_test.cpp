@@ -89,7 +89,8 @@ TEST(ModelInverse, AnswersWithTheLineUntilItsFiltersHaveSettled) {
 TEST(ModelInverse, LeavesTheLineOnlySoFar) {
   for (const double most : {0.0, 0.5, 1e6}) {
     ModelInverse inverse(deflection_and_rate(), test::example<Dgmm>(), most);
-    for (double torque_Nm = -20.0; torque_Nm <= 20.0; torque_Nm += 2.5) {
+    for (int n = -8; n <= 8; ++n) {
+      const double torque_Nm = 2.5 * n;
       const Estimate found = settled(inverse, torque_Nm, wound(0.01));
       EXPECT_LE(std::abs(found.value - (torque_Nm - 0.5) / 600.0), most * 2.0 / 600.0 + 1e-12);
     }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -99,9 +100,9 @@ class TrainedInverse {
 /// Any of the above, where a file says which.
 class AnyInverse {
  public:
-  template <class I>
-    requires SpringInverse<I>
-  AnyInverse(I inverse) : inverse_(std::move(inverse)) {}
+  AnyInverse(LinearInverse inverse) : inverse_(std::move(inverse)) {}
+  AnyInverse(ModelInverse inverse) : inverse_(std::move(inverse)) {}
+  AnyInverse(TrainedInverse inverse) : inverse_(std::move(inverse)) {}
   /// A model file's inverse: `TrainedInverse` if its target is the deflection, else `ModelInverse`.
   /// @throws Error as these do.
   [[nodiscard]] static AnyInverse of(const EstimatorSettings& settings,
