@@ -53,7 +53,7 @@ std::string error_table(const Study& study) {
 std::string tracking_table(const Study& study) {
   TextTable table;
   table.header({"condition", "model", fmt::format("MAD {}", study.unit), "+-", "STD |e|", "RMSE",
-                "/ linear", "runs", "stopped", "paper's ratio", "paper's RMSE"});
+                "/ linear", "runs", "cycles", "stopped", "paper's ratio", "paper's RMSE"});
   Conditions conditions;
   for (const StudyRow& row : study.rows) {
     const StudyTracking& of = row.tracking.value();
@@ -63,12 +63,13 @@ std::string tracking_table(const Study& study) {
     table.row({conditions.next(row), row.model, mean(of.mad, "{:.3f}"),
                row.runs > 1 ? fmt::format("{:.2g}", of.mad_std) : "", mean(of.std_abs, "{:.3f}"),
                mean(row.rmse, "{:.3f}"), mean(of.mad_to_linear, "{:.3f}"),
-               fmt::format("{}", row.runs), fmt::format("{}", of.stopped),
-               text_of(of.paper_ratio, "{:.3f}"), text_of(row.paper_rmse, "{:.2f}")});
+               fmt::format("{}", row.runs), fmt::format("{}", of.limit_cycles),
+               fmt::format("{}", of.stopped), text_of(of.paper_ratio, "{:.3f}"),
+               text_of(row.paper_rmse, "{:.2f}")});
   }
   return fmt::format(
       "\n{}/ linear: MAD over that of the line of the sweeps; +-: standard deviation of a run; "
-      "stopped: runs that diverged\n",
+      "cycles: runs with a limit cycle; stopped: runs that diverged\n",
       table.text());
 }
 
@@ -85,9 +86,13 @@ Json row_json(const StudyRow& row) {
             {"max_abs_target", row.largest},
             {"paper_rmse", optional(row.paper_rmse)}};
   if (const auto& of = row.tracking)
-    json["tracking"] = {{"mad", of->mad},         {"mad_std", of->mad_std},
-                        {"std_abs", of->std_abs}, {"mad_to_linear", of->mad_to_linear},
-                        {"stopped", of->stopped}, {"paper_ratio", optional(of->paper_ratio)}};
+    json["tracking"] = {{"mad", of->mad},
+                        {"mad_std", of->mad_std},
+                        {"std_abs", of->std_abs},
+                        {"mad_to_linear", of->mad_to_linear},
+                        {"limit_cycles", of->limit_cycles},
+                        {"stopped", of->stopped},
+                        {"paper_ratio", optional(of->paper_ratio)}};
   return json;
 }
 

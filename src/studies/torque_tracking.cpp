@@ -146,6 +146,7 @@ class TrackingRows {
     const auto n = static_cast<double>(sum.row.runs);
     const auto average = [n](double& mean, double value) { mean += (value - mean) / n; };
     StudyTracking& of = *sum.row.tracking;
+    if (run.score.limit_cycle) ++of.limit_cycles;
     const double mad_step = run.score.mad - of.mad;
     const double rmse_step = run.score.rmse - sum.row.rmse;
     average(of.mad, run.score.mad);

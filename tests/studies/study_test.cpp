@@ -74,10 +74,11 @@ TEST(Studies, OfTrackingShowMadAndRatio) {
                                                         .mad_std = 0.01,
                                                         .std_abs = 1.2,
                                                         .mad_to_linear = 0.6,
+                                                        .limit_cycles = 1,
                                                         .paper_ratio = 0.581}}}};
   EXPECT_THAT(
       study_text(info, study),
-      testing::ContainsRegex("locked +dgmm +0.900 +0.01 +1.200 +1.500 +0.600 +3 +0 +0.581"));
+      testing::ContainsRegex("locked +dgmm +0.900 +0.01 +1.200 +1.500 +0.600 +3 +1 +0 +0.581"));
   const auto json = nlohmann::json::parse(study_json(info, study));
   EXPECT_EQ(json["rows"][0]["tracking"]["mad_to_linear"], 0.6);
   EXPECT_EQ(json["rows"][0]["tracking"]["paper_ratio"], 0.581);
