@@ -203,6 +203,7 @@ double GreyBox::near_root(const Error& error_at, const ScheduledCoefficients::Po
   const double rise =
       coefficients_.coefficient(at, knots.size() - 1) - coefficients_.coefficient(at, 0);
   const double enough = kShare * (std::abs(rise) + std::abs(wanted));
+  if (!std::isfinite(enough)) return std::numeric_limits<double>::quiet_NaN();
   if (std::abs(error_before) <= enough) return before;
   double x = before - error_before * (knots.back() - knots.front()) / rise;
   for (int i = 0; i < kSteps && x >= knots.front() && x <= knots.back(); ++i) {

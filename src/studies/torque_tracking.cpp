@@ -146,6 +146,7 @@ class TrackingRows {
     const auto n = static_cast<double>(sum.row.runs);
     const auto average = [n](double& mean, double value) { mean += (value - mean) / n; };
     StudyTracking& of = *sum.row.tracking;
+    if (run.score.limit_cycle) ++of.limit_cycles;
     const double mad_step = run.score.mad - of.mad;
     const double rmse_step = run.score.rmse - sum.row.rmse;
     average(of.mad, run.score.mad);
@@ -226,7 +227,7 @@ void run_task(const Task& task, const std::string& actuator, std::uint64_t seed,
 
 }  // namespace
 
-Study torque_tracking_007(const StudyOptions& options, const Progress& progress) {
+Study torque_tracking_000(const StudyOptions& options, const Progress& progress) {
   Study study{
       .protocol =
           "deflection control (50 rad/s) through the inverse of a model; trained on three sweeps, "

@@ -88,7 +88,8 @@ class LoopLog {
 /// A run that is ready for its first step.
 class Loop {
  public:
-  Loop(const DataSheet& sheet, const TrackingSpec& spec, AnyInverse inverse, std::uint64_t seed)
+  Loop(const DataSheet& sheet, const TrackingSpec& spec, const AnyInverse& inverse,
+       std::uint64_t seed)
       : name_(fmt::format("{} {} seed {}", full_name(sheet), name(spec.reference.kind), seed)),
         reference_Nm_(reference_torque(spec.reference, sheet, seed)),
         load_(load_of(spec)),
@@ -101,7 +102,7 @@ class Loop {
                {.start = load_, .next = {}}),
         bench_log_(sheet, reference_Nm_.size(), true),
         loop_log_(reference_Nm_.size()),
-        controller_(std::move(inverse), loop_settings(sheet, spec, load_), kBenchRate_Hz),
+        controller_(inverse, loop_settings(sheet, spec, load_), kBenchRate_Hz),
         most_Nm_(kMostTorque * sheet.rating.torque_Nm.value) {
     if (load_.is_locked) return;
     check_swing(
@@ -155,13 +156,13 @@ class Loop {
 
 /// The reference's amplitude, through the frequencies of the loop.
 std::optional<double> measured_bandwidth(const DataSheet& sheet, TrackingSpec spec,
-                                         AnyInverse inverse, std::uint64_t seed,
+                                         const AnyInverse& inverse, std::uint64_t seed,
                                          const Progress& progress) {
   const double amplitude_Nm = amplitude_of(spec.reference, sheet);
   spec.reference = {
       .kind = TorqueReference::Kind::sweep, .amplitude_Nm = amplitude_Nm, .duration_s = kSweep_s};
   spec.faults = {};
-  Loop loop(sheet, spec, std::move(inverse), seed);
+  Loop loop(sheet, spec, inverse, seed);
   if (!loop.run(progress)) return std::nullopt;
   const Recording record = std::move(loop).finish();
   return bandwidth(record.channel("truth_torque_Nm").values,
@@ -212,7 +213,7 @@ void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uin
   (void)Loop(sheet, spec, LinearInverse(1.0), seed);
 }
 
-TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, AnyInverse inverse,
+TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, const AnyInverse& inverse,
                   std::uint64_t seed, const Progress& progress) {
   check_tracking(nominal, spec, seed);
   const DataSheet sheet = aged(nominal, spec.conditions.age);
@@ -224,7 +225,7 @@ TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, AnyInverse
                    .has_diverged = !has_held,
                    .record = std::move(record)};
   if (spec.measures_bandwidth && has_held)
-    done.bandwidth_Hz = measured_bandwidth(sheet, spec, std::move(inverse), seed, progress);
+    done.bandwidth_Hz = measured_bandwidth(sheet, spec, inverse, seed, progress);
   return done;
 }
 

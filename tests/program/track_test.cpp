@@ -11,7 +11,7 @@ constexpr int kCallWasWrong = 2;
 
 class TrackVerb : public Program {
  protected:
-  void expect_error(const Outcome& outcome, int exit_code, const std::string& text) {
+  static void expect_error(const Outcome& outcome, int exit_code, const std::string& text) {
     EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
     EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
     EXPECT_EQ(outcome.out, "");

@@ -102,7 +102,7 @@ TEST(Studies, OfTheRubberSensorAreWorseOnceTheClutchHasSlipped) {
 }
 
 TEST(Studies, OfTorqueTrackingJudgeInversesInTheLoop) {
-  const Study study = run_study(find_study("007-tracking"), kQuick);
+  const Study study = run_study(find_study("000-tracking"), kQuick);
   const std::string condition = "dfki-50:maxwell-slip, 13 Nm locked, chirp";
   const StudyRow& line = row_of(study, condition, "linear");
   ASSERT_TRUE(line.tracking);
@@ -128,10 +128,11 @@ TEST(Studies, OfTrackingShowMadAndRatio) {
                                                         .mad_std = 0.01,
                                                         .std_abs = 1.2,
                                                         .mad_to_linear = 0.6,
+                                                        .limit_cycles = 1,
                                                         .paper_ratio = 0.581}}}};
   EXPECT_THAT(
       study_text(info, study),
-      testing::ContainsRegex("locked +dgmm +0.900 +0.01 +1.200 +1.500 +0.600 +3 +0 +0.581"));
+      testing::ContainsRegex("locked +dgmm +0.900 +0.01 +1.200 +1.500 +0.600 +3 +1 +0 +0.581"));
   const auto json = nlohmann::json::parse(study_json(info, study));
   EXPECT_EQ(json["rows"][0]["tracking"]["mad_to_linear"], 0.6);
   EXPECT_EQ(json["rows"][0]["tracking"]["paper_ratio"], 0.581);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <vector>
 
@@ -14,9 +15,10 @@ namespace {
 constexpr double kRate_Hz = 1000.0;
 
 std::vector<double> sine(double amplitude, double frequency_Hz, double duration_s) {
-  std::vector<double> values;
-  for (int n = 0; n < duration_s * kRate_Hz; ++n)
-    values.push_back(amplitude * std::sin(2.0 * std::numbers::pi * frequency_Hz * n / kRate_Hz));
+  std::vector<double> values(static_cast<std::size_t>(duration_s * kRate_Hz));
+  for (std::size_t n = 0; n < values.size(); ++n)
+    values[n] = amplitude *
+                std::sin(2.0 * std::numbers::pi * frequency_Hz * static_cast<double>(n) / kRate_Hz);
   return values;
 }
 

@@ -23,8 +23,9 @@ struct StudyTracking {
   double mad = 0.0;
   double mad_std = 0.0;  ///< of one run
   double std_abs = 0.0;
-  double mad_to_linear = 0.0;  ///< MAD over that of the line of the sweeps
-  std::size_t stopped = 0;     ///< runs that diverged or failed, in no mean
+  double mad_to_linear = 0.0;    ///< MAD over that of the line of the sweeps
+  std::size_t limit_cycles = 0;  ///< runs with one
+  std::size_t stopped = 0;       ///< runs that diverged or failed, in no mean
   std::optional<double> paper_ratio = {};
 };
 

@@ -35,7 +35,7 @@ struct TrackingSpec {
 
 /// Whether it can be run. @throws UsageError if the actuator is not series-elastic, the reference out
 /// of its rating, the lever would tip over, or as `FaultInjector`; Error if the loop would be unstable.
-void check_tracking(const DataSheet& sheet, const TrackingSpec& spec, std::uint64_t seed);
+void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed);
 
 struct TrackingRun {
   TrackingScore score;
@@ -54,8 +54,8 @@ struct TrackingRun {
 /// the actuator's data sheet. Equal calls give equal runs.
 /// @param seed of the sensors' noise, and of a random walk
 /// @throws as `check_tracking` before the first step; Error if the plant refuses; Cancelled.
-[[nodiscard]] TrackingRun track(const DataSheet& sheet, const TrackingSpec& spec,
-                                AnyInverse inverse, std::uint64_t seed,
+[[nodiscard]] TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec,
+                                const AnyInverse& inverse, std::uint64_t seed,
                                 const Progress& progress = {});
 
 /// The inverse that a model file's model gives a loop at 1 kHz.
