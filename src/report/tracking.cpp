@@ -76,7 +76,7 @@ Json optional(const std::optional<double>& value) { return value ? Json(*value) 
 
 Json row_json(const TrackingRow& row) {
   const TrackingScore& score = row.score;
-  const bool has_score = row.status != "failed";
+  const bool has_score = row.status == "ok";
   const auto number = [&](double value) { return has_score ? Json(value) : Json(nullptr); };
   const auto count = [&](std::size_t value) { return has_score ? Json(value) : Json(nullptr); };
   return {

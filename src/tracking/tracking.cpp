@@ -219,12 +219,11 @@ TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, const AnyI
   const DataSheet sheet = aged(nominal, spec.conditions.age);
   Loop loop(sheet, spec, inverse, seed);
   const bool has_held = loop.run(progress);
-  Recording record = std::move(loop).finish();
-  TrackingRun done{.score = tracking_score(record, amplitude_of(spec.reference, sheet),
-                                           spec.reference.kind == TorqueReference::Kind::steps),
-                   .has_diverged = !has_held,
-                   .record = std::move(record)};
-  if (spec.measures_bandwidth && has_held)
+  TrackingRun done{.score = {}, .has_diverged = !has_held, .record = std::move(loop).finish()};
+  if (!has_held) return done;
+  done.score = tracking_score(done.record, amplitude_of(spec.reference, sheet),
+                              spec.reference.kind == TorqueReference::Kind::steps);
+  if (spec.measures_bandwidth)
     done.bandwidth_Hz = measured_bandwidth(sheet, spec, inverse, seed, progress);
   return done;
 }

@@ -179,6 +179,20 @@ TEST(Track, WithoutASensorFadesTheCurrentAndGoesOn) {
   for (std::size_t i = 7000; i < wanted.size(); ++i) ASSERT_NEAR(torque[i], wanted[i], 4.0);
 }
 
+TEST(Track, StopsARunWhoseLeverTurnsRound) {
+  TrackingSpec spec = short_spec();
+  spec.output = JointOutput::free;
+  const LinearInverse far_too_soft(50.0);
+  EXPECT_TRUE(track(kSheet, spec, far_too_soft, 1).has_diverged);
+  const std::array<NamedInverse, 1> models{NamedInverse{"soft", far_too_soft}};
+  const std::array<std::uint64_t, 1> seeds{1};
+  const auto rows = track_models(kSheet, spec, line(), models, seeds);
+  EXPECT_EQ(rows[0].status, "ok");
+  EXPECT_EQ(rows[1].status, "diverged");
+  EXPECT_NE(rows[1].reason.find("stopped after"), std::string::npos);
+  EXPECT_FALSE(rows[1].mad_to_linear);
+}
+
 TEST(Track, RefusesWhatItCannotRunBeforeTheFirstStep) {
   const auto refusal = [](const DataSheet& sheet, const TrackingSpec& spec) {
     return error_message([&] { (void)track(sheet, spec, line(), 1); });

@@ -38,7 +38,7 @@ struct TrackingSpec {
 void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed);
 
 struct TrackingRun {
-  TrackingScore score;
+  TrackingScore score;  ///< of a run that has not diverged
   std::optional<double> bandwidth_Hz = {};
   bool has_diverged = false;  ///< stopped: the joint turned round, or the torque left any bound
   /// What the sensors told, what the loop made of it with each term, and the `truth_` channels.
