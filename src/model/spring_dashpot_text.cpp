@@ -247,7 +247,8 @@ class Parser {
     if (end == text_.data() + start) refuse_here("a start value, like 0.68");
     position_ = static_cast<std::size_t>(end - text_.data());
     if (!is_good)
-      refuse(start, fmt::format("a start value from {:g} to {:g}", kSmallestElement, kLargestElement),
+      refuse(start,
+             fmt::format("a start value from {:g} to {:g}", kSmallestElement, kLargestElement),
              text_.substr(start, position_ - start));
     return value;
   }

@@ -45,6 +45,11 @@ std::vector<Column> tracking_columns(const Study& study) {
          return fmt::format("{:.3f}", row.tracking->mad_to_linear);
        }},
       {"runs", [](const Study&, const StudyRow& row) { return fmt::format("{}", row.runs); }, true},
+      {"cycles",
+       [](const Study&, const StudyRow& row) {
+         return fmt::format("{}", row.tracking->limit_cycles);
+       },
+       true},
       {"stopped",
        [](const Study&, const StudyRow& row) { return fmt::format("{}", row.tracking->stopped); },
        true},
@@ -148,7 +153,7 @@ std::string study_text(const StudyInfo& info, const Study& study) {
   text +=
       is_tracking(study)
           ? "/ linear: MAD over that of the line of the sweeps; +-: standard deviation of a run; "
-            "stopped: runs that diverged\n"
+            "cycles: runs with a limit cycle; stopped: runs that diverged\n"
           : "% of max: RMSE over the largest |target| of the judged recording; +-: standard "
             "deviation of a run\n";
   if (study.full_scale)
@@ -200,6 +205,7 @@ std::string study_json(const StudyInfo& info, const Study& study) {
           {"mad_std", of->mad_std},
           {"std_abs", of->std_abs},
           {"mad_to_linear", of->mad_to_linear},
+          {"limit_cycles", of->limit_cycles},
           {"stopped", of->stopped},
           {"paper_ratio", of->paper_ratio ? Json(*of->paper_ratio) : Json(nullptr)}};
   }

@@ -99,7 +99,7 @@ class Pid {
   DerivativeOf derivative_of_;
   std::optional<double> tracking_s_;
   double period_s_;
-  double step_limit_;      ///< of the command, a tick
+  double step_limit_;            ///< of the command, a tick
   double tracking_share_ = 0.0;  ///< T / T_t
   Differentiator differentiator_;
   Handover handover_;

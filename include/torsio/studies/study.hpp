@@ -46,7 +46,7 @@ struct StudyRow {
   std::size_t diverged = 0;             ///< of the runs
   double fit_percent = 0.0;             ///< mean of `Metrics::fit_percent` (BF)
   std::optional<double> paper_fit_percent = {};  ///< what the paper judges by, where it is that
-  std::optional<StudyTracking> tracking = {};  ///< of all rows of a study, or of none
+  std::optional<StudyTracking> tracking = {};    ///< of all rows of a study, or of none
 };
 
 /// A simulated bench that a study used.
