@@ -1,6 +1,7 @@
 #include "torsio/model/exponential_loading.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "model/bracketed_inverse.hpp"
 #include "model/hysteresis_checks.hpp"
@@ -8,7 +9,7 @@
 
 namespace torsio {
 
-ExponentialLoading::ExponentialLoading(const Parameters& parameters) : parameters_(parameters) {
+ExponentialLoading::ExponentialLoading(Parameters parameters) : parameters_(std::move(parameters)) {
   parameters_.curves.check(kFamily);
   check_other_inputs(parameters_.slopes, kFamily);
   for (const double decay : {parameters_.rising_decay, parameters_.falling_decay})

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "model/bracketed_inverse.hpp"
 #include "model/hysteresis_checks.hpp"
@@ -11,7 +12,7 @@
 namespace torsio {
 
 template <bool kByRate>
-Backlash<kByRate>::Backlash(const Parameters& parameters) : parameters_(parameters) {
+Backlash<kByRate>::Backlash(Parameters parameters) : parameters_(std::move(parameters)) {
   parameters_.boundaries.check(kFamily);
   check_other_inputs(parameters_.slopes, kFamily);
   require_parameter(std::isfinite(parameters_.stiffness) && parameters_.stiffness > 0.0, kFamily,

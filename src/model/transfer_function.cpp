@@ -27,7 +27,7 @@ struct Quadratic {
   Complex at;  ///< one of its roots
 };
 
-std::vector<Quadratic> quadratics_of(std::vector<Complex> roots) {
+std::vector<Quadratic> quadratics_of(const std::vector<Complex>& roots) {
   std::vector<Quadratic> made;
   std::vector<double> real;
   for (const Complex root : roots) {

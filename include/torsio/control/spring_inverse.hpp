@@ -100,7 +100,7 @@ class TrainedInverse {
 /// Any of the above, where a file says which.
 class AnyInverse {
  public:
-  AnyInverse(LinearInverse inverse) : inverse_(std::move(inverse)) {}
+  AnyInverse(LinearInverse inverse) : inverse_(inverse) {}
   AnyInverse(ModelInverse inverse) : inverse_(std::move(inverse)) {}
   AnyInverse(TrainedInverse inverse) : inverse_(std::move(inverse)) {}
   /// A model file's inverse: `TrainedInverse` if its target is the deflection, else `ModelInverse`.

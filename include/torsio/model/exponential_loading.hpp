@@ -43,7 +43,7 @@ class ExponentialLoading {
 
   /// @throws Error if the curves are none, a decay is not positive, or the slopes do not begin
   /// with 0.
-  explicit ExponentialLoading(const Parameters& parameters);
+  explicit ExponentialLoading(Parameters parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.slopes.size(); }

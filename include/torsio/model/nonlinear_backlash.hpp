@@ -60,7 +60,7 @@ class Backlash {
 
   /// @throws Error if the boundaries are none, the stiffness is not positive, a rate is out of
   /// range or given to the plain family, or the slopes do not begin with 0.
-  explicit Backlash(const Parameters& parameters);
+  explicit Backlash(Parameters parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.slopes.size(); }
