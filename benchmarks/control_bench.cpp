@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "fitted_grey_box.hpp"
@@ -70,6 +71,16 @@ EstimatorSettings settings_around_mixture() {
       .residuals = {}};
 }
 
+/// A tick of the torque loop of dfki-50 through this inverse.
+template <SpringInverse I>
+Row torque_loop_row(I inverse, TorqueLoopCore::Settings settings = {}) {
+  settings.deflection.joint = series_elastic_joint(data_sheet("dfki-50"));
+  TorqueController controller(std::move(inverse), settings, kRate_Hz);
+  const double seconds = seconds_a_tick(
+      [&](double t_s) { return controller.step(10.0 * std::sin(t_s), swinging(t_s)).current_A; });
+  return {.value = seconds * 1e6, .unit = "us"};
+}
+
 }  // namespace
 
 Row cascade_step() {
@@ -99,36 +110,17 @@ Row impedance_step() {
 
 /// The loop itself, with the line for an inverse.
 Row torque_loop_linear_step() {
-  TorqueController controller(
-      LinearInverse(573.0),
-      TorqueLoopCore::Settings{.deflection = {.joint = series_elastic_joint(data_sheet("dfki-50"))},
-                               .friction = FrictionCompensation{},
-                               .observer_cutoff_Hz = 5.0},
-      kRate_Hz);
-  const double seconds = seconds_a_tick(
-      [&](double t_s) { return controller.step(10.0 * std::sin(t_s), swinging(t_s)).current_A; });
-  return {.value = seconds * 1e6, .unit = "us"};
+  return torque_loop_row(LinearInverse(573.0),
+                         {.friction = FrictionCompensation{}, .observer_cutoff_Hz = 5.0});
 }
 
 Row torque_loop_dgmm300_step() {
-  TorqueController controller(ModelInverse(settings_around_mixture(), mixture_300()),
-                              TorqueLoopCore::Settings{.deflection = {.joint = series_elastic_joint(
-                                                                          data_sheet("dfki-50"))}},
-                              kRate_Hz);
-  const double seconds = seconds_a_tick(
-      [&](double t_s) { return controller.step(10.0 * std::sin(t_s), swinging(t_s)).current_A; });
-  return {.value = seconds * 1e6, .unit = "us"};
+  return torque_loop_row(ModelInverse(settings_around_mixture(), mixture_300()));
 }
 
 /// With the inverse of a grey box: secants from its present state.
 Row torque_loop_grey_box_step() {
-  TorqueController controller(ModelInverse(settings_around_mixture(), fitted_grey_box()),
-                              TorqueLoopCore::Settings{.deflection = {.joint = series_elastic_joint(
-                                                                          data_sheet("dfki-50"))}},
-                              kRate_Hz);
-  const double seconds = seconds_a_tick(
-      [&](double t_s) { return controller.step(10.0 * std::sin(t_s), swinging(t_s)).current_A; });
-  return {.value = seconds * 1e6, .unit = "us"};
+  return torque_loop_row(ModelInverse(settings_around_mixture(), fitted_grey_box()));
 }
 
 }  // namespace torsio::bench

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/all_finite.hpp"
+#include "model/bounded_motion.hpp"
 #include "model/check_dynamics.hpp"
 
 namespace torsio {
@@ -103,11 +104,7 @@ Estimate DynamicBoucWen::step(Features features) noexcept {
     state_[0] = before;
     return {.value = before, .fault = Fault::diverged};
   }
-  if (state_[0] >= parameters_.lowest && state_[0] <= parameters_.highest)
-    return {.value = state_[0]};
-  state_[0] = std::clamp(state_[0], parameters_.lowest, parameters_.highest);
-  state_[1] = 0.0;
-  return {.value = state_[0], .fault = Fault::diverged};
+  return bounded_position(state_, parameters_.lowest, parameters_.highest);
 }
 
 double hysteretic_energy(const DynamicBoucWen::Parameters& parameters, double force) {

@@ -262,8 +262,7 @@ Choice chosen_terms(const Parameters& with, const Scale& scale, const TrainingDa
   Choice choice;
   double best = score({});
   choice.notes.push_back(fmt::format("terms by held-out blocks: none {:.4g} {} RMSE", best, unit));
-  for (bool goes_on = true; goes_on;) {
-    goes_on = false;
+  while (choice.terms.size() < kTerms.size()) {
     TermSet better;
     double least = kWorthIt * best;
     for (const Term& term : kTerms) {
@@ -282,7 +281,6 @@ Choice chosen_terms(const Parameters& with, const Scale& scale, const TrainingDa
     if (better.empty()) break;
     choice.terms = better;
     best = least;
-    goes_on = choice.terms.size() < kTerms.size();
   }
   choice.notes.push_back(choice.terms.empty()
                              ? "no further term helps by more than 2 % on held-out blocks"
@@ -325,6 +323,7 @@ Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
                                     .progress = progress};
   Candidate made = candidate(guesses.front(), scale, {});
   std::vector<std::vector<double>> starts;
+  starts.reserve(guesses.size());
   for (const Parameters& guess : guesses) starts.push_back(start_of(made, guess));
   SimulationFit fit = fit_by_simulation(made.model, data, starts, search);
   const Parameters basic = made.parameters(fit.parameters);

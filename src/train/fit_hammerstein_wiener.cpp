@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <ranges>
 #include <string>
 #include <utility>
 #include <vector>
@@ -126,8 +125,8 @@ class Telling {
         slope_about_rest(p, dc_gain(p.sections))));
   }
 
-  void discrete_as_continuous(const HammersteinWiener::Parameters& p,
-                              std::vector<std::string>& notes) const {
+  static void discrete_as_continuous(const HammersteinWiener::Parameters& p,
+                                     std::vector<std::string>& notes) {
     const DiscreteTransfer g = transfer_of(p.sections);
     constexpr std::size_t kReadable = 4;
     if (g.denominator.size() <= kReadable && g.denominator.size() > 1)
@@ -239,7 +238,7 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
   const Telling telling(data, own);
   telling.table(fit.numbers, fitted);
   const double discrete_rmse = rmse_of(own, fit.sum_of_squares);
-  telling.discrete_as_continuous(parameters_of(own, fit.numbers, 1), fitted.notes);
+  Telling::discrete_as_continuous(parameters_of(own, fit.numbers, 1), fitted.notes);
   if (options.continuous == ContinuousForm::tustin) {
     fit.numbers = held_between_samples(own, std::move(fit.numbers));
     fitted.notes.push_back(fmt::format(
@@ -247,13 +246,13 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
         rmse_of(own, WienerError(own, fit.numbers).sum_of_squares(fit.numbers)), discrete_rmse));
   } else if (options.continuous == ContinuousForm::refined) {
     ContinuousFit continuous = refine_or_refuse(own, fit.numbers, options.iterations, last);
+    std::vector<std::string> factors;
+    factors.reserve(continuous.sections.size());
+    for (const ContinuousTransfer& each : continuous.sections) factors.push_back(text_of(each));
     fitted.notes.push_back(fmt::format(
         "refined in continuous time, the curves as they were: X/W = {}; training RMSE {:.4g}, "
         "discrete {:.4g}",
-        fmt::join(continuous.sections |
-                      std::views::transform([](const auto& each) { return text_of(each); }),
-                  " * "),
-        rmse_of(own, continuous.fit.sum_of_squares), discrete_rmse));
+        fmt::join(factors, " * "), rmse_of(own, continuous.fit.sum_of_squares), discrete_rmse));
     fit = std::move(continuous.fit);
   }
   fitted.parameters = parameters_of(own, fit.numbers, data.input_count());

@@ -17,6 +17,11 @@ struct Run {
   Matrix features;
 };
 
+std::size_t judged_samples(const Run& run) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(run.residual, [](double e) { return std::isfinite(e); }));
+}
+
 std::optional<Role> judged_role(const Dataset& dataset) {
   for (const Role role : {Role::test, Role::validation, Role::train})
     if (dataset.has_role(role)) return role;
@@ -55,8 +60,7 @@ std::size_t stride_of(const std::vector<Run>& runs) {
   std::size_t judged = 0;
   std::size_t all = 0;
   for (const Run& run : runs) {
-    const auto is_judged = [](double e) { return std::isfinite(e); };
-    judged += static_cast<std::size_t>(std::ranges::count_if(run.residual, is_judged));
+    judged += judged_samples(run);
     all += run.residual.size();
   }
   return judged == 0 ? 1 : std::max<std::size_t>(1, (all + judged / 2) / judged);
@@ -127,8 +131,7 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
   const std::vector<Run> runs = runs_of(model, dataset, *role);
   std::size_t longest = 0;
   for (const Run& run : runs) {
-    const auto is_judged = [](double e) { return std::isfinite(e); };
-    report.samples += static_cast<std::size_t>(std::ranges::count_if(run.residual, is_judged));
+    report.samples += judged_samples(run);
     longest = std::max(longest, run.residual.size());
   }
   const std::size_t stride = stride_of(runs);

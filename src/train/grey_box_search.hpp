@@ -29,7 +29,7 @@ struct GreyBoxChoice {
 /// Everything that a choice may take from, and the sums over the data that tell how good it is.
 class GreyBoxSearch {
  public:
-  /// Runs once through the data. @param rates of every input: whether it is one
+  /// Runs once through the data. @param schedule as `groups_by` takes it
   GreyBoxSearch(const TrainingData& data, const std::string& schedule);
 
   struct Candidate {
@@ -50,7 +50,6 @@ class GreyBoxSearch {
   [[nodiscard]] const char* what_was_held_out() const;
 
  private:
-  struct Projection;
   [[nodiscard]] GreyBoxTerms::Structure structure_of(const GreyBoxChoice& choice) const;
   [[nodiscard]] bool is_possible(const GreyBoxChoice& choice) const;
   [[nodiscard]] std::vector<double> solved(const GreyBoxChoice& choice,
