@@ -27,6 +27,7 @@ struct ImportFlags {
   double output_scale = 1.0;
   std::string activation;
   std::string graph_output;
+  bool fold_biases = false;
   std::optional<std::size_t> warm_up;
   std::string output;
   std::string device_serial;
@@ -81,7 +82,8 @@ torsio::ImportOptions options_of(const ImportFlags& flags) {
           .sample_rate_Hz = rate_Hz,
           .input_scale = flags.input_scale,
           .output_scale = flags.output_scale,
-          .warm_up_samples = flags.warm_up};
+          .warm_up_samples = flags.warm_up,
+          .fold_biases = flags.fold_biases};
 }
 
 void run(const ImportFlags& flags) {
@@ -141,6 +143,8 @@ void add_import(CLI::App& app) {
       "--warm-up", flags->warm_up,
       "samples after a reset before a network with memory is valid (default: the graph's "
       "window, else 0)");
+  verb->add_flag("--fold-biases", flags->fold_biases,
+                 "one bias a gate of an LSTM: a faster step, which rounds otherwise than PyTorch");
   verb->add_option("--guards", flags->data.recordings,
                    "recordings to take range guard, fallback and error bar from");
   verb->add_option("--mapping", flags->data.mapping,

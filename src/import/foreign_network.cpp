@@ -198,7 +198,12 @@ class Assembly {
     std::vector<LstmLayer> layers;
     for (const RecurrentStage& stage : recurrent_) {
       std::vector<double> bias = stage.input_bias;
-      for (std::size_t i = 0; i < bias.size(); ++i) bias[i] += stage.recurrent_bias[i];
+      const auto is_zero = [](double value) { return value == 0.0; };
+      if (network_.fold_biases || std::ranges::all_of(stage.recurrent_bias, is_zero)) {
+        for (std::size_t i = 0; i < bias.size(); ++i) bias[i] += stage.recurrent_bias[i];
+      } else {
+        bias.insert(bias.end(), stage.recurrent_bias.begin(), stage.recurrent_bias.end());
+      }
       layers.push_back(
           {single(stage.input_weights), single(stage.recurrent_weights), single(bias)});
     }

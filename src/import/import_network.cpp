@@ -28,8 +28,9 @@ void check_scale(double scale, const char* place) {
                     .found = fmt::format("{}", scale)});
 }
 
-/// The network with the scales that its program applied outside of it.
-ForeignNetwork scaled(ForeignNetwork network, const ImportOptions& options) {
+/// The network with the scales that its program applied outside of it, and its biases as asked for.
+ForeignNetwork as_wanted(ForeignNetwork network, const ImportOptions& options) {
+  network.fold_biases = options.fold_biases;
   if (!options.input_scale.empty()) {
     if (options.input_scale.size() != network.inputs)
       throw UsageError({.place = "--input-scale",
@@ -128,7 +129,7 @@ ImportedModel import_network(const ForeignNetwork& network, const Source& source
   ImportedModel imported{
       .file = {.card = card_of(options, source),
                .settings = open_settings(options),
-               .parameters = network_parameters(scaled(network, options),
+               .parameters = network_parameters(as_wanted(network, options),
                                                 1.0 / options.sample_rate_Hz, warm_up)},
       .notes = network.notes};
   const AnyModel model(imported.file.parameters);

@@ -100,7 +100,7 @@ void check_layer(const DenseLayer& layer, std::size_t inputs, const std::string&
 
 void check_layer(const LstmLayer& layer, std::size_t inputs, const std::string& place) {
   const std::size_t rows = checked_rows(layer, 4, inputs, place);
-  check_list(layer.bias, rows, place + ".bias");
+  check_list(layer.bias, layer.keeps_biases_apart() ? 2 * rows : rows, place + ".bias");
 }
 
 void check_layer(const GruLayer& layer, std::size_t inputs, const std::string& place) {

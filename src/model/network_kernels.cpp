@@ -66,10 +66,12 @@ HWY_INLINE Vector sigmoid_of(Vector x) {
 
 struct LstmCell {
   static constexpr std::size_t kRows = 4;
+  static constexpr std::size_t kSums = 4;
+  static HWY_INLINE Vector start(const float* HWY_RESTRICT bias) { return hn::Load(kTag, bias); }
   static constexpr std::size_t recurrent_sum(std::size_t row) { return row; }
 
-  static HWY_INLINE Vector hidden(const Vector* HWY_RESTRICT sums, Vector /*before*/,
-                                  float* HWY_RESTRICT cell) {
+  static HWY_INLINE Vector hidden(const Vector* HWY_RESTRICT sums, const float* /*bias*/,
+                                  Vector /*before*/, float* HWY_RESTRICT cell) {
     const Vector kept = hn::Mul(sigmoid_of(sums[1]), hn::Load(kTag, cell));
     const Vector next = hn::MulAdd(sigmoid_of(sums[0]), tanh_of(sums[2]), kept);
     hn::Store(next, kTag, cell);
@@ -77,12 +79,58 @@ struct LstmCell {
   }
 };
 
+// In double, of both halves of a vector.
+template <class Function>
+HWY_INLINE Vector from_double(Vector x, const Function& function) {
+#if HWY_TARGET == HWY_SCALAR
+  const hn::Rebind<double, Lanes> wide;
+  return hn::DemoteTo(kTag, function(wide, hn::PromoteTo(wide, x)));
+#else
+  const hn::Repartition<double, Lanes> wide;
+  const hn::Half<Lanes> half;
+  return hn::Combine(
+      kTag, hn::DemoteTo(half, function(wide, hn::PromoteTo(wide, hn::UpperHalf(half, x)))),
+      hn::DemoteTo(half, function(wide, hn::PromoteTo(wide, hn::LowerHalf(half, x)))));
+#endif
+}
+
+// PyTorch's cell: two sums, each with its bias, and no fused product.
+struct LstmCellBiasesApart {
+  static constexpr std::size_t kRows = 4;
+  static constexpr std::size_t kSums = 8;
+  static HWY_INLINE Vector start(const float* /*bias*/) { return hn::Zero(kTag); }
+  static constexpr std::size_t recurrent_sum(std::size_t row) { return kRows + row; }
+
+  static HWY_INLINE Vector tanh_rounded(Vector x) {
+    return from_double(x, [](auto wide, auto value) HWY_ATTR { return hn::Tanh(wide, value); });
+  }
+  static HWY_INLINE Vector sigmoid_rounded(Vector x) {
+    const Vector decay = from_double(
+        hn::Neg(x), [](auto wide, auto value) HWY_ATTR { return hn::Exp(wide, value); });
+    return hn::Div(set(1.0F), hn::Add(set(1.0F), decay));
+  }
+
+  static HWY_INLINE Vector hidden(const Vector* HWY_RESTRICT sums, const float* HWY_RESTRICT bias,
+                                  Vector /*before*/, float* HWY_RESTRICT cell) {
+    const auto gate = [&](std::size_t row) HWY_ATTR {
+      return hn::Add(hn::Add(sums[row], hn::Load(kTag, bias + row * kLanes)),
+                     hn::Add(sums[kRows + row], hn::Load(kTag, bias + (kRows + row) * kLanes)));
+    };
+    const Vector kept = hn::Mul(sigmoid_rounded(gate(1)), hn::Load(kTag, cell));
+    const Vector next = hn::Add(kept, hn::Mul(sigmoid_rounded(gate(0)), tanh_rounded(gate(2))));
+    hn::Store(next, kTag, cell);
+    return hn::Mul(sigmoid_rounded(gate(3)), tanh_rounded(next));
+  }
+};
+
 struct GruCell {
   static constexpr std::size_t kRows = 3;
+  static constexpr std::size_t kSums = 4;
+  static HWY_INLINE Vector start(const float* HWY_RESTRICT bias) { return hn::Load(kTag, bias); }
   static constexpr std::size_t recurrent_sum(std::size_t row) { return row < 2 ? row : 3; }
 
-  static HWY_INLINE Vector hidden(const Vector* HWY_RESTRICT sums, Vector before,
-                                  float* HWY_RESTRICT /*cell*/) {
+  static HWY_INLINE Vector hidden(const Vector* HWY_RESTRICT sums, const float* /*bias*/,
+                                  Vector before, float* HWY_RESTRICT /*cell*/) {
     const Vector fresh = tanh_of(hn::MulAdd(sigmoid_of(sums[0]), sums[3], sums[2]));
     return hn::MulAdd(sigmoid_of(sums[1]), hn::Sub(before, fresh), fresh);
   }
@@ -92,16 +140,17 @@ struct GruCell {
 template <class Cell, std::size_t kBlocks, std::size_t kJoints>
 HWY_INLINE void step_tile(const PackedView& layer, const JointStates& joints, std::size_t block,
                           std::size_t joint) {
-  constexpr std::size_t kSums = 4;
+  constexpr std::size_t kSums = Cell::kSums;
   const std::size_t block_size = (kSums + Cell::kRows * (layer.inputs + layer.units)) * kLanes;
-  const float* HWY_RESTRICT weights = layer.weights + block * block_size;
+  const float* const biases = layer.weights + block * block_size;
+  const float* HWY_RESTRICT weights = biases;
   const float* HWY_RESTRICT inputs = joints.inputs + joint * joints.input_stride;
   const float* HWY_RESTRICT hidden = joints.hidden + joint * joints.state_stride;
   Vector sums[kBlocks][kJoints][kSums];  // NOLINT(modernize-avoid-c-arrays): registers
   for (std::size_t b = 0; b < kBlocks; ++b)
     for (std::size_t j = 0; j < kJoints; ++j)
       for (std::size_t row = 0; row < kSums; ++row)
-        sums[b][j][row] = hn::Load(kTag, weights + b * block_size + row * kLanes);
+        sums[b][j][row] = Cell::start(weights + b * block_size + row * kLanes);
   weights += kSums * kLanes;
   for (std::size_t column = 0; column < layer.inputs; ++column, weights += Cell::kRows * kLanes)
     for (std::size_t b = 0; b < kBlocks; ++b)
@@ -125,7 +174,8 @@ HWY_INLINE void step_tile(const PackedView& layer, const JointStates& joints, st
       const std::size_t at = (joint + j) * joints.state_stride + (block + b) * kLanes;
       float* const cell = joints.cell == nullptr ? nullptr : joints.cell + at;
       const Vector before = hn::Load(kTag, joints.hidden + at);
-      hn::Store(Cell::hidden(sums[b][j], before, cell), kTag, joints.next_hidden + at);
+      hn::Store(Cell::hidden(sums[b][j], biases + b * block_size, before, cell), kTag,
+                joints.next_hidden + at);
     }
 }
 
@@ -150,6 +200,10 @@ HWY_INLINE void step_layer(const PackedView& layer, const JointStates& joints) {
 
 void lstm_layer(const PackedView& layer, const JointStates& joints) {
   step_layer<LstmCell>(layer, joints);
+}
+
+void lstm_layer_biases_apart(const PackedView& layer, const JointStates& joints) {
+  step_layer<LstmCellBiasesApart>(layer, joints);
 }
 
 void gru_layer(const PackedView& layer, const JointStates& joints) {
@@ -220,6 +274,7 @@ namespace torsio::network_kernels {
 
 HWY_EXPORT(lane_count);
 HWY_EXPORT(lstm_layer);
+HWY_EXPORT(lstm_layer_biases_apart);
 HWY_EXPORT(gru_layer);
 HWY_EXPORT(dense_layer);
 HWY_EXPORT(dot_product);
@@ -228,6 +283,10 @@ std::size_t lanes() noexcept { return HWY_DYNAMIC_DISPATCH(lane_count)(); }
 
 void lstm(const PackedView& layer, const JointStates& joints) noexcept {
   HWY_DYNAMIC_DISPATCH(lstm_layer)(layer, joints);
+}
+
+void lstm_biases_apart(const PackedView& layer, const JointStates& joints) noexcept {
+  HWY_DYNAMIC_DISPATCH(lstm_layer_biases_apart)(layer, joints);
 }
 
 void gru(const PackedView& layer, const JointStates& joints) noexcept {

@@ -12,10 +12,11 @@ namespace torsio::network_kernels {
 ///
 /// - dense: bias, then one row for each input;
 /// - LSTM: bias of the gates i, f, g, o, then these four for each input, then for each unit;
+/// - LSTM with biases apart: the same behind eight biases, those of the inputs first;
 /// - GRU: bias of r, z, n and of n's recurrent part, then r, z, n for each input, then for each unit.
 ///
 /// Every sum is taken in that order, by fused multiply-adds where the machine has them, so that one
-/// joint and many give the same bits.
+/// joint and many give the same bits. Biases that stand apart are added to the finished sums.
 [[nodiscard]] std::size_t lanes() noexcept;
 
 /// A packed layer.
@@ -40,6 +41,8 @@ struct JointStates {
 /// Sigmoid and tanh are within 4e-7 of the exact ones, tanh also relative to itself. NaN stays NaN
 /// in every activation.
 void lstm(const PackedView& layer, const JointStates& joints) noexcept;
+/// As PyTorch rounds (`LstmLayer`); sigmoid and tanh come from double.
+void lstm_biases_apart(const PackedView& layer, const JointStates& joints) noexcept;
 void gru(const PackedView& layer, const JointStates& joints) noexcept;
 
 /// @param output one value a unit, padding included (it becomes 0).

@@ -37,11 +37,12 @@ class BlockWriter {
 
 AlignedVector<float> packed(const LstmLayer& layer) {
   const std::size_t units = layer.units();
-  const std::size_t rows = 4 * (1 + layer.input_weights.columns + units);
+  const std::size_t biases = layer.bias.size() / units;
+  const std::size_t rows = biases + 4 * (layer.input_weights.columns + units);
   AlignedVector<float> weights(padded_count(units) * rows, 0.0F);
   for (std::size_t unit = 0; unit < units; ++unit) {
     BlockWriter block(weights, rows, unit);
-    for (std::size_t gate = 0; gate < 4; ++gate) block.add(layer.bias[gate * units + unit]);
+    for (std::size_t row = 0; row < biases; ++row) block.add(layer.bias[row * units + unit]);
     block.add(layer.input_weights, units, unit);
     block.add(layer.recurrent_weights, units, unit);
   }
@@ -79,7 +80,10 @@ RecurrentStack<Layer>::RecurrentStack(const std::vector<Layer>& layers, std::siz
                  .weights = packed(layers[i])};
     layer.hidden.assign(joints * layer.stride, 0.0F);
     layer.other_hidden = layer.hidden;
-    if constexpr (std::same_as<Layer, LstmLayer>) layer.cell = layer.hidden;
+    if constexpr (std::same_as<Layer, LstmLayer>) {
+      layer.cell = layer.hidden;
+      layer.biases_apart = layers[i].keeps_biases_apart();
+    }
     inputs = layer.units;
     layers_.push_back(std::move(layer));
   }
@@ -143,7 +147,8 @@ void RecurrentStack<Layer>::step(const float* inputs) noexcept {
                                               .cell = layer.cell.data(),
                                               .state_stride = layer.stride};
     if constexpr (std::same_as<Layer, LstmLayer>) {
-      network_kernels::lstm(view, states);
+      (layer.biases_apart ? network_kernels::lstm_biases_apart : network_kernels::lstm)(view,
+                                                                                        states);
     } else {
       network_kernels::gru(view, states);
     }

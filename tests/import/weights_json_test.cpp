@@ -45,6 +45,17 @@ TEST(WeightsJson, TakesScalesIntoTheStandardisation) {
   EXPECT_EQ(lstm.layers.at(0).bias, std::vector<float>(4, 0.0F));
 }
 
+TEST(WeightsJson, KeepsTwoBiasesApartUnlessToldOtherwise) {
+  ForeignNetwork network = parse(small_lstm(tensor("m.bias_ih_l0", "4", "1, 2, 3, 4") + "," +
+                                            tensor("m.bias_hh_l0", "4", "5, 6, 7, 8")));
+  const auto bias = [&] {
+    return std::get<Lstm::Parameters>(network_parameters(network, 0.005, 0)).layers.at(0).bias;
+  };
+  EXPECT_EQ(bias(), (std::vector<float>{1, 2, 3, 4, 5, 6, 7, 8}));
+  network.fold_biases = true;
+  EXPECT_EQ(bias(), (std::vector<float>{6, 8, 10, 12}));
+}
+
 TEST(WeightsJson, RefusesWhatItCannotMean) {
   EXPECT_THAT(refusal("{"), HasSubstr("net.json"));
   EXPECT_THAT(refusal("{}"), HasSubstr("tensors"));

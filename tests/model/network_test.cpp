@@ -55,6 +55,7 @@ std::vector<NetworkShape> recurrent_shapes() {
   shapes.push_back({.inputs = 3, .units = {7, 17, 33}});
   shapes.push_back({.units = {17}, .hidden = {7}});
   shapes.push_back({.units = {33, 1}, .hidden = {16, 3, 17}, .activation = Activation::elu});
+  shapes.push_back({.units = {8, 33}, .biases_apart = true});
   return shapes;
 }
 
@@ -189,8 +190,9 @@ TYPED_TEST(Recurrent, TellsWhatItsLastLayerSaw) {
 TYPED_TEST(Recurrent, ABankEqualsOneNetworkAJoint) {
   for (const std::size_t joints : {1U, 2U, 5U, 6U, 7U, 12U, 13U}) {
     SCOPED_TRACE(joints);
-    const auto parameters =
-        random_network<TypeParam>({.units = {33, 17}, .hidden = {5}, .warm_up_samples = 2}, joints);
+    const auto parameters = random_network<TypeParam>(
+        {.units = {33, 17}, .hidden = {5}, .warm_up_samples = 2, .biases_apart = joints % 2 == 1},
+        joints);
     NetworkBank<TypeParam> bank(parameters, joints);
     std::vector<TypeParam> alone(joints, TypeParam(parameters));
     std::vector<double> features(joints * 2);

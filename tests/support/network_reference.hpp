@@ -85,7 +85,10 @@ class NetworkReference {
       const auto gate = [&](std::size_t index) {
         const std::size_t row = index * units + unit;
         return product(layer.input_weights, row, x) +
-               product(layer.recurrent_weights, row, before) + static_cast<double>(layer.bias[row]);
+               product(layer.recurrent_weights, row, before) +
+               static_cast<double>(layer.bias[row]) +
+               (layer.keeps_biases_apart() ? static_cast<double>(layer.bias[4 * units + row])
+                                           : 0.0);
       };
       c[unit] = sigmoid(gate(1)) * c[unit] + sigmoid(gate(0)) * std::tanh(gate(2));
       h[unit] = sigmoid(gate(3)) * std::tanh(c[unit]);

@@ -19,6 +19,7 @@ struct NetworkShape {
   std::vector<std::size_t> hidden = {};  ///< of the dense layers before the last
   Activation activation = Activation::tanh;
   std::size_t warm_up_samples = 0;
+  bool biases_apart = false;  ///< of an LSTM
 };
 
 /// Weights that keep signals of the order of one; 1 kHz.
@@ -84,7 +85,7 @@ class NetworkMaker {
     if constexpr (std::same_as<Layer, LstmLayer>) {
       return {.input_weights = matrix(4 * units, inputs),
               .recurrent_weights = matrix(4 * units, units),
-              .bias = vector(4 * units, 0.3)};
+              .bias = vector((shape_.biases_apart ? 8 : 4) * units, 0.3)};
     } else {
       return {.input_weights = matrix(3 * units, inputs),
               .recurrent_weights = matrix(3 * units, units),

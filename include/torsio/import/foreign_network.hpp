@@ -50,6 +50,7 @@ struct ForeignNetwork {
   /// Samples of the window that a graph with memory is fixed to, from the zero state; none if any.
   std::optional<std::size_t> window = {};
   std::vector<std::string> notes = {};
+  bool fold_biases = false;  ///< an LSTM's two biases into one
 };
 
 /// The network as parameters of `mlp`, `lstm` or `gru`. Scales and offsets before the first layer and

@@ -22,6 +22,7 @@ struct ImportOptions {
   std::vector<double> input_scale;   ///< the network sees scale * input; empty: 1 each
   double output_scale = 1.0;         ///< target = scale * what the network says
   std::optional<std::size_t> warm_up_samples;  ///< until a value is valid; none: the graph's window
+  bool fold_biases = false;  ///< an LSTM's two biases into one: faster, not PyTorch's rounding
 };
 
 /// A file of another program and where it came from.

@@ -37,15 +37,19 @@ struct DenseLayer {
 ///     a = W x + R h₋ + b
 ///     c = σ(a_f) c₋ + σ(a_i) tanh(a_g),   h = σ(a_o) tanh(c)
 ///
+/// A layer may keep the biases of W x and of R h₋ apart, as PyTorch does. It is then evaluated with PyTorch's
+/// rounding, a = (W x + b) + (R h₋ + b_R) in float32 and σ and tanh rounded from double, which takes longer.
+///
 /// Source: paper 004 Eqs. 3-8, SPEC section 3.4.
 struct LstmLayer {
   static constexpr std::string_view kFamily = "lstm";  ///< of a network of such layers
 
   FloatMatrix input_weights;      ///< W: 4H x inputs
   FloatMatrix recurrent_weights;  ///< R: 4H x H
-  std::vector<float> bias;        ///< b: 4H
+  std::vector<float> bias;        ///< b: 4H; or 8H: b, then b_R
 
   [[nodiscard]] std::size_t units() const noexcept { return recurrent_weights.columns; }
+  [[nodiscard]] bool keeps_biases_apart() const noexcept { return bias.size() == 8 * units(); }
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
     visit("input_weights", self.input_weights);

@@ -56,6 +56,7 @@ class RecurrentStack {
     AlignedVector<float> hidden = {};        ///< joints x stride
     AlignedVector<float> other_hidden = {};  ///< where a step writes the next h
     AlignedVector<float> cell = {};          ///< joints x stride; empty for a GRU
+    bool biases_apart = false;               ///< `LstmLayer::keeps_biases_apart`
   };
 
   std::vector<Packed> layers_;
