@@ -19,42 +19,41 @@ using D = hn::CappedTag<double, 8>;
 template <bool kStored, bool kSquared>
 HWY_INLINE void add_one(const double* HWY_RESTRICT parent, const double* HWY_RESTRICT column,
                         const double* HWY_RESTRICT v, double* HWY_RESTRICT phi, double& dot,
-                        double& square) {
+                        double* square) {
   const D d;
   const std::size_t lanes = hn::Lanes(d);
-  auto dot_even = hn::Zero(d);
-  auto dot_odd = hn::Zero(d);
-  auto square_even = hn::Zero(d);
-  auto square_odd = hn::Zero(d);
+  auto dot_low = hn::Zero(d);
+  auto dot_high = hn::Zero(d);
+  auto square_low = hn::Zero(d);
+  auto square_high = hn::Zero(d);
   for (std::size_t k = 0; k < kBlock; k += 2 * lanes) {
-    const auto even = hn::Mul(hn::Load(d, parent + k), hn::Load(d, column + k));
-    const auto odd = hn::Mul(hn::Load(d, parent + k + lanes), hn::Load(d, column + k + lanes));
+    const auto low = hn::Mul(hn::Load(d, parent + k), hn::Load(d, column + k));
+    const auto high = hn::Mul(hn::Load(d, parent + k + lanes), hn::Load(d, column + k + lanes));
     if constexpr (kStored) {
-      hn::Store(even, d, phi + k);
-      hn::Store(odd, d, phi + k + lanes);
+      hn::Store(low, d, phi + k);
+      hn::Store(high, d, phi + k + lanes);
     }
-    dot_even = hn::MulAdd(even, hn::Load(d, v + k), dot_even);
-    dot_odd = hn::MulAdd(odd, hn::Load(d, v + k + lanes), dot_odd);
+    dot_low = hn::MulAdd(low, hn::Load(d, v + k), dot_low);
+    dot_high = hn::MulAdd(high, hn::Load(d, v + k + lanes), dot_high);
     if constexpr (kSquared) {
-      square_even = hn::MulAdd(even, even, square_even);
-      square_odd = hn::MulAdd(odd, odd, square_odd);
+      square_low = hn::MulAdd(low, low, square_low);
+      square_high = hn::MulAdd(high, high, square_high);
     }
   }
-  dot += hn::GetLane(hn::SumOfLanes(d, hn::Add(dot_even, dot_odd)));
+  dot += hn::GetLane(hn::SumOfLanes(d, hn::Add(dot_low, dot_high)));
   if constexpr (kSquared)
-    square += hn::GetLane(hn::SumOfLanes(d, hn::Add(square_even, square_odd)));
+    *square += hn::GetLane(hn::SumOfLanes(d, hn::Add(square_low, square_high)));
 }
 
 template <bool kSquared>
 void add_all(const Candidates& candidates, const double* columns, std::size_t stride,
              const double* v, double* scratch, double* dots, double* squares) {
-  double none = 0.0;
   for (std::size_t j = 0; j < candidates.count; ++j) {
     const Candidate& of = candidates.list[j];
     const double* column = columns + of.column * stride;
     // The first is the constant, which stands in a column.
     const double* parent = j == 0 ? columns : scratch + of.parent * kBlock;
-    double& square = kSquared ? squares[j] : none;
+    double* square = kSquared ? squares + j : nullptr;
     if (j < candidates.parents)
       add_one<true, kSquared>(parent, column, v, scratch + j * kBlock, dots[j], square);
     else

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 #include <vector>
 
 #include "core/all_finite.hpp"
@@ -22,8 +21,10 @@ class Start {
     for (std::size_t n = 0; n < target.size(); ++n)
       if (std::isfinite(target[n]) && all_finite(features.row(n))) judged_.push_back(n);
     if (judged_.empty()) return;
-    const auto [lowest, highest] = std::ranges::minmax(
-        judged_ | std::views::transform([&](std::size_t n) { return target[n]; }));
+    const auto [least, most] =
+        std::ranges::minmax_element(judged_, {}, [&](std::size_t n) { return target[n]; });
+    const double lowest = target[*least];
+    const double highest = target[*most];
     spread_ = std::max(highest - lowest, std::max(std::abs(lowest), std::abs(highest)));
     constexpr double kUnknownShare = 0.01;
     const double error = usual_error > 0.0 ? usual_error : kUnknownShare * spread_;
