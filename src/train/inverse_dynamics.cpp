@@ -24,7 +24,7 @@ class Parabola {
   Parabola(std::size_t half_width, double sample_rate_Hz)
       : half_(static_cast<std::ptrdiff_t>(half_width)), rate_Hz_(sample_rate_Hz) {
     for (std::ptrdiff_t i = -half_; i <= half_; ++i) {
-      const double square = static_cast<double>(i * i);
+      const auto square = static_cast<double>(i * i);
       count_ += 1.0;
       squares_ += square;
       fourths_ += square * square;
