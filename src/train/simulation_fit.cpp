@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -27,11 +28,14 @@ double target_spread(const TrainingData& data) {
   return highest - lowest;
 }
 
+/// Of the spread in one sample: a speed that matters.
+constexpr double kVelocityShare = 0.01;
+
 /// The unknowns, each over its typical size: parameters, then the searched states of each sequence.
 class Unknowns {
  public:
-  Unknowns(const SimulatedModel& model, const TrainingData& data) : model_(model), data_(data) {
-    const double spread = target_spread(data);
+  Unknowns(const SimulatedModel& model, const TrainingData& data, std::size_t start_samples)
+      : model_(model), data_(data), start_samples_(start_samples), spread_(target_spread(data)) {
     for (const SearchedParameter& each : model.parameters) {
       scale_.push_back(each.typical);
       lower_.push_back(each.lowest / each.typical);
@@ -41,10 +45,11 @@ class Unknowns {
       starts_.push_back(measured_start(sequence, data.sample_rate_Hz));
       starts_.back().resize(model.free_states, 0.0);
     }
-    searched_ = data.sequences.size() <= kMostSearchedStarts ? model.free_states : 0;
+    if (start_samples == 0 && data.sequences.size() <= kMostSearchedStarts)
+      searched_ = model.free_states;
     for (std::size_t i = 0; i < data.sequences.size(); ++i)
       for (std::size_t j = 0; j < searched_; ++j) {
-        scale_.push_back(j == 1 ? spread * data.sample_rate_Hz * kVelocityShare : spread);
+        scale_.push_back(j == 1 ? spread_ * data.sample_rate_Hz * kVelocityShare : spread_);
         lower_.push_back(-HUGE_VAL);
         upper_.push_back(HUGE_VAL);
       }
@@ -72,7 +77,12 @@ class Unknowns {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = unknowns[i] * scale_[i];
     return values;
   }
-  [[nodiscard]] std::vector<double> start(std::span<const double> unknowns, std::size_t i) const {
+  /// Nothing if the first samples cannot be told.
+  [[nodiscard]] std::optional<std::vector<double>> start(std::span<const double> unknowns,
+                                                         std::size_t i) const {
+    if (start_samples_ > 0)
+      return start_by_first(model_, parameters(unknowns), data_.sequences[i], data_.sample_rate_Hz,
+                            spread_, start_samples_);
     std::vector<double> state = starts_[i];
     const std::size_t first = model_.parameters.size() + i * searched_;
     for (std::size_t j = 0; j < searched_; ++j) state[j] = unknowns[first + j] * scale_[first + j];
@@ -80,21 +90,18 @@ class Unknowns {
   }
 
   /// Of the first `horizon` samples of each sequence, over the target's spread.
-  [[nodiscard]] ResidualProblem problem(std::size_t horizon) const {
+  [[nodiscard]] ResidualProblem problem(std::size_t horizon, double difference) const {
     return {.residuals = judged_samples(data_, horizon),
             .evaluate =
-                [this, horizon, spread = target_spread(data_)](std::span<const double> unknowns,
-                                                               std::span<double> residuals,
-                                                               std::span<double> /*jacobian*/) {
-                  return evaluate(unknowns, horizon, spread, residuals);
+                [this, horizon](std::span<const double> unknowns, std::span<double> residuals,
+                                std::span<double> /*jacobian*/) {
+                  return evaluate(unknowns, horizon, residuals);
                 },
-            .difference = model_.difference};
+            .difference = difference};
   }
 
  private:
-  static constexpr double kVelocityShare = 0.01;
-
-  bool evaluate(std::span<const double> unknowns, std::size_t horizon, double spread,
+  bool evaluate(std::span<const double> unknowns, std::size_t horizon,
                 std::span<double> residuals) const {
     const std::vector<double> values = parameters(unknowns);
     std::vector<double> told;
@@ -102,15 +109,18 @@ class Unknowns {
     for (std::size_t i = 0; i < data_.sequences.size(); ++i) {
       const Sequence& sequence = data_.sequences[i];
       told.assign(std::min(horizon, sequence.target.size()), 0.0);
-      if (!model_.run(values, start(unknowns, i), sequence, told)) return false;
+      const auto state = start(unknowns, i);
+      if (!state || !model_.run(values, *state, sequence, told)) return false;
       for (std::size_t n = 0; n < told.size(); ++n)
-        if (sequence.use[n] != 0) residuals[next++] = (told[n] - sequence.target[n]) / spread;
+        if (sequence.use[n] != 0) residuals[next++] = (told[n] - sequence.target[n]) / spread_;
     }
     return true;
   }
 
   const SimulatedModel& model_;
   const TrainingData& data_;
+  std::size_t start_samples_;
+  double spread_;
   std::vector<std::vector<double>> starts_;
   std::vector<double> scale_;
   std::vector<double> lower_;
@@ -186,7 +196,7 @@ std::vector<double> measured_start(const Sequence& sequence, double sample_rate_
 SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData& data,
                                 const std::vector<std::vector<double>>& starts,
                                 const SimulationFitOptions& options) {
-  const Unknowns unknowns(model, data);
+  const Unknowns unknowns(model, data, options.start_samples);
   const std::size_t longest = longest_sequence(data);
   std::vector<std::vector<double>> from;
   for (const std::vector<double>& start : starts) from.push_back(unknowns.from(start));
@@ -205,14 +215,18 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
       return true;
     };
     constexpr std::size_t kToTellStartsApart = 25;
-    std::vector<SearchResult> found = minimise_squares_each(
-        unknowns.problem(horizon), from,
-        unknowns.options(is_last ? options.most_iterations : kToTellStartsApart, options.tolerance,
-                         progress));
+    std::vector<SearchResult> found;
+    for (const double difference : model.differences) {
+      found = minimise_squares_each(
+          unknowns.problem(horizon, difference), from,
+          unknowns.options(is_last ? options.most_iterations : kToTellStartsApart,
+                           options.tolerance, progress));
+      from.clear();
+      for (const SearchResult& each : found) from.push_back(each.theta);
+    }
     best = found.front();
     if (is_last) break;
-    from.clear();
-    for (std::size_t i = 0; i < found.size() && i < kept; ++i) from.push_back(found[i].theta);
+    from.resize(std::min(from.size(), kept));
     horizon = std::min(horizon * options.growth, longest);
   }
   if (!best.has_converged)
@@ -220,7 +234,7 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
                  .advice = "Allow more (--set iterations=...), or check that the input drives the "
                            "target and their units."});
   SimulationFit fit{.parameters = unknowns.parameters(best.theta)};
-  const ResidualProblem problem = unknowns.problem(longest);
+  const ResidualProblem problem = unknowns.problem(longest, model.differences.back());
   fit.samples = problem.residuals;
   fit.rmse =
       target_spread(data) * std::sqrt(best.sum_of_squares / static_cast<double>(problem.residuals));
@@ -228,35 +242,68 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
   return fit;
 }
 
+std::optional<std::vector<double>> start_by_first(const SimulatedModel& model,
+                                                  std::span<const double> parameters,
+                                                  const Sequence& sequence, double sample_rate_Hz,
+                                                  double spread, std::size_t samples) {
+  // Positions and speeds enter the first samples all but linearly: few steps, and many such searches.
+  constexpr int kMostSteps = 5;
+  constexpr double kDifference = 1e-3;
+  constexpr double kLeftOpen = 1e-6;
+  constexpr double kWorthIt = 0.999;
+  std::vector<double> state = measured_start(sequence, sample_rate_Hz);
+  state.resize(model.free_states, 0.0);
+  std::vector<double> scale(state.size(), spread);
+  if (scale.size() > 1) scale[1] *= sample_rate_Hz * kVelocityShare;
+  std::vector<double> told(std::min(samples, sequence.target.size()));
+  const auto count = static_cast<Eigen::Index>(told.size());
+  const auto misses = [&](std::span<const double> from) -> std::optional<Eigen::VectorXd> {
+    if (!model.run(parameters, from, sequence, told)) return std::nullopt;
+    Eigen::VectorXd miss(count);
+    for (std::size_t n = 0; n < told.size(); ++n)
+      miss[static_cast<Eigen::Index>(n)] =
+          sequence.use[n] != 0 ? (told[n] - sequence.target[n]) / spread : 0.0;
+    return miss;
+  };
+  auto miss = misses(state);
+  if (!miss) return std::nullopt;
+  for (int step = 0; step < kMostSteps; ++step) {
+    Eigen::MatrixXd slope(count, static_cast<Eigen::Index>(state.size()));
+    for (std::size_t j = 0; j < state.size(); ++j) {
+      std::vector<double> moved = state;
+      moved[j] = state[j] + kDifference * scale[j];
+      const auto above = misses(moved);
+      moved[j] = state[j] - kDifference * scale[j];
+      const auto below = misses(moved);
+      if (!above || !below) return state;
+      slope.col(static_cast<Eigen::Index>(j)) = (*above - *below) / (2.0 * kDifference);
+    }
+    Eigen::MatrixXd normal = slope.transpose() * slope;
+    normal.diagonal().array() += kLeftOpen * kLeftOpen;
+    const Eigen::VectorXd change = normal.ldlt().solve(slope.transpose() * *miss);
+    std::vector<double> next = state;
+    for (std::size_t j = 0; j < state.size(); ++j)
+      next[j] -= change[static_cast<Eigen::Index>(j)] * scale[j];
+    auto next_miss = misses(next);
+    if (!next_miss || !(next_miss->squaredNorm() < miss->squaredNorm())) break;
+    const bool is_done = next_miss->squaredNorm() > kWorthIt * miss->squaredNorm();
+    state = std::move(next);
+    miss = std::move(next_miss);
+    if (is_done) break;
+  }
+  return state;
+}
+
 double held_out_rmse(const SimulatedModel& model, std::span<const double> parameters,
                      const TrainingData& data, std::size_t initialise) {
+  const double spread = target_spread(data);
   double sum = 0.0;
   std::size_t judged = 0;
   for (const Sequence& sequence : data.sequences) {
-    const double spread = target_spread(data);
-    std::vector<double> told(std::min(initialise, sequence.target.size()));
-    std::vector<double> scale = {spread, spread * data.sample_rate_Hz * 0.01};
-    scale.resize(model.free_states, spread);
-    std::vector<double> start = measured_start(sequence, data.sample_rate_Hz);
-    start.resize(model.free_states, 0.0);
-    const ResidualProblem problem{
-        .residuals = told.size() + start.size(),
-        .evaluate = [&](std::span<const double> state, std::span<double> residuals,
-                        std::span<double> /*jacobian*/) {
-          if (!model.run(parameters, state, sequence, told)) return false;
-          for (std::size_t n = 0; n < told.size(); ++n)
-            residuals[n] = sequence.use[n] != 0 ? (told[n] - sequence.target[n]) / spread : 0.0;
-          for (std::size_t j = 0; j < state.size(); ++j)
-            residuals[told.size() + j] = 1e-6 * (state[j] - start[j]) / scale[j];
-          return true;
-        }};
-    try {
-      start = minimise_squares(problem, start, {.typical = scale}).theta;
-    } catch (const Error&) {
-      return std::numeric_limits<double>::infinity();
-    }
-    told.assign(sequence.target.size(), 0.0);
-    if (!model.run(parameters, start, sequence, told))
+    const auto start =
+        start_by_first(model, parameters, sequence, data.sample_rate_Hz, spread, initialise);
+    std::vector<double> told(sequence.target.size(), 0.0);
+    if (!start || !model.run(parameters, *start, sequence, told))
       return std::numeric_limits<double>::infinity();
     for (std::size_t n = initialise; n < told.size(); ++n) {
       if (sequence.use[n] == 0) continue;
