@@ -81,42 +81,40 @@ constexpr std::array kBoucWenModels{
     Entry{"arx", "arx", "arx"},
     Entry{"narx_polynomial, 40 terms", "narx_polynomial:input_lags=5:output_lags=5:terms=40", ""},
     Entry{
-        "narx_mlp, 16 lags, 128 tanh",
+        "narx_mlp, 16 lags, 128 units",
         "narx_mlp:input_lags=16:output_lags=16:layers=128:activation=tanh:epochs=1600:learning_"
         "rate=0.003:learning_rate_schedule=cosine:patience=0:training=noise:feedback_noise=0.01",
         "narx_mlp:input_lags=16:output_lags=16:layers=16:activation=tanh:epochs=10:training=noise",
         true},
+    Entry{"lstm, 32 cells",
+          "lstm:layers=32:window=400:stride=40:burn_in=100:epochs=160:learning_rate=0.01:learning_"
+          "rate_schedule=cosine:patience=0",
+          "lstm:layers=4:window=100:stride=100:epochs=1", true},
+    Entry{"gru, 64 cells",
+          "gru:layers=64:window=400:stride=40:burn_in=100:epochs=160:learning_rate=0.005:learning_"
+          "rate_schedule=cosine:patience=0",
+          "gru:layers=4:window=100:stride=100:epochs=1", true},
     Entry{"dynamic_bouc_wen", "dynamic_bouc_wen", ""},
     Entry{"dynamic_bouc_wen, input order 5", "dynamic_bouc_wen:input_order=5", ""}};
 
 constexpr std::array kEmpsModels{
-    Entry{"linear", "linear", "linear"}, Entry{"arx", "arx", "arx"},
-    Entry{"narx_mlp, 4 lags, 32 tanh",
-          "narx_mlp:input_lags=4:output_lags=4:layers=32:activation=tanh:epochs=100:learning_rate="
-          "0.003:learning_rate_schedule=cosine:patience=0",
-          "", true},
-    Entry{"friction_drive, 4 numbers", "friction_drive", "friction_drive:iterations=50"},
-    Entry{"friction_drive, terms=auto", "friction_drive:terms=auto", ""}};
-
-constexpr std::array kBoucWenNetworks{
-    Entry{"lstm, 32 cells",
-          "lstm:layers=32:window=400:stride=40:burn_in=100:epochs=80:learning_rate=0.01:learning_"
-          "rate_schedule=cosine",
-          "lstm:layers=4:window=100:stride=100:epochs=1", true},
-    Entry{"gru, 32 cells",
-          "gru:layers=32:window=400:stride=40:burn_in=100:epochs=80:learning_rate=0.01:learning_"
-          "rate_schedule=cosine",
-          "gru:layers=4:window=100:stride=100:epochs=1", true}};
-
-constexpr std::array kEmpsNetworks{
+    Entry{"linear", "linear", "linear"},
+    Entry{"arx", "arx", "arx"},
+    Entry{
+        "narx_mlp, 16 lags, 64 units",
+        "narx_mlp:input_lags=16:output_lags=16:layers=64:activation=tanh:epochs=400:learning_rate="
+        "0.003:learning_rate_schedule=cosine:patience=0:training=noise:feedback_noise=0.01",
+        "", true},
     Entry{"lstm, 32 cells",
           "lstm:layers=32:window=1000:stride=100:burn_in=100:epochs=40:learning_rate=0.01:learning_"
-          "rate_schedule=cosine",
+          "rate_schedule=cosine:patience=0",
           "lstm:layers=4:window=100:stride=100:epochs=1", true},
     Entry{"gru, 32 cells",
           "gru:layers=32:window=1000:stride=100:burn_in=100:epochs=40:learning_rate=0.01:learning_"
-          "rate_schedule=cosine",
-          "gru:layers=4:window=100:stride=100:epochs=1", true}};
+          "rate_schedule=cosine:patience=0",
+          "", true},
+    Entry{"friction_drive, 4 numbers", "friction_drive", "friction_drive:iterations=50"},
+    Entry{"friction_drive, terms=auto", "friction_drive:terms=auto", ""}};
 
 std::string recordings_folder() {
   Manifest places;
@@ -168,8 +166,9 @@ void add_rows(const Benchmark& benchmark, std::span<const Entry> entries, Study&
                           .paper_rmse = each.rmse_m});
 }
 
-Study study_of(std::span<const Entry> bouc_wen, std::span<const Entry> emps,
-               const StudyOptions& options, const Progress& progress) {
+}  // namespace
+
+Study public_benchmarks(const StudyOptions& options, const Progress& progress) {
   Study study{
       .protocol =
           "official training and test records, free run; the start from the first 50 samples, "
@@ -178,19 +177,9 @@ Study study_of(std::span<const Entry> bouc_wen, std::span<const Entry> emps,
       .unit = "m",
       .options = options,
       .tells_fit_time = true};
-  add_rows(kBoucWen, bouc_wen, study, nth_of(progress, 0, 2, kBoucWen.name));
-  add_rows(kEmps, emps, study, nth_of(progress, 1, 2, kEmps.name));
+  add_rows(kBoucWen, kBoucWenModels, study, nth_of(progress, 0, 2, kBoucWen.name));
+  add_rows(kEmps, kEmpsModels, study, nth_of(progress, 1, 2, kEmps.name));
   return study;
-}
-
-}  // namespace
-
-Study public_benchmarks(const StudyOptions& options, const Progress& progress) {
-  return study_of(kBoucWenModels, kEmpsModels, options, progress);
-}
-
-Study public_benchmark_networks(const StudyOptions& options, const Progress& progress) {
-  return study_of(kBoucWenNetworks, kEmpsNetworks, options, progress);
 }
 
 }  // namespace torsio

@@ -18,6 +18,5 @@ Study torque_levels_004(const StudyOptions& options, const Progress& progress);
 Study impedances_004(const StudyOptions& options, const Progress& progress);
 Study tubes_004(const StudyOptions& options, const Progress& progress);
 Study public_benchmarks(const StudyOptions& options, const Progress& progress);
-Study public_benchmark_networks(const StudyOptions& options, const Progress& progress);
 
 }  // namespace torsio

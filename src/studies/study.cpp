@@ -36,9 +36,7 @@ constexpr std::array kStudies{
               "Trained under one impedance of the joint, judged under another", impedances_004},
     StudyInfo{"004-tubes", "004, Table 6", "How soft the torsion tube should be", tubes_004},
     StudyInfo{"public-benchmarks", "official records",
-              "Bouc-Wen and EMPS: our free runs beside published ones", public_benchmarks, true},
-    StudyInfo{"public-benchmarks-networks", "official records",
-              "The same by recurrent networks, which take long", public_benchmark_networks, true}};
+              "Bouc-Wen and EMPS: our free runs beside published ones", public_benchmarks, true}};
 
 }  // namespace
 
