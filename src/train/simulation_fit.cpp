@@ -128,6 +128,50 @@ class Unknowns {
   std::size_t searched_ = 0;  ///< states of a start
 };
 
+/// What free runs make of the first samples of a sequence.
+class FirstSamples {
+ public:
+  FirstSamples(const SimulatedModel& model, std::span<const double> parameters,
+               const Sequence& sequence, std::size_t samples)
+      : model_(model),
+        parameters_(parameters),
+        sequence_(sequence),
+        told_(std::min(samples, sequence.target.size())) {}
+
+  /// Nothing if they cannot be told from that state.
+  [[nodiscard]] std::optional<Eigen::VectorXd> misses(std::span<const double> state) {
+    if (!model_.run(parameters_, state, sequence_, told_)) return std::nullopt;
+    Eigen::VectorXd miss = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(told_.size()));
+    for (std::size_t n = 0; n < told_.size(); ++n)
+      if (sequence_.use[n] != 0)
+        miss[static_cast<Eigen::Index>(n)] = told_[n] - sequence_.target[n];
+    return miss;
+  }
+  /// Of the misses, over each state's scale: samples x states.
+  [[nodiscard]] std::optional<Eigen::MatrixXd> slopes(const std::vector<double>& state,
+                                                      const Eigen::VectorXd& scale) {
+    constexpr double kDifference = 1e-3;
+    Eigen::MatrixXd slopes(told_.size(), state.size());
+    for (std::size_t j = 0; j < state.size(); ++j) {
+      const auto column = static_cast<Eigen::Index>(j);
+      std::vector<double> moved = state;
+      moved[j] = state[j] + kDifference * scale[column];
+      const auto above = misses(moved);
+      moved[j] = state[j] - kDifference * scale[column];
+      const auto below = misses(moved);
+      if (!above || !below) return std::nullopt;
+      slopes.col(column) = (*above - *below) / (2.0 * kDifference);
+    }
+    return slopes;
+  }
+
+ private:
+  const SimulatedModel& model_;
+  std::span<const double> parameters_;
+  const Sequence& sequence_;
+  std::vector<double> told_;
+};
+
 std::pair<double, double> range_of_input(const Table& table, std::size_t input) {
   double lowest = table.features(0, input);
   double highest = lowest;
@@ -221,8 +265,8 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
           unknowns.problem(horizon, difference), from,
           unknowns.options(is_last ? options.most_iterations : kToTellStartsApart,
                            options.tolerance, progress));
-      from.clear();
-      for (const SearchResult& each : found) from.push_back(each.theta);
+      from.resize(found.size());
+      std::ranges::transform(found, from.begin(), &SearchResult::theta);
     }
     best = found.front();
     if (is_last) break;
@@ -248,43 +292,26 @@ std::optional<std::vector<double>> start_by_first(const SimulatedModel& model,
                                                   double spread, std::size_t samples) {
   // Positions and speeds enter the first samples all but linearly: few steps, and many such searches.
   constexpr int kMostSteps = 5;
-  constexpr double kDifference = 1e-3;
-  constexpr double kLeftOpen = 1e-6;
+  constexpr double kLeftOpen = 1e-12;
   constexpr double kWorthIt = 0.999;
   std::vector<double> state = measured_start(sequence, sample_rate_Hz);
   state.resize(model.free_states, 0.0);
-  std::vector<double> scale(state.size(), spread);
+  Eigen::VectorXd scale =
+      Eigen::VectorXd::Constant(static_cast<Eigen::Index>(state.size()), spread);
   if (scale.size() > 1) scale[1] *= sample_rate_Hz * kVelocityShare;
-  std::vector<double> told(std::min(samples, sequence.target.size()));
-  const auto count = static_cast<Eigen::Index>(told.size());
-  const auto misses = [&](std::span<const double> from) -> std::optional<Eigen::VectorXd> {
-    if (!model.run(parameters, from, sequence, told)) return std::nullopt;
-    Eigen::VectorXd miss(count);
-    for (std::size_t n = 0; n < told.size(); ++n)
-      miss[static_cast<Eigen::Index>(n)] =
-          sequence.use[n] != 0 ? (told[n] - sequence.target[n]) / spread : 0.0;
-    return miss;
-  };
-  auto miss = misses(state);
+  FirstSamples first(model, parameters, sequence, samples);
+  std::optional<Eigen::VectorXd> miss = first.misses(state);
   if (!miss) return std::nullopt;
   for (int step = 0; step < kMostSteps; ++step) {
-    Eigen::MatrixXd slope(count, static_cast<Eigen::Index>(state.size()));
-    for (std::size_t j = 0; j < state.size(); ++j) {
-      std::vector<double> moved = state;
-      moved[j] = state[j] + kDifference * scale[j];
-      const auto above = misses(moved);
-      moved[j] = state[j] - kDifference * scale[j];
-      const auto below = misses(moved);
-      if (!above || !below) return state;
-      slope.col(static_cast<Eigen::Index>(j)) = (*above - *below) / (2.0 * kDifference);
-    }
-    Eigen::MatrixXd normal = slope.transpose() * slope;
-    normal.diagonal().array() += kLeftOpen * kLeftOpen;
-    const Eigen::VectorXd change = normal.ldlt().solve(slope.transpose() * *miss);
+    const std::optional<Eigen::MatrixXd> slope = first.slopes(state, scale);
+    if (!slope) break;
+    Eigen::MatrixXd normal = slope->transpose() * *slope;
+    normal.diagonal().array() += kLeftOpen * spread * spread;
+    const Eigen::VectorXd change =
+        normal.ldlt().solve(slope->transpose() * *miss).cwiseProduct(scale);
     std::vector<double> next = state;
-    for (std::size_t j = 0; j < state.size(); ++j)
-      next[j] -= change[static_cast<Eigen::Index>(j)] * scale[j];
-    auto next_miss = misses(next);
+    for (std::size_t j = 0; j < state.size(); ++j) next[j] -= change[static_cast<Eigen::Index>(j)];
+    std::optional<Eigen::VectorXd> next_miss = first.misses(next);
     if (!next_miss || !(next_miss->squaredNorm() < miss->squaredNorm())) break;
     const bool is_done = next_miss->squaredNorm() > kWorthIt * miss->squaredNorm();
     state = std::move(next);

@@ -96,6 +96,7 @@ TEST(EmpsBenchmark, HasFrictionThatFallsAlongTheScrew) {
 TEST(PublicBenchmarks, StandBesidePublishedFigures) {
   TORSIO_NEEDS_DATA("emps");
   TORSIO_NEEDS_DATA("boucwen");
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): before any thread
   setenv("TORSIO_DATA", data_folder(read_manifest(manifest_path("emps"))).c_str(), 1);
   const StudyOptions quick{.seed = 1, .repeats = 2, .is_quick = true};
   const Study study = run_study(find_study("public-benchmarks"), quick);
