@@ -99,6 +99,10 @@ std::vector<Column> columns_of(const Study& study) {
   }
   columns.push_back(
       {"runs", [](const Study&, const StudyRow& row) { return fmt::format("{}", row.runs); }});
+  if (study.tells_fit_time)
+    columns.push_back({"fit s", [](const Study&, const StudyRow& row) {
+                         return fmt::format("{:.3g}", row.fit_seconds);
+                       }});
   if (any([](const StudyRow& row) { return row.paper_rmse.has_value(); }))
     columns.push_back({"paper",
                        [](const Study&, const StudyRow& row) {
@@ -199,6 +203,8 @@ std::string study_json(const StudyInfo& info, const Study& study) {
          {"fit_percent", row.fit_percent},
          {"paper_fit_percent",
           row.paper_fit_percent ? Json(*row.paper_fit_percent) : Json(nullptr)}});
+    if (study.tells_fit_time && row.runs > 0)
+      document["rows"].back()["fit_seconds"] = row.fit_seconds;
     if (const auto& of = row.tracking)
       document["rows"].back()["tracking"] = {
           {"mad", of->mad},

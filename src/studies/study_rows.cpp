@@ -31,6 +31,7 @@ void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
   guarded += row.score.guarded_samples;
   if (row.status == "diverged") ++diverged;
   fit_percent += (row.score.metrics.fit_percent - fit_percent) / n;
+  fit_seconds += (row.fit_seconds - fit_seconds) / n;
 }
 
 void StudyRows::paper(const std::string& condition, const std::string& model, double rmse) {
@@ -93,7 +94,8 @@ std::vector<StudyRow> StudyRows::rows() const {
         .guarded_percent = 100.0 * static_cast<double>(sum.guarded) /
                            static_cast<double>(std::max<std::size_t>(sum.samples, 1)),
         .diverged = sum.diverged,
-        .fit_percent = sum.fit_percent};
+        .fit_percent = sum.fit_percent,
+        .fit_seconds = sum.fit_seconds};
     if (sum.one_step_runs > 0) row.one_step = sum.one_step;
     for (const auto& [paper_key, rmse] : papers_)
       if (paper_key == key) row.paper_rmse = rmse;

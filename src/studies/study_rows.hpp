@@ -60,6 +60,7 @@ class StudyRows {
     std::size_t guarded = 0;
     std::size_t diverged = 0;
     double fit_percent = 0.0;
+    double fit_seconds = 0.0;
     void add(const ResultRow& row, double largest_target);
   };
   struct Key {

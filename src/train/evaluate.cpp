@@ -6,8 +6,10 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <string_view>
 
 #include "torsio/core/error.hpp"
+#include "torsio/model/friction_drive.hpp"
 #include "torsio/train/initial_state.hpp"
 
 namespace torsio {
@@ -99,8 +101,11 @@ struct Tally {
   }
 };
 
-/// Root mean square over the regions of the residual table; NaN without one.
-double usual_error(const EstimatorSettings& settings) {
+/// What a model is usually wrong by in a record's first samples: root mean square over the regions of the
+/// residual table; NaN without one, and of a drive, whose errors are those of a drift that has hardly
+/// begun there: they would draw its speed to rest.
+double usual_error(const EstimatorSettings& settings, std::string_view family) {
+  if (family == FrictionDrive::kFamily) return kNotMeasured;
   double sum = 0.0;
   double count = 0.0;
   for (const double std_dev : settings.residuals.std_dev) {
@@ -130,7 +135,7 @@ std::size_t start_with(Estimator& estimator,
     std::ranges::copy(pipeline.step(raw), features.row(n).begin());
     if (pipeline.is_settled() && target.is_fresh(n)) measured[n] = target.values[n];
   }
-  start_where_measured(estimator.model(), features, measured, usual_error(settings));
+  start_where_measured(estimator.model(), features, measured, usual_error(settings, estimator.model().family()));
   return samples;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -27,11 +28,14 @@ double target_spread(const TrainingData& data) {
   return highest - lowest;
 }
 
+/// Of the spread in one sample: a speed that matters.
+constexpr double kVelocityShare = 0.01;
+
 /// The unknowns, each over its typical size: parameters, then the searched states of each sequence.
 class Unknowns {
  public:
-  Unknowns(const SimulatedModel& model, const TrainingData& data) : model_(model), data_(data) {
-    const double spread = target_spread(data);
+  Unknowns(const SimulatedModel& model, const TrainingData& data, std::size_t start_samples)
+      : model_(model), data_(data), start_samples_(start_samples), spread_(target_spread(data)) {
     for (const SearchedParameter& each : model.parameters) {
       scale_.push_back(each.typical);
       lower_.push_back(each.lowest / each.typical);
@@ -41,10 +45,11 @@ class Unknowns {
       starts_.push_back(measured_start(sequence, data.sample_rate_Hz));
       starts_.back().resize(model.free_states, 0.0);
     }
-    searched_ = data.sequences.size() <= kMostSearchedStarts ? model.free_states : 0;
+    if (start_samples == 0 && data.sequences.size() <= kMostSearchedStarts)
+      searched_ = model.free_states;
     for (std::size_t i = 0; i < data.sequences.size(); ++i)
       for (std::size_t j = 0; j < searched_; ++j) {
-        scale_.push_back(j == 1 ? spread * data.sample_rate_Hz * kVelocityShare : spread);
+        scale_.push_back(j == 1 ? spread_ * data.sample_rate_Hz * kVelocityShare : spread_);
         lower_.push_back(-HUGE_VAL);
         upper_.push_back(HUGE_VAL);
       }
@@ -72,7 +77,12 @@ class Unknowns {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = unknowns[i] * scale_[i];
     return values;
   }
-  [[nodiscard]] std::vector<double> start(std::span<const double> unknowns, std::size_t i) const {
+  /// Nothing if the first samples cannot be told.
+  [[nodiscard]] std::optional<std::vector<double>> start(std::span<const double> unknowns,
+                                                         std::size_t i) const {
+    if (start_samples_ > 0)
+      return start_by_first(model_, parameters(unknowns), data_.sequences[i], data_.sample_rate_Hz,
+                            spread_, start_samples_);
     std::vector<double> state = starts_[i];
     const std::size_t first = model_.parameters.size() + i * searched_;
     for (std::size_t j = 0; j < searched_; ++j) state[j] = unknowns[first + j] * scale_[first + j];
@@ -80,21 +90,18 @@ class Unknowns {
   }
 
   /// Of the first `horizon` samples of each sequence, over the target's spread.
-  [[nodiscard]] ResidualProblem problem(std::size_t horizon) const {
+  [[nodiscard]] ResidualProblem problem(std::size_t horizon, double difference) const {
     return {.residuals = judged_samples(data_, horizon),
             .evaluate =
-                [this, horizon, spread = target_spread(data_)](std::span<const double> unknowns,
-                                                               std::span<double> residuals,
-                                                               std::span<double> /*jacobian*/) {
-                  return evaluate(unknowns, horizon, spread, residuals);
+                [this, horizon](std::span<const double> unknowns, std::span<double> residuals,
+                                std::span<double> /*jacobian*/) {
+                  return evaluate(unknowns, horizon, residuals);
                 },
-            .difference = model_.difference};
+            .difference = difference};
   }
 
  private:
-  static constexpr double kVelocityShare = 0.01;
-
-  bool evaluate(std::span<const double> unknowns, std::size_t horizon, double spread,
+  bool evaluate(std::span<const double> unknowns, std::size_t horizon,
                 std::span<double> residuals) const {
     const std::vector<double> values = parameters(unknowns);
     std::vector<double> told;
@@ -102,20 +109,67 @@ class Unknowns {
     for (std::size_t i = 0; i < data_.sequences.size(); ++i) {
       const Sequence& sequence = data_.sequences[i];
       told.assign(std::min(horizon, sequence.target.size()), 0.0);
-      if (!model_.run(values, start(unknowns, i), sequence, told)) return false;
+      const auto state = start(unknowns, i);
+      if (!state || !model_.run(values, *state, sequence, told)) return false;
       for (std::size_t n = 0; n < told.size(); ++n)
-        if (sequence.use[n] != 0) residuals[next++] = (told[n] - sequence.target[n]) / spread;
+        if (sequence.use[n] != 0) residuals[next++] = (told[n] - sequence.target[n]) / spread_;
     }
     return true;
   }
 
   const SimulatedModel& model_;
   const TrainingData& data_;
+  std::size_t start_samples_;
+  double spread_;
   std::vector<std::vector<double>> starts_;
   std::vector<double> scale_;
   std::vector<double> lower_;
   std::vector<double> upper_;
   std::size_t searched_ = 0;  ///< states of a start
+};
+
+/// What free runs make of the first samples of a sequence.
+class FirstSamples {
+ public:
+  FirstSamples(const SimulatedModel& model, std::span<const double> parameters,
+               const Sequence& sequence, std::size_t samples)
+      : model_(model),
+        parameters_(parameters),
+        sequence_(sequence),
+        told_(std::min(samples, sequence.target.size())) {}
+
+  /// Nothing if they cannot be told from that state.
+  [[nodiscard]] std::optional<Eigen::VectorXd> misses(std::span<const double> state) {
+    if (!model_.run(parameters_, state, sequence_, told_)) return std::nullopt;
+    Eigen::VectorXd miss = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(told_.size()));
+    for (std::size_t n = 0; n < told_.size(); ++n)
+      if (sequence_.use[n] != 0)
+        miss[static_cast<Eigen::Index>(n)] = told_[n] - sequence_.target[n];
+    return miss;
+  }
+  /// Of the misses, over each state's scale: samples x states.
+  [[nodiscard]] std::optional<Eigen::MatrixXd> slopes(const std::vector<double>& state,
+                                                      const Eigen::VectorXd& scale) {
+    constexpr double kDifference = 1e-3;
+    Eigen::MatrixXd slopes(told_.size(), state.size());
+    for (std::size_t j = 0; j < state.size(); ++j) {
+      const auto column = static_cast<Eigen::Index>(j);
+      std::vector<double> moved = state;
+      moved[j] = state[j] + kDifference * scale[column];
+      const auto above = misses(moved);
+      moved[j] = state[j] - kDifference * scale[column];
+      const auto below = misses(moved);
+      if (!above || !below) return std::nullopt;
+      slopes.col(column) = (*above - *below) / (2.0 * kDifference);
+    }
+    return slopes;
+  }
+
+ private:
+  const SimulatedModel& model_;
+  std::span<const double> parameters_;
+  const Sequence& sequence_;
+  std::vector<double> told_;
 };
 
 std::pair<double, double> range_of_input(const Table& table, std::size_t input) {
@@ -186,7 +240,7 @@ std::vector<double> measured_start(const Sequence& sequence, double sample_rate_
 SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData& data,
                                 const std::vector<std::vector<double>>& starts,
                                 const SimulationFitOptions& options) {
-  const Unknowns unknowns(model, data);
+  const Unknowns unknowns(model, data, options.start_samples);
   const std::size_t longest = longest_sequence(data);
   std::vector<std::vector<double>> from;
   for (const std::vector<double>& start : starts) from.push_back(unknowns.from(start));
@@ -205,14 +259,18 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
       return true;
     };
     constexpr std::size_t kToTellStartsApart = 25;
-    std::vector<SearchResult> found = minimise_squares_each(
-        unknowns.problem(horizon), from,
-        unknowns.options(is_last ? options.most_iterations : kToTellStartsApart, options.tolerance,
-                         progress));
+    std::vector<SearchResult> found;
+    for (const double difference : model.differences) {
+      found = minimise_squares_each(
+          unknowns.problem(horizon, difference), from,
+          unknowns.options(is_last ? options.most_iterations : kToTellStartsApart,
+                           options.tolerance, progress));
+      from.resize(found.size());
+      std::ranges::transform(found, from.begin(), &SearchResult::theta);
+    }
     best = found.front();
     if (is_last) break;
-    from.clear();
-    for (std::size_t i = 0; i < found.size() && i < kept; ++i) from.push_back(found[i].theta);
+    from.resize(std::min(from.size(), kept));
     horizon = std::min(horizon * options.growth, longest);
   }
   if (!best.has_converged)
@@ -220,7 +278,7 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
                  .advice = "Allow more (--set iterations=...), or check that the input drives the "
                            "target and their units."});
   SimulationFit fit{.parameters = unknowns.parameters(best.theta)};
-  const ResidualProblem problem = unknowns.problem(longest);
+  const ResidualProblem problem = unknowns.problem(longest, model.differences.back());
   fit.samples = problem.residuals;
   fit.rmse =
       target_spread(data) * std::sqrt(best.sum_of_squares / static_cast<double>(problem.residuals));
@@ -228,35 +286,51 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
   return fit;
 }
 
+std::optional<std::vector<double>> start_by_first(const SimulatedModel& model,
+                                                  std::span<const double> parameters,
+                                                  const Sequence& sequence, double sample_rate_Hz,
+                                                  double spread, std::size_t samples) {
+  // Positions and speeds enter the first samples all but linearly: few steps, and many such searches.
+  constexpr int kMostSteps = 5;
+  constexpr double kLeftOpen = 1e-12;
+  constexpr double kWorthIt = 0.999;
+  std::vector<double> state = measured_start(sequence, sample_rate_Hz);
+  state.resize(model.free_states, 0.0);
+  Eigen::VectorXd scale =
+      Eigen::VectorXd::Constant(static_cast<Eigen::Index>(state.size()), spread);
+  if (scale.size() > 1) scale[1] *= sample_rate_Hz * kVelocityShare;
+  FirstSamples first(model, parameters, sequence, samples);
+  std::optional<Eigen::VectorXd> miss = first.misses(state);
+  if (!miss) return std::nullopt;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const std::optional<Eigen::MatrixXd> slope = first.slopes(state, scale);
+    if (!slope) break;
+    Eigen::MatrixXd normal = slope->transpose() * *slope;
+    normal.diagonal().array() += kLeftOpen * spread * spread;
+    const Eigen::VectorXd change =
+        normal.ldlt().solve(slope->transpose() * *miss).cwiseProduct(scale);
+    std::vector<double> next = state;
+    for (std::size_t j = 0; j < state.size(); ++j) next[j] -= change[static_cast<Eigen::Index>(j)];
+    std::optional<Eigen::VectorXd> next_miss = first.misses(next);
+    if (!next_miss || !(next_miss->squaredNorm() < miss->squaredNorm())) break;
+    const bool is_done = next_miss->squaredNorm() > kWorthIt * miss->squaredNorm();
+    state = std::move(next);
+    miss = std::move(next_miss);
+    if (is_done) break;
+  }
+  return state;
+}
+
 double held_out_rmse(const SimulatedModel& model, std::span<const double> parameters,
                      const TrainingData& data, std::size_t initialise) {
+  const double spread = target_spread(data);
   double sum = 0.0;
   std::size_t judged = 0;
   for (const Sequence& sequence : data.sequences) {
-    const double spread = target_spread(data);
-    std::vector<double> told(std::min(initialise, sequence.target.size()));
-    std::vector<double> scale = {spread, spread * data.sample_rate_Hz * 0.01};
-    scale.resize(model.free_states, spread);
-    std::vector<double> start = measured_start(sequence, data.sample_rate_Hz);
-    start.resize(model.free_states, 0.0);
-    const ResidualProblem problem{
-        .residuals = told.size() + start.size(),
-        .evaluate = [&](std::span<const double> state, std::span<double> residuals,
-                        std::span<double> /*jacobian*/) {
-          if (!model.run(parameters, state, sequence, told)) return false;
-          for (std::size_t n = 0; n < told.size(); ++n)
-            residuals[n] = sequence.use[n] != 0 ? (told[n] - sequence.target[n]) / spread : 0.0;
-          for (std::size_t j = 0; j < state.size(); ++j)
-            residuals[told.size() + j] = 1e-6 * (state[j] - start[j]) / scale[j];
-          return true;
-        }};
-    try {
-      start = minimise_squares(problem, start, {.typical = scale}).theta;
-    } catch (const Error&) {
-      return std::numeric_limits<double>::infinity();
-    }
-    told.assign(sequence.target.size(), 0.0);
-    if (!model.run(parameters, start, sequence, told))
+    const auto start =
+        start_by_first(model, parameters, sequence, data.sample_rate_Hz, spread, initialise);
+    std::vector<double> told(sequence.target.size(), 0.0);
+    if (!start || !model.run(parameters, *start, sequence, told))
       return std::numeric_limits<double>::infinity();
     for (std::size_t n = initialise; n < told.size(); ++n) {
       if (sequence.use[n] == 0) continue;

@@ -35,8 +35,10 @@ struct SimulatedModel {
   std::function<bool(std::span<const double> parameters, std::span<const double> state,
                      const Sequence& sequence, std::span<double> values)>
       run;
-  double difference = 1e-6;     ///< `ResidualProblem::difference`
-  std::size_t free_states = 2;  ///< of the start, searched for: position, velocity, ..
+  /// `ResidualProblem::difference`, one search after the other: what stops and starts make rough looks
+  /// smooth from afar, and a fine difference alone stays in the first dent.
+  std::vector<double> differences = {1e-6};
+  std::size_t free_states = 2;  ///< of the start: position, velocity, ..
 };
 
 /// A model of family M, made from what the search has; nothing if it refuses that.
@@ -69,6 +71,9 @@ struct SimulationFitOptions {
   std::size_t kept = 3;             ///< starts that go on to the second horizon
   std::size_t most_iterations = 200;
   double tolerance = 1e-9;  ///< relative fall of the squares below which a search has converged
+  /// First samples of each record that put its start, as in a score; 0: the start is searched for
+  /// beside the parameters. A start that all of the record draws on hides what a free run drifts by.
+  std::size_t start_samples = 0;
   Progress progress = {};
 };
 
@@ -80,10 +85,11 @@ struct SimulationFit {
   std::size_t samples = 0;              ///< that were judged
 };
 
-/// argmin over parameters and each record's start of the sum of (y_k - target_k)^2, y a free run
-/// through the record. From all starts over a short horizon, then from the best over longer ones: a
-/// long run has many minima in frequency and phase, a short one few. Where the records are more than
-/// `kMostSearchedStarts`, the starts stay where the first samples point.
+/// argmin over the parameters of the sum of (y_k - target_k)^2, y a free run through the record from a
+/// start that is searched for, too, or put by the record's first samples. From all starts of the
+/// search over a short horizon, then from the best over longer ones: a long run has many minima in
+/// frequency and phase, a short one few. Where the records are more than `kMostSearchedStarts`,
+/// the starts to be searched for stay where the first samples point.
 /// @throws Error if a record is shorter than the unknowns need, every start runs away, or the last
 /// search did not converge; Cancelled.
 inline constexpr std::size_t kMostSearchedStarts = 30;
@@ -95,6 +101,14 @@ inline constexpr std::size_t kMostSearchedStarts = 30;
 
 /// Position and velocity of a line through the first measured samples.
 [[nodiscard]] std::vector<double> measured_start(const Sequence& sequence, double sample_rate_Hz);
+
+/// The state from which a free run misses the first samples of a sequence least (Gauss-Newton, from
+/// `measured_start`). Nothing if no run can be told.
+[[nodiscard]] std::optional<std::vector<double>> start_by_first(const SimulatedModel& model,
+                                                                std::span<const double> parameters,
+                                                                const Sequence& sequence,
+                                                                double sample_rate_Hz,
+                                                                double spread, std::size_t samples);
 
 /// Root mean square of what free runs miss, the start of each sequence put by its first `initialise`
 /// measured samples, which are not judged. Infinite if a run cannot be told.

@@ -2,10 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <string>
 
 #include "real_data/real_data.hpp"
+#include "torsio/core/not_measured.hpp"
 #include "torsio/data/load.hpp"
+#include "torsio/studies/study.hpp"
 #include "torsio/train/comparison.hpp"
 
 namespace torsio {
@@ -47,6 +50,18 @@ TEST(BoucWenBenchmark, IsSimulatedToThreeMillionthsOfAMetre) {
   EXPECT_LT(scored(results, "multisine").score.metrics.rmse, 1.5e-6);  // 1.2e-6
 }
 
+// The setting of `torsio reproduce public-benchmarks` has twice the units and four times the epochs.
+TEST(BoucWenBenchmark, IsSimulatedByANetworkThatHearsItsPast) {
+  TORSIO_NEEDS_DATA("boucwen");
+  const Results results =
+      compared("boucwen",
+               "narx_mlp:input_lags=16:output_lags=16:layers=64:activation=tanh:epochs=400:"
+               "learning_rate=0.003:"
+               "learning_rate_schedule=cosine:patience=0:training=noise:feedback_noise=0.01");
+  EXPECT_LT(scored(results, "multisine").score.metrics.rmse, 4.52e-5);
+  EXPECT_LT(scored(results, "sinesweep").score.metrics.rmse, 4.52e-5);
+}
+
 TEST(BoucWenBenchmark, CannotBeSimulatedFromAHeldForce) {
   TORSIO_NEEDS_DATA("boucwen");
   const Results held = compared("boucwen", "dynamic_bouc_wen:input_order=0");
@@ -65,10 +80,47 @@ TEST(EmpsBenchmark, IsSimulatedByFourNumbers) {
   // Janot, Gautier and Brunot identified 95.1 kg, 203.5 Ns/m, 20.4 N, -3.16 N by inverse dynamics.
   EXPECT_NEAR(trained.table[0].value, 95.1, 8.0);
   EXPECT_NEAR(trained.table[1].value, 203.5, 30.0);
-  EXPECT_NEAR(trained.table[2].value, 20.4, 3.0);
+  EXPECT_NEAR(trained.table[2].value, 20.4, 3.5);
   EXPECT_NEAR(trained.table[3].value, -3.16, 0.4);
   const ResultRow row = scored(evaluate_model(trained.file, dataset), "pulses");
-  EXPECT_LT(row.score.metrics.rmse, 1.15e-2);  // 9.6e-3
+  EXPECT_LT(row.score.metrics.rmse, 8e-3);  // 6.8e-3
+}
+
+// What terms=auto chooses by blocks of the training record, in a minute.
+TEST(EmpsBenchmark, HasFrictionThatFallsAlongTheScrew) {
+  TORSIO_NEEDS_DATA("emps");
+  const Results results = compared("emps", "friction_drive:terms=position");
+  EXPECT_LT(scored(results, "pulses").score.metrics.rmse, 5.5e-3);  // 4.4e-3
+}
+
+TEST(PublicBenchmarks, StandBesidePublishedFigures) {
+  TORSIO_NEEDS_DATA("emps");
+  TORSIO_NEEDS_DATA("boucwen");
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): before any thread
+  setenv("TORSIO_DATA", data_folder(read_manifest(manifest_path("emps"))).c_str(), 1);
+  const StudyOptions quick{.seed = 1, .repeats = 2, .is_quick = true};
+  const Study study = run_study(find_study("public-benchmarks"), quick);
+  EXPECT_TRUE(study.tells_fit_time);
+  std::size_t published = 0;
+  for (const StudyRow& row : study.rows) {
+    SCOPED_TRACE(row.condition + ", " + row.model);
+    EXPECT_NE(row.paper_rmse.has_value(), row.runs > 0);
+    if (row.paper_rmse) {
+      ++published;
+    } else {
+      EXPECT_GT(row.fit_seconds, 0.0);
+    }
+  }
+  EXPECT_EQ(published, 17U);
+  const auto rmse_of = [&](const std::string& condition, const std::string& model) {
+    const auto found = std::ranges::find_if(study.rows, [&](const StudyRow& row) {
+      return row.condition == condition && row.model == model;
+    });
+    return found == study.rows.end() ? kNotMeasured : found->rmse;
+  };
+  EXPECT_LT(rmse_of("boucwen test_sinesweep", "narx_mlp, 16 lags, 128 units"),
+            rmse_of("boucwen test_sinesweep", "arx"));
+  EXPECT_LT(rmse_of("emps emps_val", "friction_drive, 4 numbers"), rmse_of("emps emps_val", "arx"));
 }
 
 }  // namespace

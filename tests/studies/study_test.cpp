@@ -175,6 +175,22 @@ TEST(Studies, ShowTheirFiguresBesideThePapers) {
   EXPECT_TRUE(json["full_scale"].is_null());
 }
 
+TEST(Studies, TellHowLongAFitTookIfThatIsAsked) {
+  const StudyInfo info{"bench", "official", "a title", nullptr};
+  Study study{.protocol = "a protocol",
+              .unit = "m",
+              .options = {},
+              .rows = {{.condition = "test", .model = "arx", .runs = 1, .fit_seconds = 12.34},
+                       {.condition = "published", .model = "theirs", .paper_rmse = 0.25}}};
+  EXPECT_THAT(study_text(info, study), testing::Not(HasSubstr("fit s")));
+  EXPECT_FALSE(nlohmann::json::parse(study_json(info, study))["rows"][0].contains("fit_seconds"));
+  study.tells_fit_time = true;
+  EXPECT_THAT(study_text(info, study), testing::ContainsRegex("fit s +paper\ntest +arx .* 12.3\n"));
+  const auto rows = nlohmann::json::parse(study_json(info, study))["rows"];
+  EXPECT_EQ(rows[0]["fit_seconds"], 12.34);
+  EXPECT_FALSE(rows[1].contains("fit_seconds"));
+}
+
 TEST(Studies, OfASensorTellErrorsOfItsFullScaleAndWhatDiverged) {
   const StudyInfo info{"002-x", "002, Table 0", "a title", nullptr};
   const Study study{.protocol = "a protocol",

@@ -9,6 +9,8 @@
 #include "support/driven_record.hpp"
 #include "support/error_message.hpp"
 #include "torsio/model/any_model.hpp"
+#include "torsio/train/comparison.hpp"
+#include "torsio/train/evaluate.hpp"
 #include "torsio/train/fit_dynamic_bouc_wen.hpp"
 #include "torsio/train/fit_friction_drive.hpp"
 #include "torsio/train/initial_state.hpp"
@@ -118,6 +120,41 @@ TEST(FitFrictionDrive, SaysWhyItCannotFit) {
   for (double& y : backward.sequences[0].target) y = -y;
   EXPECT_THAT(test::error_message([&] { (void)fit_friction_drive(backward, {}); }),
               HasSubstr("accelerates the target in its own direction"));
+}
+
+/// Pushed by a hand that the record knows nothing of, from a speed of 0.3 m/s on.
+Recording drifting_record() {
+  std::vector<double> force = multisine(4000, 1000.0, 0.5, 4.0, 80.0);
+  FrictionDrive drive = carriage();
+  drive.set_state(std::vector<double>{0.1, 0.3, 0.0});
+  std::vector<double> position;
+  for (std::size_t n = 0; n < force.size(); ++n) {
+    const double pushed = force[n] + 15.0 * std::sin(1e-3 * static_cast<double>(n));
+    position.push_back(drive.step({&pushed, 1}).value);
+  }
+  Recording recording("drifting", 1000.0);
+  recording.add(Channel{"force_N", std::move(force)});
+  recording.add(Channel{"position_m", std::move(position)});
+  return recording;
+}
+
+TEST(FitFrictionDrive, PutsAStartByTheFirstSamplesHoweverFarTheRunDrifts) {
+  Dataset dataset;
+  dataset.target = "position_m";
+  Recording recording = drifting_record();
+  dataset.records.push_back({recording, whole_record(recording.size(), Role::train)});
+  const auto choices = model_choices(dataset, "friction_drive", {"force_N"});
+  const TrainedModel trained = train_model(dataset, choices[0], 1);
+  const Channel& target = recording.channel("position_m");
+  const Prediction told = predict(make_estimator(trained.file), recording, {&target, 50});
+  const auto miss = [&](std::size_t n) {
+    return std::abs(told.estimates[n].value - target.values[n]);
+  };
+  EXPECT_EQ(told.initialised, 50U);
+  EXPECT_LT(miss(49), 2e-5);
+  double largest = 0.0;
+  for (std::size_t n = 50; n < recording.size(); ++n) largest = std::max(largest, miss(n));
+  EXPECT_GT(largest, 5e-3);
 }
 
 TEST(InitialState, OfAMassOnAHystereticSpringIsFoundFromItsFirstSamples) {

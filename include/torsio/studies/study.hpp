@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/core/not_measured.hpp"
 #include "torsio/core/progress.hpp"
 
 namespace torsio {
@@ -47,6 +48,7 @@ struct StudyRow {
   double fit_percent = 0.0;             ///< mean of `Metrics::fit_percent` (BF)
   std::optional<double> paper_fit_percent = {};  ///< what the paper judges by, where it is that
   std::optional<StudyTracking> tracking = {};    ///< of all rows of a study, or of none
+  double fit_seconds = kNotMeasured;             ///< mean of the runs
 };
 
 /// A simulated bench that a study used.
@@ -65,6 +67,7 @@ struct Study {
   std::optional<double> full_scale =
       {};  ///< of the sensor, in `unit`: errors are also told in % of it
   std::vector<std::string> notes = {};  ///< what the rows say in words, settings behind their names
+  bool tells_fit_time = false;          ///< how long a fit took is part of what it asks
 };
 
 struct StudyInfo {

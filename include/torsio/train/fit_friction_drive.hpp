@@ -21,10 +21,10 @@ struct FrictionDriveOptions {
   std::size_t iterations = 200;      ///< at most, of the last search
 };
 
-/// Least squares of free runs, each record's start searched for too. The search starts where the
-/// force is a linear function of acceleration, speed and direction (inverse dynamics, differences over
-/// three widths). "auto": the training records in 8 blocks, each fourth of them held out in turn and
-/// simulated from its own first 50 samples; a term stays if it lowers that error by more than 2 %.
+/// Least squares of free runs, each from where the record's first 50 samples put it. The search
+/// starts where the force is a linear function of acceleration, speed and direction (inverse dynamics,
+/// differences over three widths). "auto": the training records in 4 blocks, each of them held out in
+/// turn and simulated from its own first 50 samples; a term stays if it lowers that error by a tenth.
 /// @throws UsageError for an unknown term, Error unless the first input and the target move
 /// in both directions, and the search converges; Cancelled.
 [[nodiscard]] Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
