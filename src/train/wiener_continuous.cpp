@@ -71,6 +71,17 @@ std::vector<double> theta_of(const Sections& sections, double slowest) {
   return theta;
 }
 
+/// Logarithms would go on without end towards the slowest pole.
+std::vector<double> lowest_theta(std::size_t sections, std::size_t size, double slowest) {
+  constexpr double kNear = 1e-2;
+  std::vector<double> lowest(size, -std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < sections; ++i) {
+    lowest[kSectionColumns * i + 3] = std::log(kNear * slowest);
+    lowest[kSectionColumns * i + 4] = std::log(kNear * slowest * slowest);
+  }
+  return lowest;
+}
+
 /// What goes into G and what should come out of it, as the discrete model has it.
 WienerData inner_data(const WienerData& data, const WienerNumbers& numbers) {
   WienerData inner = data;
@@ -124,7 +135,9 @@ ContinuousFit refined_in_continuous_time(const WienerData& data, const WienerNum
   const WienerChart chart = continuous_chart(sections, slowest);
   const SearchResult found =
       minimise_squares_from(wiener_problem(error, error.size(), chart), starts,
-                            {.most_iterations = iterations, .progress = progress});
+                            {.most_iterations = iterations,
+                             .lower = lowest_theta(sections, error.size(), slowest),
+                             .progress = progress});
   std::vector<double> packed(error.size());
   Matrix no_slopes;
   chart(found.theta, packed, no_slopes);
