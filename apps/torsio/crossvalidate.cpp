@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <map>
+#include <string>
 #include <utility>
 
 #include "data_flags.hpp"
@@ -27,9 +29,9 @@ struct CrossValidateFlags {
 };
 
 std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
+                                            const std::map<std::string, std::string>& settings,
                                             const torsio::Dataset& dataset) {
   auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
-  const auto settings = parse_settings(flags.settings);
   if (settings.empty()) return choices;
   if (flags.models == "all")
     throw torsio::UsageError({.place = "--set",
@@ -44,13 +46,14 @@ std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
 }
 
 void run(const CrossValidateFlags& flags) {
+  const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   flags.data.check_outputs({flags.json.destination});
   const torsio::FoldScheme scheme{.folds = flags.folds,
                                   .embargo_s = torsio::si_quantity(flags.embargo, "s", "--embargo"),
                                   .by = flags.by};
   ProgressBar bar;
   torsio::Dataset dataset = flags.data.load({}, {}, bar.listener());
-  const auto choices = choices_of(flags, dataset);
+  const auto choices = choices_of(flags, settings, dataset);
   const torsio::CrossValidation validation = torsio::cross_validate(
       std::move(dataset), choices, scheme, flags.seed, flags.allow_leak, bar.listener());
   flags.json.write(torsio::cross_validation_json(validation));

@@ -136,8 +136,10 @@ std::map<std::string, std::string> parse_settings(const std::vector<std::string>
   for (const std::string& setting : settings) {
     const std::size_t equals = setting.find('=');
     if (equals == std::string::npos)
-      throw torsio::UsageError(
-          {.place = "--set", .expected = "option=value", .found = "'" + setting + "'"});
+      throw torsio::UsageError({.place = "--set",
+                                .expected = "option=value in one word, such as degree=3",
+                                .found = "'" + setting + "'",
+                                .advice = "Each setting has a --set of its own."});
     options[setting.substr(0, equals)] = setting.substr(equals + 1);
   }
   return options;

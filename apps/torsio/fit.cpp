@@ -82,12 +82,13 @@ void run(const FitFlags& flags) {
         {.place = "torsio fit",
          .expected = "recordings, --model FAMILY and -o FILE",
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
+  const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   flags.data.check_outputs({flags.output, flags.json.destination}, flags.validation);
   ProgressBar bar;
   const torsio::Dataset dataset = flags.data.load(flags.validation, {}, bar.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   (void)torsio::refuse_leak(dataset, features, flags.allow_leak);
-  const torsio::ModelChoice choice{flags.family, parse_settings(flags.settings), "", features};
+  const torsio::ModelChoice choice{flags.family, settings, "", features};
   torsio::TrainedModel trained = train(flags, dataset, choice, bar.listener());
   trained.file.card.device_serial = flags.device_serial;
   const torsio::Results results = torsio::evaluate_model(trained.file, dataset, bar.listener());

@@ -29,53 +29,77 @@ static_assert(std::endian::native == std::endian::little, "raw data of ONNX are 
                .advice = std::move(advice)});
 }
 
-template <class Number>
-std::vector<double> raw_numbers(const std::string& raw, const std::string& place) {
-  if (raw.size() % sizeof(Number) != 0) refuse(place, "whole numbers of bytes", "a part of one");
-  std::vector<Number> numbers(raw.size() / sizeof(Number));
-  if (!raw.empty()) std::memcpy(numbers.data(), raw.data(), raw.size());
-  return {numbers.begin(), numbers.end()};
+void check_count(std::size_t expected, std::size_t found, const char* of,
+                 const std::string& place) {
+  if (found != expected)
+    refuse(place, fmt::format("{} {}, as its shape says", expected, of), fmt::format("{}", found));
 }
 
 template <class Number, class Field>
 std::vector<double> numbers_of(const onnx::TensorProto& tensor, const Field& field,
-                               const std::string& place) {
-  if (tensor.has_raw_data()) return raw_numbers<Number>(tensor.raw_data(), place);
-  return {field.begin(), field.end()};
+                               std::size_t count, const std::string& place) {
+  if (!tensor.has_raw_data()) {
+    check_count(count, static_cast<std::size_t>(field.size()), "numbers", place);
+    return {field.begin(), field.end()};
+  }
+  const std::string& raw = tensor.raw_data();
+  check_count(count * sizeof(Number), raw.size(), "bytes", place);
+  std::vector<Number> numbers(count);
+  if (!raw.empty()) std::memcpy(numbers.data(), raw.data(), raw.size());
+  return {numbers.begin(), numbers.end()};
 }
 
-std::vector<double> values_of(const onnx::TensorProto& tensor, const std::string& place) {
+std::vector<double> values_of(const onnx::TensorProto& tensor, std::size_t count,
+                              const std::string& place) {
   switch (tensor.data_type()) {
-    case onnx::TensorProto::FLOAT: return numbers_of<float>(tensor, tensor.float_data(), place);
-    case onnx::TensorProto::DOUBLE: return numbers_of<double>(tensor, tensor.double_data(), place);
+    case onnx::TensorProto::FLOAT:
+      return numbers_of<float>(tensor, tensor.float_data(), count, place);
+    case onnx::TensorProto::DOUBLE:
+      return numbers_of<double>(tensor, tensor.double_data(), count, place);
     case onnx::TensorProto::INT64:
-      return numbers_of<std::int64_t>(tensor, tensor.int64_data(), place);
+      return numbers_of<std::int64_t>(tensor, tensor.int64_data(), count, place);
     case onnx::TensorProto::INT32:
-      return numbers_of<std::int32_t>(tensor, tensor.int32_data(), place);
+      return numbers_of<std::int32_t>(tensor, tensor.int32_data(), count, place);
     case onnx::TensorProto::BOOL:
-      return numbers_of<std::int8_t>(tensor, tensor.int32_data(), place);
+      return numbers_of<std::int8_t>(tensor, tensor.int32_data(), count, place);
     default:
       refuse(place, "float, double, int32, int64 or bool",
              fmt::format("type {}", tensor.data_type()), "Export the network in float32.");
   }
 }
 
-graph::Tensor tensor_of(const onnx::TensorProto& tensor, const std::string& place) {
-  if (tensor.data_location() == onnx::TensorProto::EXTERNAL || tensor.external_data_size() > 0)
-    refuse(place, "data within the file", "a reference to another file",
-           "Save the model with its weights inside (save_as_external_data=False).");
-  if (tensor.has_segment()) refuse(place, "a whole tensor", "a segment of one");
-  graph::Tensor result{{tensor.dims().begin(), tensor.dims().end()}, values_of(tensor, place)};
-  if (result.shape.size() > 8 || graph::element_count(result.shape) != result.values.size())
-    refuse(place, "as many numbers as its shape says", fmt::format("{}", result.values.size()));
-  const auto bad =
-      std::ranges::find_if_not(result.values, [](double x) { return std::isfinite(x); });
-  if (bad != result.values.end())
-    refuse(place, "finite numbers", fmt::format("{} at {}", *bad, bad - result.values.begin()));
-  return result;
-}
+/// Reads the constants of a graph. All of them together are few: elements of one byte in a file become
+/// numbers of eight.
+class Constants {
+ public:
+  graph::Tensor tensor_of(const onnx::TensorProto& tensor, const std::string& place) {
+    if (tensor.data_location() == onnx::TensorProto::EXTERNAL || tensor.external_data_size() > 0)
+      refuse(place, "data within the file", "a reference to another file",
+             "Save the model with its weights inside (save_as_external_data=False).");
+    if (tensor.has_segment()) refuse(place, "a whole tensor", "a segment of one");
+    const std::vector<std::int64_t> shape(tensor.dims().begin(), tensor.dims().end());
+    constexpr std::size_t kMostRank = 8;
+    const auto count = graph::element_count(shape);
+    if (shape.size() > kMostRank || !count)
+      refuse(place, "as many numbers as its shape says", "a shape that no file holds");
+    numbers_ += *count;
+    constexpr std::size_t kMost = kMostForeignBytes / sizeof(float);
+    if (numbers_ > kMost)
+      refuse(place, fmt::format("at most {} numbers in all constants", kMost), "more");
+    graph::Tensor result{shape, values_of(tensor, *count, place)};
+    const auto bad =
+        std::ranges::find_if_not(result.values, [](double x) { return std::isfinite(x); });
+    if (bad != result.values.end())
+      refuse(place, "finite numbers", fmt::format("{} at {}", *bad, bad - result.values.begin()));
+    return result;
+  }
 
-graph::Attribute attribute_of(const onnx::AttributeProto& proto, const std::string& place) {
+ private:
+  std::size_t numbers_ = 0;
+};
+
+graph::Attribute attribute_of(const onnx::AttributeProto& proto, const std::string& place,
+                              Constants& constants) {
   graph::Attribute attribute;
   switch (proto.type()) {
     case onnx::AttributeProto::FLOAT: attribute.numbers = {static_cast<double>(proto.f())}; break;
@@ -90,7 +114,9 @@ graph::Attribute attribute_of(const onnx::AttributeProto& proto, const std::stri
     case onnx::AttributeProto::STRINGS:
       attribute.texts.assign(proto.strings().begin(), proto.strings().end());
       break;
-    case onnx::AttributeProto::TENSOR: attribute.tensor = tensor_of(proto.t(), place); break;
+    case onnx::AttributeProto::TENSOR:
+      attribute.tensor = constants.tensor_of(proto.t(), place);
+      break;
     default: break;  // graphs and types belong to operators that are refused by name
   }
   if (std::ranges::any_of(attribute.numbers, [](double x) { return !std::isfinite(x); }))
@@ -98,7 +124,7 @@ graph::Attribute attribute_of(const onnx::AttributeProto& proto, const std::stri
   return attribute;
 }
 
-graph::Node node_of(const onnx::NodeProto& proto, const std::string& place) {
+graph::Node node_of(const onnx::NodeProto& proto, const std::string& place, Constants& constants) {
   const bool is_own = proto.domain().empty() || proto.domain() == "ai.onnx";
   graph::Node node{
       .name = proto.name(),
@@ -108,7 +134,8 @@ graph::Node node_of(const onnx::NodeProto& proto, const std::string& place) {
   for (const onnx::AttributeProto& attribute : proto.attribute())
     node.attributes[attribute.name()] = attribute_of(
         attribute,
-        fmt::format("{}: node '{}' ({}): {}", place, node.name, node.op, attribute.name()));
+        fmt::format("{}: node '{}' ({}): {}", place, node.name, node.op, attribute.name()),
+        constants);
   return node;
 }
 
@@ -133,11 +160,12 @@ std::int64_t opset_of(const onnx::ModelProto& model, const std::string& place) {
 
 graph::Graph graph_of(const onnx::ModelProto& model, std::string_view place) {
   graph::Graph graph{.place = std::string(place), .opset = opset_of(model, std::string(place))};
+  Constants constants;
   for (const onnx::TensorProto& tensor : model.graph().initializer())
     graph.constants[tensor.name()] =
-        tensor_of(tensor, fmt::format("{}: tensor '{}'", place, tensor.name()));
+        constants.tensor_of(tensor, fmt::format("{}: tensor '{}'", place, tensor.name()));
   for (const onnx::NodeProto& node : model.graph().node())
-    graph.nodes.push_back(node_of(node, graph.place));
+    graph.nodes.push_back(node_of(node, graph.place, constants));
   for (const onnx::ValueInfoProto& input : model.graph().input())
     if (!graph.constants.contains(input.name())) graph.inputs.push_back(input_of(input));
   for (const onnx::ValueInfoProto& output : model.graph().output())

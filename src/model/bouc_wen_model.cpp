@@ -6,7 +6,6 @@
 #include "model/bracketed_inverse.hpp"
 #include "model/hysteresis_checks.hpp"
 #include "model/other_inputs.hpp"
-#include "torsio/actuator/bouc_wen_loading.hpp"
 
 namespace torsio {
 namespace {
@@ -32,6 +31,22 @@ Unloaded unload(double share, double travel, double rho, double exponent) noexce
     travel -= step;
   }
   return {std::min(share, 0.0), travel};
+}
+
+/// dz/du = 1 - z^n from z >= 0. Near 1 by the first two powers of e = 1 - z, a Bernoulli equation:
+/// de/du = -n e + n (n - 1) / 2 e^2.
+double load(double share, double travel, double exponent) noexcept {
+  constexpr double kNear = 0.01;  // the third power is 6e-5 there at the most
+  const double longest = std::min(kLongestStep, 0.5 / exponent);  // cannot overshoot z = 1
+  while (travel > 0.0 && share < 1.0 - kNear) {
+    const double step = std::min(travel, longest);
+    const double middle = share + 0.5 * step * (1.0 - std::pow(share, exponent));
+    share += step * (1.0 - std::pow(middle, exponent));
+    travel -= step;
+  }
+  if (travel <= 0.0 || share >= 1.0) return std::min(share, 1.0);
+  const double curved = 0.5 * (exponent - 1.0);
+  return 1.0 - 1.0 / ((1.0 / (1.0 - share) - curved) * std::exp(exponent * travel) + curved);
 }
 
 }  // namespace
@@ -75,11 +90,7 @@ double BoucWenModel::share_after(double increment) const noexcept {
   const Unloaded free = unload(direction * share_, travel, unloading_, exponent);
   if (free.travel == 0.0 && free.share < 0.0) return direction * free.share;
   const double share = share_ * direction > 0.0 ? share_ * direction : 0.0;
-  // Near 1 the rest fades as exp(-n u), before that within u = 1 and a little.
-  const double settled = 1.0 + 36.0 / exponent;
-  return direction * bouc_wen_loading(share, free.travel, std::min(kLongestStep, 0.5 / exponent),
-                                      settled,
-                                      [exponent](double z) { return std::pow(z, exponent); });
+  return direction * load(share, free.travel, exponent);
 }
 
 Estimate BoucWenModel::step(Features features) noexcept {

@@ -90,8 +90,11 @@ Estimate HammersteinWiener::step(Features features) noexcept {
     state[1] = g[2] * x - g[4] * y;
     x = y;
   }
-  value_ = parameters_.output(std::min(std::max(x, parameters_.lowest), parameters_.highest));
-  return {.value = value_};
+  const double held = std::min(std::max(x, parameters_.lowest), parameters_.highest);
+  value_ = parameters_.output(held);
+  const double border = kBorder * (parameters_.highest - parameters_.lowest);
+  return {.value = value_,
+          .fault = std::abs(x - held) <= border ? Fault::none : Fault::outside_training_range};
 }
 
 void HammersteinWiener::set_state(std::span<const double> state) noexcept {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "model/affine_inverse.hpp"
 #include "torsio/core/error.hpp"
@@ -31,6 +32,28 @@ void require(bool good, const std::string& field, const std::string& expected, d
         {.place = "polynomial: " + field, .expected = expected, .found = std::to_string(found)});
 }
 
+/// The ranges as a schedule over the coefficients' knots.
+CoefficientSchedule ranges_of(const Polynomial::Parameters& parameters) {
+  CoefficientSchedule schedule = parameters.coefficients;
+  const std::size_t columns = 2 * parameters.curves();
+  if (!parameters.ranges.values.empty()) {
+    const Matrix& given = parameters.ranges;
+    if (given.rows != schedule.values.rows || given.columns != columns)
+      throw Error({.place = "polynomial: ranges",
+                   .expected = std::to_string(schedule.values.rows) + " x " +
+                               std::to_string(columns) + ", lowest and highest of each curve",
+                   .found = std::to_string(given.rows) + " x " + std::to_string(given.columns)});
+    schedule.values = given;
+    return schedule;
+  }
+  Matrix whole(schedule.values.rows, columns);
+  for (std::size_t k = 0; k < whole.rows; ++k)
+    for (std::size_t j = 0; j < columns; ++j)
+      whole(k, j) = parameters.centre + (j % 2 == 0 ? -1.0 : 1.0) * parameters.half_range;
+  schedule.values = std::move(whole);
+  return schedule;
+}
+
 }  // namespace
 
 Polynomial::Polynomial(const Parameters& parameters)
@@ -41,6 +64,7 @@ Polynomial::Polynomial(const Parameters& parameters)
       half_range_(parameters.half_range),
       first_slope_(parameters.curve_columns()),
       coefficients_(parameters.coefficients, inputs_of(parameters), kFamily),
+      ranges_(ranges_of(parameters), input_count(), "polynomial: ranges"),
       direction_(parameters.dead_band) {
   require(std::isfinite(centre_), "centre", "a finite number", centre_);
   require(std::isfinite(half_range_) && half_range_ > 0.0, "half_range", "a positive number",
@@ -51,6 +75,11 @@ Polynomial::Polynomial(const Parameters& parameters)
   for (std::size_t k = 0; k < values.rows; ++k)
     require(values(k, first_slope_) == 0.0, "slope of the first input",
             "0, since the curve holds that term", values(k, first_slope_));
+  const Matrix& ranges = ranges_.schedule().values;
+  for (std::size_t k = 0; k < ranges.rows; ++k)
+    for (std::size_t j = 0; j < ranges.columns; j += 2)
+      require(ranges(k, j) <= ranges(k, j + 1), "ranges", "a highest that is not below the lowest",
+              ranges(k, j + 1));
 }
 
 Polynomial::Parameters Polynomial::parameters() const {
@@ -59,34 +88,47 @@ Polynomial::Parameters Polynomial::parameters() const {
           .by_direction = by_direction_,
           .dead_band = dead_band_,
           .centre = centre_,
-          .half_range = half_range_};
+          .half_range = half_range_,
+          .ranges = ranges_.schedule().values};
 }
 
-Polynomial::Curve Polynomial::branch(const ScheduledCoefficients::Position& at, std::size_t first,
+Polynomial::Reach Polynomial::reach(const Position& at, std::size_t branch) const noexcept {
+  return {(ranges_.coefficient(at, 2 * branch) - centre_) / half_range_,
+          (ranges_.coefficient(at, 2 * branch + 1) - centre_) / half_range_};
+}
+
+Polynomial::Curve Polynomial::branch(const Position& at, std::size_t branch,
                                      double z) const noexcept {
-  Curve result;
+  const Reach own = reach(at, branch);
+  const double border = kBorder * (own.highest - own.lowest);
+  const double held = std::min(std::max(z, own.lowest - border), own.highest + border);
+  const std::size_t first = branch * (degree_ + 1);
+  Curve result{.is_held = held < z || held > z};
   for (std::size_t i = degree_ + 1; i-- > 0;) {
-    result.slope = result.slope * z + result.value;
-    result.value = result.value * z + coefficients_.coefficient(at, first + i);
+    result.slope = result.slope * held + result.value;
+    result.value = result.value * held + coefficients_.coefficient(at, first + i);
   }
+  if (result.is_held) result.slope = 0.0;
   return result;
 }
 
-Polynomial::Curve Polynomial::curve(const ScheduledCoefficients::Position& at,
-                                    double z) const noexcept {
+Polynomial::Curve Polynomial::curve(const Position& at, double z) const noexcept {
   const Direction direction = direction_.direction();
   if (!by_direction_ || direction == Direction::rising) return branch(at, 0, z);
-  const Curve falling = branch(at, degree_ + 1, z);
+  const Curve falling = branch(at, 1, z);
   if (direction == Direction::falling) return falling;
   const Curve rising = branch(at, 0, z);
-  return {0.5 * (rising.value + falling.value), 0.5 * (rising.slope + falling.slope)};
+  return {0.5 * (rising.value + falling.value), 0.5 * (rising.slope + falling.slope),
+          rising.is_held || falling.is_held};
 }
 
 Estimate Polynomial::step(Features features) noexcept {
   direction_.step(features[0]);
   const auto at = coefficients_.locate(features);
   const double z = (features[0] - centre_) / half_range_;
-  return {.value = curve(at, z).value + coefficients_.weighted_sum(at, first_slope_, features)};
+  const Curve here = curve(at, z);
+  return {.value = here.value + coefficients_.weighted_sum(at, first_slope_, features),
+          .fault = here.is_held ? Fault::outside_training_range : Fault::none};
 }
 
 Estimate Polynomial::invert(double target, Features features) const noexcept {
@@ -96,8 +138,11 @@ Estimate Polynomial::invert(double target, Features features) const noexcept {
   const double wanted = target - coefficients_.weighted_sum(at, first_slope_, features, 1);
   const auto x = [this](double z) { return centre_ + half_range_ * z; };
 
-  double low = -1.0;
-  double high = 1.0;
+  const Direction direction = direction_.direction();
+  auto [low, high] = !by_direction_ ? reach(at, 0)
+                     : direction == Direction::unknown
+                         ? Reach{}
+                         : reach(at, direction == Direction::rising ? 0 : 1);
   const double error_low = curve(at, low).value - wanted;
   const double error_high = curve(at, high).value - wanted;
   if (!(error_low * error_high <= 0.0)) {

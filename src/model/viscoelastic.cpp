@@ -7,7 +7,7 @@
 
 #include "core/all_finite.hpp"
 #include "model/affine_inverse.hpp"
-#include "torsio/actuator/maxwell_branches.hpp"
+#include "model/relaxation_step.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -34,10 +34,10 @@ Viscoelastic::Viscoelastic(Parameters parameters)
   slope_ = spectrum_.damping / period_s;
   moving_slope_ = spectrum_.stiffness + slope_;
   for (const RelaxationBranch& branch : spectrum_.branches) {
-    const double passed = branch.rate_1_s * period_s;
-    decay_.push_back(std::exp(-passed));
-    gain_.push_back(branch.stiffness * mean_decay(passed));
-    moving_slope_ += gain_.back();
+    const RelaxationStep step = relaxation_step(branch, period_s);
+    decay_.push_back(step.decay);
+    gain_.push_back(step.gain);
+    moving_slope_ += step.gain;
   }
   torque_.resize(decay_.size());
   reset();
@@ -63,11 +63,7 @@ Estimate Viscoelastic::step(Features features) noexcept {
   double value = parameters_.offset + spectrum_.stiffness * u;
   if (is_started_) {
     const double moved = u - last_;
-    value += slope_ * moved;
-    for (std::size_t i = 0; i < torque_.size(); ++i) {
-      torque_[i] = decay_[i] * torque_[i] + gain_[i] * moved;
-      value += torque_[i];
-    }
+    value = relaxed<std::dynamic_extent>(value + slope_ * moved, moved, decay_, gain_, torque_);
     value_per_input_ = moving_slope_;
   } else {
     for (const double torque : torque_) value += torque;

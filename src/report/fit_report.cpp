@@ -1,8 +1,11 @@
 #include "torsio/report/fit_report.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "report/result_parts.hpp"
 #include "torsio/report/text_table.hpp"
@@ -34,6 +37,21 @@ Json report_json(const FitReport& report) {
           {"parameters", std::move(parameters)}};
 }
 
+/// What the correlations say, in a sentence.
+std::string verdict(const FitReport& report) {
+  constexpr double kMatters = 0.1;  // long records tell any correlation from none
+  constexpr double kChance = 0.05;  // of the lags; one in a hundred lies outside by chance
+  std::vector<std::string> with;
+  for (const ResidualCorrelation& each : report.correlations)
+    if (std::abs(each.strongest) > kMatters && each.share_outside > kChance)
+      with.push_back(&each == report.correlations.data() ? "their own past" : each.with);
+  if (with.empty())
+    return "neither their past nor an input tells the residuals: nothing is left to learn\n";
+  return fmt::format("the residuals follow {}: what is left there another model could learn{}\n",
+                     fmt::join(with, ", "),
+                     report.table.empty() ? "" : "; the standard errors below are widened for it");
+}
+
 }  // namespace
 
 std::string fit_report_text(const FitReport& report) {
@@ -51,7 +69,7 @@ std::string fit_report_text(const FitReport& report) {
       table.row({each.with, fmt::format("{:+.3f}", each.strongest),
                  fmt::format("{:.3g}", each.lag_s), fmt::format("{:.3f}", each.bound),
                  fmt::format("{:.0f}", 100.0 * each.share_outside)});
-    text += table.text();
+    text += table.text() + verdict(report);
   }
   if (report.table.empty()) return text;
   TextTable table;

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "torsio/core/units.hpp"
-#include "torsio/model/hammerstein_wiener.hpp"
 #include "torsio/model/network_layers.hpp"
 #include "torsio/model/parameters.hpp"
 #include "torsio/report/text_table.hpp"
+#include "torsio/train/fit_hammerstein_wiener.hpp"
 #include "torsio/train/fit_narx_polynomial.hpp"
 #include "train/kernel_search.hpp"
 
@@ -101,15 +101,8 @@ std::string parameter_lines(const std::vector<Leaf>& leaves) {
 std::string linear_part_lines(const ModelFile& model) {
   const auto* of = std::get_if<HammersteinWiener::Parameters>(&model.parameters);
   if (of == nullptr) return {};
-  constexpr std::size_t kReadableOrder = 4;
-  const DiscreteTransfer g = transfer_of(of->sections);
   std::string text;
-  if (g.denominator.size() > 1 && g.denominator.size() <= kReadableOrder)
-    text += fmt::format("linear part in continuous time, by Tustin: {}\n",
-                        text_of(tustin(g, of->sample_period_s)));
-  if (const std::string warning = continuous_warning(of->sections, of->sample_period_s);
-      !warning.empty())
-    text += fmt::format("{}\n", warning);
+  for (const std::string& line : continuous_notes(*of)) text += line + "\n";
   return text;
 }
 

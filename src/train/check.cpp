@@ -165,28 +165,46 @@ class Checker {
     pass_unless_found("frozen sensors", "none rests while the others move", [&] {
       for_each_channel([&](const Recording& recording, const Channel& channel) {
         if (is_condition(recording, channel.name)) return;
-        const Rest rest = longest_rest(channel);
-        const double duration_s =
-            static_cast<double>(rest.end - rest.begin) / recording.sample_rate_Hz();
-        // A silent sensor delivers nothing where it should have delivered many times.
-        const double expected_deliveries =
-            share_fresh(channel) * static_cast<double>(rest.end - rest.begin);
-        if (duration_s < kFrozen_s || expected_deliveries < kFrozenDeliveries ||
-            rest.end - rest.begin == channel.values.size())
-          return;
-        for (const std::string& other : channels_) {
-          const double moved = share_moved(recording.channel(other), rest);
-          if (other == channel.name || moved < kMovedMeanwhile) continue;
-          add(Verdict::warn, "frozen sensors", recording.name(),
-              fmt::format("{} tells {:g} for {:.3g} s from t = {:.4g} s, while {} moves through "
-                          "{:.0f} % of its range",
-                          channel.name, channel.values[rest.begin], duration_s,
-                          recording.time_s(rest.begin), other, 100.0 * moved),
-              "Did its bus stall? Cut that part out: a model would learn the stall.");
-          return;
+        const auto shortest =
+            static_cast<std::size_t>(0.5 * kFrozen_s * recording.sample_rate_Hz());
+        const std::vector<Rest> rests = rests_of(channel, std::max<std::size_t>(shortest, 2));
+        for (const Rest& rest : rests) {
+          const auto samples = static_cast<double>(rest.length());
+          const double duration_s = samples / recording.sample_rate_Hz();
+          // A silent sensor delivers nothing where it should have delivered many times.
+          if (duration_s < kFrozen_s || share_fresh(channel) * samples < kFrozenDeliveries ||
+              rest.length() == channel.values.size())
+            return;
+          for (const std::string& name : channels_) {
+            const Channel& other = recording.channel(name);
+            const double moved = share_moved(other, rest);
+            if (name == channel.name ||
+                (moved < kMovedMeanwhile && !stands_out(channel, rests, rest, other, moved)))
+              continue;
+            add(Verdict::warn, "frozen sensors", recording.name(),
+                fmt::format("{} tells {:g} for {:.3g} s from t = {:.4g} s, while {} moves through "
+                            "{:.{}f} % of its range",
+                            channel.name, channel.values[rest.begin], duration_s,
+                            recording.time_s(rest.begin), name, 100.0 * moved, moved < 0.1 ? 1 : 0),
+                "Did its bus stall? Cut that part out: a model would learn the stall.");
+            return;
+          }
         }
       });
     });
+  }
+
+  // A stall while little moves: the channel goes with another everywhere else, and nowhere else did it
+  // stay behind like that, as a joint does that sticks at every turn.
+  [[nodiscard]] static bool stands_out(const Channel& channel, const std::vector<Rest>& rests,
+                                       const Rest& rest, const Channel& other, double moved) {
+    return moved >= kMovedALittle &&
+           moved * extent_of(channel.values).width() >= kFewCodes * finest_step(channel.values) &&
+           std::abs(correlation(channel.values, other.values)) >= kTogether &&
+           std::ranges::none_of(rests, [&](const Rest& each) {
+             return !(each == rest) && 2 * each.length() >= rest.length() &&
+                    2.0 * share_moved(other, each) >= moved;
+           });
   }
 
   // What the first input is made of may move through much more than it does: codes of a gear's angle
@@ -394,7 +412,10 @@ class Checker {
   static constexpr double kFrozen_s = 0.2;
   static constexpr double kFrozenDeliveries = 10.0;
   static constexpr double kMovedMeanwhile = 0.4;  ///< of another channel's range
-  static constexpr double kCoarseShare = 0.02;    ///< of the range: 50 codes
+  static constexpr double kMovedALittle = 0.02;
+  static constexpr double kTogether = 0.9;  ///< correlation
+  static constexpr double kFewCodes = 5.0;
+  static constexpr double kCoarseShare = 0.02;  ///< of the range: 50 codes
   static constexpr double kJumpShare = 0.02;
   static constexpr double kJumpOverOthers = 5.0;
   static constexpr double kLongestDelay_s = 0.1;

@@ -1,5 +1,7 @@
 #include "train/excited_band.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -50,6 +52,14 @@ ExcitedBand excited_band(const TrainingData& data) {
            static_cast<double>(length);
   };
   return {.lowest_Hz = frequency_at(kEdge), .highest_Hz = frequency_at(1.0 - kEdge)};
+}
+
+std::string outside_of(const ExcitedBand& band, double rate_1_s) {
+  const double frequency_Hz = rate_1_s / (2.0 * std::numbers::pi);
+  const bool is_below = frequency_Hz < 0.5 * band.lowest_Hz;
+  if (!is_below && frequency_Hz <= 2.0 * band.highest_Hz) return {};
+  return fmt::format("{} the {:.2g} to {:.2g} Hz that the records excite, which see only its tail",
+                     is_below ? "below" : "above", band.lowest_Hz, band.highest_Hz);
 }
 
 }  // namespace torsio

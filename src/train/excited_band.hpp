@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "torsio/train/training_data.hpp"
 
 namespace torsio {
@@ -11,5 +13,9 @@ struct ExcitedBand {
   double highest_Hz = 0.0;
 };
 [[nodiscard]] ExcitedBand excited_band(const TrainingData& data);
+
+/// "below the 0.05 to 4 Hz that the records excite, which see only its tail" of what relaxes at a rate
+/// more than an octave outside; else nothing.
+[[nodiscard]] std::string outside_of(const ExcitedBand& band, double rate_1_s);
 
 }  // namespace torsio

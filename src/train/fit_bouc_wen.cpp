@@ -129,32 +129,41 @@ Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const HysteresisSear
                                   const Progress& progress) {
   const OperatorData runs =
       operator_data(data, options.rates, 0, kMostResiduals / 4, 6 + data.input_count());
+  constexpr double kSmallTurn = 2e-3;
+  const OperatorData smooth_runs = without_small_turns(runs, kSmallTurn * runs.half_range);
+  BoucWenSearch smooth_search(smooth_runs);
   BoucWenSearch search(runs);
-  const ResidualProblem problem{
-      .residuals = runs.rows(),
-      .evaluate = [&](std::span<const double> theta, std::span<double> residuals,
-                      std::span<double> /*jacobian*/) {
-        if (!is_allowed(shape_of(theta))) return false;
-        search.solve(shape_of(theta), residuals);
-        return true;
-      }};
+  const auto problem_of = [&](BoucWenSearch& of) {
+    return ResidualProblem{
+        .residuals = runs.rows(),
+        .evaluate = [&](std::span<const double> theta, std::span<double> residuals,
+                        std::span<double> /*jacobian*/) {
+          if (!is_allowed(shape_of(theta))) return false;
+          of.solve(shape_of(theta), residuals);
+          return true;
+        }};
+  };
   const double range = std::log(runs.half_range);
   const double highest = range + std::log(4.0);
   std::vector<std::vector<double>> starts;
   for (const double share : {0.03, 0.3})
     for (const double ratio : {0.8, -0.3}) starts.push_back({range + std::log(share), 1.5, ratio});
-  const SearchResult found = converged_search(problem, starts,
-                                              {.most_iterations = options.most_iterations,
-                                               .lower = {range + std::log(1e-4), 1.0, kLeastRatio},
-                                               .upper = {highest, kMostExponent, 1.0},
-                                               .typical = {1.0, 1.0, 1.0},
-                                               .progress = progress},
-                                              BoucWenModel::kFamily);
+  const SearchOptions limits{.most_iterations = options.most_iterations,
+                             .lower = {range + std::log(1e-4), 1.0, kLeastRatio},
+                             .upper = {highest, kMostExponent, 1.0},
+                             .typical = {1.0, 1.0, 1.0},
+                             .progress = progress};
+  const SearchResult near =
+      converged_search(problem_of(smooth_search), starts, limits, BoucWenModel::kFamily);
+  const SearchResult found =
+      converged_search(problem_of(search), {near.theta}, limits, BoucWenModel::kFamily);
   std::vector<double> residuals(runs.rows());
   const Shape shape = shape_of(found.theta);
   const LinearSolution linear = search.solve(shape, residuals);
   const std::vector<double>& c = linear.coefficients;
-  Fitted<BoucWenModel> fitted{parameters_of(shape, c[0], c[1], c[2]), runs.notes};
+  // A line takes no small steps.
+  const Shape told = c[2] == 0.0 ? Shape{runs.half_range, 1.0, 0.0} : shape;
+  Fitted<BoucWenModel> fitted{parameters_of(told, c[0], c[1], c[2]), runs.notes};
   fitted.parameters.slopes.assign(c.begin() + 3, c.end());
   fitted.parameters.centre = runs.centre;
   fitted.parameters.half_range = runs.half_range;

@@ -31,8 +31,9 @@ struct Trained {
 
 /// Which member of an ensemble a network is; empty: of none.
 struct EnsembleMember {
-  std::string name;                 ///< ends the recipe
-  std::span<const float> finished;  ///< its weights, if an earlier call has come so far
+  std::string name;                      ///< ends the recipe
+  std::size_t of = 1;                    ///< so many members
+  std::span<const float> finished = {};  ///< its weights, if an earlier call has come so far
   double finished_loss = 0.0;
 };
 
@@ -57,7 +58,7 @@ Fitted<Ensemble<Member>> fit_ensemble(std::size_t members, const FitContext& con
   double least = std::numeric_limits<double>::infinity();
   double most = 0.0;
   for (std::size_t k = 0; k < members; ++k) {
-    EnsembleMember member{fmt::format(", member {} of {}", k + 1, members), {}};
+    EnsembleMember member{.name = fmt::format(", member {} of {}", k + 1, members), .of = members};
     FitContext own = context;
     own.seed = k == 0 ? context.seed : Random(context.seed + k).bits();
     own.resume = k == known ? context.resume : nullptr;

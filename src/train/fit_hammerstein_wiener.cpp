@@ -6,12 +6,16 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <iterator>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "train/excited_band.hpp"
+#include "train/wiener_problem.hpp"
 #include "train/wiener_search.hpp"
 
 namespace torsio {
@@ -98,9 +102,14 @@ WienerFit fit_or_refuse(const WienerData& own, const WienerShape& shape, std::si
 
 std::string roots_text(const std::vector<std::complex<double>>& roots, double period_s,
                        bool with_time) {
+  constexpr std::size_t kReadable = 8;
   std::vector<std::string> parts;
   for (const std::complex<double> root : roots) {
     if (root.imag() < 0.0) continue;
+    if (parts.size() == kReadable) {
+      parts.emplace_back("...");
+      break;
+    }
     const bool is_real = root.imag() == 0.0;
     std::string text = is_real ? fmt::format("{:.6g}", root.real())
                                : fmt::format("{:.6g} +- {:.4g}i", root.real(), root.imag());
@@ -123,17 +132,16 @@ class Telling {
         "slope d({})/d({}) about rest: {:.4g} at once, {:.4g} after a long time", data_.target,
         data_.inputs.front().expression, slope_about_rest(p, first_gain(p.sections)),
         slope_about_rest(p, dc_gain(p.sections))));
-  }
-
-  static void discrete_as_continuous(const HammersteinWiener::Parameters& p,
-                                     std::vector<std::string>& notes) {
-    const DiscreteTransfer g = transfer_of(p.sections);
-    constexpr std::size_t kReadable = 4;
-    if (g.denominator.size() <= kReadable && g.denominator.size() > 1)
-      notes.push_back(fmt::format("in continuous time by Tustin: X/W = {}",
-                                  text_of(tustin(g, p.sample_period_s))));
-    if (std::string warning = continuous_warning(p.sections, p.sample_period_s); !warning.empty())
-      notes.push_back(std::move(warning));
+    const ExcitedBand band = excited_band(data_);
+    for (const std::complex<double> pole : poles(p.sections)) {
+      if (pole.imag() != 0.0 || pole.real() <= 0.0) continue;
+      const double rate_1_s = -std::log(pole.real()) / p.sample_period_s;
+      if (const std::string place = outside_of(band, rate_1_s); place.starts_with("below"))
+        notes.push_back(
+            fmt::format("the pole {:.6g} ({:.2g} Hz) lies {}: its time constant may be far off; "
+                        "add a slow record",
+                        pole.real(), rate_1_s / (2.0 * std::numbers::pi), place));
+    }
   }
 
   void what_is_held(const HammersteinWiener::Parameters& p, const WienerNumbers& numbers,
@@ -208,6 +216,19 @@ ContinuousFit refine_or_refuse(const WienerData& own, const WienerNumbers& numbe
 
 }  // namespace
 
+std::vector<std::string> continuous_notes(const HammersteinWiener::Parameters& parameters) {
+  std::vector<std::string> notes;
+  const DiscreteTransfer g = transfer_of(parameters.sections);
+  constexpr std::size_t kReadable = 4;
+  if (g.denominator.size() <= kReadable && g.denominator.size() > 1)
+    notes.push_back(fmt::format("linear part in continuous time, by Tustin: X/W = {}",
+                                text_of(tustin(g, parameters.sample_period_s))));
+  if (std::string warning = continuous_warning(parameters.sections, parameters.sample_period_s);
+      !warning.empty())
+    notes.push_back(std::move(warning));
+  return notes;
+}
+
 Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
                                                  const HammersteinWienerOptions& options,
                                                  const FitContext& context) {
@@ -238,7 +259,8 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
   const Telling telling(data, own);
   telling.table(fit.numbers, fitted);
   const double discrete_rmse = rmse_of(own, fit.sum_of_squares);
-  Telling::discrete_as_continuous(parameters_of(own, fit.numbers, 1), fitted.notes);
+  std::ranges::move(continuous_notes(parameters_of(own, fit.numbers, 1)),
+                    std::back_inserter(fitted.notes));
   if (options.continuous == ContinuousForm::tustin) {
     fit.numbers = held_between_samples(own, std::move(fit.numbers));
     fitted.notes.push_back(fmt::format(

@@ -60,15 +60,18 @@ void check(const TrainingWindows& windows) {
           fmt::format("{}", windows.burn_in));
 }
 
-void check_fits_a_file(const TrainingNetwork& network) {
-  const std::size_t bytes = network.parameter_count() * sizeof(float);
+void check_fits_a_file(const TrainingNetwork& network, std::size_t members) {
+  const std::size_t bytes = members * network.parameter_count() * sizeof(float);
   if (bytes <= kMostModelFileBytes) return;
   throw UsageError(
       {.place = "layers",
-       .expected = fmt::format("a network of at most {} MiB, as model files are",
+       .expected = fmt::format("networks of at most {} MiB together, as model files are",
                                kMostModelFileBytes >> 20),
-       .found = fmt::format("{} parameters, {} MiB", network.parameter_count(), bytes >> 20),
-       .advice = "Take fewer or smaller layers."});
+       .found = fmt::format("{} parameters{}, {} MiB", network.parameter_count(),
+                            members == 1 ? "" : fmt::format(" in each of {} members", members),
+                            bytes >> 20),
+       .advice = members == 1 ? "Take fewer or smaller layers."
+                              : "Take fewer members, or fewer or smaller layers."});
 }
 
 /// A number that changes with the data.
@@ -204,7 +207,7 @@ std::pair<TrainedNetwork, Material> train(const Job& job, const TrainingData& da
                                           const PutInitial& put_initial) {
   check(job.training);
   check(job.windows);
-  check_fits_a_file(job.network);
+  check_fits_a_file(job.network, job.member.of);
   report_progress(context.progress, 0.0, fmt::format("fitting {}", job.family));
   Material material = prepare(data, job.windows, job.embargo, context);
   NetworkTrainer trainer(job.network, job.training);

@@ -23,6 +23,22 @@ struct Samples {
   std::vector<Direction> direction;
 };
 
+void require_movement(const TrainingData& data) {
+  const Table table = usable_table(data);
+  for (std::size_t n = 1; n < table.features.rows; ++n)
+    if (table.features(n, 0) != table.features(0, 0)) return;
+  throw Error({.problem = "a polynomial needs a first input that varies",
+               .found = data.inputs[0].expression + " is constant in the training data"});
+}
+
+Error one_way(const TrainingData& data, const std::string& where) {
+  return Error({.problem = fmt::format(
+                    "the first input, {}, moves in one direction only in the training data{}",
+                    data.inputs[0].expression, where),
+                .advice = "Record a full loop, or fit one curve for both directions: --set "
+                          "branch=false."});
+}
+
 Samples directed_samples(const TrainingData& data, bool branch, double dead_band) {
   const Table table = usable_table(data);
   std::vector<Direction> direction;
@@ -41,24 +57,40 @@ Samples directed_samples(const TrainingData& data, bool branch, double dead_band
   if (branch)
     for (const Direction each : {Direction::rising, Direction::falling})
       if (std::ranges::find(samples.direction, each) == samples.direction.end())
-        throw Error({.problem = "the first input, " + data.inputs[0].expression +
-                                ", moves in one direction only in the training data",
-                     .advice = "Record a full loop, or fit one curve for both directions: --set "
-                               "branch=false."});
+        throw one_way(data, "");
   return samples;
 }
 
-std::pair<double, double> centre_and_half_range(const Samples& samples, const std::string& input) {
+std::pair<double, double> centre_and_half_range(const Samples& samples) {
   double lowest = std::numeric_limits<double>::infinity();
   double highest = -lowest;
   for (std::size_t n = 0; n < samples.features.rows; ++n) {
     lowest = std::min(lowest, samples.features(n, 0));
     highest = std::max(highest, samples.features(n, 0));
   }
-  if (!(highest > lowest))
-    throw Error({.problem = "a polynomial needs a first input that varies",
-                 .found = input + " is constant in the training data"});
   return {0.5 * (lowest + highest), 0.5 * (highest - lowest)};
+}
+
+/// Lowest and highest x_0 of each curve in each group.
+Matrix ranges_of(const Samples& samples, const Groups& groups, const TrainingData& data,
+                 bool branch) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Matrix ranges(groups.samples.size(), branch ? 4 : 2);
+  for (std::size_t k = 0; k < ranges.rows; ++k) {
+    for (std::size_t j = 0; j < ranges.columns; j += 2) {
+      double& lowest = ranges(k, j) = kInfinity;
+      double& highest = ranges(k, j + 1) = -kInfinity;
+      for (const std::size_t n : groups.samples[k]) {
+        if (branch && (samples.direction[n] == Direction::falling) != (j == 2)) continue;
+        lowest = std::min(lowest, samples.features(n, 0));
+        highest = std::max(highest, samples.features(n, 0));
+      }
+      if (lowest > highest)
+        throw one_way(data,
+                      fmt::format(" where {} is {:.6g}", groups.feature, groups.frame.knots[k]));
+    }
+  }
+  return ranges;
 }
 
 Design polynomial_design(const TrainingData& data, const Samples& samples, const Groups& groups,
@@ -160,10 +192,11 @@ Fitted<Polynomial> fit_polynomial(const TrainingData& data, const PolynomialOpti
       fitted.notes.push_back(fmt::format("{} turns once it moved back by more than {:.3g}",
                                          data.inputs[0].expression, parameters.dead_band));
   }
+  require_movement(data);
   const Samples samples = directed_samples(data, options.branch, parameters.dead_band);
-  std::tie(parameters.centre, parameters.half_range) =
-      centre_and_half_range(samples, data.inputs[0].expression);
+  std::tie(parameters.centre, parameters.half_range) = centre_and_half_range(samples);
   const Groups groups = groups_by(options.schedule, data, samples.features);
+  parameters.ranges = ranges_of(samples, groups, data, options.branch);
   if (parameters.degree == 0) {
     parameters.degree = chosen_degree(data, samples, groups, parameters, options.rates);
     fitted.notes.push_back("degree " + std::to_string(parameters.degree) +

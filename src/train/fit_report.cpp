@@ -1,17 +1,18 @@
 #include "torsio/train/fit_report.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "torsio/train/evaluate.hpp"
+#include "torsio/train/training_data.hpp"
 
 namespace torsio {
 namespace {
 
-/// Residuals and features of one record, sample by sample; NaN where nothing is judged.
+/// Residuals of one record, sample by sample, NaN where nothing is judged, and its features.
 struct Run {
   std::vector<double> residual;
   Matrix features;
@@ -30,27 +31,20 @@ std::optional<Role> judged_role(const Dataset& dataset) {
 
 std::vector<Run> runs_of(const TrainedModel& model, const Dataset& dataset, Role role) {
   const Estimator estimator = make_estimator(model.file);
+  TrainingData data = training_data(dataset, model.file.settings.features, role);
+  auto sequence = data.sequences.begin();
   std::vector<Run> runs;
   for (const DatasetRecord& record : dataset.records) {
     if (!record.has_role(role)) continue;
-    const Recording& recording = record.recording;
-    const Channel& target = recording.channel(dataset.target);
-    const Prediction told = predict(estimator, recording, {&target, dataset.initialise_samples});
-    FeaturePipeline pipeline(estimator.settings().features, estimator.settings().sample_rate_Hz);
-    Run& run = runs.emplace_back(Run{std::vector<double>(recording.size(), kNotMeasured),
-                                     Matrix(recording.size(), pipeline.feature_count())});
-    std::vector<double> raw(pipeline.raw_inputs().size());
-    for (std::size_t n = 0; n < recording.size(); ++n) {
-      for (std::size_t j = 0; j < raw.size(); ++j)
-        raw[j] = recording.channel(pipeline.raw_inputs()[j]).values[n];
-      std::ranges::copy(pipeline.step(raw), run.features.row(n).begin());
-    }
-    for (const Segment& segment : record.segments) {
-      if (segment.role != role) continue;
-      for (std::size_t n = std::max(segment.begin, told.initialised); n < segment.end; ++n)
-        if (target.is_fresh(n) && told.estimates[n].fault != Fault::warming_up)
-          run.residual[n] = told.estimates[n].value - target.values[n];
-    }
+    const Channel& target = record.recording.channel(dataset.target);
+    const Prediction told =
+        predict(estimator, record.recording, {&target, dataset.initialise_samples});
+    std::vector<double> residual(target.values.size(), kNotMeasured);
+    for (std::size_t n = told.initialised; n < residual.size(); ++n)
+      if (sequence->use[n] != 0 && told.estimates[n].fault != Fault::warming_up)
+        residual[n] = told.estimates[n].value - target.values[n];
+    runs.push_back({std::move(residual), std::move(sequence->features)});
+    ++sequence;
   }
   return runs;
 }

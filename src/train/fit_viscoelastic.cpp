@@ -80,15 +80,13 @@ void note_relaxation(std::vector<std::string>& notes, const SpringDashpotNetwork
   notes.push_back(fmt::format("relaxes within {}", fmt::join(times, ", ")));
   const ExcitedBand band = excited_band(data);
   for (std::size_t i = 0; i < branches.size(); ++i) {
-    const double frequency_Hz = branches[i].rate_1_s / (2.0 * std::numbers::pi);
-    const bool is_below = frequency_Hz < 0.5 * band.lowest_Hz;
-    if (!is_below && frequency_Hz <= 2.0 * band.highest_Hz) continue;
+    const std::string place = outside_of(band, branches[i].rate_1_s);
+    if (place.empty()) continue;
     notes.push_back(fmt::format(
-        "relaxation {} ({:.2g} Hz) lies {} the {:.2g} to {:.2g} Hz that the records excite, which "
-        "see "
-        "only its tail: {} may be far off; add a {} record, or a prior",
-        times[i], frequency_Hz, is_below ? "below" : "above", band.lowest_Hz, band.highest_Hz,
-        fmt::join(elements_behind(network, i), ", "), is_below ? "slow" : "fast"));
+        "relaxation {} ({:.2g} Hz) lies {}: {} may be far off; add a {} record, or a prior",
+        times[i], branches[i].rate_1_s / (2.0 * std::numbers::pi), place,
+        fmt::join(elements_behind(network, i), ", "),
+        place.starts_with("below") ? "slow" : "fast"));
   }
 }
 
@@ -103,8 +101,8 @@ void note_uncertainty(std::vector<std::string>& notes, const ParameterUncertaint
   constexpr double kHardly = 0.5;
   for (std::size_t j = 0; j + 1 < table.size(); ++j)
     if (table[j].std_error > kHardly * table[j].value)
-      notes.push_back(fmt::format("the data hardly tell {}: {:.3g} +- {:.2g} {}", table[j].name,
-                                  table[j].value, table[j].std_error, table[j].unit));
+      notes.push_back(fmt::format(
+          "the data hardly tell {}: its standard error is above half its value", table[j].name));
 }
 
 void note_unused(std::vector<std::string>& notes, const TrainingData& data) {
@@ -113,6 +111,22 @@ void note_unused(std::vector<std::string>& notes, const TrainingData& data) {
   for (std::size_t j = 1; j < data.input_count(); ++j) names.push_back(data.inputs[j].expression);
   notes.push_back(fmt::format("{} not used: the network is between both sides of {} alone",
                               fmt::join(names, ", "), data.inputs.front().expression));
+}
+
+/// Springs and dashpots push back; no values of theirs make a torque that falls.
+void note_sign(std::vector<std::string>& notes, const TrainingData& data) {
+  const Table table = usable_table(data);
+  double covariance = 0.0;
+  double mean = 0.0;
+  for (std::size_t n = 0; n < table.target.size(); ++n)
+    mean += table.target[n] / static_cast<double>(table.target.size());
+  for (std::size_t n = 0; n < table.target.size(); ++n)
+    covariance += table.features(n, 0) * (table.target[n] - mean);
+  if (covariance < 0.0)
+    notes.push_back(fmt::format(
+        "{} falls while {} rises, which no springs and dashpots do: is one of them of the wrong "
+        "sign?",
+        data.target, data.inputs.front().expression));
 }
 
 void check(const ViscoelasticOptions& options) {
@@ -160,6 +174,7 @@ Fitted<Viscoelastic> fit_viscoelastic(const TrainingData& data, const Viscoelast
       .table = table_of(fit.network, fit.offset, uncertainty.std_error, data)};
   fitted.notes.insert(fitted.notes.begin(), text_of(fit.network, 4));
   note_unused(fitted.notes, data);
+  note_sign(fitted.notes, data);
   note_relaxation(fitted.notes, fit.network, data);
   note_uncertainty(fitted.notes, uncertainty, fitted.table);
   return fitted;

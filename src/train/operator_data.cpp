@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/model/direction.hpp"
 #include "train/design.hpp"
 #include "train/nnls.hpp"
 
@@ -105,6 +107,33 @@ OperatorData operator_data(const TrainingData& data, bool rates, std::size_t rat
   set_range(result, data.inputs[0].expression);
   set_units(result, data);
   return result;
+}
+
+OperatorData without_small_turns(OperatorData data, double dead_band) {
+  for (Stretch& stretch : data.stretches) {
+    DirectionTracker tracker(dead_band);
+    std::size_t extreme = 0;  // since the last turn
+    std::vector<bool> is_turn(stretch.x.size(), false);
+    for (std::size_t n = 0; n < stretch.x.size(); ++n) {
+      const Direction before = tracker.direction();
+      const Direction now = tracker.step(stretch.x[n]);
+      const double beyond = stretch.x[n] - stretch.x[extreme];
+      if (now != before) {
+        is_turn[extreme] = true;
+        extreme = n;
+      } else if (now == Direction::falling ? beyond <= 0.0 : beyond >= 0.0) {
+        extreme = n;
+      }
+    }
+    Stretch kept;
+    for (std::size_t n = 0; n < stretch.x.size(); ++n) {
+      if (stretch.row[n] == Stretch::kUnused && !is_turn[n] && n > 0) continue;
+      kept.x.push_back(stretch.x[n]);
+      kept.row.push_back(stretch.row[n]);
+    }
+    stretch = std::move(kept);
+  }
+  return data;
 }
 
 LinearSolution solve_linear(const Matrix& columns, const std::vector<double>& target,

@@ -47,6 +47,10 @@ struct OperatorData {
                                          std::size_t rate_feature, std::size_t most_rows,
                                          std::size_t parameters);
 
+/// The same rows, and on the way between them only turns by more than `dead_band`: for the long part of a
+/// search, since an encoder's noise is thousands of turns that move next to nothing.
+[[nodiscard]] OperatorData without_small_turns(OperatorData data, double dead_band);
+
 /// Coefficients of columns that are linear in them, and what they leave.
 struct LinearSolution {
   std::vector<double> coefficients;

@@ -263,12 +263,15 @@ ParameterUncertainty uncertainty_of(const ResidualProblem& problem, std::span<co
 
 std::string description_of(std::span<const double> direction, std::span<const std::string> names) {
   constexpr double kPart = 0.05;
+  constexpr std::size_t kReadable = 8;
+  std::size_t told = 0;
   const double largest =
       std::abs(*std::ranges::max_element(direction, {}, [](double x) { return std::abs(x); }));
   std::string text;
   for (std::size_t i = 0; i < direction.size(); ++i) {
     const double part = direction[i] / largest;
     if (std::abs(part) < kPart) continue;
+    if (++told > kReadable) return text + " + ...";
     const char* sign = part < 0.0 ? "-" : "+";
     const std::string amount =
         std::abs(std::abs(part) - 1.0) < 5e-3 ? "" : fmt::format("{:.2g} ", std::abs(part));

@@ -74,7 +74,8 @@ struct ParameterUncertainty {
                                                   std::span<const double> theta,
                                                   std::span<const double> typical = {});
 
-/// "k1 - 0.7 k2" of a null direction and the parameters' names; parts below 5 % are left out.
+/// "k1 - 0.7 k2" of a null direction and the parameters' names; parts below 5 % are left out, and
+/// all beyond the first eight.
 [[nodiscard]] std::string description_of(std::span<const double> direction,
                                          std::span<const std::string> names);
 

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "torsio/core/not_measured.hpp"
 
@@ -75,15 +76,18 @@ Jump largest_jump(const std::vector<double>& values) {
   return jump;
 }
 
-Rest longest_rest(const Channel& channel) {
-  Rest longest;
+std::vector<Rest> rests_of(const Channel& channel, std::size_t shortest) {
+  std::vector<Rest> rests;
   Rest rest;
-  for (std::size_t i = 0; i < channel.values.size(); ++i) {
-    if (i == 0 || channel.values[i] != channel.values[i - 1]) rest = {.begin = i, .end = i};
+  const std::size_t size = channel.values.size();
+  for (std::size_t i = 0; i < size; ++i) {
     rest.end = i + 1;
-    if (rest.end - rest.begin > longest.end - longest.begin) longest = rest;
+    if (rest.end < size && channel.values[rest.end] == channel.values[i]) continue;
+    if (rest.length() >= shortest) rests.push_back(rest);
+    rest.begin = rest.end;
   }
-  return longest;
+  std::ranges::stable_sort(rests, std::greater<>(), &Rest::length);
+  return rests;
 }
 
 double finest_step(const std::vector<double>& values) {

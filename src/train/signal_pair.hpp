@@ -46,12 +46,15 @@ struct Jump {
 };
 [[nodiscard]] Jump largest_jump(const std::vector<double>& values);
 
-/// The longest stretch over which a channel tells the very same number.
+/// A stretch over which a channel tells the very same number.
 struct Rest {
   std::size_t begin = 0;
   std::size_t end = 0;
+  [[nodiscard]] std::size_t length() const { return end - begin; }
+  bool operator==(const Rest&) const = default;
 };
-[[nodiscard]] Rest longest_rest(const Channel& channel);
+/// Those of so many samples or more, the longest first.
+[[nodiscard]] std::vector<Rest> rests_of(const Channel& channel, std::size_t shortest);
 
 /// The smallest step that a channel makes: the code of a sensor that has codes, next to nothing of
 /// any other; 0 if it never moves.

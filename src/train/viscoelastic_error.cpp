@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "torsio/actuator/maxwell_branches.hpp"
+#include "model/relaxation_step.hpp"
 
 namespace torsio {
 namespace {
@@ -23,9 +23,9 @@ struct Steps {
   Steps(const RelaxationSpectrum& spectrum, double start, double period_s)
       : offset(start), stiffness(spectrum.stiffness), slope(spectrum.damping / period_s) {
     for (std::size_t i = 0; i < spectrum.branches.size(); ++i) {
-      const RelaxationBranch& branch = spectrum.branches[i];
-      decay[i] = std::exp(-branch.rate_1_s * period_s);
-      gain[i] = branch.stiffness * mean_decay(branch.rate_1_s * period_s);
+      const RelaxationStep step = relaxation_step(spectrum.branches[i], period_s);
+      decay[i] = step.decay;
+      gain[i] = step.gain;
     }
   }
 };
@@ -152,11 +152,9 @@ void ViscoelasticError::evaluate_with(const RelaxationSpectrum& spectrum, double
     const std::size_t first = next;
     for (std::size_t n = 0; n < run.input.size(); ++n) {
       const double moved = n == 0 ? 0.0 : run.input[n] - run.input[n - 1];
-      double value = steps.offset + steps.stiffness * run.input[n] + steps.slope * moved;
-      for (std::size_t i = 0; i < Count; ++i) {
-        torque[i] = steps.decay[i] * torque[i] + steps.gain[i] * moved;
-        value += torque[i];
-      }
+      const double value =
+          relaxed<Count>(steps.offset + steps.stiffness * run.input[n] + steps.slope * moved, moved,
+                         steps.decay, steps.gain, torque);
       if (run.is_judged[n] != 0) {
         residuals[next] = value - run.target[n];
         if (!is_at_rest_) start.add(residuals[next]);

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <string>
 #include <utility>
@@ -11,7 +10,6 @@
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/hammerstein_wiener.hpp"
 #include "torsio/train/training_data.hpp"
-#include "train/residual_search.hpp"
 
 namespace torsio {
 
@@ -33,6 +31,9 @@ struct WienerData {
   double deviation = 0.0;   ///< standard deviation of the judged targets
 
   [[nodiscard]] std::size_t judged_samples() const;
+  /// Radius within which a search keeps poles: what decays slower than over the longest record cannot be
+  /// told from what never does.
+  [[nodiscard]] double slowest_pole() const;
 };
 
 /// The first so many samples of each record, about so many together.
@@ -85,6 +86,8 @@ enum class WienerFree : std::uint8_t {
 ///     dy/dtheta = C'(x) dx/dtheta,  dy/dc_k = phi_k(x)
 class WienerError {
  public:
+  static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
+
   /// @param data outlives this. The starts move, too, if there are any.
   WienerError(const WienerData& data, WienerNumbers numbers, WienerFree free = WienerFree::model);
 
@@ -96,9 +99,10 @@ class WienerError {
   [[nodiscard]] WienerNumbers unpack(std::span<const double> packed) const;
   [[nodiscard]] std::size_t sections() const { return frame_.sections.rows; }
   [[nodiscard]] std::size_t judged_samples() const { return data_.judged_samples(); }
-  /// Where coefficients a1, a2 of the sections stand in the packed numbers; npos: not free.
+  [[nodiscard]] double slowest_pole() const { return data_.slowest_pole(); }
+  /// Where coefficients a1, a2 of the sections stand in the packed numbers; kNowhere: not free.
   [[nodiscard]] std::pair<std::size_t, std::size_t> poles_at(std::size_t section) const;
-  /// Where the section coefficient stands; npos: not free.
+  /// Where the section coefficient stands; kNowhere: not free.
   [[nodiscard]] std::size_t at(std::size_t section, std::size_t column) const;
 
   /// sum of squares over the judged samples; NaN if it runs away.
@@ -124,23 +128,5 @@ class WienerError {
   std::size_t model_size_ = 0;
   std::vector<Matrix> basis_;  ///< of each record: one row a value of P, less its value at rest
 };
-
-/// Numbers as a function of what is searched over, and how they move with it.
-/// (theta, packed, slopes): slopes packed x theta, zero when it comes, or no rows.
-using WienerChart = std::function<void(std::span<const double>, std::span<double>, Matrix& slopes)>;
-
-/// The numbers themselves.
-[[nodiscard]] WienerChart natural_chart();
-/// Poles inside the unit circle whatever theta: a2 = tanh(q), a1 = (1 + a2) tanh(r); the other
-/// numbers are themselves.
-[[nodiscard]] WienerChart stable_chart(const WienerError& error);
-[[nodiscard]] std::vector<double> stable_start(const WienerError& error,
-                                               std::span<const double> packed);
-
-/// For `minimise_squares`. The samples come as the triangle R of [J r] = Q R: the same squares, gradient
-/// and curvature in a few rows.
-/// @param parameters length of theta
-[[nodiscard]] ResidualProblem wiener_problem(const WienerError& error, std::size_t parameters,
-                                             const WienerChart& chart);
 
 }  // namespace torsio

@@ -9,6 +9,7 @@
 
 #include "torsio/core/error.hpp"
 #include "train/folds.hpp"
+#include "train/wiener_problem.hpp"
 
 namespace torsio {
 namespace {
@@ -188,8 +189,9 @@ HammersteinWiener::Parameters parameters_of(const WienerData& data, const Wiener
     for (double& value : parameters.input.values) value -= at_rest;
   const std::vector<double> x = WienerError(data, numbers).inner(numbers);
   const auto [lowest, highest] = std::ranges::minmax(x);
-  const double width = highest > lowest ? highest - lowest : 1.0;
-  const Interval part = monotone_part(numbers.output, {lowest - width, highest + width});
+  const Interval trained =
+      highest > lowest ? Interval{lowest, highest} : Interval{lowest - 1.0, lowest + 1.0};
+  const Interval part = monotone_part(numbers.output, trained);
   parameters.lowest = part.lowest;
   parameters.highest = part.highest;
   return parameters;

@@ -281,6 +281,19 @@ TEST(OnnxNetwork, CannotAskForMoreMemoryThanAModelNeeds) {
               AllOf(HasSubstr("(Concat)"), HasSubstr("numbers made from constants")));
 }
 
+TEST(OnnxNetwork, CannotSwellTheConstantsOfASmallFile) {
+  // A byte each in the file, eight in memory.
+  EXPECT_THAT(refusal_after("torch_relu.onnx",
+                            [](onnx::GraphProto& graph) {
+                              onnx::TensorProto& flags = *graph.add_initializer();
+                              flags.set_name("flags");
+                              flags.set_data_type(onnx::TensorProto::BOOL);
+                              flags.add_dims(17 << 20);
+                              flags.set_raw_data(std::string(17 << 20, '\1'));
+                            }),
+              AllOf(HasSubstr("tensor 'flags'"), HasSubstr("numbers in all constants")));
+}
+
 TEST(OnnxNetwork, KeepsItsScalesAsStandardisation) {
   const auto lstm =
       std::get<Lstm::Parameters>(network_parameters(parse(file("torch_lstm.onnx")), 0.01, 0));

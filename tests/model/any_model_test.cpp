@@ -77,7 +77,7 @@ TEST(AnyModel, ParametersNameTheirLeaves) {
   for_each_leaf(parameters, [&](const std::string& path, const auto&) { names += path + ' '; });
   EXPECT_EQ(names,
             "coefficients.scheduled coefficients.feature coefficients.knots coefficients.values "
-            "degree by_direction dead_band centre half_range ");
+            "degree by_direction dead_band centre half_range ranges ");
 }
 
 }  // namespace

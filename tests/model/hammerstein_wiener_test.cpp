@@ -157,6 +157,23 @@ TEST(HammersteinWiener, SurvivesAnInputThatOverflows) {
   EXPECT_EQ(step(model, 0.3), step(other, 0.3));
 }
 
+TEST(HammersteinWiener, StaysAtTheEndOfItsRangeAndSaysSo) {
+  const Parameters p = example_parameters();
+  const double gain = dc_gain(p.sections);
+  HammersteinWiener model(p);
+  Estimate told;
+  for (const double u : {0.0, 3.0, -3.0}) {  // within, above, below what x may be
+    for (int n = 0; n < 200; ++n) told = model.step({&u, 1});
+    const double x = gain * p.input(u);
+    EXPECT_EQ(told.fault,
+              x >= p.lowest && x <= p.highest ? Fault::none : Fault::outside_training_range);
+    EXPECT_NEAR(told.value, p.output(std::clamp(x, p.lowest, p.highest)), 1e-9) << u;
+  }
+  model.reset();
+  const double u = 0.1;
+  EXPECT_EQ(model.step({&u, 1}).fault, Fault::none);
+}
+
 TEST(HammersteinWiener, RefusesWhatItCannotRun) {
   const auto message = [](auto change) {
     Parameters p = example_parameters();

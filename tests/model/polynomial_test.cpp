@@ -73,6 +73,27 @@ TEST(Polynomial, InvertsWithAnInputBeyondItsRange) {
   EXPECT_DOUBLE_EQ(model.invert(-1e6, std::array{0.0, 0.0}).value, -0.1);
 }
 
+TEST(Polynomial, StaysAtTheEndOfTheRangeOfItsDirectionAndSaysSo) {
+  Polynomial::Parameters parameters = example<Polynomial>().parameters();
+  parameters.ranges = Matrix(1, 4);
+  parameters.ranges.values = {-0.1, 0.0, -0.1, 0.1};  // P+ knows the lower half alone
+  Polynomial model(parameters);
+  const auto rising = [](double z) { return 1.2 + 50.0 * z - z * z + 12.0 * z * z * z; };
+  says(model, -0.1);
+  EXPECT_EQ(model.step(std::array{0.004, 0.0}).fault, Fault::none) << "a twentieth beyond";
+  const Estimate told = model.step(std::array{0.08, 0.0});
+  EXPECT_EQ(told.fault, Fault::outside_training_range);
+  EXPECT_NEAR(told.value, rising(0.05), 1e-12);
+  const Estimate back = model.step(std::array{0.07, 0.0});
+  EXPECT_EQ(back.fault, Fault::none) << "falling, P- knows that";
+  // Backwards: what P+ says at the end of its range is the most that it says.
+  model.step(std::array{-0.05, 0.0});
+  model.step(std::array{-0.02, 0.0});
+  const Estimate found = model.invert(rising(0.5), std::array{0.0, 0.0});
+  EXPECT_EQ(found.fault, Fault::outside_training_range);
+  EXPECT_NEAR(found.value, 0.0, 1e-12);
+}
+
 TEST(Polynomial, RefusesParametersThatDisagree) {
   const auto good = example<Polynomial>().parameters();
   const auto refused = [&](auto change) {
@@ -87,6 +108,9 @@ TEST(Polynomial, RefusesParametersThatDisagree) {
   refused([](auto& p) { p.centre = kNotMeasured; });
   refused([](auto& p) { p.dead_band = -1.0; });
   refused([](auto& p) { p.coefficients.values(0, 8) = 1.0; });
+  refused([](auto& p) { p.ranges = Matrix(1, 2); });
+  refused([](auto& p) { p.ranges.values[0] = 0.5; });
+  refused([](auto& p) { p.ranges.values[3] = kNotMeasured; });
 }
 
 }  // namespace

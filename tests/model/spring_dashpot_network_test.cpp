@@ -18,6 +18,7 @@
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/model/hammerstein_wiener.hpp"
 
 namespace torsio {
 namespace {
@@ -191,6 +192,20 @@ TEST(RelaxationSpectrum, Of003cHasItsPolesAndZeros) {
     EXPECT_LT(by_spectrum(spectrum, 1.05 * zero).real() * by_spectrum(spectrum, 0.95 * zero).real(),
               0.0)
         << zero;
+  }
+}
+
+// SPEC sections 2, 7: the elements that partial fractions of paper 003's (10) give, to start (a) from.
+TEST(RelaxationSpectrum, OfTheStartValuesIsThePapersTransferFunction) {
+  const RelaxationSpectrum spectrum = relaxation_spectrum(
+      parse_network("series(kv(k1=0.684218, d1=14.2903), kv(k2=4.52983, d2=4.43722), k3=1.61244)"));
+  const ContinuousTransfer g = continuous_of(Paper003::refined);
+  constexpr double kGains = 1137.56 * 0.00187;  // of the curves about 0
+  for (const double frequency : {0.001, 0.01, 0.1, 0.4, 1.0, 4.0, 20.0}) {
+    const Complex s = at_Hz(frequency);
+    const Complex expected = kGains * ((g.numerator[0] * s + g.numerator[1]) * s + g.numerator[2]) /
+                             ((s + g.denominator[1]) * s + g.denominator[2]);
+    EXPECT_NEAR(std::abs(by_spectrum(spectrum, s) / expected - 1.0), 0.0, 2e-5) << frequency;
   }
 }
 

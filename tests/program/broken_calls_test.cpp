@@ -107,6 +107,8 @@ TEST_F(BrokenCalls, LeaveTheOutputUntouchedWhenTheFitFails) {
                "components");
   expect_error(torsio("fit a.csv --model dgmm --set components -o m.safetensors"), kCallWasWrong,
                "option=value");
+  expect_error(torsio("fit a.csv --model dgmm --set components 3 -o m.safetensors"), kCallWasWrong,
+               "in one word");
   expect_error(torsio("fit a.csv --model linear --inputs nothing_rad -o m.safetensors"),
                kCallWasWrong, "nothing_rad");
   expect_error(torsio("fit a.csv --model linear --inputs 'foo(' -o m.safetensors"), kCallWasWrong,

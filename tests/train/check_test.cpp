@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "support/bench_dataset.hpp"
@@ -100,6 +101,34 @@ TEST(Check, WarnsOfASensorThatFreezesWhileTheOthersMove) {
   const std::string message = first_of(findings, "frozen sensors").message;
   EXPECT_NE(message.find("gear_angle_rad"), std::string::npos) << message;
   EXPECT_NE(message.find("for 1.2 s from t = 1 s"), std::string::npos) << message;
+}
+
+TEST(Check, WarnsOfAStallDuringSlowMotion) {
+  // A slow ramp and back; a second of it is next to nothing of the range.
+  Channel gear{"gear_angle_rad", {}};
+  Channel joint{"joint_angle_rad", {}};
+  Channel torque{"torque_Nm", {}};
+  for (int n = 0; n < 6000; ++n) {
+    const double phase = 1e-3 * static_cast<double>(n);
+    joint.values.push_back(2.0 * std::sin(phase));
+    gear.values.push_back(2.02 * std::sin(phase));
+    torque.values.push_back(10.0 * std::sin(phase));
+  }
+  const auto verdict = [&](double stalls_at, double twice_at) {
+    Recording spoiled("slow", 100.0);
+    Channel stalled = gear;
+    for (const double at_s : {stalls_at, twice_at})
+      for (std::size_t i = 0; i < 100 && at_s > 0.0; ++i)
+        stalled.values[static_cast<std::size_t>(100.0 * at_s) + i] =
+            stalled.values[static_cast<std::size_t>(100.0 * at_s)];
+    for (const Channel& each : {stalled, joint, torque}) spoiled.add(each);
+    Dataset dataset;
+    add_record(dataset, std::move(spoiled), Role::train);
+    return verdict_of(findings_of(dataset), "frozen sensors");
+  };
+  EXPECT_EQ(verdict(-1.0, -1.0), Verdict::pass);
+  EXPECT_EQ(verdict(30.0, -1.0), Verdict::warn);
+  EXPECT_EQ(verdict(30.0, 32.0), Verdict::pass) << "a joint that sticks does so again";
 }
 
 TEST(Check, DoesNotCallAStandstillFrozen) {

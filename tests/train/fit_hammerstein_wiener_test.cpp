@@ -141,6 +141,38 @@ TEST(FitHammersteinWiener, KeepsPolesInsideTheUnitCircle) {
   }
 }
 
+TEST(FitHammersteinWiener, SaysWhereSlowMotionLeavesWhatItLearnedFrom) {
+  // Fast motion never fills the slow pole; slow motion of the same amplitude does.
+  HammersteinWiener::Parameters slow = known_hammerstein_wiener();
+  slow.sections = sections_of({{0.05}, {1.0, -0.99}});
+  const auto told = fit_hammerstein_wiener(recorded(slow, 6000, 0.01, 1), kTrueShape);
+  HammersteinWiener model(told.parameters);
+  const auto data = recorded(slow, 6000, 0.0, 1);
+  const auto [lowest, highest] = std::ranges::minmax(data.sequences[0].target);
+  const double u = std::ranges::max(data.sequences[0].features.values);
+  Estimate last;
+  for (int n = 0; n < 20'000; ++n) {
+    last = model.step({&u, 1});
+    ASSERT_GE(last.value, lowest - 0.5);
+    ASSERT_LE(last.value, highest + 0.5);
+  }
+  EXPECT_EQ(last.fault, Fault::outside_training_range);
+}
+
+TEST(FitHammersteinWiener, ClaimsNoMemoryThatNoRecordCouldShow) {
+  // Torque that drifts off in a straight line: any pole beyond the record's length does as well.
+  TrainingData data = recorded(known_hammerstein_wiener(), 3000, 0.01, 12);
+  for (std::size_t n = 0; n < 3000; ++n)
+    data.sequences[0].target[n] += 1e-3 * static_cast<double>(n);
+  auto shape = kTrueShape;
+  shape.iterations = 1000;
+  for (const ContinuousForm form : {ContinuousForm::none, ContinuousForm::refined}) {
+    shape.continuous = form;
+    const auto fitted = fit_hammerstein_wiener(data, shape);
+    EXPECT_LT(sorted_poles(fitted.parameters.sections).back(), std::exp(-1.0 / 3001.0));
+  }
+}
+
 TEST(FitHammersteinWiener, GoesToContinuousTimeAndWarnsOfArtefacts) {
   HammersteinWiener::Parameters printed = hammerstein_wiener_of(Paper003::discrete);
   printed.input.half_range = 1.0;  // u in degrees: within what the output curve holds

@@ -303,6 +303,11 @@ TEST(FitNetwork, RefusesANetworkThatFitsNoFileOrMemory) {
                 (void)fit_mlp(data, {.layers = {60000, 60000}});
               }),
               HasSubstr("MiB"));
+  // One member would fit, so would four.
+  EXPECT_THAT(test::error_message([&] {
+                (void)fit_mlp_ensemble(data, {.layers = {3000, 3000}}, 64, {});
+              }),
+              AllOf(HasSubstr("in each of 64 members"), HasSubstr("Take fewer members")));
   // Every 16 windows of a batch have a gradient of their own: here more than a terabyte of them.
   RecurrentOptions options = small_memory();
   options.layers = {3900};

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -129,6 +130,42 @@ TEST(FitPolynomial, SchedulesItsCurvesOverACondition) {
   model.step(std::array{0.0, 0.2});
   EXPECT_NEAR(model.step(std::array{0.05, 0.2}).value, 110.0 * 0.05 + 2.0, 1e-9);
   EXPECT_NEAR(model.step(std::array{0.04, 0.2}).value, 110.0 * 0.04 - 2.0, 1e-9);
+}
+
+TEST(FitPolynomial, KnowsWhereEachCurveHasData) {
+  // It falls all the way, but rises over the lower fifth only: what degree 5 says above is anything.
+  Matrix features(2000, 1);
+  for (std::size_t n = 0; n < 1000; ++n) {
+    features(n, 0) = 0.1 - 0.2 * static_cast<double>(n) / 999.0;
+    features(1000 + n, 0) = -0.1 + 0.04 * static_cast<double>(n) / 999.0;
+  }
+  Random random(5);
+  const auto data = training_data_of({{.expression = "x"}}, features,
+                                     [&](Row x) { return quintic(x[0]) + random.normal(); });
+  Polynomial model(fit_polynomial(data, {}).parameters);
+  const auto measured = std::ranges::minmax(data.sequences[0].target);
+  for (double x = -0.1; x <= 0.1; x += 0.001) {
+    const Estimate told = model.step(std::array{x});
+    EXPECT_GT(told.value, measured.min - 5.0) << x;
+    EXPECT_LT(told.value, measured.max + 5.0) << x;
+    EXPECT_EQ(told.fault, x < -0.058 ? Fault::none : Fault::outside_training_range) << x;
+  }
+}
+
+TEST(FitPolynomial, KnowsWhereEachKnotHasData) {
+  Matrix features(8000, 2);
+  const Matrix loop = triangle(8000);
+  for (std::size_t n = 0; n < features.rows; ++n) {
+    features(n, 0) = (n < 4000 ? 1.0 : 0.2) * loop(n, 0);
+    features(n, 1) = n < 4000 ? 0.1 : 0.3;
+  }
+  const auto data = training_data_of({{.expression = "x"}, {.expression = "support_m"}}, features,
+                                     [](Row x) { return quintic(x[0]); });
+  const auto fitted = fit_polynomial(data, {.branch = false, .schedule = "support_m"});
+  Polynomial model(fitted.parameters);
+  EXPECT_EQ(model.step(std::array{0.09, 0.1}).fault, Fault::none);
+  EXPECT_EQ(model.step(std::array{0.09, 0.3}).fault, Fault::outside_training_range);
+  EXPECT_EQ(model.step(std::array{0.019, 0.3}).fault, Fault::none);
 }
 
 TEST(FitPolynomial, RefusesDataThatCannotTellItsCurves) {

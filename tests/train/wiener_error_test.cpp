@@ -1,11 +1,10 @@
-#include "train/wiener_error.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
 #include "hammerstein_wiener_example.hpp"
+#include "train/wiener_problem.hpp"
 
 namespace torsio {
 namespace {

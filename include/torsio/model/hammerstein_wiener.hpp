@@ -31,6 +31,7 @@ namespace torsio {
 class HammersteinWiener {
  public:
   static constexpr std::string_view kFamily = "hammerstein_wiener";
+  static constexpr double kBorder = 0.1;  ///< of highest - lowest: beyond it x being held is told
 
   struct Parameters {
     std::size_t inputs = 1;  ///< of a tick

@@ -17,12 +17,15 @@ namespace torsio {
 /// training data, a_i in the target's unit. By direction, P is P+ while x_0 rises and P- while it
 /// falls; the direction turns when x_0 has moved back from its extreme by more than the dead band.
 /// From `reset()` until the first movement beyond it the direction is unknown and P is the mean of
-/// both. All but centre, half_range and dead band may be scheduled over one input. Source: SPEC 3.7
-/// (Polynomial, degree 5). Cost: `degree` multiply-adds, and as `Linear`.
+/// both. All but centre, half_range and dead band may be scheduled over one input. Each curve knows
+/// the range of x_0 that it was fitted to: more than `kBorder` of it outside, x_0 is held there and
+/// the value comes with `Fault::outside_training_range`. Source: SPEC 3.7 (Polynomial, degree 5).
+/// Cost: `degree` multiply-adds, and as `Linear`.
 class Polynomial {
  public:
   static constexpr std::string_view kFamily = "polynomial";
   static constexpr std::size_t kHighestDegree = 20;
+  static constexpr double kBorder = 0.05;  ///< of a curve's range: so far it goes on beyond it
 
   struct Parameters {
     /// Columns: P+ (degree + 1, constant first), P- likewise if `by_direction`, then k_0 .. k_n-1
@@ -33,6 +36,9 @@ class Polynomial {
     double dead_band = 0.0;   ///< x_0's unit, >= 0
     double centre = 0.0;      ///< x_0's unit
     double half_range = 1.0;  ///< x_0's unit, > 0
+    /// Lowest and highest x_0 that P+ was fitted to, then those of P- if `by_direction`; a row for each
+    /// of the coefficients. Empty: centre +- half_range for all of them.
+    Matrix ranges = {};
 
     template <class Self, class Visit>
     static void visit_fields(Self& self, Visit&& visit) {
@@ -42,17 +48,17 @@ class Polynomial {
       visit("dead_band", self.dead_band);
       visit("centre", self.centre);
       visit("half_range", self.half_range);
+      visit("ranges", self.ranges);
     }
     bool operator==(const Parameters&) const = default;
 
     /// Columns that belong to P+ and P-.
-    [[nodiscard]] std::size_t curve_columns() const noexcept {
-      return (by_direction ? 2 : 1) * (degree + 1);
-    }
+    [[nodiscard]] std::size_t curve_columns() const noexcept { return curves() * (degree + 1); }
+    [[nodiscard]] std::size_t curves() const noexcept { return by_direction ? 2 : 1; }
   };
 
   /// @throws Error if the coefficients do not fit the degree or are no valid schedule, k_0 is not
-  /// 0, or centre, half_range or dead band are out of range.
+  /// 0, or centre, half_range, ranges or dead band are out of range.
   explicit Polynomial(const Parameters& parameters);
 
   [[nodiscard]] Parameters parameters() const;
@@ -66,8 +72,8 @@ class Polynomial {
   void reset() noexcept { direction_.reset(); }
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
-  /// The x_0 within centre +- half_range at which the model, in its present direction, says
-  /// `target`; the other inputs are as given and the search starts from the given x_0 (Newton's
+  /// The x_0 in the range of the present direction's curve (centre +- half_range before it has one)
+  /// at which the model says `target`; the other inputs are as given and the search starts from the given x_0 (Newton's
   /// method kept inside a bracket, at most `kInversionSteps` steps). Where the two ends of that
   /// range do not enclose the target, the nearer end comes back with
   /// `Fault::outside_training_range`; where the schedule runs over x_0 itself, the given x_0 with
@@ -79,10 +85,17 @@ class Polynomial {
   struct Curve {
     double value = 0.0;
     double slope = 0.0;  ///< per unit of z
+    bool is_held = false;
   };
-  [[nodiscard]] Curve branch(const ScheduledCoefficients::Position& at, std::size_t first,
-                             double z) const noexcept;
-  [[nodiscard]] Curve curve(const ScheduledCoefficients::Position& at, double z) const noexcept;
+  struct Reach {
+    double lowest = -1.0;  ///< z
+    double highest = 1.0;
+  };
+  using Position = ScheduledCoefficients::Position;
+  /// Of P+ (0) or P- (1).
+  [[nodiscard]] Reach reach(const Position& at, std::size_t branch) const noexcept;
+  [[nodiscard]] Curve branch(const Position& at, std::size_t branch, double z) const noexcept;
+  [[nodiscard]] Curve curve(const Position& at, double z) const noexcept;
 
   std::size_t degree_;
   bool by_direction_;
@@ -91,6 +104,7 @@ class Polynomial {
   double half_range_;
   std::size_t first_slope_;
   ScheduledCoefficients coefficients_;
+  ScheduledCoefficients ranges_;
   DirectionTracker direction_;
 };
 

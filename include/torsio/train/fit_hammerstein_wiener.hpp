@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "torsio/model/hammerstein_wiener.hpp"
 #include "torsio/train/fit_context.hpp"
@@ -49,5 +51,10 @@ struct HammersteinWienerOptions {
 [[nodiscard]] Fitted<HammersteinWiener> fit_hammerstein_wiener(
     const TrainingData& data, const HammersteinWienerOptions& options,
     const FitContext& context = {});
+
+/// G in continuous time by Tustin where it has at most three poles, and what stands against reading it
+/// so (`continuous_warning`); a line each.
+[[nodiscard]] std::vector<std::string> continuous_notes(
+    const HammersteinWiener::Parameters& parameters);
 
 }  // namespace torsio
