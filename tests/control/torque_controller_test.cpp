@@ -204,8 +204,8 @@ TEST(TorqueController, ReachesTheWantedTorqueAgainstALockedOutput) {
     EXPECT_NEAR(joint.torque_Nm(), wanted_Nm, 1e-4 * wanted_Nm) << actuator;
     EXPECT_NEAR(output.current_A,
                 output.proportional_A + output.integral_A + output.derivative_A +
-                    output.feed_forward_A + output.friction_A + output.observer_A +
-                    output.handover_A,
+                    output.feed_forward_A + output.rate_feed_forward_A + output.friction_A +
+                    output.observer_A + output.handover_A,
                 1e-12);
   }
 }
@@ -239,11 +239,35 @@ TEST(TorqueController, CompensatesFrictionWhereTheSpringIsToBeWound) {
   TorqueLoopCore::Output output;
   for (int n = 0; n < 200; ++n) output = controller.step(0.02 * n, wound(3.5e-5 * n));
   const Drive& drive = settings.deflection.joint.drive;
-  const double rate_rad_s = 0.02 * kRate_Hz / 573.0;
+  const double rate_rad_s = 0.02 * kRate_Hz / settings.deflection.joint.stiffness_Nm_rad;
   EXPECT_NEAR(
       output.friction_A,
       0.5 * (drive.coulomb_Nm + drive.viscous_Nms_rad * rate_rad_s) / drive.torque_per_current(),
       1e-6);
+}
+
+// Of a torque that rises steadily the plain loop is 2 ζ / ω behind, whatever the slope.
+TEST(TorqueController, FollowsARampWithoutLagWhereItsRateIsFedForward) {
+  auto settings = settings_of("dfki-50");
+  settings.deflection.integral_1_s = 0.0;
+  settings.deflection.joint.drive.viscous_Nms_rad = 0.0;
+  const SeriesElasticJoint& parts = settings.deflection.joint;
+  constexpr double kSlope_Nm_s = 20.0;
+  const auto lag_s = [&] {
+    TorqueController controller(LinearInverse(parts.stiffness_Nm_rad), settings, kRate_Hz);
+    SpringJoint joint(parts, JointOutput::locked);
+    double wanted_Nm = 0.0;
+    for (int n = 0; n < 1000; ++n) {
+      wanted_Nm = kSlope_Nm_s * n / kRate_Hz;
+      joint.step(controller.step(wanted_Nm, sample_of(joint, parts.drive)).current_A,
+                 1.0 / kRate_Hz);
+    }
+    return (wanted_Nm - joint.torque_Nm()) / kSlope_Nm_s;
+  };
+  EXPECT_NEAR(lag_s(), 2.0 * settings.deflection.damping / settings.deflection.bandwidth_rad_s,
+              2e-3);
+  settings.feeds_rate_forward = true;
+  EXPECT_NEAR(lag_s(), 0.0, 2e-3);
 }
 
 TEST(TorqueController, SaysTheFaultAndLetsTheCurrentFade) {
