@@ -1,34 +1,19 @@
-// A torque loop at 1 kHz on its own thread: set-points come in through a mailbox, what the loop saw
-// goes out to a recorder. A simulated spring stands for the drive. Links torsio::runtime and
-// torsio::realtime.
+// A torque loop at 1 kHz on its own thread: set-points come in through a mailbox, a watchdog lets go of the
+// joint when they stop coming, what the loop saw goes out to a recorder. A simulated joint stands for yours.
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <thread>
 
-#include "torsio/estimate/estimator.hpp"
-#include "torsio/model/linear.hpp"
+#include "torsio/control/torque_controller.hpp"
 #include "torsio/realtime/mailbox.hpp"
 #include "torsio/realtime/realtime_loop.hpp"
 #include "torsio/realtime/recorder.hpp"
+#include "torsio/safety/command_watchdog.hpp"
 
 namespace {
-
-constexpr double kPeriod_s = 1e-3;
-
-torsio::BasicEstimator<torsio::Linear> spring_torque() {
-  torsio::EstimatorSettings settings;
-  settings.features.inputs = {"spring_deflection_rad"};
-  settings.sample_rate_Hz = 1.0 / kPeriod_s;
-  settings.target = "torque_Nm";
-  settings.ranges = {.lowest = {-0.1}, .highest = {0.1}};
-  settings.fallback = {.intercept = 0.0, .slope = {500.0}};
-  torsio::Linear::Parameters parameters;
-  parameters.coefficients.values = torsio::Matrix(1, 2);
-  parameters.coefficients.values.values = {0.0, 500.0};
-  return {settings, torsio::Linear(parameters)};
-}
 
 void print(const char* what, const torsio::DurationHistogram& times) {
   const auto us = [&](double part) { return 1e-3 * static_cast<double>(times.quantile_ns(part)); };
@@ -37,32 +22,48 @@ void print(const char* what, const torsio::DurationHistogram& times) {
 }
 
 void run(const char* recording) {
+  const auto parts = torsio::series_elastic_joint(torsio::data_sheet("dfki-50"));
+  torsio::TorqueController controller(  // in a robot: AnyInverse::of a model file, example 04
+      torsio::LinearInverse(parts.stiffness_Nm_rad),
+      torsio::TorqueLoopCore::Settings{.deflection = {.joint = parts}}, 1000.0);
+  torsio::CommandWatchdog watchdog(
+      {.timeout_s = 0.1});  // default 18 ms: too short for a busy desktop
   torsio::Mailbox<double> wanted_Nm;
-  torsio::Recorder recorder(recording,
-                            {.channels = {"wanted_torque_Nm", "torque_Nm"}, .period_s = kPeriod_s});
-  torsio::RealtimeLoop loop({.period_s = kPeriod_s, .stop_after_overruns = 1000});
-  double deflection_rad = 0.0;
-  loop.start([&, estimator = spring_torque()](const torsio::Tick& tick) mutable noexcept {
-    constexpr std::int64_t kStaleInNs = 500'000'000;
+  torsio::Recorder recorder(recording, {.channels = {"wanted_torque_Nm", "torque_Nm"}});
+  torsio::RealtimeLoop loop({.period_s = 1e-3, .stop_after_overruns = 1000});
+  torsio::JointSample joint = {.gear_angle_rad = 0.0, .joint_angle_rad = 0.0};
+  loop.start([&, rate_rad_s = 0.0](const torsio::Tick& tick) mutable noexcept {
+    if (tick.index == 0) watchdog.arm(tick.due_ns);  // in a robot: when its operator says so
     const auto& letter = wanted_Nm.read();
-    // No command, or none any more: let go of the spring.
-    const double wanted = letter.age_ns(tick.due_ns) < kStaleInNs ? letter.value : 0.0;
-    const torsio::Estimate torque = estimator.step(std::array{deflection_rad});
-    deflection_rad += kPeriod_s * 0.02 * (wanted - torque.value);  // the drive turns
-    recorder.push(tick.index, std::array{wanted, torque.value});
+    const bool is_valid = letter.sequence > 0 && std::isfinite(letter.value);
+    double current_A = 0.0;
+    if (watchdog.step(tick.due_ns, {letter.written_ns, is_valid}) ==
+        torsio::CommandWatchdog::State::running)
+      current_A = controller.step(letter.value, joint).current_A;
+    else
+      controller.reset();
+    // The joint, its output held fast: J N² δ'' + b δ' + K δ = N k_t i.
+    const double torque_Nm = parts.stiffness_Nm_rad * joint.gear_angle_rad;
+    rate_rad_s += 1e-3 / parts.drive.inertia() *
+                  (parts.drive.torque_per_current() * current_A - torque_Nm -
+                   parts.drive.viscous_Nms_rad * rate_rad_s);
+    joint.gear_angle_rad += 1e-3 * rate_rad_s;
+    recorder.push(tick.index, std::array{letter.value, torque_Nm});
     return true;
   });
   torsio::MonotonicClock clock;
-  for (const double torque_Nm : {5.0, -5.0, 10.0, 0.0}) {
-    wanted_Nm.write(torque_Nm, clock.now_ns());
-    std::this_thread::sleep_for(std::chrono::milliseconds(250));
+  for (int n = 0; n < 150; ++n) {
+    wanted_Nm.write(std::array{5.0, -5.0, 10.0}.at(n / 50), clock.now_ns());
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // nobody speaks any more
   loop.request_stop();
   const torsio::LoopReport report = loop.wait();
   const torsio::RecorderReport recorded = recorder.close();
-  std::printf("%s refused; %zu steps, %zu overruns, ended by %s\n",
+  std::printf("%s refused; %zu steps, %zu overruns, ended by %s; watchdog: %s, %s\n",
               report.grants.refused.empty() ? "nothing" : report.grants.refused.c_str(),
-              report.steps, report.overruns, torsio::name(report.end));
+              report.steps, report.overruns, torsio::name(report.end),
+              name(watchdog.state()).data(), name(watchdog.reason()).data());
   print("lateness", report.lateness);
   print("CPU time", report.cpu_time);
   std::printf("%zu frames recorded, %zu dropped\n", recorded.frames, recorded.dropped);

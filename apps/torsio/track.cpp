@@ -35,6 +35,7 @@ struct TrackFlags {
   double damping = torsio::TrackingSpec{}.damping;
   double friction = 0.0;
   std::string observer;
+  bool feeds_rate_forward = false;
   std::vector<std::string> models;
   std::string faults;
   std::string record;
@@ -70,7 +71,8 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
   torsio::TrackingSpec spec{
       .output = flags.output == "free" ? torsio::JointOutput::free : torsio::JointOutput::locked,
       .reference = reference_of(flags),
-      .damping = flags.damping};
+      .damping = flags.damping,
+      .feeds_rate_forward = flags.feeds_rate_forward};
   if (!flags.lever.empty()) {
     if (flags.output != "free")
       throw torsio::UsageError({.place = "--lever",
@@ -179,6 +181,8 @@ void add_track(CLI::App& app) {
                    "share of the drive's friction to make up for, 0 to 1")
       ->capture_default_str();
   verb->add_option("--observer", flags->observer, "cut-off of a disturbance observer: 10Hz");
+  verb->add_flag("--feed-forward", flags->feeds_rate_forward,
+                 "feed the rate of the wanted torque forward: no lag");
   verb->add_option("--faults", flags->faults, "YAML schedule of what fails when (docs/faults.md)");
   add_seed(*verb, flags->seed, "of the first run's sensor noise, and of a random walk");
   verb->add_option("--seeds", flags->seeds, "runs of each model, seed after seed")

@@ -84,7 +84,8 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
                    .is_limited = loop.is_limited,
                    .inverse = wanted_rad.fault,
                    .fault = is_refused_ ? Fault::input_not_finite : loop.fault};
-  const double rate_rad_s = wanted_rate_.step(loop.wanted_deflection_rad);
+  const double rate_rad_s =
+      wanted_rate_.step(wanted_Nm_) / settings_.deflection.joint.stiffness_Nm_rad;
   if (!is_measured || loop.fault != Fault::none) {
     if (observer_) observer_->reset();
     applied_A_ = output.current_A;
@@ -94,9 +95,11 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
     output.friction_A = friction->share * amperes_per_Nm_ *
                         (drive.coulomb_Nm * std::tanh(rate_rad_s / friction->speed_rad_s) +
                          drive.viscous_Nms_rad * rate_rad_s);
+  if (settings_.feeds_rate_forward)
+    output.rate_feed_forward_A = deflection_.gains().derivative * rate_rad_s;
   if (observer_)
     output.observer_A = observer_->step(applied_A_, sample.motor_angle_rad, deflection_rad);
-  const double added_A = output.friction_A + output.observer_A;
+  const double added_A = output.rate_feed_forward_A + output.friction_A + output.observer_A;
   if (added_A != 0.0) {
     const double all_A = loop.command + added_A;
     output.current_A = std::clamp(all_A, -drive.peak_current_A, drive.peak_current_A);

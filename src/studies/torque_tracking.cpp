@@ -30,16 +30,18 @@ using Kind = TorqueReference::Kind;
 constexpr std::array kVariants{"maxwell-slip", "bouc-wen", "lugre"};
 constexpr double kQuick_s = 20.0;
 constexpr std::uint64_t kJudged = 50;  // seeds of runs to be judged on
+constexpr double kObserver_Hz = 8.0;   // of the loop that does what a controller can
 
 /// What a loop is asked for (SPEC section 6).
 struct Task {
   const char* actuator;
   double amplitude_Nm;
   JointOutput output;
+  bool is_helped = false;  ///< also by a loop with feed-forward of the rate and an observer
 };
 constexpr std::array kTasks{
-    Task{"dfki-50", 13.0, JointOutput::locked}, Task{"dfki-50", 13.0, JointOutput::free},
-    Task{"dfki-120", 20.0, JointOutput::locked}, Task{"dfki-120", 20.0, JointOutput::free},
+    Task{"dfki-50", 13.0, JointOutput::locked, true}, Task{"dfki-50", 13.0, JointOutput::free},
+    Task{"dfki-120", 20.0, JointOutput::locked, true}, Task{"dfki-120", 20.0, JointOutput::free},
     Task{"dfki-120", 70.0, JointOutput::locked}};
 
 /// A family in the inverse; those that this build does not have are left out.
@@ -77,14 +79,14 @@ constexpr std::array kPapers{
     Paper{kTasks[0], Kind::random_walk, "linear", {}, 1.61},
 };
 
-/// The torque-mode recordings beside the sweeps: chirps under the linear controller of the data
-/// sheet, other amplitudes, the same output (SPEC section 6, observation 1).
-void add_torque_mode(Dataset& dataset, const std::string& actuator, const Task& task,
+/// The torque-mode recordings beside the sweeps: chirps (or walks) under the linear controller of the
+/// data sheet, other amplitudes, the same output (SPEC section 6, observation 1).
+void add_torque_mode(Dataset& dataset, const std::string& actuator, const Task& task, Kind kind,
                      std::uint64_t seed, bool is_quick) {
   const bool is_locked = task.output == JointOutput::locked;
   for (const double share : {is_locked ? 1.1 : 0.9, 0.5, 0.25}) {
     ExperimentSpec spec{.actuator = actuator,
-                        .experiment = "chirp",
+                        .experiment = std::string(name(kind)),
                         .seed = seed + 10 + dataset.records.size(),
                         .torque_amplitude_Nm = share * task.amplitude_Nm};
     if (!is_locked) spec.lever_m = TrackingSpec{}.lever_m;
@@ -195,34 +197,62 @@ class TrackingRows {
   std::vector<Sum> sums_;
 };
 
-/// One task on one spring, one repeat.
-void run_task(const Task& task, const std::string& actuator, std::uint64_t seed,
-              const StudyOptions& options, TrackingRows& rows, const Progress& progress) {
-  const DataSheet sheet = data_sheet(actuator);
-  Dataset dataset = sweep_dataset(actuator, seed, progress);
-  std::vector<NamedInverse> inverses = all_learned(dataset, "sweeps", seed, options.is_quick);
-  inverses.erase(inverses.begin());  // the line of the sweeps is run anyway
-  add_torque_mode(dataset, actuator, task, seed, options.is_quick);
-  for (NamedInverse& more : all_learned(dataset, "+ torque mode", seed, options.is_quick))
-    inverses.push_back(std::move(more));
-  const LinearInverse line = sweep_line(sheet, seed, progress);
+/// Everything that is tried on one task on one spring, with one seed.
+struct Trial {
+  const Task& task;
+  const std::string& actuator;
+  std::uint64_t seed;
+  const LinearInverse& line;
+  std::span<const NamedInverse> inverses;
+  bool is_quick;
+};
+
+/// Both references, where rating and lever allow them.
+void judge(const Trial& trial, bool is_helped, TrackingRows& rows, const Progress& progress) {
+  const Task& task = trial.task;
+  const DataSheet sheet = data_sheet(trial.actuator);
   for (const Kind kind : {Kind::chirp, Kind::random_walk}) {
     TrackingSpec spec{.output = task.output,
                       .reference = {.kind = kind, .amplitude_Nm = task.amplitude_Nm},
+                      .feeds_rate_forward = is_helped,
                       .measures_bandwidth = false};
-    if (options.is_quick) spec.reference.duration_s = kQuick_s;
-    const std::array<std::uint64_t, 1> seeds{seed + kJudged};
+    if (is_helped) spec.observer_cutoff_Hz = kObserver_Hz;
+    if (trial.is_quick) spec.reference.duration_s = kQuick_s;
+    const std::array<std::uint64_t, 1> seeds{trial.seed + kJudged};
     try {
       check_tracking(sheet, spec, seeds.front());
     } catch (const UsageError&) {
       continue;  // beyond the rating, or the lever would tip over
     }
     const std::string condition =
-        fmt::format("{}, {:g} Nm {}, {}", actuator, task.amplitude_Nm,
-                    task.output == JointOutput::locked ? "locked" : "free", name(kind));
-    for (const TrackingRow& run : track_models(sheet, spec, line, inverses, seeds, progress))
+        fmt::format("{}, {:g} Nm {}, {}{}", trial.actuator, task.amplitude_Nm,
+                    task.output == JointOutput::locked ? "locked" : "free", name(kind),
+                    is_helped ? ", fed forward and observed" : "");
+    for (const TrackingRow& run :
+         track_models(sheet, spec, trial.line, trial.inverses, seeds, progress))
       rows.add(condition, task, kind, run);
   }
+}
+
+/// One task on one spring, one repeat.
+void run_task(const Task& task, const std::string& actuator, std::uint64_t seed,
+              const StudyOptions& options, TrackingRows& rows, const Progress& progress) {
+  Dataset dataset = sweep_dataset(actuator, seed, progress);
+  std::vector<NamedInverse> inverses = all_learned(dataset, "sweeps", seed, options.is_quick);
+  inverses.erase(inverses.begin());  // the line of the sweeps is run anyway
+  const auto train_more = [&](Kind kind, std::string_view trained_on) {
+    add_torque_mode(dataset, actuator, task, kind, seed, options.is_quick);
+    for (NamedInverse& more : all_learned(dataset, trained_on, seed, options.is_quick))
+      inverses.push_back(std::move(more));
+  };
+  const auto of_sweeps = static_cast<std::ptrdiff_t>(inverses.size());
+  train_more(Kind::chirp, "+ torque mode");
+  const LinearInverse line = sweep_line(data_sheet(actuator), seed, progress);
+  judge({task, actuator, seed, line, inverses, options.is_quick}, false, rows, progress);
+  if (!task.is_helped) return;
+  inverses.erase(inverses.begin(), inverses.begin() + of_sweeps);
+  train_more(Kind::random_walk, "+ walks");
+  judge({task, actuator, seed, line, inverses, options.is_quick}, true, rows, progress);
 }
 
 }  // namespace
@@ -236,7 +266,8 @@ Study torque_tracking_000(const StudyOptions& options, const Progress& progress)
           "controller (+ torque mode); judged on the chirp and on noise with its RMS, where the "
           "rating "
           "and the 0.8 m lever of a free output allow it; errors of the torque without sensor "
-          "noise",
+          "noise; fed forward and observed: with the rate of the wanted torque fed forward and a "
+          "disturbance observer of 8 Hz, trained also on such noise (+ walks)",
       .unit = "Nm",
       .options = options};
   const std::span<const Task> tasks = std::span(kTasks).first(options.is_quick ? 1 : kTasks.size());

@@ -40,7 +40,8 @@ TorqueLoopCore::Settings loop_settings(const DataSheet& sheet, const TrackingSpe
                          .damping = spec.damping},
           .largest_torque_Nm = sheet.rating.torque_Nm.value,
           .friction = spec.friction,
-          .observer_cutoff_Hz = spec.observer_cutoff_Hz};
+          .observer_cutoff_Hz = spec.observer_cutoff_Hz,
+          .feeds_rate_forward = spec.feeds_rate_forward};
 }
 
 /// What the controller made of each tick, as channels.
@@ -52,7 +53,8 @@ class LoopLog {
 
   void add(double wanted_Nm, const TorqueLoopCore::Output& out) {
     const double terms_A = out.proportional_A + out.integral_A + out.derivative_A +
-                           out.feed_forward_A + out.friction_A + out.observer_A + out.handover_A;
+                           out.feed_forward_A + out.rate_feed_forward_A + out.friction_A +
+                           out.observer_A + out.handover_A;
     const std::array<double, kNames.size()> row{wanted_Nm,
                                                 out.wanted_torque_Nm,
                                                 out.wanted_deflection_rad,
@@ -60,6 +62,7 @@ class LoopLog {
                                                 out.integral_A,
                                                 out.derivative_A,
                                                 out.feed_forward_A,
+                                                out.rate_feed_forward_A,
                                                 out.friction_A,
                                                 out.observer_A,
                                                 out.handover_A,
@@ -76,12 +79,14 @@ class LoopLog {
   }
 
  private:
-  static constexpr std::array kNames{
-      "wanted_torque_Nm",       "limited_torque_Nm",  "wanted_deflection_rad",
-      "proportional_current_A", "integral_current_A", "derivative_current_A",
-      "feed_forward_current_A", "friction_current_A", "observer_current_A",
-      "handover_current_A",     "rest_current_A",     "command_current_A",
-      "is_limited_1",           "inverse_fault_1",    "fault_1"};
+  static constexpr std::array kNames{"wanted_torque_Nm",       "limited_torque_Nm",
+                                     "wanted_deflection_rad",  "proportional_current_A",
+                                     "integral_current_A",     "derivative_current_A",
+                                     "feed_forward_current_A", "rate_feed_forward_current_A",
+                                     "friction_current_A",     "observer_current_A",
+                                     "handover_current_A",     "rest_current_A",
+                                     "command_current_A",      "is_limited_1",
+                                     "inverse_fault_1",        "fault_1"};
   std::array<std::vector<double>, kNames.size()> columns_;
 };
 

@@ -204,6 +204,31 @@ TEST(TubeImpedance, FadesWithoutAMeasurement) {
   }
 }
 
+// 100 cases of 10^4 ticks.
+RC_GTEST_PROP(TubeImpedance, GivesAFaultAndASafeCurrentForAnyNumbers, ()) {
+  const auto settings =
+      tube_settings(*rc::gen::element(TubeImpedance::kHigh, TubeImpedance::kZero));
+  TubeImpedance impedance(settings, kRate_Hz);
+  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  const auto spoil = [&](double value) {
+    const double draw = random.uniform();
+    return draw < 0.02 ? kNaN : draw < 0.04 ? kInfinity : draw < 0.06 ? 1e308 : value;
+  };
+  double last_A = 0.0;
+  for (int n = 0; n < 10'000; ++n) {
+    const double wanted_rad = spoil(random.normal());
+    const TubeImpedance::Angles angles = {.rotor_rad = spoil(10.0 * random.normal()),
+                                          .middle_rad = spoil(10.0 * random.normal()),
+                                          .joint_rad = spoil(random.normal())};
+    const auto output = impedance.step(wanted_rad, 0.1 * random.normal(), angles);
+    RC_ASSERT(std::abs(output.current_A) <= settings.drive.peak_current_A);
+    const bool is_measured = std::isfinite(angles.rotor_rad + angles.middle_rad + angles.joint_rad);
+    if (!is_measured) RC_ASSERT(std::abs(output.current_A) <= std::abs(last_A));
+    if (!is_measured || !std::isfinite(wanted_rad)) RC_ASSERT(output.fault != Fault::none);
+    last_A = output.current_A;
+  }
+}
+
 TEST(TubeImpedance, RefusesWhatItCannotRender) {
   const auto refusal = [](auto change) {
     auto settings = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kZero);

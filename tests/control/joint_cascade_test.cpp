@@ -403,7 +403,7 @@ RC_GTEST_PROP(JointCascade, GivesAFaultAndASafeCurrentForAnyNumberThatIsNotFinit
   Random random = any_random();
   JointCascade cascade(settings, kRate_Hz);
   double last_A = 0.0;
-  for (int n = 0; n < 2000; ++n) {
+  for (int n = 0; n < 10'000; ++n) {
     const auto spoil = [&](double value) {
       const double draw = random.uniform();
       return draw < 0.05 ? kNaN : draw < 0.08 ? kInfinity : draw < 0.1 ? 1e308 : value;
@@ -435,7 +435,7 @@ RC_GTEST_PROP(JointCascade, KeepsToItsCurrentRateWhereNothingDisturbsIt, ()) {
   RigidJoint joint(settings.drive);
   JointReference reference;
   double last_A = 0.0;
-  for (int n = 0; n < 3000; ++n) {
+  for (int n = 0; n < 10'000; ++n) {
     if (random.uniform() < 0.01) reference = any_reference(random);
     const auto output = cascade.step(reference, joint.state(0.0));
     joint.step(output.current_A, 0.0, 1.0 / kRate_Hz);

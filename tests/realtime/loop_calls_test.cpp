@@ -4,6 +4,7 @@
 #include <pthread.h>
 
 #include <array>
+#include <chrono>
 #include <condition_variable>
 #include <csignal>
 #include <cstdlib>
@@ -16,9 +17,27 @@
 #include "support/lock_counter.hpp"
 #include "support/system_calls.hpp"
 #include "support/temporary_folder.hpp"
+#include "torsio/control/torque_controller.hpp"
 #include "torsio/realtime/mailbox.hpp"
 #include "torsio/realtime/realtime_loop.hpp"
 #include "torsio/realtime/recorder.hpp"
+#include "torsio/safety/command_watchdog.hpp"
+
+namespace {
+
+thread_local int looks_at_monotonic_clock = 0;
+thread_local int looks_at_other_clocks = 0;
+
+}  // namespace
+
+// Stands in front of glibc's, to see which clock is looked at.
+extern "C" int clock_gettime(clockid_t id, timespec* time) noexcept {
+  if (id == CLOCK_MONOTONIC)
+    ++looks_at_monotonic_clock;
+  else if (id != CLOCK_THREAD_CPUTIME_ID)
+    ++looks_at_other_clocks;
+  return static_cast<int>(syscall(SYS_clock_gettime, id, time));
+}
 
 namespace torsio {
 namespace {
@@ -33,7 +52,8 @@ struct SetPoint {
   double stiffness_Nm_rad = 0.0;
 };
 
-/// A step that does all that a step may: reads one mailbox, writes another, records, overruns.
+/// A step that does all that a step may: reads one mailbox, writes another, controls a torque under a
+/// watchdog, records, overruns.
 class BusyStep {
  public:
   BusyStep(Recorder& recorder, SimulatedClock* clock, std::int64_t ticks)
@@ -44,7 +64,17 @@ class BusyStep {
     const auto& wanted = wanted_.read();
     const double torque_Nm = 0.9 * wanted.value.torque_Nm;
     wanted_.write({.torque_Nm = torque_Nm + 1.0}, tick.due_ns);
-    recorder_.push(tick.index, std::array{torque_Nm, static_cast<double>(tick.lateness_ns)});
+    if (steps_ % 5000 == 0) watchdog_.arm(tick.due_ns - 1);
+    const auto state = watchdog_.step(
+        tick.due_ns, {.written_ns = wanted.written_ns, .is_valid = wanted.sequence > 0});
+    if (state == CommandWatchdog::State::running) {
+      joint_.gear_angle_rad = steps_ % 700 == 0 ? kNotMeasured : 1e-3 * torque_Nm;
+      current_A_ = controller_.step(torque_Nm, joint_).current_A;
+      ++driven_;
+    } else {
+      controller_.reset();
+    }
+    recorder_.push(tick.index, std::array{torque_Nm, current_A_});
     recorder_.push(tick.index, std::array{torque_Nm});  // refused
     histogram_.add(tick.lateness_ns);
     if (clock_ != nullptr && steps_ % 1000 == 999) clock_->pass(3'500'000);
@@ -55,6 +85,7 @@ class BusyStep {
 
   [[nodiscard]] std::size_t heap_calls_made() const noexcept { return heap_calls_; }
   [[nodiscard]] std::size_t lock_calls_made() const noexcept { return lock_calls_; }
+  [[nodiscard]] std::int64_t steps_driven() const noexcept { return driven_; }
 
  private:
   void begin() noexcept {
@@ -73,13 +104,22 @@ class BusyStep {
   std::size_t heap_calls_ = 0;
   std::size_t lock_calls_ = 0;
   Mailbox<SetPoint> wanted_;
+  CommandWatchdog watchdog_{CommandWatchdog::Settings{}};
+  TorqueController<LinearInverse> controller_{
+      LinearInverse(573.0),
+      TorqueLoopCore::Settings{
+          .deflection = {.joint = series_elastic_joint(data_sheet("dfki-50"))}},
+      1000.0};
+  JointSample joint_{.joint_angle_rad = 0.0};
+  double current_A_ = 0.0;
+  std::int64_t driven_ = 0;
   DurationHistogram histogram_;
 };
 
 LoopOptions modest() { return {.period_s = 1e-3, .priority = 0, .lock_memory = false}; }
 
 RecorderOptions two_channels(std::size_t ring_frames) {
-  return {.channels = {"torque_Nm", "lateness_1"}, .ring_frames = ring_frames};
+  return {.channels = {"torque_Nm", "current_A"}, .ring_frames = ring_frames};
 }
 
 TEST(LockCounter, SeesLocksAndWakeUps) {
@@ -110,6 +150,19 @@ TEST(RealtimeLoop, TenMillionStepsTouchNeitherHeapNorLock) {
   EXPECT_GT(recorder.dropped(), static_cast<std::uint64_t>(kSteps));
   EXPECT_EQ(step->heap_calls_made(), 0U);
   EXPECT_EQ(step->lock_calls_made(), 0U);
+  EXPECT_GT(step->steps_driven(), kSteps / 2);
+}
+
+// FAULTS 27: whoever sets the time of day, the loop does not look at it.
+TEST(RealtimeLoop, LooksAtNoClockThatMayBeSet) {
+  const int others = looks_at_other_clocks;
+  (void)std::chrono::system_clock::now();
+  ASSERT_EQ(looks_at_other_clocks, others + 1) << "seen where somebody does";
+  const int before = looks_at_monotonic_clock;
+  const LoopReport report =
+      RealtimeLoop(modest()).run([](const Tick& tick) noexcept { return tick.index < 20; });
+  EXPECT_GT(looks_at_monotonic_clock, before + static_cast<int>(report.steps));
+  EXPECT_EQ(looks_at_other_clocks, others + 1);
 }
 
 /// Ends the process with 0 if `work` did nothing but compute and look at the time.

@@ -79,6 +79,7 @@ TEST(Track, RecordsTermsThatAddUpToTheCommand) {
   TrackingSpec spec = short_spec();
   spec.friction = FrictionCompensation{.share = 0.3};
   spec.observer_cutoff_Hz = 2.0;
+  spec.feeds_rate_forward = true;
   const Recording record = track(kSheet, spec, line(), 1).record;
   const auto at = [&](const char* channel, std::size_t i) {
     return record.channel(channel).values[i];
@@ -86,21 +87,32 @@ TEST(Track, RecordsTermsThatAddUpToTheCommand) {
   double most_rest = 0.0;
   double most_friction = 0.0;
   double most_observer = 0.0;
+  double most_forward = 0.0;
   for (std::size_t i = 0; i < record.size(); ++i) {
     double sum = 0.0;
-    for (const char* term : {"proportional_current_A", "integral_current_A", "derivative_current_A",
-                             "feed_forward_current_A", "friction_current_A", "observer_current_A",
-                             "handover_current_A", "rest_current_A"})
+    for (const char* term :
+         {"proportional_current_A", "integral_current_A", "derivative_current_A",
+          "feed_forward_current_A", "rate_feed_forward_current_A", "friction_current_A",
+          "observer_current_A", "handover_current_A", "rest_current_A"})
       sum += at(term, i);
     ASSERT_NEAR(sum, at("command_current_A", i), 1e-12);
     if (at("is_limited_1", i) == 0.0)
       most_rest = std::max(most_rest, std::abs(at("rest_current_A", i)));
     most_friction = std::max(most_friction, std::abs(at("friction_current_A", i)));
     most_observer = std::max(most_observer, std::abs(at("observer_current_A", i)));
+    most_forward = std::max(most_forward, std::abs(at("rate_feed_forward_current_A", i)));
   }
   EXPECT_LT(most_rest, 1e-12);
   EXPECT_GT(most_friction, 0.01);
   EXPECT_GT(most_observer, 0.01);
+  EXPECT_GT(most_forward, 0.01);
+}
+
+TEST(Track, FollowsNoiseFasterThanTheLoopWhereItsRateIsFedForward) {
+  TrackingSpec spec = short_spec(Kind::random_walk);
+  const double plain_Nm = track(kSheet, spec, line(), 1).score.rmse;
+  spec.feeds_rate_forward = true;
+  EXPECT_LT(track(kSheet, spec, line(), 1).score.rmse, 0.6 * plain_Nm);
 }
 
 TEST(Track, AModelFilesInverseBeatsTheLineWhereItLearned) {

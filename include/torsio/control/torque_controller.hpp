@@ -14,7 +14,10 @@ namespace torsio {
 
 /// Makes up for a share of the drive's friction where the spring is to be wound:
 ///
-///     i_f = s (F_c tanh(v* / v₀) + F_v v*) / (N k_t),   v* = D[δ*] low-passed
+///     i_f = s (F_c tanh(v* / v₀) + F_v v*) / (N k_t),   v* = D[τ*] / K, low-passed
+///
+/// Of the wanted torque, not of what an inverse makes of it: that hears the measured motion, and its
+/// rate would close a second loop through the model.
 struct FrictionCompensation {
   double share = 0.7;         ///< s, 0 to 1; more than there is makes the loop hunt
   double speed_rad_s = 0.02;  ///< v₀, at the joint
@@ -28,6 +31,11 @@ class TorqueLoopCore {
     double largest_torque_Nm = std::numeric_limits<double>::infinity();  ///< the wish is cut there
     std::optional<FrictionCompensation> friction = std::nullopt;
     std::optional<double> observer_cutoff_Hz = std::nullopt;  ///< needs the rotor's angle
+    /// Adds i_r = K_d v*, v* as in `FrictionCompensation`: the deflection is damped against its wanted
+    /// rate instead of against standing still, and no longer lags by 2 ζ / ω. Margins stay as they
+    /// are; a torque that steps makes a current that jumps. For a torque that is known, not for one
+    /// that follows from a measurement, as that of an impedance.
+    bool feeds_rate_forward = false;
   };
 
   struct Output {
@@ -38,6 +46,7 @@ class TorqueLoopCore {
     double integral_A = 0.0;
     double derivative_A = 0.0;
     double feed_forward_A = 0.0;
+    double rate_feed_forward_A = 0.0;
     double friction_A = 0.0;
     double observer_A = 0.0;
     double handover_A = 0.0;
@@ -67,7 +76,7 @@ class TorqueLoopCore {
   Settings settings_;
   DeflectionController deflection_;
   std::optional<DisturbanceObserver> observer_;
-  Differentiator wanted_rate_;
+  Differentiator wanted_rate_;  ///< D[τ*]
   double amperes_per_Nm_;
   double wanted_Nm_ = 0.0;
   bool is_refused_ = false;
@@ -75,9 +84,9 @@ class TorqueLoopCore {
 };
 
 /// Torque through the spring: inverse model of the spring, deflection control, and optionally friction
-/// compensation and a disturbance observer.
+/// compensation, feed-forward of the rate, and a disturbance observer.
 ///
-///     δ* = inverse(τ*),   i = deflection controller(δ*, δ) + i_f + d,   |i| <= i_peak
+///     δ* = inverse(τ*),   i = deflection controller(δ*, δ) + i_r + i_f + d,   |i| <= i_peak
 ///
 /// A wish that is not finite is a fault, and the last good one stands; without a usable measurement
 /// the current fades to 0. Where the inverse falls back on its line the loop goes on and

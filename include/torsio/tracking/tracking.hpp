@@ -28,6 +28,7 @@ struct TrackingSpec {
   double damping = 0.9;
   std::optional<FrictionCompensation> friction = std::nullopt;
   std::optional<double> observer_cutoff_Hz = std::nullopt;
+  bool feeds_rate_forward = false;
   bool measures_bandwidth = true;  ///< by a run of its own with `frequency_sweep`
   OperatingConditions conditions = {};
   FaultSchedule faults = {};
@@ -43,8 +44,8 @@ struct TrackingRun {
   bool has_diverged = false;  ///< stopped: the joint turned round, or the torque left any bound
   /// What the sensors told, what the loop made of it with each term, and the `truth_` channels.
   ///
-  ///     command = proportional + integral + derivative + feed_forward + friction + observer +
-  ///               handover + rest,   all `..._current_A`
+  ///     command = proportional + integral + derivative + feed_forward + rate_feed_forward +
+  ///               friction + observer + handover + rest,   all `..._current_A`
   ///
   /// where rest is what a limit cut, or what stands while a fault lets the command fade.
   Recording record;

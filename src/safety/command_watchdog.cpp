@@ -1,0 +1,101 @@
+#include "torsio/safety/command_watchdog.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kLongest_s = 3600.0;
+
+std::int64_t checked_ns(double timeout_s) {
+  if (!(timeout_s > 0.0 && timeout_s <= kLongest_s))
+    throw Error({.place = "command watchdog: timeout_s",
+                 .expected = fmt::format("above 0, at most {}", kLongest_s),
+                 .found = fmt::format("{}", timeout_s)});
+  return std::llround(timeout_s * 1e9);
+}
+
+double checked_s(double longest_fault_s) {
+  if (!(longest_fault_s > 0.0))
+    throw Error({.place = "command watchdog: longest_fault_s",
+                 .expected = "above 0",
+                 .found = fmt::format("{}", longest_fault_s)});
+  return longest_fault_s;
+}
+
+}  // namespace
+
+CommandWatchdog::CommandWatchdog(const Settings& settings)
+    : timeout_ns_(checked_ns(settings.timeout_s)),
+      longest_fault_s_(checked_s(settings.longest_fault_s)) {}
+
+void CommandWatchdog::arm(std::int64_t now_ns) noexcept {
+  if (state_ == State::running) return;
+  state_ = State::waiting;
+  armed_ns_ = now_ns;
+  last_ns_ = now_ns;
+}
+
+void CommandWatchdog::stop() noexcept { stop_because(Reason::requested); }
+
+void CommandWatchdog::stop_because(Reason reason) noexcept {
+  if (state_ == State::stopped || state_ == State::disarmed) return;
+  state_ = State::stopped;
+  reason_ = reason;
+}
+
+CommandWatchdog::State CommandWatchdog::step(std::int64_t now_ns, const Command& command,
+                                             Fault fault) noexcept {
+  if (now_ns < last_ns_) stop_because(Reason::clock);
+  last_ns_ = now_ns;
+  // The future feeds as little as the past: a command from there would stand for too long.
+  const std::int64_t age_ns = now_ns - command.written_ns;
+  const bool is_fresh = command.is_valid && std::max(age_ns, -age_ns) < timeout_ns_;
+  if (state_ == State::waiting && is_fresh && command.written_ns > armed_ns_) {
+    state_ = State::running;
+    reason_ = Reason::none;
+    fed_ns_ = command.written_ns;
+    well_ns_ = now_ns;
+    fault = Fault::none;  // of what was before
+  } else if (state_ == State::running && is_fresh) {
+    fed_ns_ = std::max(fed_ns_, command.written_ns);
+  }
+  if (state_ == State::running) run(now_ns, fault);
+  return state_;
+}
+
+void CommandWatchdog::run(std::int64_t now_ns, Fault fault) noexcept {
+  if (fault == Fault::none) well_ns_ = now_ns;
+  if (now_ns - fed_ns_ >= timeout_ns_)
+    stop_because(Reason::command_lost);
+  else if (1e-9 * static_cast<double>(now_ns - well_ns_) >= longest_fault_s_)
+    stop_because(Reason::fault);
+}
+
+std::string_view name(CommandWatchdog::State state) noexcept {
+  switch (state) {
+    case CommandWatchdog::State::disarmed: return "disarmed";
+    case CommandWatchdog::State::waiting: return "waiting";
+    case CommandWatchdog::State::running: return "running";
+    case CommandWatchdog::State::stopped: break;
+  }
+  return "stopped";
+}
+
+std::string_view name(CommandWatchdog::Reason reason) noexcept {
+  switch (reason) {
+    case CommandWatchdog::Reason::none: return "none";
+    case CommandWatchdog::Reason::command_lost: return "command_lost";
+    case CommandWatchdog::Reason::fault: return "fault";
+    case CommandWatchdog::Reason::clock: return "clock";
+    case CommandWatchdog::Reason::requested: break;
+  }
+  return "requested";
+}
+
+}  // namespace torsio

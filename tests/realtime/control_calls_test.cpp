@@ -1,0 +1,296 @@
+// What the controllers ask of the machine in ten million cycles each, faults among them: no heap, no
+// lock, no system call.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "model/random_mixture.hpp"
+#include "support/example_models.hpp"
+#include "support/example_settings.hpp"
+#include "support/system_calls.hpp"
+#include "torsio/control/joint_cascade.hpp"
+#include "torsio/control/joint_impedance.hpp"
+#include "torsio/control/torque_controller.hpp"
+#include "torsio/control/tube_impedance.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/signal/excitation.hpp"
+#include "torsio/signal/joint_move.hpp"
+
+namespace torsio {
+namespace {
+
+using test::besides_computing;
+
+constexpr double kRate_Hz = 1000.0;
+constexpr int kCycles = 10'000'000;
+constexpr int kLeastFaults = kCycles / 1000;
+
+/// Numbers about 0 and, now and then, what is none; drawn before, so that drawing costs no time.
+class Spoiled {
+ public:
+  /// @param count so many and over again: another for each signal, that all meet all
+  Spoiled(double size, std::size_t count) : values_(count) {
+    Random random(count);
+    for (double& value : values_) {
+      const double draw = random.uniform();
+      value = draw < 0.002   ? std::numeric_limits<double>::quiet_NaN()
+              : draw < 0.004 ? std::numeric_limits<double>::infinity()
+              : draw < 0.006 ? 1e308
+                             : size * random.normal();
+    }
+  }
+  double next() noexcept {
+    place_ = place_ + 1 < values_.size() ? place_ + 1 : 0;
+    return values_[place_];
+  }
+
+ private:
+  std::vector<double> values_;
+  std::size_t place_ = 0;
+};
+
+TEST(BesidesComputing, TellsWhatItSees) {
+  EXPECT_EQ(besides_computing([] { return true; }), "");
+  EXPECT_EQ(besides_computing([] { return false; }), "wrong results");
+  EXPECT_EQ(besides_computing([] {
+              int* volatile number = new int(1);
+              delete number;
+              return true;
+            }),
+            "the heap");
+  std::mutex mutex;
+  EXPECT_EQ(besides_computing([&] {
+              const std::lock_guard guard(mutex);
+              return true;
+            }),
+            "a lock");
+  const auto call = [] { return syscall(SYS_getppid) > 0; };
+  const bool has_filter = besides_computing([] { return test::allow_no_calls(); }) != "";
+  EXPECT_EQ(besides_computing(call), has_filter ? "a system call" : "");
+}
+
+TEST(ControlCalls, OfPidAreNone) {
+  Pid pid({.gains = {.proportional = 2.0, .integral = 10.0, .derivative = 0.1},
+           .limits = {.lowest = -1.0, .highest = 1.0, .rate_per_s = 100.0},
+           .derivative_cutoff_Hz = 100.0},
+          kRate_Hz);
+  Spoiled reference(1.0, 4099);
+  Spoiled measurement(1.0, 4111);
+  EXPECT_EQ(besides_computing([&] {
+              int faults = 0;
+              for (int n = 0; n < kCycles; ++n) {
+                const Pid::Output output = pid.step(reference.next(), measurement.next());
+                faults += output.fault != Fault::none ? 1 : 0;
+                if (n % 7 == 0) pid.track(0.5 * output.command);
+                if (n % 777 == 0) static_cast<void>(pid.set_gains({3.0, n % 2 == 0 ? 5.0 : -5.0}));
+                if (n % 77'777 == 0) pid.start(0.3);
+                if (!(std::abs(output.command) <= 1.0)) return false;
+              }
+              return faults > kLeastFaults;
+            }),
+            "");
+}
+
+// Every mode, the fault paths, gains that are taken and gains that are refused.
+TEST(ControlCalls, OfJointCascadeAreNone) {
+  const Drive drive = drive_of(data_sheet("dfki-50"));
+  JointCascade cascade(
+      {.drive = drive,
+       .limits = {.lowest_rad = -1.0, .highest_rad = 1.0, .speed_rad_s = 2.0, .load_Nm = 2.0},
+       .has_torque = true},
+      kRate_Hz);
+  const JointCascade::Gains gains = JointCascade::gains_for(drive, 40.0);
+  Spoiled position(1.0, 4099);
+  Spoiled torque(1.0, 4111);
+  Spoiled angle(0.5, 4127);
+  EXPECT_EQ(besides_computing([&] {
+              int faults = 0;
+              for (int n = 0; n < kCycles; ++n) {
+                const auto output =
+                    cascade.step({.mode = static_cast<JointMode>(n / 1000 % 5),
+                                  .position_rad = position.next(),
+                                  .torque_Nm = torque.next()},
+                                 {.angle_rad = angle.next(), .speed_rad_s = 0.1, .torque_Nm = 1.0});
+                faults += output.fault != Fault::none ? 1 : 0;
+                if (n % 777 == 0) static_cast<void>(cascade.set_gains(gains));
+                if (n % 777'777 == 0) cascade.reset();
+                if (!(std::abs(output.current_A) <= drive.peak_current_A)) return false;
+              }
+              return faults > kLeastFaults;
+            }),
+            "");
+}
+
+TEST(ControlCalls, OfDeflectionControllerAreNone) {
+  for (const auto actuation :
+       {DeflectionController::Actuation::current, DeflectionController::Actuation::velocity}) {
+    const SeriesElasticJoint joint = series_elastic_joint(data_sheet("dfki-50"));
+    DeflectionController controller(
+        {.joint = joint,
+         .actuation = actuation,
+         .speed_loop = JointCascade::gains_for(joint.drive, 200.0).velocity},
+        kRate_Hz);
+    const Pid::Gains gains = controller.gains();
+    Spoiled wanted(0.05, 4099);
+    Spoiled deflection(0.05, 4111);
+    EXPECT_EQ(besides_computing([&] {
+                int faults = 0;
+                for (int n = 0; n < kCycles / 2; ++n) {
+                  const auto output = controller.step(wanted.next(), deflection.next());
+                  faults += output.fault != Fault::none ? 1 : 0;
+                  if (n % 7 == 0) controller.track(0.5 * output.command);
+                  if (n % 777 == 0) static_cast<void>(controller.set_gains(gains));
+                  if (!std::isfinite(output.command)) return false;
+                }
+                return faults > kLeastFaults / 2;
+              }),
+              "");
+  }
+}
+
+/// Torque control with all that may be added to it.
+template <SpringInverse I>
+void expect_no_calls(I inverse) {
+  const SeriesElasticJoint joint = series_elastic_joint(data_sheet("dfki-50"));
+  TorqueController controller(std::move(inverse),
+                              TorqueLoopCore::Settings{.deflection = {.joint = joint},
+                                                       .largest_torque_Nm = 50.0,
+                                                       .friction = FrictionCompensation{},
+                                                       .observer_cutoff_Hz = 5.0,
+                                                       .feeds_rate_forward = true},
+                              kRate_Hz);
+  const Pid::Gains gains = controller.core().deflection().gains();
+  Spoiled wanted(10.0, 4099);
+  Spoiled rotor(1.0, 4111);
+  Spoiled gear(0.01, 4127);
+  EXPECT_EQ(besides_computing([&] {
+              int faults = 0;
+              int fallbacks = 0;
+              JointSample sample;
+              sample.joint_angle_rad = 0.0;
+              for (int n = 0; n < kCycles; ++n) {
+                sample.motor_angle_rad = rotor.next();
+                sample.gear_angle_rad = gear.next();
+                const auto output = controller.step(wanted.next(), sample);
+                faults += output.fault != Fault::none ? 1 : 0;
+                fallbacks += output.inverse != Fault::none ? 1 : 0;
+                if (n % 777 == 0) static_cast<void>(controller.set_gains(gains));
+                if (n % 777'777 == 0) controller.reset();
+                if (!(std::abs(output.current_A) <= joint.drive.peak_current_A)) return false;
+              }
+              const bool has_fallback = !std::same_as<I, LinearInverse>;
+              return faults > kLeastFaults && fallbacks < kCycles / 2 &&
+                     (fallbacks > kLeastFaults) == has_fallback;
+            }),
+            "");
+}
+
+/// Around a model of so many inputs: the range is left now and then.
+EstimatorSettings inverse_settings(std::size_t inputs) {
+  EstimatorSettings settings = test::example_settings();
+  settings.zeroed_channels.clear();
+  settings.ranges = {.lowest = {-0.03, -10.0}, .highest = {0.03, 10.0}, .margin = 0.1};
+  settings.fallback = {.slope = {573.0, 0.0}, .residual_std = 1.5};
+  if (inputs == 3) {
+    settings.features.inputs.emplace_back("lowpass(rate(joint_angle_rad), 10Hz)");
+    settings.ranges.lowest.push_back(-1.0);
+    settings.ranges.highest.push_back(1.0);
+    settings.fallback.slope.push_back(0.0);
+  }
+  return settings;
+}
+
+TEST(ControlCalls, OfTorqueControllerWithALineAreNone) { expect_no_calls(LinearInverse(573.0)); }
+
+TEST(ControlCalls, OfTorqueControllerWithAMixtureOf300AreNone) {
+  Dgmm::Parameters mixture{
+      .mixture = test::random_mixture({.components = 300, .background = true}, 4),
+      .clamp = {.slope = {573.0, 0.0, 0.0}, .width = 2.0}};
+  mixture.mixture.centre = {0.0, 0.0, 0.0, 0.0};
+  mixture.mixture.scale = {10.0, 0.02, 5.0, 0.1};
+  expect_no_calls(ModelInverse(inverse_settings(3), Dgmm(mixture)));
+}
+
+TEST(ControlCalls, OfTorqueControllerWithAGreyBoxAreNone) {
+  expect_no_calls(ModelInverse(inverse_settings(2), test::example<GreyBox>()));
+}
+
+TEST(ControlCalls, OfTorqueControllerWithANetworkAreNone) {
+  EstimatorSettings settings = inverse_settings(2);
+  settings.target = "spring_deflection_rad";
+  settings.features.inputs.front() = "torque_Nm";
+  settings.ranges = {.lowest = {-20.0, -10.0}, .highest = {20.0, 10.0}, .margin = 0.1};
+  settings.fallback.slope.front() = 1.0 / 573.0;
+  expect_no_calls(TrainedInverse(Estimator(settings, AnyModel(test::example<Mlp>()))));
+}
+
+TEST(ControlCalls, OfJointImpedanceAreNone) {
+  JointImpedance impedance({.gains = {20.0, 1.0}, .torque_Nm = 40.0, .torque_rate_Nm_s = 1000.0},
+                           kRate_Hz);
+  Spoiled wanted(0.1, 4099);
+  Spoiled angle(0.1, 4111);
+  EXPECT_EQ(besides_computing([&] {
+              int faults = 0;
+              for (int n = 0; n < kCycles; ++n) {
+                const auto output = impedance.step({.angle_rad = wanted.next()},
+                                                   {.angle_rad = angle.next(), .speed_rad_s = 0.1});
+                faults += output.fault != Fault::none ? 1 : 0;
+                if (n % 777 == 0)
+                  static_cast<void>(impedance.set_gains({n % 2 == 0 ? 10.0 : -10.0, 1.0}));
+                if (!(std::abs(output.torque_Nm) <= 40.0)) return false;
+              }
+              return faults > kLeastFaults;
+            }),
+            "");
+}
+
+TEST(ControlCalls, OfTubeImpedanceAreNone) {
+  TubeImpedance impedance(
+      TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kZero), kRate_Hz);
+  Spoiled wanted(0.1, 4099);
+  Spoiled rotor(0.1, 4111);
+  EXPECT_EQ(besides_computing([&] {
+              int faults = 0;
+              for (int n = 0; n < kCycles; ++n) {
+                const auto output = impedance.step(
+                    wanted.next(), 0.1,
+                    {.rotor_rad = rotor.next(), .middle_rad = 0.0, .joint_rad = 0.0});
+                faults += output.fault != Fault::none ? 1 : 0;
+                if (!std::isfinite(output.current_A)) return false;
+              }
+              return faults > kLeastFaults;
+            }),
+            "");
+}
+
+TEST(ControlCalls, OfReferencesAreNone) {
+  Chirp chirp({}, kRate_Hz);
+  LogSweep sweep({}, kRate_Hz);
+  RandomWalk walk({}, kRate_Hz);
+  Steps steps({.levels = {1.0, -1.0, 0.5}, .hold_s = 2.0}, kRate_Hz);
+  Replay replay({.values = {0.0, 1.0, 0.5}, .recorded_Hz = 100.0}, kRate_Hz);
+  JointMove move({.waypoints_rad = {0.0, 1.0, -0.5}}, kRate_Hz);
+  EXPECT_EQ(besides_computing([&] {
+              double sum = 0.0;
+              for (int n = 0; n < kCycles / 5; ++n) {
+                sum += chirp.step() + sweep.step() + walk.step() + steps.step() + replay.step() +
+                       move.step().position_rad;
+                if (n % 10'000 == 0) {
+                  replay.reset();
+                  move.reset();
+                }
+              }
+              return std::isfinite(sum);
+            }),
+            "");
+}
+
+}  // namespace
+}  // namespace torsio
