@@ -77,7 +77,7 @@ JointCascade::JointCascade(const Settings& settings, double sample_rate_Hz)
       approach_1_s_(kApproachShare * settings.bandwidth_rad_s),
       braking_rad_s2_(kBrakingShare *
                       (settings.drive.rated_current_A * settings.drive.torque_per_current() -
-                       settings.limits.load_Nm) /
+                       settings.limits.load_Nm - settings.limits.carried_Nm) /
                       settings.drive.inertia()),
       margin_rad_(settings.limits.load_Nm /
                   (settings.drive.inertia() * settings.bandwidth_rad_s * approach_1_s_)),
@@ -100,10 +100,10 @@ JointCascade::JointCascade(const Settings& settings, double sample_rate_Hz)
 void JointCascade::check_limits() const {
   const Limits& limits = settings_.limits;
   if (!(braking_rad_s2_ > 0.0))
-    contradict(
-        "the rated current cannot brake against the load",
-        fmt::format("a load below {:.4g} Nm", settings_.drive.rated_current_A / amperes_per_Nm_),
-        fmt::format("{:.4g} Nm", limits.load_Nm + limits.carried_Nm));
+    contradict("the rated current cannot brake against the load",
+               fmt::format("load_Nm and carried_Nm together below {:.4g} Nm",
+                           settings_.drive.rated_current_A / amperes_per_Nm_),
+               fmt::format("{:.4g} Nm", limits.load_Nm + limits.carried_Nm));
   if (!(soft_speed_rad_s_ > 0.0))
     contradict("the load alone may use up the speed limit",
                fmt::format("a speed above {:.4g} rad/s, or more bandwidth",

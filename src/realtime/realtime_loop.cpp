@@ -67,10 +67,18 @@ void RealtimeLoop::refuse_to_start_twice() const {
 
 LoopReport RealtimeLoop::wait() {
   if (!running_.valid()) throw Error({.place = "real-time loop", .problem = "it was not started"});
+  running_.wait();
+  is_stop_requested_.store(false, std::memory_order_relaxed);  // what it was for is over
   return running_.get();
 }
 
 LoopReport RealtimeLoop::run_steps(StepCall step, const std::stop_token& stop) {
+  LoopReport report = run_until_stopped(step, stop);
+  is_stop_requested_.store(false, std::memory_order_relaxed);
+  return report;
+}
+
+LoopReport RealtimeLoop::run_until_stopped(StepCall step, const std::stop_token& stop) {
   const LoopPrivileges privileges(options_);
   const DenormalsOff denormals_off;
   LoopReport report;
@@ -80,7 +88,7 @@ LoopReport RealtimeLoop::run_steps(StepCall step, const std::stop_token& stop) {
   std::uint64_t overruns_in_row = 0;
   while (true) {
     clock_->sleep_until(tick.due_ns);
-    if (stop.stop_requested()) {
+    if (is_stop_requested_.load(std::memory_order_acquire) || stop.stop_requested()) {
       report.end = LoopEnd::stop_requested;
       return report;
     }

@@ -266,6 +266,12 @@ TEST(JointCascade, RefusesLimitsThatContradictEachOther) {
             std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.limits.load_Nm = 70.0; }).find("cannot brake"),
             std::string::npos);
+  // 0.9 of what the rated current can, beside a load_Nm of 2.5 Nm.
+  const Drive drive = drive_of(data_sheet("dfki-50"));
+  const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
+  EXPECT_EQ(refusal([&](auto& s) { s.limits.carried_Nm = 0.9 * rated_Nm; }), "");
+  EXPECT_NE(refusal([&](auto& s) { s.limits.carried_Nm = rated_Nm; }).find("cannot brake"),
+            std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.limits.speed_rad_s = 0.05; }).find("use up the speed limit"),
             std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.limits.current_rate_A_s = 100.0; }).find("current rate"),
@@ -299,6 +305,8 @@ JointCascade::Settings any_settings() {
   settings.limits.lowest_rad = number(-2.0, -0.5);
   settings.limits.highest_rad = number(0.5, 2.0);
   settings.limits.thermal_time_s = number(0.2, 5.0);
+  settings.limits.carried_Nm =
+      number(0.0, 0.8) * settings.drive.rated_current_A * settings.drive.torque_per_current();
   settings.gains = JointCascade::gains_for(settings.drive, settings.bandwidth_rad_s);
   settings.gains->velocity.integral *= number(0.0, 3.0);
   settings.gains->position_1_s *= number(0.1, 5.0);
@@ -344,6 +352,7 @@ RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
   JointCascade cascade(settings, kRate_Hz);
   RigidJoint joint(settings.drive);
   JointReference reference;
+  const bool is_steady = *rc::gen::arbitrary<bool>();
   double carried_Nm = 0.0;
   double unknown_Nm = 0.0;
   double heat = 0.0;
@@ -359,8 +368,10 @@ RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
     }
     if (random.uniform() < 0.02)
       unknown_Nm = 0.8 * limits.load_Nm * (random.uniform() < 0.5 ? -1 : 1);
-    carried_Nm = std::clamp(carried_Nm + 0.004 * limits.carried_Nm * random.normal(),
-                            -limits.carried_Nm, limits.carried_Nm);
+    // Half of the cases push to one side with all of it.
+    carried_Nm = is_steady ? limits.carried_Nm
+                           : std::clamp(carried_Nm + 0.004 * limits.carried_Nm * random.normal(),
+                                        -limits.carried_Nm, limits.carried_Nm);
     const auto output = cascade.step(reference, joint.state(carried_Nm));
     joint.step(output.current_A, carried_Nm + unknown_Nm, 1.0 / kRate_Hz);
     RC_ASSERT(joint.angle_rad() >= limits.lowest_rad);
@@ -370,6 +381,37 @@ RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
     RC_ASSERT(std::abs(output.current_A) <= settings.drive.peak_current_A);
     heat += share * (output.current_A * output.current_A - heat);
     RC_ASSERT(heat <= settings.drive.rated_current_A * settings.drive.rated_current_A);
+  }
+}
+
+// The worst that the limits were told of: a load that pushes into the limit for ever, and a current
+// that heats the winding until no more than the rated one is left to brake with.
+TEST(JointCascade, StopsAtItsLimitWithAHotWindingUnderTheWholeLoadThatItWasToldOf) {
+  for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
+    for (const double share : {0.3, 0.6, 0.9}) {
+      JointCascade::Settings settings = settings_of(actuator);
+      const Drive& drive = settings.drive;
+      const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
+      settings.limits.carried_Nm = share * rated_Nm;
+      JointCascade cascade(settings, kRate_Hz);
+      RigidJoint joint(drive);
+      double farthest_rad = 0.0;
+      double hottest = 0.0;
+      for (int n = 0; n < 50'000; ++n) {
+        // To and fro on the spot at the peak, then with the load.
+        const bool is_heating = n < 40'000;
+        const double wanted_A =
+            is_heating && n / 10 % 2 == 0 ? -drive.peak_current_A : drive.peak_current_A;
+        const double load_Nm = is_heating ? 0.0 : -settings.limits.carried_Nm;
+        const auto output =
+            cascade.step({.mode = JointMode::current, .current_A = wanted_A}, joint.state(load_Nm));
+        joint.step(output.current_A, load_Nm, 1.0 / kRate_Hz);
+        farthest_rad = std::max(farthest_rad, std::abs(joint.angle_rad()));
+        hottest = std::max(hottest, output.thermal_load);
+      }
+      EXPECT_LE(farthest_rad, 1.0) << actuator << ", " << share;
+      EXPECT_GT(hottest, 0.8) << actuator << ": above 0.75 the peak is no longer allowed";
+    }
   }
 }
 

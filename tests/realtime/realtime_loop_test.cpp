@@ -6,6 +6,7 @@
 #include <atomic>
 #include <limits>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "realtime/simulated_clock.hpp"
@@ -112,6 +113,56 @@ TEST(RealtimeLoop, StopsOnRequestBeforeTheNextStepAndStaysStopped) {
   EXPECT_EQ(steps, 5);
 }
 
+TEST(RealtimeLoop, StopsOnRequestWhatRunsOnTheCallersThread) {
+  SimulatedClock clock;
+  RealtimeLoop loop(modest(), &clock);
+  const auto step = [&](const Tick& tick) noexcept {
+    if (tick.index == 4) loop.request_stop();
+    return tick.index < 499;
+  };
+  const LoopReport stopped = loop.run(step);
+  EXPECT_EQ(stopped.end, LoopEnd::stop_requested);
+  EXPECT_EQ(stopped.steps, 5U);
+  // The request was for that run.
+  EXPECT_EQ(loop.run([](const Tick&) noexcept { return false; }).steps, 1U);
+}
+
+TEST(RealtimeLoop, StopsOnRequestFromAnotherThread) {
+  RealtimeLoop loop(modest());
+  std::atomic<bool> runs{false};
+  std::thread other([&] {
+    while (!runs) std::this_thread::yield();
+    loop.request_stop();
+  });
+  const LoopReport report = loop.run([&](const Tick& tick) noexcept {
+    runs = true;
+    return tick.index < 60'000;
+  });
+  other.join();
+  EXPECT_EQ(report.end, LoopEnd::stop_requested);
+}
+
+TEST(RealtimeLoop, ARequestThatComesBeforeTheLoopIsNotLost) {
+  SimulatedClock clock;
+  RealtimeLoop loop(modest(), &clock);
+  const auto step = [](const Tick&) noexcept { return false; };
+  loop.request_stop();
+  loop.start(step);
+  EXPECT_EQ(loop.wait().steps, 0U);
+  loop.request_stop();
+  EXPECT_EQ(loop.run(step).end, LoopEnd::stop_requested);
+  // One that comes too late is over with the loop that it was for.
+  std::atomic<bool> is_over{false};
+  loop.start([&](const Tick&) noexcept {
+    is_over = true;
+    return false;
+  });
+  while (!is_over) std::this_thread::yield();
+  loop.request_stop();
+  EXPECT_EQ(loop.wait().steps, 1U);
+  EXPECT_EQ(loop.run(step).steps, 1U);
+}
+
 TEST(RealtimeLoop, RunsOnItsOwnThreadByTheMonotonicClock) {
   RealtimeLoop loop(modest());
   EXPECT_THROW((void)loop.wait(), Error);
@@ -143,8 +194,13 @@ TEST(RealtimeLoop, EndsWithItsObject) {
       return true;
     });
     while (!ran) std::this_thread::yield();
+    ran = false;
+    while (!ran) std::this_thread::yield();
   }
-  SUCCEED();
+  ran = false;
+  MonotonicClock clock;
+  clock.sleep_until(clock.now_ns() + 5 * kPeriodInNs);
+  EXPECT_FALSE(ran) << "a step after the object was gone";
 }
 
 TEST(RealtimeLoop, SaysWhatItWasGrantedAndGivesTheThreadBack) {

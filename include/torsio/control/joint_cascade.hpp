@@ -54,10 +54,10 @@ struct JointState {
 ///     k_v (v_lo − v) + τ / (N k_t)  <=  i  <=  k_v (v_hi − v) + τ / (N k_t),   k_v = J N² ω / (N k_t)
 ///     v_hi = min(v_max′, ω_p e, √(2 a (e − a / 2ω_p²))),   e = q_max − m − q,   and v_lo alike
 ///
-/// with ω_p = ω / 5, half of what the rated current can brake beside the loads as a, and the margins
-/// m = d / (J N² ω ω_p), v_max′ = v_max − d / (J N² ω) that a load d the cascade does not know of may
-/// use up: in a joint that starts within its limits, q <= q_max and v <= v_max for any command and
-/// any such load. Both bounds are continuous in the state and have no memory, so the least of them
+/// with ω_p = ω / 5, a = (N k_t i_rated − d − τ_c) / (2 J N²), half of what the rated current can brake
+/// beside the loads, and the margins m = d / (J N² ω ω_p), v_max′ = v_max − d / (J N² ω) that a load d
+/// the cascade does not know of may use up: in a joint that starts within its limits, q <= q_max and
+/// v <= v_max for any command, any such load and any measured one up to τ_c, hot winding or cold. Both bounds are continuous in the state and have no memory, so the least of them
 /// wins, there is nothing to wind up, and it lets go where it took over. What follows (current, I²t,
 /// voltage) cuts further. A rate limit acts on what the mode wants; one that is slower than the
 /// override is refused. Without a torque sensor τ is 0 and d is the whole load.
@@ -76,7 +76,7 @@ class JointCascade {
     double speed_rad_s = 0.0;
     double load_Nm = 0.0;     ///< d: the largest load that is not measured (friction, torque
                               ///< error, what changes faster than the current follows)
-    double carried_Nm = 0.0;  ///< the largest load that is: none is left of it to brake with
+    double carried_Nm = 0.0;  ///< the largest load that is: what carries it cannot brake
     double torque_Nm = std::numeric_limits<double>::infinity();  ///< of the wanted torque
     double current_rate_A_s = std::numeric_limits<double>::infinity();
     double thermal_time_s = 10.0;  ///< of the winding

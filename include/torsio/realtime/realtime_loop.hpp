@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <concepts>
 #include <cstdint>
 #include <future>
@@ -103,14 +104,13 @@ class RealtimeLoop {
   template <LoopStep Step>
   void start(Step step) {
     refuse_to_start_twice();
-    stop_ = std::stop_source{};
     running_ = std::async(std::launch::async,
-                          [this, token = stop_.get_token(), own = std::move(step)]() mutable {
-                            return run(own, token);
-                          });
+                          [this, own = std::move(step)]() mutable { return run(own); });
   }
-  /// Takes effect before the next step: within a period. From any thread.
-  void request_stop() noexcept { stop_.request_stop(); }
+  /// Ends what `run` or `start` runs before its next step: within a period. From any thread, or a
+  /// signal handler. A request stands until `run` or `wait` returns: one that comes before `run` or
+  /// `start` ends that before its first step.
+  void request_stop() noexcept { is_stop_requested_.store(true, std::memory_order_release); }
   /// Waits for the end of what was started. @throws Error as `run`, or if nothing was started.
   LoopReport wait();
 
@@ -121,13 +121,15 @@ class RealtimeLoop {
   };
 
   LoopReport run_steps(StepCall step, const std::stop_token& stop);
+  LoopReport run_until_stopped(StepCall step, const std::stop_token& stop);
   void refuse_to_start_twice() const;
 
   LoopOptions options_;
   std::int64_t period_ns_ = 0;
   MonotonicClock monotonic_;
   LoopClock* clock_;
-  std::stop_source stop_;
+  std::atomic<bool> is_stop_requested_{false};
+  static_assert(std::atomic<bool>::is_always_lock_free);
   std::future<LoopReport> running_;
 };
 
