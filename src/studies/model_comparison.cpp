@@ -113,7 +113,8 @@ Study model_comparison(const StudyOptions& options, const Progress& progress) {
           "free run. dfki: three sweeps, judged on a fourth lever in an inclined plane (new "
           "lever); "
           "torque chirps of 0.4 and 0.15 of the rating, output locked, judged on noise of 0.3 "
-          "(random walk). elastomer: triangles of 0.4 to 4 Hz. rubber-clutch: sines, judged on "
+          "(random walk), at 125 Hz, the load cell's rate. elastomer: triangles of 0.4 to 4 Hz. "
+          "rubber-clutch: sines, judged on "
           "multisines. harmonic-drive: pushes of 10 and 20 Nm, high and zero impedance, judged on "
           "15 Nm. Real ones: docs/studies.md",
       .unit = "Nm",

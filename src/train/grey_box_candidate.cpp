@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace torsio {
 namespace {
@@ -129,6 +130,9 @@ Eigen::VectorXd solve_mixed(const Eigen::MatrixXd& product, const Eigen::VectorX
     small.square = square;
     const NonNegativeFit fit =
         non_negative_least_squares(small, std::vector<std::uint8_t>(bound.size(), 0));
+    // A search for active sets that went in circles is no fit: NaN is never chosen.
+    if (!fit.has_converged)
+      return Eigen::VectorXd::Constant(projection.size(), std::numeric_limits<double>::quiet_NaN());
     const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(
         fit.coefficients.data(), static_cast<Index>(fit.coefficients.size()));
     for (std::size_t i = 0; i < bound.size(); ++i)
