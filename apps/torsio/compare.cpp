@@ -1,8 +1,11 @@
+#include <optional>
+
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/report/cross_validation.hpp"
 #include "torsio/report/html.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/train/comparison.hpp"
@@ -27,19 +30,22 @@ void run(const CompareFlags& flags) {
   flags.data.check_outputs({flags.output, flags.report, flags.json.destination}, flags.test);
   ProgressBar bar;
   const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, bar.listener());
-  std::vector<torsio::ModelChoice> choices;
+  std::optional<torsio::StructureSearch> search;
   if (flags.models == torsio::kSearch) {
-    const torsio::StructureSearch search = torsio::search_structures(
+    search = torsio::search_structures(
         dataset, torsio::search_candidates(dataset, flags.data.wanted_inputs()), flags.seed,
         flags.allow_leak, bar.listener());
-    if (flags.json.wants_tables()) print(cross_validation_text(search.scores) + "\n");
-    choices = search.winners;
-  } else {
-    choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
+    if (search->winners.empty())
+      throw torsio::Error({.problem = first_failure(search->scores.results)});
+    if (flags.json.wants_tables()) print(cross_validation_text(search->scores) + "\n");
   }
+  const auto choices =
+      search ? search->winners
+             : torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   const auto comparison =
       torsio::compare(dataset, choices, flags.seed, flags.allow_leak, bar.listener());
-  flags.json.write(torsio::results_json(comparison.results));
+  flags.json.write(search ? torsio::search_json(comparison.results, search->scores)
+                          : torsio::results_json(comparison.results));
   if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
   if (flags.json.wants_tables()) print(comparison_text(comparison.results));
   if (!flags.report.empty()) write_text(flags.report, torsio::results_html(comparison.results));

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "torsio/report/text_table.hpp"
 
@@ -22,6 +23,10 @@ std::string heading(const torsio::Results& results) {
   if (results.non_causal_zero)
     text += "zero: non-causal (taken from the middle of each whole record)\n";
   return text;
+}
+
+std::string percent(double share) {
+  return std::isfinite(share) ? fmt::format("{:.1f}", 100.0 * share) : "-";
 }
 
 }  // namespace
@@ -49,8 +54,8 @@ std::string cross_validation_text(const torsio::CrossValidation& validation) {
 
 std::string evaluation_text(const torsio::Results& results) {
   torsio::TextTable table;
-  table.header(
-      {"split", "RMSE", "MAD", "max|e|", "fit %", "samples", "by a guard", "step ns", "p99.9"});
+  table.header({"split", "RMSE", "MAD", "max|e|", "fit %", "samples", "by a guard", "in 1 sd %",
+                "in 2 sd %", "step ns", "p99.9"});
   // Four places, or three digits where the smallest error would be lost in them (metres).
   constexpr double kTooSmallForFourPlaces = 0.0005;
   const bool is_small = std::ranges::any_of(results.rows, [](const torsio::ResultRow& row) {
@@ -65,8 +70,8 @@ std::string evaluation_text(const torsio::Results& results) {
     if (row.recording) split = "  " + *row.recording;
     table.row({split, error(metrics.rmse), error(metrics.mad), error(metrics.max_abs),
                fmt::format("{:.1f}", metrics.fit_percent), fmt::format("{}", metrics.samples),
-               fmt::format("{}", row.score.guarded_samples),
-               fmt::format("{:.0f}", row.score.step_ns_p50),
+               fmt::format("{}", row.score.guarded_samples), percent(row.score.within_std_dev),
+               percent(row.score.within_2_std_dev), fmt::format("{:.0f}", row.score.step_ns_p50),
                fmt::format("{:.0f}", row.score.step_ns_p999)});
   }
   return fmt::format("target {}, inputs {}\nerrors in {}, free run\n{}", results.target,

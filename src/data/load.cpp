@@ -115,6 +115,23 @@ class Collector {
       add_log(path, role);
   }
 
+  void add_manifest(Manifest manifest, std::optional<Role> role) {
+    agree(dataset_.target, manifest.target, "target", manifest.file);
+    agree(dataset_.label, manifest.label, "label", manifest.file);
+    if (dataset_.input_sets.empty()) dataset_.input_sets = manifest.input_sets;
+    const std::filesystem::path folder = data_folder(manifest);
+    for (ManifestFile& entry : manifest.files) {
+      if (role) entry.role = role;
+      Planned planned{.log = {.path = (folder / entry.file).string(),
+                              .entry = entry,
+                              .mapping = mapping_of(entry, manifest),
+                              .rate_Hz = options_.rate_Hz.value_or(manifest.sample_rate_Hz)},
+                      .split_of_all = manifest.split};
+      if (entry.zero) planned.log.mapping.zero = *entry.zero;
+      logs_.push_back(std::move(planned));
+    }
+  }
+
   Dataset finish() {
     if (dataset_.target.empty()) dataset_.target = kDefaultTarget;
     name_twins_by_path();
@@ -156,23 +173,6 @@ class Collector {
     for (Planned& planned : logs_)
       if (planned.log.entry.name.empty() && met[file_stem(planned.log.path)] > 1)
         planned.log.entry.name = planned.log.entry.file;
-  }
-
-  void add_manifest(Manifest manifest, std::optional<Role> role) {
-    agree(dataset_.target, manifest.target, "target", manifest.file);
-    agree(dataset_.label, manifest.label, "label", manifest.file);
-    if (dataset_.input_sets.empty()) dataset_.input_sets = manifest.input_sets;
-    const std::filesystem::path folder = data_folder(manifest);
-    for (ManifestFile& entry : manifest.files) {
-      if (role) entry.role = role;
-      Planned planned{.log = {.path = (folder / entry.file).string(),
-                              .entry = entry,
-                              .mapping = mapping_of(entry, manifest),
-                              .rate_Hz = options_.rate_Hz.value_or(manifest.sample_rate_Hz)},
-                      .split_of_all = manifest.split};
-      if (entry.zero) planned.log.mapping.zero = *entry.zero;
-      logs_.push_back(std::move(planned));
-    }
   }
 
   /// The user's word counts more than a manifest's; two manifests must say the same.
@@ -219,6 +219,14 @@ Dataset load_dataset(const std::vector<std::string>& train_files,
   Collector collector(options);
   for (const std::string& path : train_files) collector.add(path);
   for (const std::string& path : test_files) collector.add(path, Role::test);
+  Dataset dataset = collector.finish();
+  dataset.check();
+  return dataset;
+}
+
+Dataset load_manifest(const Manifest& manifest, const LoadOptions& options) {
+  Collector collector(options);
+  collector.add_manifest(manifest, {});
   Dataset dataset = collector.finish();
   dataset.check();
   return dataset;

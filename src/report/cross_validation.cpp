@@ -40,6 +40,17 @@ Json summary_json(const FoldSummary& summary) {
   return json;
 }
 
+void add_folds_and_summary(Json& document, const CrossValidation& validation) {
+  document["folds"] = Json::array();
+  for (const Fold& fold : validation.plan.folds)
+    document["folds"].push_back({{"name", fold.name},
+                                 {"recordings", fold.recordings},
+                                 {"held_out_samples", fold.held_out_samples}});
+  document["summary"] = Json::array();
+  for (const FoldSummary& summary : validation.ranking)
+    document["summary"].push_back(summary_json(summary));
+}
+
 std::string mean_and_spread(const FoldStatistic& statistic) {
   return std::isfinite(statistic.std_dev)
              ? fmt::format("{} +- {}", error_text(statistic.mean), error_text(statistic.std_dev))
@@ -58,14 +69,14 @@ std::string held_out_list(const FoldPlan& plan) {
 
 std::string cross_validation_json(const CrossValidation& validation) {
   Json document = results_document(validation.results);
-  document["folds"] = Json::array();
-  for (const Fold& fold : validation.plan.folds)
-    document["folds"].push_back({{"name", fold.name},
-                                 {"recordings", fold.recordings},
-                                 {"held_out_samples", fold.held_out_samples}});
-  document["summary"] = Json::array();
-  for (const FoldSummary& summary : validation.ranking)
-    document["summary"].push_back(summary_json(summary));
+  add_folds_and_summary(document, validation);
+  return document.dump(2) + "\n";
+}
+
+std::string search_json(const Results& results, const CrossValidation& search) {
+  Json document = results_document(results);
+  document["search"] = {{"label", search.results.label}};
+  add_folds_and_summary(document["search"], search);
   return document.dump(2) + "\n";
 }
 

@@ -13,6 +13,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr std::string_view kFreeRun = "free_run";
+
 /// @param mode of how the past outputs of a model that feeds back are had
 Json row_json(const ResultRow& row, const Metrics& metrics, std::string_view mode,
               bool non_causal_zero) {
@@ -36,6 +38,10 @@ Json row_json(const ResultRow& row, const Metrics& metrics, std::string_view mod
             {"parameter_count", row.parameter_count},
             {"status", row.status},
             {"reason", text_or_null(row.reason)}};
+  if (mode == kFreeRun) {
+    json["within_std_dev"] = json_number(row.score.within_std_dev);
+    json["within_2_std_dev"] = json_number(row.score.within_2_std_dev);
+  }
   if (!row.fold.empty()) json["fold"] = row.fold;
   if (row.leak) json["leak"] = true;
   if (non_causal_zero) json["zero"] = "non_causal";
@@ -112,7 +118,7 @@ Json results_document(const Results& results) {
     const auto add = [&](const Metrics& metrics, std::string_view mode) {
       document["results"].push_back(row_json(row, metrics, mode, results.non_causal_zero));
     };
-    add(row.score.metrics, "free_run");
+    add(row.score.metrics, kFreeRun);
     if (row.score.one_step.samples > 0) add(row.score.one_step, "one_step");
   }
   return document;

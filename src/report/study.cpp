@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -66,8 +68,46 @@ std::vector<Column> tracking_columns(const Study& study) {
        true}};
 }
 
+double best_rmse(const Study& study, const std::string& condition) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const StudyRow& row : study.rows)
+    if (row.condition == condition && row.is_ranked()) best = std::min(best, row.rmse);
+  return best;
+}
+
+std::string share(double within) {
+  return std::isfinite(within) ? fmt::format("{:.1f}", 100.0 * within) : "-";
+}
+
+/// Why a row is not ranked, in a few words.
+std::string unranked(const StudyRow& row) {
+  if (row.diverged > 0) return fmt::format("diverged in {} of {}", row.diverged, row.runs);
+  if (row.failure.empty()) return {};
+  return "failed: " + row.failure.substr(0, row.failure.find('\n'));
+}
+
+/// Of a study that compares families: how far each is from the best.
+std::vector<Column> comparison_columns(const Study& study) {
+  return {
+      {fmt::format("RMSE {}", study.unit),
+       [](const Study&, const StudyRow& row) { return number(row.rmse); }},
+      {"/ best",
+       [](const Study& of, const StudyRow& row) {
+         return row.is_ranked() ? fmt::format("{:.2f}", row.rmse / best_rmse(of, row.condition))
+                                : std::string("-");
+       }},
+      {"% of max",
+       [](const Study&, const StudyRow& row) { return fmt::format("{:.1f}", row.percent); }},
+      {"in 1 sd %", [](const Study&, const StudyRow& row) { return share(row.within_std_dev); }},
+      {"in 2 sd %", [](const Study&, const StudyRow& row) { return share(row.within_2_std_dev); }},
+      {"step ns",
+       [](const Study&, const StudyRow& row) { return fmt::format("{:.0f}", row.step_ns); }},
+      {"", [](const Study&, const StudyRow& row) { return unranked(row); }, true}};
+}
+
 std::vector<Column> columns_of(const Study& study) {
   if (is_tracking(study)) return tracking_columns(study);
+  if (!study.judged.empty()) return comparison_columns(study);
   const auto any = [&](const auto& has) { return std::ranges::any_of(study.rows, has); };
   std::vector<Column> columns{
       {fmt::format("RMSE {}", study.unit),
@@ -144,6 +184,38 @@ std::string table_of(const Study& study) {
   return table.text();
 }
 
+/// Where the judged model stands under each condition.
+std::string verdict_text(const Study& study) {
+  TextTable table;
+  table.header({"condition", "best", fmt::format("RMSE {}", study.unit), study.judged, "/ best",
+                "within 5 %"});
+  std::size_t near = 0;
+  const std::vector<StudyVerdict> all = verdicts(study);
+  for (const StudyVerdict& verdict : all) {
+    if (verdict.is_near_best()) ++near;
+    table.row({verdict.condition, verdict.best, number(verdict.best_rmse),
+               verdict.rmse ? number(*verdict.rmse) : "not ranked",
+               verdict.rmse ? fmt::format("{:.3f}", *verdict.rmse / verdict.best_rmse) : "-",
+               verdict.is_near_best() ? "yes" : "no"});
+  }
+  return fmt::format("{}{} is lowest or within 5 % of the lowest in {} of {}\n", table.text(),
+                     study.judged, near, all.size());
+}
+
+/// What the columns mean.
+std::string legend(const Study& study) {
+  if (is_tracking(study))
+    return "/ linear: MAD over that of the line of the sweeps; +-: standard deviation of a run; "
+           "cycles: runs with a limit cycle; stopped: runs that diverged\n";
+  const char* const percent = "% of max: RMSE over the largest |target| of the judged recording; ";
+  if (study.judged.empty()) return fmt::format("{}+-: standard deviation of a run\n", percent);
+  return fmt::format(
+      "/ best: RMSE over the lowest of the condition; {}in 1 sd %, in 2 sd %: samples whose error "
+      "is "
+      "at most one, two error bars (honest: 68 and 95)\n",
+      percent);
+}
+
 }  // namespace
 
 std::string study_text(const StudyInfo& info, const Study& study) {
@@ -154,12 +226,8 @@ std::string study_text(const StudyInfo& info, const Study& study) {
   for (const StudyPlant& plant : study.plants)
     text += fmt::format("plant {}, data sheet {}\n", plant.name, plant.fingerprint);
   text += '\n' + table_of(study);
-  text +=
-      is_tracking(study)
-          ? "/ linear: MAD over that of the line of the sweeps; +-: standard deviation of a run; "
-            "cycles: runs with a limit cycle; stopped: runs that diverged\n"
-          : "% of max: RMSE over the largest |target| of the judged recording; +-: standard "
-            "deviation of a run\n";
+  text += legend(study);
+  if (!study.judged.empty()) text += '\n' + verdict_text(study);
   if (study.full_scale)
     text += fmt::format(
         "% of FS: of RMSE or of max|e|, the largest error of all runs, over {:g} {}; 1 step: RMSE "
@@ -168,6 +236,15 @@ std::string study_text(const StudyInfo& info, const Study& study) {
   for (const std::string& note : study.notes) text += note + '\n';
   return text;
 }
+
+namespace {
+
+nlohmann::ordered_json json_share(const StudyRow& row, double within) {
+  using Json = nlohmann::ordered_json;
+  return row.runs > 0 && std::isfinite(within) ? Json(within) : Json(nullptr);
+}
+
+}  // namespace
 
 std::string study_json(const StudyInfo& info, const Study& study) {
   using Json = nlohmann::ordered_json;
@@ -205,6 +282,13 @@ std::string study_json(const StudyInfo& info, const Study& study) {
           row.paper_fit_percent ? Json(*row.paper_fit_percent) : Json(nullptr)}});
     if (study.tells_fit_time && row.runs > 0)
       document["rows"].back()["fit_seconds"] = row.fit_seconds;
+    if (!study.judged.empty())
+      document["rows"].back().update(
+          Json{{"ranked", row.is_ranked()},
+               {"step_ns", row.runs > 0 ? Json(row.step_ns) : Json(nullptr)},
+               {"within_std_dev", json_share(row, row.within_std_dev)},
+               {"within_2_std_dev", json_share(row, row.within_2_std_dev)},
+               {"failure", row.failure.empty() ? Json(nullptr) : Json(row.failure)}});
     if (const auto& of = row.tracking)
       document["rows"].back()["tracking"] = {
           {"mad", of->mad},
@@ -214,6 +298,15 @@ std::string study_json(const StudyInfo& info, const Study& study) {
           {"limit_cycles", of->limit_cycles},
           {"stopped", of->stopped},
           {"paper_ratio", of->paper_ratio ? Json(*of->paper_ratio) : Json(nullptr)}};
+  }
+  if (!study.judged.empty()) {
+    document["judged"] = study.judged;
+    for (const StudyVerdict& verdict : verdicts(study))
+      document["verdicts"].push_back({{"condition", verdict.condition},
+                                      {"best", verdict.best},
+                                      {"best_rmse", verdict.best_rmse},
+                                      {"rmse", verdict.rmse ? Json(*verdict.rmse) : Json(nullptr)},
+                                      {"within_5_percent", verdict.is_near_best()}});
   }
   return document.dump(2) + "\n";
 }

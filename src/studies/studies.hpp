@@ -17,6 +17,7 @@ Study encoders_004(const StudyOptions& options, const Progress& progress);
 Study torque_levels_004(const StudyOptions& options, const Progress& progress);
 Study impedances_004(const StudyOptions& options, const Progress& progress);
 Study tubes_004(const StudyOptions& options, const Progress& progress);
+Study model_comparison(const StudyOptions& options, const Progress& progress);
 Study public_benchmarks(const StudyOptions& options, const Progress& progress);
 
 }  // namespace torsio

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "studies.hpp"
 #include "torsio/core/error.hpp"
@@ -35,6 +36,9 @@ constexpr std::array kStudies{
     StudyInfo{"004-impedance", "004, Table 5",
               "Trained under one impedance of the joint, judged under another", impedances_004},
     StudyInfo{"004-tubes", "004, Table 6", "How soft the torsion tube should be", tubes_004},
+    StudyInfo{"model-comparison", "all",
+              "Every family on every simulated actuator and on the real recordings",
+              model_comparison, true},
     StudyInfo{"public-benchmarks", "official records",
               "Bouc-Wen and EMPS: our free runs beside published ones", public_benchmarks, true}};
 
@@ -58,6 +62,26 @@ Study run_study(const StudyInfo& study, const StudyOptions& options, const Progr
                       .expected = fmt::format("1 to {}", kMostRepeats),
                       .found = fmt::format("{}", options.repeats)});
   return study.run(options, progress);
+}
+
+std::vector<StudyVerdict> verdicts(const Study& study) {
+  std::vector<StudyVerdict> all;
+  for (const StudyRow& row : study.rows) {
+    auto found = std::ranges::find(all, row.condition, &StudyVerdict::condition);
+    if (found == all.end())
+      found = all.insert(found, {.condition = row.condition,
+                                 .best_rmse = std::numeric_limits<double>::infinity()});
+    if (!row.is_ranked()) continue;
+    if (row.model == study.judged) found->rmse = row.rmse;
+    if (row.rmse < found->best_rmse) {
+      found->best = row.model;
+      found->best_rmse = row.rmse;
+    }
+  }
+  for (const StudyVerdict& verdict : all)
+    if (verdict.best.empty())
+      throw Error({.place = verdict.condition, .problem = "no model could be fitted"});
+  return all;
 }
 
 }  // namespace torsio

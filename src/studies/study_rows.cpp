@@ -30,6 +30,9 @@ void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
   samples += row.score.metrics.samples;
   guarded += row.score.guarded_samples;
   if (row.status == "diverged") ++diverged;
+  within += (row.score.within_std_dev - within) / n;
+  within_2 += (row.score.within_2_std_dev - within_2) / n;
+  step_ns += (row.score.step_ns_p50 - step_ns) / n;
   fit_percent += (row.score.metrics.fit_percent - fit_percent) / n;
   fit_seconds += (row.fit_seconds - fit_seconds) / n;
 }
@@ -68,10 +71,21 @@ StudyRows::Sum& StudyRows::sum_of(Key key) {
   return sums_.emplace_back(std::move(key), Sum{}).second;
 }
 
-double StudyRows::largest_target(const Dataset& dataset, const std::string& recording) {
+void StudyRows::add(const std::string& condition, const std::string& model, const ResultRow& row,
+                    const Dataset& dataset) {
+  sum_of({condition, model}).add(row, largest_target(dataset, row.recording));
+}
+
+void StudyRows::failed(const std::string& condition, const std::string& model,
+                       const std::string& reason) {
+  sum_of({condition, model}).failure = reason;
+}
+
+double StudyRows::largest_target(const Dataset& dataset,
+                                 const std::optional<std::string>& recording) {
   double largest = 0.0;
   for (const DatasetRecord& record : dataset.records) {
-    if (record.recording.name() != recording) continue;
+    if (recording && record.recording.name() != *recording) continue;
     for (const double value : record.recording.channel(dataset.target).values)
       if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
   }
@@ -95,7 +109,11 @@ std::vector<StudyRow> StudyRows::rows() const {
                            static_cast<double>(std::max<std::size_t>(sum.samples, 1)),
         .diverged = sum.diverged,
         .fit_percent = sum.fit_percent,
-        .fit_seconds = sum.fit_seconds};
+        .fit_seconds = sum.fit_seconds,
+        .step_ns = sum.step_ns,
+        .within_std_dev = sum.within,
+        .within_2_std_dev = sum.within_2,
+        .failure = sum.failure};
     if (sum.one_step_runs > 0) row.one_step = sum.one_step;
     for (const auto& [paper_key, rmse] : papers_)
       if (paper_key == key) row.paper_rmse = rmse;

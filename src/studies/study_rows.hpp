@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,6 +44,12 @@ class StudyRows {
     add(results, dataset, split, condition_of, model_of);
   }
 
+  /// One row, whatever its split.
+  void add(const std::string& condition, const std::string& model, const ResultRow& row,
+           const Dataset& dataset);
+  /// A fit that failed: a row that says why. A study that compares all families has such holes.
+  void failed(const std::string& condition, const std::string& model, const std::string& reason);
+
   [[nodiscard]] std::vector<StudyRow> rows() const;
 
  private:
@@ -61,6 +68,10 @@ class StudyRows {
     std::size_t diverged = 0;
     double fit_percent = 0.0;
     double fit_seconds = 0.0;
+    double within = 0.0;
+    double within_2 = 0.0;
+    double step_ns = 0.0;
+    std::string failure;
     void add(const ResultRow& row, double largest_target);
   };
   struct Key {
@@ -73,7 +84,8 @@ class StudyRows {
   static std::string model_of(const ResultRow& row);
   Sum& sum_of(Key key);
 
-  static double largest_target(const Dataset& dataset, const std::string& recording);
+  /// Of one recording, or of all.
+  static double largest_target(const Dataset& dataset, const std::optional<std::string>& recording);
 
   std::vector<std::pair<Key, Sum>> sums_;
   std::vector<std::pair<Key, double>> papers_;

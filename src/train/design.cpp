@@ -64,6 +64,10 @@ LeastSquares solve(const Matrix& columns, const std::vector<double>& target,
                    std::span<const std::uint8_t> is_free) {
   if (is_free.empty()) return least_squares(columns, target);
   NonNegativeFit fit = non_negative_least_squares(normal_equations(columns, target), is_free);
+  if (!fit.has_converged)
+    throw Error(
+        {.problem = "least squares with bounds did not converge: its active sets went in circles",
+         .advice = "Take fewer terms, or --set passive=false where there is that."});
   return {std::move(fit.coefficients), std::move(fit.dropped)};
 }
 

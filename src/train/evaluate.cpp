@@ -61,9 +61,28 @@ std::vector<const std::vector<double>*> raw_channels(const Estimator& estimator,
   return channels;
 }
 
+/// Counts how often the truth is within one and two error bars.
+struct Coverage {
+  std::size_t samples = 0;
+  std::size_t within = 0;
+  std::size_t within_2 = 0;
+
+  void add(const Estimate& estimate, double target) {
+    if (!std::isfinite(estimate.std_dev)) return;
+    const double error = std::abs(estimate.value - target);
+    ++samples;
+    if (error <= estimate.std_dev) ++within;
+    if (error <= 2.0 * estimate.std_dev) ++within_2;
+  }
+  [[nodiscard]] double share(std::size_t count) const {
+    return samples == 0 ? kNotMeasured : static_cast<double>(count) / static_cast<double>(samples);
+  }
+};
+
 /// Adds up one recording's, or a whole split's, samples.
 struct Tally {
   MetricsAccumulator metrics;
+  Coverage coverage;
   std::vector<double> step_ns;
   std::size_t initialised = 0;
   std::size_t guarded = 0;
@@ -87,6 +106,7 @@ struct Tally {
       if (estimate.fault != Fault::none) ++guarded;
       if (estimate.fault == Fault::diverged) ++diverged;
       metrics.add(estimate.value, target.values[i]);
+      coverage.add(estimate, target.values[i]);
     }
   }
 
@@ -96,6 +116,8 @@ struct Tally {
             .initialised_samples = initialised,
             .guarded_samples = guarded,
             .diverged_samples = diverged,
+            .within_std_dev = coverage.share(coverage.within),
+            .within_2_std_dev = coverage.share(coverage.within_2),
             .step_ns_p50 = quantile(step_ns, 0.5),
             .step_ns_p999 = quantile(step_ns, 0.999)};
   }

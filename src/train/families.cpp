@@ -149,12 +149,16 @@ ResidualKind residual_of(const Options& options) {
 }
 
 FittedModel grey_box(const TrainingData& data, const Options& options, const FitContext& context) {
-  return fitted_model(fit_grey_box(data,
-                                   {.schedule = options.text("schedule"),
-                                    .passive = options.boolean("passive"),
-                                    .bound = options.number("bound"),
-                                    .residual = residual_of(options)},
-                                   context));
+  FittedGreyBox fitted = fit_grey_box(data,
+                                      {.schedule = options.text("schedule"),
+                                       .passive = options.boolean("passive"),
+                                       .bound = options.number("bound"),
+                                       .residual = residual_of(options)},
+                                      context);
+  const double held_out_rmse = fitted.held_out_rmse;
+  FittedModel model = fitted_model<GreyBox>(std::move(fitted));
+  model.held_out_rmse = held_out_rmse;
+  return model;
 }
 
 FittedModel dgmm_paper(const TrainingData& data, const Options& options,

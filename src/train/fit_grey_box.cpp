@@ -96,8 +96,8 @@ void take_in(GreyBoxResidual& residual, const AnyModel& model, const TrainingDat
   }
 }
 
-void learn_residual(Fitted<GreyBox>& fitted, const TrainingData& data,
-                    const GreyBoxOptions& options, const FitContext& context) {
+void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyBoxOptions& options,
+                    const FitContext& context) {
   const TrainingData left = residual_data(data, fitted.parameters);
   const double rms = rms_of(left, nullptr);
   if (options.residual == ResidualKind::automatic) {
@@ -112,6 +112,7 @@ void learn_residual(Fitted<GreyBox>& fitted, const TrainingData& data,
         "that it did not see: {}",
         with, without, is_kept ? "kept" : "left out"));
     if (!is_kept) return;
+    fitted.held_out_rmse *= with / without;
   }
   take_in(fitted.parameters.residual, residual_model(left, options.residual, context), left,
           options.bound * rms);
@@ -119,12 +120,14 @@ void learn_residual(Fitted<GreyBox>& fitted, const TrainingData& data,
 
 }  // namespace
 
-Fitted<GreyBox> fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
-                             const FitContext& context) {
+FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
+                           const FitContext& context) {
   report_progress(context.progress, 0.0, "gathering the terms of grey_box");
   const GreyBoxSearch search(data, options.schedule);
   const GreyBoxSearch::Candidate chosen = search.choose(options.passive, context.progress);
-  Fitted<GreyBox> fitted{.parameters = search.fitted(chosen.choice), .notes = {}, .table = {}};
+  FittedGreyBox fitted;
+  fitted.parameters = search.fitted(chosen.choice);
+  fitted.held_out_rmse = chosen.held_out_error;
   fitted.notes.push_back(fmt::format("{}; held out ({}): RMSE {:.4g}, a straight line {:.4g}",
                                      search.description_of(chosen.choice),
                                      search.what_was_held_out(), chosen.held_out_error,

@@ -50,6 +50,15 @@ void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
   }
 }
 
+/// To a root mean square of `rmse` over its regions, which hold about equally many samples.
+void widen_to(ResidualTable& table, double rmse) {
+  double sum = 0.0;
+  for (const double std_dev : table.std_dev) sum += std_dev * std_dev;
+  const double usual = std::sqrt(sum / static_cast<double>(table.std_dev.size()));
+  if (!(rmse > usual)) return;
+  for (double& std_dev : table.std_dev) std_dev *= rmse / usual;
+}
+
 }  // namespace
 
 FeatureRanges feature_ranges(const TrainingData& data) {
@@ -119,7 +128,8 @@ ResidualTable residual_table(AnyModel model, const TrainingData& data) {
 }
 
 EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingData& training,
-                                   const AnyModel& model, const TrainingData* validation) {
+                                   const AnyModel& model, const TrainingData* validation,
+                                   double held_out_rmse) {
   EstimatorSettings settings;
   settings.features = features;
   settings.sample_rate_Hz = training.sample_rate_Hz;
@@ -128,6 +138,7 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
   widen_for_physics(settings.ranges, model);
   settings.fallback = linear_fallback(training);
   settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
+  if (validation == nullptr) widen_to(settings.residuals, held_out_rmse);
   return settings;
 }
 

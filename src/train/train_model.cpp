@@ -105,7 +105,8 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   TrainedModel trained{
       .file = {.card = std::move(card),
                .settings = guarded_settings(choice.features, data.training, fitted.model,
-                                            data.validation ? &*data.validation : nullptr),
+                                            data.validation ? &*data.validation : nullptr,
+                                            fitted.held_out_rmse),
                .parameters = fitted.model.parameters()},
       .notes = std::move(fitted.notes),
       .table = std::move(fitted.table),

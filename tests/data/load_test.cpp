@@ -92,6 +92,19 @@ computed_from: {torque_Nm: [iq_A]}
   std::string manifest_;
 };
 
+TEST_F(Manifests, NeedNotStandInAFile) {
+  Manifest manifest = read_manifest(manifest_);
+  const Dataset from_file = load_dataset({manifest_}, {});
+  const Dataset from_memory = load_manifest(manifest);
+  ASSERT_EQ(from_memory.records.size(), from_file.records.size());
+  for (std::size_t i = 0; i < from_file.records.size(); ++i) {
+    EXPECT_EQ(from_memory.records[i].recording.name(), from_file.records[i].recording.name());
+    EXPECT_EQ(from_memory.records[i].segments, from_file.records[i].segments);
+  }
+  manifest.files.pop_back();
+  EXPECT_EQ(load_manifest(manifest).records.size(), 2U);
+}
+
 TEST_F(Manifests, SayFilesRolesConditionsMappingsAndSplits) {
   const Dataset dataset = load_dataset({manifest_}, {});
   ASSERT_EQ(dataset.records.size(), 3U);

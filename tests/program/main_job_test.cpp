@@ -1,5 +1,9 @@
 // The main job as a user types it: simulate, check, fit, evaluate, compare, demo.
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "program/program.hpp"
 
@@ -51,6 +55,45 @@ TEST_F(MainJob, RanksEveryFamilyOnHeldOutRecords) {
   for (const char* family : {"linear ", "linear_coulomb", "polynomial", "dgmm ", "dgmm_paper"})
     EXPECT_NE(compare.out.find(family), std::string::npos) << compare.out;
   EXPECT_EQ(torsio("evaluate best.safetensors b.csv").exit_code, 0);
+}
+
+TEST_F(MainJob, SearchesStructuresWithinTheTrainingRecords) {
+  for (const char* run : {"triangles --seed 1 -o a.csv", "triangles --seed 2 -o b.csv",
+                          "random-walk --seed 3 -o c.csv"})
+    ASSERT_EQ(torsio(std::string("simulate elastomer --duration 6s ") + run).exit_code, 0);
+  const Outcome search = torsio(
+      "compare a.csv b.csv --test c.csv --models search --inputs spring_deflection_rad --json "
+      "s.json -o best.safetensors");
+  ASSERT_EQ(search.exit_code, 0) << search.err;
+  // What was tried, then the best of each family on the held-out record.
+  EXPECT_NE(search.out.find("maxwell_slip[thresholds=16]"), std::string::npos) << search.out;
+  EXPECT_NE(search.out.find("held-out (test) errors"), std::string::npos) << search.out;
+  const auto json = nlohmann::json::parse(contents("s.json"));
+  const auto& tried = json.at("search").at("summary");
+  EXPECT_EQ(json.at("search").at("folds").size(), 3U);
+  std::map<std::string, std::string> winner;  // variant by family
+  bool is_ranked = true;
+  for (const auto& row : tried) {
+    const bool is_ok = row.at("status") == "ok";
+    EXPECT_TRUE(is_ranked || !is_ok) << "a failure stands before " << row;
+    is_ranked = is_ok;
+    if (is_ok) winner.emplace(row.at("family"), row.at("variant").dump());
+  }
+  // No input tells a rate: its fit fails in each fold, says so, and is not compared.
+  EXPECT_FALSE(winner.contains("linear_coulomb"));
+  EXPECT_NE(search.out.find("linear_coulomb: failed in 3 of 3 folds"), std::string::npos)
+      << search.out;
+  for (const char* family : {"viscoelastic", "bouc_wen", "grey_box"})
+    EXPECT_TRUE(std::ranges::any_of(tried, [&](const auto& row) {
+      return row["family"] == family;
+    })) << family;
+  std::set<std::string> compared;
+  for (const auto& row : json.at("results")) {
+    compared.insert(row.at("family"));
+    EXPECT_EQ(row.at("variant").dump(), winner.at(row.at("family")));
+  }
+  EXPECT_EQ(compared.size(), winner.size());
+  EXPECT_EQ(torsio("evaluate best.safetensors c.csv").exit_code, 0);
 }
 
 TEST_F(MainJob, CrossValidatesWithoutAHeldOutRecording) {

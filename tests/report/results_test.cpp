@@ -27,8 +27,8 @@ TEST(ResultsJson, HasTheFieldsOfTheContract) {
   for (const auto& row : json.at("results"))
     for (const char* field :
          {"family", "split", "recording", "mode", "rmse", "mad", "std_abs", "max_abs",
-          "fit_percent", "samples", "initialised_samples", "step_ns_p50", "step_ns_p999",
-          "fit_seconds", "parameter_count", "status", "reason"})
+          "fit_percent", "samples", "initialised_samples", "within_std_dev", "within_2_std_dev",
+          "step_ns_p50", "step_ns_p999", "fit_seconds", "parameter_count", "status", "reason"})
       EXPECT_TRUE(row.contains(field)) << field;
 }
 

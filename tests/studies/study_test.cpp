@@ -101,6 +101,58 @@ TEST(Studies, OfTheRubberSensorAreWorseOnceTheClutchHasSlipped) {
   }
 }
 
+TEST(Studies, OfAllFamiliesSayWhereGreyBoxStandsAndRankNoFailure) {
+  const StudyInfo& info = find_study("model-comparison");
+  const Study study = run_study(info, kQuick);
+  const std::vector<StudyVerdict> all = verdicts(study);
+  ASSERT_EQ(all.size(), 4U);
+  for (const StudyVerdict& verdict : all) {
+    const StudyRow& best = row_of(study, verdict.condition, verdict.best);
+    EXPECT_TRUE(best.is_ranked());
+    EXPECT_EQ(verdict.rmse, row_of(study, verdict.condition, "grey_box").rmse);
+    EXPECT_EQ(verdict.is_near_best(), *verdict.rmse <= 1.05 * best.rmse);
+    for (const StudyRow& row : study.rows)
+      if (row.condition == verdict.condition && row.is_ranked()) {
+        EXPECT_GE(row.rmse, best.rmse) << row.model;
+      }
+  }
+  const StudyRow& box = row_of(study, "elastomer:bonded, random walk", "grey_box");
+  EXPECT_LT(box.rmse, 0.5 * row_of(study, box.condition, "maxwell_slip").rmse);
+  EXPECT_GT(box.within_2_std_dev, box.within_std_dev);
+  EXPECT_THAT(study_text(info, study), HasSubstr("is lowest or within 5 % of the lowest in"));
+}
+
+TEST(Studies, WithAModelToJudgeTellRatiosAndWhyARowIsNotRanked) {
+  const StudyInfo info{"009-x", "all", "a title", nullptr};
+  const Study study{
+      .protocol = "a protocol",
+      .unit = "Nm",
+      .options = {},
+      .rows = {{.condition = "new lever",
+                .model = "grey_box",
+                .runs = 1,
+                .rmse = 0.103,
+                .step_ns = 90.0,
+                .within_std_dev = 0.66,
+                .within_2_std_dev = 0.93},
+               {.condition = "new lever", .model = "bouc_wen", .runs = 1, .rmse = 0.1},
+               {.condition = "new lever", .model = "arx", .runs = 1, .rmse = 0.01, .diverged = 1},
+               {.condition = "new lever", .model = "viscoelastic", .failure = "no convergence"}},
+      .judged = "grey_box"};
+  const std::string text = study_text(info, study);
+  EXPECT_THAT(text, testing::ContainsRegex("grey_box +0.103 +1.03 +0.0 +66.0 +93.0 +90"));
+  EXPECT_THAT(text, testing::ContainsRegex("arx +0.01 +- .*diverged in 1 of 1"));
+  EXPECT_THAT(text, testing::ContainsRegex("viscoelastic +failed: no convergence"));
+  EXPECT_THAT(text, testing::ContainsRegex("new lever +bouc_wen +0.1 +0.103 +1.030 +yes"));
+  EXPECT_THAT(text, HasSubstr("lowest in 1 of 1"));
+  const auto json = nlohmann::json::parse(study_json(info, study));
+  EXPECT_EQ(json["verdicts"][0]["best"], "bouc_wen");
+  EXPECT_EQ(json["verdicts"][0]["within_5_percent"], true);
+  EXPECT_EQ(json["rows"][2]["ranked"], false);
+  EXPECT_EQ(json["rows"][3]["failure"], "no convergence");
+  EXPECT_TRUE(json["rows"][3]["rmse"].is_null());
+}
+
 TEST(Studies, OfTorqueTrackingJudgeInversesInTheLoop) {
   const Study study = run_study(find_study("000-tracking"), kQuick);
   const std::string condition = "dfki-50:maxwell-slip, 13 Nm locked, chirp";

@@ -151,6 +151,31 @@ TEST(FitGreyBox, InterpolatesOverAConditionThatItIsScheduledBy) {
   EXPECT_LT(evaluate(GreyBox(fitted.parameters), at(0.02, 9)).rmse, 0.15);
 }
 
+TEST(FitGreyBox, KnowsHowWrongItIsBetweenTheKnotsOfItsSchedule) {
+  const auto at = [](double support) {
+    Matrix features(4000, 2);
+    const Matrix motion = wander(4000, support);
+    for (std::size_t n = 0; n < 4000; ++n) {
+      features(n, 0) = motion(n, 0);
+      features(n, 1) = support;
+    }
+    // No curve through four supports tells what is between them.
+    return test::training_data_of(
+        {{.expression = "spring_deflection_rad"}, {.expression = "support_m"}}, std::move(features),
+        [](Row x) { return 400.0 * x[0] * (1.0 + std::sin(400.0 * x[1])); });
+  };
+  TrainingData data = at(0.0);
+  for (const double support : {0.01, 0.03, 0.04})
+    data.sequences.push_back(at(support).sequences[0]);
+  const FittedGreyBox fitted =
+      fit_grey_box(data, {.schedule = "support_m", .residual = ResidualKind::none});
+  const double at_the_knots = evaluate(GreyBox(fitted.parameters), data).rmse;
+  const double between = evaluate(GreyBox(fitted.parameters), at(0.02)).rmse;
+  EXPECT_GT(between, 10.0 * at_the_knots);
+  EXPECT_GT(fitted.held_out_rmse, 10.0 * at_the_knots);
+  EXPECT_LT(fitted.held_out_rmse, 3.0 * between);
+}
+
 TEST(FitGreyBox, ANetworkIsKeptOnlyWhereItHelps) {
   // The second input bends the torque: no term of the box can.
   const auto data_of = [](double bend) {

@@ -122,5 +122,23 @@ TEST(Guards, FillTheSettingsAndPreferValidationData) {
   EXPECT_GT(std::ranges::min(other.residuals.std_dev), std::ranges::max(own.residuals.std_dev));
 }
 
+TEST(Guards, WidenErrorBarsFromTrainingToWhatTheFitHeldOut) {
+  const TrainingData training = test::noisy_spring();
+  const AnyModel model = Linear(fit_linear(training, {}).parameters);
+  const FeatureSpec spec{.inputs = {"a", "b"}, .definitions = {}};
+  const auto mean_square = [&](const TrainingData* validation, double held_out_rmse) {
+    const ResidualTable table =
+        guarded_settings(spec, training, model, validation, held_out_rmse).residuals;
+    double sum = 0.0;
+    for (const double std_dev : table.std_dev) sum += std_dev * std_dev;
+    return sum / static_cast<double>(table.std_dev.size());
+  };
+  const double own = mean_square(nullptr, kNotMeasured);
+  const double wider = 3.0 * std::sqrt(own);
+  EXPECT_NEAR(mean_square(nullptr, wider), 9.0 * own, 1e-9 * own);
+  EXPECT_EQ(mean_square(nullptr, 0.1 * wider), own) << "never narrower";
+  EXPECT_EQ(mean_square(&training, wider), own) << "validation records tell it better";
+}
+
 }  // namespace
 }  // namespace torsio

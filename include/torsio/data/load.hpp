@@ -6,6 +6,7 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
+#include "torsio/data/manifest.hpp"
 
 namespace torsio {
 
@@ -31,5 +32,8 @@ struct LoadOptions {
 [[nodiscard]] Dataset load_dataset(const std::vector<std::string>& train_files,
                                    const std::vector<std::string>& test_files,
                                    const LoadOptions& options = {});
+
+/// The dataset of a manifest that stands in no file.
+[[nodiscard]] Dataset load_manifest(const Manifest& manifest, const LoadOptions& options = {});
 
 }  // namespace torsio

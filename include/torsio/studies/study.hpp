@@ -49,6 +49,24 @@ struct StudyRow {
   std::optional<double> paper_fit_percent = {};  ///< what the paper judges by, where it is that
   std::optional<StudyTracking> tracking = {};    ///< of all rows of a study, or of none
   double fit_seconds = kNotMeasured;             ///< mean of the runs
+  double step_ns = 0.0;                          ///< mean of the runs' medians
+  double within_std_dev = 0.0;  ///< mean of `Score::within_std_dev`; NaN: no error bar
+  double within_2_std_dev = 0.0;
+  std::string failure = {};  ///< why a fit failed, of a study that goes on then
+
+  /// Every run was fitted and stayed within the output's range.
+  [[nodiscard]] bool is_ranked() const { return runs > 0 && diverged == 0 && failure.empty(); }
+};
+
+/// How one model of a study stands to the best under a condition.
+struct StudyVerdict {
+  std::string condition;
+  std::string best = {};  ///< model of the least RMSE among those that are ranked
+  double best_rmse = 0.0;
+  std::optional<double> rmse = {};  ///< of the judged model; none if it is not ranked
+
+  [[nodiscard]] bool is_near_best() const { return rmse && *rmse <= kNear * best_rmse; }
+  static constexpr double kNear = 1.05;
 };
 
 /// A simulated bench that a study used.
@@ -65,10 +83,14 @@ struct Study {
   std::vector<StudyPlant> plants = {};
   std::vector<StudyRow> rows = {};  ///< condition by condition, in the order of their first fit
   std::optional<double> full_scale =
-      {};  ///< of the sensor, in `unit`: errors are also told in % of it
+      {};                   ///< of the sensor, in `unit`: errors are also told in % of it
+  std::string judged = {};  ///< model that the study is about: ratios and verdicts are told
   std::vector<std::string> notes = {};  ///< what the rows say in words, settings behind their names
   bool tells_fit_time = false;          ///< how long a fit took is part of what it asks
 };
+
+/// Condition by condition. @throws Error if none is ranked under one.
+[[nodiscard]] std::vector<StudyVerdict> verdicts(const Study& study);
 
 struct StudyInfo {
   std::string_view name;

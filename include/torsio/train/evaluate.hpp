@@ -21,7 +21,11 @@ struct Score {
   std::size_t initialised_samples = 0;  ///< not scored: filters had not settled
   std::size_t guarded_samples = 0;      ///< scored, but answered by a guard instead of the model
   std::size_t diverged_samples = 0;     ///< of these, because the model had run away
-  double step_ns_p50 = kNotMeasured;    ///< of `Estimator::step`, the clock's own cost taken off
+  /// Shares of the scored samples whose error is at most one, or two, of the error bar told with them;
+  /// NaN if none had one. Of an honest Gaussian error bar 0.683 and 0.954.
+  double within_std_dev = kNotMeasured;
+  double within_2_std_dev = kNotMeasured;
+  double step_ns_p50 = kNotMeasured;  ///< of `Estimator::step`, the clock's own cost taken off
   double step_ns_p999 = kNotMeasured;
 };
 

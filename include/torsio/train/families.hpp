@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/core/not_measured.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/train/fit_context.hpp"
 #include "torsio/train/fitted.hpp"
@@ -18,6 +19,9 @@ struct FittedModel {
   AnyModel model;
   std::vector<std::string> notes;
   std::vector<FittedParameter> table = {};
+  /// On training data that the fit held out to choose by; NaN of families that do not. Error bars that no
+  /// validation records tell are no narrower.
+  double held_out_rmse = kNotMeasured;
 };
 
 /// How one family is trained: what `fit --list`, the command line, cross-validation and `compare`

@@ -27,6 +27,12 @@ struct GreyBoxOptions {
   ResidualKind residual = ResidualKind::automatic;
 };
 
+struct FittedGreyBox : Fitted<GreyBox> {
+  /// Root mean square error on what was held out, the residual's share taken off: what error bars are to
+  /// be wide as.
+  double held_out_rmse = kNotMeasured;
+};
+
 /// Chooses terms by cross-validation and fits them by least squares, slip forces and branches >= 0
 /// unless signed ones are clearly better.
 ///
@@ -39,7 +45,7 @@ struct GreyBoxOptions {
 /// Smoothing: λ n Σ (second difference)² over the knots of curve and forces.
 /// Deterministic.
 /// @throws Error if the first input is constant, or as `groups_by`.
-[[nodiscard]] Fitted<GreyBox> fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
-                                           const FitContext& context = {});
+[[nodiscard]] FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
+                                         const FitContext& context = {});
 
 }  // namespace torsio

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "torsio/core/not_measured.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/train/training_data.hpp"
@@ -27,11 +28,13 @@ inline constexpr std::size_t kMostResidualRegions = 16;
 [[nodiscard]] ResidualTable residual_table(AnyModel model, const TrainingData& data);
 
 /// What goes around a fitted model into its file. The residual table is from `validation` where
-/// given (training residuals are too small for a model with many parameters). `zeroed_channels` are
-/// left to the caller, who knows the recordings.
+/// given (training residuals are too small for a model with many parameters). Else it is from training,
+/// widened as a whole to `held_out_rmse` where the fit knows that and it is larger. `zeroed_channels`
+/// are left to the caller, who knows the recordings.
 [[nodiscard]] EstimatorSettings guarded_settings(const FeatureSpec& features,
                                                  const TrainingData& training,
                                                  const AnyModel& model,
-                                                 const TrainingData* validation = nullptr);
+                                                 const TrainingData* validation = nullptr,
+                                                 double held_out_rmse = kNotMeasured);
 
 }  // namespace torsio

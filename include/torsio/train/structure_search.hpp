@@ -19,8 +19,9 @@ struct StructureSearch {
   CrossValidation scores;            ///< of everything that was tried
 };
 
-/// What a search tries: every choice of `model_choices(..., "all")`, the families with feedback, and of each the orders,
-/// sizes and structures that people vary first (`structure_grid`), one at a time.
+/// What a search tries: every choice of `model_choices(..., "all")`, linear systems, hysteresis and networks of
+/// springs and dashpots that are slower to fit, and of each the orders, sizes and structures that people
+/// vary first, one at a time.
 [[nodiscard]] std::vector<ModelChoice> search_candidates(
     const Dataset& dataset, const std::vector<std::string>& wanted_inputs);
 
