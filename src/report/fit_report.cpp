@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -39,11 +40,12 @@ Json report_json(const FitReport& report) {
 
 /// What the correlations say, in a sentence.
 std::string verdict(const FitReport& report) {
-  constexpr double kMatters = 0.1;  // long records tell any correlation from none
+  // Long records tell any correlation from none; residuals with a memory show one that is chance.
+  const double matters = std::max(0.1, 2.576 / std::sqrt(std::max(report.effective_samples, 1.0)));
   constexpr double kChance = 0.05;  // of the lags; one in a hundred lies outside by chance
   std::vector<std::string> with;
   for (const ResidualCorrelation& each : report.correlations)
-    if (std::abs(each.strongest) > kMatters && each.share_outside > kChance)
+    if (std::abs(each.strongest) > matters && each.share_outside > kChance)
       with.push_back(&each == report.correlations.data() ? "their own past" : each.with);
   if (with.empty())
     return "neither their past nor an input tells the residuals: nothing is left to learn\n";

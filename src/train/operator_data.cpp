@@ -153,7 +153,8 @@ SearchResult converged_search(const ResidualProblem& problem,
   constexpr std::size_t kFirstIterations = 6;
   const std::size_t most = options.most_iterations;
   options.most_iterations = std::min(most, kFirstIterations);
-  std::vector<double> best = minimise_squares_from(problem, starts, options).theta;
+  std::vector<double> best =
+      starts.size() == 1 ? starts.front() : minimise_squares_from(problem, starts, options).theta;
   options.most_iterations = most;
   SearchResult found = minimise_squares(problem, std::move(best), options);
   if (!found.has_converged)

@@ -60,7 +60,7 @@ struct LinearSolution {
                                           const std::vector<std::uint8_t>& is_free,
                                           std::span<double> residuals);
 
-/// A few iterations from each start, then the best of them to its end.
+/// A few iterations from each of several starts, then the best of them to its end.
 /// @throws Error if that does not converge in `options.most_iterations`.
 [[nodiscard]] SearchResult converged_search(const ResidualProblem& problem,
                                             const std::vector<std::vector<double>>& starts,

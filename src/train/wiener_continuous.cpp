@@ -73,7 +73,7 @@ std::vector<double> theta_of(const Sections& sections, double slowest) {
 
 /// Logarithms would go on without end towards the slowest pole.
 std::vector<double> lowest_theta(std::size_t sections, std::size_t size, double slowest) {
-  constexpr double kNear = 1e-2;
+  constexpr double kNear = 0.1;
   std::vector<double> lowest(size, -std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < sections; ++i) {
     lowest[kSectionColumns * i + 3] = std::log(kNear * slowest);
@@ -137,6 +137,7 @@ ContinuousFit refined_in_continuous_time(const WienerData& data, const WienerNum
       minimise_squares_from(wiener_problem(error, error.size(), chart), starts,
                             {.most_iterations = iterations,
                              .lower = lowest_theta(sections, error.size(), slowest),
+                             .tolerance = 1e-7,  // a slow pole's valley has no end that matters
                              .progress = progress});
   std::vector<double> packed(error.size());
   Matrix no_slopes;

@@ -62,9 +62,10 @@ void fill_basis(const StaticCurve& curve, double x, std::span<double> basis) {
 }
 
 double WienerData::slowest_pole() const {
+  constexpr double kLongestMemory = 10.0;  // records
   std::size_t longest = 1;
   for (const WienerRecord& record : records) longest = std::max(longest, record.input.size());
-  return std::exp(-1.0 / static_cast<double>(longest));
+  return std::exp(-1.0 / (kLongestMemory * static_cast<double>(longest)));
 }
 
 std::size_t WienerData::judged_samples() const {

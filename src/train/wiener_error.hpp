@@ -31,7 +31,7 @@ struct WienerData {
   double deviation = 0.0;   ///< standard deviation of the judged targets
 
   [[nodiscard]] std::size_t judged_samples() const;
-  /// Radius within which a search keeps poles: what decays slower than over the longest record cannot be
+  /// Radius within which a search keeps poles: what decays slower than over ten of the longest record cannot be
   /// told from what never does.
   [[nodiscard]] double slowest_pole() const;
 };

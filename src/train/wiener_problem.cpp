@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace torsio {
 namespace {
@@ -58,7 +59,7 @@ WienerChart stable_chart(const WienerError& error) {
 }
 
 std::vector<double> stable_start(const WienerError& error, std::span<const double> packed) {
-  static constexpr double kMost = 1.0 - 1e-12;
+  static constexpr double kMost = 1.0 - 1e-6;
   const auto inside = [](double x) { return std::clamp(x, -kMost, kMost); };
   const double edge = error.slowest_pole();
   std::vector<double> theta(packed.begin(), packed.end());
@@ -73,6 +74,17 @@ std::vector<double> stable_start(const WienerError& error, std::span<const doubl
       theta[a1] = std::atanh(inside(packed[a1] / (edge * (1.0 + two))));
   }
   return theta;
+}
+
+std::vector<double> stable_bound(const WienerError& error) {
+  constexpr double kFarEnough = 7.0;  // tanh: 1e-6 from the edge
+  std::vector<double> bound(error.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < error.sections(); ++i) {
+    const auto [a1, a2] = error.poles_at(i);
+    for (const std::size_t at : {a1, a2})
+      if (at != WienerError::kNowhere) bound[at] = kFarEnough;
+  }
+  return bound;
 }
 
 ResidualProblem wiener_problem(const WienerError& error, std::size_t parameters,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -137,9 +138,12 @@ WienerFit refined(const WienerData& data, const WienerNumbers& start, std::size_
   const WienerError error(data, start);
   const std::vector<double> theta = stable_start(error, error.pack(start));
   const WienerChart chart = stable_chart(error);
-  const SearchResult found =
-      minimise_squares(wiener_problem(error, theta.size(), chart), theta,
-                       {.most_iterations = iterations, .progress = progress});
+  const std::vector<double> upper = stable_bound(error);
+  std::vector<double> lower(upper.size());
+  std::ranges::transform(upper, lower.begin(), std::negate{});
+  const SearchResult found = minimise_squares(
+      wiener_problem(error, theta.size(), chart), theta,
+      {.most_iterations = iterations, .lower = lower, .upper = upper, .progress = progress});
   std::vector<double> packed(error.size());
   Matrix no_slopes;
   chart(found.theta, packed, no_slopes);
@@ -174,6 +178,17 @@ std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& sh
   return best;
 }
 
+namespace {
+
+/// x of the judged samples.
+Interval inner_range(const WienerData& data, const WienerNumbers& numbers) {
+  const std::vector<double> x = WienerError(data, numbers).inner(numbers);
+  const auto [lowest, highest] = std::ranges::minmax(x);
+  return {lowest, highest};
+}
+
+}  // namespace
+
 HammersteinWiener::Parameters parameters_of(const WienerData& data, const WienerNumbers& numbers,
                                             std::size_t inputs) {
   HammersteinWiener::Parameters parameters{.inputs = inputs,
@@ -187,10 +202,15 @@ HammersteinWiener::Parameters parameters_of(const WienerData& data, const Wiener
     parameters.input.values.front() -= at_rest;
   else
     for (double& value : parameters.input.values) value -= at_rest;
-  const std::vector<double> x = WienerError(data, numbers).inner(numbers);
-  const auto [lowest, highest] = std::ranges::minmax(x);
-  const Interval trained =
-      highest > lowest ? Interval{lowest, highest} : Interval{lowest - 1.0, lowest + 1.0};
+  Interval trained = inner_range(data, numbers);
+  if (numbers.start.rows > 0) {
+    // A run in the loop begins at rest, wherever the records began.
+    WienerNumbers at_rest_first = numbers;
+    at_rest_first.start = {};
+    const Interval rest = inner_range(data, at_rest_first);
+    trained = {std::min(trained.lowest, rest.lowest), std::max(trained.highest, rest.highest)};
+  }
+  if (!(trained.lowest < trained.highest)) trained = {trained.lowest - 1.0, trained.highest + 1.0};
   const Interval part = monotone_part(numbers.output, trained);
   parameters.lowest = part.lowest;
   parameters.highest = part.highest;
