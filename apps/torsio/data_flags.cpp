@@ -1,6 +1,9 @@
 #include "data_flags.hpp"
 
+#include <fmt/format.h>
+
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -48,6 +51,12 @@ std::string refuse_unless_whole(const std::string& text) {
 
 void add_seed(CLI::App& verb, std::uint64_t& seed, const char* help) {
   verb.add_option("--seed", seed, help)->check(refuse_unless_whole)->capture_default_str();
+}
+
+double above_zero(double value, const char* flag) {
+  if (value > 0.0 && std::isfinite(value)) return value;
+  throw torsio::UsageError(
+      {.place = flag, .expected = "a finite number above 0", .found = fmt::format("{}", value)});
 }
 
 void DataFlags::add_recordings(CLI::App& verb, const char* help) {

@@ -41,6 +41,8 @@ inline constexpr std::uint64_t kDefaultSeed = 1;
 
 /// `--seed`, for every verb that draws random numbers.
 void add_seed(CLI::App& verb, std::uint64_t& seed, const char* help);
+/// @returns the number. @throws UsageError naming the flag unless it is finite and above 0.
+[[nodiscard]] double above_zero(double value, const char* flag);
 /// What `--set option=value` said, each time it was given.
 [[nodiscard]] std::map<std::string, std::string> parse_settings(
     const std::vector<std::string>& settings);

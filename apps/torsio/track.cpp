@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -44,6 +46,17 @@ struct TrackFlags {
   JsonOutput json;
 };
 
+void check_replayed(const std::string& file, const torsio::TorqueReference& reference) {
+  const auto gap = std::ranges::find_if_not(reference.recorded_Nm,
+                                            [](double value) { return std::isfinite(value); });
+  if (gap == reference.recorded_Nm.end()) return;
+  const auto sample = static_cast<double>(gap - reference.recorded_Nm.begin());
+  throw torsio::UsageError({.place = fmt::format("{}: torque_Nm {:g} s from its start", file,
+                                                 sample / reference.recorded_Hz),
+                            .expected = "a number: what is replayed has no gaps",
+                            .found = fmt::format("{}", *gap)});
+}
+
 torsio::TorqueReference reference_of(const TrackFlags& flags) {
   torsio::TorqueReference reference{.kind = torsio::find_reference(flags.reference)};
   const bool is_replay = reference.kind == torsio::TorqueReference::Kind::replay;
@@ -59,6 +72,7 @@ torsio::TorqueReference reference_of(const TrackFlags& flags) {
                                 .found = fmt::format("{}", recordings.size())});
     reference.recorded_Nm = recordings.front().channel("torque_Nm").values;
     reference.recorded_Hz = recordings.front().sample_rate_Hz();
+    check_replayed(flags.replayed, reference);
   }
   if (!flags.amplitude.empty())
     reference.amplitude_Nm = torsio::si_quantity(flags.amplitude, "Nm", "--amplitude");
@@ -71,7 +85,7 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
   torsio::TrackingSpec spec{
       .output = flags.output == "free" ? torsio::JointOutput::free : torsio::JointOutput::locked,
       .reference = reference_of(flags),
-      .damping = flags.damping,
+      .damping = above_zero(flags.damping, "--damping"),
       .feeds_rate_forward = flags.feeds_rate_forward};
   if (!flags.lever.empty()) {
     if (flags.output != "free")
@@ -82,10 +96,16 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
   }
   if (!flags.bandwidth.empty())
     spec.bandwidth_rad_s =
-        2.0 * std::numbers::pi * torsio::si_quantity(flags.bandwidth, "Hz", "--bandwidth");
+        2.0 * std::numbers::pi *
+        above_zero(torsio::si_quantity(flags.bandwidth, "Hz", "--bandwidth"), "--bandwidth");
+  if (!(flags.friction >= 0.0 && flags.friction <= 1.0))
+    throw torsio::UsageError({.place = "--friction",
+                              .expected = "a share from 0 to 1",
+                              .found = fmt::format("{}", flags.friction)});
   if (flags.friction != 0.0) spec.friction = {.share = flags.friction};
   if (!flags.observer.empty())
-    spec.observer_cutoff_Hz = torsio::si_quantity(flags.observer, "Hz", "--observer");
+    spec.observer_cutoff_Hz =
+        above_zero(torsio::si_quantity(flags.observer, "Hz", "--observer"), "--observer");
   if (!flags.faults.empty()) spec.faults = torsio::read_fault_schedule(flags.faults, sheet);
   return spec;
 }

@@ -5,12 +5,15 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "torsio/control/deflection_controller.hpp"
 #include "torsio/control/joint_impedance.hpp"
+#include "torsio/control/torque_controller.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/report/text_table.hpp"
 #include "verbs.hpp"
@@ -28,6 +31,7 @@ struct TuneFlags {
   std::string actuator = "dfki-120";
   std::string bandwidth = "7.96Hz";
   double damping = torsio::DeflectionController::Settings{}.damping;
+  std::string observer;
   double load_inertia_kg_m2 = 0.0;
   JsonOutput json;
 };
@@ -38,6 +42,7 @@ struct Tuned {
   torsio::Margins locked;
   torsio::Margins free;
   torsio::Passivity passive;
+  std::optional<double> observer_Hz;
   double passive_Nm_rad = 0.0;  ///< stiffest impedance, passive up to `kContact_rad_s`
 };
 
@@ -45,14 +50,26 @@ Tuned tuned(const TuneFlags& flags) {
   using torsio::JointOutput;
   torsio::DeflectionController::Settings settings{
       .joint = torsio::series_elastic_joint(torsio::data_sheet(flags.actuator)),
-      .bandwidth_rad_s = kTurn * torsio::si_quantity(flags.bandwidth, "Hz", "--bandwidth"),
-      .damping = flags.damping};
+      .bandwidth_rad_s =
+          kTurn *
+          above_zero(torsio::si_quantity(flags.bandwidth, "Hz", "--bandwidth"), "--bandwidth"),
+      .damping = above_zero(flags.damping, "--damping")};
+  if (!(flags.load_inertia_kg_m2 >= 0.0))
+    throw torsio::UsageError({.place = "--load-inertia",
+                              .expected = "0 or more",
+                              .found = fmt::format("{}", flags.load_inertia_kg_m2)});
   settings.joint.joint_inertia_kg_m2 += flags.load_inertia_kg_m2;
-  const torsio::DeflectionController controller(settings, kRate_Hz);
+  torsio::TorqueLoopCore::Settings loop{.deflection = settings};
+  if (!flags.observer.empty())
+    loop.observer_cutoff_Hz =
+        above_zero(torsio::si_quantity(flags.observer, "Hz", "--observer"), "--observer");
+  const torsio::TorqueLoopCore core(loop, kRate_Hz);
+  const torsio::DeflectionController& controller = core.deflection();
   return {.controller = controller,
-          .locked = controller.margins_of(controller.gains(), JointOutput::locked),
-          .free = controller.margins_of(controller.gains(), JointOutput::free),
-          .passive = torsio::passivity(settings.joint, controller.feedback()),
+          .locked = core.margins_of(JointOutput::locked),
+          .free = core.margins_of(JointOutput::free),
+          .passive = torsio::passivity(settings.joint, core.feedback()),
+          .observer_Hz = loop.observer_cutoff_Hz,
           .passive_Nm_rad =
               torsio::passive_stiffness(controller, 0.0, kContact_rad_s, kSpeedCutoff_Hz)};
 }
@@ -102,11 +119,12 @@ std::string text_of(const TuneFlags& flags, const Tuned& loop) {
       "{}: deflection control on the current at {} Hz, bandwidth {:.4g} Hz, damping {:.3g}\n"
       "spring {:.4g} Nm/rad, drive {:.4g} kg m2 at the joint, {:.4g} Nm/A, derivative behind "
       "{:g} Hz\n{}\nstable for any gain between the least and the margin:\n{}\n{}"
-      "an impedance on it is passive up to {:.3g} Hz with at most {} Nm/rad\n",
+      "an impedance on it{} is passive up to {:.3g} Hz with at most {} Nm/rad\n",
       flags.actuator, kRate_Hz, settings.bandwidth_rad_s / kTurn, settings.damping,
       joint.stiffness_Nm_rad, joint.drive.inertia(), joint.drive.torque_per_current(),
       settings.rate_cutoff_Hz, of_gains.text(), table.text(), passivity_text(loop.passive),
-      kContact_rad_s / kTurn, number(loop.passive_Nm_rad));
+      loop.observer_Hz ? ", without the observer," : "", kContact_rad_s / kTurn,
+      number(loop.passive_Nm_rad));
 }
 
 Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -128,6 +146,7 @@ Json json_of(const TuneFlags& flags, const Tuned& loop) {
           {"sample_rate_Hz", kRate_Hz},
           {"bandwidth_Hz", settings.bandwidth_rad_s / kTurn},
           {"damping", settings.damping},
+          {"observer_Hz", loop.observer_Hz ? Json(*loop.observer_Hz) : Json(nullptr)},
           {"gains",
            {{"proportional_A_rad", gains.proportional},
             {"integral_A_rad_s", gains.integral},
@@ -167,6 +186,8 @@ void add_tune_loop(CLI::App& app) {
   verb->add_option("--bandwidth", flags->bandwidth, "natural frequency of the closed loop")
       ->capture_default_str();
   verb->add_option("--damping", flags->damping, "of the closed loop")->capture_default_str();
+  verb->add_option("--observer", flags->observer,
+                   "with a disturbance observer of this cut-off: 8Hz");
   verb->add_option("--load-inertia", flags->load_inertia_kg_m2,
                    "on the joint, in kg m2, for the free output")
       ->capture_default_str();

@@ -51,9 +51,19 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
   expect_error(torsio("track --lever 0.5m"), kCallWasWrong, "the output is locked");
   expect_error(torsio("track --reference replay"), kCallWasWrong, "--replay");
   expect_error(torsio("track --bandwidth 300Hz"), kWorkFailed, "phase margin");
+  expect_error(torsio("track --bandwidth -5Hz"), kCallWasWrong,
+               "--bandwidth: expected a finite number above 0, found -5");
+  expect_error(torsio("track --damping -1"), kCallWasWrong, "--damping: expected");
+  expect_error(torsio("track --friction nan"), kCallWasWrong, "--friction: expected a share");
+  expect_error(torsio("track --observer 0Hz"), kCallWasWrong, "--observer: expected");
+  expect_error(torsio("track --observer 400Hz"), kWorkFailed, "phase margin, found -");
   expect_error(torsio("track --seeds 0"), kCallWasWrong, "1 to 100");
   expect_error(torsio("track --model none.safetensors"), kWorkFailed, "none.safetensors");
   ASSERT_EQ(torsio("simulate dfki-50 chirp --duration 30s -o a.csv").exit_code, 0);
+  const Outcome gap =
+      shell("awk -F, -v OFS=, 'NR == 5000 { $6 = \"nan\" } 1' a.csv >gap.csv; "
+            "{torsio} track --reference replay --replay gap.csv");
+  expect_error(gap, kCallWasWrong, "gap.csv: torque_Nm 4.998 s from its start: expected a number");
   ASSERT_EQ(torsio("fit a.csv --model mlp --set epochs=1 -o m.safetensors").exit_code, 0);
   expect_error(torsio("track --model m.safetensors"), kCallWasWrong,
                "m.safetensors: spring inverse: expected a family with an inverse");
@@ -74,6 +84,12 @@ TEST_F(TrackVerb, TuneLoopProposesGainsWithTheirMarginsOrRefuses) {
   expect_error(torsio("tune-loop --bandwidth 200Hz"), kWorkFailed, "phase margin, found -");
   expect_error(torsio("tune-loop --bandwidth 1Hz"), kWorkFailed, "faster than the loop");
   expect_error(torsio("tune-loop --bandwidth 8Nm"), kCallWasWrong, "--bandwidth");
+  expect_error(torsio("tune-loop --damping 0"), kCallWasWrong, "--damping");
+  expect_error(torsio("tune-loop --load-inertia -1"), kCallWasWrong, "--load-inertia");
+  expect_error(torsio("tune-loop --observer 400Hz"), kWorkFailed, "phase margin, found -");
+  const auto observed =
+      nlohmann::json::parse(torsio("tune-loop --actuator dfki-50 --observer 8Hz --json -").out);
+  EXPECT_LT(observed.at("margins").at(0).at("phase_deg"), json.at("margins").at(0).at("phase_deg"));
 }
 
 }  // namespace
