@@ -204,6 +204,36 @@ TEST(TubeImpedance, FadesWithoutAMeasurement) {
   }
 }
 
+TEST(TubeImpedance, GoesOnFromWhereItFadedTo) {
+  TubeImpedance impedance(tube_settings(TubeImpedance::kHigh), kRate_Hz);
+  const TubeImpedance::Angles angles = {.rotor_rad = 0.0, .middle_rad = 0.0, .joint_rad = 0.0};
+  const double wanted_A = impedance.step(0.01, 0.0, angles).current_A;
+  ASSERT_GT(wanted_A, 5.0);
+  double last_A = wanted_A;
+  for (int n = 0; n < 200; ++n) last_A = impedance.step(0.01, 0.0, {}).current_A;
+  const auto back = impedance.step(0.01, 0.0, angles);
+  EXPECT_EQ(back.fault, Fault::none);
+  EXPECT_NEAR(back.current_A, last_A, 1e-9);
+  EXPECT_NEAR(back.current_A, wanted_A + back.handover_A, 1e-9);
+  for (int n = 0; n < 100; ++n) last_A = impedance.step(0.01, 0.0, angles).current_A;
+  EXPECT_NEAR(last_A, wanted_A * (1.0 - std::exp(-1.0)), 0.01 * wanted_A);
+}
+
+// FAULTS 13: the angle 0 is nobody's wish, and far away.
+TEST(TubeImpedance, GivesNoCurrentBeforeItsFirstGoodWish) {
+  TubeImpedance impedance(tube_settings(TubeImpedance::kHigh), kRate_Hz);
+  const TubeImpedance::Angles angles = {
+      .rotor_rad = 0.5 * 102.0, .middle_rad = 0.5 * 51.0, .joint_rad = 0.5};
+  for (int n = 0; n < 3; ++n) {
+    const auto output = impedance.step(kNaN, 0.0, angles);
+    EXPECT_EQ(output.current_A, 0.0);
+    EXPECT_EQ(output.fault, Fault::input_not_finite);
+  }
+  EXPECT_NEAR(impedance.step(0.51, 0.0, angles).current_A, 0.0, 1e-9) << "handed over from none";
+  impedance.reset();
+  EXPECT_EQ(impedance.step(kNaN, 0.0, angles).current_A, 0.0);
+}
+
 // 100 cases of 10^4 ticks.
 RC_GTEST_PROP(TubeImpedance, GivesAFaultAndASafeCurrentForAnyNumbers, ()) {
   const auto settings =
