@@ -14,6 +14,7 @@
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/model/grey_box.hpp"
 
 namespace torsio {
 namespace {
@@ -116,6 +117,58 @@ TEST(ModelInverse, CountsInTheZerosOfItsChannels) {
   EXPECT_EQ(found.fault, Fault::none);
   // Against its zero the joint stands at +0.23: a spring wound by 20 mrad shows as -10 mrad.
   EXPECT_NEAR(found.value, 0.02 + 0.03, 1e-9);
+}
+
+/// 600 Nm/rad and a branch of 100 that relaxes within 5 s.
+ModelInverse relaxing_inverse() {
+  EstimatorSettings settings = deflection_and_rate();
+  settings.features = {.inputs = {"spring_deflection_rad"}, .definitions = {}};
+  settings.ranges = {.lowest = {-0.1}, .highest = {0.1}, .margin = 0.1};
+  settings.fallback = {.intercept = 0.0, .slope = {600.0}, .residual_std = 2.0};
+  GreyBox::Parameters parameters;
+  parameters.terms = {.curve_knots = {-0.1, 0.1},
+                      .thresholds = {},
+                      .friction_knots = {0.0},
+                      .time_constants_s = {5.0},
+                      .rate_scales = {0.0},
+                      .sample_period_s = 1e-3};
+  parameters.coefficients.values = Matrix(1, parameters.terms.columns());
+  const auto coefficients = parameters.coefficients.values.row(0);
+  coefficients[0] = -60.0;
+  coefficients[1] = 60.0;
+  coefficients[2] = 100.0;
+  return ModelInverse(settings, GreyBox(parameters));
+}
+
+// A wish that no limit of the torque cuts, but that of the deflection: the spring never was where
+// the inverse wanted it.
+TEST(TorqueController, RemembersWhatItAskedTheJointForAndNotWhatItWasAskedFor) {
+  auto settings = settings_of("dfki-50");
+  settings.largest_torque_Nm = kInfinity;
+  settings.deflection.largest_deflection_rad = 0.05;
+  const auto asked_rad = [&](double wish_Nm) {
+    TorqueController controller(relaxing_inverse(), settings, kRate_Hz);
+    TorqueLoopCore::Output output;
+    for (int n = 0; n < 2000; ++n) output = controller.step(6.0, wound(0.01));
+    EXPECT_NEAR(output.wanted_deflection_rad, 0.01, 1e-3);
+    for (int n = 0; n < 1000; ++n) output = controller.step(wish_Nm, wound(0.01));
+    EXPECT_EQ(output.wanted_deflection_rad, 0.05);
+    return controller.step(6.0, wound(0.01)).wanted_deflection_rad;
+  };
+  // The branch has come towards 0.05 rad by a fifth at most: 100 / 700 of that.
+  EXPECT_LT(asked_rad(300.0), 0.0112);
+  EXPECT_EQ(asked_rad(300.0), asked_rad(3000.0));
+  EXPECT_EQ(asked_rad(300.0), asked_rad(40.0));
+}
+
+TEST(ModelInverse, GoesOnWithoutItsMemoryWhereThatIsNoLongerFinite) {
+  ModelInverse inverse = relaxing_inverse();
+  const double sound_rad = settled(inverse, 6.0, wound(0.01)).value;
+  inverse.follow(kInfinity);
+  for (int n = 0; n < 3; ++n) (void)inverse.step(6.0, wound(0.01));
+  const Estimate found = inverse.step(6.0, wound(0.01));
+  EXPECT_EQ(found.fault, Fault::none);
+  EXPECT_NEAR(found.value, sound_rad, 2e-3);
 }
 
 TEST(ModelInverse, HoldsItsAnswerWhereAnInputIsMissing) {

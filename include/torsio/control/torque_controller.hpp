@@ -112,7 +112,9 @@ class TorqueController {
 
   Output step(double wanted_Nm, const JointSample& sample) noexcept TORSIO_REALTIME {
     const double accepted_Nm = core_.accept(wanted_Nm);
-    return core_.step(inverse_.step(accepted_Nm, sample), sample);
+    const Output output = core_.step(inverse_.step(accepted_Nm, sample), sample);
+    if constexpr (requires { inverse_.follow(0.0); }) inverse_.follow(output.wanted_deflection_rad);
+    return output;
   }
 
   [[nodiscard]] I& inverse() noexcept { return inverse_; }
