@@ -98,9 +98,8 @@ DeflectionController::Output DeflectionController::step(double wanted_rad,
                                   : wanted_rate_.step(wanted_rad_);
   const Pid::Output loop = pid_.step(wanted_rad_, deflection_rad, feed_forward);
   if (loop.fault != Fault::none) {
-    const double faded = pid_.command() * fault_keep_;
-    pid_.start(std::abs(faded) > 1e-9 ? faded : 0.0);
-    output.command = pid_.command();
+    output.command = fade(pid_.command());
+    output.is_fading = true;
     output.fault = loop.fault;
     return output;
   }
@@ -112,6 +111,12 @@ DeflectionController::Output DeflectionController::step(double wanted_rad,
   output.handover = loop.handover;
   output.is_limited = output.is_limited || loop.is_limited;
   return output;
+}
+
+double DeflectionController::fade(double applied) noexcept {
+  const double faded = applied * fault_keep_;
+  pid_.start(std::abs(faded) > 1e-9 ? faded : 0.0);
+  return pid_.command();
 }
 
 JointFeedback DeflectionController::feedback(const Pid::Gains& gains) const {

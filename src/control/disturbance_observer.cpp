@@ -13,12 +13,15 @@ DisturbanceObserver::DisturbanceObserver(const SeriesElasticJoint& joint, double
       acceleration_(sample_rate_Hz),
       lowpass_(cutoff_Hz, sample_rate_Hz) {
   joint.check();
+  reset();
 }
 
 void DisturbanceObserver::reset() noexcept {
   speed_.reset();
   acceleration_.reset();
+  // Nothing is known of a disturbance yet: the first raw difference is mostly noise.
   lowpass_.reset();
+  static_cast<void>(lowpass_.step(0.0));
 }
 
 double DisturbanceObserver::step(double applied_A, double motor_angle_rad,

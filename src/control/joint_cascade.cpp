@@ -90,6 +90,8 @@ JointCascade::JointCascade(const Settings& settings, double sample_rate_Hz)
       torque_(
           {.gains = gains_of(settings).torque, .derivative_cutoff_Hz = settings.torque_cutoff_Hz},
           sample_rate_Hz),
+      impedance_({.torque_Nm = settings.limits.torque_Nm, .handover_s = settings.handover_s},
+                 sample_rate_Hz),
       handover_(settings.handover_s, sample_rate_Hz),
       thermal_(settings.drive.rated_current_A, settings.drive.peak_current_A,
                settings.limits.thermal_time_s, sample_rate_Hz) {
@@ -127,6 +129,7 @@ void JointCascade::check_limits() const {
 void JointCascade::reset() noexcept {
   velocity_.reset();
   torque_.reset();
+  impedance_.reset();
   handover_.reset();
   reference_ = {};
   current_A_ = 0.0;
@@ -171,12 +174,14 @@ void JointCascade::enter(JointMode mode) noexcept {
     velocity_.reset();
     torque_.reset();
   }
+  impedance_.reset();
   is_switching_ = true;
 }
 
 JointCascade::Output JointCascade::fade() noexcept {
   velocity_.reset();
   torque_.reset();
+  impedance_.reset();
   handover_.reset();
   current_A_ *= fault_keep_;
   if (std::abs(current_A_) < 1e-9) current_A_ = 0.0;
@@ -219,6 +224,16 @@ JointCascade::Output JointCascade::step(const JointReference& reference,
   return output;
 }
 
+double JointCascade::impedance_torque(const JointState& measured) noexcept {
+  const JointReference& wanted = reference_;
+  // Found to be valid where the reference was taken.
+  static_cast<void>(impedance_.set_gains({wanted.stiffness_Nm_rad, wanted.damping_Nms_rad}));
+  const JointImpedance::Output told =
+      impedance_.step({wanted.position_rad, wanted.velocity_rad_s, wanted.torque_Nm},
+                      {measured.angle_rad, measured.speed_rad_s});
+  return told.fault == Fault::none ? told.torque_Nm : kNotMeasured;
+}
+
 double JointCascade::wanted_current(const JointState& measured, const Bounds& speed,
                                     Output& output) noexcept {
   const JointReference& wanted = reference_;
@@ -240,10 +255,8 @@ double JointCascade::wanted_current(const JointState& measured, const Bounds& sp
     }
     case JointMode::torque:
     case JointMode::impedance: {
-      double torque_Nm = wanted.torque_Nm;
-      if (wanted.mode == JointMode::impedance)
-        torque_Nm += wanted.stiffness_Nm_rad * (wanted.position_rad - measured.angle_rad) +
-                     wanted.damping_Nms_rad * (wanted.velocity_rad_s - measured.speed_rad_s);
+      const double torque_Nm =
+          wanted.mode == JointMode::impedance ? impedance_torque(measured) : wanted.torque_Nm;
       output.wanted_torque_Nm =
           std::clamp(torque_Nm, -settings_.limits.torque_Nm, settings_.limits.torque_Nm);
       output.feed_forward_A += output.wanted_torque_Nm * amperes_per_Nm_;
@@ -289,9 +302,10 @@ double JointCascade::within_limits(double wanted_A, const JointState& measured, 
   cut((-drive.supply_V - back_emf_V) / drive.resistance_Ohm,
       (drive.supply_V - back_emf_V) / drive.resistance_Ohm, Limit::voltage);
   const double allowed_A = thermal_.allowed_A();
-  cut(-allowed_A, allowed_A, allowed_A < drive.peak_current_A ? Limit::thermal : Limit::current);
-  if (output.limit != Limit::none) {
-    Pid& loop = loop_of(reference_.mode) == Loop::torque ? torque_ : velocity_;
+  cut(-allowed_A, allowed_A, thermal_.is_warm() ? Limit::thermal : Limit::current);
+  const Loop active = loop_of(reference_.mode);
+  if (output.limit != Limit::none && active != Loop::none) {
+    Pid& loop = active == Loop::torque ? torque_ : velocity_;
     loop.track(loop.command() + current_A - wanted_A);
   }
   return current_A;

@@ -35,8 +35,10 @@ JointImpedance::JointImpedance(const Settings& settings, double sample_rate_Hz)
 void JointImpedance::reset() noexcept {
   handover_.reset();
   wanted_ = {};
+  behind_rad_ = 0.0;
+  behind_rad_s_ = 0.0;
   has_wish_ = false;
-  is_changing_ = false;
+  is_returning_ = false;
   torque_Nm_ = 0.0;
 }
 
@@ -44,9 +46,17 @@ bool JointImpedance::set_gains(const Gains& gains) noexcept {
   if (!(gains.stiffness_Nm_rad >= 0.0 && gains.damping_Nms_rad >= 0.0 &&
         std::isfinite(gains.stiffness_Nm_rad) && std::isfinite(gains.damping_Nms_rad)))
     return false;
+  handover_.add((gains_.stiffness_Nm_rad - gains.stiffness_Nm_rad) * behind_rad_ +
+                (gains_.damping_Nms_rad - gains.damping_Nms_rad) * behind_rad_s_);
   gains_ = gains;
-  is_changing_ = true;
   return true;
+}
+
+JointImpedance::Output JointImpedance::fade() noexcept {
+  torque_Nm_ *= fault_keep_;
+  if (std::abs(torque_Nm_) < 1e-9) torque_Nm_ = 0.0;
+  is_returning_ = true;
+  return {.torque_Nm = torque_Nm_, .fault = Fault::input_not_finite};
 }
 
 JointImpedance::Output JointImpedance::step(const Wish& wanted, const State& measured) noexcept {
@@ -57,23 +67,23 @@ JointImpedance::Output JointImpedance::step(const Wish& wanted, const State& mea
   } else {
     output.fault = Fault::input_not_finite;
   }
-  output.spring_Nm = gains_.stiffness_Nm_rad * (wanted_.angle_rad - measured.angle_rad);
-  output.damper_Nm = gains_.damping_Nms_rad * (wanted_.speed_rad_s - measured.speed_rad_s);
+  const double behind_rad = wanted_.angle_rad - measured.angle_rad;
+  const double behind_rad_s = wanted_.speed_rad_s - measured.speed_rad_s;
+  output.spring_Nm = gains_.stiffness_Nm_rad * behind_rad;
+  output.damper_Nm = gains_.damping_Nms_rad * behind_rad_s;
   output.feed_forward_Nm = wanted_.torque_Nm;
   const double terms_Nm = output.spring_Nm + output.damper_Nm + output.feed_forward_Nm;
-  if (!std::isfinite(terms_Nm) || !has_wish_) {
-    torque_Nm_ *= fault_keep_;
-    if (std::abs(torque_Nm_) < 1e-9) torque_Nm_ = 0.0;
-    is_changing_ = true;
-    return {.torque_Nm = torque_Nm_, .fault = Fault::input_not_finite};
-  }
-  if (is_changing_) {
+  if (!std::isfinite(terms_Nm) || !has_wish_) return fade();
+  if (is_returning_) {
     handover_.reset();
     handover_.add(torque_Nm_ - terms_Nm);
-    is_changing_ = false;
   }
   output.handover_Nm = handover_.step();
   const double all_Nm = terms_Nm + output.handover_Nm;
+  if (!std::isfinite(all_Nm)) return fade();
+  is_returning_ = false;
+  behind_rad_ = behind_rad;
+  behind_rad_s_ = behind_rad_s;
   const double moved_Nm = std::clamp(all_Nm, torque_Nm_ - step_Nm_, torque_Nm_ + step_Nm_);
   torque_Nm_ = std::clamp(moved_Nm, -most_Nm_, most_Nm_);
   output.torque_Nm = torque_Nm_;

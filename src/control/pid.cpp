@@ -85,7 +85,7 @@ double Pid::limited(double command) const noexcept {
 
 Pid::Output Pid::step(double reference, double measurement, double feed_forward) noexcept {
   const double error = reference - measurement;
-  if (!std::isfinite(error + feed_forward)) return held();
+  if (!std::isfinite(error + feed_forward)) return hold();
   rate_ = differentiator_.step(derivative_of_ == DerivativeOf::error ? error : -measurement);
   Output output = {.proportional = gains_.proportional * error,
                    .integral = integral_,
@@ -98,7 +98,7 @@ Pid::Output Pid::step(double reference, double measurement, double feed_forward)
   const double wanted = terms + output.handover;
   if (!std::isfinite(wanted)) {
     start(last_.command);
-    return held();
+    return hold();
   }
   is_starting_ = false;
   output.command = limited(wanted);
@@ -109,7 +109,8 @@ Pid::Output Pid::step(double reference, double measurement, double feed_forward)
   return output;
 }
 
-Pid::Output Pid::held() const noexcept {
+Pid::Output Pid::hold() noexcept {
+  differentiator_.skip();
   Output held = last_;
   held.fault = Fault::input_not_finite;
   return held;

@@ -83,7 +83,13 @@ ModelInverse::ModelInverse(EstimatorSettings settings, AnyModel model, double mo
 void ModelInverse::reset() noexcept {
   core_.reset();
   model_.reset();
+  is_asked_ = false;
+  follows_answer_ = false;
   last_rad_ = 0.0;
+}
+
+void ModelInverse::remember(Features features) noexcept {
+  if (!std::isfinite(model_.step(features).value)) model_.reset();
 }
 
 double ModelInverse::on_the_line(double torque_Nm, Features features) const noexcept {
@@ -121,25 +127,29 @@ Estimate ModelInverse::guarded(double torque_Nm, Features features) noexcept {
 }
 
 Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcept {
+  if (is_asked_) remember(asked_);
+  is_asked_ = false;
+  follows_answer_ = false;
   const EstimatorCore::Conditioned input = core_.condition(inputs_.from(sample));
   if (input.fault != Fault::none || !std::isfinite(torque_Nm))
     return {.value = last_rad_,
             .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};
   if (input.restarted) model_.reset();
   const bool has_state = !model_.state().empty();
-  if (is_stepped_ && !has_state) static_cast<void>(model_.step(input.features));
+  if (is_stepped_ && !has_state) remember(input.features);
   Estimate answer = guarded(torque_Nm, input.features);
+  zero_rad_ = sample.spring_deflection_rad() - input.features.front();
   if (has_state) {
-    // Hysteresis follows the deflection that is asked for. Along the measured one it would take a joint
-    // that sticks for a spring that is stiff, and ask for less the longer it sticks.
+    // What the loop makes of the answer is not known yet: the memory goes there in the next step.
     std::ranges::copy(input.features, asked_.begin());
-    if (answer.fault != Fault::warming_up) asked_.front() = answer.value;
-    static_cast<void>(model_.step(asked_));
+    follows_answer_ = answer.fault != Fault::warming_up;
+    if (follows_answer_) asked_.front() = answer.value;
+    is_asked_ = true;
   }
   if (!core_.unset_zeros().empty() && answer.fault != Fault::warming_up)
     answer.fault = Fault::zero_not_set;
   // The model's deflection lies off the measured one by the zeros of its channels.
-  answer.value += sample.spring_deflection_rad() - input.features.front();
+  answer.value += zero_rad_;
   if (!std::isfinite(answer.value)) return {.value = last_rad_, .fault = Fault::model_not_finite};
   last_rad_ = answer.value;
   return answer;

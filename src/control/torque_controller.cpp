@@ -9,6 +9,7 @@ namespace torsio {
 namespace {
 
 constexpr auto kPlace = "torque controller";
+constexpr double kHandover_s = 0.1;  // as that of the deflection controller
 
 TorqueLoopCore::Settings checked(const TorqueLoopCore::Settings& settings) {
   if (settings.deflection.actuation != DeflectionController::Actuation::current)
@@ -28,6 +29,7 @@ TorqueLoopCore::Settings checked(const TorqueLoopCore::Settings& settings) {
 TorqueLoopCore::TorqueLoopCore(const Settings& settings, double sample_rate_Hz)
     : settings_(checked(settings)),
       deflection_(settings.deflection, sample_rate_Hz),
+      handover_(kHandover_s, sample_rate_Hz),
       wanted_rate_(sample_rate_Hz, settings.deflection.rate_cutoff_Hz),
       amperes_per_Nm_(1.0 / settings.deflection.joint.drive.torque_per_current()) {
   if (!settings.observer_cutoff_Hz) return;
@@ -53,8 +55,10 @@ void TorqueLoopCore::reset() noexcept {
   deflection_.reset();
   if (observer_) observer_->reset();
   wanted_rate_.reset();
+  handover_.reset();
   wanted_Nm_ = 0.0;
   is_refused_ = false;
+  is_returning_ = false;
   applied_A_ = 0.0;
 }
 
@@ -86,11 +90,7 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
                    .fault = is_refused_ ? Fault::input_not_finite : loop.fault};
   const double rate_rad_s =
       wanted_rate_.step(wanted_Nm_) / settings_.deflection.joint.stiffness_Nm_rad;
-  if (!is_measured || loop.fault != Fault::none) {
-    if (observer_) observer_->reset();
-    applied_A_ = output.current_A;
-    return output;
-  }
+  if (loop.is_fading) return fade(output);
   if (const auto& friction = settings_.friction)
     output.friction_A = friction->share * amperes_per_Nm_ *
                         (drive.coulomb_Nm * std::tanh(rate_rad_s / friction->speed_rad_s) +
@@ -99,17 +99,35 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
     output.rate_feed_forward_A = deflection_.gains().derivative * rate_rad_s;
   if (observer_)
     output.observer_A = observer_->step(applied_A_, sample.motor_angle_rad, deflection_rad);
-  const double added_A = output.rate_feed_forward_A + output.friction_A + output.observer_A;
-  if (added_A != 0.0) {
-    const double all_A = loop.command + added_A;
-    output.current_A = std::clamp(all_A, -drive.peak_current_A, drive.peak_current_A);
-    if (output.current_A != all_A) {
-      output.is_limited = true;
-      deflection_.track(output.current_A - added_A);
-    }
+  const double terms_A = output.rate_feed_forward_A + output.friction_A + output.observer_A;
+  // The loop itself goes on from the current that was applied; the rest comes in slowly.
+  if (is_returning_) handover_.add(-terms_A);
+  is_returning_ = false;
+  const double fading_A = handover_.step();
+  output.handover_A += fading_A;
+  const double added_A = terms_A + fading_A;
+  const double all_A = loop.command + added_A;
+  if (!std::isfinite(all_A)) return fade(output);
+  output.current_A = std::clamp(all_A, -drive.peak_current_A, drive.peak_current_A);
+  if (output.current_A != all_A) {
+    output.is_limited = true;
+    deflection_.track(output.current_A - added_A);
   }
   applied_A_ = output.current_A;
   return output;
+}
+
+// The whole current fades, not the deflection controller's part of it.
+TorqueLoopCore::Output TorqueLoopCore::fade(Output output) noexcept {
+  if (observer_) observer_->reset();
+  handover_.reset();
+  is_returning_ = true;
+  applied_A_ = deflection_.fade(applied_A_);
+  return {.current_A = applied_A_,
+          .wanted_torque_Nm = output.wanted_torque_Nm,
+          .wanted_deflection_rad = output.wanted_deflection_rad,
+          .inverse = output.inverse,
+          .fault = Fault::input_not_finite};
 }
 
 }  // namespace torsio

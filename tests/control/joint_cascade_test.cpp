@@ -440,6 +440,39 @@ RC_GTEST_PROP(JointCascade, SwitchesItsModeAndItsGainsWithoutAJump, ()) {
   }
 }
 
+// Stiffness and damping travel in the reference: a change of them within the mode is one of gains.
+TEST(JointCascade, ChangesItsImpedanceWithoutAJump) {
+  JointCascade::Settings settings = settings_of("dfki-50");
+  settings.gains = JointCascade::gains_for(settings.drive, 50.0);
+  settings.gains->torque = {.proportional = 0.1, .integral = 1.0};
+  JointCascade cascade(settings, kRate_Hz);
+  JointReference reference = {
+      .mode = JointMode::impedance, .position_rad = 0.2, .stiffness_Nm_rad = 20.0};
+  const JointState state = {.angle_rad = 0.0, .speed_rad_s = 0.0, .torque_Nm = 4.0};
+  double last_A = 0.0;
+  for (int n = 0; n < 2000; ++n) last_A = cascade.step(reference, state).current_A;
+  EXPECT_NEAR(last_A, 4.0 / settings.drive.torque_per_current(), 1e-6);
+  reference.stiffness_Nm_rad = 50.0;
+  reference.damping_Nms_rad = 3.0;
+  const auto changed = cascade.step(reference, state);
+  EXPECT_NEAR(changed.current_A, last_A, 1e-9);
+  EXPECT_NEAR(changed.wanted_torque_Nm, 4.0, 1e-9);
+  JointCascade::Output output;
+  for (int n = 0; n < 2000; ++n) output = cascade.step(reference, state);
+  EXPECT_NEAR(output.wanted_torque_Nm, 10.0, 1e-6) << "and arrives";
+}
+
+TEST(JointCascade, HasTheTorqueOfItsImpedanceFromTheFirstTickOn) {
+  const JointCascade::Settings settings = settings_of("dfki-50");
+  JointCascade cascade(settings, kRate_Hz);
+  const JointReference reference = {
+      .mode = JointMode::impedance, .position_rad = 0.2, .stiffness_Nm_rad = 20.0};
+  const JointState state = {.angle_rad = 0.0, .speed_rad_s = 0.0, .torque_Nm = 0.0};
+  EXPECT_NEAR(cascade.step(reference, state).wanted_torque_Nm, 4.0, 1e-12);
+  (void)cascade.step({.mode = JointMode::current}, state);
+  EXPECT_NEAR(cascade.step(reference, state).wanted_torque_Nm, 4.0, 1e-12);
+}
+
 RC_GTEST_PROP(JointCascade, GivesAFaultAndASafeCurrentForAnyNumberThatIsNotFinite, ()) {
   const JointCascade::Settings settings = any_settings();
   Random random = any_random();
@@ -483,6 +516,21 @@ RC_GTEST_PROP(JointCascade, KeepsToItsCurrentRateWhereNothingDisturbsIt, ()) {
     joint.step(output.current_A, 0.0, 1.0 / kRate_Hz);
     RC_ASSERT(std::abs(output.current_A - last_A) <= rate_A_s / kRate_Hz * (1.0 + 1e-9));
     last_A = output.current_A;
+  }
+}
+
+TEST(ThermalLimit, AllowsAColdWindingThePeakItselfForAnyPair) {
+  for (int i = 100; i < 2000; ++i) {
+    for (int k = 0; k < 5; ++k) {
+      const double rated_A = 0.01 * i;
+      const double peak_A = rated_A * (1.5 + 0.37 * k);
+      ThermalLimit limit(rated_A, peak_A, 10.0, kRate_Hz);
+      EXPECT_EQ(limit.allowed_A(), peak_A);
+      for (int n = 0; n < 5; ++n) {
+        limit.step(peak_A);
+        ASSERT_LE(limit.allowed_A(), peak_A);
+      }
+    }
   }
 }
 

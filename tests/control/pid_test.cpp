@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "support/error_message.hpp"
 #include "torsio/core/random.hpp"
@@ -225,8 +226,31 @@ RC_GTEST_PROP(Pid, StartsFromTheCommandThatItIsGiven, ()) {
 }
 
 // What has gone wrong once leaves no trace: the same commands as if it had not been.
+// Time passes while a measurement is missing; the derivative must not take what happened in it for
+// the work of one tick.
+TEST(Pid, HasNoKickOfItsDerivativeAfterAGap) {
+  for (const auto derivative_of : {Pid::DerivativeOf::measurement, Pid::DerivativeOf::error}) {
+    for (const std::optional<double> cutoff_Hz : {std::optional(120.0), std::optional<double>()}) {
+      Pid pid({.gains = {.derivative = 1.0},
+               .derivative_of = derivative_of,
+               .derivative_cutoff_Hz = cutoff_Hz},
+              kRate_Hz);
+      int ticks = 0;
+      const auto step = [&](bool is_lost) {
+        const double ramp = ++ticks / kRate_Hz;
+        return pid.step(0.0, is_lost ? kNaN : ramp);
+      };
+      for (int n = 0; n < 1000; ++n) step(false);
+      for (int n = 0; n < 50; ++n) EXPECT_EQ(step(true).fault, Fault::input_not_finite);
+      for (int n = 0; n < 50; ++n) EXPECT_NEAR(step(false).derivative, -1.0, 1e-6) << n;
+    }
+  }
+}
+
+// But for the derivative's next difference.
 RC_GTEST_PROP(Pid, PassesOverWhatIsNotFinite, ()) {
-  const Pid::Settings settings = any_settings();
+  Pid::Settings settings = any_settings();
+  settings.gains.derivative = 0.0;
   Random random = any_random();
   Pid disturbed(settings, kRate_Hz);
   Pid sound(settings, kRate_Hz);

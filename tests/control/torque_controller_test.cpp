@@ -3,15 +3,18 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "spring_joint.hpp"
 #include "support/error_message.hpp"
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/model/grey_box.hpp"
 
 namespace torsio {
 namespace {
@@ -114,6 +117,58 @@ TEST(ModelInverse, CountsInTheZerosOfItsChannels) {
   EXPECT_EQ(found.fault, Fault::none);
   // Against its zero the joint stands at +0.23: a spring wound by 20 mrad shows as -10 mrad.
   EXPECT_NEAR(found.value, 0.02 + 0.03, 1e-9);
+}
+
+/// 600 Nm/rad and a branch of 100 that relaxes within 5 s.
+ModelInverse relaxing_inverse() {
+  EstimatorSettings settings = deflection_and_rate();
+  settings.features = {.inputs = {"spring_deflection_rad"}, .definitions = {}};
+  settings.ranges = {.lowest = {-0.1}, .highest = {0.1}, .margin = 0.1};
+  settings.fallback = {.intercept = 0.0, .slope = {600.0}, .residual_std = 2.0};
+  GreyBox::Parameters parameters;
+  parameters.terms = {.curve_knots = {-0.1, 0.1},
+                      .thresholds = {},
+                      .friction_knots = {0.0},
+                      .time_constants_s = {5.0},
+                      .rate_scales = {0.0},
+                      .sample_period_s = 1e-3};
+  parameters.coefficients.values = Matrix(1, parameters.terms.columns());
+  const auto coefficients = parameters.coefficients.values.row(0);
+  coefficients[0] = -60.0;
+  coefficients[1] = 60.0;
+  coefficients[2] = 100.0;
+  return ModelInverse(settings, GreyBox(parameters));
+}
+
+// A wish that no limit of the torque cuts, but that of the deflection: the spring never was where
+// the inverse wanted it.
+TEST(TorqueController, RemembersWhatItAskedTheJointForAndNotWhatItWasAskedFor) {
+  auto settings = settings_of("dfki-50");
+  settings.largest_torque_Nm = kInfinity;
+  settings.deflection.largest_deflection_rad = 0.05;
+  const auto asked_rad = [&](double wish_Nm) {
+    TorqueController controller(relaxing_inverse(), settings, kRate_Hz);
+    TorqueLoopCore::Output output;
+    for (int n = 0; n < 2000; ++n) output = controller.step(6.0, wound(0.01));
+    EXPECT_NEAR(output.wanted_deflection_rad, 0.01, 1e-3);
+    for (int n = 0; n < 1000; ++n) output = controller.step(wish_Nm, wound(0.01));
+    EXPECT_EQ(output.wanted_deflection_rad, 0.05);
+    return controller.step(6.0, wound(0.01)).wanted_deflection_rad;
+  };
+  // The branch has come towards 0.05 rad by a fifth at most: 100 / 700 of that.
+  EXPECT_LT(asked_rad(300.0), 0.0112);
+  EXPECT_EQ(asked_rad(300.0), asked_rad(3000.0));
+  EXPECT_EQ(asked_rad(300.0), asked_rad(40.0));
+}
+
+TEST(ModelInverse, GoesOnWithoutItsMemoryWhereThatIsNoLongerFinite) {
+  ModelInverse inverse = relaxing_inverse();
+  const double sound_rad = settled(inverse, 6.0, wound(0.01)).value;
+  inverse.follow(kInfinity);
+  for (int n = 0; n < 3; ++n) (void)inverse.step(6.0, wound(0.01));
+  const Estimate found = inverse.step(6.0, wound(0.01));
+  EXPECT_EQ(found.fault, Fault::none);
+  EXPECT_NEAR(found.value, sound_rad, 2e-3);
 }
 
 TEST(ModelInverse, HoldsItsAnswerWhereAnInputIsMissing) {
@@ -276,19 +331,62 @@ TEST(TorqueController, SaysTheFaultAndLetsTheCurrentFade) {
   const SeriesElasticJoint& parts = settings.deflection.joint;
   TorqueController controller(LinearInverse(parts.stiffness_Nm_rad), settings, kRate_Hz);
   SpringJoint joint(parts, JointOutput::locked);
-  double last_A = run(controller, joint, parts.drive, 10.0, 500).current_A;
+  double last_A = run(controller, joint, parts.drive, 10.0, 500, -6.0).current_A;
   const auto refused = controller.step(kNaN, sample_of(joint, parts.drive));
   EXPECT_EQ(refused.fault, Fault::input_not_finite);
   EXPECT_EQ(refused.wanted_torque_Nm, 10.0);
   EXPECT_NEAR(refused.current_A, last_A, 0.01);
-  last_A = refused.current_A - refused.observer_A;
+  ASSERT_GT(refused.observer_A, 0.01);
+  last_A = refused.current_A;
   for (int n = 0; n < 10; ++n) {
     JointSample lost = sample_of(joint, parts.drive);
     (n % 2 == 0 ? lost.motor_angle_rad : lost.gear_angle_rad) = kNaN;
     const auto faded = controller.step(10.0, lost);
     EXPECT_EQ(faded.fault, Fault::input_not_finite);
-    EXPECT_LT(std::abs(faded.current_A), std::abs(last_A));
+    EXPECT_NEAR(faded.current_A, last_A * std::exp(-1e-3 / settings.deflection.fault_decay_s),
+                1e-12);
     last_A = faded.current_A;
+  }
+}
+
+/// Loses the measurement for so many ticks under a load and a ramp; the largest change of the current
+/// in a tick, within 20 ticks of its return.
+double change_after_a_loss_A(const TorqueLoopCore::Settings& settings, int lost_ticks) {
+  const SeriesElasticJoint& parts = settings.deflection.joint;
+  TorqueController controller(LinearInverse(parts.stiffness_Nm_rad), settings, kRate_Hz);
+  SpringJoint joint(parts, JointOutput::locked);
+  double last_A = 0.0;
+  int ticks = 0;
+  const auto change_A = [&](bool is_lost) {
+    JointSample sample = sample_of(joint, parts.drive);
+    if (is_lost) sample.gear_angle_rad = kNaN;
+    const auto output = controller.step(10.0 + 2e-3 * ++ticks, sample);
+    joint.step(output.current_A, 1.0 / kRate_Hz, 0.0, -6.0);
+    return output.current_A - std::exchange(last_A, output.current_A);
+  };
+  for (int n = 0; n < 2000; ++n) change_A(false);
+  EXPECT_GT(last_A, 1.0);
+  for (int n = 0; n < lost_ticks; ++n) {
+    const double before_A = last_A;
+    EXPECT_NEAR(change_A(true), before_A * std::expm1(-0.05), 1e-9);
+  }
+  EXPECT_NEAR(change_A(false), 0.0, 1e-9);
+  double largest_A = 0.0;
+  for (int n = 0; n < 20; ++n) largest_A = std::max(largest_A, std::abs(change_A(false)));
+  return largest_A;
+}
+
+// Of the whole current: what is added to that of the deflection controller neither vanishes with
+// the measurement nor comes back with it at once, nor after the ticks that the observer waits for.
+TEST(TorqueController, LosesAndFindsItsMeasurementWithoutAJumpOfTheCurrent) {
+  for (const int lost_ticks : {1, 5, 300}) {
+    auto settings = settings_of("dfki-50");
+    // The joint has moved: its deflection is damped in either case.
+    const double plain_A = change_after_a_loss_A(settings, lost_ticks);
+    settings.observer_cutoff_Hz = 5.0;
+    settings.friction = FrictionCompensation{};
+    settings.feeds_rate_forward = true;
+    EXPECT_LT(change_after_a_loss_A(settings, lost_ticks), plain_A + 0.1) << lost_ticks;
   }
 }
 

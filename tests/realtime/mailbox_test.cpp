@@ -22,6 +22,22 @@ TEST(Mailbox, AnInitialValueIsReadAndIsNoCommand) {
   EXPECT_EQ(mailbox.read().age_ns(140), 40);
 }
 
+// FAULTS 12, 27: the source's clock may be wrong, and what it sends must not stay fresh for that.
+TEST(Mailbox, ALetterFromTheFutureIsNotFresh) {
+  constexpr auto kEarliest = std::numeric_limits<std::int64_t>::min();
+  constexpr auto kLatest = std::numeric_limits<std::int64_t>::max();
+  Mailbox<double> mailbox;
+  mailbox.write(1.0, 1'000'000'000'000);
+  EXPECT_EQ(mailbox.read().age_ns(5), 999'999'999'995);
+  EXPECT_EQ(mailbox.read().age_ns(1'000'000'000'005), 5);
+  mailbox.write(1.0, kEarliest);
+  EXPECT_EQ(mailbox.read().age_ns(kLatest), kLatest);
+  EXPECT_EQ(mailbox.read().age_ns(kEarliest), 0);
+  mailbox.write(1.0, kLatest);
+  EXPECT_EQ(mailbox.read().age_ns(kEarliest), kLatest);
+  EXPECT_EQ(mailbox.read().age_ns(-1), kLatest);
+}
+
 TEST(Mailbox, AReaderHasTheLatestValueWhateverTheOrderOfWritesAndReads) {
   EXPECT_TRUE(rc::check([](const std::vector<bool>& writes) {
     Mailbox<std::uint64_t> mailbox(0);

@@ -43,6 +43,20 @@ TEST(Differentiator, ForgetsASampleThatIsNotFinite) {
   EXPECT_DOUBLE_EQ(rate.step(1.5), 5.0);
 }
 
+TEST(Differentiator, SkipsWhatWasLost) {
+  Differentiator rate(10.0);
+  rate.step(0.0);
+  EXPECT_DOUBLE_EQ(rate.step(0.5), 5.0);
+  rate.skip();
+  EXPECT_DOUBLE_EQ(rate.step(7.0), 5.0);
+  EXPECT_NEAR(rate.step(7.2), 2.0, 1e-12);
+  rate.skip();
+  rate.reset();
+  rate.skip();
+  EXPECT_EQ(rate.step(3.0), 0.0);
+  EXPECT_NEAR(rate.step(3.1), 1.0, 1e-12);
+}
+
 TEST(Differentiator, RefusesARateThatIsNone) {
   EXPECT_THROW(Differentiator(0.0), UsageError);
   EXPECT_THROW(Differentiator(std::numeric_limits<double>::quiet_NaN()), UsageError);

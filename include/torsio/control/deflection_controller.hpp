@@ -50,6 +50,7 @@ class DeflectionController {
     double feed_forward = 0.0;
     double handover = 0.0;    ///< after a change of gains or a fault
     bool is_limited = false;  ///< the deflection or the command was cut
+    bool is_fading = false;   ///< no usable measurement
     Fault fault = Fault::none;
   };
 
@@ -64,6 +65,10 @@ class DeflectionController {
   Output step(double wanted_rad, double deflection_rad) noexcept TORSIO_REALTIME;
   /// As `Pid::track`: what was applied in the place of the last command.
   void track(double applied) noexcept TORSIO_REALTIME { pid_.track(applied); }
+  /// What was applied in the place of the last command fades by a tick, and the loop goes on from
+  /// there: for what adds to the command, where its own measurement is lost.
+  /// @returns the command
+  double fade(double applied) noexcept TORSIO_REALTIME;
 
   /// As `Pid::set_gains`. Whether the new ones are stable is not looked at: `margins_of` tells.
   [[nodiscard]] bool set_gains(const Pid::Gains& gains) noexcept TORSIO_REALTIME {

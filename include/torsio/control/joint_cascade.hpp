@@ -7,6 +7,7 @@
 
 #include "torsio/control/drive.hpp"
 #include "torsio/control/handover.hpp"
+#include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/pid.hpp"
 #include "torsio/control/thermal_limit.hpp"
 #include "torsio/core/fault.hpp"
@@ -46,7 +47,8 @@ struct JointState {
 ///     torque      i = PID(τ* − τ) + τ* / (N k_t) + i*
 ///     impedance   τ* = K (q* − q) + D (q̇* − q̇) + τ_ff, then torque
 ///
-/// A change of mode or of gains goes on from the last current; the difference fades by the handover.
+/// A change of mode or of gains, those in an impedance's reference too, goes on from the last current;
+/// the difference fades by the handover. The impedance is a `JointImpedance`.
 ///
 /// **Limit override.** Whatever the mode wants, the current stays between those of two speed loops
 /// that sleep behind it and wake where the joint comes near a limit:
@@ -155,6 +157,7 @@ class JointCascade {
   double wanted_current(const JointState& measured, const Bounds& speed, Output& output) noexcept;
   double within_limits(double wanted_A, const JointState& measured, const Bounds& speed,
                        Output& output) noexcept;
+  double impedance_torque(const JointState& measured) noexcept;
   Output fade() noexcept;
 
   Settings settings_;
@@ -169,6 +172,7 @@ class JointCascade {
   double position_1_s_;
   Pid velocity_;
   Pid torque_;
+  JointImpedance impedance_;
   Handover handover_;
   ThermalLimit thermal_;
   JointReference reference_;

@@ -56,20 +56,25 @@ class JointImpedance {
   /// measurement is one too, and the torque fades to 0 and goes on from there.
   Output step(const Wish& wanted, const State& measured) noexcept TORSIO_REALTIME;
 
-  /// Both at once, from the next step on, without a jump.
+  /// Both at once, from the next step on, without a jump: what they would change at the last step's
+  /// errors fades in by the handover, so that gains may also move in every tick.
   /// @returns false, and both stay, if one is negative or not finite
   [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
   [[nodiscard]] const Gains& gains() const noexcept { return gains_; }
 
  private:
+  Output fade() noexcept;
+
   Gains gains_;
   double most_Nm_;
   double step_Nm_;
   double fault_keep_;
   Handover handover_;
   Wish wanted_;
+  double behind_rad_ = 0.0;    ///< of the last step
+  double behind_rad_s_ = 0.0;  ///< of the last step
   bool has_wish_ = false;
-  bool is_changing_ = false;
+  bool is_returning_ = false;  ///< from a fault
   double torque_Nm_ = 0.0;
 };
 

@@ -69,8 +69,9 @@ class Pid {
   /// No memory, but that the next command is this one (cut to the limits), whatever the terms say.
   void start(double command) noexcept;
 
-  /// A value that is not finite is `Fault::input_not_finite`: the last command is held and nothing
-  /// remembered. So are finite ones beyond what the terms hold.
+  /// A value that is not finite is `Fault::input_not_finite`: the last command is held, and nothing
+  /// remembered: the derivative goes on with its last rate, not with a jump over the gap. So are
+  /// finite ones beyond what the terms hold.
   Output step(double reference, double measurement,
               double feed_forward = 0.0) noexcept TORSIO_REALTIME;
 
@@ -90,7 +91,7 @@ class Pid {
  private:
   void set_tracking_share() noexcept;
   void integrate(double wanted) noexcept;
-  [[nodiscard]] Output held() const noexcept;
+  Output hold() noexcept;
   [[nodiscard]] double limited(double command) const noexcept;
 
   Gains gains_;

@@ -17,7 +17,8 @@ namespace torsio {
 
 /// What tells the deflection [rad] that gives a wanted torque, from what the joint reports in this
 /// tick. The value is finite in every case, `fault` says where it is a fallback's. Whoever writes one
-/// of their own satisfies this.
+/// of their own satisfies this. One that also has `follow(rad) noexcept` is told after each step what
+/// the loop made of its answer: a limit may have cut it.
 template <class I>
 concept SpringInverse =
     std::copyable<I> && requires(I inverse, double torque_Nm, const JointSample& sample) {
@@ -49,6 +50,11 @@ class LinearInverse {
 /// where the model has no answer, that alone tells. A slow sweep teaches nothing about the fast
 /// motions of a torque loop (SPEC section 6), so the answer may leave that line only by so many of
 /// its residual standard deviations.
+///
+/// The memory of a model with state follows the deflection that is asked for, not the measured one:
+/// along that it would take a joint that sticks for a spring that is stiff, and ask for less the
+/// longer it sticks. `follow` tells it what was really asked for behind the limits of the loop. A
+/// model that answers with what is not finite is reset.
 class ModelInverse {
  public:
   /// Of the residual standard deviation of the linear fallback.
@@ -64,8 +70,13 @@ class ModelInverse {
 
   void reset() noexcept;
   Estimate step(double torque_Nm, const JointSample& sample) noexcept TORSIO_REALTIME;
+  /// @param asked_rad what the loop asks for instead of the last answer; without a call, that
+  void follow(double asked_rad) noexcept TORSIO_REALTIME {
+    if (follows_answer_) asked_.front() = asked_rad - zero_rad_;
+  }
 
  private:
+  void remember(Features features) noexcept;
   [[nodiscard]] double on_the_line(double torque_Nm, Features features) const noexcept;
   Estimate guarded(double torque_Nm, Features features) noexcept;
 
@@ -75,6 +86,9 @@ class ModelInverse {
   double most_departure_rad_;
   bool is_stepped_;
   std::vector<double> asked_;  ///< features of this tick, the deflection being the answer
+  bool is_asked_ = false;      ///< the memory has yet to go there
+  bool follows_answer_ = false;
+  double zero_rad_ = 0.0;  ///< the measured deflection less the model's, of this tick
   double last_rad_ = 0.0;
 };
 
@@ -115,6 +129,9 @@ class AnyInverse {
   }
   Estimate step(double torque_Nm, const JointSample& sample) noexcept TORSIO_REALTIME {
     return dispatch(inverse_, [&](auto& inverse) { return inverse.step(torque_Nm, sample); });
+  }
+  void follow(double asked_rad) noexcept TORSIO_REALTIME {
+    if (auto* const model = std::get_if<ModelInverse>(&inverse_)) model->follow(asked_rad);
   }
 
  private:

@@ -24,8 +24,11 @@ class ThermalLimit {
 
   /// @returns the largest current [A] of this tick
   [[nodiscard]] double allowed_A() const noexcept TORSIO_REALTIME {
-    return rated_A_ * std::sqrt(std::min(peak_square_, 1.0 + fade_ * (1.0 - load_)));
+    return is_warm() ? std::min(peak_A_, rated_A_ * std::sqrt(1.0 + fade_ * (1.0 - load_)))
+                     : peak_A_;
   }
+  /// Whether the limit has begun to fall, at three quarters of the heat.
+  [[nodiscard]] bool is_warm() const noexcept TORSIO_REALTIME { return load_ > kCold; }
   /// @param current_A that flows in this tick, finite
   void step(double current_A) noexcept TORSIO_REALTIME {
     const double ratio = current_A / rated_A_;
@@ -35,10 +38,12 @@ class ThermalLimit {
   [[nodiscard]] double load() const noexcept { return load_; }
 
  private:
+  static constexpr double kCold = 0.75;
+
   double rated_A_;
-  double peak_square_;  ///< over the rated one's
-  double fade_;         ///< κ
-  double share_;        ///< of the lag in a tick
+  double peak_A_;
+  double fade_;   ///< κ
+  double share_;  ///< of the lag in a tick
   double load_ = 0.0;
 };
 

@@ -8,6 +8,7 @@
 
 #include "torsio/control/deflection_controller.hpp"
 #include "torsio/control/disturbance_observer.hpp"
+#include "torsio/control/handover.hpp"
 #include "torsio/control/spring_inverse.hpp"
 
 namespace torsio {
@@ -49,7 +50,7 @@ class TorqueLoopCore {
     double rate_feed_forward_A = 0.0;
     double friction_A = 0.0;
     double observer_A = 0.0;
-    double handover_A = 0.0;
+    double handover_A = 0.0;  ///< after a change of gains or a fault
     bool is_limited = false;
     Fault inverse = Fault::none;  ///< the inverse fell back on its line, which may be used
     Fault fault = Fault::none;    ///< a reference or a measurement could not be used
@@ -72,14 +73,17 @@ class TorqueLoopCore {
 
  private:
   void check_stability() const;
+  Output fade(Output output) noexcept;
 
   Settings settings_;
   DeflectionController deflection_;
+  Handover handover_;  ///< of what is added to the deflection controller's current
   std::optional<DisturbanceObserver> observer_;
   Differentiator wanted_rate_;  ///< D[τ*]
   double amperes_per_Nm_;
   double wanted_Nm_ = 0.0;
   bool is_refused_ = false;
+  bool is_returning_ = false;  ///< from a fault
   double applied_A_ = 0.0;
 };
 
@@ -108,7 +112,9 @@ class TorqueController {
 
   Output step(double wanted_Nm, const JointSample& sample) noexcept TORSIO_REALTIME {
     const double accepted_Nm = core_.accept(wanted_Nm);
-    return core_.step(inverse_.step(accepted_Nm, sample), sample);
+    const Output output = core_.step(inverse_.step(accepted_Nm, sample), sample);
+    if constexpr (requires { inverse_.follow(0.0); }) inverse_.follow(output.wanted_deflection_rad);
+    return output;
   }
 
   [[nodiscard]] I& inverse() noexcept { return inverse_; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "torsio/control/handover.hpp"
 #include "torsio/control/pid.hpp"
 #include "torsio/control/series_elastic_joint.hpp"
 #include "torsio/core/fault.hpp"
@@ -46,6 +47,7 @@ class TubeImpedance {
     /// high impedance are such: at 1 kHz the joint without dry friction is unstable with them.
     bool relies_on_friction = false;
     double speed_cutoff_Hz = 40.0;  ///< of q̇
+    double handover_s = 0.1;        ///< of the current, when the measurement is back
     double fault_decay_s = 0.02;    ///< of the current without a usable measurement
   };
   struct Angles {
@@ -58,7 +60,8 @@ class TubeImpedance {
     double twist_rad = 0.0;        ///< θ_s, or θ_s1
     double position_rad = 0.0;     ///< its share of θ_s*
     double damping_rad = 0.0;      ///< its share of θ_s*
-    double motor_torque_Nm = 0.0;  ///< before the current's limit
+    double motor_torque_Nm = 0.0;  ///< τ_m
+    double handover_A = 0.0;       ///< beside τ_m / k_t, after a fault
     bool is_limited = false;
     Fault fault = Fault::none;
   };
@@ -77,8 +80,8 @@ class TubeImpedance {
 
   void reset() noexcept;
 
-  /// A wish that is not finite is a fault, and the last good one stands; a measurement too, and the
-  /// current fades to 0.
+  /// A wish that is not finite is a fault, and the last good one stands (none yet: no current); a
+  /// measurement too, and the current fades to 0 and goes on from there.
   Output step(double wanted_rad, double wanted_rad_s,
               const Angles& measured) noexcept TORSIO_REALTIME;
 
@@ -90,10 +93,15 @@ class TubeImpedance {
   [[nodiscard]] static JointFeedback feedback_of(const Settings& settings, double sample_rate_Hz);
 
  private:
+  Output fade() noexcept;
+
   Settings settings_;
   double gear_ratio_;
   double fault_keep_;
   Differentiator speed_;
+  Handover handover_;
+  bool has_wish_ = false;
+  bool is_returning_ = false;  ///< from a fault
   double wanted_rad_ = 0.0;
   double wanted_rad_s_ = 0.0;
   double current_A_ = 0.0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -28,10 +29,17 @@ class Mailbox {
     std::uint64_t sequence = 0;   ///< 1 for the first value written; 0: the initial one still
     std::int64_t written_ns = 0;  ///< on the writer's clock, as it was told
 
-    /// How long ago it was written; for ever, if nothing was written yet: an initial value is no
-    /// command.
+    /// How far from now it was written, before or after: a stamp ahead of the clock is as little of
+    /// now as one behind it, or it would be fresh for ever. Never negative; for ever, if nothing was
+    /// written yet: an initial value is no command.
     [[nodiscard]] std::int64_t age_ns(std::int64_t now_ns) const noexcept {
-      return sequence == 0 ? std::numeric_limits<std::int64_t>::max() : now_ns - written_ns;
+      constexpr auto kForEver = std::numeric_limits<std::int64_t>::max();
+      if (sequence == 0) return kForEver;
+      // Of two stamps that are as far apart as may be, too.
+      const auto later = static_cast<std::uint64_t>(std::max(now_ns, written_ns));
+      const auto earlier = static_cast<std::uint64_t>(std::min(now_ns, written_ns));
+      return static_cast<std::int64_t>(
+          std::min(later - earlier, static_cast<std::uint64_t>(kForEver)));
     }
   };
 

@@ -21,15 +21,22 @@ class Differentiator {
 
   void reset() noexcept {
     seen_ = 0;
+    rate_ = 0.0;
+    is_skipped_ = false;
     if (lowpass_) lowpass_->reset();
   }
 
   double step(double input) noexcept TORSIO_REALTIME {
-    const double rate = seen_ > 0 ? (input - previous_) * sample_rate_Hz_ : 0.0;
+    if (seen_ > 0 && !is_skipped_) rate_ = (input - previous_) * sample_rate_Hz_;
+    is_skipped_ = false;
     previous_ = input;
     if (seen_ < settling_samples_) ++seen_;
-    return lowpass_ ? lowpass_->step(rate) : rate;
+    return lowpass_ ? lowpass_->step(rate_) : rate_;
   }
+
+  /// For samples that were lost: the next input is not one sample behind the last, and takes over
+  /// the last difference instead of making one.
+  void skip() noexcept TORSIO_REALTIME { is_skipped_ = true; }
 
   /// Samples after `reset()` until the output is the derivative (to 1 % of a step of it): 2 without
   /// low-pass.
@@ -44,6 +51,8 @@ class Differentiator {
   std::size_t settling_samples_ = 2;
   std::size_t seen_ = 0;
   double previous_ = 0.0;
+  double rate_ = 0.0;  ///< before the low-pass
+  bool is_skipped_ = false;
 };
 
 }  // namespace torsio
