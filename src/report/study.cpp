@@ -237,15 +237,6 @@ std::string study_text(const StudyInfo& info, const Study& study) {
   return text;
 }
 
-namespace {
-
-nlohmann::ordered_json json_share(const StudyRow& row, double within) {
-  using Json = nlohmann::ordered_json;
-  return row.runs > 0 && std::isfinite(within) ? Json(within) : Json(nullptr);
-}
-
-}  // namespace
-
 std::string study_json(const StudyInfo& info, const Study& study) {
   using Json = nlohmann::ordered_json;
   Json document{{"study", info.name},
@@ -267,7 +258,7 @@ std::string study_json(const StudyInfo& info, const Study& study) {
         {{"condition", row.condition},
          {"model", row.model},
          {"runs", row.runs},
-         {"rmse", row.runs > 0 ? Json(row.rmse) : Json(nullptr)},
+         {"rmse", row.rmse},  // what is NaN for want of runs is written as null
          {"rmse_std", row.rmse_std},
          {"percent_of_max_abs", row.percent},
          {"max_abs_target", row.largest},
@@ -285,9 +276,9 @@ std::string study_json(const StudyInfo& info, const Study& study) {
     if (!study.judged.empty())
       document["rows"].back().update(
           Json{{"ranked", row.is_ranked()},
-               {"step_ns", row.runs > 0 ? Json(row.step_ns) : Json(nullptr)},
-               {"within_std_dev", json_share(row, row.within_std_dev)},
-               {"within_2_std_dev", json_share(row, row.within_2_std_dev)},
+               {"step_ns", row.step_ns},
+               {"within_std_dev", row.within_std_dev},
+               {"within_2_std_dev", row.within_2_std_dev},
                {"failure", row.failure.empty() ? Json(nullptr) : Json(row.failure)}});
     if (const auto& of = row.tracking)
       document["rows"].back()["tracking"] = {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/running_mean.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -20,33 +21,20 @@ std::string_view name(JointOutput output) {
   return output == JointOutput::locked ? "locked" : "free";
 }
 
+/// "-" of no run.
+std::string text(const RunningMean& of, const char* format = "{:.4g}") {
+  return of.count() == 0 ? std::string("-") : fmt::format(fmt::runtime(format), of.mean());
+}
+
+/// Nothing of fewer than two runs.
+std::string spread(const RunningMean& of) {
+  return of.count() < 2 ? std::string() : fmt::format("{:.2g}", of.std_dev());
+}
+
 /// Over the runs of one model that came to their end.
-struct Mean {
-  std::size_t count = 0;
-  double sum = 0.0;
-  double squares = 0.0;
-
-  void add(double value) {
-    ++count;
-    sum += value;
-    squares += value * value;
-  }
-  void add(const std::optional<double>& value) {
-    if (value) add(*value);
-  }
-  [[nodiscard]] double mean() const { return sum / static_cast<double>(count); }
-  [[nodiscard]] std::string text(const char* format = "{:.4g}") const {
-    return count == 0 ? std::string("-") : fmt::format(fmt::runtime(format), mean());
-  }
-  [[nodiscard]] std::string spread() const {
-    if (count < 2) return "";
-    const auto n = static_cast<double>(count);
-    return fmt::format("{:.2g}", std::sqrt(std::max(0.0, squares - sum * mean()) / (n - 1.0)));
-  }
-};
-
 struct ModelMeans {
-  Mean mad, std_abs, rmse, to_linear, error_ratio, bandwidth, overshoot, limit_events, faults;
+  RunningMean mad, std_abs, rmse, to_linear, error_ratio, bandwidth, overshoot, limit_events,
+      faults;
   std::size_t cycles = 0;
   std::vector<std::string> remarks;
 
@@ -127,11 +115,11 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
   if (has_overshoot) table.header({"overshoot"});
   std::string remarks;
   for (const auto& [model, means] : models) {
-    table.row({model, means.mad.text(), means.mad.spread(), means.std_abs.text(), means.rmse.text(),
-               means.to_linear.text("{:.3f}"), means.error_ratio.text("{:.3f}"),
-               means.bandwidth.text("{:.2f}"), means.limit_events.text("{:.0f}"),
-               means.faults.text("{:.0f}"), fmt::format("{}", means.cycles),
-               means.overshoot.text("{:.2f}")});
+    table.row({model, text(means.mad), spread(means.mad), text(means.std_abs), text(means.rmse),
+               text(means.to_linear, "{:.3f}"), text(means.error_ratio, "{:.3f}"),
+               text(means.bandwidth, "{:.2f}"), text(means.limit_events, "{:.0f}"),
+               text(means.faults, "{:.0f}"), fmt::format("{}", means.cycles),
+               text(means.overshoot, "{:.2f}")});
     for (const std::string& remark : means.remarks) remarks += remark + "\n";
   }
   return fmt::format(

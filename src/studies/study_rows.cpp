@@ -14,27 +14,22 @@
 namespace torsio {
 
 void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
-  const double rmse = row.score.metrics.rmse;
-  ++runs;
-  const auto n = static_cast<double>(runs);
-  const double distance = rmse - mean;
-  mean += distance / n;
-  squares += distance * (rmse - mean);
-  percent += (100.0 * rmse / largest_target - percent) / n;
-  largest += (largest_target - largest) / n;
+  const double error = row.score.metrics.rmse;
+  rmse.add(error);
+  percent.add(100.0 * error / largest_target);
+  largest.add(largest_target);
   max_abs = std::max(max_abs, row.score.metrics.max_abs);
   constexpr double kBlank = 5.0;
   if (row.score.metrics.fit_percent < kBlank) ++blank;
-  if (row.score.one_step.samples > 0)
-    one_step += (row.score.one_step.rmse - one_step) / static_cast<double>(++one_step_runs);
+  if (row.score.one_step.samples > 0) one_step.add(row.score.one_step.rmse);
   samples += row.score.metrics.samples;
   guarded += row.score.guarded_samples;
   if (row.status == "diverged") ++diverged;
-  within += (row.score.within_std_dev - within) / n;
-  within_2 += (row.score.within_2_std_dev - within_2) / n;
-  step_ns += (row.score.step_ns_p50 - step_ns) / n;
-  fit_percent += (row.score.metrics.fit_percent - fit_percent) / n;
-  fit_seconds += (row.fit_seconds - fit_seconds) / n;
+  within.add(row.score.within_std_dev);
+  within_2.add(row.score.within_2_std_dev);
+  step_ns.add(row.score.step_ns_p50);
+  fit_percent.add(row.score.metrics.fit_percent);
+  fit_seconds.add(row.fit_seconds);
 }
 
 void StudyRows::paper(const std::string& condition, const std::string& model, double rmse) {
@@ -95,26 +90,25 @@ double StudyRows::largest_target(const Dataset& dataset,
 std::vector<StudyRow> StudyRows::rows() const {
   std::vector<StudyRow> rows;
   for (const auto& [key, sum] : sums_) {
-    StudyRow row{
-        .condition = key.condition,
-        .model = key.model,
-        .runs = sum.runs,
-        .rmse = sum.mean,
-        .rmse_std = sum.runs < 2 ? 0.0 : std::sqrt(sum.squares / static_cast<double>(sum.runs - 1)),
-        .percent = sum.percent,
-        .largest = sum.largest,
-        .max_abs = sum.max_abs,
-        .blank = sum.blank,
-        .guarded_percent = 100.0 * static_cast<double>(sum.guarded) /
-                           static_cast<double>(std::max<std::size_t>(sum.samples, 1)),
-        .diverged = sum.diverged,
-        .fit_percent = sum.fit_percent,
-        .fit_seconds = sum.fit_seconds,
-        .step_ns = sum.step_ns,
-        .within_std_dev = sum.within,
-        .within_2_std_dev = sum.within_2,
-        .failure = sum.failure};
-    if (sum.one_step_runs > 0) row.one_step = sum.one_step;
+    StudyRow row{.condition = key.condition,
+                 .model = key.model,
+                 .runs = sum.rmse.count(),
+                 .rmse = sum.rmse.mean(),
+                 .rmse_std = sum.rmse.std_dev(),
+                 .percent = sum.percent.mean(),
+                 .largest = sum.largest.mean(),
+                 .max_abs = sum.rmse.count() > 0 ? sum.max_abs : kNotMeasured,
+                 .blank = sum.blank,
+                 .guarded_percent = 100.0 * static_cast<double>(sum.guarded) /
+                                    static_cast<double>(std::max<std::size_t>(sum.samples, 1)),
+                 .diverged = sum.diverged,
+                 .fit_percent = sum.fit_percent.mean(),
+                 .fit_seconds = sum.fit_seconds.mean(),
+                 .step_ns = sum.step_ns.mean(),
+                 .within_std_dev = sum.within.mean(),
+                 .within_2_std_dev = sum.within_2.mean(),
+                 .failure = sum.failure};
+    if (sum.one_step.count() > 0) row.one_step = sum.one_step.mean();
     for (const auto& [paper_key, rmse] : papers_)
       if (paper_key == key) row.paper_rmse = rmse;
     for (const auto& [paper_key, fit_percent] : paper_fits_)

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/running_mean.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/studies/study.hpp"
 #include "torsio/train/results.hpp"
@@ -54,23 +55,13 @@ class StudyRows {
 
  private:
   struct Sum {
-    std::size_t runs = 0;
-    double mean = 0.0;
-    double squares = 0.0;  ///< deviations from the mean
-    double percent = 0.0;
-    double largest = 0.0;
+    RunningMean rmse, percent, largest, one_step, fit_percent, fit_seconds, within, within_2,
+        step_ns;
     double max_abs = 0.0;
-    double one_step = 0.0;
-    std::size_t one_step_runs = 0;
     std::size_t blank = 0;
     std::size_t samples = 0;
     std::size_t guarded = 0;
     std::size_t diverged = 0;
-    double fit_percent = 0.0;
-    double fit_seconds = 0.0;
-    double within = 0.0;
-    double within_2 = 0.0;
-    double step_ns = 0.0;
     std::string failure;
     void add(const ResultRow& row, double largest_target);
   };

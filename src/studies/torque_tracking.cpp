@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/running_mean.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/core/error.hpp"
@@ -144,31 +145,31 @@ class TrackingRows {
       ++sum.row.tracking->stopped;
       return;
     }
-    ++sum.row.runs;
-    const auto n = static_cast<double>(sum.row.runs);
-    const auto average = [n](double& mean, double value) { mean += (value - mean) / n; };
-    StudyTracking& of = *sum.row.tracking;
-    if (run.score.limit_cycle) ++of.limit_cycles;
-    const double mad_step = run.score.mad - of.mad;
-    const double rmse_step = run.score.rmse - sum.row.rmse;
-    average(of.mad, run.score.mad);
-    average(of.std_abs, run.score.std_abs);
-    average(of.mad_to_linear, run.mad_to_linear.value_or(1.0));
-    average(sum.row.rmse, run.score.rmse);
-    average(sum.row.percent, 100.0 * run.score.rmse / run.amplitude_Nm);
-    average(sum.row.largest, run.amplitude_Nm);
-    sum.mad_squares += mad_step * (run.score.mad - of.mad);
-    sum.rmse_squares += rmse_step * (run.score.rmse - sum.row.rmse);
+    if (run.score.limit_cycle) ++sum.row.tracking->limit_cycles;
+    sum.mad.add(run.score.mad);
+    sum.std_abs.add(run.score.std_abs);
+    sum.rmse.add(run.score.rmse);
+    sum.to_linear.add(run.mad_to_linear);
   }
+
+  /// A condition that no joint of the kind can be under.
+  void left_out(const std::string& condition, std::string_view reason) {
+    std::string note = fmt::format("left out: {}: {}", condition, reason);
+    if (std::ranges::find(notes_, note) == notes_.end()) notes_.push_back(std::move(note));
+  }
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
   [[nodiscard]] std::vector<StudyRow> rows() const {
     std::vector<StudyRow> all;
     for (const Sum& sum : sums_) {
-      StudyRow row = sum.row;
-      const double freedom = std::max(1.0, static_cast<double>(row.runs) - 1.0);
-      row.tracking->mad_std = std::sqrt(sum.mad_squares / freedom);
-      row.rmse_std = std::sqrt(sum.rmse_squares / freedom);
-      all.push_back(std::move(row));
+      StudyRow& row = all.emplace_back(sum.row);
+      row.runs = sum.rmse.count();
+      row.rmse = sum.rmse.mean();
+      row.rmse_std = sum.rmse.std_dev();
+      row.tracking->mad = sum.mad.mean();
+      row.tracking->mad_std = sum.mad.std_dev();
+      row.tracking->std_abs = sum.std_abs.mean();
+      row.tracking->mad_to_linear = sum.to_linear.mean();
     }
     return all;
   }
@@ -176,8 +177,7 @@ class TrackingRows {
  private:
   struct Sum {
     StudyRow row;
-    double mad_squares = 0.0;  ///< deviations from the mean
-    double rmse_squares = 0.0;
+    RunningMean mad = {}, std_abs = {}, rmse = {}, to_linear = {};
   };
 
   Sum& begin(const std::string& condition, const Task& task, Kind kind, const TrackingRow& run) {
@@ -195,6 +195,7 @@ class TrackingRows {
   }
 
   std::vector<Sum> sums_;
+  std::vector<std::string> notes_;
 };
 
 /// Everything that is tried on one task on one spring, with one seed.
@@ -219,15 +220,16 @@ void judge(const Trial& trial, bool is_helped, TrackingRows& rows, const Progres
     if (is_helped) spec.observer_cutoff_Hz = kObserver_Hz;
     if (trial.is_quick) spec.reference.duration_s = kQuick_s;
     const std::array<std::uint64_t, 1> seeds{trial.seed + kJudged};
-    try {
-      check_tracking(sheet, spec, seeds.front());
-    } catch (const UsageError&) {
-      continue;  // beyond the rating, or the lever would tip over
-    }
     const std::string condition =
         fmt::format("{}, {:g} Nm {}, {}{}", trial.actuator, task.amplitude_Nm,
                     task.output == JointOutput::locked ? "locked" : "free", name(kind),
                     is_helped ? ", fed forward and observed" : "");
+    try {
+      check_tracking(sheet, spec, seeds.front());
+    } catch (const UsageError& error) {  // beyond the rating, or the lever would tip over
+      rows.left_out(condition, error.what());
+      continue;
+    }
     for (const TrackingRow& run :
          track_models(sheet, spec, trial.line, trial.inverses, seeds, progress))
       rows.add(condition, task, kind, run);
@@ -288,6 +290,7 @@ Study torque_tracking_000(const StudyOptions& options, const Progress& progress)
     }
   }
   study.rows = rows.rows();
+  study.notes = rows.notes();
   return study;
 }
 

@@ -49,15 +49,22 @@ std::vector<Run> runs_of(const TrainedModel& model, const Dataset& dataset, Role
   return runs;
 }
 
-/// Every `stride`-th sample of a signal: that of a slow load cell between its fresh ones is not judged.
+/// Samples from one judged one to the next, usually: what a slow load cell repeats between its fresh ones is not
+/// judged, nor is what lies outside of the split's segments.
 std::size_t stride_of(const std::vector<Run>& runs) {
-  std::size_t judged = 0;
-  std::size_t all = 0;
+  std::vector<std::size_t> steps;
   for (const Run& run : runs) {
-    judged += judged_samples(run);
-    all += run.residual.size();
+    std::optional<std::size_t> last;
+    for (std::size_t n = 0; n < run.residual.size(); ++n) {
+      if (!std::isfinite(run.residual[n])) continue;
+      if (last) steps.push_back(n - *last);
+      last = n;
+    }
   }
-  return judged == 0 ? 1 : std::max<std::size_t>(1, (all + judged / 2) / judged);
+  if (steps.empty()) return 1;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::ranges::nth_element(steps, middle);
+  return *middle;
 }
 
 template <class Value>
@@ -125,11 +132,12 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
   const std::vector<Run> runs = runs_of(model, dataset, *role);
   std::size_t longest = 0;
   for (const Run& run : runs) {
-    report.samples += judged_samples(run);
-    longest = std::max(longest, run.residual.size());
+    const std::size_t judged = judged_samples(run);
+    report.samples += judged;
+    longest = std::max(longest, judged);
   }
   const std::size_t stride = stride_of(runs);
-  const std::size_t lags = std::min(kMostLags, longest / stride / 10 + 1);
+  const std::size_t lags = std::min(kMostLags, longest / 10 + 1);
   if (report.samples < 2 || lags < 2) return report;
   constexpr double kQuantile = 2.576;  // of |x|, 99 %, standard normal
   const auto samples = static_cast<double>(report.samples);

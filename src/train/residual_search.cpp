@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -147,6 +148,27 @@ std::vector<int> on_bounds(const std::vector<double>& theta, const SearchOptions
   return held;
 }
 
+/// What a search meets is in its summary; Ceres would also tell the terminal. glog has one level for the program,
+/// which is put back behind the last of the searches that run.
+class SilentCeres {
+ public:
+  SilentCeres() {
+    const std::scoped_lock lock(mutex);
+    if (searches++ == 0) before = std::exchange(FLAGS_minloglevel, google::GLOG_FATAL);
+  }
+  ~SilentCeres() {
+    const std::scoped_lock lock(mutex);
+    if (--searches == 0) FLAGS_minloglevel = before;
+  }
+  SilentCeres(const SilentCeres&) = delete;
+  SilentCeres& operator=(const SilentCeres&) = delete;
+
+ private:
+  static inline std::mutex mutex;
+  static inline std::size_t searches = 0;
+  static inline int before = 0;
+};
+
 /// Nothing if r cannot be told at the start.
 std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<double> theta,
                                    const SearchOptions& options) {
@@ -167,8 +189,7 @@ std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<d
   Reporter reporter(options);
   settings.callbacks.push_back(&reporter);
   ceres::Solver::Summary summary;
-  // What the search meets is in the summary; Ceres would also tell the terminal.
-  FLAGS_minloglevel = google::GLOG_FATAL;
+  const SilentCeres silent;
   ceres::Solve(settings, &ceres_problem, &summary);
   reporter.rethrow();
   // Steps that a bound cuts short stop early: what lies on one is held, and the rest goes on.

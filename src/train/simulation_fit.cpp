@@ -240,6 +240,10 @@ std::vector<double> measured_start(const Sequence& sequence, double sample_rate_
 SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData& data,
                                 const std::vector<std::vector<double>>& starts,
                                 const SimulationFitOptions& options) {
+  if (options.first_horizon == 0 || options.growth < 2)
+    throw UsageError({.place = "first_horizon, growth",
+                      .expected = "a first horizon from 1 sample and a growth from 2",
+                      .found = fmt::format("{} and {}", options.first_horizon, options.growth)});
   const Unknowns unknowns(model, data, options.start_samples);
   const std::size_t longest = longest_sequence(data);
   std::vector<std::vector<double>> from;

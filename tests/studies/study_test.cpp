@@ -132,6 +132,7 @@ TEST(Studies, WithAModelToJudgeTellRatiosAndWhyARowIsNotRanked) {
                 .model = "grey_box",
                 .runs = 1,
                 .rmse = 0.103,
+                .percent = 1.5,
                 .step_ns = 90.0,
                 .within_std_dev = 0.66,
                 .within_2_std_dev = 0.93},
@@ -140,7 +141,7 @@ TEST(Studies, WithAModelToJudgeTellRatiosAndWhyARowIsNotRanked) {
                {.condition = "new lever", .model = "viscoelastic", .failure = "no convergence"}},
       .judged = "grey_box"};
   const std::string text = study_text(info, study);
-  EXPECT_THAT(text, testing::ContainsRegex("grey_box +0.103 +1.03 +0.0 +66.0 +93.0 +90"));
+  EXPECT_THAT(text, testing::ContainsRegex("grey_box +0.103 +1.03 +1.5 +66.0 +93.0 +90"));
   EXPECT_THAT(text, testing::ContainsRegex("arx +0.01 +- .*diverged in 1 of 1"));
   EXPECT_THAT(text, testing::ContainsRegex("viscoelastic +failed: no convergence"));
   EXPECT_THAT(text, testing::ContainsRegex("new lever +bouc_wen +0.1 +0.103 +1.030 +yes"));
@@ -150,7 +151,10 @@ TEST(Studies, WithAModelToJudgeTellRatiosAndWhyARowIsNotRanked) {
   EXPECT_EQ(json["verdicts"][0]["within_5_percent"], true);
   EXPECT_EQ(json["rows"][2]["ranked"], false);
   EXPECT_EQ(json["rows"][3]["failure"], "no convergence");
-  EXPECT_TRUE(json["rows"][3]["rmse"].is_null());
+  for (const char* key :
+       {"rmse", "rmse_std", "percent_of_max_abs", "max_abs", "fit_percent", "step_ns"})
+    EXPECT_TRUE(json["rows"][3][key].is_null()) << key;
+  EXPECT_TRUE(json["rows"][0]["rmse_std"].is_null()) << "of one run";
 }
 
 TEST(Studies, OfTorqueTrackingJudgeInversesInTheLoop) {

@@ -63,6 +63,18 @@ TEST(FitReportOf, ColouredResidualsTellLessThanTheirNumber) {
   EXPECT_NEAR(report.table[0].std_error, std::sqrt(4000.0 / report.effective_samples), 1e-9);
 }
 
+TEST(FitReportOf, PartOfARecordTellsNoMoreThanItsSamples) {
+  Random random(4);
+  double state = 0.0;
+  Dataset dataset =
+      spring_with([&](std::size_t) { return state = 0.95 * state + random.normal(); });
+  dataset.records[0].segments = {{0, 3000, Role::train}, {3000, 4000, Role::test}};
+  const FitReport report = report_of(dataset);
+  EXPECT_EQ(report.samples, 1000U);
+  EXPECT_NEAR(report.correlations[0].lag_s, 0.01, 1e-12);
+  EXPECT_LT(report.effective_samples, 1000.0 / 39.0 * 3.0);
+}
+
 TEST(FitReportOf, NamesTheInputThatWouldExplainMore) {
   Random random(4);
   double last = 0.0;

@@ -21,10 +21,11 @@ struct StudyOptions {
 
 /// How a model did in a torque loop; means over the runs, in `Study::unit` (SPEC section 3.10).
 struct StudyTracking {
-  double mad = 0.0;
-  double mad_std = 0.0;  ///< of one run
-  double std_abs = 0.0;
-  double mad_to_linear = 0.0;    ///< MAD over that of the line of the sweeps
+  double mad = kNotMeasured;
+  double mad_std = kNotMeasured;  ///< of one run; NaN of fewer than two
+  double std_abs = kNotMeasured;
+  double mad_to_linear =
+      kNotMeasured;  ///< MAD over that of the line of the sweeps, where both came to their end
   std::size_t limit_cycles = 0;  ///< runs with one
   std::size_t stopped = 0;       ///< runs that diverged or failed, in no mean
   std::optional<double> paper_ratio = {};
@@ -34,24 +35,24 @@ struct StudyTracking {
 struct StudyRow {
   std::string condition;
   std::string model;
-  std::size_t runs = 0;   ///< fits that the statistics are of; 0: only the paper's figure
-  double rmse = 0.0;      ///< mean, in `Study::unit`
-  double rmse_std = 0.0;  ///< of one run
-  double percent = 0.0;   ///< mean of 100 rmse / (largest |target| of the judged recording)
-  double largest = 0.0;   ///< mean of that largest |target|
+  std::size_t runs = 0;            ///< fits that the statistics are of; 0: only the paper's figure
+  double rmse = kNotMeasured;      ///< mean, in `Study::unit`; NaN of no run, as all means
+  double rmse_std = kNotMeasured;  ///< of one run; NaN of fewer than two
+  double percent = kNotMeasured;  ///< mean of 100 rmse / (largest |target| of the judged recording)
+  double largest = kNotMeasured;  ///< mean of that largest |target|
   std::optional<double> paper_rmse = {};
-  double max_abs = 0.0;                 ///< largest |error| of all runs
+  double max_abs = kNotMeasured;        ///< largest |error| of all runs
   std::optional<double> one_step = {};  ///< mean RMSE one step ahead, of a model that feeds back
   std::size_t blank = 0;                ///< of the runs: fit_percent below 5, no more than the mean
   double guarded_percent = 0.0;         ///< of the scored samples, answered by a guard
   std::size_t diverged = 0;             ///< of the runs
-  double fit_percent = 0.0;             ///< mean of `Metrics::fit_percent` (BF)
+  double fit_percent = kNotMeasured;    ///< mean of `Metrics::fit_percent` (BF)
   std::optional<double> paper_fit_percent = {};  ///< what the paper judges by, where it is that
   std::optional<StudyTracking> tracking = {};    ///< of all rows of a study, or of none
   double fit_seconds = kNotMeasured;             ///< mean of the runs
-  double step_ns = 0.0;                          ///< mean of the runs' medians
-  double within_std_dev = 0.0;  ///< mean of `Score::within_std_dev`; NaN: no error bar
-  double within_2_std_dev = 0.0;
+  double step_ns = kNotMeasured;                 ///< mean of the runs' medians
+  double within_std_dev = kNotMeasured;  ///< mean of `Score::within_std_dev`; NaN: no error bar
+  double within_2_std_dev = kNotMeasured;
   std::string failure = {};  ///< why a fit failed, of a study that goes on then
 
   /// Every run was fitted and stayed within the output's range.
