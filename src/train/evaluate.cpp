@@ -157,7 +157,8 @@ std::size_t start_with(Estimator& estimator,
     std::ranges::copy(pipeline.step(raw), features.row(n).begin());
     if (pipeline.is_settled() && target.is_fresh(n)) measured[n] = target.values[n];
   }
-  start_where_measured(estimator.model(), features, measured, usual_error(settings, estimator.model().family()));
+  start_where_measured(estimator.model(), features, measured,
+                       usual_error(settings, estimator.model().family()));
   return samples;
 }
 

@@ -247,6 +247,7 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
   const Unknowns unknowns(model, data, options.start_samples);
   const std::size_t longest = longest_sequence(data);
   std::vector<std::vector<double>> from;
+  from.reserve(starts.size());
   for (const std::vector<double>& start : starts) from.push_back(unknowns.from(start));
   const std::size_t least = 2 * from.front().size();
   if (judged_samples(data, longest) < least)

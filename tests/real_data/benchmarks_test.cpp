@@ -90,7 +90,7 @@ TEST(EmpsBenchmark, IsSimulatedByFourNumbers) {
 TEST(EmpsBenchmark, HasFrictionThatFallsAlongTheScrew) {
   TORSIO_NEEDS_DATA("emps");
   const Results results = compared("emps", "friction_drive:terms=position");
-  EXPECT_LT(scored(results, "pulses").score.metrics.rmse, 5.5e-3);  // 4.4e-3
+  EXPECT_LT(scored(results, "pulses").score.metrics.rmse, 6e-3);  // 5.0e-3
 }
 
 TEST(PublicBenchmarks, StandBesidePublishedFigures) {
