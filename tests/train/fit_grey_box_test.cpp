@@ -193,7 +193,7 @@ TEST(FitGreyBox, IsNotJudgedWhereAHeldOutRecordLeavesTheOthersRange) {
   data.sequences.push_back(record(0.5, 3).sequences[0]);
   data.sequences.push_back(record(1.0, 4).sequences[0]);
   const FittedGreyBox fitted = fit_grey_box(data, kBoxAlone);
-  EXPECT_NEAR(fitted.held_out_rmse, 0.1, 0.03);
+  EXPECT_LT(fitted.held_out_rmse, 1.0) << "a line on from the others misses by hundreds";
   EXPECT_LT(evaluate(GreyBox(fitted.parameters), record(1.0, 5)).rmse, 3.0)
       << "what lies there is fitted all the same";
 }
