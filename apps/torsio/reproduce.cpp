@@ -61,7 +61,8 @@ void add_reproduce(CLI::App& app) {
   verb->footer(
       "Example: torsio reproduce 001-models --repeats 1\n"
       "Without an item all of them run that need no recordings: the best part of an hour on two "
-      "cores. public-benchmarks reads the official records in TORSIO_DATA or ../shared/data.");
+      "cores. public-benchmarks and model-comparison read recordings in TORSIO_DATA or "
+      "../shared/data.");
   verb->add_option("ITEM", flags->items, "which; --list shows them");
   verb->add_flag("--list", flags->list, "show the experiments");
   verb->add_flag("--quick", flags->options.is_quick,

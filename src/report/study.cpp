@@ -184,19 +184,29 @@ std::string table_of(const Study& study) {
   return table.text();
 }
 
+const StudyRow* row_of(const Study& study, const std::string& condition) {
+  for (const StudyRow& row : study.rows)
+    if (row.condition == condition && row.model == study.judged && row.runs > 0) return &row;
+  return nullptr;
+}
+
 /// Where the judged model stands under each condition.
 std::string verdict_text(const Study& study) {
   TextTable table;
   table.header({"condition", "best", fmt::format("RMSE {}", study.unit), study.judged, "/ best",
-                "within 5 %"});
+                "within 5 %", "in 1 sd %", "in 2 sd %", "step ns"});
   std::size_t near = 0;
   const std::vector<StudyVerdict> all = verdicts(study);
   for (const StudyVerdict& verdict : all) {
     if (verdict.is_near_best()) ++near;
+    const StudyRow* const row = row_of(study, verdict.condition);
     table.row({verdict.condition, verdict.best, number(verdict.best_rmse),
                verdict.rmse ? number(*verdict.rmse) : "not ranked",
                verdict.rmse ? fmt::format("{:.3f}", *verdict.rmse / verdict.best_rmse) : "-",
-               verdict.is_near_best() ? "yes" : "no"});
+               verdict.is_near_best() ? "yes" : "no",
+               row != nullptr ? share(row->within_std_dev) : "-",
+               row != nullptr ? share(row->within_2_std_dev) : "-",
+               row != nullptr ? fmt::format("{:.0f}", row->step_ns) : "-"});
   }
   return fmt::format("{}{} is lowest or within 5 % of the lowest in {} of {}\n", table.text(),
                      study.judged, near, all.size());
@@ -225,9 +235,9 @@ std::string study_text(const StudyInfo& info, const Study& study) {
                   study.options.is_quick ? ", quick: not the paper's sizes" : "");
   for (const StudyPlant& plant : study.plants)
     text += fmt::format("plant {}, data sheet {}\n", plant.name, plant.fingerprint);
+  if (!study.judged.empty()) text += '\n' + verdict_text(study);
   text += '\n' + table_of(study);
   text += legend(study);
-  if (!study.judged.empty()) text += '\n' + verdict_text(study);
   if (study.full_scale)
     text += fmt::format(
         "% of FS: of RMSE or of max|e|, the largest error of all runs, over {:g} {}; 1 step: RMSE "

@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <string_view>
+#include <utility>
 
 #include "torsio/data/load.hpp"
 #include "torsio/data/manifest.hpp"
-#include "torsio/data/resample.hpp"
+#include "torsio/data/recording.hpp"
 #include "torsio/sim/bench_dataset.hpp"
 #include "torsio/sim/experiment.hpp"
 
@@ -16,13 +18,31 @@ namespace torsio {
 namespace {
 
 constexpr std::uint64_t kJudged = 50;  // seeds of runs to be judged on
-// Of the DFKI benches' load cell: a log of 1 kHz tells no more of its torque, at eight times the cost.
-constexpr double kLoadCell_Hz = 125.0;
+/// What a DFKI bench tells at the samples of its load cell (125 Hz), whose known latency is taken off: a log of
+/// 1 kHz tells no more of the torque, at eight times the cost.
+Recording at_load_cell(const Recording& log, const DataSheet& sheet) {
+  const Channel& torque = log.channel("torque_Nm");
+  const double tick_s = 1.0 / log.sample_rate_Hz();
+  const auto late =
+      static_cast<std::size_t>(std::lround(sheet.sensors.torque_latency_s.value / tick_s));
+  std::vector<std::size_t> fresh;
+  for (std::size_t n = late; n < log.size(); ++n)
+    if (torque.is_fresh(n)) fresh.push_back(n);
+  const double period_s = tick_s * static_cast<double>(fresh[2] - fresh[1]);
+  Recording thinned(log.name(), 1.0 / period_s);
+  for (const Channel& channel : log.channels()) {
+    Channel own{.name = channel.name, .values = {}, .fresh = {}};
+    for (const std::size_t n : fresh)
+      own.values.push_back(channel.values[channel.name == torque.name ? n : n - late]);
+    thinned.add(std::move(own));
+  }
+  return thinned;
+}
 
-void thin_out(Dataset& dataset) {
+void thin_out(Dataset& dataset, const DataSheet& sheet) {
   for (DatasetRecord& record : dataset.records) {
     const Role role = record.segments.front().role;
-    record.recording = resample(record.recording, kLoadCell_Hz);
+    record.recording = at_load_cell(record.recording, sheet);
     record.segments = whole_record(record.recording.size(), role);
   }
 }
@@ -38,7 +58,7 @@ void add(ComparisonCase& to, const ExperimentSpec& spec, Role role, const Progre
 
 ComparisonCase sweeps(const std::string& actuator, std::uint64_t seed, const Progress& progress) {
   ComparisonCase made{.dataset = sweep_dataset(actuator, seed, progress)};
-  thin_out(made.dataset);
+  thin_out(made.dataset, data_sheet(actuator));
   return made;
 }
 
@@ -55,10 +75,10 @@ ComparisonCase torque_loop(const std::string& actuator, std::uint64_t seed,
          .torque_amplitude_Nm = share * rated_Nm},
         role, progress);
   };
-  run("chirp", 0.4, Role::train);
-  run("chirp", 0.15, Role::train);
-  run("random-walk", 0.3, Role::test);
-  thin_out(made.dataset);
+  run("chirp", 0.8, Role::train);
+  run("chirp", 0.3, Role::train);
+  run("random-walk", 0.25, Role::test);  // whose peaks reach 0.6
+  thin_out(made.dataset, data_sheet(actuator));
   return made;
 }
 

@@ -39,8 +39,7 @@ constexpr std::array kRivals{
     Rival{"nonlinear_backlash_improved", "nonlinear_backlash_improved"},
     Rival{"exponential_loading", "exponential_loading"},
     Rival{"hammerstein_wiener", "hammerstein_wiener:structure=given:iterations=500", true},
-    Rival{"viscoelastic", "viscoelastic:starts=3"},
-    Rival{"viscoelastic 003a", "viscoelastic:network=003a:starts=3"},
+    Rival{"viscoelastic", "viscoelastic:network=003a:starts=2"},
     Rival{"grey_box", "grey_box", true},
     Rival{"grey_box, no residual", "grey_box:residual=none", true},
     Rival{"dgmm", "dgmm"},
@@ -112,11 +111,12 @@ Study model_comparison(const StudyOptions& options, const Progress& progress) {
           "every family on every simulated actuator and on the real recordings with a torque, in "
           "free run. dfki: three sweeps, judged on a fourth lever in an inclined plane (new "
           "lever); "
-          "torque chirps of 0.4 and 0.15 of the rating, output locked, judged on noise of 0.3 "
-          "(random walk), at 125 Hz, the load cell's rate. elastomer: triangles of 0.4 to 4 Hz. "
+          "torque chirps of 0.8 and 0.3 of the rating, output locked, judged on noise of 0.25 "
+          "(random walk), both at the load cell's 125 Hz, its latency taken off. elastomer: "
+          "triangles of 0.4 to 4 Hz. "
           "rubber-clutch: sines, judged on "
           "multisines. harmonic-drive: pushes of 10 and 20 Nm, high and zero impedance, judged on "
-          "15 Nm. Real ones: docs/studies.md",
+          "15 Nm. Real ones: docs/model_comparison.md",
       .unit = "Nm",
       .options = options,
       .judged = std::string(kJudgedModel)};

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -16,6 +17,10 @@
 
 namespace torsio {
 namespace {
+
+/// Of a rate's root mean square: dry friction that turns within it, or all but at once.
+constexpr std::array kRateShares{0.2, 0.02};
+constexpr double kClearly = 0.99;  // less of the held-out error
 
 /// What the box leaves over, with its slips as further inputs.
 TrainingData residual_data(const TrainingData& data, const GreyBox::Parameters& parameters) {
@@ -118,13 +123,11 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
           options.bound * rms);
 }
 
-}  // namespace
-
-FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
-                           const FitContext& context) {
-  report_progress(context.progress, 0.0, "gathering the terms of grey_box");
-  const GreyBoxSearch search(data, options.schedule);
-  const GreyBoxSearch::Candidate chosen = search.choose(options.passive, context.progress);
+/// The box of the terms that predict best what is held out.
+FittedGreyBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, double rate_share,
+                         const Progress& progress) {
+  const GreyBoxSearch search(data, options.schedule, rate_share);
+  const GreyBoxSearch::Candidate chosen = search.choose(options.passive, progress);
   FittedGreyBox fitted;
   fitted.parameters = search.fitted(chosen.choice);
   fitted.held_out_rmse = chosen.held_out_error;
@@ -132,6 +135,21 @@ FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& optio
                                      search.description_of(chosen.choice),
                                      search.what_was_held_out(), chosen.held_out_error,
                                      search.held_out_error({})));
+  return fitted;
+}
+
+}  // namespace
+
+FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
+                           const FitContext& context) {
+  report_progress(context.progress, 0.0, "gathering the terms of grey_box");
+  FittedGreyBox fitted = chosen_box(data, options, kRateShares[0], context.progress);
+  const bool has_rates =
+      std::ranges::any_of(data.inputs, [](const auto& input) { return input.is_rate; });
+  if (has_rates) {
+    FittedGreyBox other = chosen_box(data, options, kRateShares[1], context.progress);
+    if (other.held_out_rmse < kClearly * fitted.held_out_rmse) fitted = std::move(other);
+  }
   if (options.residual != ResidualKind::none) learn_residual(fitted, data, options, context);
   return fitted;
 }

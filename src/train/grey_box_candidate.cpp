@@ -154,11 +154,12 @@ bool GreyBoxCandidate::is_possible() const noexcept {
   return columns <= kMostColumns && kSamplesPerTerm * columns * sums_.levels <= sums_.samples;
 }
 
-std::vector<NormalEquations> GreyBoxCandidate::projected() const {
+std::vector<NormalEquations> GreyBoxCandidate::projected(
+    const std::vector<NormalEquations>& all) const {
   const Eigen::SparseMatrix<double> map = map_of(sums_, choice_, structure_);
   std::vector<NormalEquations> cells;
-  cells.reserve(sums_.cells.size());
-  for (const NormalEquations& cell : sums_.cells) {
+  cells.reserve(all.size());
+  for (const NormalEquations& cell : all) {
     NormalEquations& small = cells.emplace_back(structure_.columns());
     const Eigen::Map<const RowMajor> product(cell.product.values.data(),
                                              static_cast<Index>(sums_.all.columns()),
@@ -229,6 +230,7 @@ double GreyBoxCandidate::left_out_levels(const std::vector<NormalEquations>& cel
 }
 
 double GreyBoxCandidate::left_out_folds(const std::vector<NormalEquations>& cells) const {
+  const std::vector<NormalEquations> beyond = projected(sums_.beyond);
   double error = 0.0;
   std::size_t rows = 0;
   for (std::size_t level = 0; level < sums_.levels; ++level) {
@@ -238,20 +240,24 @@ double GreyBoxCandidate::left_out_folds(const std::vector<NormalEquations>& cell
       if (out.rows == 0 || out.rows == sum.rows) continue;
       NormalEquations rest = sum;
       add(rest, out, -1.0);
-      error += out.error(solved(rest));
+      const std::vector<double> coefficients = solved(rest);
+      error += out.error(coefficients);
       rows += out.rows;
+      if (beyond.empty()) continue;
+      error -= beyond[fold].error(coefficients);
+      rows -= beyond[fold].rows;
     }
   }
   return std::sqrt(error / static_cast<double>(rows));
 }
 
 double GreyBoxCandidate::held_out_error() const {
-  const std::vector<NormalEquations> cells = projected();
+  const std::vector<NormalEquations> cells = projected(sums_.cells);
   return sums_.folds == 1 ? left_out_levels(cells) : left_out_folds(cells);
 }
 
 GreyBox::Parameters GreyBoxCandidate::fitted() const {
-  const std::vector<NormalEquations> cells = projected();
+  const std::vector<NormalEquations> cells = projected(sums_.cells);
   GreyBox::Parameters parameters{.terms = structure_, .coefficients = sums_.frame, .residual = {}};
   Matrix& values = parameters.coefficients.values;
   values = Matrix(sums_.levels, structure_.columns());

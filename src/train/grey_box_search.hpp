@@ -10,9 +10,9 @@ namespace torsio {
 /// Chooses the terms of a grey box by what they predict of held-out data.
 class GreyBoxSearch {
  public:
-  /// Runs once through the data. @param schedule as `groups_by` takes it
-  GreyBoxSearch(const TrainingData& data, const std::string& schedule)
-      : sums_(gather(data, schedule)) {}
+  /// Runs once through the data. @param schedule, rate_share as `gather` takes them
+  GreyBoxSearch(const TrainingData& data, const std::string& schedule, double rate_share)
+      : sums_(gather(data, schedule, rate_share)) {}
 
   struct Candidate {
     GreyBoxChoice choice;

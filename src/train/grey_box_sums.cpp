@@ -53,20 +53,19 @@ std::vector<double> time_constants(const TrainingData& data) {
 }
 
 /// Rates at which dry friction is taken to have turned: a share of their root mean square.
-std::vector<double> rate_scales(const TrainingData& data, const Table& table) {
-  constexpr double kShare = 0.2;
+std::vector<double> rate_scales(const TrainingData& data, const Table& table, double share) {
   std::vector<double> scales(data.input_count(), 0.0);
   for (std::size_t j = 0; j < scales.size(); ++j) {
     if (!data.inputs[j].is_rate) continue;
     double squares = 0.0;
     for (std::size_t n = 0; n < table.features.rows; ++n)
       squares += table.features(n, j) * table.features(n, j);
-    scales[j] = kShare * std::sqrt(squares / static_cast<double>(table.features.rows));
+    scales[j] = share * std::sqrt(squares / static_cast<double>(table.features.rows));
   }
   return scales;
 }
 
-GreyBoxTerms::Structure finest(const TrainingData& data, const Table& table) {
+GreyBoxTerms::Structure finest(const TrainingData& data, const Table& table, double rate_share) {
   GreyBoxTerms::Structure all;
   const auto [low, high] = range_of(table, data);
   all.sample_period_s = 1.0 / data.sample_rate_Hz;
@@ -75,7 +74,7 @@ GreyBoxTerms::Structure finest(const TrainingData& data, const Table& table) {
   for (std::size_t i = GreyBoxSums::kThresholds; i-- > 0;)
     all.thresholds.push_back(half * std::exp2(-static_cast<double>(i + 1)));
   all.time_constants_s = time_constants(data);
-  all.rate_scales = rate_scales(data, table);
+  all.rate_scales = rate_scales(data, table, rate_share);
   return all;
 }
 
@@ -114,7 +113,36 @@ class RowSum {
   std::vector<std::pair<std::size_t, double>> row_;  ///< what is not 0
 };
 
+struct Range {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void take(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  [[nodiscard]] bool holds(double value) const { return value >= low && value <= high; }
+};
+
+/// Of the first input in all records but those of each fold.
+std::vector<Range> ranges_of_others(const GreyBoxSums& sums, const TrainingData& data) {
+  std::vector<Range> ranges(sums.folds);
+  std::size_t record = 0;
+  for (const Sequence& sequence : data.sequences) {
+    if (usable_samples(sequence) == 0) continue;
+    const std::size_t own = record++ % sums.folds;
+    for (std::size_t n = 0; n < sequence.use.size(); ++n) {
+      if (sequence.use[n] == 0) continue;
+      for (std::size_t fold = 0; fold < sums.folds; ++fold)
+        if (fold != own) ranges[fold].take(sequence.features(n, 0));
+    }
+  }
+  return ranges;
+}
+
 void add_data(GreyBoxSums& sums, const TrainingData& data) {
+  const std::vector<Range> others =
+      sums.is_by_record ? ranges_of_others(sums, data) : std::vector<Range>{};
   const std::size_t stride = (sums.samples + kMostSummed - 1) / kMostSummed;
   RowSum row;
   std::size_t record = 0;
@@ -139,6 +167,8 @@ void add_data(GreyBoxSums& sums, const TrainingData& data) {
             std::ranges::find(sums.frame.knots, features[sums.frame.feature]) -
             sums.frame.knots.begin());
       row.add(sums.cells[level * sums.folds + fold], terms, features, sequence.target[n]);
+      if (sums.is_by_record && !others[fold].holds(features[0]))
+        row.add(sums.beyond[fold], terms, features, sequence.target[n]);
     }
     if (usable > 0) ++record;
   }
@@ -163,18 +193,20 @@ void add(NormalEquations& sum, const NormalEquations& part, double sign) {
   sum.rows = sign > 0.0 ? sum.rows + part.rows : sum.rows - part.rows;
 }
 
-GreyBoxSums gather(const TrainingData& data, const std::string& schedule) {
+GreyBoxSums gather(const TrainingData& data, const std::string& schedule, double rate_share) {
   const Table table = usable_table(data);
   const Groups groups = groups_by(schedule, data, table.features);
-  GreyBoxSums sums{.all = finest(data, table),
+  GreyBoxSums sums{.all = finest(data, table, rate_share),
                    .is_rate = {},
                    .frame = groups.frame,
                    .levels = groups.samples.size(),
                    .cells = {},
+                   .beyond = {},
                    .samples = table.features.rows};
   for (const auto& input : data.inputs) sums.is_rate.push_back(input.is_rate ? 1 : 0);
   choose_folds(sums, data);
   sums.cells.assign(sums.levels * sums.folds, NormalEquations(sums.all.columns()));
+  if (sums.is_by_record) sums.beyond = sums.cells;
   add_data(sums, data);
   return sums;
 }

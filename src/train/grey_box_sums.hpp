@@ -26,12 +26,17 @@ struct GreyBoxSums {
   std::size_t folds = 1;               ///< 1: levels are held out instead
   bool is_by_record = false;           ///< a fold is some records; else blocks
   std::vector<NormalEquations> cells;  ///< [level * folds + fold]
+  /// Of each cell, what lies beyond the first input's range in all other cells; empty unless folds are
+  /// records. A guard answers there, so it chooses no terms.
+  std::vector<NormalEquations> beyond;
   std::size_t samples = 0;
 };
 
 /// Runs once through the data. @param schedule as `groups_by` takes it
+/// @param rate_share of a rate's root mean square: where its dry friction has turned
 /// @throws Error if the first input does not vary, or there are too few samples.
-[[nodiscard]] GreyBoxSums gather(const TrainingData& data, const std::string& schedule);
+[[nodiscard]] GreyBoxSums gather(const TrainingData& data, const std::string& schedule,
+                                 double rate_share);
 
 /// `count` knots over [low, high].
 [[nodiscard]] std::vector<double> evenly(double low, double high, std::size_t count);

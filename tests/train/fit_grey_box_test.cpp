@@ -176,6 +176,47 @@ TEST(FitGreyBox, KnowsHowWrongItIsBetweenTheKnotsOfItsSchedule) {
   EXPECT_LT(fitted.held_out_rmse, 3.0 * between);
 }
 
+TEST(FitGreyBox, IsNotJudgedWhereAHeldOutRecordLeavesTheOthersRange) {
+  // Beyond +-0.06 the spring is another one, and one record of four goes there.
+  const auto record = [](double amplitude, std::uint64_t seed) {
+    Random random(seed);
+    Matrix features = wander(4000, static_cast<double>(seed));
+    for (std::size_t n = 0; n < 4000; ++n) features(n, 0) *= amplitude;
+    return test::training_data_of(
+        {{.expression = "spring_deflection_rad"}}, std::move(features), [&](Row x) {
+          const double beyond = std::max(std::abs(x[0]) - 0.06, 0.0);
+          return 300.0 * x[0] + std::copysign(2e4 * beyond, x[0]) + 0.1 * random.normal();
+        });
+  };
+  TrainingData data = record(0.5, 1);
+  data.sequences.push_back(record(0.55, 2).sequences[0]);
+  data.sequences.push_back(record(0.5, 3).sequences[0]);
+  data.sequences.push_back(record(1.0, 4).sequences[0]);
+  const FittedGreyBox fitted = fit_grey_box(data, kBoxAlone);
+  EXPECT_LT(fitted.held_out_rmse, 1.0) << "a line on from the others misses by hundreds";
+  EXPECT_LT(evaluate(GreyBox(fitted.parameters), record(1.0, 5)).rmse, 3.0)
+      << "what lies there is fitted all the same";
+}
+
+TEST(FitGreyBox, FindsDryFrictionThatTurnsAtAFractionOfTheUsualRate) {
+  const auto scale_of = [](double turns_within) {
+    Matrix features(8000, 2);
+    const Matrix motion = wander(8000);
+    for (std::size_t n = 0; n < 8000; ++n) {
+      features(n, 0) = motion(n, 0);
+      features(n, 1) = std::sin(0.0007 * static_cast<double>(n) * static_cast<double>(n % 997));
+    }
+    const TrainingData data = test::training_data_of(
+        {{.expression = "spring_deflection_rad"}, {.expression = "rate(q)", .is_rate = true}},
+        std::move(features),
+        [&](Row x) { return 400.0 * x[0] + 2.0 * std::tanh(x[1] / turns_within); });
+    return fit_grey_box(data, kBoxAlone).parameters.terms.rate_scales.at(1);
+  };
+  const double wide = scale_of(0.14);
+  EXPECT_NEAR(wide, 0.14, 0.02);
+  EXPECT_NEAR(scale_of(0.01), 0.1 * wide, 1e-3);
+}
+
 TEST(FitGreyBox, ANetworkIsKeptOnlyWhereItHelps) {
   // The second input bends the torque: no term of the box can.
   const auto data_of = [](double bend) {
