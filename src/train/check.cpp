@@ -179,7 +179,7 @@ class Checker {
             const Channel& other = recording.channel(name);
             const double moved = share_moved(other, rest);
             if (name == channel.name ||
-                (moved < kMovedMeanwhile && !stands_out(channel, rests, rest, other, moved)))
+                (moved < kMovedMeanwhile && !is_odd_one_out(rest, rests, channel, other)))
               continue;
             add(Verdict::warn, "frozen sensors", recording.name(),
                 fmt::format("{} tells {:g} for {:.3g} s from t = {:.4g} s, while {} moves through "
@@ -192,19 +192,6 @@ class Checker {
         }
       });
     });
-  }
-
-  // A stall while little moves: the channel goes with another everywhere else, and nowhere else did it
-  // stay behind like that, as a joint does that sticks at every turn.
-  [[nodiscard]] static bool stands_out(const Channel& channel, const std::vector<Rest>& rests,
-                                       const Rest& rest, const Channel& other, double moved) {
-    return moved >= kMovedALittle &&
-           moved * extent_of(channel.values).width() >= kFewCodes * finest_step(channel.values) &&
-           std::abs(correlation(channel.values, other.values)) >= kTogether &&
-           std::ranges::none_of(rests, [&](const Rest& each) {
-             return !(each == rest) && 2 * each.length() >= rest.length() &&
-                    2.0 * share_moved(other, each) >= moved;
-           });
   }
 
   // What the first input is made of may move through much more than it does: codes of a gear's angle
@@ -412,10 +399,7 @@ class Checker {
   static constexpr double kFrozen_s = 0.2;
   static constexpr double kFrozenDeliveries = 10.0;
   static constexpr double kMovedMeanwhile = 0.4;  ///< of another channel's range
-  static constexpr double kMovedALittle = 0.02;
-  static constexpr double kTogether = 0.9;  ///< correlation
-  static constexpr double kFewCodes = 5.0;
-  static constexpr double kCoarseShare = 0.02;  ///< of the range: 50 codes
+  static constexpr double kCoarseShare = 0.02;    ///< of the range: 50 codes
   static constexpr double kJumpShare = 0.02;
   static constexpr double kJumpOverOthers = 5.0;
   static constexpr double kLongestDelay_s = 0.1;

@@ -112,6 +112,21 @@ double share_moved(const Channel& channel, const Rest& meanwhile) {
   return whole > 0.0 ? passed.width() / whole : 0.0;
 }
 
+bool is_odd_one_out(const Rest& rest, const std::vector<Rest>& rests, const Channel& channel,
+                    const Channel& other) {
+  constexpr double kLittle = 0.02;  // of the other's range
+  constexpr double kTogether = 0.9;
+  constexpr double kFewCodes = 5.0;
+  const double moved = share_moved(other, rest);
+  return moved >= kLittle &&
+         moved * extent_of(channel.values).width() >= kFewCodes * finest_step(channel.values) &&
+         std::abs(correlation(channel.values, other.values)) >= kTogether &&
+         std::ranges::none_of(rests, [&](const Rest& each) {
+           return !(each == rest) && 2 * each.length() >= rest.length() &&
+                  2.0 * share_moved(other, each) >= moved;
+         });
+}
+
 Line line_through(const Pair& pair) {
   Line line;
   double count = 0.0;

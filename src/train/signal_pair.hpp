@@ -66,6 +66,12 @@ struct Rest {
 /// The share of its whole range that a channel passes through meanwhile.
 [[nodiscard]] double share_moved(const Channel& channel, const Rest& meanwhile);
 
+/// A stall while little moves: the channel goes with another one everywhere else, and nowhere else did it
+/// stay behind like that, as a joint does that sticks at every turn.
+/// @param rests of the channel, from half the length of `rest` on
+[[nodiscard]] bool is_odd_one_out(const Rest& rest, const std::vector<Rest>& rests,
+                                  const Channel& channel, const Channel& other);
+
 /// Least squares through the samples where input and target are both finite.
 struct Line {
   double mean_input = 0.0;

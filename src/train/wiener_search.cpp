@@ -138,12 +138,18 @@ WienerFit refined(const WienerData& data, const WienerNumbers& start, std::size_
   const WienerError error(data, start);
   const std::vector<double> theta = stable_start(error, error.pack(start));
   const WienerChart chart = stable_chart(error);
-  const std::vector<double> upper = stable_bound(error);
-  std::vector<double> lower(upper.size());
-  std::ranges::transform(upper, lower.begin(), std::negate{});
-  const SearchResult found = minimise_squares(
-      wiener_problem(error, theta.size(), chart), theta,
-      {.most_iterations = iterations, .lower = lower, .upper = upper, .progress = progress});
+  const ResidualProblem problem = wiener_problem(error, theta.size(), chart);
+  SearchOptions options{.most_iterations = iterations, .progress = progress};
+  SearchResult found = minimise_squares(problem, theta, options);
+  const std::vector<double> bound = stable_bound(error);
+  const auto is_beyond = [](double theta_i, double most) { return std::abs(theta_i) > most; };
+  if (!found.has_converged && !std::ranges::equal(found.theta, bound, std::not_fn(is_beyond))) {
+    // Along a pole's edge there is no end. Bounds from the beginning would cost every search.
+    options.upper = bound;
+    options.lower.resize(bound.size());
+    std::ranges::transform(bound, options.lower.begin(), std::negate{});
+    found = minimise_squares(problem, std::move(found.theta), options);
+  }
   std::vector<double> packed(error.size());
   Matrix no_slopes;
   chart(found.theta, packed, no_slopes);
