@@ -55,6 +55,12 @@ void require_fit(bool fits, const char* what, std::size_t expected, std::size_t 
                .found = fmt::format("{}", found)});
 }
 
+void require_one_rate(const LinearSystem& one, const LinearSystem& other) {
+  require(one.sample_rate_Hz() == other.sample_rate_Hz(), kPlace,
+          fmt::format("systems of one sample rate, {} Hz", one.sample_rate_Hz()),
+          other.sample_rate_Hz());
+}
+
 }  // namespace
 
 LinearSystem::LinearSystem(Matrices matrices, double sample_rate_Hz)
@@ -156,6 +162,7 @@ LinearSystem LinearSystem::closed() const {
 }
 
 LinearSystem operator*(const LinearSystem& after, const LinearSystem& before) {
+  require_one_rate(after, before);
   require_fit(after.input_count() == before.output_count(), "outputs before inputs",
               after.input_count(), before.output_count());
   const auto& [a2, b2, c2, d2] = after.matrices();
@@ -173,6 +180,7 @@ LinearSystem operator*(const LinearSystem& after, const LinearSystem& before) {
 }
 
 LinearSystem side_by_side(const LinearSystem& one, const LinearSystem& other) {
+  require_one_rate(one, other);
   require_fit(one.output_count() == other.output_count(), "outputs", one.output_count(),
               other.output_count());
   const auto& [a1, b1, c1, d1] = one.matrices();

@@ -31,6 +31,13 @@ std::string spread(const RunningMean& of) {
   return of.count() < 2 ? std::string() : fmt::format("{:.2g}", of.std_dev());
 }
 
+/// What the bandwidth's number is, or why there is none.
+std::string_view bandwidth_outcome(const TrackingRow& row) {
+  if (!row.bandwidth_Hz) return "not_measured";
+  if (*row.bandwidth_Hz == 0.0) return "below_sweep";
+  return std::isfinite(*row.bandwidth_Hz) ? "measured" : "above_sweep";
+}
+
 /// Over the runs of one model that came to their end.
 struct ModelMeans {
   RunningMean mad, std_abs, rmse, to_linear, error_ratio, bandwidth, overshoot, limit_events,
@@ -48,7 +55,11 @@ struct ModelMeans {
     rmse.add(row.score.rmse);
     to_linear.add(row.mad_to_linear);
     error_ratio.add(row.score.error_ratio);
-    bandwidth.add(row.bandwidth_Hz);
+    const std::string_view outcome = bandwidth_outcome(row);
+    if (outcome == "measured") bandwidth.add(row.bandwidth_Hz);
+    if (outcome == "below_sweep" || outcome == "above_sweep")
+      remarks.push_back(fmt::format("{}, seed {}: bandwidth {} the sweep's frequencies", row.model,
+                                    row.seed, outcome.substr(0, 5)));
     overshoot.add(row.score.overshoot);
     limit_events.add(static_cast<double>(row.score.limit_events));
     faults.add(static_cast<double>(row.score.inverse_faults));
@@ -65,6 +76,7 @@ Json optional(const std::optional<double>& value) { return value ? Json(*value) 
 Json row_json(const TrackingRow& row) {
   const TrackingScore& score = row.score;
   const bool has_score = row.status == "ok";
+  const bool is_measured = bandwidth_outcome(row) == "measured";
   const auto number = [&](double value) { return has_score ? Json(value) : Json(nullptr); };
   const auto count = [&](std::size_t value) { return has_score ? Json(value) : Json(nullptr); };
   return {
@@ -79,10 +91,11 @@ Json row_json(const TrackingRow& row) {
       {"std_abs", number(score.std_abs)},
       {"rmse", number(score.rmse)},
       {"mad_to_linear", optional(row.mad_to_linear)},
-      {"bandwidth_Hz", optional(row.bandwidth_Hz)},
+      {"bandwidth_Hz", is_measured ? Json(*row.bandwidth_Hz) : Json(nullptr)},
       {"limit_events", count(score.limit_events)},
       {"status", row.status},
       {"reason", row.reason},
+      {"bandwidth", bandwidth_outcome(row)},
       {"max_abs", number(score.max_abs)},
       {"error_ratio", number(score.error_ratio)},
       {"load_cell_mad", number(score.load_cell_mad)},

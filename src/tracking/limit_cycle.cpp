@@ -1,10 +1,14 @@
 #include "torsio/tracking/limit_cycle.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
+#include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"
 
 namespace torsio {
@@ -38,16 +42,20 @@ std::vector<HalfWave> half_waves(std::span<const double> error, std::span<const 
   Highpass of_reference(sample_rate_Hz);
   std::vector<HalfWave> waves;
   HalfWave wave;
-  bool was_positive = true;
+  double last = 0.0;
+  double crossed_s = 0.0;
   for (std::size_t i = 0; i < error.size(); ++i) {
     const double value = of_error.step(error[i]);
     const double wanted = of_reference.step(reference[i]);
-    if ((value > 0.0) != was_positive) {
+    if ((value > 0.0) != (last > 0.0)) {
+      // Between the samples: of fast cycles a half wave has but two or three.
+      const double share = value != last ? last / (last - value) : 0.0;
+      const double now_s = (static_cast<double>(i) - 1.0 + share) / sample_rate_Hz;
+      wave.length_s = now_s - std::exchange(crossed_s, now_s);
       waves.push_back(wave);
       wave = {};
-      was_positive = value > 0.0;
     }
-    wave.length_s += 1.0 / sample_rate_Hz;
+    last = value;
     wave.height = std::max(wave.height, std::abs(value));
     wave.reference_height = std::max(wave.reference_height, std::abs(wanted));
   }
@@ -61,6 +69,10 @@ bool is_alike(double one, double other) { return std::abs(one - other) <= kAlike
 std::optional<LimitCycle> find_limit_cycle(std::span<const double> error,
                                            std::span<const double> reference,
                                            double least_amplitude, double sample_rate_Hz) {
+  if (reference.size() != error.size())
+    throw Error({.place = "limit cycle",
+                 .expected = fmt::format("a reference of {} samples, as the error", error.size()),
+                 .found = fmt::format("{}", reference.size())});
   const std::vector<HalfWave> waves = half_waves(error, reference, sample_rate_Hz);
   std::optional<LimitCycle> found;
   std::size_t run = 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -28,7 +29,7 @@ double overshoot_of(Values wanted, Values torque) {
     const double height = level - last;
     double beyond = 0.0;
     for (; end < wanted.size() && wanted[end] == level; ++end)
-      beyond = std::max(beyond, (torque[end] - level) / height);
+      if (height != 0.0) beyond = std::max(beyond, (torque[end] - level) / height);
     largest = std::max(largest, beyond);
     last = level;
     begin = end;
@@ -48,9 +49,9 @@ std::size_t ticks(Values values, std::size_t first, const Counts& counts) {
   return static_cast<std::size_t>(std::ranges::count_if(values.subspan(first), counts));
 }
 
-std::size_t rises(Values flags) {
+std::size_t rises(Values flags, std::size_t first) {
   std::size_t count = 0;
-  for (std::size_t i = 0; i < flags.size(); ++i)
+  for (std::size_t i = first; i < flags.size(); ++i)
     if (flags[i] != 0.0 && (i == 0 || flags[i - 1] == 0.0)) ++count;
   return count;
 }
@@ -105,16 +106,16 @@ TrackingScore tracking_score(const Recording& record, double amplitude_Nm, bool 
       .load_cell_rmse = load_cell.rmse,
       .limit_cycle = find_limit_cycle(Values(error).subspan(first), wanted.subspan(first),
                                       kVisible * amplitude_Nm, rate_Hz),
-      .limit_events = rises(limited),
-      .limited_s = static_cast<double>(ticks(limited, 0, is_fault)) / rate_Hz,
+      .limit_events = rises(limited, first),
+      .limited_s = static_cast<double>(ticks(limited, first, is_fault)) / rate_Hz,
       .inverse_faults = ticks(record.channel("inverse_fault_1").values, first, is_fault),
       .loop_faults = ticks(record.channel("fault_1").values, first, is_fault)};
   if (has_steps) score.overshoot = overshoot_of(wanted, torque);
   return score;
 }
 
-std::optional<double> bandwidth(std::span<const double> torque_Nm,
-                                const LogSweep::Parameters& sweep, double sample_rate_Hz) {
+double bandwidth(std::span<const double> torque_Nm, const LogSweep::Parameters& sweep,
+                 double sample_rate_Hz) {
   const double log_ratio = std::log(sweep.end_Hz / sweep.start_Hz);
   std::vector<double> phases(torque_Nm.size());
   std::vector<double> frequencies_Hz(torque_Nm.size());
@@ -139,7 +140,7 @@ std::optional<double> bandwidth(std::span<const double> torque_Nm,
                                        std::span(phases).subspan(begin, end - begin));
     const double at_Hz = std::sqrt(frequencies_Hz[begin] * frequencies_Hz[end]);
     if (gain < least) {
-      if (last_Hz == 0.0) return std::nullopt;
+      if (last_Hz == 0.0) return 0.0;
       const double share = (last - least) / (last - gain);
       return last_Hz * std::pow(at_Hz / last_Hz, share);
     }
@@ -147,7 +148,7 @@ std::optional<double> bandwidth(std::span<const double> torque_Nm,
     last_Hz = at_Hz;
     begin = end;
   }
-  return std::nullopt;
+  return std::numeric_limits<double>::infinity();
 }
 
 }  // namespace torsio

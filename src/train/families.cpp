@@ -130,7 +130,7 @@ FittedModel dgmm(const TrainingData& data, const Options& options, const FitCont
 constexpr std::array kGreyBoxOptions{
     kSchedule,
     OptionInfo{"passive", Kind::boolean, "false", 0, 0,
-               "only friction and relaxation that take energy, as true ones do"},
+               "only friction and relaxation that take energy, as true ones do; no residual"},
     OptionInfo{"residual", Kind::text, "auto", 0, 0,
                "learned on what the terms leave over: none, mlp, dgmm; auto: mlp if it lowers the "
                "error on data that it did not see"},

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "torsio/core/error.hpp"
 #include "torsio/train/fit_dgmm.hpp"
 #include "torsio/train/fit_network.hpp"
 #include "torsio/train/model_run.hpp"
@@ -142,6 +143,12 @@ FittedGreyBox chosen_box(const TrainingData& data, const GreyBoxOptions& options
 
 FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
                            const FitContext& context) {
+  const bool learns =
+      options.residual == ResidualKind::mlp || options.residual == ResidualKind::dgmm;
+  if (options.passive && learns)
+    throw UsageError({.place = "options passive and residual",
+                      .problem = "a learned residual may give energy",
+                      .advice = "Leave one of them away."});
   report_progress(context.progress, 0.0, "gathering the terms of grey_box");
   FittedGreyBox fitted = chosen_box(data, options, kRateShares[0], context.progress);
   const bool has_rates =
@@ -150,7 +157,8 @@ FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& optio
     FittedGreyBox other = chosen_box(data, options, kRateShares[1], context.progress);
     if (other.held_out_rmse < kClearly * fitted.held_out_rmse) fitted = std::move(other);
   }
-  if (options.residual != ResidualKind::none) learn_residual(fitted, data, options, context);
+  const bool may_learn = options.residual != ResidualKind::none && !options.passive;
+  if (may_learn) learn_residual(fitted, data, options, context);
   return fitted;
 }
 

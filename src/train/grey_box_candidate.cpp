@@ -193,6 +193,9 @@ std::vector<double> GreyBoxCandidate::solved(const NormalEquations& equations) c
   for (Index j = 0; j < count; ++j) product(j, j) += kRidge * std::max(product(j, j), 1e-3 * mean);
   for (std::size_t j = structure_.first_slip(); j < structure_.first_slope(); ++j)
     if (!choice_.is_signed || j >= structure_.first_relaxation()) is_free[j] = 0;
+  for (std::size_t l = 0; choice_.is_passive && l < structure_.inputs(); ++l)
+    if (sums_.is_rate[l] != 0)
+      is_free[structure_.first_slope() + l] = is_free[structure_.first_coulomb() + l] = 0;
   const Eigen::VectorXd solution = solve_mixed(product, projection, equations.square, is_free);
   return {solution.begin(), solution.end()};
 }

@@ -16,6 +16,7 @@ struct GreyBoxChoice {
   std::size_t branches = 0;   ///< 0, 3, 6 time constants
   std::size_t smoothing = 2;  ///< λ = 1e-6, 1e-4, 1e-2
   bool is_signed = false;     ///< slip forces of any sign
+  bool is_passive = false;    ///< slopes and friction of rates >= 0, too
   bool has_viscous = false;   ///< slopes of rates
   bool has_coulomb = false;   ///< tanh of rates
 

@@ -11,7 +11,7 @@ namespace {
 constexpr double kWorthwhile = 0.99;
 
 /// One step up any ladder from `at`.
-std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool passive, bool has_rates) {
+std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
   std::vector<GreyBoxChoice> next;
   const auto with = [&](auto change) {
     GreyBoxChoice candidate = at;
@@ -27,15 +27,15 @@ std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool passive, bool 
   if (at.slips > 1) with([](auto& c) { --c.slips; });
   if (at.branches < GreyBoxChoice::kMostBranches) with([](auto& c) { ++c.branches; });
   if (at.smoothing > 0) with([](auto& c) { --c.smoothing; });
-  if (!passive && !at.is_signed && at.slips > 0) with([](auto& c) { c.is_signed = true; });
+  if (!at.is_passive && !at.is_signed && at.slips > 0) with([](auto& c) { c.is_signed = true; });
   // Friction of the wrong sign somewhere: no force >= 0 is a step towards it.
-  if (!passive && at.slips == 0)
+  if (!at.is_passive && at.slips == 0)
     with([](auto& c) {
       c.is_signed = true;
       c.slips = 1;
       c.forces = 2;
     });
-  if (!passive && at.slips > 0 && at.forces + 1 < GreyBoxSums::kFinest)
+  if (!at.is_passive && at.slips > 0 && at.forces + 1 < GreyBoxSums::kFinest)
     with([](auto& c) {
       c.is_signed = true;
       c.forces += 2;
@@ -50,13 +50,14 @@ std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool passive, bool 
 
 GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& progress) const {
   const bool has_rates = std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
-  Candidate best{.choice = {}, .held_out_error = held_out_error({})};
+  const GreyBoxChoice line{.is_passive = passive};
+  Candidate best{.choice = line, .held_out_error = held_out_error(line)};
   constexpr double kUsualSteps = 12.0;
   for (double step = 0.0;; ++step) {
     report_progress(progress, std::min(step / kUsualSteps, 0.99),
                     fmt::format("choosing terms, error {:.4g}", best.held_out_error));
     std::optional<Candidate> better;
-    for (const GreyBoxChoice& choice : steps_up(best.choice, passive, has_rates)) {
+    for (const GreyBoxChoice& choice : steps_up(best.choice, has_rates)) {
       const GreyBoxCandidate candidate(sums_, choice);
       if (!candidate.is_possible()) continue;
       const double error = candidate.held_out_error();

@@ -306,6 +306,28 @@ TEST(TubeImpedance, RefusesWhatItCannotRender) {
             std::string::npos);
 }
 
+// Without poles in the right half plane: those of the joint with its output locked.
+TEST(PassiveStiffness, OfATubeIsStableLockedAsWell) {
+  int found = 0;
+  for (const char* actuator : {"harmonic-drive", "harmonic-drive:soft"}) {
+    for (const double torque_Nm_rad : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0}) {
+      for (const double damping_Nms_rad : {0.0, 30.0, 100.0, 300.0}) {
+        auto settings =
+            TubeImpedance::settings_of(data_sheet(actuator), {.torque_Nm_rad = torque_Nm_rad});
+        const double stiffness_Nm_rad =
+            passive_stiffness(settings, damping_Nms_rad, 60.0, kRate_Hz);
+        if (!(stiffness_Nm_rad > 0.0)) continue;
+        ++found;
+        settings.gains =
+            TubeImpedance::gains_for(settings, stiffness_Nm_rad, damping_Nms_rad, torque_Nm_rad);
+        EXPECT_EQ(test::error_message([&] { TubeImpedance(settings, kRate_Hz); }), "")
+            << actuator << ", " << torque_Nm_rad << ", " << damping_Nms_rad;
+      }
+    }
+  }
+  EXPECT_GT(found, 10);
+}
+
 TEST(PassiveStiffness, OfATubeEndsWhereTheLoopIsFast) {
   const auto slow = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kZero);
   const auto fast = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kHigh);

@@ -149,6 +149,12 @@ TEST(LinearSystem, RefusesWhatDoesNotFit) {
   EXPECT_NE(refusal([] { return LinearSystem::lowpass(600.0, kRate_Hz); }), "");
   const LinearSystem two =
       side_by_side(LinearSystem::delay(kRate_Hz), LinearSystem::delay(kRate_Hz));
+  const LinearSystem slow = LinearSystem::delay(0.1 * kRate_Hz);
+  const LinearSystem one = LinearSystem::delay(kRate_Hz);
+  EXPECT_NE(refusal([&] { return slow * one; }).find("one sample rate"), std::string::npos);
+  EXPECT_NE(refusal([&] { return slow + one; }).find("one sample rate"), std::string::npos);
+  EXPECT_NE(refusal([&] { return side_by_side(one, slow); }).find("one sample rate"),
+            std::string::npos);
   EXPECT_NE(refusal([&] { return margins(two); }), "");
   EXPECT_NE(refusal([&] { return two * LinearSystem::delay(kRate_Hz); }), "");
   EXPECT_NE(refusal([&] { return (two + LinearSystem::delay(kRate_Hz)); }), "");

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <string>
 #include <vector>
 
+#include "support/error_message.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
@@ -30,6 +32,26 @@ TEST(LimitCycle, IsFoundWithItsFrequencyInASlowError) {
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->frequency_Hz, 11.0, 0.5);
   EXPECT_NEAR(found->amplitude, 0.5, 0.2);
+}
+
+// A loop of 1 kHz with two ticks of delay cycles at the upper end.
+TEST(LimitCycle, IsFoundAtEveryFrequencyUpToNearlyAQuarterOfTheSampleRate) {
+  for (int frequency_Hz = 5; frequency_Hz <= 240; frequency_Hz += 5) {
+    const std::vector<double> cycle = sine(0.5, frequency_Hz + 0.3, 4.0);
+    const auto found =
+        find_limit_cycle(cycle, std::vector<double>(cycle.size(), 0.0), 0.1, kRate_Hz);
+    ASSERT_TRUE(found) << frequency_Hz;
+    EXPECT_NEAR(found->frequency_Hz, frequency_Hz + 0.3, 0.05 * frequency_Hz);
+    EXPECT_NEAR(found->amplitude, 0.5, 0.2) << frequency_Hz;
+  }
+}
+
+TEST(LimitCycle, RefusesAReferenceOfAnotherLength) {
+  EXPECT_NE(test::error_message([] {
+              (void)find_limit_cycle(std::vector<double>(10), std::vector<double>(9), 0.1,
+                                     kRate_Hz);
+            }).find("of 10 samples"),
+            std::string::npos);
 }
 
 TEST(LimitCycle, IsNoneInSlowMotionSmallMotionNoiseOrADecay) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -16,14 +18,17 @@ namespace {
 
 constexpr double kRate_Hz = 1000.0;
 
-Recording record_of(std::vector<double> wanted, std::vector<double> torque) {
+Recording record_of(std::vector<double> wanted, std::vector<double> torque,
+                    std::vector<double> limited = {}) {
   Recording record("made up", kRate_Hz);
   std::vector<double> none(wanted.size(), 0.0);
+  limited.resize(wanted.size(), 0.0);
   record.add({.name = "wanted_torque_Nm", .values = std::move(wanted)});
   record.add({.name = "truth_torque_Nm", .values = torque});
   for (double& value : torque) value += 0.5;
   record.add({.name = "torque_Nm", .values = std::move(torque)});
-  for (const char* name : {"is_limited_1", "inverse_fault_1", "fault_1"})
+  record.add({.name = "is_limited_1", .values = std::move(limited)});
+  for (const char* name : {"inverse_fault_1", "fault_1"})
     record.add({.name = name, .values = none});
   return record;
 }
@@ -54,6 +59,24 @@ TEST(TrackingScore, TellsTheLargestOvershootOfASetOfSteps) {
   EXPECT_NEAR(*score.overshoot, 0.3, 1e-12);
 }
 
+TEST(TrackingScore, HasNoOvershootOfAStepThatIsNone) {
+  std::vector<double> wanted(4000, 0.0);
+  std::vector<double> torque(4000, 0.1);
+  for (std::size_t i = 2000; i < 4000; ++i) wanted[i] = torque[i] = 4.0;
+  torque[3000] = 5.0;
+  EXPECT_EQ(tracking_score(record_of(wanted, torque), 4.0, true).overshoot, 0.25);
+}
+
+TEST(TrackingScore, CountsTheLimitsOfWhatItScores) {
+  const std::vector<double> wanted(4000, 10.0);
+  std::vector<double> limited(4000, 0.0);
+  for (const int begin : {0, 1500, 2500, 3000})
+    std::fill_n(limited.begin() + begin, begin == 1500 ? 600 : 10, 1.0);
+  const TrackingScore score = tracking_score(record_of(wanted, wanted, limited), 10.0, false);
+  EXPECT_EQ(score.limit_events, 2U);
+  EXPECT_NEAR(score.limited_s, 0.12, 1e-12);
+}
+
 TEST(TrackingScore, RefusesARunThatIsOverBeforeItCounts) {
   const std::vector<double> none(1500, 0.0);
   EXPECT_NE(test::error_message([&] {
@@ -73,10 +96,11 @@ TEST(Bandwidth, OfALowPassIsItsCutOff) {
     exact.push_back(reference.step());
     torque.push_back(1.0 + lowpass.step(exact.back()));
   }
-  const auto found = bandwidth(torque, sweep, kRate_Hz);
-  ASSERT_TRUE(found);
-  EXPECT_NEAR(*found, 8.0, 0.25);
-  EXPECT_FALSE(bandwidth(exact, sweep, kRate_Hz));
+  const double found = bandwidth(torque, sweep, kRate_Hz);
+  EXPECT_NEAR(found, 8.0, 0.25);
+  EXPECT_EQ(bandwidth(exact, sweep, kRate_Hz), std::numeric_limits<double>::infinity());
+  for (double& value : exact) value *= 0.6;
+  EXPECT_EQ(bandwidth(exact, sweep, kRate_Hz), 0.0);
 }
 
 }  // namespace

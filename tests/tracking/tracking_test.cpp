@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -267,6 +268,29 @@ TEST(TrackingReport, HasTheFieldsOfItsSchemaAndNoNumbersOfARunThatFailed) {
   const std::string text = tracking_text(rows);
   EXPECT_NE(text.find("chirp of 13 Nm"), std::string::npos) << text;
   EXPECT_NE(text.find("m, seed 1: failed: why"), std::string::npos) << text;
+}
+
+// Never down to -3 dB is the best that there is, down from the start the worst, and none is neither.
+TEST(TrackingReport, TellsABandwidthAboveTheSweepFromOneBelowItAndFromNone) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  TrackingRow row;
+  row.model = "m";
+  std::vector<TrackingRow> rows(4, row);
+  rows[0].bandwidth_Hz = 6.0;
+  rows[1].bandwidth_Hz = kInfinity;
+  rows[2].bandwidth_Hz = 0.0;
+  for (std::size_t n = 0; n < rows.size(); ++n) rows[n].seed = n + 1;
+  const auto json = nlohmann::json::parse(tracking_json(rows)).at("results");
+  const std::array<const char*, 4> outcomes{"measured", "above_sweep", "below_sweep",
+                                            "not_measured"};
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    EXPECT_EQ(json.at(n).at("bandwidth"), outcomes.at(n));
+    EXPECT_EQ(json.at(n).at("bandwidth_Hz").is_null(), n > 0);
+  }
+  const std::string text = tracking_text(rows);
+  EXPECT_NE(text.find("6.00"), std::string::npos) << text;
+  EXPECT_NE(text.find("m, seed 2: bandwidth above the sweep"), std::string::npos) << text;
+  EXPECT_NE(text.find("m, seed 3: bandwidth below the sweep"), std::string::npos) << text;
 }
 
 }  // namespace

@@ -11,7 +11,8 @@ namespace torsio {
 ///
 ///     x[n+1] = A x[n] + B u[n],   y[n] = C x[n] + D u[n]
 ///
-/// Configuration only: everything here allocates. Systems that are put together have one sample rate.
+/// Configuration only: everything here allocates. Systems that are put together must have one sample
+/// rate, or that is an Error.
 class LinearSystem {
  public:
   struct Matrices {
@@ -55,7 +56,7 @@ class LinearSystem {
   double sample_rate_Hz_;
 };
 
-/// First `before`, then `after`. @throws Error if what goes between does not fit.
+/// First `before`, then `after`. @throws Error if what goes between, or the rates, do not fit.
 [[nodiscard]] LinearSystem operator*(const LinearSystem& after, const LinearSystem& before);
 /// Both on the same inputs, their outputs added. @throws Error if they do not fit.
 [[nodiscard]] LinearSystem operator+(const LinearSystem& one, const LinearSystem& other);

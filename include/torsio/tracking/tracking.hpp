@@ -40,6 +40,7 @@ void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uin
 
 struct TrackingRun {
   TrackingScore score;  ///< of a run that has not diverged
+  /// As `bandwidth`: 0 below the sweep, infinite above it; none if not asked for, or if it diverged
   std::optional<double> bandwidth_Hz = {};
   bool has_diverged = false;  ///< stopped: the joint turned round, or the torque left any bound
   /// What the sensors told, what the loop made of it with each term, and the `truth_` channels.
@@ -84,8 +85,8 @@ struct TrackingRow {
   std::uint64_t seed = 1;
   TrackingScore score = {};
   std::optional<double> mad_to_linear = {};  ///< MAD over that of the linear inverse, same seed
-  std::optional<double> bandwidth_Hz = {};
-  std::string status = "ok";  ///< "diverged", "failed"
+  std::optional<double> bandwidth_Hz = {};   ///< as `TrackingRun`'s
+  std::string status = "ok";                 ///< "diverged", "failed"
   std::string reason = {};
 };
 

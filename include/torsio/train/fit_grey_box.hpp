@@ -22,8 +22,9 @@ enum class ResidualKind : std::uint8_t {
 
 struct GreyBoxOptions {
   std::string schedule = {};  ///< expression of the input to schedule over; empty: constant
-  bool passive = false;  ///< only slip forces and stiffnesses that can take energy, never give it
-  double bound = 3.0;    ///< of the residual, in RMSE of the box
+  /// Only slip forces, branches and friction of rates >= 0, which take energy and never give it; no residual.
+  bool passive = false;
+  double bound = 3.0;  ///< of the residual, in RMSE of the box
   ResidualKind residual = ResidualKind::automatic;
 };
 
@@ -44,7 +45,7 @@ struct FittedGreyBox : Fitted<GreyBox> {
 /// gathered once (AᵀA of all terms, for each fold), so the search does not see the data again.
 /// Smoothing: λ n Σ (second difference)² over the knots of curve and forces.
 /// Deterministic.
-/// @throws Error if the first input is constant, or as `groups_by`.
+/// @throws Error if the first input is constant, or as `groups_by`, or UsageError for a residual of a passive box.
 [[nodiscard]] FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
                                          const FitContext& context = {});
 
