@@ -126,7 +126,7 @@ TEST(FitGreyBox, FrictionOfTheWrongSignNeedsSignedForces) {
 /// What the box takes around a closed path of deflections, the second time around it: its memory is then periodic, too.
 double work_around(const GreyBox::Parameters& parameters, std::size_t inputs) {
   GreyBox box(parameters);
-  constexpr std::size_t kSteps = 4000;
+  constexpr std::size_t kSteps = 400;
   double work = 0.0;
   double before = 0.0;
   for (std::size_t n = 0; n <= 2 * kSteps; ++n) {
