@@ -60,9 +60,9 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
   expect_error(torsio("track --seeds 0"), kCallWasWrong, "1 to 100");
   expect_error(torsio("track --model none.safetensors"), kWorkFailed, "none.safetensors");
   ASSERT_EQ(torsio("simulate dfki-50 chirp --duration 30s -o a.csv").exit_code, 0);
-  const Outcome gap =
-      shell("awk -F, -v OFS=, 'NR == 5000 { $6 = \"nan\" } 1' a.csv >gap.csv; "
-            "{torsio} track --reference replay --replay gap.csv");
+  const Outcome gap = shell(
+      "awk -F, -v OFS=, 'NR == 5000 { $6 = \"nan\" } 1' a.csv >gap.csv; "
+      "{torsio} track --reference replay --replay gap.csv");
   expect_error(gap, kCallWasWrong, "gap.csv: torque_Nm 4.998 s from its start: expected a number");
   ASSERT_EQ(torsio("fit a.csv --model mlp --set epochs=1 -o m.safetensors").exit_code, 0);
   expect_error(torsio("track --model m.safetensors"), kCallWasWrong,

@@ -14,7 +14,6 @@
 #include "torsio/realtime/mailbox.hpp"
 #include "torsio/realtime/realtime_loop.hpp"
 #include "torsio/safety/command_watchdog.hpp"
-#include "torsio/sim/energy_audit.hpp"
 #include "torsio/sim/plant.hpp"
 
 namespace torsio {
@@ -43,7 +42,7 @@ class Doubting {
  public:
   explicit Doubting(const bool& is_lost) : is_lost_(&is_lost) {}
   void reset() noexcept {}
-  Estimate step(double torque_Nm, const JointSample&) const noexcept {
+  Estimate step(double torque_Nm, const JointSample& /*sample*/) const noexcept {
     return {.value = torque_Nm / 573.0,
             .fault = *is_lost_ ? Fault::outside_training_range : Fault::none};
   }
