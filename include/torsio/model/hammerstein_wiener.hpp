@@ -17,8 +17,9 @@ namespace torsio {
 ///     w = P(u),   x = G(z) w,   y = C(clip(x))
 ///
 /// u the first input (the others are not used), P and C polynomials or piecewise linear, G of any
-/// order. x is held in lowest..highest, where C is monotone: beyond, a polynomial turns back. The
-/// memory is that of G; after `reset()` it is that of a long rest at u = rest_input. A discrete model:
+/// order. x is held in lowest..highest, what it was in training as far as C is monotone there: beyond,
+/// a polynomial runs away or turns back; more than `kBorder` of that range beyond, a step says
+/// `Fault::outside_training_range`. The memory is that of G; after `reset()` it is that of a long rest at u = rest_input. A discrete model:
 /// it runs at the sample period that it was trained at.
 ///
 /// G runs as a cascade of second-order sections in transposed direct form II: two numbers of memory
