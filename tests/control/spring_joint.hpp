@@ -42,6 +42,7 @@ class SpringJoint {
   [[nodiscard]] double speed_rad_s() const noexcept { return speed_rad_s_; }
   [[nodiscard]] double joint_rad() const noexcept { return joint_rad_; }
   [[nodiscard]] double joint_speed_rad_s() const noexcept { return joint_speed_rad_s_; }
+  [[nodiscard]] double spring_J() const noexcept { return 0.5 * torque_Nm() * deflection_rad(); }
   /// Of rotor, spring and joint.
   [[nodiscard]] double energy_J() const noexcept {
     return 0.5 * (parts_.drive.inertia() * speed_rad_s_ * speed_rad_s_ +

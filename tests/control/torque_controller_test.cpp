@@ -242,6 +242,9 @@ TEST(TrainedInverse, RefusesAnotherTargetAndOtherInputs) {
   EXPECT_NE(refusal([](auto& s) { s.target = "torque_Nm"; }), "");
   EXPECT_NE(refusal([](auto& s) { s.features.inputs[0] = "motor_current_A"; }).find("torque_Nm"),
             std::string::npos);
+  EXPECT_NE(
+      refusal([](auto& s) { s.zeroed_channels = {"joint_angle_rad"}; }).find("zero of joint_angle"),
+      std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.features.inputs[1] = "load_cell_V"; }).find("load_cell_V"),
             std::string::npos);
 }
@@ -429,6 +432,7 @@ RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyWishAndLetsItGo, ()) {
       0.5 * (parts.drive.inertia() + parts.joint_inertia_kg_m2) * most_rad_s * most_rad_s +
       2.0 * most_Nm * most_Nm / parts.stiffness_Nm_rad;
   double wanted_Nm = 0.0;
+  double largest_J = 0.0;
   for (int n = 0; n < 10'000; ++n) {
     if (random.uniform() < 0.01) wanted_Nm = 2.0 * settings.largest_torque_Nm * random.normal();
     if (n >= 7000) wanted_Nm = 0.0;
@@ -439,8 +443,10 @@ RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyWishAndLetsItGo, ()) {
     RC_ASSERT((output.fault != Fault::none) == std::isnan(asked_Nm));
     joint.step(output.current_A, 1.0 / kRate_Hz);
     RC_ASSERT(joint.energy_J() <= most_J);
+    if (n < 7000) largest_J = std::max(largest_J, joint.spring_J());
   }
-  RC_ASSERT(joint.energy_J() <= 0.2 * most_J);
+  // What was wound lets go; the joint, of itself, may still turn.
+  RC_ASSERT(joint.spring_J() <= 0.01 * largest_J);
 }
 
 // 100 cases of 10^4 ticks.

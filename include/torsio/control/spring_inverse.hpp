@@ -97,7 +97,8 @@ class ModelInverse {
 class TrainedInverse {
  public:
   /// @throws Error if its target is not `spring_deflection_rad`, `torque_Nm` is not among its raw
-  /// inputs, or another is not in a `JointSample`.
+  /// inputs, another is not in a `JointSample`, or a channel behind its target was zeroed in training:
+  /// its deflection would be off the measured one by zeros that it is not told.
   explicit TrainedInverse(Estimator estimator);
 
   void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
