@@ -44,7 +44,7 @@ class GreyBoxCandidate {
  private:
   [[nodiscard]] std::vector<double> solved(const NormalEquations& equations) const;
   [[nodiscard]] std::vector<NormalEquations> projected(
-      const std::vector<NormalEquations>& cells) const;
+      const std::vector<NormalEquations>& all) const;
   [[nodiscard]] double left_out_levels(const std::vector<NormalEquations>& cells) const;
   [[nodiscard]] double left_out_folds(const std::vector<NormalEquations>& cells) const;
   [[nodiscard]] NormalEquations of_level(const std::vector<NormalEquations>& cells,
