@@ -72,6 +72,21 @@ void refuse_constant_target(const TrainingData& data) {
                .advice = "Is the sensor connected? torsio check says more."});
 }
 
+/// An inverse's target is compared with the measured deflection, and nobody tells it these zeros.
+void refuse_zeros_behind_an_inverse(const TrainingData& data, const FeaturePipeline& pipeline,
+                                    const std::vector<ZeroRule>& zeros) {
+  if (data.target != "spring_deflection_rad" ||
+      std::ranges::find(pipeline.raw_inputs(), "torque_Nm") == pipeline.raw_inputs().end())
+    return;
+  for (const ZeroRule& zero : zeros)
+    if (zero.channel == "gear_angle_rad" || zero.channel == "joint_angle_rad" ||
+        zero.channel == data.target)
+      throw Error({.place = data.target,
+                   .expected = "a target as it is measured, of an inverse that takes torque_Nm",
+                   .found = fmt::format("a zero: rule for {}", zero.channel),
+                   .advice = "Take the rule away, or train the torque, which runs backwards."});
+}
+
 }  // namespace
 
 std::string ModelChoice::variant() const {
@@ -96,6 +111,8 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   const FamilyInfo& family = find_family(choice.family);
   const Options options(family.options, choice.options);
   ModelCard card = card_for(dataset, choice, options, context.seed);
+  const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
+  refuse_zeros_behind_an_inverse(data.training, pipeline, card.zeros);
   if (context.validation == nullptr && data.validation) context.validation = &*data.validation;
 
   const auto start = std::chrono::steady_clock::now();
@@ -111,7 +128,6 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
       .notes = std::move(fitted.notes),
       .table = std::move(fitted.table),
       .fit_seconds = fit_time.count()};
-  const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
   for (const ZeroRule& zero : trained.file.card.zeros)
     if (std::ranges::find(pipeline.raw_inputs(), zero.channel) != pipeline.raw_inputs().end())
       trained.file.settings.zeroed_channels.push_back(zero.channel);
