@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kDeg = kTurn / 360.0;
+constexpr double kPoundForce = 4.4482216152605;  // N
 
 constexpr auto kUnits = std::to_array<Unit>({
     {"1", "1"},
@@ -46,6 +47,9 @@ constexpr auto kUnits = std::to_array<Unit>({
     {"Ncm", "Nm", 1e-2},
     {"Nmm", "Nm", 1e-3},
     {"kNm", "Nm", 1e3},
+    {"lbft", "Nm", kPoundForce * 0.3048},
+    {"lbin", "Nm", kPoundForce * 0.0254},
+    {"ozin", "Nm", kPoundForce * 0.0254 / 16.0},
     {"Nm_s", "Nm_s"},
     {"Nm_rad", "Nm_rad"},
     {"Nm_deg", "Nm_rad", 1.0 / kDeg},

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "data/column_advice.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -68,10 +69,7 @@ TableChannel channel_from_column(const CsvColumn& column, const CsvTable& table)
                                        : "the name has no unit",
                  .expected = "a name that ends in one of " + known_unit_list(),
                  .found = "'" + printable(column.name) + "'",
-                 .advice = fmt::format(
-                     "Rename the column, or say in a mapping  channels: {{torque_Nm: {{from: {0}, "
-                     "unit: Nm}}}}  or  drop: [{0}]",
-                     column.name)});
+                 .advice = advice_without_unit(column.name)});
   }
   return {.channel = {.name = name->si(),
                       .values = converted(column.values, name->unit->scale, name->unit->offset)},

@@ -153,13 +153,19 @@ class TableParser {
   bool comma_seen_ = false;
 };
 
+std::string nearest_or(std::string nearest, const char* otherwise) {
+  return nearest.empty() ? otherwise : std::move(nearest);
+}
+
 void check_skipped(const CsvHeader& header, const CsvOptions& options, const std::string& place) {
   for (const std::string& name : options.skip)
     if (std::ranges::find(header.names, name) == header.names.end())
       throw Error({.place = place,
                    .problem = "there is no column '" + name + "' to drop",
-                   .found = "the columns " + printable(joined(header.names)),
-                   .advice = did_you_mean(name, header.names)});
+                   .found = "the columns " + joined(header.names),
+                   .advice = nearest_or(did_you_mean(name, header.names),
+                                        "Logs of several kinds take a manifest, which gives each "
+                                        "file its own mapping.")});
 }
 
 bool is_comment_or_blank(std::string_view line) { return line.empty() || line.front() == '#'; }
@@ -183,13 +189,30 @@ std::string_view header_line(LineReader& lines, const std::string& name, std::si
                .expected = "a header line and rows of numbers"});
 }
 
+/// A model file, whose first bytes are a number and may hold a line end.
+void refuse_model(std::string_view first, LineReader& lines, const std::string& name) {
+  constexpr std::string_view kMark = R"({"__metadata__")";
+  constexpr std::size_t kLengthBytes = 8;
+  constexpr std::size_t kLongestHeader = std::size_t{1} << 20;
+  const bool is_like_length = first.size() < kLengthBytes && !is_utf8(first);
+  std::string_view next = first;
+  if (is_like_length && !lines.next(next, kLongestHeader)) return;
+  if (next.substr(0, kLengthBytes + kMark.size()).find(kMark) == std::string_view::npos) return;
+  throw Error({.place = name,
+               .expected = "a recording",
+               .found = "a model file",
+               .advice = "torsio evaluate MODEL REC takes the model first; other verbs take "
+                         "recordings only."});
+}
+
 CsvTable parse(ByteSource& source, const std::string& name, const CsvOptions& options) {
   CsvTable table;
   table.source.file = name;
   LineReader lines(source, name);
-  const std::string_view first = header_line(lines, name, options.limits.header_bytes);
+  const std::string first(header_line(lines, name, options.limits.header_bytes));
   table.header_line = lines.number();
   const std::string place = fmt::format("{}: line {}", name, table.header_line);
+  refuse_model(first, lines, name);
   const CsvHeader header = parse_header(first, place);
   check_skipped(header, options, place);
   TableParser parser(table, header, options);

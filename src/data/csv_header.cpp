@@ -77,6 +77,35 @@ void refuse_binary(std::string_view line, const std::string& place) {
                               : "torsio reads CSV, plain or gzipped; convert the file first."});
 }
 
+std::string escaped(std::string_view line) {
+  std::string text;
+  for (const char c : line.substr(0, 40))
+    text += static_cast<unsigned char>(c) < 0x80
+                ? std::string(1, c)
+                : fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+  return text;
+}
+
+void refuse_latin(std::string_view line, const std::string& place) {
+  if (is_utf8(line)) return;
+  throw Error({.place = place,
+               .expected = "names in UTF-8",
+               .found = "other bytes, Latin-1 for example: '" + escaped(line) + "'",
+               .advice = "Save the file as UTF-8, or convert it:  iconv -f LATIN1 -t UTF-8 LOG.csv "
+                         "> LOG_utf8.csv"});
+}
+
+void refuse_blanks(const std::vector<std::string>& names, std::string_view line,
+                   const std::string& place) {
+  if (names.size() > 1 || trimmed(line).find_first_of(" |") == std::string_view::npos) return;
+  throw Error({.place = place,
+               .problem = "no separator found",
+               .expected = "names between commas, semicolons or tabs",
+               .found = "'" + printable(line) + "'",
+               .advice = "Export the log again with one of them, or put commas in the place of the "
+                         "blanks:  sed 's/^ *//; s/  */,/g' LOG.txt > LOG.csv"});
+}
+
 void check_names(const std::vector<std::string>& names, const std::string& place) {
   if (std::ranges::all_of(names, is_number))
     throw Error({.place = place,
@@ -101,11 +130,26 @@ void check_names(const std::vector<std::string>& names, const std::string& place
 
 }  // namespace
 
+bool is_utf8(std::string_view text) noexcept {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  for (std::size_t i = 0; i < text.size();) {
+    const unsigned char first = byte(i++);
+    if (first < 0x80) continue;
+    if (first < 0xc2 || first > 0xf4) return false;
+    const int more = first < 0xe0 ? 1 : first < 0xf0 ? 2 : 3;
+    for (int k = 0; k < more; ++k, ++i)
+      if (i == text.size() || (byte(i) & 0xc0U) != 0x80U) return false;
+  }
+  return true;
+}
+
 CsvHeader parse_header(std::string_view line, const std::string& place) {
   refuse_binary(line, place);
   CsvHeader header;
   header.separator = detect_separator(line);
+  refuse_latin(line, place);
   header.names = split_names(line, header.separator, place);
+  refuse_blanks(header.names, line, place);
   check_names(header.names, place);
   return header;
 }

@@ -133,6 +133,7 @@ class Collector {
   }
 
   Dataset finish() {
+    refuse_twins();
     if (dataset_.target.empty()) dataset_.target = kDefaultTarget;
     name_twins_by_path();
     for (const Planned& planned : logs_) {
@@ -164,6 +165,23 @@ class Collector {
     planned.log.entry.role = role;
     planned.log.rate_Hz = options_.rate_Hz.value_or(0.0);
     logs_.push_back(std::move(planned));
+  }
+
+  /// One file twice in one role would only count double.
+  void refuse_twins() const {
+    std::set<std::pair<std::string, Role>> seen;
+    for (const Planned& planned : logs_) {
+      const ManifestFile& entry = planned.log.entry;
+      if (planned.log.path == "-" || entry.split || planned.split_of_all ||
+          !planned.log.mapping.keep.empty() || !entry.conditions.empty())
+        continue;
+      std::error_code absent;
+      const auto place = std::filesystem::weakly_canonical(planned.log.path, absent);
+      if (!seen.emplace(place.string(), entry.role.value_or(options_.role)).second)
+        throw UsageError({.place = planned.log.path,
+                     .problem = "the recording is given twice",
+                     .advice = "Leave one out: the same samples twice tell no more than once."});
+    }
   }
 
   /// Two files of one name in different folders must stay apart in every table.

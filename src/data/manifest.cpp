@@ -1,5 +1,7 @@
 #include "torsio/data/manifest.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -91,7 +93,18 @@ ManifestFile manifest_file(const YamlValue& yaml) {
   return file;
 }
 
+/// A mapping in a recording's place, told by a key that only mappings have.
+void refuse_mapping(const YamlValue& yaml) {
+  for (const std::string_view key : {"channels", "derive", "drop", "split_by", "clock", "hold"})
+    if (yaml.find(key) && !yaml.find("files"))
+      throw Error({.place = yaml.place(),
+                   .expected = "a recording, or a manifest with files:",
+                   .found = fmt::format("a mapping (it has {}:)", key),
+                   .advice = "Give it beside the recordings:  --mapping " + yaml.file()});
+}
+
 Manifest manifest_from(const YamlValue& yaml) {
+  refuse_mapping(yaml);
   yaml.allow_only(
       {"label", "target", "sample_rate_Hz", "root", "mapping", "split", "input_sets", "files"});
   Manifest manifest;

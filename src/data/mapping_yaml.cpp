@@ -92,6 +92,11 @@ std::vector<ZeroRule> zeros_from(const YamlValue& yaml) {
 }
 
 Mapping mapping_from(const YamlValue& yaml) {
+  if (yaml.find("files"))
+    throw Error({.place = yaml.place(),
+                 .expected = "a mapping",
+                 .found = "a manifest (it has files:)",
+                 .advice = "A manifest stands where recordings stand, without --mapping."});
   yaml.allow_only({"channels", "derive", "drop", "split_by", "keep", "clock", "rate", "zero",
                    "hold", "latency", "computed_from"});
   Mapping mapping;

@@ -30,10 +30,64 @@ struct Stamps {
   }
 };
 
-constexpr const char* kRemedies =
-    "If the samples were taken evenly and only the stamps are coarse, say in a mapping  clock: "
-    "{rebuild: true}\n  If they were really taken unevenly, say  clock: {resample: 500Hz}  with "
-    "the rate that you want.";
+double rate_of_steps(const Stamps& stamps) {
+  constexpr double kRounding = 1e-3;
+  return simplest_rate(1.0 / stamps.report.stamp_step_s, kRounding);
+}
+
+std::string remedies(const Stamps& stamps) {
+  return fmt::format(
+      "If the samples were taken evenly and only the stamps are coarse, say in a mapping  clock: "
+      "{{rebuild: true}}\n  If they were really taken unevenly, say  clock: {{resample: {:.6g}Hz}} "
+      " "
+      "or another rate that you want.",
+      rate_of_steps(stamps));
+}
+
+/// Samples that a log lacks: whole intervals too many, here and there.
+struct Loss {
+  std::size_t samples = 0;
+  std::size_t longest = 0;  ///< samples lost at one place
+  std::size_t first = 0;    ///< the sample behind the first gap
+};
+
+/// Empty where the stamps may just as well be coarse: their doubled steps come evenly.
+Loss lost_samples(const Stamps& stamps) {
+  constexpr double kNear = 0.25;
+  constexpr std::size_t kCertainlyFew = 3;
+  const double step = stamps.report.stamp_step_s;
+  Loss loss;
+  for (std::size_t i = 1; i < stamps.values_s.size(); ++i) {
+    const double steps = (stamps.values_s[i] - stamps.values_s[i - 1]) / step;
+    const double whole = std::round(steps);
+    if (whole < 1.0 || std::abs(steps - whole) > kNear) return {};
+    const auto lost = static_cast<std::size_t>(std::min(whole - 1.0, 1e9));
+    if (lost == 0) continue;
+    if (loss.samples == 0) loss.first = i;
+    loss.samples += lost;
+    loss.longest = std::max(loss.longest, lost);
+  }
+  const bool strays = stamps.report.largest_stray_s > step;
+  return strays || loss.samples <= kCertainlyFew ? loss : Loss{};
+}
+
+void refuse_lost(const Stamps& stamps) {
+  const Loss loss = lost_samples(stamps);
+  if (loss.samples == 0) return;
+  const double before_s = stamps.values_s[loss.first - 1];
+  const auto gap = static_cast<double>(loss.longest + 1);
+  throw ClockError(
+      {.place = stamps.place(loss.first),
+       .problem = fmt::format("{} {} missing, the first behind t = {:.6g} s", loss.samples,
+                              loss.samples == 1 ? "sample is" : "samples are", before_s),
+       .expected = fmt::format("an interval near {:.6g} s", stamps.report.stamp_step_s),
+       .found = fmt::format("{:.6g} s", stamps.values_s[loss.first] - before_s),
+       .advice = gap > kLongestGapIntervals
+                     ? "Cut the log there into two files: the gap is too long to draw a line over."
+                     : fmt::format("Fill it with straight lines, in a mapping:  clock: {{resample: "
+                                   "{:.6g}Hz}}",
+                                   rate_of_steps(stamps))});
+}
 
 void refuse_unusable(const Stamps& stamps) {
   if (stamps.rows.size() < 2)
@@ -57,7 +111,7 @@ void refuse_unusable(const Stamps& stamps) {
          .advice = "Drop the clock column in a mapping and tell the rate:  rate: 1000Hz"});
 }
 
-void refuse_not_increasing(const Stamps& stamps, const char* advice) {
+void refuse_not_increasing(const Stamps& stamps, const std::string& advice) {
   const std::size_t at = stamps.report.first_not_increasing;
   if (at == 0) return;
   throw ClockError(
@@ -71,9 +125,10 @@ void refuse_not_increasing(const Stamps& stamps, const char* advice) {
 }
 
 double even_rate(const Stamps& stamps) {
-  refuse_not_increasing(stamps, kRemedies);
+  refuse_not_increasing(stamps, remedies(stamps));
   const ClockReport& report = stamps.report;
   const std::size_t odd = report.worst_interval;
+  if (!report.is_uniform()) refuse_lost(stamps);
   if (!report.is_uniform())
     throw ClockError(
         {.place = stamps.place(odd),
@@ -81,7 +136,7 @@ double even_rate(const Stamps& stamps) {
                                 report.largest_stray_s * report.sample_rate_Hz),
          .expected = fmt::format("an interval near {:.6g} s", report.stamp_step_s),
          .found = fmt::format("{:.6g} s", stamps.values_s[odd] - stamps.values_s[odd - 1]),
-         .advice = kRemedies});
+         .advice = remedies(stamps)});
   const double first = stamps.values_s.front();
   const double last = stamps.values_s.back();
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon();

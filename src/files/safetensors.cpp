@@ -153,6 +153,13 @@ Tensor::Values copied_values(std::size_t type, std::span<const std::byte> bytes)
   }
 }
 
+bool is_text(std::span<const std::byte> bytes) {
+  return std::ranges::all_of(bytes, [](std::byte byte) {
+    return (byte >= std::byte{0x20} && byte < std::byte{0x7f}) || byte == std::byte{'\t'} ||
+           byte == std::byte{'\r'} || byte == std::byte{'\n'};
+  });
+}
+
 std::string_view header_of(std::span<const std::byte> bytes, std::string_view place) {
   if (bytes.size() < kLengthBytes)
     refuse(std::string(place), "a safetensors file of at least 8 bytes",
@@ -160,10 +167,14 @@ std::string_view header_of(std::span<const std::byte> bytes, std::string_view pl
   std::uint64_t length = 0;
   std::memcpy(&length, bytes.data(), kLengthBytes);
   if (length > kMostHeaderBytes)
-    throw Error({.place = fmt::format("{}: header length", place),
-                 .expected = fmt::format("at most {} bytes", kMostHeaderBytes),
-                 .found = fmt::format("{}", length),
-                 .advice = "This is no safetensors file, or not one of ours."});
+    throw Error(
+        {.place = fmt::format("{}: header length", place),
+         .expected = fmt::format("at most {} bytes", kMostHeaderBytes),
+         .found = is_text(bytes.first(kLengthBytes)) ? "text" : fmt::format("{}", length),
+         .advice = is_text(bytes.first(kLengthBytes))
+                       ? "This is no model file. If it is a recording: the model comes first, "
+                         "then the recordings."
+                       : "This is no safetensors file, or not one of ours."});
   if (length > bytes.size() - kLengthBytes)
     refuse(fmt::format("{}: header", place), fmt::format("{} bytes", length),
            fmt::format("{} (the file is truncated)", bytes.size() - kLengthBytes));

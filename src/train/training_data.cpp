@@ -1,5 +1,7 @@
 #include "torsio/train/training_data.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -24,13 +26,19 @@ std::vector<const Channel*> raw_channels(const Recording& recording,
     const Channel& channel = recording.channel(channel_name);
     const auto bad =
         std::ranges::find_if(channel.values, [](double value) { return !std::isfinite(value); });
-    if (bad != channel.values.end())
-      throw Error({.place = recording.name() + ": channel " + channel_name + ", sample " +
-                            std::to_string(bad - channel.values.begin()),
-                   .expected = "a finite value, since the model's inputs need it",
-                   .found = std::to_string(*bad),
-                   .advice = "Cut the gap out of the record or choose inputs without this channel; "
-                             "only the target may be missing."});
+    if (bad != channel.values.end()) {
+      const auto sample = static_cast<std::size_t>(bad - channel.values.begin());
+      throw Error(
+          {.place = fmt::format("{}: channel {} at t = {:.6g} s (sample {})", recording.name(),
+                                channel_name, recording.time_s(sample), sample),
+           .expected = "a finite value, since the model's inputs need it",
+           .found = fmt::format("{}", *bad),
+           .advice = fmt::format("If the sensor is slower or drops a sample now and then, say in a "
+                                 "mapping  hold: [{}]  which repeats the last value. Else cut the "
+                                 "gap out or choose inputs without this channel; only the target "
+                                 "may be missing.",
+                                 channel_name)});
+    }
     channels.push_back(&channel);
   }
   return channels;

@@ -87,8 +87,8 @@ TEST(BrokenModelFile, SaysWhatIsThereInstead) {
               HasSubstr("empty: expected a safetensors file of at least 8 bytes, found 0 bytes"));
   EXPECT_THAT(
       error_message([&] { (void)load_model(folder.file("rec.csv", "t_s,torque_Nm\n1,2\n")); }),
-      AllOf(HasSubstr("rec.csv: header length: expected at most 1048576 bytes"),
-            HasSubstr("This is no safetensors file")));
+      AllOf(HasSubstr("rec.csv: header length: expected at most 1048576 bytes, found text"),
+            HasSubstr("If it is a recording: the model comes first")));
 }
 
 TEST(BrokenModelFile, IsRefusedForItsSizeBeforeMemoryIsTaken) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "support/bench_dataset.hpp"
@@ -168,6 +169,161 @@ TEST(Check, WarnsOfAJump) {
   const auto findings = findings_of(with_record(changed("torque_Nm", jump)));
   EXPECT_EQ(verdict_of(findings, "gaps"), Verdict::warn);
   EXPECT_NE(first_of(findings, "gaps").message.find("t = 2 s"), std::string::npos);
+}
+
+/// The joint's encoder spoiled by what `error_rad` says of a time.
+Recording with_joint_error(const std::function<double(double)>& error_rad) {
+  return changed("joint_angle_rad", [&](Channel& channel) {
+    for (std::size_t i = 0; i < channel.values.size(); ++i)
+      channel.values[i] += error_rad(1e-3 * static_cast<double>(i));
+  });
+}
+
+TEST(Check, WarnsOfAnEncoderThatSlipsByHalfTheDeflectionAlthoughThatIsLittleForTheAngle) {
+  const auto findings = findings_of(
+      with_record(with_joint_error([](double t_s) { return t_s < 2.0 ? 0.0 : 0.009; })));
+  ASSERT_EQ(verdict_of(findings, "gaps"), Verdict::warn);
+  const std::string& message = first_of(findings, "gaps").message;
+  EXPECT_NE(message.find("spring_deflection_rad jumps by 0.009"), std::string::npos) << message;
+  EXPECT_NE(message.find("t = 2 s"), std::string::npos) << message;
+  EXPECT_NE(message.find("it comes from joint_angle_rad"), std::string::npos) << message;
+}
+
+TEST(Check, WarnsOfAZeroThatDrifts) {
+  const auto drifting = [](double rad_s) {
+    Recording good = bench_recording("drifting", {.samples = 20000});
+    Recording recording("drifting", 1000.0);
+    for (Channel copy : good.channels()) {
+      if (copy.name == "joint_angle_rad")
+        for (std::size_t i = 0; i < copy.values.size(); ++i)
+          copy.values[i] += 1e-3 * rad_s * static_cast<double>(i);
+      recording.add(std::move(copy));
+    }
+    return findings_of(with_record(std::move(recording)));
+  };
+  EXPECT_EQ(verdict_of(drifting(0.0), "change"), Verdict::pass);
+  const auto findings = drifting(0.0012);
+  ASSERT_EQ(verdict_of(findings, "change"), Verdict::warn);
+  EXPECT_NE(first_of(findings, "change").message.find("little by little"), std::string::npos)
+      << first_of(findings, "change").message;
+}
+
+TEST(Check, WarnsOfASpringThatBreaksAndSaysWhen) {
+  Recording good = bench_recording("broken", {.samples = 20000});
+  Recording recording("broken", 1000.0);
+  for (Channel copy : good.channels()) {
+    if (copy.name == "torque_Nm")
+      for (std::size_t i = 12000; i < copy.values.size(); ++i) copy.values[i] *= 0.4;
+    recording.add(std::move(copy));
+  }
+  const auto findings = findings_of(with_record(std::move(recording)));
+  ASSERT_EQ(verdict_of(findings, "change"), Verdict::warn);
+  const std::string& message = first_of(findings, "change").message;
+  EXPECT_NE(message.find("the slope of torque_Nm changes to 0.4"), std::string::npos) << message;
+  const std::size_t at = message.find("t = ");
+  ASSERT_NE(at, std::string::npos) << message;
+  EXPECT_NEAR(std::stod(message.substr(at + 4)), 12.0, 0.7) << message;
+}
+
+TEST(Check, NamesTheRecordThatDiffersByAUnitAndItsChannel) {
+  Recording odd = changed("torque_Nm", [](Channel& channel) {
+    for (double& value : channel.values) value *= 1000.0;
+  });
+  const auto findings = findings_of(with_record(std::move(odd)));
+  ASSERT_EQ(verdict_of(findings, "units"), Verdict::fail);
+  const Finding& finding = first_of(findings, "units");
+  EXPECT_EQ(finding.recording, "changed");
+  EXPECT_NE(finding.message.find("1000 times larger"), std::string::npos) << finding.message;
+  EXPECT_NE(finding.advice.find("torque_Nm in this record"), std::string::npos) << finding.advice;
+  EXPECT_EQ(verdict_of(findings, "offsets"), Verdict::pass) << "a zero mends no unit";
+}
+
+TEST(Check, BlamesNeitherOfTwoRecordsForAUnit) {
+  Dataset dataset;
+  add_record(dataset, bench_recording("one"), Role::train);
+  add_record(dataset,
+             bench_recording("other", {.stiffness_Nm_rad = 500.0 / 57.29578, .friction_Nm = 0.02}),
+             Role::train);
+  const auto findings = findings_of(dataset);
+  ASSERT_EQ(verdict_of(findings, "units"), Verdict::fail);
+  EXPECT_EQ(first_of(findings, "units").recording, "other or one");
+  EXPECT_NE(first_of(findings, "units").advice.find("degrees and radians"), std::string::npos);
+}
+
+TEST(Check, FailsOnOneOfTwoAnglesInDegrees) {
+  Dataset dataset;
+  add_record(dataset,
+             changed("gear_angle_rad",
+                     [](Channel& channel) {
+                       for (double& value : channel.values) value *= 57.29578;
+                     }),
+             Role::train);
+  const auto findings = findings_of(dataset);
+  ASSERT_EQ(verdict_of(findings, "units"), Verdict::fail);
+  EXPECT_NE(first_of(findings, "units").message.find("gear_angle_rad moves"), std::string::npos);
+}
+
+TEST(Check, NamesTheAngleThatIsTurnedRound) {
+  const auto turned = [](const std::string& name) {
+    Dataset dataset;
+    add_record(dataset,
+               changed(name,
+                       [](Channel& channel) {
+                         for (double& value : channel.values) value = -value;
+                       }),
+               Role::train);
+    return findings_of(dataset);
+  };
+  for (const std::string name : {"joint_angle_rad", "gear_angle_rad"}) {
+    const auto findings = turned(name);
+    ASSERT_EQ(verdict_of(findings, "sign"), Verdict::fail) << name;
+    EXPECT_NE(first_of(findings, "sign").message.find("with " + name + " turned"),
+              std::string::npos)
+        << first_of(findings, "sign").message;
+  }
+}
+
+TEST(Check, FailsOnASignThatFlipsWithinARecordAndSaysWhen) {
+  const auto findings = findings_of(with_record(changed("torque_Nm", [](Channel& channel) {
+    for (std::size_t i = 2200; i < channel.values.size(); ++i) channel.values[i] *= -1.0;
+  })));
+  ASSERT_EQ(verdict_of(findings, "sign"), Verdict::fail);
+  EXPECT_NE(first_of(findings, "sign").message.find("until t = 2.2"), std::string::npos)
+      << first_of(findings, "sign").message;
+  EXPECT_EQ(verdict_of(findings, "gaps"), Verdict::pass) << "the flip is no lost sample";
+}
+
+TEST(Check, WarnsOfATorqueThatFreezesWhileTheDeflectionMoves) {
+  const auto findings = findings_of(with_record(changed("torque_Nm", [](Channel& channel) {
+    for (std::size_t i = 1000; i < 1350; ++i) channel.values[i] = channel.values[1000];
+  })));
+  EXPECT_EQ(verdict_of(findings, "frozen sensors"), Verdict::warn);
+}
+
+TEST(Check, SaysOnceThatALockedOutputStandsStill) {
+  Recording good = bench_recording("locked");
+  Recording recording("locked", 1000.0);
+  const std::vector<double> joint = good.channel("joint_angle_rad").values;
+  for (Channel copy : good.channels()) {
+    for (std::size_t i = 0; i < joint.size(); ++i) {
+      if (copy.name == "gear_angle_rad") copy.values[i] -= joint[i];
+      if (copy.name == "joint_angle_rad") copy.values[i] = i < 1500 ? -1.2e-5 : 1.2e-5;
+    }
+    recording.add(std::move(copy));
+  }
+  Dataset dataset;
+  add_record(dataset, std::move(recording), Role::train);
+  const auto findings = findings_of(dataset);
+  for (const Finding& finding : findings)
+    EXPECT_EQ(finding.verdict, Verdict::pass) << finding.check << ": " << finding.message;
+  EXPECT_NE(first_of(findings, "constant channels").message.find("joint_angle_rad stands still"),
+            std::string::npos);
+}
+
+TEST(Check, StillFailsOnADeadEncoderOfAMovingJoint) {
+  const auto findings = findings_of(with_record(changed(
+      "joint_angle_rad", [](Channel& channel) { std::ranges::fill(channel.values, 0.1); })));
+  EXPECT_EQ(verdict_of(findings, "constant channels"), Verdict::fail);
 }
 
 TEST(Check, MeasuresADelayAndSaysTheMappingLine) {

@@ -1,0 +1,141 @@
+#include "data/column_advice.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include "core/trimmed.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+struct Word {
+  std::string_view word;
+  std::string_view meaning;
+};
+
+/// Units as loggers spell them.
+constexpr auto kSpellings = std::to_array<Word>({
+    {"radians", "rad"}, {"radian", "rad"},   {"degrees", "deg"}, {"degree", "deg"},
+    {"seconds", "s"},   {"second", "s"},     {"sec", "s"},       {"msec", "ms"},
+    {"usec", "us"},     {"amps", "A"},       {"amp", "A"},       {"ampere", "A"},
+    {"volts", "V"},     {"volt", "V"},       {"nm", "Nm"},       {"newtonmeter", "Nm"},
+    {"hz", "Hz"},       {"celsius", "degC"}, {"lbfft", "lbft"},  {"ftlb", "lbft"},
+});
+
+/// Quantities and the SI unit that they are kept in.
+constexpr auto kQuantities = std::to_array<Word>({
+    {"timestamp", "s"},
+    {"time", "s"},
+    {"stamp", "s"},
+    {"torque", "Nm"},
+    {"moment", "Nm"},
+    {"speed", "rad_s"},
+    {"velocity", "rad_s"},
+    {"rate", "rad_s"},
+    {"angle", "rad"},
+    {"position", "rad"},
+    {"deflection", "rad"},
+    {"current", "A"},
+    {"voltage", "V"},
+    {"force", "N"},
+    {"temperature", "K"},
+    {"power", "W"},
+});
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  std::ranges::transform(result, result.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return result;
+}
+
+/// The known unit that is meant, or nothing.
+std::string_view unit_meant(std::string_view text) {
+  if (const Unit* unit = find_unit(text)) return unit->suffix;
+  const auto* const at = std::ranges::find(kSpellings, lower(text), &Word::word);
+  return at == kSpellings.end() ? std::string_view() : at->meaning;
+}
+
+/// The SI unit of what the name speaks of, or nothing.
+std::string_view unit_of_quantity(std::string_view name) {
+  const std::string spoken = lower(name);
+  for (const Word& quantity : kQuantities)
+    if (spoken.find(quantity.word) != std::string::npos) return quantity.meaning;
+  return {};
+}
+
+/// Letters, digits and underscores, as in a channel's name.
+std::string channel_like(std::string_view text) {
+  std::string name;
+  for (const char c : text) {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0)
+      name += c;
+    else if (!name.empty() && name.back() != '_')
+      name += '_';
+  }
+  while (!name.empty() && name.back() == '_') name.pop_back();
+  return name.empty() ? "channel" : name;
+}
+
+std::string quoted(std::string_view text) {
+  const bool is_plain =
+      std::ranges::all_of(text, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
+  return is_plain ? std::string(text) : fmt::format("\"{}\"", text);
+}
+
+std::string mapping_line(std::string_view quantity, std::string_view unit, std::string_view column,
+                         std::string_view rest) {
+  const Unit* const known = find_unit(unit);
+  const std::string_view si = known != nullptr ? known->si_suffix : unit;
+  const bool is_clock = si == "s";
+  return fmt::format("channels: {{{}_{}: {{from: {}, {}}}}}",
+                     is_clock ? "t" : channel_like(quantity), si, quoted(column), rest);
+}
+
+/// "Torque [Nm]", "Winkel (deg)": the name and what stands in the brackets at its end.
+std::pair<std::string_view, std::string_view> without_brackets(std::string_view name) {
+  if (name.empty() || (name.back() != ']' && name.back() != ')')) return {name, {}};
+  const auto open = name.find_last_of(name.back() == ']' ? '[' : '(');
+  if (open == std::string_view::npos || open == 0) return {name, {}};
+  return {trimmed(name.substr(0, open)), name.substr(open + 1, name.size() - open - 2)};
+}
+
+}  // namespace
+
+std::string advice_without_unit(std::string_view column) {
+  const std::string drop = fmt::format("  or leave it out:  drop: [{}]", quoted(column));
+  auto [quantity, unit] = without_brackets(column);
+  if (unit.empty()) {
+    const auto ending = column.rfind('_');
+    if (ending != std::string_view::npos && ending > 0 && ending + 1 < column.size() &&
+        unit_of_quantity(column.substr(ending + 1)).empty()) {
+      quantity = column.substr(0, ending);
+      unit = column.substr(ending + 1);
+    }
+  }
+  if (const std::string_view meant = unit_meant(unit); !meant.empty())
+    return fmt::format("If that is {}, say in a mapping  {}", meant,
+                       mapping_line(quantity, meant, column, fmt::format("unit: {}", meant))) +
+           drop;
+  const std::string_view si = unit_of_quantity(quantity);
+  if (si.empty())
+    return fmt::format(
+               "Rename the column to NAME_UNIT, or say in a mapping  channels: {{NAME_UNIT: "
+               "{{from: {}, unit: UNIT}}}}",
+               quoted(column)) +
+           drop;
+  if (unit.empty())
+    return fmt::format("Rename the column, or tell its unit in a mapping; if it is {0}:  {1}", si,
+                       mapping_line(quantity, si, column, fmt::format("unit: {}", si))) +
+           drop;
+  return fmt::format(
+             "Tell in a mapping how many {0} one {1} is:  {2}", si, unit,
+             mapping_line(quantity, si, column, fmt::format("unit: {}, scale: FACTOR", si))) +
+         drop;
+}
+
+}  // namespace torsio
