@@ -720,6 +720,7 @@ class Checker {
   static constexpr double kSameMoment_s = 0.05;
   static constexpr double kStandstillShare = 0.02;  ///< of the first input's range
   static constexpr double kFollows = 0.8;           ///< correlation
+  static constexpr double kTogether = 0.9;          ///< correlation
   static constexpr double kOneMotion = 0.99;        ///< correlation
   static constexpr double kNarrow = 0.5;
   static constexpr double kSlopeRatio = 5.0;
