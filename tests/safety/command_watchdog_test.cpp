@@ -50,6 +50,15 @@ TEST(CommandWatchdog, LetsNothingMoveBeforeItIsArmed) {
   EXPECT_EQ(loop.with_fresh_command(), State::running);
 }
 
+TEST(CommandWatchdog, TakesNoStampForACommandHoweverFarAway) {
+  Loop loop;
+  loop.dog.arm(loop.now_ns);
+  for (const std::int64_t written_ns :
+       {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()})
+    EXPECT_EQ(loop.step({.written_ns = written_ns, .is_valid = true}), State::waiting)
+        << written_ns;
+}
+
 TEST(CommandWatchdog, StopsWithin20MsOfTheLastCommandAndStaysStopped) {
   Loop loop;
   loop.start();

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -8,6 +7,7 @@
 #include <type_traits>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/time_distance.hpp"
 
 namespace torsio {
 
@@ -33,13 +33,8 @@ class Mailbox {
     /// now as one behind it, or it would be fresh for ever. Never negative; for ever, if nothing was
     /// written yet: an initial value is no command.
     [[nodiscard]] std::int64_t age_ns(std::int64_t now_ns) const noexcept {
-      constexpr auto kForEver = std::numeric_limits<std::int64_t>::max();
-      if (sequence == 0) return kForEver;
-      // Of two stamps that are as far apart as may be, too.
-      const auto later = static_cast<std::uint64_t>(std::max(now_ns, written_ns));
-      const auto earlier = static_cast<std::uint64_t>(std::min(now_ns, written_ns));
-      return static_cast<std::int64_t>(
-          std::min(later - earlier, static_cast<std::uint64_t>(kForEver)));
+      return sequence == 0 ? std::numeric_limits<std::int64_t>::max()
+                           : distance_ns(now_ns, written_ns);
     }
   };
 
