@@ -26,6 +26,8 @@ bool has_segment(const DatasetRecord& record, Role role) {
                              [&](const Segment& segment) { return segment.role == role; });
 }
 
+constexpr double kClearCorrelation = 0.5;
+
 /// Runs the checks one after the other and collects what they find.
 class Checker {
  public:
@@ -325,6 +327,7 @@ class Checker {
                     bool is_majority) {
     const std::string_view mistake = unit_mistake(slope / usual_slope);
     const Recording& other = dataset_.records[usual].recording;
+    if (mistake.empty() && !other.conditions().empty()) return;  // the condition explains it
     const double torque_ratio =
         extent_of(pairs_[r].target).width() / extent_of(pairs_[usual].target).width();
     const bool by_torque =
@@ -741,7 +744,6 @@ class Checker {
   static constexpr double kNarrow = 0.5;
   static constexpr double kSlopeRatio = 5.0;
   static constexpr double kLongestDelay_s = 0.1;
-  static constexpr double kClearCorrelation = 0.5;
   static constexpr double kExplainsLittle =
       0.2;  ///< of the variance: a fit that leaves more tells no delay
   static constexpr double kDelayGain = 0.7;  ///< of what is unexplained without shift
@@ -771,6 +773,14 @@ std::string_view name(Verdict verdict) noexcept {
     case Verdict::fail: return "FAIL";
   }
   return "unknown";
+}
+
+std::string unit_doubt(const Recording& recording, const EstimatorSettings& trained) {
+  if (trained.fallback.slope.empty() || !recording.has(trained.target)) return {};
+  const Pair pair{first_feature(recording, trained.features),
+                  bridged(recording.channel(trained.target))};
+  if (std::abs(correlation(pair.input, pair.target)) < kClearCorrelation) return {};
+  return std::string(unit_mistake(std::abs(line_through(pair).slope / trained.fallback.slope[0])));
 }
 
 std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec) {
