@@ -173,10 +173,14 @@ class Checker {
       for_each_moving_channel([&](std::size_t, const Recording& recording, const Channel& channel) {
         const Extent span = extent_of(channel.values);
         if (!(span.width() > 0.0)) return;
+        // A motion that turns within the last of few codes rests there, too.
+        const double by_code = kCodesAtATurn * finest_step(channel.values) / span.width();
         for (const double extreme : {span.lowest, span.highest}) {
           const auto count = static_cast<double>(std::ranges::count(channel.values, extreme));
           const double share = count / static_cast<double>(channel.values.size());
-          if (share < kSaturatedShare || approaches_gradually(channel, extreme, span)) continue;
+          if (share < std::max(kSaturatedShare, by_code) ||
+              approaches_gradually(channel, extreme, span))
+            continue;
           add(Verdict::warn, "saturation", recording.name(),
               fmt::format("{}: {:.1f} % of the samples are exactly {:g}", channel.name,
                           100.0 * share, extreme),
@@ -727,6 +731,7 @@ class Checker {
 
   static constexpr std::size_t kFewSamples = 100;
   static constexpr double kSaturatedShare = 0.005;
+  static constexpr double kCodesAtATurn = 2.0;
   static constexpr double kFrozen_s = 0.2;
   static constexpr double kFrozenDeliveries = 10.0;
   static constexpr double kMovedMeanwhile = 0.4;  ///< of another channel's range

@@ -111,6 +111,24 @@ TEST(Check, WarnsOfASensorAtItsLimit) {
             Verdict::warn);
 }
 
+TEST(Check, DoesNotCallTheLastOfFewCodesALimit) {
+  Channel deflection{"spring_deflection_rad", {}};
+  Channel torque{"torque_Nm", {}};
+  constexpr double kCode_rad = 0.002;
+  for (int n = 0; n < 4000; ++n) {
+    const double phase = std::fmod(1e-3 * static_cast<double>(n), 1.0);
+    const double triangle_rad = 0.0505 * (4.0 * std::abs(phase - 0.5) - 1.0);
+    deflection.values.push_back(kCode_rad * std::round(triangle_rad / kCode_rad));
+    torque.values.push_back(100.0 * triangle_rad);
+  }
+  Recording recording("triangles", 1000.0);
+  recording.add(std::move(deflection));
+  recording.add(std::move(torque));
+  Dataset dataset;
+  add_record(dataset, std::move(recording), Role::train);
+  EXPECT_EQ(verdict_of(findings_of(dataset), "saturation"), Verdict::pass);
+}
+
 TEST(Check, WarnsOfASensorThatFreezesWhileTheOthersMove) {
   const auto findings = findings_of(with_record(changed("gear_angle_rad", [](Channel& channel) {
     for (std::size_t i = 1000; i < 2200; ++i) channel.values[i] = channel.values[1000];
