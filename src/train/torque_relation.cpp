@@ -11,7 +11,6 @@
 namespace torsio {
 namespace {
 
-constexpr double kClearCorrelation = 0.5;
 constexpr double kStrongCorrelation = 0.8;
 constexpr double kShortestPart = 0.05;  ///< of the record
 constexpr double kHalfWindow_s = 0.05;
