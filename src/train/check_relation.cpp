@@ -8,8 +8,8 @@
 
 namespace torsio {
 
-// The sensors of both sides of a spring turn alike, so one of them in another unit turns by a unit's factor as
-// much; and records of one joint have one stiffness.
+// The sensors of both sides of a spring turn alike, so one of them in another unit turns by a unit's
+// factor as much; and records of one joint have one stiffness.
 void Checker::check_units() {
   pass_unless_found("units", "the records agree", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) check_units_within(r);
