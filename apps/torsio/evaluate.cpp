@@ -67,6 +67,7 @@ void run(const EvaluateFlags& flags) {
   warn_of_seen_recordings(file, dataset);
   warn_of_missing_zeros(file, dataset);
   const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
+  warn_of_another_unit(file, dataset);
   if (!flags.predictions.empty()) {
     const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
     torsio::write_csv(prediction_recording(estimator, dataset.records.front().recording,

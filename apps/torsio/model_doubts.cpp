@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "output.hpp"
+#include "torsio/train/check.hpp"
 
 void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
   const auto& trained = file.card.training_files;
@@ -27,5 +28,16 @@ void warn_of_missing_zeros(const torsio::ModelFile& file, const torsio::Dataset&
         remark("warning: the model expects " + channel + " with its zero taken, but " +
                recording.name() + " has it as measured: use the mapping that it was trained with");
     }
+  }
+}
+
+void warn_of_another_unit(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
+  for (const torsio::DatasetRecord& record : dataset.records) {
+    const std::string mistake = torsio::unit_doubt(record.recording, file.settings);
+    if (!mistake.empty())
+      remark("warning: " + file.settings.target + " of " + record.recording.name() + " over " +
+             file.settings.features.inputs.front() +
+             " differs from the training data by the factor between " + mistake +
+             ": look at the units of the recording");
   }
 }

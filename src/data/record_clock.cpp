@@ -30,9 +30,12 @@ struct Stamps {
   }
 };
 
+/// Near the rate of the log; stamps that come several times tell only their number.
 double rate_of_steps(const Stamps& stamps) {
   constexpr double kRounding = 1e-3;
-  return simplest_rate(1.0 / stamps.report.stamp_step_s, kRounding);
+  constexpr double kCoarseRounding = 1e-2;
+  return stamps.report.duplicated > 0 ? simplest_rate(stamps.report.sample_rate_Hz, kCoarseRounding)
+                                      : simplest_rate(1.0 / stamps.report.stamp_step_s, kRounding);
 }
 
 std::string remedies(const Stamps& stamps) {

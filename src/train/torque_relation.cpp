@@ -11,7 +11,6 @@
 namespace torsio {
 namespace {
 
-constexpr double kClearCorrelation = 0.5;
 constexpr double kStrongCorrelation = 0.8;
 constexpr double kShortestPart = 0.05;  ///< of the record
 constexpr double kHalfWindow_s = 0.05;
@@ -195,8 +194,10 @@ class Comparison {
 
 // Before its first turn a hysteretic spring is on its virgin curve: another torque, but no change.
 bool turns_on_both_sides(const std::vector<double>& input, double sample) {
+  constexpr std::size_t kThereAndBack = 2;
   const auto middle = input.begin() + static_cast<std::ptrdiff_t>(sample);
-  return count_reversals({input.begin(), middle}) > 0 && count_reversals({middle, input.end()}) > 0;
+  return count_reversals({input.begin(), middle}) >= kThereAndBack &&
+         count_reversals({middle, input.end()}) >= kThereAndBack;
 }
 
 }  // namespace
@@ -276,6 +277,7 @@ std::string_view unit_mistake(double ratio) {
                                                      {1000.0, "a unit and its thousandth"},
                                                      {57295.77951308232, "degrees and mrad"},
                                                      {1e6, "a unit and its millionth"}});
+  if (!(ratio > 0.0)) return {};
   const double factor = std::max(ratio, 1.0 / ratio);
   for (const Mistake& mistake : kMistakes)
     if (factor < kNear * mistake.ratio && mistake.ratio < kNear * factor) return mistake.name;

@@ -8,6 +8,9 @@
 
 namespace torsio {
 
+/// Below it a torque hardly follows its input.
+inline constexpr double kClearCorrelation = 0.5;
+
 /// The torque rises with the input up to a sample and falls with it from there on, or the other way
 /// round.
 struct SignFlip {

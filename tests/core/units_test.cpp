@@ -10,6 +10,12 @@
 namespace torsio {
 namespace {
 
+TEST(Units, PoundsAndOuncesAreKnown) {
+  EXPECT_NEAR(find_unit("lbft")->si(1.0), 1.3558179483314004, 1e-12);
+  EXPECT_NEAR(find_unit("lbin")->si(12.0), find_unit("lbft")->si(1.0), 1e-12);
+  EXPECT_NEAR(find_unit("ozin")->si(16.0), find_unit("lbin")->si(1.0), 1e-12);
+}
+
 TEST(Units, TakeTheLongestSuffixThatIsKnown) {
   const auto rate = split_channel_name("spring_deflection_rate_deg_s");
   ASSERT_TRUE(rate);

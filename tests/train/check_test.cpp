@@ -8,7 +8,9 @@
 #include <limits>
 
 #include "support/bench_dataset.hpp"
+#include "support/error_message.hpp"
 #include "torsio/train/inputs.hpp"
+#include "torsio/train/training_data.hpp"
 
 namespace torsio {
 namespace {
@@ -77,6 +79,21 @@ TEST(Check, FailsOnAMissingInputAndWarnsOfAMissingTarget) {
       Verdict::fail);
 }
 
+TEST(TrainingData, NamesTheTimeAndHoldWhereAnInputIsMissing) {
+  Dataset dataset;
+  add_record(dataset,
+             changed("gear_angle_rad",
+                     [](Channel& channel) {
+                       channel.values[100] = std::numeric_limits<double>::quiet_NaN();
+                     }),
+             Role::train);
+  const FeatureSpec spec = resolve_inputs(dataset, {});
+  const std::string message =
+      test::error_message([&] { static_cast<void>(training_data(dataset, spec, Role::train)); });
+  EXPECT_NE(message.find("channel gear_angle_rad at t = 0.1 s"), std::string::npos) << message;
+  EXPECT_NE(message.find("hold: [gear_angle_rad]"), std::string::npos) << message;
+}
+
 TEST(Check, FailsOnADeadChannel) {
   const auto dead = [](Channel& channel) { std::ranges::fill(channel.values, 1.5); };
   const auto findings = findings_of(with_record(changed("torque_Nm", dead)));
@@ -92,6 +109,24 @@ TEST(Check, WarnsOfASensorAtItsLimit) {
   };
   EXPECT_EQ(verdict_of(findings_of(with_record(changed("torque_Nm", clip))), "saturation"),
             Verdict::warn);
+}
+
+TEST(Check, DoesNotCallTheLastOfFewCodesALimit) {
+  Channel deflection{"spring_deflection_rad", {}};
+  Channel torque{"torque_Nm", {}};
+  constexpr double kCode_rad = 0.002;
+  for (int n = 0; n < 4000; ++n) {
+    const double phase = std::fmod(1e-3 * static_cast<double>(n), 1.0);
+    const double triangle_rad = 0.0505 * (4.0 * std::abs(phase - 0.5) - 1.0);
+    deflection.values.push_back(kCode_rad * std::round(triangle_rad / kCode_rad));
+    torque.values.push_back(100.0 * triangle_rad);
+  }
+  Recording recording("triangles", 1000.0);
+  recording.add(std::move(deflection));
+  recording.add(std::move(torque));
+  Dataset dataset;
+  add_record(dataset, std::move(recording), Role::train);
+  EXPECT_EQ(verdict_of(findings_of(dataset), "saturation"), Verdict::pass);
 }
 
 TEST(Check, WarnsOfASensorThatFreezesWhileTheOthersMove) {
@@ -236,6 +271,16 @@ TEST(Check, NamesTheRecordThatDiffersByAUnitAndItsChannel) {
   EXPECT_NE(finding.message.find("1000 times larger"), std::string::npos) << finding.message;
   EXPECT_NE(finding.advice.find("torque_Nm in this record"), std::string::npos) << finding.advice;
   EXPECT_EQ(verdict_of(findings, "offsets"), Verdict::pass) << "a zero mends no unit";
+}
+
+TEST(Check, DoubtsTheUnitOfARecordingThatAModelWasNotTrainedOn) {
+  EstimatorSettings trained;
+  trained.features = resolve_inputs(test::bench_dataset(), {});
+  trained.target = "torque_Nm";
+  trained.fallback.slope = {500.0, 0.0, 0.0};
+  EXPECT_EQ(unit_doubt(bench_recording("as trained"), trained), "");
+  trained.fallback.slope[0] = 0.5;
+  EXPECT_EQ(unit_doubt(bench_recording("odd"), trained), "a unit and its thousandth");
 }
 
 TEST(Check, BlamesNeitherOfTwoRecordsForAUnit) {

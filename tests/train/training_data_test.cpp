@@ -103,7 +103,7 @@ TEST(TrainingData, NamesRecordChannelAndSampleOfAnInputThatIsNotFinite) {
   recording.add(deflection);
   recording.add(ramp().channel("torque_Nm"));
   const std::string message = refusal(dataset_of(recording, whole_record(10, Role::train)), kSpec);
-  EXPECT_NE(message.find("gap: channel spring_deflection_rad, sample 7"), std::string::npos)
+  EXPECT_NE(message.find("gap: channel spring_deflection_rad at t = 0.07 s (sample 7)"), std::string::npos)
       << message;
 }
 

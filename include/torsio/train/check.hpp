@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "torsio/data/dataset.hpp"
+#include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
@@ -24,10 +25,16 @@ struct Finding {
 };
 
 /// Can a torque model be learned from these recordings? Looks at each channel that the inputs need
-/// and at the target: values that are missing, constant or saturated; frozen sensors; coarse codes; gaps; the delay and the sign
-/// between the first input and the target; reversals and speeds; offsets that differ between
-/// records; a target computed from an input; test data outside the training range. Every check
-/// gives at least one finding, PASS ones included, in a fixed order.
+/// and at the target: values that are missing, constant or saturated; frozen sensors; coarse codes;
+/// units; gaps and slips; the delay and the sign between the first input and the target; their
+/// relation early and late in a record; reversals and speeds; offsets that differ between records; a
+/// target computed from an input; test data outside the training range. Every check gives at least
+/// one finding, PASS ones included, in a fixed order.
 [[nodiscard]] std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec);
+
+/// The unit mistake ("degrees and radians") that makes a recording's slope of target over first
+/// input differ from the one that a model was trained on, `EstimatorSettings::fallback`; empty if
+/// they differ by no unit's factor, or the recording tells no slope.
+[[nodiscard]] std::string unit_doubt(const Recording& recording, const EstimatorSettings& trained);
 
 }  // namespace torsio
