@@ -45,7 +45,7 @@ Tuned tuned(const TuneFlags& flags) {
   using torsio::JointOutput;
   torsio::DeflectionController::Settings settings{
       .joint = torsio::series_elastic_joint(torsio::data_sheet(flags.actuator)),
-      .bandwidth_rad_s = kTurn * torsio::si_quantity(flags.bandwidth, "Hz", "--bandwidth"),
+      .bandwidth_rad_s = angular_frequency_rad_s(flags.bandwidth, "--bandwidth"),
       .damping = flags.damping};
   settings.joint.joint_inertia_kg_m2 += flags.load_inertia_kg_m2;
   const torsio::DeflectionController controller(settings, kRate_Hz);
@@ -164,7 +164,8 @@ void add_tune_loop(CLI::App& app) {
       "What would be unstable is refused with its margin. torsio track closes the loop.");
   verb->add_option("--actuator", flags->actuator, "torsio simulate --list shows the names")
       ->capture_default_str();
-  verb->add_option("--bandwidth", flags->bandwidth, "natural frequency of the closed loop")
+  verb->add_option("--bandwidth", flags->bandwidth,
+                   "natural frequency of the closed loop, in Hz or rad_s")
       ->capture_default_str();
   verb->add_option("--damping", flags->damping, "of the closed loop")->capture_default_str();
   verb->add_option("--load-inertia", flags->load_inertia_kg_m2,
