@@ -211,7 +211,7 @@ TEST_F(BrokenCalls, OfAdaptationSayWhatIsMissingAndLeaveTheOutputUntouched) {
   expect_error(torsio("adapt m.safetensors a.csv -o a.csv"), kCallWasWrong, "replace");
   expect_error(torsio("adapt m.safetensors a.csv -o no/such/m.safetensors"), kCallWasWrong,
                "no/such");
-  expect_error(torsio("adapt m.safetensors a.csv -o /dev/full"), kWorkFailed, "/dev/full");
+  expect_error(torsio("adapt m.safetensors a.csv -o /dev/full"), kCallWasWrong, "/dev/full");
   expect_error(shell("trap '' XFSZ; ulimit -f 1; {torsio} " + call + ">/dev/null"), kWorkFailed,
                "old.safetensors: cannot write: File too large");
   EXPECT_EQ(files(), before);
