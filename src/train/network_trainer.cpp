@@ -333,12 +333,13 @@ std::string differing_part(const std::string& recipe, const std::string& other) 
   if (own.size() != others.size() || own.empty() || own[0] != others[0]) return recipe;
   std::string part;
   for (std::size_t i = 1; i < own.size(); ++i) {
-    if (own[i] == others[i]) continue;
+    const bool is_data = own[i - 1] == "data";  // last; other windows or seeds change it, too
+    if (own[i] == others[i] || (is_data && !part.empty())) continue;
     part += part.empty() ? "" : ", ";
     const bool is_value = own[i - 1] == others[i - 1];
-    part += own[i - 1] == "data" ? "recordings of fingerprint " + own[i]
-            : is_value           ? own[i - 1] + " " + own[i]
-                                 : own[i];
+    part += is_data    ? "recordings of fingerprint " + own[i]
+            : is_value ? own[i - 1] + " " + own[i]
+                       : own[i];
   }
   return part;
 }
