@@ -26,11 +26,14 @@ int run(const char* model_file) {
   // Trained on records with a `zero:`? estimator.set_zero("gear_angle_rad", angle_at_rest_rad);
   const torsio::DenormalsOff denormals_off;  // once a real-time thread
   estimator.reset();
+  torsio::Fault last = torsio::Fault::none;
   for (int tick = 0; tick < 2000; ++tick) {
-    const torsio::JointSample joint = read_joint(tick);     // angles on both sides of the spring
+    const torsio::JointSample joint = read_joint(tick);     // all that the model's inputs need
     const torsio::Estimate torque = estimator.step(joint);  // noexcept, no heap, no lock
-    if (torque.fault != torsio::Fault::none)
-      continue;  // warming up, zero not set, outside the training range, ...
+    if (torque.fault != last)  // input_not_finite, zero_not_set, outside_training_range, ...
+      std::printf("t = %.3f s: fault %s\n", joint.t_s, torsio::name(torque.fault).data());
+    last = torque.fault;
+    if (torque.fault != torsio::Fault::none) continue;  // the value is finite, but not to be used
     if (tick % 500 == 0)
       std::printf("t = %.1f s: %6.2f Nm +- %.2f\n", joint.t_s, torque.value, torque.std_dev);
   }

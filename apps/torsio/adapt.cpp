@@ -50,6 +50,7 @@ void run(const AdaptFlags& flags) {
   std::vector<std::string> read = flags.test;
   read.push_back(flags.model);
   flags.data.check_outputs({flags.output, flags.json.destination}, read);
+  require_model_file(flags.output);
   const auto settings = torsio::adaptation_settings(flags.method, parse_settings(flags.settings));
   const torsio::ModelFile file = torsio::load_model(flags.model);
   torsio::require_last_layer(file.parameters);  // before recordings are read

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <optional>
 
 #include "data_flags.hpp"
@@ -28,13 +30,18 @@ struct CompareFlags {
 
 void run(const CompareFlags& flags) {
   flags.data.check_outputs({flags.output, flags.report, flags.json.destination}, flags.test);
+  require_model_file(flags.output);
   ProgressBar bar;
   const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, bar.listener());
   std::optional<torsio::StructureSearch> search;
   if (flags.models == torsio::kSearch) {
-    search = torsio::search_structures(
-        dataset, torsio::search_candidates(dataset, flags.data.wanted_inputs()), flags.seed,
-        flags.allow_leak, bar.listener());
+    const auto candidates = torsio::search_candidates(dataset, flags.data.wanted_inputs());
+    remark(fmt::format(
+        "search: {} structures, each fitted on {} folds, then the best of each family: {} fits and "
+        "more, many of them slow. Ctrl-C stops it; --models with fewer families is quicker.",
+        candidates.size(), torsio::kSearchFolds, candidates.size() * torsio::kSearchFolds));
+    search = torsio::search_structures(dataset, candidates, flags.seed, flags.allow_leak,
+                                       bar.listener());
     if (search->winners.empty())
       throw torsio::Error({.problem = first_failure(search->scores.results)});
     if (flags.json.wants_tables()) print(cross_validation_text(search->scores) + "\n");
@@ -48,6 +55,8 @@ void run(const CompareFlags& flags) {
                           : torsio::results_json(comparison.results));
   if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
   if (flags.json.wants_tables()) print(comparison_text(comparison.results));
+  if (has_all(flags.models))
+    remark("note: all leaves out " + families_beyond_all() + ": add them by name, as all,lstm");
   if (!flags.report.empty()) write_text(flags.report, torsio::results_html(comparison.results));
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, comparison.best->file);
@@ -68,10 +77,15 @@ void add_compare(CLI::App& app) {
   flags->data.add_target_and_inputs(*verb);
   verb->add_option("--test", flags->test, "held-out recordings: they rank the models");
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
-  verb->add_option("--models", flags->models,
-                   "all (but lstm and gru), or families with settings: "
-                   "linear,polynomial:degree=7:branch=true; search: orders and structures of each "
-                   "family by cross-validation within the training records, the best then compared")
+  verb->add_option(
+          "--models", flags->models,
+          "families with settings: linear,polynomial:degree=7:branch=true; all: every family "
+          "but " +
+              families_beyond_all() +
+              ", which take longer or are for other data and are added by name: "
+              "all,viscoelastic; search: orders and structures of each family by "
+              "cross-validation within the training records, the best then compared: "
+              "minutes to hours")
       ->capture_default_str();
   verb->add_option("-o,--output", flags->output, "write the best model to this file");
   verb->add_option("--report", flags->report, "write the tables as a page for a browser");

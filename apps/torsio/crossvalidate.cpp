@@ -33,10 +33,10 @@ std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
                                             const torsio::Dataset& dataset) {
   auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   if (settings.empty()) return choices;
-  if (flags.models == "all")
+  if (has_all(flags.models))
     throw torsio::UsageError({.place = "--set",
                               .expected = "models that have the setting, named with --models",
-                              .found = "--models all"});
+                              .found = "--models " + flags.models});
   for (torsio::ModelChoice& choice : choices) {
     for (const auto& [option, value] : settings) choice.options[option] = value;
     // Refuses what the family does not know before any work is done.
@@ -80,8 +80,11 @@ void add_crossvalidate(CLI::App& app) {
   flags->data.add_mapping(*verb);
   flags->data.add_initialise(*verb);
   flags->data.add_target_and_inputs(*verb);
-  verb->add_option("--models", flags->models,
-                   "all, or families with settings: linear,polynomial:degree=7:branch=true")
+  verb->add_option(
+          "--models", flags->models,
+          "families with settings: linear,polynomial:degree=7:branch=true; all: every family "
+          "but " +
+              families_beyond_all() + ", which are added by name: all,lstm")
       ->capture_default_str();
   verb->add_option("--set", flags->settings, "a setting of every model named, option=value")
       ->allow_extra_args(false);

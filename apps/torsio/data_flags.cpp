@@ -1,10 +1,14 @@
 #include "data_flags.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -13,6 +17,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
+#include "torsio/train/families.hpp"
 
 namespace {
 
@@ -48,6 +53,26 @@ std::string refuse_unless_whole(const std::string& text) {
 }
 
 }  // namespace
+
+double angular_frequency_rad_s(const std::string& text, const char* option) {
+  constexpr std::string_view kSlash = "rad/s";
+  std::string in_words = text;
+  if (text.ends_with(kSlash)) in_words.replace(text.size() - kSlash.size(), kSlash.size(), "rad_s");
+  if (in_words.ends_with("rad_s")) return torsio::si_quantity(in_words, "rad_s", option);
+  return 2.0 * std::numbers::pi * torsio::si_quantity(text, "Hz", option);
+}
+
+std::string families_beyond_all() {
+  std::vector<std::string_view> names;
+  for (const torsio::FamilyInfo& family : torsio::families())
+    if (family.only_if_named) names.push_back(family.name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+bool has_all(const std::string& models) {
+  const std::vector<std::string> each = torsio::split_inputs(models);
+  return std::ranges::find(each, "all") != each.end();
+}
 
 void add_seed(CLI::App& verb, std::uint64_t& seed, const char* help) {
   verb.add_option("--seed", seed, help)->check(refuse_unless_whole)->capture_default_str();
@@ -124,7 +149,7 @@ void DataFlags::check_outputs(const std::vector<std::string>& outputs,
   inputs_read.push_back(mapping);
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     if (outputs[i].empty()) continue;
-    require_folder_of(outputs[i]);
+    require_writable(outputs[i]);
     for (const std::string& input : inputs_read) {
       if (!is_same_file(input, outputs[i])) continue;
       throw torsio::UsageError({.place = outputs[i],

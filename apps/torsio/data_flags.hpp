@@ -39,6 +39,12 @@ struct DataFlags {
 
 inline constexpr std::uint64_t kDefaultSeed = 1;
 
+/// A frequency of a loop in Hz or rad/s ("8Hz", "50rad_s"), in rad/s. @throws torsio::UsageError.
+[[nodiscard]] double angular_frequency_rad_s(const std::string& text, const char* option);
+/// The families that `--models all` leaves out, for help and remarks.
+[[nodiscard]] std::string families_beyond_all();
+/// Whether `all` stands in a list of models.
+[[nodiscard]] bool has_all(const std::string& models);
 /// `--seed`, for every verb that draws random numbers.
 void add_seed(CLI::App& verb, std::uint64_t& seed, const char* help);
 /// @returns the number. @throws UsageError naming the flag unless it is finite and above 0.

@@ -58,6 +58,7 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
 
 void run(const DemoFlags& flags) {
   flags.data.check_outputs({flags.output, flags.json.destination}, flags.test);
+  require_model_file(flags.output);
   ProgressBar bar;
   const bool is_simulated = flags.data.recordings.empty();
   if (is_simulated) remark(fmt::format("simulating four sweeps of {} ...", flags.actuator));

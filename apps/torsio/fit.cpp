@@ -1,7 +1,10 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "data_flags.hpp"
 #include "output.hpp"
@@ -77,13 +80,18 @@ torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset
 
 void run(const FitFlags& flags) {
   if (flags.list) return print(family_list());
-  if (flags.data.recordings.empty() || flags.family.empty() || flags.output.empty())
+  const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
+  std::vector<std::string> missing;
+  if (flags.data.recordings.empty()) missing.emplace_back("recordings");
+  if (flags.family.empty()) missing.emplace_back("--model FAMILY (torsio fit --list)");
+  if (flags.output.empty()) missing.emplace_back("-o FILE");
+  if (!missing.empty())
     throw torsio::UsageError(
         {.place = "torsio fit",
-         .expected = "recordings, --model FAMILY and -o FILE",
+         .problem = fmt::format("{} missing", fmt::join(missing, " and ")),
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
-  const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   flags.data.check_outputs({flags.output, flags.json.destination}, flags.validation);
+  require_model_file(flags.output);
   ProgressBar bar;
   const torsio::Dataset dataset = flags.data.load(flags.validation, {}, bar.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());

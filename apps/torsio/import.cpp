@@ -94,6 +94,7 @@ void run(const ImportFlags& flags) {
                                   "into its network, nor how often",
                               .advice = kExample});
   flags.data.check_outputs({flags.output, flags.json.destination}, {flags.file});
+  require_model_file(flags.output);
   const torsio::ForeignFile file = torsio::read_foreign_file(flags.file);
   const torsio::ForeignNetwork network =
       is_json(file.bytes) ? read_weights(flags, file) : read_graph(flags, file);

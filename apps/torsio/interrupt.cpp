@@ -6,7 +6,7 @@ namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
 
-void on_interrupt(int /*signal*/) { interrupted = 1; }
+void on_interrupt(int signal) { interrupted = signal; }
 
 }  // namespace
 
@@ -21,3 +21,9 @@ void catch_interrupts() {
 }
 
 bool is_interrupted() noexcept { return interrupted != 0; }
+
+void end_as_interrupted() {
+  const int signal = interrupted;
+  (void)std::signal(signal, SIG_DFL);
+  (void)std::raise(signal);
+}

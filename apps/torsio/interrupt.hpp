@@ -5,3 +5,7 @@
 void catch_interrupts();
 
 [[nodiscard]] bool is_interrupted() noexcept;
+
+/// Ends the program by the signal that interrupted it, so that a shell sees 130 (Ctrl-C) or 143 and
+/// ends its loop, too.
+void end_as_interrupted();

@@ -4,11 +4,13 @@
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <string>
 
 #include "interrupt.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
 #include "verbs.hpp"
+#include "wrong_call.hpp"
 
 namespace {
 
@@ -45,6 +47,9 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
     return 0;
   } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0)
+      if (const std::string unknown = unknown_name(app, argc, argv); !unknown.empty())
+        return complain(unknown.c_str(), kCallWasWrong);
     return app.exit(error) == 0 ? 0 : kCallWasWrong;
   }
 }
@@ -57,7 +62,9 @@ int main(int argc, char** argv) {
   } catch (const torsio::UsageError& error) {
     return complain(error.what(), kCallWasWrong);
   } catch (const torsio::Error& error) {
-    return complain(error.what(), kWorkFailed);
+    (void)complain(error.what(), kWorkFailed);
+    if (is_interrupted()) end_as_interrupted();
+    return kWorkFailed;
   } catch (const std::bad_alloc&) {
     return complain("out of memory: use fewer or shorter recordings", kWorkFailed);
   } catch (const std::exception& error) {

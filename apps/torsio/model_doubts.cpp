@@ -1,9 +1,53 @@
 #include "model_doubts.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
 
 #include "output.hpp"
 #include "torsio/train/check.hpp"
+
+namespace {
+
+constexpr int kSettled = 2000;  // ticks of 1 ms
+
+/// From -torque to torque, the joint being at rest; none where the model does not tell.
+std::optional<double> deflection_range_rad(torsio::AnyInverse inverse, double torque_Nm) {
+  double range_rad = 0.0;
+  for (const double sign : {-1.0, 1.0}) {
+    inverse.reset();
+    torsio::Estimate told;
+    for (int tick = 0; tick < kSettled; ++tick)
+      told = inverse.step(sign * torque_Nm, {.t_s = 1e-3 * tick,
+                                             .motor_angle_rad = 0.0,
+                                             .gear_angle_rad = 0.0,
+                                             .joint_angle_rad = 0.0,
+                                             .motor_current_A = 0.0});
+    if (told.fault != torsio::Fault::none) return std::nullopt;
+    range_rad += sign * told.value;
+  }
+  return range_rad;
+}
+
+}  // namespace
+
+void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse,
+                            const torsio::LinearInverse& line, const torsio::DataSheet& sheet,
+                            double torque_Nm) {
+  constexpr double kAnother = 1.4;  // hysteresis and wear of one spring stay below it
+  const auto told = deflection_range_rad(std::move(inverse), torque_Nm);
+  const auto swept = deflection_range_rad(line, torque_Nm);
+  if (!told || !swept || !(*told > 0.0)) return;
+  const double ratio = *told / *swept;
+  if (ratio < kAnother && ratio > 1.0 / kAnother) return;
+  remark(fmt::format(
+      "warning: for {:.3g} Nm {} winds the spring {:.2g} times as far as sweeps of {} do: was it "
+      "trained on another actuator?",
+      torque_Nm, model, ratio, sheet.name));
+}
 
 void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
   const auto& trained = file.card.training_files;

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/control/spring_inverse.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
 
@@ -9,3 +13,8 @@ void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Datase
 void warn_of_missing_zeros(const torsio::ModelFile& file, const torsio::Dataset& dataset);
 /// Warns of recordings whose torque over the first input differs from the training data's by a unit.
 void warn_of_another_unit(const torsio::ModelFile& file, const torsio::Dataset& dataset);
+/// Warns of an inverse that tells a deflection for `torque_Nm` at rest that is far from that of the
+/// actuator's own line: the model learned another spring.
+void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse,
+                            const torsio::LinearInverse& line, const torsio::DataSheet& sheet,
+                            double torque_Nm);

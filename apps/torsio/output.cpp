@@ -1,8 +1,13 @@
 #include "output.hpp"
 
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <span>
+#include <system_error>
 
 #include "torsio/core/error.hpp"
 #include "torsio/files/output_file.hpp"
@@ -24,10 +29,46 @@ void JsonOutput::write(std::string_view document) const {
   write_text(destination, document);
 }
 
-void require_folder_of(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  if (!folder.empty() && !std::filesystem::is_directory(folder))
+void require_writable(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code absent;
+  // A link is followed, as the writing does.
+  const fs::path target =
+      fs::is_symlink(path, absent) ? fs::weakly_canonical(path, absent) : fs::path(path);
+  const fs::path folder = target.parent_path();
+  if (!folder.empty() && !fs::is_directory(folder, absent))
     throw torsio::UsageError({.place = path, .problem = "there is no folder " + folder.string()});
+  if (fs::is_directory(target, absent))
+    throw torsio::UsageError({.place = path,
+                              .expected = "a file to write",
+                              .found = "a folder",
+                              .advice = "Add the name that the file in it is to have."});
+  const bool is_replaced = !fs::exists(path, absent) || fs::is_regular_file(path, absent);
+  const std::string written = !is_replaced ? path : folder.empty() ? "." : folder.string();
+  if (!is_standard_output(path) && ::access(written.c_str(), W_OK) != 0)
+    throw torsio::UsageError({.place = path, .problem = "you may not write to " + written});
+}
+
+void require_model_file(const std::string& path) {
+  if (path.empty()) return;
+  std::error_code absent;
+  const bool is_device =
+      std::filesystem::exists(path, absent) && !std::filesystem::is_regular_file(path, absent);
+  if (!is_standard_output(path) && !is_device) return;
+  throw torsio::UsageError({.place = path,
+                            .expected = "a file to write the model to",
+                            .found = "a device, pipe or standard output",
+                            .advice = "A model is written whole or not at all: name a file."});
+}
+
+void require_ending(const char* option, const std::string& path,
+                    std::initializer_list<std::string_view> endings) {
+  const std::string ending = std::filesystem::path(path).extension().string();
+  if (ending.empty() || std::ranges::find(endings, ending) != endings.end()) return;
+  throw torsio::UsageError(
+      {.place = option,
+       .expected = fmt::format("a file that ends in {}", fmt::join(endings, " or ")),
+       .found = path});
 }
 
 void write_text(const std::string& path, std::string_view text) {

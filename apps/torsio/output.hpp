@@ -1,5 +1,6 @@
 #pragma once
 
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
@@ -17,8 +18,16 @@ struct JsonOutput {
   void write(std::string_view document) const;
 };
 
-/// Refuses an output whose folder does not exist before any work is done; an empty path is none.
-void require_folder_of(const std::string& path);
+/// Refuses an output that cannot be written before any work is done: its folder is missing or not
+/// writable, or it is a folder itself.
+void require_writable(const std::string& path);
+/// The same for a model file, which is written whole or not at all: no device, no standard output.
+/// An empty path is none.
+void require_model_file(const std::string& path);
+/// Refuses a file whose ending promises another format than what is written; a name without an ending
+/// is taken.
+void require_ending(const char* option, const std::string& path,
+                    std::initializer_list<std::string_view> endings);
 /// Writes a text file whole or not at all; a device or pipe is written straight.
 void write_text(const std::string& path, std::string_view text);
 /// Prints to stdout; a full disk or a closed pipe is an Error.

@@ -7,12 +7,14 @@
 #include <cstdio>
 
 #include "interrupt.hpp"
+#include "output.hpp"
 
 namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr auto kPatience = std::chrono::seconds(1);
 constexpr auto kRedraw = std::chrono::milliseconds(100);
+constexpr auto kBetweenLines = std::chrono::seconds(30);
 constexpr int kWidth = 30;
 
 }  // namespace
@@ -26,14 +28,26 @@ ProgressBar::~ProgressBar() {
 
 torsio::Progress ProgressBar::listener() {
   return [this](double fraction, std::string_view doing) {
-    draw(fraction, doing);
+    if (is_terminal_)
+      draw(fraction, doing);
+    else
+      tell(fraction, doing);
     return !is_interrupted();
   };
 }
 
+void ProgressBar::tell(double fraction, std::string_view doing) {
+  const auto now = Clock::now();
+  if (now - last_ < kBetweenLines) return;
+  last_ = now;
+  const std::chrono::duration<double> spent = now - start_;
+  remark(fmt::format("{:.0f} % after {:.0f} s: {}", 100.0 * std::clamp(fraction, 0.0, 1.0),
+                     spent.count(), doing));
+}
+
 void ProgressBar::draw(double fraction, std::string_view doing) {
   const auto now = Clock::now();
-  if (!is_terminal_ || now - start_ < kPatience || now - last_ < kRedraw) return;
+  if (now - start_ < kPatience || now - last_ < kRedraw) return;
   last_ = now;
   is_drawn_ = true;
   const double share = std::clamp(fraction, 0.0, 1.0);

@@ -6,8 +6,8 @@
 
 #include "torsio/core/progress.hpp"
 
-/// A bar on stderr, if that is a terminal and the work lasts over a second; it also carries Ctrl-C
-/// to the work.
+/// A bar on stderr, if that is a terminal and the work lasts over a second; in a log or pipe a line
+/// every half minute. It also carries Ctrl-C to the work.
 class ProgressBar {
  public:
   ProgressBar();
@@ -19,6 +19,7 @@ class ProgressBar {
   [[nodiscard]] torsio::Progress listener();
 
  private:
+  void tell(double fraction, std::string_view doing);
   void draw(double fraction, std::string_view doing);
 
   bool is_terminal_;

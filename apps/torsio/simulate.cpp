@@ -53,18 +53,36 @@ std::vector<std::string_view> variants(const torsio::DataSheet& sheet) {
   return names;
 }
 
+/// What goes into a model of an actuator whose spring does not lie between `gear_angle_rad` and
+/// `joint_angle_rad`; empty: what every verb takes by itself.
+std::string inputs_for(std::string_view actuator, std::string_view variant) {
+  if (actuator == "rubber-clutch")
+    return "input_angle_rad - joint_angle_rad, lowpass(rate(input_angle_rad - joint_angle_rad), "
+           "10Hz)";
+  if (actuator != "harmonic-drive") return {};
+  // A rigid tube's twist cannot be measured: gear and tube stand for it.
+  const std::string twist = variant == "rigid"
+                                ? "lowpass(motor_angle_rad / 2 - 51 * joint_angle_rad, 10Hz)"
+                                : "motor_angle_rad / 2 - wave_generator_angle_rad";
+  return twist + ", motor_torque_Nm, lowpass(rate(wave_generator_angle_rad), 10Hz)";
+}
+
 std::string bench_list() {
   torsio::TextTable actuators;
   actuators.header({"actuator", "variants (NAME:VARIANT)", "what it is"});
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
     actuators.row({std::string(sheet.name), fmt::format("{}", fmt::join(variants(sheet), ", ")),
                    std::string(sheet.title)});
+  std::string inputs;
+  for (const torsio::DataSheet& sheet : torsio::data_sheets())
+    if (const std::string named = inputs_for(sheet.name, sheet.variant); !named.empty())
+      inputs += fmt::format("check and train {} with --inputs '{}'\n", sheet.name, named);
   torsio::TextTable experiments;
   experiments.header({"experiment", "actuators", "what is done"});
   for (const torsio::ExperimentInfo& info : torsio::experiments())
     experiments.row(
         {std::string(info.name), std::string(info.actuators), std::string(info.description)});
-  return actuators.text() + "\nA piece of its own, by serial number: NAME#03\n\n" +
+  return actuators.text() + "\nA piece of its own, by serial number: NAME#03\n" + inputs + "\n" +
          experiments.text();
 }
 
@@ -232,6 +250,7 @@ void run(const SimulateFlags& flags) {
                               .advice = "torsio simulate --list shows what there is; example: "
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
   DataFlags().check_outputs({flags.output, flags.json.destination, flags.plot}, {flags.faults});
+  require_ending("--plot", flags.plot, {".svg"});
   const torsio::ExperimentSpec spec = experiment_spec(flags);
   ProgressBar bar;
   const torsio::Recording recording = torsio::simulate(spec, bar.listener());
@@ -240,6 +259,9 @@ void run(const SimulateFlags& flags) {
   flags.json.write(recording_json(flags, spec, recording).dump(2) + "\n");
   remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),
                      recording.sample_rate_Hz()));
+  const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
+  if (const std::string inputs = inputs_for(sheet.name, sheet.variant); !inputs.empty())
+    remark("check it and train on it with --inputs '" + inputs + "'");
 }
 
 }  // namespace

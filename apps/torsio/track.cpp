@@ -1,16 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "data_flags.hpp"
+#include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
@@ -96,8 +95,7 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
   }
   if (!flags.bandwidth.empty())
     spec.bandwidth_rad_s =
-        2.0 * std::numbers::pi *
-        above_zero(torsio::si_quantity(flags.bandwidth, "Hz", "--bandwidth"), "--bandwidth");
+        above_zero(angular_frequency_rad_s(flags.bandwidth, "--bandwidth"), "--bandwidth");
   if (!(flags.friction >= 0.0 && flags.friction <= 1.0))
     throw torsio::UsageError({.place = "--friction",
                               .expected = "a share from 0 to 1",
@@ -138,7 +136,19 @@ void check(const TrackFlags& flags) {
   if (!flags.record.empty() && flags.models.size() > 1)
     throw torsio::UsageError({.place = "--record",
                               .expected = "one --model",
-                              .found = fmt::format("{}", flags.models.size())});
+                              .found = fmt::format("{}", flags.models.size()),
+                              .advice = "Call track once for each model that is to be recorded."});
+  require_ending("--record", flags.record, {".csv", ".gz"});
+  for (auto model = flags.models.begin(); model != flags.models.end(); ++model)
+    if (std::find(flags.models.begin(), model, *model) != model)
+      throw torsio::UsageError({.place = "--model", .problem = *model + " is given twice"});
+}
+
+/// Of the output that the loop's joint has; people who mean a file are told where it is named.
+std::string refuse_output(const std::string& text) {
+  if (text == "locked" || text == "free") return {};
+  return "expected locked or free, of the joint's output, found '" + text +
+         "'. Results go to --json FILE, what the loop saw to --record FILE.csv";
 }
 
 void run(const TrackFlags& flags) {
@@ -149,6 +159,9 @@ void run(const TrackFlags& flags) {
   torsio::check_tracking(sheet, spec, flags.seed);  // before the sweeps for the line are run
   ProgressBar bar;
   const torsio::LinearInverse linear = torsio::sweep_line(sheet, kDefaultSeed, bar.listener());
+  for (const torsio::NamedInverse& model : models)
+    warn_of_another_spring(model.name, model.inverse, linear, sheet,
+                           0.5 * torsio::amplitude_of(spec.reference, sheet));
   std::vector<std::uint64_t> seeds;
   for (std::size_t k = 0; k < flags.seeds; ++k) seeds.push_back(flags.seed + k);
   const std::vector<torsio::TrackingRow> rows =
@@ -183,8 +196,8 @@ void add_track(CLI::App& app) {
   verb->add_option("--actuator", flags->actuator, "dfki-28 to dfki-300, as NAME:VARIANT#SERIAL")
       ->capture_default_str();
   verb->add_option("--output", flags->output,
-                   "of the spring: locked, or free with a lever and 9 kg")
-      ->check(CLI::IsMember({"locked", "free"}))
+                   "of the spring: locked, or free with a lever and 9 kg; no file")
+      ->check(refuse_output)
       ->capture_default_str();
   verb->add_option("--lever", flags->lever, "free: where the 9 kg hang (default 0.8m)");
   verb->add_option("--reference", flags->reference, "chirp, random-walk, steps, sweep, replay")
@@ -193,8 +206,10 @@ void add_track(CLI::App& app) {
   verb->add_option("--amplitude", flags->amplitude, "of the torque: 20Nm");
   verb->add_option("--duration", flags->duration, "of the reference: 30s");
   verb->add_option("--model", flags->models, "model file, or linear; may be given more than once");
-  verb->add_option("--bandwidth", flags->bandwidth,
-                   "that the gains are made for (default 50 rad/s: 7.96Hz); torsio tune-loop");
+  verb->add_option(
+      "--bandwidth", flags->bandwidth,
+      "that the gains are made for, as 8Hz or 50rad_s (default 50 rad/s: 7.96Hz); torsio "
+      "tune-loop");
   verb->add_option("--damping", flags->damping, "that the gains are made for")
       ->capture_default_str();
   verb->add_option("--friction", flags->friction,
@@ -209,7 +224,7 @@ void add_track(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--record", flags->record,
                    "write all that the loop saw and each term of its command in the first run of "
-                   "the model as CSV");
+                   "the one --model as CSV");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

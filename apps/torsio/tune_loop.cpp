@@ -51,8 +51,7 @@ Tuned tuned(const TuneFlags& flags) {
   torsio::DeflectionController::Settings settings{
       .joint = torsio::series_elastic_joint(torsio::data_sheet(flags.actuator)),
       .bandwidth_rad_s =
-          kTurn *
-          above_zero(torsio::si_quantity(flags.bandwidth, "Hz", "--bandwidth"), "--bandwidth"),
+          above_zero(angular_frequency_rad_s(flags.bandwidth, "--bandwidth"), "--bandwidth"),
       .damping = above_zero(flags.damping, "--damping")};
   if (!(flags.load_inertia_kg_m2 >= 0.0))
     throw torsio::UsageError({.place = "--load-inertia",
@@ -183,7 +182,8 @@ void add_tune_loop(CLI::App& app) {
       "What would be unstable is refused with its margin. torsio track closes the loop.");
   verb->add_option("--actuator", flags->actuator, "torsio simulate --list shows the names")
       ->capture_default_str();
-  verb->add_option("--bandwidth", flags->bandwidth, "natural frequency of the closed loop")
+  verb->add_option("--bandwidth", flags->bandwidth,
+                   "natural frequency of the closed loop, in Hz or rad_s")
       ->capture_default_str();
   verb->add_option("--damping", flags->damping, "of the closed loop")->capture_default_str();
   verb->add_option("--observer", flags->observer,

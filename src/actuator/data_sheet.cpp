@@ -9,6 +9,7 @@
 #include "actuators.hpp"
 #include "piece_spread.hpp"
 #include "sheet_values.hpp"
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -20,12 +21,15 @@ struct ActuatorName {
   std::optional<unsigned> serial;
 };
 
-[[noreturn]] void refuse(std::string_view what, std::string expected, std::string_view found) {
-  throw UsageError({.place = "actuator",
-                    .problem = fmt::format("unknown {}", what),
-                    .expected = std::move(expected),
-                    .found = fmt::format("\"{}\"", found),
-                    .advice = "torsio simulate --list shows them"});
+[[noreturn]] void refuse(std::string_view what, std::string expected, std::string_view found,
+                         std::span<const std::string_view> known = {}) {
+  const std::string nearest = did_you_mean(found, known);
+  throw UsageError(
+      {.place = "actuator",
+       .problem = fmt::format("unknown {}", what),
+       .expected = std::move(expected),
+       .found = fmt::format("\"{}\"", found),
+       .advice = (nearest.empty() ? "" : nearest + " ") + "torsio simulate --list shows them"});
 }
 
 std::optional<unsigned> serial_of(std::string_view digits) {
@@ -72,7 +76,7 @@ DataSheet data_sheet(std::string_view name) {
   if (found == sheets.end()) {
     std::vector<std::string_view> known(sheets.size());
     std::ranges::transform(sheets, known.begin(), &DataSheet::name);
-    refuse("name", one_of(known), parts.base);
+    refuse("name", one_of(known), parts.base, known);
   }
   DataSheet sheet = *found;
   if (!parts.variant.empty()) {
@@ -80,7 +84,7 @@ DataSheet data_sheet(std::string_view name) {
     std::erase(known, "");
     if (std::ranges::find(known, parts.variant) == known.end()) {
       refuse(fmt::format("variant of {}", sheet.name),
-             known.empty() ? "none: it has no variants" : one_of(known), parts.variant);
+             known.empty() ? "none: it has no variants" : one_of(known), parts.variant, known);
     }
     set_variant(sheet, parts.variant);
   }

@@ -26,6 +26,6 @@ std::string message(const ErrorReport& report) {
 Error::Error(ErrorReport report)
     : std::runtime_error(message(report)), report_(std::move(report)) {}
 
-Cancelled::Cancelled() : Error({.problem = "stopped on request; nothing was written"}) {}
+Cancelled::Cancelled() : Error({.problem = "stopped on request; no output was touched"}) {}
 
 }  // namespace torsio

@@ -62,6 +62,8 @@ double sample_period_of(const Parameters& parameters) {
     return 0.0;
   else if constexpr (requires { parameters.sample_period_s; })
     return parameters.sample_period_s;
+  else if constexpr (requires { parameters.time.sample_period_s; })
+    return parameters.time.sample_period_s;  // whose substeps are good for that period
   if constexpr (requires { parameters.members; })
     return parameters.members.empty() ? 0.0 : sample_period_of(parameters.members.front());
   return 0.0;
@@ -69,11 +71,15 @@ double sample_period_of(const Parameters& parameters) {
 
 /// A continuous-time model is discretised anew for the rate that it is to run at.
 AnyModel::Parameters at_rate(AnyModel::Parameters parameters, double sample_rate_Hz) {
+  const auto take = [sample_rate_Hz](double& sample_period_s) {
+    if (sample_period_s > 0.0 && sample_rate_Hz > 0.0) sample_period_s = 1.0 / sample_rate_Hz;
+  };
   std::visit(
       [&]<class P>(P& of) {
         if constexpr (requires { requires P::kRunsAtAnyRate; })
-          if (of.sample_period_s > 0.0 && sample_rate_Hz > 0.0)
-            of.sample_period_s = 1.0 / sample_rate_Hz;
+          take(of.sample_period_s);
+        else if constexpr (requires { of.terms.sample_period_s; })
+          take(of.terms.sample_period_s);  // a grey box, whose relaxation is exact at any
       },
       parameters);
   return parameters;
@@ -91,9 +97,11 @@ void check_sample_rate(const ModelFile& model) {
                .expected = fmt::format("{:.6g} Hz, at which the {} was trained", own_Hz,
                                        family_of(model.parameters)),
                .found = fmt::format("{:.6g} Hz", rate_Hz),
-               .advice = fmt::format("A network with memory runs at no other rate: resample the "
-                                     "recording (--rate {:.6g}), or train a model at this one.",
-                                     own_Hz)});
+               .advice = fmt::format(
+                   "A {} steps by its own sample period and runs at no other rate: resample what "
+                   "it is given to {:.6g} Hz (--rate, where recordings are read), or train one at "
+                   "{:.6g} Hz.",
+                   family_of(model.parameters), own_Hz, rate_Hz)});
 }
 
 /// Checks what only the estimator itself can: that settings and model fit together.

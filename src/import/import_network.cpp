@@ -16,9 +16,6 @@
 namespace torsio {
 namespace {
 
-/// Beyond every quantity, and a range of this much on either side has a width that double can hold.
-constexpr double kOpenRange = 1e300;
-
 constexpr std::size_t kChunk = std::size_t{1} << 16;
 
 void check_scale(double scale, const char* place) {

@@ -1,6 +1,7 @@
 #include "torsio/import/weights_json.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -128,11 +129,13 @@ class WeightReader {
     result.values = std::move(weights->values);
     return result;
   }
-  /// 0 if there is none.
+  /// 0 if there is none, which is remembered.
   [[nodiscard]] std::vector<double> bias(const std::string& name, std::size_t length) {
     const std::optional<Weights> weights = take(name);
-    std::vector<double> none(length, 0.0);
-    if (!weights) return none;
+    if (!weights) {
+      taken_as_zero_.push_back(name);
+      return std::vector<double>(length, 0.0);
+    }
     if (weights->shape.size() != 1 || weights->values.size() != length)
       refuse(at(name), fmt::format("shape [{}]", length), shape_text(weights->shape));
     return weights->values;
@@ -143,6 +146,7 @@ class WeightReader {
       if (name.ends_with(suffix)) return name.substr(0, name.size() - suffix.size());
     return std::nullopt;
   }
+  [[nodiscard]] const std::vector<std::string>& taken_as_zero() const { return taken_as_zero_; }
   void refuse_the_rest() const {
     if (tensors_.empty()) return;
     refuse(
@@ -159,6 +163,7 @@ class WeightReader {
  private:
   Tensors tensors_;
   std::string place_;
+  std::vector<std::string> taken_as_zero_;
 };
 
 void check_columns(const Matrix& matrix, std::size_t expected, const std::string& place) {
@@ -245,6 +250,10 @@ ForeignNetwork parse_weights_json(std::span<const std::byte> bytes, std::string_
   reader.refuse_the_rest();
   if (network.stages.empty()) refuse(network.place, "weights of at least one layer", "none");
   network.inputs = input_count(network.stages.front());
+  if (!reader.taken_as_zero().empty())
+    network.notes.push_back(
+        fmt::format("the file has no {}: taken as 0, as of a layer without bias",
+                    fmt::join(reader.taken_as_zero(), ", ")));
   if (in_scale)
     network.stages.insert(network.stages.begin(),
                           scale_stage(*in_scale, network.inputs, reader.at("in_scale")));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -10,12 +11,14 @@
 #include <vector>
 
 #include "torsio/core/units.hpp"
+#include "torsio/import/import_network.hpp"
 #include "torsio/model/network_layers.hpp"
 #include "torsio/model/parameters.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/train/fit_hammerstein_wiener.hpp"
 #include "torsio/train/fit_narx_polynomial.hpp"
 #include "train/kernel_search.hpp"
+#include "train/named_coefficients.hpp"
 
 namespace torsio {
 namespace {
@@ -128,6 +131,42 @@ std::string equation_line(const ModelFile& model) {
   return equation_of(*narx, model.settings.features.inputs, model.settings.target) + "\n";
 }
 
+std::string coefficient_table(const std::vector<FittedParameter>& told) {
+  TextTable table;
+  table.header({"parameter", "value", "unit"});
+  for (const FittedParameter& each : told)
+    table.row({each.name, fmt::format("{:.6g}", each.value), each.unit});
+  return table.text();
+}
+
+/// A network of another program comes without the range of its inputs.
+bool is_open(double limit) { return std::abs(limit) >= kOpenRange; }
+
+std::string range_table(const EstimatorSettings& settings) {
+  TextTable inputs;
+  inputs.header({"input", "lowest", "highest trained on"});
+  bool has_open = false;
+  const auto limit = [&](double value) {
+    has_open = has_open || is_open(value);
+    return is_open(value) ? std::string("open") : fmt::format("{:.4g}", value);
+  };
+  for (std::size_t j = 0; j < settings.features.inputs.size(); ++j)
+    inputs.row({settings.features.inputs[j], limit(settings.ranges.lowest[j]),
+                limit(settings.ranges.highest[j])});
+  return inputs.text() +
+         (has_open ? "open: nobody said what the model was trained on; no guard answers there\n"
+                   : "");
+}
+
+std::string zero_line(const EstimatorSettings& settings) {
+  if (settings.zeroed_channels.empty()) return {};
+  return fmt::format(
+      "wants the zero of {}: set_zero(channel, value) before the loop, the mapping's zero: on "
+      "files; "
+      "without it every step is zero_not_set\n",
+      fmt::join(settings.zeroed_channels, ", "));
+}
+
 std::string family_of(const ModelFile& model) {
   const std::string own(family_of(model.parameters));
   const std::string& asked = model.card.fitted_as;
@@ -155,14 +194,13 @@ std::string model_description(const ModelFile& model) {
       text += fmt::format(" {} {:.4g}", name, value);
     text += "\n";
   }
-  TextTable inputs;
-  inputs.header({"input", "lowest", "highest trained on"});
-  for (std::size_t j = 0; j < settings.features.inputs.size(); ++j)
-    inputs.row({settings.features.inputs[j], fmt::format("{:.4g}", settings.ranges.lowest[j]),
-                fmt::format("{:.4g}", settings.ranges.highest[j])});
-  text += fmt::format("\n{}", inputs.text());
+  text += zero_line(settings);
+  text += fmt::format("\n{}", range_table(settings));
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
+  const std::vector<FittedParameter> told =
+      named_coefficients(model.parameters, settings.features.inputs, settings.target);
+  if (!told.empty() && told.size() <= kReadable) return text + "\n" + coefficient_table(told);
   std::vector<Leaf> leaves = leaves_of(model);
   std::erase_if(leaves, [](const Leaf& leaf) {
     return leaf.name.starts_with("kernel.") || leaf.name.starts_with("network.nodes.");

@@ -138,7 +138,9 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
   return fmt::format(
       "{} ({}), output {}, {} of {:.4g} Nm, {} run{} a model\n{}{}"
       "errors: of the joint's torque without noise, the first 2 s left out; limits: how often one "
-      "cut;\nfallback: ticks in which the inverse told its line; cycles: runs with a limit cycle\n",
+      "cut;\nfallback: ticks in which the inverse told its line; cycles: runs with a limit cycle;\n"
+      "-3 dB Hz: where a sweep's answer has fallen to 0.71, - where it has not, or never was "
+      "above\n",
       first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,
       rows.size() / models.size(), rows.size() == models.size() ? "" : "s", table.text(), remarks);
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/excitation.hpp"
 
@@ -61,11 +62,13 @@ const ExperimentEntry& experiment_entry(std::string_view name, const DataSheet& 
     if (entry.info.name == name) return entry;
     known.push_back(entry.info.name);
   }
-  throw UsageError({.place = "experiment",
-                    .problem = fmt::format("not one of {}", sheet.name),
-                    .expected = fmt::format("one of {}", fmt::join(known, ", ")),
-                    .found = fmt::format("\"{}\"", name),
-                    .advice = "torsio simulate --list shows them"});
+  const std::string nearest = did_you_mean(name, known);
+  throw UsageError(
+      {.place = "experiment",
+       .problem = fmt::format("not one of {}", sheet.name),
+       .expected = fmt::format("one of {}", fmt::join(known, ", ")),
+       .found = fmt::format("\"{}\"", name),
+       .advice = (nearest.empty() ? "" : nearest + " ") + "torsio simulate --list shows them"});
 }
 
 }  // namespace torsio

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "studies.hpp"
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -52,7 +53,8 @@ const StudyInfo& find_study(std::string_view name) {
   std::array<std::string_view, kStudies.size()> names{};
   std::ranges::transform(kStudies, names.begin(), &StudyInfo::name);
   throw UsageError({.problem = fmt::format("no study is called \"{}\"", name),
-                    .expected = fmt::format("one of {}", fmt::join(names, ", "))});
+                    .expected = fmt::format("one of {}", fmt::join(names, ", ")),
+                    .advice = did_you_mean(name, names)});
 }
 
 Study run_study(const StudyInfo& study, const StudyOptions& options, const Progress& progress) {

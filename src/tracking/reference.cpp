@@ -12,6 +12,7 @@
 
 #include "sim/experiment_table.hpp"
 #include "sim/torque_references.hpp"
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -76,7 +77,8 @@ Kind find_reference(std::string_view name) {
   const auto* const found = std::ranges::find(kNames, name);
   if (found == kNames.end())
     throw UsageError({.problem = fmt::format("no reference is called \"{}\"", name),
-                      .expected = fmt::format("one of {}", fmt::join(kNames, ", "))});
+                      .expected = fmt::format("one of {}", fmt::join(kNames, ", ")),
+                      .advice = did_you_mean(name, kNames)});
   return static_cast<Kind>(found - kNames.begin());
 }
 

@@ -21,6 +21,7 @@ constexpr auto kRoles = std::to_array<Role>({Role::train, Role::validation, Role
 struct FamilyChoice {
   std::string family;
   std::map<std::string, std::string> options;
+  bool operator==(const FamilyChoice&) const = default;
 };
 
 /// "polynomial:degree=7:branch=true" -> family and settings.
@@ -106,10 +107,11 @@ std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view 
   for (const auto& [set_name, inputs] : input_sets) {
     const FeatureSpec features = resolve_inputs(dataset, inputs);
     std::vector<FamilyChoice> wanted;
-    if (models == "all") {
-      wanted = all_choices(dataset, features.inputs);
-    } else {
-      for (const std::string& model : split_inputs(models)) wanted.push_back(parse_choice(model));
+    for (const std::string& model : split_inputs(models)) {
+      const auto meant = model == "all" ? all_choices(dataset, features.inputs)
+                                        : std::vector<FamilyChoice>{parse_choice(model)};
+      for (const FamilyChoice& choice : meant)
+        if (std::ranges::find(wanted, choice) == wanted.end()) wanted.push_back(choice);
     }
     for (FamilyChoice& choice : wanted)
       choices.push_back({std::move(choice.family), std::move(choice.options), set_name, features});

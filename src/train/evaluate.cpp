@@ -11,6 +11,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/model/friction_drive.hpp"
 #include "torsio/train/initial_state.hpp"
+#include "train/finite_input.hpp"
 
 namespace torsio {
 namespace {
@@ -45,19 +46,8 @@ double quantile(std::vector<double> values, double share) {
 std::vector<const std::vector<double>*> raw_channels(const Estimator& estimator,
                                                      const Recording& recording) {
   std::vector<const std::vector<double>*> channels;
-  for (const std::string& input : estimator.raw_inputs()) {
-    const std::vector<double>& values = recording.channel(input).values;
-    const auto bad =
-        std::ranges::find_if_not(values, [](double value) { return std::isfinite(value); });
-    if (bad != values.end())
-      throw Error(
-          {.place = fmt::format("{}: {}", recording.name(), input),
-           .expected = "a finite number in every sample: it is an input of the model",
-           .found = fmt::format("{} at t = {} s", *bad,
-                                recording.time_s(static_cast<std::size_t>(bad - values.begin()))),
-           .advice = "Cut the record there, or bridge a slow sensor with `hold:` in the mapping."});
-    channels.push_back(&values);
-  }
+  for (const std::string& input : estimator.raw_inputs())
+    channels.push_back(&finite_input(recording, input));
   return channels;
 }
 

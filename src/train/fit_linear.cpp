@@ -7,6 +7,7 @@
 #include "torsio/core/error.hpp"
 #include "train/design.hpp"
 #include "train/least_squares.hpp"
+#include "train/named_coefficients.hpp"
 
 namespace torsio {
 namespace {
@@ -149,7 +150,10 @@ Fitted<Linear> fit_linear(const TrainingData& data, const LinearOptions& options
                     "schedule the coefficients",
          .advice = "Add an input that is none, or let rates have slopes: --set rates=true."});
   DesignFit fit = fit_design(design, groups);
-  return {{std::move(fit.coefficients)}, std::move(fit.notes)};
+  Fitted<Linear> fitted{{std::move(fit.coefficients)}, std::move(fit.notes)};
+  fitted.table =
+      fitted_coefficients(fitted.parameters, fitted.parameters.coefficients.values, design, data);
+  return fitted;
 }
 
 Fitted<LinearCoulomb> fit_linear_coulomb(const TrainingData& data,
@@ -174,6 +178,7 @@ Fitted<LinearCoulomb> fit_linear_coulomb(const TrainingData& data,
   DesignFit fit = fit_design(design, groups);
   parameters.coefficients = std::move(fit.coefficients);
   std::ranges::move(fit.notes, std::back_inserter(fitted.notes));
+  fitted.table = fitted_coefficients(parameters, parameters.coefficients.values, design, data);
   return fitted;
 }
 

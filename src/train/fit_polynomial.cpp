@@ -12,6 +12,7 @@
 #include "torsio/core/error.hpp"
 #include "train/design.hpp"
 #include "train/folds.hpp"
+#include "train/named_coefficients.hpp"
 
 namespace torsio {
 namespace {
@@ -202,9 +203,10 @@ Fitted<Polynomial> fit_polynomial(const TrainingData& data, const PolynomialOpti
     fitted.notes.push_back("degree " + std::to_string(parameters.degree) +
                            " chosen by cross-validation");
   }
-  DesignFit fit =
-      fit_design(polynomial_design(data, samples, groups, parameters, options.rates), groups);
+  const Design design = polynomial_design(data, samples, groups, parameters, options.rates);
+  DesignFit fit = fit_design(design, groups);
   parameters.coefficients = std::move(fit.coefficients);
+  fitted.table = fitted_coefficients(parameters, parameters.coefficients.values, design, data);
   std::ranges::move(fit.notes, std::back_inserter(fitted.notes));
   return fitted;
 }

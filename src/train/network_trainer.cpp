@@ -7,8 +7,11 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <sstream>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
@@ -312,13 +315,42 @@ TrainingCheckpoint first_state(std::vector<float> weights, const std::string& re
   return state;
 }
 
+std::vector<std::string> words_of(const std::string& recipe) {
+  std::istringstream text(recipe);
+  std::vector<std::string> words;
+  for (std::string word; text >> word;) {
+    if (word.ends_with(',')) word.pop_back();
+    words.push_back(std::move(word));
+  }
+  return words;
+}
+
+/// What of "epochs 200 batch 64 ..." is another in `other`, as `recipe` has it; all of it where they
+/// are not alike.
+std::string differing_part(const std::string& recipe, const std::string& other) {
+  const std::vector<std::string> own = words_of(recipe);
+  const std::vector<std::string> others = words_of(other);
+  if (own.size() != others.size() || own.empty() || own[0] != others[0]) return recipe;
+  std::string part;
+  for (std::size_t i = 1; i < own.size(); ++i) {
+    const bool is_data = own[i - 1] == "data";  // last; other windows or seeds change it, too
+    if (own[i] == others[i] || (is_data && !part.empty())) continue;
+    part += part.empty() ? "" : ", ";
+    const bool is_value = own[i - 1] == others[i - 1];
+    part += is_data    ? "recordings of fingerprint " + own[i]
+            : is_value ? own[i - 1] + " " + own[i]
+                       : own[i];
+  }
+  return part;
+}
+
 TrainingCheckpoint resumed_state(const TrainingCheckpoint& from, std::size_t parameters,
                                  const std::string& recipe) {
   if (from.recipe != recipe)
     throw UsageError(
         {.place = "checkpoint",
-         .expected = "one of this training: " + recipe,
-         .found = from.recipe,
+         .expected = "one of this training: " + differing_part(recipe, from.recipe),
+         .found = differing_part(from.recipe, recipe),
          .advice = "Resume with the recordings, settings and seed of the first call."});
   for (const std::vector<float>* values : {&from.weights, &from.mean, &from.square, &from.best})
     if (values->size() != parameters)

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <vector>
 
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 
@@ -67,9 +69,13 @@ Options::Options(std::span<const OptionInfo> known,
   for (const OptionInfo& option : known) values_.emplace(option.name, option.default_value);
   for (const auto& [option_name, value] : given) {
     const auto option = std::ranges::find(known, option_name, &OptionInfo::name);
-    if (option == known.end())
-      throw UsageError(
-          {.problem = "unknown option \"" + option_name + '"', .expected = names_of(known)});
+    if (option == known.end()) {
+      std::vector<std::string_view> names;
+      for (const OptionInfo& each : known) names.push_back(each.name);
+      throw UsageError({.problem = "unknown option \"" + option_name + '"',
+                        .expected = names_of(known),
+                        .advice = did_you_mean(option_name, names)});
+    }
     if (!is_valid(*option, value))
       throw UsageError({.place = "option " + option_name,
                         .expected = expected_of(*option),

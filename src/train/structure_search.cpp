@@ -50,8 +50,6 @@ constexpr std::array<std::string_view, 8> kSlow{"arx",
                                                 "viscoelastic",
                                                 "hammerstein_wiener"};
 
-constexpr std::size_t kSearchFolds = 3;
-
 }  // namespace
 
 std::vector<ModelChoice> search_candidates(const Dataset& dataset,

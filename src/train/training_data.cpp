@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "torsio/core/error.hpp"
+#include "train/finite_input.hpp"
 
 namespace torsio {
 namespace {
@@ -19,35 +20,18 @@ std::vector<std::uint8_t> role_mask(const DatasetRecord& record, Role role) {
   return mask;
 }
 
-std::vector<const Channel*> raw_channels(const Recording& recording,
-                                         const FeaturePipeline& pipeline) {
-  std::vector<const Channel*> channels;
-  for (const std::string& channel_name : pipeline.raw_inputs()) {
-    const Channel& channel = recording.channel(channel_name);
-    const auto bad =
-        std::ranges::find_if(channel.values, [](double value) { return !std::isfinite(value); });
-    if (bad != channel.values.end()) {
-      const auto sample = static_cast<std::size_t>(bad - channel.values.begin());
-      throw Error(
-          {.place = fmt::format("{}: channel {} at t = {:.6g} s (sample {})", recording.name(),
-                                channel_name, recording.time_s(sample), sample),
-           .expected = "a finite value, since the model's inputs need it",
-           .found = fmt::format("{}", *bad),
-           .advice = fmt::format("If the sensor is slower or drops a sample now and then, say in a "
-                                 "mapping  hold: [{}]  which repeats the last value. Else cut the "
-                                 "gap out or choose inputs without this channel; only the target "
-                                 "may be missing.",
-                                 channel_name)});
-    }
-    channels.push_back(&channel);
-  }
+std::vector<const std::vector<double>*> raw_channels(const Recording& recording,
+                                                     const FeaturePipeline& pipeline) {
+  std::vector<const std::vector<double>*> channels;
+  for (const std::string& input : pipeline.raw_inputs())
+    channels.push_back(&finite_input(recording, input));
   return channels;
 }
 
 Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::string& target,
              Role role) {
   const Recording& recording = record.recording;
-  const std::vector<const Channel*> channels = raw_channels(recording, pipeline);
+  const std::vector<const std::vector<double>*> channels = raw_channels(recording, pipeline);
   const Channel& measured = recording.channel(target);
   Sequence sequence{.recording = recording.name(),
                     .features = Matrix(recording.size(), pipeline.feature_count()),
@@ -57,7 +41,7 @@ Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::
   pipeline.reset();
   for (std::size_t n = 0; n < recording.size(); ++n) {
     std::ranges::transform(channels, raw.begin(),
-                           [n](const Channel* channel) { return channel->values[n]; });
+                           [n](const auto* channel) { return (*channel)[n]; });
     std::ranges::copy(pipeline.step(raw), sequence.features.row(n).begin());
     if (!pipeline.is_settled() || !measured.is_fresh(n) || !std::isfinite(measured.values[n]) ||
         !sequence.has_features(n))
@@ -103,11 +87,14 @@ TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role
       data.sequences.push_back(run(record, pipeline, dataset.target, role));
   if (data.usable_samples() == 0) {
     refuse_if_not_finite(data);
+    std::size_t samples = 0;
+    for (const Sequence& sequence : data.sequences) samples += sequence.target.size();
     throw Error({.problem = "nothing to use with role " + std::string(name(role)),
                  .expected = "samples with a measured " + dataset.target +
                              " after the filters have settled (" +
                              std::to_string(pipeline.settling_samples()) + " samples)",
-                 .found = std::to_string(data.sequences.size()) + " records of that role"});
+                 .found = std::to_string(data.sequences.size()) + " record(s) of that role with " +
+                          std::to_string(samples) + " samples in all"});
   }
   return data;
 }

@@ -146,6 +146,20 @@ TEST(ModelFile, OfAContinuousTimeModelIsDiscretisedForAnotherRate) {
   EXPECT_EQ(std::get<Viscoelastic::Parameters>(model.parameters).sample_period_s, 1e-3);
 }
 
+TEST(ModelFile, OfAGreyBoxIsDiscretisedForAnotherRate) {
+  ModelFile model = example_model_file(example<GreyBox>());
+  model.settings.sample_rate_Hz = 250.0;
+  const Estimator estimator = make_estimator(model);
+  EXPECT_EQ(estimator.model().get_if<GreyBox>()->sample_period(), 4e-3);
+}
+
+TEST(ModelFile, OfASecondOrderSystemRunsAtItsOwnRateOnly) {
+  ModelFile model = example_model_file(example<DynamicBoucWen>());
+  const double own_Hz = 1.0 / example<DynamicBoucWen>().sample_period();
+  model.settings.sample_rate_Hz = 0.5 * own_Hz;
+  EXPECT_THAT(error_message([&] { (void)make_estimator(model); }), HasSubstr("sample rate"));
+}
+
 TEST(ModelFile, OfANetworkWithMemoryRunsAtItsOwnRateOnly) {
   ModelFile model = example_model_file(example<Gru>());
   model.settings.sample_rate_Hz = 1000.0 * (1.0 + 1e-4);  // as a clock measures it
@@ -154,7 +168,7 @@ TEST(ModelFile, OfANetworkWithMemoryRunsAtItsOwnRateOnly) {
   EXPECT_THAT(error_message([&] { (void)make_estimator(model); }),
               testing::AllOf(HasSubstr("sample rate: expected 1000 Hz, at which the gru was "
                                        "trained, found 250 Hz"),
-                             HasSubstr("resample the recording (--rate 1000)")));
+                             HasSubstr("resample what it is given to 1000 Hz")));
   model = example_model_file(example<Mlp>());
   model.settings.sample_rate_Hz = 250.0;
   EXPECT_NO_THROW((void)make_estimator(model));

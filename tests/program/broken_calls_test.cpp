@@ -1,5 +1,8 @@
 // Bad calls and bad input through the program: a clear message, the right exit code, nothing
 // half-written.
+#include <csignal>
+#include <utility>
+
 #include "program/program.hpp"
 
 namespace torsio::test {
@@ -7,6 +10,7 @@ namespace {
 
 constexpr int kWorkFailed = 1;
 constexpr int kCallWasWrong = 2;
+constexpr int kInterrupted = 128 + SIGINT;
 
 class BrokenCalls : public Program {
  protected:
@@ -30,6 +34,29 @@ TEST_F(BrokenCalls, OfTheCommandLineExitWithTwo) {
   expect_error(torsio("simulate dfki-50 sweep --duration 3Nm -o x.csv"), kCallWasWrong,
                "--duration");
   EXPECT_EQ(torsio("check").exit_code, kCallWasWrong);
+}
+
+TEST_F(BrokenCalls, NameTheNearestOfWhatThereIs) {
+  const auto suggests = [this](const std::string& call, const std::string& right) {
+    expect_error(torsio(call), kCallWasWrong, "Did you mean '" + right + "'?");
+  };
+  suggests("fitt a.csv", "fit");
+  expect_error(torsio("track -o rows.json"), kCallWasWrong,
+               "torsio track: there is no option '-o'");
+  suggests("fit a.csv --modle linear -o m.safetensors", "--model");
+  suggests("simulate dfki50 sweep -o a.csv", "dfki-50");
+  suggests("simulate dfki-50:bouc-wenn sweep -o a.csv", "bouc-wen");
+  suggests("simulate dfki-50 swep -o a.csv", "sweep");
+  suggests("reproduce 001-model", "001-models");
+  suggests("track --reference chrip", "chirp");
+  record();
+  suggests("fit a.csv --model polynomial --set degre=3 -o m.safetensors", "degree");
+}
+
+TEST_F(BrokenCalls, OfFitNameOnlyWhatIsMissing) {
+  expect_error(torsio("fit a.csv --model linear"), kCallWasWrong, "torsio fit: -o FILE missing");
+  expect_error(torsio("fit a.csv --model linear --set degree 3"), kCallWasWrong,
+               "expected option=value in one word");
 }
 
 TEST_F(BrokenCalls, OfImportLeaveTheirOutputAlone) {
@@ -151,7 +178,7 @@ TEST_F(BrokenCalls, OfAttributionSayWhatIsMissing) {
   expect_error(torsio(call + "b.csv"), kWorkFailed, "gear_angle_rad");
   expect_error(shell("timeout --foreground --signal=INT --preserve-status 2 {torsio} " + call +
                      "a.csv --windows 20000 --background 2000 --window 0.1s --json x.json"),
-               kWorkFailed, "stopped on request");
+               kInterrupted, "stopped on request");
   EXPECT_EQ(contents("x.json"), "");
 }
 
@@ -184,7 +211,7 @@ TEST_F(BrokenCalls, OfAdaptationSayWhatIsMissingAndLeaveTheOutputUntouched) {
   expect_error(torsio("adapt m.safetensors a.csv -o a.csv"), kCallWasWrong, "replace");
   expect_error(torsio("adapt m.safetensors a.csv -o no/such/m.safetensors"), kCallWasWrong,
                "no/such");
-  expect_error(torsio("adapt m.safetensors a.csv -o /dev/full"), kWorkFailed, "/dev/full");
+  expect_error(torsio("adapt m.safetensors a.csv -o /dev/full"), kCallWasWrong, "/dev/full");
   expect_error(shell("trap '' XFSZ; ulimit -f 1; {torsio} " + call + ">/dev/null"), kWorkFailed,
                "old.safetensors: cannot write: File too large");
   EXPECT_EQ(files(), before);
@@ -217,7 +244,7 @@ TEST_F(BrokenCalls, CtrlCDuringAnAdaptationLeavesTheOutputUntouched) {
   expect_error(shell("timeout --foreground --signal=INT --preserve-status 2 {torsio} adapt "
                      "m.safetensors a.csv "
                      "--method rls -o old.safetensors --json x.json"),
-               kWorkFailed, "stopped on request");
+               kInterrupted, "stopped on request");
   EXPECT_EQ(contents("old.safetensors"), "precious");
   EXPECT_EQ(contents("x.json"), "");
 }
@@ -236,17 +263,18 @@ TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
       "timeout --foreground --signal=INT --preserve-status 1 {torsio} fit a.csv --model dgmm --set "
       "components=2000 "
       "--set novelty_distance=0.01 --set em_iterations=10000 -o m.safetensors");
-  EXPECT_EQ(outcome.exit_code, kWorkFailed) << outcome.err;
+  EXPECT_EQ(outcome.exit_code, kInterrupted) << outcome.err;
   EXPECT_NE(outcome.err.find("stopped on request"), std::string::npos) << outcome.err;
   EXPECT_EQ(contents("m.safetensors"), "precious");
 }
 
-TEST_F(BrokenCalls, CtrlCStopsTheWaitForAPipe) {
-  for (const char* signal : {"INT", "TERM"}) {
+TEST_F(BrokenCalls, CtrlCStopsTheWaitForAPipeAndTellsTheShell) {
+  for (const auto& [signal, exit_code] :
+       {std::pair("INT", kInterrupted), std::pair("TERM", 128 + SIGTERM)}) {
     const Outcome outcome = shell(
         std::string("rm -f pipe; mkfifo pipe; sleep 4 >pipe & timeout --foreground --signal=") +
         signal + " --preserve-status 1 {torsio} check pipe");
-    EXPECT_EQ(outcome.exit_code, kWorkFailed) << outcome.err;
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
     EXPECT_NE(outcome.err.find("stopped on request"), std::string::npos) << outcome.err;
   }
 }
@@ -273,7 +301,15 @@ TEST_F(BrokenCalls, OnAFullDiskSaySoAndLeaveNothing) {
 
 TEST_F(BrokenCalls, NameTheOutputThatCannotBeAFile) {
   record();
-  expect_error(torsio("fit a.csv --model linear -o /dev/full"), kWorkFailed, "/dev/full");
+  // "precious" is no recording: what is refused, is refused before it is read.
+  folder_.file("b.csv", "precious");
+  expect_error(torsio("fit b.csv --model linear -o /dev/full"), kCallWasWrong,
+               "/dev/full: expected a file to write the model to");
+  expect_error(torsio("fit b.csv --model linear -o -"), kCallWasWrong, "standard output");
+  expect_error(torsio("compare b.csv --test a.csv -o ."), kCallWasWrong, "found a folder");
+  expect_error(torsio("simulate dfki-50 sweep -o ."), kCallWasWrong, "found a folder");
+  expect_error(torsio("simulate dfki-50 sweep -o a.csv --plot p.png"), kCallWasWrong,
+               "--plot: expected a file that ends in .svg, found p.png");
   expect_error(torsio("fit a.csv --model linear -o no/such/folder/m.safetensors"), kCallWasWrong,
                "no/such/folder");
 }

@@ -208,6 +208,13 @@ TEST_F(MainJob, RunsTheExamples) {
       shell(std::string(TORSIO_EXAMPLES) + "/example_01_estimate_torque joint.safetensors");
   EXPECT_EQ(estimate.exit_code, 0) << estimate.err;
   EXPECT_NE(estimate.out.find("Nm +-"), std::string::npos) << estimate.out;
+  ASSERT_EQ(torsio("fit a.csv --model linear --inputs spring_deflection_rad,motor_current_A -o "
+                   "current.safetensors")
+                .exit_code,
+            0);
+  const Outcome lacking =
+      shell(std::string(TORSIO_EXAMPLES) + "/example_01_estimate_torque current.safetensors");
+  EXPECT_EQ(lacking.out, "t = 0.000 s: fault input_not_finite\n") << "told once, not in silence";
   const Outcome control =
       shell(std::string(TORSIO_EXAMPLES) + "/example_04_torque_control joint.safetensors");
   EXPECT_EQ(control.exit_code, 0) << control.err;
@@ -243,6 +250,21 @@ TEST_F(MainJob, TellsMachinesWhatItSimulated) {
   EXPECT_EQ(sheet.at("variant"), "bouc-wen");
   EXPECT_GT(sheet.at("longest_step_s"), 1e-5);
   EXPECT_LT(sheet.at("natural_frequencies_Hz").at(0), sheet.at("natural_frequencies_Hz").at(1));
+}
+
+TEST_F(MainJob, SaysWhatToTrainASpringOfOtherChannelsOn) {
+  for (const char* bench : {"rubber-clutch multisine", "harmonic-drive:soft human-torque",
+                            "harmonic-drive:rigid human-torque"}) {
+    const Outcome simulated =
+        torsio("simulate " + std::string(bench) + " --duration 20s -o other.csv");
+    ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+    const std::size_t inputs = simulated.err.find("--inputs '");
+    ASSERT_NE(inputs, std::string::npos) << simulated.err;
+    const std::string flag =
+        simulated.err.substr(inputs, simulated.err.find('\n', inputs) - inputs);
+    EXPECT_EQ(torsio("fit other.csv --model linear -o m.safetensors " + flag).exit_code, 0) << flag;
+    EXPECT_NE(torsio("simulate --list").out.find("with --inputs '"), std::string::npos);
+  }
 }
 
 TEST_F(MainJob, RecordsAnActuatorThatFailsAndWears) {

@@ -27,6 +27,7 @@ TEST_F(TrackVerb, ComparesAModelWithTheLineAndRecordsTheLoop) {
   ASSERT_EQ(table.exit_code, 0) << table.err;
   for (const char* word : {"chirp of 13 Nm", "linear", "m.safetensors", "-3 dB Hz", "2 runs"})
     EXPECT_NE(table.out.find(word), std::string::npos) << table.out;
+  EXPECT_EQ(table.err.find("another actuator"), std::string::npos) << table.err;
   const auto json = nlohmann::json::parse(contents("rows.json"));
   ASSERT_EQ(json.at("results").size(), 4U);
   EXPECT_EQ(json.at("results").at(3).at("seed"), 2);
@@ -44,7 +45,22 @@ TEST_F(TrackVerb, ComparesAModelWithTheLineAndRecordsTheLoop) {
       0);
 }
 
+TEST_F(TrackVerb, WarnsOfAModelOfAnotherActuator) {
+  ASSERT_EQ(torsio("simulate dfki-120 sweep --duration 40s -o stiff.csv").exit_code, 0);
+  ASSERT_EQ(torsio("fit stiff.csv --model linear -o stiff.safetensors").exit_code, 0);
+  const Outcome table = torsio("track --actuator dfki-50 --duration 5s --model stiff.safetensors");
+  EXPECT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_NE(table.err.find("stiff.safetensors winds the spring 0."), std::string::npos)
+      << table.err;
+  EXPECT_NE(table.err.find("was it trained on another actuator?"), std::string::npos) << table.err;
+}
+
 TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
+  expect_error(torsio("track --output out.csv"), kCallWasWrong, "Results go to --json FILE");
+  expect_error(torsio("track --record run.tsr"), kCallWasWrong, "a file that ends in .csv or .gz");
+  expect_error(torsio("track --model a.safetensors --model a.safetensors"), kCallWasWrong,
+               "a.safetensors is given twice");
+  expect_error(torsio("track --bandwidth 50Nm"), kCallWasWrong, "--bandwidth");
   expect_error(torsio("track --actuator elastomer"), kCallWasWrong, "series-elastic");
   expect_error(torsio("track --amplitude 130Nm"), kCallWasWrong, "the 120 Nm that dfki-120 is");
   expect_error(torsio("track --output free --amplitude 70Nm"), kCallWasWrong, "tip the lever over");
@@ -74,6 +90,10 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
 TEST_F(TrackVerb, TuneLoopProposesGainsWithTheirMarginsOrRefuses) {
   const Outcome table = torsio("tune-loop --actuator dfki-50 --json gains.json");
   ASSERT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_EQ(torsio("tune-loop --bandwidth 50rad_s").out,
+            torsio("tune-loop --bandwidth 50rad/s").out);
+  EXPECT_NE(torsio("tune-loop --bandwidth 50rad_s").out.find("bandwidth 7.958 Hz"),
+            std::string::npos);
   for (const char* word : {"proportional", "locked", "free", "phase margin", "passive up to"})
     EXPECT_NE(table.out.find(word), std::string::npos) << table.out;
   const auto json = nlohmann::json::parse(contents("gains.json"));

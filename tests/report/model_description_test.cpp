@@ -5,6 +5,7 @@
 
 #include "support/example_model_file.hpp"
 #include "support/example_models.hpp"
+#include "torsio/import/import_network.hpp"
 
 namespace torsio {
 namespace {
@@ -20,9 +21,26 @@ TEST(ModelDescription, OfANetworkIsALineALayer) {
   EXPECT_THAT(text, HasSubstr("residual_std = 0.7\n"));
 }
 
-TEST(ModelDescription, OfALineTellsItsNumbers) {
-  EXPECT_THAT(model_description(test::example_model_file(test::example<Linear>())),
-              HasSubstr("coefficients.values = 0.5, 600, 0.25\n"));
+TEST(ModelDescription, OfALineNamesItsCoefficientsAndTheirUnits) {
+  const std::string text = model_description(test::example_model_file(test::example<Linear>()));
+  EXPECT_THAT(text, testing::ContainsRegex("k1 \\(spring_deflection_rad\\) +600 +Nm/rad"));
+  EXPECT_THAT(text, testing::ContainsRegex("b +0.5 +Nm"));
+}
+
+TEST(ModelDescription, SaysWhichZerosTheModelWants) {
+  ModelFile file = test::example_model_file(test::example<Linear>());
+  EXPECT_THAT(model_description(file), HasSubstr("wants the zero of joint_angle_rad: set_zero("));
+  file.settings.zeroed_channels.clear();
+  EXPECT_THAT(model_description(file), testing::Not(HasSubstr("zero")));
+}
+
+TEST(ModelDescription, DoesNotCallAnOpenRangeTrainedOn) {
+  ModelFile file = test::example_model_file(test::example<Linear>());
+  file.settings.ranges.lowest[0] = -kOpenRange;
+  file.settings.ranges.highest[0] = kOpenRange;
+  const std::string text = model_description(file);
+  EXPECT_THAT(text, testing::Not(HasSubstr("e+300")));
+  EXPECT_THAT(text, HasSubstr("open: nobody said what the model was trained on"));
 }
 
 TEST(ModelDescription, StatesAKernelAsAnExpressionWithItsNumbers) {

@@ -107,6 +107,15 @@ TEST(ModelChoices, OfAllScheduleOverAConditionThatChangesInTraining) {
   EXPECT_GE(scheduled, 3);
 }
 
+TEST(ModelChoices, OfAllAndMoreAreAllWithThatAdded) {
+  const Dataset dataset = test::bench_dataset();
+  const std::size_t all = model_choices(dataset, "all", {}).size();
+  const auto more = model_choices(dataset, "all,lstm,linear", {});
+  ASSERT_EQ(more.size(), all + 1) << "linear is among all";
+  EXPECT_EQ(more.back().family, "lstm");
+  EXPECT_EQ(model_choices(dataset, "linear,all", {}).size(), all);
+}
+
 TEST(RankedTable, PutsTheBestFirst) {
   const std::string table = ranked_table(small_comparison().results, Role::test);
   EXPECT_LT(table.find("linear_coulomb"), table.find("linear "));

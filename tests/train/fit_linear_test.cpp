@@ -50,6 +50,23 @@ TEST(FitLinear, RecoversASpringAndLeavesRatesOut) {
   EXPECT_TRUE(fitted.notes.empty());
 }
 
+TEST(FitLinear, TellsTheStiffnessWithUnitAndError) {
+  const auto data = training_data_of(deflection_and_rate(), oscillation(500), [](Row x) {
+    return 0.7 + 350.0 * x[0] + 0.01 * std::sin(1e4 * x[0]);
+  });
+  const auto table = fit_linear(data, {}).table;
+  ASSERT_EQ(table.size(), 2U);
+  EXPECT_EQ(table[1].name, "k1 (spring_deflection_rad)");
+  EXPECT_EQ(table[1].unit, "Nm/rad");
+  EXPECT_NEAR(table[1].value, 350.0, 3.0 * table[1].std_error);
+  EXPECT_GT(table[1].std_error, 0.0);
+  const auto coulomb = fit_linear_coulomb(data, {.rates = true}).table;
+  ASSERT_EQ(coulomb.size(), 5U);
+  EXPECT_EQ(coulomb[2].unit, "Nm/(rad/s)");
+  EXPECT_EQ(coulomb[4].name, "v");
+  EXPECT_EQ(coulomb[4].unit, "rad/s");
+}
+
 TEST(FitLinear, GivesRatesASlopeWhenAsked) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(500),
                                      [](Row x) { return 0.7 + 350.0 * x[0] - 2.0 * x[1]; });

@@ -244,6 +244,10 @@ TEST(FitNetwork, RefusesACheckpointOfAnotherTraining) {
   const auto lstm = [&](const FitContext& context) { return fit_lstm(data, options, context); };
   const TrainingCheckpoint kept = stopped_at(5, lstm);
   EXPECT_THROW((void)lstm({.seed = 7, .resume = &kept}), UsageError);
+  const std::string message =
+      test::error_message([&] { (void)lstm({.seed = 7, .resume = &kept}); });
+  EXPECT_THAT(message, testing::HasSubstr("expected one of this training: seed 7, found seed 6"))
+      << "only what differs is named";
   options.layers = {9};
   EXPECT_THROW((void)lstm({.seed = 6, .resume = &kept}), UsageError);
 }

@@ -43,6 +43,10 @@ TEST(FitPolynomial, RecoversACurveOfItsDegree) {
   EXPECT_EQ(fitted.parameters.degree, 5U);
   EXPECT_LT(evaluate(Polynomial(fitted.parameters), data).max_abs, 1e-10);
   EXPECT_EQ(Polynomial(fitted.parameters).parameter_count(), 6U);
+  ASSERT_EQ(fitted.table.size(), 8U) << "six coefficients and the scale of their variable";
+  EXPECT_EQ(fitted.table[1].name, "a1");
+  EXPECT_EQ(fitted.table[1].unit, "Nm");
+  EXPECT_EQ(fitted.table[7].unit, "rad");
 }
 
 TEST(FitPolynomial, RecoversBothBranchesOfALoop) {

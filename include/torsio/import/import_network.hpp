@@ -39,6 +39,10 @@ struct ImportedModel {
   std::vector<std::string> notes;  ///< what its user should know
 };
 
+/// Stands for no limit in the ranges of inputs: beyond every quantity, and a range of this much on
+/// either side has a width that double can hold.
+inline constexpr double kOpenRange = 1e300;
+
 /// A network of another program inside torsio's estimator. Range guard, linear fallback and error
 /// bar are taken from `guards` (all of its records, whatever their role). Without it the guard is open, the
 /// fallback says 0 and there is no error bar; a note says so.

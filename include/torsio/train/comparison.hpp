@@ -13,8 +13,9 @@
 
 namespace torsio {
 
-/// Reads `--models`: `all`, or families separated by commas, each with settings behind colons
-/// (`linear,polynomial:degree=7:branch=true`). Each is paired with every input set. `all` is every
+/// Reads `--models`: families separated by commas, each with settings behind colons
+/// (`linear,polynomial:degree=7:branch=true`), or `all` in the place of one (`all,lstm`); what is
+/// asked for twice is taken once. Each is paired with every input set. `all` is every
 /// family that is not `only_if_named`, `polynomial` also without branches, and, where a condition
 /// takes several values in training, the scheduled variants over it.
 /// @throws UsageError for a family or setting that does not exist.

@@ -33,7 +33,7 @@ struct FamilyInfo {
   /// Deterministic for a seed. @throws Error if the data do not suffice, Cancelled.
   FittedModel (*fit)(const TrainingData&, const Options&, const FitContext&);
   bool can_resume = false;     ///< uses `FitContext::resume` and `keep`
-  bool only_if_named = false;  ///< too slow for "all families"
+  bool only_if_named = false;  ///< not in `all`: slow, or made for other data than most have
 };
 
 /// Every family that can be trained, cheapest first.

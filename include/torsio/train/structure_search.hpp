@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 #include <vector>
@@ -13,6 +14,8 @@ namespace torsio {
 
 /// How `--models` asks for a search.
 inline constexpr std::string_view kSearch = "search";
+/// Fits of each candidate.
+inline constexpr std::size_t kSearchFolds = 3;
 
 struct StructureSearch {
   std::vector<ModelChoice> winners;  ///< the best of each family, best family first

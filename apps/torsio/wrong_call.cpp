@@ -1,0 +1,42 @@
+#include "wrong_call.hpp"
+
+#include <fmt/format.h>
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/did_you_mean.hpp"
+
+namespace {
+
+std::string refusal(std::string_view place, std::string_view kind, std::string_view wrong,
+                    const std::vector<std::string>& known) {
+  const std::string nearest = torsio::did_you_mean(wrong, known);
+  return fmt::format("{}: there is no {} '{}'. {}{}{} --help lists what there is.", place, kind,
+                     wrong, nearest, nearest.empty() ? "" : " ", place);
+}
+
+std::string unknown_option(const CLI::App& verb, const std::vector<std::string>& left) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : verb.get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  for (const std::string& word : left) {
+    const std::string name = word.substr(0, word.find('='));
+    if (name.starts_with('-') && name.size() > 1)
+      return refusal("torsio " + verb.get_name(), "option", name, known);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string unknown_name(const CLI::App& app, int argc, char** argv) {
+  for (const CLI::App* verb : app.get_subcommands())
+    return unknown_option(*verb, verb->remaining());
+  std::vector<std::string> verbs;
+  for (const CLI::App* verb : app.get_subcommands({})) verbs.push_back(verb->get_name());
+  for (const char* word : std::span(argv, static_cast<std::size_t>(argc)).subspan(1))
+    if (*word != '-') return refusal("torsio", "verb", word, verbs);
+  return {};
+}

@@ -1,0 +1,24 @@
+#include "torsio/core/did_you_mean.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string_view>
+
+namespace torsio {
+namespace {
+
+constexpr std::array<std::string_view, 3> kVerbs{"fit", "evaluate", "compare"};
+
+TEST(DidYouMean, NamesTheNearestName) {
+  EXPECT_EQ(did_you_mean("fitt", kVerbs), "Did you mean 'fit'?");
+  EXPECT_EQ(did_you_mean("comapre", kVerbs), "Did you mean 'compare'?");
+}
+
+TEST(DidYouMean, KeepsQuietWhereNothingIsNear) {
+  EXPECT_EQ(did_you_mean("simulate", kVerbs), "");
+  EXPECT_EQ(did_you_mean("", kVerbs), "");
+}
+
+}  // namespace
+}  // namespace torsio
