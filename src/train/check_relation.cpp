@@ -135,13 +135,12 @@ void Checker::check_sign() {
         std::vector<double> values;
         for (const Pair& pair : pairs_) values.push_back(correlation(pair.input, pair.target));
         const std::string flipped = flipped_source(values);
+        if (!flipped.empty()) std::ranges::fill(spoiled_, std::uint8_t{1});
         const bool some_rise =
             std::ranges::any_of(values, [](double value) { return value > kClearCorrelation; });
         for (std::size_t r = 0; r < values.size(); ++r) {
           const std::string& recording = dataset_.records[r].recording.name();
-          if (flips_[r]) {
-            report_flip(r);
-          } else if (!flipped.empty() && values[r] < kTogether) {
+          if (!flipped.empty() && values[r] < kTogether) {
             add(Verdict::fail, "sign", recording,
                 fmt::format("{} does not follow {} (correlation {:.3f}), but would with {} turned "
                             "round",
@@ -149,6 +148,8 @@ void Checker::check_sign() {
                 fmt::format(
                     "Mapping: channels: {{{0}: {{from: ..., sign: -1}}}}, with the column of {0}",
                     flipped));
+          } else if (flips_[r] && flipped.empty()) {
+            report_flip(r);
           } else if (values[r] < -kClearCorrelation) {
             add(Verdict::fail, "sign", recording,
                 fmt::format("{} falls with {} (correlation {:.3f})", dataset_.target,
