@@ -37,7 +37,8 @@ TEST_F(MainJob, GoesFromARecordingToADeployedModel) {
   EXPECT_EQ(evaluate.exit_code, 0) << evaluate.err;
   const Outcome description = torsio("evaluate joint.safetensors");
   EXPECT_NE(description.out.find("trained on a.csv"), std::string::npos) << description.out;
-  EXPECT_NE(description.out.find("coefficients.values = "), std::string::npos) << description.out;
+  EXPECT_NE(description.out.find("k1 (spring_deflection_rad)"), std::string::npos)
+      << description.out;
   const auto model = nlohmann::json::parse(torsio("evaluate joint.safetensors --json -").out);
   EXPECT_NEAR(model.at("parameters").at("coefficients.values").at(1), 573.0, 100.0);
   const auto json = nlohmann::json::parse(evaluate.out);
