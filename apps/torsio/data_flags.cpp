@@ -58,8 +58,9 @@ double angular_frequency_rad_s(const std::string& text, const char* option) {
   constexpr std::string_view kSlash = "rad/s";
   std::string in_words = text;
   if (text.ends_with(kSlash)) in_words.replace(text.size() - kSlash.size(), kSlash.size(), "rad_s");
-  if (in_words.ends_with("rad_s")) return torsio::si_quantity(in_words, "rad_s", option);
-  return 2.0 * std::numbers::pi * torsio::si_quantity(text, "Hz", option);
+  if (in_words.ends_with("rad_s"))
+    return above_zero(torsio::si_quantity(in_words, "rad_s", option), option);
+  return 2.0 * std::numbers::pi * above_zero(torsio::si_quantity(text, "Hz", option), option);
 }
 
 std::string families_beyond_all() {

@@ -39,7 +39,7 @@ struct DataFlags {
 
 inline constexpr std::uint64_t kDefaultSeed = 1;
 
-/// A frequency of a loop in Hz or rad/s ("8Hz", "50rad_s"), in rad/s. @throws torsio::UsageError.
+/// A frequency of a loop in Hz or rad/s ("8Hz", "50rad_s"), in rad/s. @throws torsio::UsageError if it is not above 0.
 [[nodiscard]] double angular_frequency_rad_s(const std::string& text, const char* option);
 /// The families that `--models all` leaves out, for help and remarks.
 [[nodiscard]] std::string families_beyond_all();

@@ -94,8 +94,7 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
     spec.lever_m = torsio::si_quantity(flags.lever, "m", "--lever");
   }
   if (!flags.bandwidth.empty())
-    spec.bandwidth_rad_s =
-        above_zero(angular_frequency_rad_s(flags.bandwidth, "--bandwidth"), "--bandwidth");
+    spec.bandwidth_rad_s = angular_frequency_rad_s(flags.bandwidth, "--bandwidth");
   if (!(flags.friction >= 0.0 && flags.friction <= 1.0))
     throw torsio::UsageError({.place = "--friction",
                               .expected = "a share from 0 to 1",

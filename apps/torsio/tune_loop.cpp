@@ -50,8 +50,7 @@ Tuned tuned(const TuneFlags& flags) {
   using torsio::JointOutput;
   torsio::DeflectionController::Settings settings{
       .joint = torsio::series_elastic_joint(torsio::data_sheet(flags.actuator)),
-      .bandwidth_rad_s =
-          above_zero(angular_frequency_rad_s(flags.bandwidth, "--bandwidth"), "--bandwidth"),
+      .bandwidth_rad_s = angular_frequency_rad_s(flags.bandwidth, "--bandwidth"),
       .damping = above_zero(flags.damping, "--damping")};
   if (!(flags.load_inertia_kg_m2 >= 0.0))
     throw torsio::UsageError({.place = "--load-inertia",

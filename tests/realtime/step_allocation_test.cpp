@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstdlib>
 #include <limits>
 #include <memory>
@@ -180,7 +181,10 @@ TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {
               step(0.0, 0.0);
             }),
             0U);
-  EXPECT_EQ(in_border, Fault::none);
+  // The curves of these two end at 0.1, far inside the estimator's range, and they say so themselves.
+  constexpr bool kEndsEarlier =
+      std::same_as<TypeParam, Polynomial> || std::same_as<TypeParam, HammersteinWiener>;
+  EXPECT_EQ(in_border, kEndsEarlier ? Fault::outside_training_range : Fault::none);
   seen.insert(faults.begin(), faults.begin() + static_cast<std::ptrdiff_t>(at));
   EXPECT_EQ(seen,
             (std::set{Fault::none, Fault::input_not_finite, Fault::input_count_wrong,

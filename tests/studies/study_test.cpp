@@ -257,6 +257,7 @@ TEST(Studies, OfASensorTellErrorsOfItsFullScaleAndWhatDiverged) {
                               .model = "NN",
                               .runs = 3,
                               .rmse = 0.01,
+                              .rmse_std = 0.003,
                               .percent = 4.0,
                               .largest = 0.25,
                               .max_abs = 0.04,
@@ -266,8 +267,9 @@ TEST(Studies, OfASensorTellErrorsOfItsFullScaleAndWhatDiverged) {
                     .full_scale = 0.5,
                     .notes = {"a note"}};
   const std::string text = study_text(info, study);
-  EXPECT_THAT(text, testing::ContainsRegex(
-                        "NN +0.01 +0 +4.0 +0.25 +2.00 +0.04 +8.0 +0.002 +3 +diverged in 2 of 3"));
+  EXPECT_THAT(text,
+              testing::ContainsRegex(
+                  "NN +0.01 +0.003 +4.0 +0.25 +2.00 +0.04 +8.0 +0.002 +3 +diverged in 2 of 3"));
   EXPECT_THAT(text, HasSubstr("over 0.5 Nm"));
   EXPECT_THAT(text, testing::EndsWith("a note\n"));
   EXPECT_THAT(text, testing::Not(HasSubstr("guard")));
