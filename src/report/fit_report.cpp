@@ -49,9 +49,11 @@ std::string verdict(const FitReport& report) {
       with.push_back(&each == report.correlations.data() ? "their own past" : each.with);
   if (with.empty())
     return "neither their past nor an input tells the residuals: nothing is left to learn\n";
-  return fmt::format("the residuals follow {}: what is left there another model could learn{} (docs/fit_report.md)\n",
-                     fmt::join(with, ", "),
-                     report.table.empty() ? "" : "; the standard errors below are widened for it");
+  return fmt::format(
+      "the residuals follow {}: what is left there another model could learn{} "
+      "(docs/fit_report.md)\n",
+      fmt::join(with, ", "),
+      report.table.empty() ? "" : "; the standard errors below are widened for it");
 }
 
 }  // namespace

@@ -234,14 +234,15 @@ TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, const AnyI
 }
 
 AnyInverse inverse_of(const ModelFile& model) {
-  const EstimatorSettings settings = estimator_at(model, kBenchRate_Hz).settings();
+  const Estimator estimator = estimator_at(model, kBenchRate_Hz);
+  const EstimatorSettings& settings = estimator.settings();
   if (!settings.zeroed_channels.empty())
     throw Error({.place = kPlace,
                  .expected = "a model that takes the channels as they are measured",
                  .found = fmt::format("one that wants the zero of {}",
                                       fmt::join(settings.zeroed_channels, ", ")),
                  .advice = "Train it without zero rules: simulated encoders have none."});
-  return AnyInverse::of(settings, model.parameters);
+  return AnyInverse::of(settings, estimator.model().parameters());
 }
 
 LinearInverse sweep_line(const DataSheet& sheet, std::uint64_t seed, const Progress& progress) {

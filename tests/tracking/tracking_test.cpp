@@ -141,6 +141,24 @@ TEST(Track, AModelThatWasTrainedTheOtherWayRoundClosesTheLoopToo) {
   EXPECT_LT(run.score.mad, 2.0);
 }
 
+TEST(Track, AContinuousModelOfAnotherRateIsDiscretisedAnew) {
+  ModelFile model = fitted(torque_mode(), "linear", {"spring_deflection_rad"});
+  const auto mad_of = [&](double sample_period_s) {
+    GreyBox::Parameters box;
+    box.terms = {.curve_knots = {-0.1, 0.1},
+                 .thresholds = {},
+                 .friction_knots = {0.0},
+                 .time_constants_s = {0.05},
+                 .rate_scales = {0.0},
+                 .sample_period_s = sample_period_s};
+    box.coefficients.values = Matrix(1, box.terms.columns());
+    box.coefficients.values.values = {-57.0, 57.0, 200.0, 0.0, 0.0};
+    model.parameters = box;
+    return track(kSheet, short_spec(), inverse_of(model), 1).score.mad;
+  };
+  EXPECT_EQ(mad_of(0.005), mad_of(0.001));
+}
+
 TEST(Track, MeasuresTheBandwidthThatTheGainsWereMadeFor) {
   TrackingSpec spec = short_spec();
   spec.measures_bandwidth = true;
