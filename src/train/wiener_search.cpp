@@ -87,8 +87,7 @@ class ShapeSearch {
   /// The smallest within 1 % of the best.
   WienerShape best_of(std::vector<WienerShape> shapes, double begin, double end) {
     std::ranges::stable_sort(shapes, {}, numbers_of);
-    const auto doubles = std::ranges::unique(shapes);
-    shapes.erase(doubles.begin(), doubles.end());
+    shapes.erase(std::unique(shapes.begin(), shapes.end()), shapes.end());
     std::vector<double> errors;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < shapes.size(); ++i) {
