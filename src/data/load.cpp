@@ -178,9 +178,10 @@ class Collector {
       std::error_code absent;
       const auto place = std::filesystem::weakly_canonical(planned.log.path, absent);
       if (!seen.emplace(place.string(), entry.role.value_or(options_.role)).second)
-        throw UsageError({.place = planned.log.path,
-                     .problem = "the recording is given twice",
-                     .advice = "Leave one out: the same samples twice tell no more than once."});
+        throw UsageError(
+            {.place = planned.log.path,
+             .problem = "the recording is given twice",
+             .advice = "Leave one out: the same samples twice tell no more than once."});
     }
   }
 
