@@ -357,12 +357,13 @@ TEST_F(MainJob, ImportsANetworkOfAnotherProgram) {
 TEST_F(MainJob, AStoppedFitOfANetworkGoesOnWhereItWas) {
   record();
   const std::string fit =
-      "fit a.csv --model lstm --set layers=8 --set stride=10 --set epochs=4 --set batch=16";
+      "fit a.csv --model lstm --set layers=8 --set stride=10 --set epochs=60 --set patience=0 "
+      "--set batch=16";
   ASSERT_EQ(torsio(fit + " -o whole.safetensors").exit_code, 0);
   // Stopped at once, after a while, and after a longer while: wherever that is.
   const std::string stop = "timeout --foreground --preserve-status -s INT ";
   Outcome stopped;
-  for (const char* seconds : {"0.3", "0.6", "1.2", "2.4"}) {
+  for (const char* seconds : {"0.2", "0.4", "0.8", "1.6"}) {
     stopped = shell(stop + seconds + " {torsio} " + fit + " -o part.safetensors");
     if (stopped.exit_code != 0 && !contents("part.safetensors.checkpoint").empty()) break;
   }
