@@ -132,9 +132,10 @@ class WeightReader {
   /// 0 if there is none, which is remembered.
   [[nodiscard]] std::vector<double> bias(const std::string& name, std::size_t length) {
     const std::optional<Weights> weights = take(name);
+    std::vector<double> none(length, 0.0);
     if (!weights) {
       taken_as_zero_.push_back(name);
-      return std::vector<double>(length, 0.0);
+      return none;
     }
     if (weights->shape.size() != 1 || weights->values.size() != length)
       refuse(at(name), fmt::format("shape [{}]", length), shape_text(weights->shape));
