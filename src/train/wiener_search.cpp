@@ -167,6 +167,7 @@ std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& sh
     const WienerData part = front_of(data, kEnough);
     if (part.judged_samples() > 0) {
       std::vector<WienerFit> tried;
+      tried.reserve(starts.size());
       for (const WienerNumbers& start : starts) tried.push_back(refined(part, start, iterations));
       starts = {std::ranges::min_element(tried, {}, &WienerFit::sum_of_squares)->numbers};
     }
