@@ -4,7 +4,6 @@
 
 #include "studies.hpp"
 #include "study_rows.hpp"
-#include "torsio/data/mapping.hpp"
 #include "torsio/sim/bench_dataset.hpp"
 #include "torsio/train/comparison.hpp"
 
@@ -14,16 +13,6 @@ namespace {
 constexpr const char* kModels =
     "linear,linear_coulomb,polynomial,dgmm,mlp:layers=50-20-10,mlp:layers=50-10-5";
 constexpr std::array kVariants{"maxwell-slip", "bouc-wen", "lugre"};
-
-/// The deflection as the torque's function, with the rates of the forward models.
-void turn_round(Dataset& dataset) {
-  dataset.target = "spring_deflection_rad";
-  for (DatasetRecord& record : dataset.records)
-    add_derived(record.recording, {{"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"}});
-  dataset.input_sets = {{"",
-                         {"torque_Nm", "lowpass(rate(spring_deflection_rad), 10Hz)",
-                          "lowpass(rate(joint_angle_rad), 10Hz)"}}};
-}
 
 Study sweep_study(Study study, bool is_inverse, const Progress& progress) {
   const StudyOptions& options = study.options;

@@ -10,6 +10,7 @@
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/data/mapping.hpp"
 
 namespace torsio {
 
@@ -134,6 +135,15 @@ StudyPlant study_plant(std::string_view actuator) {
 
 std::uint64_t repeat_seed(const StudyOptions& options, std::size_t k) noexcept {
   return options.seed + 100 * k;
+}
+
+void turn_round(Dataset& dataset) {
+  dataset.target = "spring_deflection_rad";
+  for (DatasetRecord& record : dataset.records)
+    add_derived(record.recording, {{"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"}});
+  dataset.input_sets = {{"",
+                         {"torque_Nm", "lowpass(rate(spring_deflection_rad), 10Hz)",
+                          "lowpass(rate(joint_angle_rad), 10Hz)"}}};
 }
 
 Progress nth_of(const Progress& progress, std::size_t n, std::size_t count,

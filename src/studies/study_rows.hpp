@@ -89,6 +89,9 @@ class StudyRows {
 /// Of the k-th repeat; far enough apart for a dataset to count on from it.
 [[nodiscard]] std::uint64_t repeat_seed(const StudyOptions& options, std::size_t k) noexcept;
 
+/// The deflection becomes the torque's function, with the rates of the forward models.
+void turn_round(Dataset& dataset);
+
 /// The share of one fit's progress among so many.
 [[nodiscard]] Progress nth_of(const Progress& progress, std::size_t n, std::size_t count,
                               std::string_view doing);

@@ -15,7 +15,6 @@
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/mapping.hpp"
 #include "torsio/sim/bench_dataset.hpp"
 #include "torsio/sim/experiment.hpp"
 #include "torsio/tracking/tracking.hpp"
@@ -98,20 +97,12 @@ void add_torque_mode(Dataset& dataset, const std::string& actuator, const Task& 
   }
 }
 
-/// The deflection as the torque's function, with the rates of the forward models.
-FeatureSpec turn_round(Dataset& dataset) {
-  dataset.target = "spring_deflection_rad";
-  for (DatasetRecord& record : dataset.records)
-    add_derived(record.recording, {{"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"}});
-  return resolve_inputs(dataset, {"torque_Nm", "lowpass(rate(spring_deflection_rad), 10Hz)",
-                                  "lowpass(rate(joint_angle_rad), 10Hz)"});
-}
-
 AnyInverse learned(const Learner& learner, const Dataset& dataset, std::uint64_t seed) {
   ModelChoice choice{.family = std::string(learner.family), .features = {}};
   if (learner.is_turned_round) {
     Dataset turned = dataset;
-    choice.features = turn_round(turned);
+    turn_round(turned);
+    choice.features = resolve_inputs(turned, turned.input_sets.front().second);
     return inverse_of(train_model(turned, choice, seed).file);
   }
   const bool is_line = learner.family == "linear";

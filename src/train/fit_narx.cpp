@@ -13,6 +13,7 @@
 #include "train/free_run_refinement.hpp"
 #include "train/memory_check.hpp"
 #include "train/narx_run.hpp"
+#include "train/shared_progress.hpp"
 
 namespace torsio {
 namespace {

@@ -19,6 +19,7 @@
 #include "train/kernel_data.hpp"
 #include "train/least_squares.hpp"
 #include "train/narx_run.hpp"
+#include "train/shared_progress.hpp"
 
 namespace torsio {
 namespace {

@@ -79,13 +79,6 @@ double free_run_rmse(const OutputLists& outputs, const TrainingData& data) {
   return accumulator.metrics().rmse;
 }
 
-Progress share_of(const Progress& progress, double first, double last) {
-  if (!progress) return {};
-  return [&progress, first, last](double share, std::string_view doing) {
-    return progress(first + (last - first) * share, doing);
-  };
-}
-
 OutputLists noisy_targets(const TrainingData& data, double deviation, std::uint64_t seed) {
   Random random(seed);
   OutputLists outputs;

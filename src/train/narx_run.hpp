@@ -75,9 +75,6 @@ void require_free_run(const TrainingData& data);
 /// Over what came behind the measured start.
 [[nodiscard]] double free_run_rmse(const OutputLists& outputs, const TrainingData& data);
 
-/// Tells `progress` of a part of the work as of all of it, from `first` to `last`.
-[[nodiscard]] Progress share_of(const Progress& progress, double first, double last);
-
 /// The targets with normal noise.
 [[nodiscard]] OutputLists noisy_targets(const TrainingData& data, double deviation,
                                         std::uint64_t seed);

@@ -3,11 +3,20 @@
 #include <cstddef>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "torsio/core/progress.hpp"
 
 namespace torsio {
+
+/// Tells `progress`, which must outlive it, of a part of the work as of all of it, from `first` to `last`.
+[[nodiscard]] inline Progress share_of(const Progress& progress, double first, double last) {
+  if (!progress) return {};
+  return [&progress, first, last](double share, std::string_view doing) {
+    return progress(first + (last - first) * share, doing);
+  };
+}
 
 /// Progress of work on several threads, told by one of them at a time.
 class SharedProgress {

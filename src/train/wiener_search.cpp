@@ -10,6 +10,7 @@
 
 #include "torsio/core/error.hpp"
 #include "train/folds.hpp"
+#include "train/shared_progress.hpp"
 #include "train/wiener_problem.hpp"
 
 namespace torsio {
@@ -41,13 +42,6 @@ std::string text_of(const WienerShape& shape) {
   if (shape.is_piecewise_linear) return fmt::format("{}, {} knots", orders, shape.input_values);
   return fmt::format("{}, degrees {} and {}", orders, shape.input_values - 1,
                      shape.output_values - 1);
-}
-
-Progress share_of(const Progress& progress, double begin, double length) {
-  if (!progress) return {};
-  return [&progress, begin, length](double share, std::string_view doing) {
-    return progress(begin + length * share, doing);
-  };
 }
 
 /// The data with one fold left out, or with nothing else.
@@ -92,7 +86,8 @@ class ShapeSearch {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const double length = (end - begin) / static_cast<double>(shapes.size());
-      const Progress told = share_of(progress_, begin + static_cast<double>(i) * length, length);
+      const Progress told = share_of(progress_, begin + static_cast<double>(i) * length,
+                                     begin + static_cast<double>(i + 1) * length);
       const Progress part = [&](double share, std::string_view doing) {
         return !told || told(share, fmt::format("{}: {}", text_of(shapes[i]), doing));
       };
@@ -174,8 +169,9 @@ std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& sh
   }
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const auto begin = static_cast<double>(i) / static_cast<double>(starts.size());
-    WienerFit fit = refined(data, starts[i], iterations,
-                            share_of(progress, begin, 1.0 / static_cast<double>(starts.size())));
+    WienerFit fit =
+        refined(data, starts[i], iterations,
+                share_of(progress, begin, begin + 1.0 / static_cast<double>(starts.size())));
     // A search that ended goes before one that did not, whatever its error.
     if (!best || std::pair(!fit.has_converged, fit.sum_of_squares) <
                      std::pair(!best->has_converged, best->sum_of_squares))
