@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -18,12 +20,53 @@ namespace {
 
 std::string number(double value) { return fmt::format("{:.4g}", value); }
 
-/// How a row is told; columns that no row of the study fills are left out.
+/// A column of the table; columns that no row of the study fills are left out.
 struct Column {
   std::string title;
-  std::string (*cell)(const Study& study, const StudyRow& row);
-  bool is_published = false;  ///< told of models that only others ran, too
+  std::function<std::string(const Study& study, const StudyRow& row)> cell;
+  bool is_published = false;  ///< also filled in rows of models that only others ran
 };
+
+/// What a published figure is called in a table and in JSON.
+struct PublishedName {
+  RowQuantity quantity;
+  const char* title;
+  const char* key;
+};
+constexpr std::array kPublishedNames{
+    PublishedName{RowQuantity::rmse, "paper", "rmse"},
+    PublishedName{RowQuantity::rmse_percent, "paper %", "rmse_percent"},
+    PublishedName{RowQuantity::max_percent, "paper max %", "max_percent"},
+    PublishedName{RowQuantity::percent_of_max, "paper % of max", "percent_of_max_abs"},
+    PublishedName{RowQuantity::fit_percent, "paper fit %", "fit_percent"},
+    PublishedName{RowQuantity::mad, "paper MAD", "mad"},
+    PublishedName{RowQuantity::std_abs, "paper STD", "std_abs"},
+    PublishedName{RowQuantity::mad_to_linear, "paper / linear", "mad_to_linear"},
+    PublishedName{RowQuantity::mad_percent, "paper MAD %", "mad_percent"}};
+
+const PaperFigure* published(const StudyRow& row, RowQuantity quantity) {
+  for (const auto& [of, figure] : row.published)
+    if (of == quantity) return &figure;
+  return nullptr;
+}
+
+bool shows(const Study& study, RowQuantity quantity) {
+  return std::ranges::any_of(
+      study.rows, [&](const StudyRow& row) { return published(row, quantity) != nullptr; });
+}
+
+/// The figures of others, last in the table, with the digits that were printed.
+void add_published(const Study& study, std::vector<Column>& columns) {
+  for (const PublishedName& name : kPublishedNames) {
+    if (!shows(study, name.quantity)) continue;
+    columns.push_back({name.title,
+                       [quantity = name.quantity](const Study&, const StudyRow& row) {
+                         const PaperFigure* const figure = published(row, quantity);
+                         return std::string(figure == nullptr ? "" : figure->text);
+                       },
+                       true});
+  }
+}
 
 bool is_tracking(const Study& study) {
   return std::ranges::any_of(study.rows,
@@ -32,7 +75,7 @@ bool is_tracking(const Study& study) {
 
 /// Of a study of torque loops: what the papers judge these by.
 std::vector<Column> tracking_columns(const Study& study) {
-  return {
+  std::vector<Column> columns{
       {fmt::format("MAD {}", study.unit),
        [](const Study&, const StudyRow& row) { return fmt::format("{:.3f}", row.tracking->mad); }},
       {"+-",
@@ -54,18 +97,9 @@ std::vector<Column> tracking_columns(const Study& study) {
        true},
       {"stopped",
        [](const Study&, const StudyRow& row) { return fmt::format("{}", row.tracking->stopped); },
-       true},
-      {"paper's ratio",
-       [](const Study&, const StudyRow& row) {
-         return row.tracking->paper_ratio ? fmt::format("{:.3f}", *row.tracking->paper_ratio)
-                                          : std::string();
-       },
-       true},
-      {"paper's RMSE",
-       [](const Study&, const StudyRow& row) {
-         return row.paper_rmse ? fmt::format("{:.2f}", *row.paper_rmse) : std::string();
-       },
        true}};
+  add_published(study, columns);
+  return columns;
 }
 
 double best_rmse(const Study& study, const std::string& condition) {
@@ -143,22 +177,11 @@ std::vector<Column> columns_of(const Study& study) {
     columns.push_back({"fit s", [](const Study&, const StudyRow& row) {
                          return fmt::format("{:.3g}", row.fit_seconds);
                        }});
-  if (any([](const StudyRow& row) { return row.paper_rmse.has_value(); }))
-    columns.push_back({"paper",
-                       [](const Study&, const StudyRow& row) {
-                         return row.paper_rmse ? number(*row.paper_rmse) : std::string();
-                       },
-                       true});
-  if (any([](const StudyRow& row) { return row.paper_fit_percent.has_value(); })) {
+  if (shows(study, RowQuantity::fit_percent))
     columns.push_back({"fit %", [](const Study&, const StudyRow& row) {
                          return fmt::format("{:.2f}", row.fit_percent);
                        }});
-    columns.push_back({"paper fit %", [](const Study&, const StudyRow& row) {
-                         return row.paper_fit_percent
-                                    ? fmt::format("{:.2f}", *row.paper_fit_percent)
-                                    : std::string();
-                       }});
-  }
+  add_published(study, columns);
   if (any([](const StudyRow& row) { return row.diverged > 0; }))
     columns.push_back({"", [](const Study&, const StudyRow& row) {
                          return row.diverged == 0
@@ -215,9 +238,10 @@ std::string verdict_text(const Study& study) {
 /// What the columns mean.
 std::string legend(const Study& study) {
   if (is_tracking(study))
-    return "/ linear: MAD over that of the line of the sweeps; +-: standard deviation of a run; "
+    return "/ linear: MAD over that of the linear model of the sweeps; +-: standard deviation of a "
+           "run; "
            "cycles: runs with a limit cycle; stopped: runs that diverged\n";
-  const char* const percent = "% of max: RMSE over the largest |target| of the judged recording; ";
+  const char* const percent = "% of max: RMSE over the largest |target| of the test recording; ";
   if (study.judged.empty()) return fmt::format("{}+-: standard deviation of a run\n", percent);
   return fmt::format(
       "/ best: RMSE over the lowest of the condition; {}in 1 sd %, in 2 sd %: samples whose error "
@@ -226,7 +250,27 @@ std::string legend(const Study& study) {
       percent);
 }
 
+using Json = nlohmann::ordered_json;
+
+/// The published figures of a row by quantity, each with its source; empty if there are none.
+Json published_json(const StudyRow& row) {
+  Json all = Json::object();
+  for (const PublishedName& name : kPublishedNames)
+    if (const PaperFigure* const figure = published(row, name.quantity))
+      all[name.key] = {{"value", figure->value},
+                       {"text", figure->text},
+                       {"unit", figure->unit},
+                       {"paper", figure->paper},
+                       {"item", figure->item}};
+  return all;
+}
+
 }  // namespace
+
+std::string_view published_title(RowQuantity quantity) noexcept {
+  const auto* const name = std::ranges::find(kPublishedNames, quantity, &PublishedName::quantity);
+  return name == kPublishedNames.end() ? "" : name->title;
+}
 
 std::string study_text(const StudyInfo& info, const Study& study) {
   std::string text =
@@ -241,14 +285,13 @@ std::string study_text(const StudyInfo& info, const Study& study) {
   if (study.full_scale)
     text += fmt::format(
         "% of FS: of RMSE or of max|e|, the largest error of all runs, over {:g} {}; 1 step: RMSE "
-        "with each past torque measured, which is no sensor\n",
+        "one step ahead, with measured past torques: not usable as a sensor\n",
         *study.full_scale, study.unit);
   for (const std::string& note : study.notes) text += note + '\n';
   return text;
 }
 
 std::string study_json(const StudyInfo& info, const Study& study) {
-  using Json = nlohmann::ordered_json;
   Json document{{"study", info.name},
                 {"paper", info.paper},
                 {"title", info.title},
@@ -277,10 +320,8 @@ std::string study_json(const StudyInfo& info, const Study& study) {
          {"one_step_rmse", row.one_step ? Json(*row.one_step) : Json(nullptr)},
          {"guarded_percent", row.guarded_percent},
          {"diverged", row.diverged},
-         {"paper_rmse", row.paper_rmse ? Json(*row.paper_rmse) : Json(nullptr)},
          {"fit_percent", row.fit_percent},
-         {"paper_fit_percent",
-          row.paper_fit_percent ? Json(*row.paper_fit_percent) : Json(nullptr)}});
+         {"published", published_json(row)}});
     if (study.tells_fit_time && row.runs > 0)
       document["rows"].back()["fit_seconds"] = row.fit_seconds;
     if (!study.judged.empty())
@@ -291,14 +332,12 @@ std::string study_json(const StudyInfo& info, const Study& study) {
                {"within_2_std_dev", row.within_2_std_dev},
                {"failure", row.failure.empty() ? Json(nullptr) : Json(row.failure)}});
     if (const auto& of = row.tracking)
-      document["rows"].back()["tracking"] = {
-          {"mad", of->mad},
-          {"mad_std", of->mad_std},
-          {"std_abs", of->std_abs},
-          {"mad_to_linear", of->mad_to_linear},
-          {"limit_cycles", of->limit_cycles},
-          {"stopped", of->stopped},
-          {"paper_ratio", of->paper_ratio ? Json(*of->paper_ratio) : Json(nullptr)}};
+      document["rows"].back()["tracking"] = {{"mad", of->mad},
+                                             {"mad_std", of->mad_std},
+                                             {"std_abs", of->std_abs},
+                                             {"mad_to_linear", of->mad_to_linear},
+                                             {"limit_cycles", of->limit_cycles},
+                                             {"stopped", of->stopped}};
   }
   if (!study.judged.empty()) {
     document["judged"] = study.judged;

@@ -41,7 +41,7 @@ Study sweep_study(Study study, bool is_inverse, const Progress& progress) {
 Study spring_models_001(const StudyOptions& options, const Progress& progress) {
   return sweep_study(
       {.protocol = "dfki-50, three kinds of inner friction: trained on sweeps of +-170 "
-                   "deg at 10 deg/s with three levers, judged on a fourth lever in a "
+                   "deg at 10 deg/s with three levers, tested on a fourth lever in a "
                    "plane inclined by 37.8 deg",
        .unit = "Nm",
        .options = options},

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "published.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/sim/experiment.hpp"
@@ -71,7 +72,7 @@ struct PushData {
   }
 };
 
-/// 150 s each: with five of a kind more than the ten minutes a condition of the paper.
+/// 150 s each, assumed: the paper prints no duration.
 PushData record(const std::vector<Push>& pushes, const StudyOptions& options, std::uint64_t seed,
                 const Progress& progress) {
   PushData data;
@@ -136,7 +137,7 @@ Study encoders_004(const StudyOptions& options, const Progress& progress) {
               .unit = "Nm",
               .options = options,
               .plants = {study_plant("harmonic-drive")}};
-  StudyRows rows;
+  StudyRows rows(kPublishedEncoders);
   for (std::size_t k = 0; k < options.repeats; ++k)
     cross_validate_into(rows, {.condition = "20 Nm"}, {kSet1, kSet2, kSet3}, options,
                         repeat_seed(options, k),
@@ -147,13 +148,13 @@ Study encoders_004(const StudyOptions& options, const Progress& progress) {
 
 Study torque_levels_004(const StudyOptions& options, const Progress& progress) {
   Study study{.protocol =
-                  "stiff tube, high impedance: trained on pushes of 10 to 20 Nm, judged on "
+                  "stiff tube, high impedance: trained on pushes of 10 to 20 Nm, tested on "
                   "others; inputs II",
               .unit = "Nm",
               .options = options,
               .plants = {study_plant("harmonic-drive")}};
-  constexpr std::array kLevels_Nm{5.0, 15.0, 30.0, 40.0, 50.0};
-  StudyRows rows;
+  constexpr std::array kLevels_Nm{5.0, 20.0, 30.0, 40.0, 50.0};
+  StudyRows rows(kPublishedTorqueLevels);
   for (std::size_t k = 0; k < options.repeats; ++k) {
     std::vector<Push> pushes = five_between(10.0, 20.0, false);
     for (const double level_Nm : kLevels_Nm)
@@ -171,7 +172,7 @@ Study torque_levels_004(const StudyOptions& options, const Progress& progress) {
 Study impedances_004(const StudyOptions& options, const Progress& progress) {
   Study study{.protocol =
                   "stiff tube, pushes of 10 to 20 Nm: trained under high, zero or both "
-                  "impedances, judged on pushes of 15 Nm; inputs II, and II+ with the speed "
+                  "impedances, tested on pushes of 15 Nm; inputs II, and II+ with the speed "
                   "of the wave generator where both are trained on",
               .unit = "Nm",
               .options = options,
@@ -186,7 +187,7 @@ Study impedances_004(const StudyOptions& options, const Progress& progress) {
                                 {"zero", false, true, kSet2},
                                 {"both", true, true, kSet2},
                                 {"both", true, true, kSet2Plus}};
-  StudyRows rows;
+  StudyRows rows(kPublishedImpedances);
   for (std::size_t k = 0; k < options.repeats; ++k) {
     for (std::size_t c = 0; c < cases.size(); ++c) {
       const Case& of = cases[c];
@@ -200,7 +201,7 @@ Study impedances_004(const StudyOptions& options, const Progress& progress) {
         pushes.push_back(
             {.torque_Nm = 15.0,
              .is_impedance_zero = is_zero,
-             .condition = fmt::format("trained {}, judged {}", of.name, is_zero ? "zero" : "high"),
+             .condition = fmt::format("trained {}, tested {}", of.name, is_zero ? "zero" : "high"),
              .seed_offset = kJudged + (is_zero ? 1 : 0),
              .role = Role::test});
       compare_into(rows, pushes, of.set, options, repeat_seed(options, k),
@@ -220,9 +221,7 @@ Study tubes_004(const StudyOptions& options, const Progress& progress) {
               .unit = "Nm",
               .options = options};
   constexpr std::array kTubes{"soft", "stiff", "rigid"};
-  StudyRows rows;
-  rows.paper("soft", "lstm 250, II", 0.666);
-  rows.paper("rigid", "lstm 250, III", 0.658);
+  StudyRows rows(kPublishedTubes);
   for (std::size_t t = 0; t < kTubes.size(); ++t) {
     const std::string actuator = std::string("harmonic-drive:") + kTubes[t];
     study.plants.push_back(study_plant(actuator));

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "published.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/data/load.hpp"
@@ -14,11 +15,6 @@
 
 namespace torsio {
 namespace {
-
-struct Published {
-  std::string_view method;
-  double rmse_m;
-};
 
 struct Entry {
   std::string_view name;    ///< of its rows
@@ -34,29 +30,8 @@ struct Benchmark {
   std::string_view target;
   std::string_view input;
   double rate_Hz;  ///< of recordings without a clock; 0: theirs
-  std::span<const Published> published;
+  std::span<const PaperEntry> published;
 };
-
-// Free run, in metres. Bouc-Wen, official multisine test: Iacob, Beintema, Schoukens and Toth, Table 1;
-// Forgione and Piga 2021 (dynoNet, and what they quote). No figure of the sine sweep test was found
-// with its unit. EMPS: Forgione and Piga 2021, and Champneys et al. 2024.
-constexpr std::array kPublishedBoucWen{Published{"gr-SS-NN", 7.53e-6},
-                                       Published{"SS-NN Suykens improved", 8.91e-6},
-                                       Published{"polynomial state space", 1.34e-5},
-                                       Published{"Koopman, input-affine", 1.43e-5},
-                                       Published{"Koopman, general", 1.59e-5},
-                                       Published{"decoupled PNLSS", 1.87e-5},
-                                       Published{"SS-NN Suykens", 2.65e-5},
-                                       Published{"Koopman, bilinear", 3.69e-5},
-                                       Published{"dynoNet", 4.52e-5},
-                                       Published{"Koopman, linear", 1.60e-4},
-                                       Published{"NFIR local models", 1.63e-4}};
-constexpr std::array kPublishedEmps{Published{"dynoNet", 2.64e-3},
-                                    Published{"LSTM", 7.41e-2},
-                                    Published{"RNN", 8.92e-2},
-                                    Published{"OLSTM", 1.109e-1},
-                                    Published{"MLP of past inputs", 1.21e-1},
-                                    Published{"GRU", 2.20e-1}};
 
 constexpr Benchmark kBoucWen{.name = "boucwen",
                              .train = "train_multisine.csv.gz",
@@ -160,10 +135,10 @@ void add_rows(const Benchmark& benchmark, std::span<const Entry> entries, Study&
   }
   const std::vector<StudyRow> ours = rows.rows();
   study.rows.insert(study.rows.end(), ours.begin(), ours.end());
-  for (const Published& each : benchmark.published)
-    study.rows.push_back({.condition = std::string(benchmark.name) + ", published",
-                          .model = std::string(each.method),
-                          .paper_rmse = each.rmse_m});
+  for (const PaperEntry& each : benchmark.published)
+    study.rows.push_back({.condition = std::string(each.condition),
+                          .model = std::string(each.model),
+                          .published = {{each.quantity, each.figure}}});
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <array>
 #include <limits>
 
+#include "published.hpp"
 #include "studies.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
@@ -15,33 +16,40 @@ namespace torsio {
 namespace {
 
 constexpr std::array kStudies{
-    StudyInfo{"001-models", "001, Figure 4", "What models of a spring are wrong by on a new sweep",
+    StudyInfo{"001-models", "001, Figure 4", "Errors of spring models on a new sweep",
               spring_models_001},
     StudyInfo{"001-inverse", "001, section 4.2",
-              "The same the other way round, as its controller asks", inverse_models_001},
-    StudyInfo{"002-table3", "002, Table III", "What models of a rubber torque sensor are wrong by",
-              sensor_models_002},
-    StudyInfo{"002-slow", "002, Figures 8 and 10",
-              "Slow loops, until its clutch slips and after it", slow_loops_002},
-    StudyInfo{"002-collision", "002, Figures 8 and 10", "The same in a drop test and a collision",
+              "Errors of the inverse models, from torque to deflection", inverse_models_001},
+    StudyInfo{"002-table3", "002, Table III", "Errors of models of a rubber torque sensor",
+              sensor_models_002, kPublishedSensorModels},
+    StudyInfo{"002-slow", "002, Figure 8", "Slow loops, until its clutch slips and after it",
+              slow_loops_002},
+    StudyInfo{"002-collision", "002, Figure 10", "The same in a fast slip and a collision",
               collision_002},
-    StudyInfo{"003-ladder", "003, Tables 2 and 3",
-              "What models of an elastomer coupling explain of its torque", ladder_003},
+    StudyInfo{"003-ladder", "003, sections 4.2.1 and 4.3, Table 3",
+              "What models of an elastomer coupling explain of its torque", ladder_003,
+              kPublishedCouplingModels},
     StudyInfo{"000-tracking", "000, Figure 8; 001, Figure 6",
               "How well a torque loop follows through a learned inverse of the spring",
-              torque_tracking_000},
-    StudyInfo{"004-encoders", "004, Table 4", "Which encoders an LSTM needs to tell the torque",
-              encoders_004},
-    StudyInfo{"004-torque", "004, Table 5", "Trained on 10 to 20 Nm, judged on 5 to 50 Nm",
-              torque_levels_004},
-    StudyInfo{"004-impedance", "004, Table 5",
-              "Trained under one impedance of the joint, judged under another", impedances_004},
-    StudyInfo{"004-tubes", "004, Table 6", "How soft the torsion tube should be", tubes_004},
-    StudyInfo{"model-comparison", "all",
+              torque_tracking_000, kPublishedTracking},
+    StudyInfo{"004-encoders", "004, Table 4", "Which encoders an LSTM needs to estimate the torque",
+              encoders_004, kPublishedEncoders},
+    StudyInfo{"004-torque", "004, Table 5", "Trained on 10 to 20 Nm, tested on 5 to 50 Nm",
+              torque_levels_004, kPublishedTorqueLevels},
+    StudyInfo{"004-impedance", "004, section 5.2",
+              "Trained under one impedance of the joint, tested under another", impedances_004,
+              kPublishedImpedances},
+    StudyInfo{"004-tubes", "004, Table 6", "How soft the torsion tube should be", tubes_004,
+              kPublishedTubes},
+    StudyInfo{"model-comparison",
+              "all",
               "Every family on every simulated actuator and on the real recordings",
-              model_comparison, true},
+              model_comparison,
+              {},
+              true},
     StudyInfo{"public-benchmarks", "official records",
-              "Bouc-Wen and EMPS: our free runs beside published ones", public_benchmarks, true}};
+              "Bouc-Wen and EMPS: our free runs beside published ones", public_benchmarks,
+              kPublishedBenchmarks, true}};
 
 }  // namespace
 

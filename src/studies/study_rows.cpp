@@ -33,15 +33,6 @@ void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
   fit_seconds.add(row.fit_seconds);
 }
 
-void StudyRows::paper(const std::string& condition, const std::string& model, double rmse) {
-  papers_.push_back({{condition, model}, rmse});
-}
-
-void StudyRows::paper_fit(const std::string& condition, const std::string& model,
-                          double fit_percent) {
-  paper_fits_.push_back({{condition, model}, fit_percent});
-}
-
 void StudyRows::require_fitted(const ResultRow& row) {
   if (row.status != "failed") return;  // a free run that diverged is a result
   throw Error({.place = row.fold.empty() ? row.family : row.family + ", " + row.fold,
@@ -110,10 +101,9 @@ std::vector<StudyRow> StudyRows::rows() const {
                  .within_2_std_dev = sum.within_2.mean(),
                  .failure = sum.failure};
     if (sum.one_step.count() > 0) row.one_step = sum.one_step.mean();
-    for (const auto& [paper_key, rmse] : papers_)
-      if (paper_key == key) row.paper_rmse = rmse;
-    for (const auto& [paper_key, fit_percent] : paper_fits_)
-      if (paper_key == key) row.paper_fit_percent = fit_percent;
+    for (const PaperEntry& entry : published_)
+      if (entry.condition == key.condition && entry.model == key.model)
+        row.published.emplace_back(entry.quantity, entry.figure);
     rows.push_back(std::move(row));
   }
   // Condition by condition, as they were met first.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -18,10 +19,8 @@ namespace torsio {
 /// Gathers a study's rows from the results of its fits.
 class StudyRows {
  public:
-  /// What the paper found under this condition.
-  void paper(const std::string& condition, const std::string& model, double rmse);
-  /// The same of a paper that judges by the best fit [%].
-  void paper_fit(const std::string& condition, const std::string& model, double fit_percent);
+  /// @param published figures to be shown in the rows of their condition and model
+  explicit StudyRows(std::span<const PaperEntry> published = {}) : published_(published) {}
 
   /// The rows of single recordings in a split, each under its condition.
   /// @param condition_of (recording) -> condition
@@ -79,8 +78,7 @@ class StudyRows {
   static double largest_target(const Dataset& dataset, const std::optional<std::string>& recording);
 
   std::vector<std::pair<Key, Sum>> sums_;
-  std::vector<std::pair<Key, double>> papers_;
-  std::vector<std::pair<Key, double>> paper_fits_;
+  std::span<const PaperEntry> published_;
 };
 
 /// A hash of all numbers in the data sheet of an actuator.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/running_mean.hpp"
+#include "published.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/core/error.hpp"
@@ -59,25 +60,6 @@ bool exists(std::string_view family) {
   return std::ranges::any_of(families(),
                              [&](const FamilyInfo& info) { return info.name == family; });
 }
-
-/// What the papers found, whatever the spring's friction and the output were.
-struct Paper {
-  Task task;
-  Kind kind;
-  std::string_view family;
-  std::optional<double> ratio = {};  ///< MAD over that of the linear controller; 000, Figure 8
-  std::optional<double> rmse = {};   ///< 001, Figure 6
-};
-constexpr std::array kPapers{
-    Paper{kTasks[2], Kind::chirp, "dgmm", 0.581, {}},
-    Paper{kTasks[4], Kind::chirp, "dgmm", 0.802, {}},
-    Paper{kTasks[0], Kind::chirp, "dgmm", {}, 0.93},
-    Paper{kTasks[0], Kind::chirp, "mlp", {}, 1.07},
-    Paper{kTasks[0], Kind::chirp, "linear", {}, 1.77},
-    Paper{kTasks[0], Kind::random_walk, "dgmm", {}, 0.90},
-    Paper{kTasks[0], Kind::random_walk, "mlp", {}, 0.80},
-    Paper{kTasks[0], Kind::random_walk, "linear", {}, 1.61},
-};
 
 /// The torque-mode recordings beside the sweeps: chirps (or walks) under the linear controller of the
 /// data sheet, other amplitudes, the same output (SPEC section 6, observation 1).
@@ -174,14 +156,12 @@ class TrackingRows {
   Sum& begin(const std::string& condition, const Task& task, Kind kind, const TrackingRow& run) {
     StudyRow row{.condition = condition, .model = run.model, .tracking = StudyTracking{}};
     const std::string_view family = std::string_view(run.model).substr(0, run.model.find(','));
-    for (const Paper& paper : kPapers) {
-      if (paper.kind != kind || paper.family != family ||
-          std::string_view(paper.task.actuator) != task.actuator ||
-          paper.task.amplitude_Nm != task.amplitude_Nm)
-        continue;
-      row.tracking->paper_ratio = paper.ratio;
-      row.paper_rmse = paper.rmse;
-    }
+    // Whatever the friction of the spring and the output were: the papers do not print them.
+    const std::string at =
+        fmt::format("{}, {:g} Nm, {}", task.actuator, task.amplitude_Nm, name(kind));
+    for (const PaperEntry& entry : kPublishedTracking)
+      if (entry.condition == at && entry.model == family)
+        row.published.emplace_back(entry.quantity, entry.figure);
     return sums_.emplace_back(Sum{.row = std::move(row)});
   }
 
@@ -256,10 +236,11 @@ Study torque_tracking_000(const StudyOptions& options, const Progress& progress)
           "deflection control (50 rad/s) through the inverse of a model; trained on three sweeps, "
           "or "
           "also on chirps of 1.1 (free: 0.9), 0.5 and 0.25 times the amplitude under the linear "
-          "controller (+ torque mode); judged on the chirp and on noise with its RMS, where the "
+          "controller (+ torque mode); tested on the chirp and on noise with its RMS, where the "
           "rating "
           "and the 0.8 m lever of a free output allow it; errors of the torque without sensor "
-          "noise; fed forward and observed: with the rate of the wanted torque fed forward and a "
+          "noise; fed forward and observed: with the rate of the reference torque fed forward and "
+          "a "
           "disturbance observer of 8 Hz, trained also on such noise (+ walks)",
       .unit = "Nm",
       .options = options};

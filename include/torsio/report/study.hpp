@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "torsio/studies/study.hpp"
 
@@ -11,5 +12,8 @@ namespace torsio {
 
 /// One JSON object with the same; ends with a line feed.
 [[nodiscard]] std::string study_json(const StudyInfo& info, const Study& study);
+
+/// The title of the column that shows a published figure of the quantity.
+[[nodiscard]] std::string_view published_title(RowQuantity quantity) noexcept;
 
 }  // namespace torsio

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/not_measured.hpp"
@@ -28,29 +29,59 @@ struct StudyTracking {
       kNotMeasured;  ///< MAD over that of the line of the sweeps, where both came to their end
   std::size_t limit_cycles = 0;  ///< runs with one
   std::size_t stopped = 0;       ///< runs that diverged or failed, in no mean
-  std::optional<double> paper_ratio = {};
+};
+
+/// A figure that a paper prints, as it prints it.
+struct PaperFigure {
+  std::string_view paper;      ///< its number in docs/sources.md
+  std::string_view item;       ///< table, figure or section
+  std::string_view condition;  ///< under which it was found
+  std::string_view quantity;   ///< in the paper's own term
+  std::string_view text;       ///< with the digits that are printed
+  std::string_view unit;
+  double value = kNotMeasured;
+};
+
+/// Which quantity of a row a published figure is to be compared with.
+enum class RowQuantity {
+  rmse,            ///< in `Study::unit`
+  rmse_percent,    ///< RMSE in percent of a full scale that the paper does not name
+  max_percent,     ///< largest |error|, likewise
+  percent_of_max,  ///< RMSE in percent of the largest |target|
+  fit_percent,     ///< best fit
+  mad,
+  std_abs,
+  mad_to_linear,
+  mad_percent  ///< MAD in percent of the amplitude of the reference
+};
+
+/// Where in a study's table a published figure belongs.
+struct PaperEntry {
+  std::string_view condition;
+  std::string_view model;
+  RowQuantity quantity;
+  PaperFigure figure;
 };
 
 /// One model under one condition, over all repeats and folds.
 struct StudyRow {
   std::string condition;
   std::string model;
-  std::size_t runs = 0;            ///< fits that the statistics are of; 0: only the paper's figure
+  std::size_t runs = 0;            ///< fits that the statistics are of; 0: only published figures
   double rmse = kNotMeasured;      ///< mean, in `Study::unit`; NaN of no run, as all means
   double rmse_std = kNotMeasured;  ///< of one run; NaN of fewer than two
   double percent = kNotMeasured;  ///< mean of 100 rmse / (largest |target| of the judged recording)
   double largest = kNotMeasured;  ///< mean of that largest |target|
-  std::optional<double> paper_rmse = {};
-  double max_abs = kNotMeasured;        ///< largest |error| of all runs
+  double max_abs = kNotMeasured;  ///< largest |error| of all runs
   std::optional<double> one_step = {};  ///< mean RMSE one step ahead, of a model that feeds back
   std::size_t blank = 0;                ///< of the runs: fit_percent below 5, no more than the mean
   double guarded_percent = 0.0;         ///< of the scored samples, answered by a guard
   std::size_t diverged = 0;             ///< of the runs
   double fit_percent = kNotMeasured;    ///< mean of `Metrics::fit_percent` (BF)
-  std::optional<double> paper_fit_percent = {};  ///< what the paper judges by, where it is that
-  std::optional<StudyTracking> tracking = {};    ///< of all rows of a study, or of none
-  double fit_seconds = kNotMeasured;             ///< mean of the runs
-  double step_ns = kNotMeasured;                 ///< mean of the runs' medians
+  std::vector<std::pair<RowQuantity, PaperFigure>> published = {};
+  std::optional<StudyTracking> tracking = {};  ///< of all rows of a study, or of none
+  double fit_seconds = kNotMeasured;           ///< mean of the runs
+  double step_ns = kNotMeasured;               ///< mean of the runs' medians
   double within_std_dev = kNotMeasured;  ///< mean of `Score::within_std_dev`; NaN: no error bar
   double within_2_std_dev = kNotMeasured;
   std::string failure = {};  ///< why a fit failed, of a study that goes on then
@@ -98,6 +129,7 @@ struct StudyInfo {
   std::string_view paper;  ///< number and table or figure
   std::string_view title;
   Study (*run)(const StudyOptions& options, const Progress& progress);
+  std::span<const PaperEntry> published = {};  ///< every figure that its table shows beside ours
   bool needs_recordings = false;  ///< in TORSIO_DATA or ../shared/data: must be named to be run
 };
 

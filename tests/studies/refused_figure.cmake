@@ -1,0 +1,11 @@
+# Embeds a copy of the figures in which FROM is replaced by TO; the message is the test's.
+cmake_minimum_required(VERSION 3.25)
+file(READ ${FIGURES} text)
+string(FIND "${text}" "${FROM}" at)
+if(at EQUAL -1)
+  message(FATAL_ERROR "the figures do not have \"${FROM}\"")
+endif()
+string(REPLACE "${FROM}" "${TO}" text "${text}")
+file(WRITE ${COPY} "${text}")
+execute_process(COMMAND ${CMAKE_COMMAND} -DFIGURES=${COPY} -DOUTPUT=${COPY}.inc -P ${EMBED} ERROR_VARIABLE said)
+message("${said}")
