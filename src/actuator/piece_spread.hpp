@@ -11,7 +11,7 @@ namespace torsio {
 /// coupling, rubber or tube +-3 % (all stiffnesses of one together), inner friction +-25 %, backlash
 /// +-50 %, asymmetry +-0.03 (added), Coulomb friction of gear and bearing +-20 %, and the zero of
 /// each encoder +-0.02 deg. Gears and the clutch, whose preload is set on the bench, stay nominal.
-/// Source: SPEC section 4.6.
+/// Source: specification 4.6.
 void spread_piece(DataSheet& sheet);
 
 }  // namespace torsio

@@ -5,7 +5,7 @@
 
 namespace torsio {
 
-/// What every log of a joint has if it has its sources (SPEC section 0).
+/// What every log of a joint has if it has its sources (specification 0).
 struct CanonicalChannel {
   std::string_view name;
   std::string_view expression;

@@ -10,7 +10,7 @@
 namespace torsio {
 
 /// A jitter on the diagonal, in shares of its mean: from `first` ten times larger as long as the
-/// matrix is not positive definite. Source: SPEC 3.3.
+/// matrix is not positive definite. Source: specification 3.3.
 struct Jitter {
   double first = 0.0;  ///< 0: none at first, then 1e-12
   static constexpr double kLargest = 1e-4;

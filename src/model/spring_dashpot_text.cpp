@@ -29,7 +29,7 @@ struct Preset {
   double scale = 1.0;  ///< of its values, to Nm/rad
 };
 
-// Paper 003, Table 3, is per degree. Topologies: SPEC section 2.1.
+// Paper 003, Table 3, is per degree. Topologies: specification 2.1.
 constexpr double kPerDegree = deg_from_rad(1.0);
 constexpr std::array kPresets{
     Preset{"hooke", "k1"},

@@ -87,7 +87,7 @@ BenchProgram torque_tracking(const DataSheet& sheet, double duration_s, auto ref
 BenchProgram triangles(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double amplitude_Nm = spec.torque_amplitude_Nm.value_or(kTriangleAmplitude_Nm);
   if (!spec.frequency_Hz) {
-    // What the prototype of SPEC section 4.3 learns from, in shares of 5 Nm.
+    // What the prototype of specification 4.3 learns from, in shares of 5 Nm.
     std::vector<Triangles::Piece> pieces = {{0.4, 1.0, 4.0},  {1.0, 0.8, 4.0}, {2.0, 0.6, 6.0},
                                             {4.0, 0.4, 12.0}, {0.6, 0.6, 4.0}, {1.5, 1.0, 5.0}};
     for (auto& piece : pieces) piece.amplitude_Nm *= amplitude_Nm;

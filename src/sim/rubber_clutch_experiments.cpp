@@ -17,7 +17,7 @@
 #include "torsio/signal/excitation.hpp"
 #include "torsio/sim/position_loop.hpp"
 
-// The bench of 002 (SPEC sections 4.4 and 4.7): the input angle is position controlled, the output
+// The bench of 002 (specification 4.4 and 4.7): the input angle is position controlled, the output
 // is clamped, but for the collision and the static cycle.
 
 namespace torsio {

@@ -8,7 +8,7 @@
 #include "torsio/signal/excitation.hpp"
 #include "torsio/sim/plant.hpp"
 
-// The torques that the benches of more than one family ask for (SPEC section 4.7).
+// The torques that the benches of more than one family ask for (specification 4.7).
 
 namespace torsio {
 
@@ -16,7 +16,7 @@ constexpr double kTorqueTest_s = 100.0;
 /// Highest amplitude of a walk as a share of the rating: four of its standard deviations reach it.
 constexpr double kWalkAmplitude = 0.35;
 
-/// SPEC section 6 asks 13 Nm of dfki-50 and 20 Nm of dfki-120, 0.26 and 0.17 of their ratings; of
+/// Specification 6 asks 13 Nm of dfki-50 and 20 Nm of dfki-120, 0.26 and 0.17 of their ratings; of
 /// others we ask the fifth part.
 [[nodiscard]] double usual_torque_amplitude(const DataSheet& sheet);
 

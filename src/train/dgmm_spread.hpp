@@ -12,7 +12,7 @@
 
 namespace torsio {
 
-/// SPEC 3.1: the spread of a new component, and how far it is to the next.
+/// Specification 3.1: the spread of a new component, and how far it is to the next.
 inline constexpr double kDefaultSpread = 0.15;
 inline constexpr double kNoveltyPerSpread = 0.25 / kDefaultSpread;
 

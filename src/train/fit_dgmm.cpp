@@ -37,8 +37,8 @@ Matrix joint_samples(const TrainingData& data) {
   return samples;
 }
 
-// What a data sheet says that a channel can resolve (SPEC 3.1); 0 for those without one and for
-// what is calculated from channels, whose size may be any.
+// What a data sheet says that a channel can resolve (specification 3.1); 0 for those without one
+// and for what is calculated from channels, whose size may be any.
 double resolution(std::string_view expression, bool is_rate) {
   constexpr double kTorque_Nm = 0.05;
   constexpr double kAngle_rad = rad_from_deg(0.01);

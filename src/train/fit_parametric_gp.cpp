@@ -22,7 +22,7 @@
 namespace torsio {
 namespace {
 
-// SPEC 3.3
+// Specification 3.3
 constexpr double kPaperStart = 0.3;
 constexpr double kPaperRate = 0.1;
 constexpr std::size_t kWidenEvery = 1000;

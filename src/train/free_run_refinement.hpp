@@ -28,7 +28,8 @@ struct Refined {
 ///
 ///     min sum (yhat_k(theta) - y_k)^2,   dyhat_k/dtheta = phi_k + sum_i (df/dy_k-i) dyhat_k-i/dtheta
 ///
-/// Nothing says that the end is stable elsewhere: compare it with the start. Source: SPEC section 3.3.
+/// Nothing says that the end is stable elsewhere: compare it with the start. Source: specification
+/// 3.3.
 /// @param regressors `narx_data` of `data`.
 /// @throws Error if the derivatives would not fit into memory; Cancelled.
 [[nodiscard]] Refined refined_in_free_run(const NarxTerms& f, const TrainingData& data,

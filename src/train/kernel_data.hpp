@@ -32,7 +32,7 @@ struct KernelData {
 [[nodiscard]] double median_distance(const Matrix& points, Random& random);
 
 /// Numbers to start from: length scales of distances at that distance, periods at twice that, 0.3 for
-/// what multiplies a linear kernel, 1 for the rest. Source: SPEC 3.3 (`recommended`).
+/// what multiplies a linear kernel, 1 for the rest. Source: specification 3.3 (`recommended`).
 void set_start(KernelExpression& kernel, double distance);
 
 /// k-means from k-means++ (Arthur and Vassilvitskii 2007), at most 30 rounds. Fewer centres come back

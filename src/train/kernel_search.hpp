@@ -20,7 +20,7 @@ struct KernelSearch {
   KernelSearch(const Kernel& kernel, std::size_t most_iterations);
 };
 
-/// ln sigma^2 to start from, and its least: SPEC 3.3's floor.
+/// ln sigma^2 to start from, and its least: the floor of specification 3.3.
 inline constexpr double kFirstLogNoise = -4.605170185988091;   // ln 0.01
 inline constexpr double kLeastLogNoise = -13.815510557964274;  // ln 1e-6
 

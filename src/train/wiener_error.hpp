@@ -79,7 +79,7 @@ enum class WienerFree : std::uint8_t {
 };
 
 /// The simulation error y(numbers) - target over all records and what it does when numbers change, by
-/// the sensitivities of SPEC section 3.5 run as filters:
+/// the sensitivities of specification 3.5 run as filters:
 ///
 ///     dx/db_ik =  z^-k (prod_j>i G_j) x_i-1 / F_i      dx/dv_k = G phi_k(u)
 ///     dx/da_ik = -z^-k (prod_j>i G_j) x_i / F_i         dx/ds_i1 = (prod_j>i G_j) delta / F_i

@@ -13,7 +13,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kPositive = 0.5 / rad_from_deg(12.4);  // secants at 0.5 Nm, SPEC section 4.4
+constexpr double kPositive = 0.5 / rad_from_deg(12.4);  // secants at 0.5 Nm, specification 4.4
 constexpr double kNegative = 0.5 / rad_from_deg(11.3);
 constexpr double kStiffness = 0.5 * (kPositive + kNegative);
 constexpr std::array<double, 3> kRelaxation_s = {2.0, 0.3, 0.03};

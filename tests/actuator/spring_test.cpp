@@ -24,7 +24,7 @@ Spring spring_of(const DataSheet& sheet) {
   return Spring(std::get<Spring::Parameters>(plant_parameters(sheet).second));
 }
 
-/// The sheet's spring with each inner friction (SPEC section 4.6), without viscosity.
+/// The sheet's spring with each inner friction (specification 4.6), without viscosity.
 std::vector<Spring> variants_of(const DataSheet& sheet) {
   std::vector<Spring> springs;
   for (const std::string_view variant : sheet.variants) {

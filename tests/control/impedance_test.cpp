@@ -248,7 +248,7 @@ TEST(TubeImpedance, GoesOnFromWhereItFadedTo) {
   EXPECT_NEAR(last_A, wanted_A * (1.0 - std::exp(-1.0)), 0.01 * wanted_A);
 }
 
-// FAULTS 13: the angle 0 is nobody's wish, and far away.
+// docs/faults.md 13: without a command there is no reference; the angle 0 would be far away.
 TEST(TubeImpedance, GivesNoCurrentBeforeItsFirstGoodWish) {
   TubeImpedance impedance(tube_settings(TubeImpedance::kHigh), kRate_Hz);
   const TubeImpedance::Angles angles = {

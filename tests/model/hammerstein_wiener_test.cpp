@@ -34,8 +34,9 @@ double slope_after(const HammersteinWiener& model, std::size_t steps) {
          (2.0 * kAside);
 }
 
-// SPEC section 2: chain gain 2.127; DC .63 (discrete), .62 (8), .434 (10), at once 2.13, 3.66, 1.61 Nm/deg.
-// The curves bend: about the rest state C's slope is not that about 0, hence the ratio.
+// Specification 2: chain gain 2.127; DC .63 (discrete), .62 (8), .434 (10), at once 2.13, 3.66,
+// 1.61 Nm/deg. The curves bend: about the rest state C's slope is not that about 0, hence the
+// ratio.
 TEST(Paper003, HasTheGainsOfTheSpecification) {
   struct Gains {
     Paper003 form;
@@ -60,7 +61,7 @@ TEST(Paper003, HasTheGainsOfTheSpecification) {
 
 TEST(Paper003, IsInDegreesAndNewtonMetres) {
   const HammersteinWiener model(hammerstein_wiener_of(Paper003::refined));
-  EXPECT_NEAR(after(model, 0.0, 1), -0.056, 1e-3);  // SPEC section 2: y(0) = -.056 Nm
+  EXPECT_NEAR(after(model, 0.0, 1), -0.056, 1e-3);  // specification 2: y(0) = -.056 Nm
   EXPECT_NEAR(after(model, 8.0 * kDegree, 20'000), 3.1, 0.1);
   EXPECT_NEAR(after(model, -8.0 * kDegree, 20'000), -3.7, 0.1);
 }

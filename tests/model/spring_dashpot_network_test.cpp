@@ -154,7 +154,7 @@ TEST(RelaxationSpectrum, RefusesNodesThatAreNoNetwork) {
       HasSubstr("node 1: expected a name that stands nowhere else, found k"));
 }
 
-// SPEC section 7.
+// Specification 7.
 TEST(RelaxationSpectrum, Of003aHasItsPolesZerosAndResponse) {
   const SpringDashpotNetwork a = parse_network("003a");
   const auto poles = rates(a);
@@ -171,7 +171,7 @@ TEST(RelaxationSpectrum, Of003aHasItsPolesZerosAndResponse) {
     EXPECT_NEAR(std::abs(response), magnitude, 5e-5) << frequency;
     EXPECT_NEAR(std::arg(response) * kDegrees, phase, 5e-3) << frequency;
   }
-  // SPEC section 2.1: its generalised Maxwell equivalent, d = g / p.
+  // Specification 2.1: its generalised Maxwell equivalent, d = g / p.
   EXPECT_NEAR(spectrum.stiffness / kDegrees, 0.3829, 5e-5);
   EXPECT_NEAR(spectrum.branches[0].stiffness / kDegrees, 0.7701, 5e-5);
   EXPECT_NEAR(spectrum.branches[0].stiffness / poles[0] / kDegrees, 6.0003, 5e-5);
@@ -195,7 +195,8 @@ TEST(RelaxationSpectrum, Of003cHasItsPolesAndZeros) {
   }
 }
 
-// SPEC sections 2, 7: the elements that partial fractions of paper 003's (10) give, to start (a) from.
+// Specification 2, 7: the elements that partial fractions of paper 003's (10) give, to start (a)
+// from.
 TEST(RelaxationSpectrum, OfTheStartValuesIsThePapersTransferFunction) {
   const RelaxationSpectrum spectrum = relaxation_spectrum(
       parse_network("series(kv(k1=0.684218, d1=14.2903), kv(k2=4.52983, d2=4.43722), k3=1.61244)"));
@@ -209,7 +210,7 @@ TEST(RelaxationSpectrum, OfTheStartValuesIsThePapersTransferFunction) {
   }
 }
 
-// SPEC section 2.1: what (b) and (c) are from outside, within the band of the paper.
+// Specification 2.1: what (b) and (c) are from outside, within the band of the paper.
 TEST(RelaxationSpectrum, Of003bAnd003cIsNearlyThatOf003a) {
   const RelaxationSpectrum a = relaxation_spectrum(parse_network("003a"));
   for (const auto& [name, share] : {std::pair{"003b", 0.027}, {"003c", 0.0039}}) {

@@ -54,7 +54,7 @@ TEST(TransferFunction, HasTheRootsThatThePaperPrints) {
   EXPECT_NEAR(real_parts(zeros(sections)).front(), 0.9989, 1e-12);
 }
 
-// SPEC section 2: Tustin at 5 ms -> (1.7198, 688.29, 151.42) / (1, 975.31, 509.3), printed as (8).
+// Specification 2: Tustin at 5 ms -> (1.7198, 688.29, 151.42) / (1, 975.31, 509.3), printed as (8).
 TEST(TransferFunction, TustinGivesThePapersContinuousForm) {
   const ContinuousTransfer found = continuous_of(Paper003::discrete);
   ASSERT_EQ(found.numerator.size(), 3U);
@@ -94,7 +94,7 @@ TEST(TransferFunction, WarnsOfPolesThatNoContinuousSystemHas) {
 TEST(TransferFunction, KnowsThePolesAndZerosOfTheRefinedForm) {
   const ContinuousTransfer refined = continuous_of(Paper003::refined);
   const auto found = real_parts(polynomial_roots(refined.denominator));
-  EXPECT_NEAR(found[0], -1.416, 1e-3);   // SPEC section 2
+  EXPECT_NEAR(found[0], -1.416, 1e-3);   // specification 2
   EXPECT_NEAR(found[1], -0.1282, 2e-4);  // -0.12807 of the printed coefficients
   const auto of_numerator = real_parts(polynomial_roots(refined.numerator));
   EXPECT_NEAR(of_numerator[0], -1.0209, 1e-4);

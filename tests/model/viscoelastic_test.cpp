@@ -75,20 +75,20 @@ struct StateSpace {
   }
 };
 
-// SPEC section 3.6 (a).
+// Specification 3.6 (a).
 StateSpace explicit_a(double k1, double d1, double k2, double d2, double k3) {
   StateSpace of{Eigen::Matrix2d{{-(k3 + k1) / d1, -k3 / d1}, {-k3 / d2, -(k3 + k2) / d2}},
                 Eigen::Vector2d{k3 / d1, k3 / d2}, Eigen::RowVector2d{-k3, -k3}, k3};
   return of;
 }
 
-// SPEC section 3.6 (b).
+// Specification 3.6 (b).
 StateSpace explicit_b(double k2, double d2, double k3, double k5, double k6, double d3) {
   return {Eigen::Matrix2d{{-(k3 + k2) / d2, 0.0}, {0.0, -k6 / d3}},
           Eigen::Vector2d{k3 / d2, k6 / d3}, Eigen::RowVector2d{-k3, -k6}, k5 + k6 + k3};
 }
 
-// SPEC section 3.6 (c).
+// Specification 3.6 (c).
 StateSpace explicit_c(double k1, double d1, double k7, double k5, double k6, double d3, double k4,
                       double d4) {
   // In x = (x1, v3, v4): y = (k7 (u - x1) + k6 v3 + k4 v4) / sum.
@@ -131,7 +131,7 @@ TEST(Viscoelastic, IsTheStateSpaceOfTheSpecification) {
   expect_response("003c", explicit_c(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]));
 }
 
-// SPEC section 3.7: k_inf + k1 exp(-t k1 / d).
+// Specification 3.7: k_inf + k1 exp(-t k1 / d).
 TEST(Viscoelastic, RelaxesAsTheStandardLinearSolidDoes) {
   Viscoelastic model = model_of("parallel(k0=300, maxwell(k1=120, d1=30))", 1e-3);
   (void)step(model, 0.0);

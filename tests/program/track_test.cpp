@@ -97,7 +97,7 @@ TEST_F(TrackVerb, TuneLoopProposesGainsWithTheirMarginsOrRefuses) {
   for (const char* word : {"proportional", "locked", "free", "phase margin", "passive up to"})
     EXPECT_NE(table.out.find(word), std::string::npos) << table.out;
   const auto json = nlohmann::json::parse(contents("gains.json"));
-  // (J N² ω² − K) / (N k_t) of SPEC section 3.11
+  // (J N² ω² − K) / (N k_t) of specification 3.11
   EXPECT_NEAR(json.at("gains").at("proportional_A_rad"), 127.3, 0.1);
   EXPECT_GT(json.at("margins").at(0).at("phase_deg"), 45.0);
   EXPECT_GT(json.at("margins").at(1).at("gain"), 2.0);

@@ -1,4 +1,4 @@
-// The official free-run tests of public benchmarks: thresholds of issue 6, and what was measured.
+// The official free-run tests of public benchmarks: thresholds, and what was measured.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -150,7 +150,7 @@ TEST(ControlLoop, FollowsTheTorqueThatIsSent) {
   EXPECT_NEAR(mean_Nm, 8.0, 2.5) << "a line knows nothing of the friction of the spring";
 }
 
-// FAULTS 19.
+// docs/faults.md 19.
 TEST(ControlLoop, GivesNoCurrentBeforeItIsArmed) {
   Robot robot;
   robot.run(600, [&](int n) {
@@ -161,7 +161,8 @@ TEST(ControlLoop, GivesNoCurrentBeforeItIsArmed) {
   EXPECT_GT(most_current(robot, 500, 600), 0.5);
 }
 
-// FAULTS 17, 20, 21: at any moment of any motion. What is stored falls from the stop on; nothing wakes the joint.
+// docs/faults.md 17, 20, 21: at any moment of any motion. The stored energy falls from the stop
+// on, and nothing starts the joint again.
 TEST(ControlLoop, StopsWithin20MsWithoutCommandsAndTakesUpNoEnergy) {
   Random random(3);
   for (int round = 0; round < 30; ++round) {
@@ -184,7 +185,7 @@ TEST(ControlLoop, StopsWithin20MsWithoutCommandsAndTakesUpNoEnergy) {
   }
 }
 
-// FAULTS 21: the word of an operator, and a command since.
+// docs/faults.md 21: the word of an operator, and a command since.
 TEST(ControlLoop, GoesOnOnlyWhenItIsArmedAgainAndAskedAgain) {
   Robot robot;
   robot.run(1500, [&](int n) {
@@ -197,7 +198,7 @@ TEST(ControlLoop, GoesOnOnlyWhenItIsArmedAgainAndAskedAgain) {
   EXPECT_GT(most_current(robot, 1001, 1500), 0.3);
 }
 
-// FAULTS 13, 18: the last good set-point stands, but does not feed the watchdog; nor do gains.
+// docs/faults.md 13, 18: the last good set-point stands, but does not feed the watchdog; nor do gains.
 TEST(ControlLoop, TakesNoPartOfACommandThatIsNotANumber) {
   Robot robot;
   const double usual =
@@ -220,7 +221,7 @@ TEST(ControlLoop, TakesNoPartOfACommandThatIsNotANumber) {
   EXPECT_LE(stop_after(robot, 0), 520U);
 }
 
-// FAULTS 14: a model out of its range is a line; not for ever.
+// docs/faults.md 14: a model out of its range is a line; not for ever.
 TEST(ControlLoop, FallsBackOnTheLineAndThenStops) {
   Robot robot;
   robot.run(900, [&](int n) {
@@ -246,7 +247,7 @@ TEST(ControlLoop, LetsTheCurrentFadeWithoutASensorAndThenStops) {
   EXPECT_LE(stop_after(robot, 0), 553U);
 }
 
-// FAULTS 28: no burst, no command that is older than it says, and an end.
+// docs/faults.md 28: no burst, no command that is older than it says, and an end.
 TEST(ControlLoop, StopsAfterOverrunsWithoutCatchingUp) {
   Robot robot;
   robot.run(
@@ -264,7 +265,8 @@ TEST(ControlLoop, StopsAfterOverrunsWithoutCatchingUp) {
   EXPECT_EQ(robot.loop_end.skipped_periods, 6U + 5U);
 }
 
-// FAULTS 27: the loop's own clock does not run backwards; a watchdog that is told of one that does stops.
+// docs/faults.md 27: the loop's own clock does not run backwards; a watchdog that is told of one
+// that does stops.
 TEST(ControlLoop, StopsWhereTheClockOfItsCommandsIsAhead) {
   Robot robot;
   robot.run(600, [&](int n) {
@@ -274,7 +276,7 @@ TEST(ControlLoop, StopsWhereTheClockOfItsCommandsIsAhead) {
   EXPECT_LE(stop_after(robot, 0), 320U);
 }
 
-// FAULTS 29: taken whole or not at all, and without a jump.
+// docs/faults.md 29: taken whole or not at all, and without a jump.
 TEST(ControlLoop, TakesNewGainsWithoutABump) {
   Robot robot;
   double usual = 0.0;

@@ -62,8 +62,8 @@ double best_fit(const std::vector<double>& measured, const std::vector<double>& 
   return 100.0 * (1.0 - norm(error) / norm(spread));
 }
 
-/// Model (a) of paper 003 with its printed parameters, (d1|k1)-(d2|k2)-k3 in Nm, deg and s (SPEC
-/// sections 2.1 and 3.6), from rest; the twist is linear between samples.
+/// Model (a) of paper 003 with its printed parameters, (d1|k1)-(d2|k2)-k3 in Nm, deg and s
+/// (specification 2.1 and 3.6), from rest; the twist is linear between samples.
 std::vector<double> model_a(const std::vector<double>& twist_deg) {
   constexpr std::array kDamping = {2.172, 13.46};
   constexpr std::array kStiffness = {3.803, 0.564};
@@ -140,7 +140,7 @@ TEST(Triangles, AreLoggedAtTwoHundredHertzWithTwelveBitsOfTwist) {
   EXPECT_NEAR(largest(recording.channel("torque_Nm").values), 5.0, 0.1);
 }
 
-// SPEC section 4.3 has 90.6 and 73.6 % for twists that the inverse of (a) gives instead of a loop
+// Specification 4.3 has 90.6 and 73.6 % for twists that the inverse of (a) gives instead of a loop
 // with friction.
 TEST(Triangles, ModelAOfThePaperFitsThemAsInThePrototype) {
   const Recording recording = simulate({.actuator = "elastomer", .experiment = "triangles"});

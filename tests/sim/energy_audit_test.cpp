@@ -136,7 +136,7 @@ TEST(EnergyAudit, BooksOfEveryActuatorCloseUnderARandomDrive) {
   double largest_following = 0.0;
   for (const std::string& actuator : test::every_actuator()) {
     const Books books = driven_at_random(actuator);
-    EXPECT_LE(books.largest_gain_J, 1e-12) << actuator << ": SPEC section 4.6";
+    EXPECT_LE(books.largest_gain_J, 1e-12) << actuator << ": specification 4.6";
     EXPECT_LT(books.largest_residual_J, 1e-4 * books.throughput_J) << actuator;
     EXPECT_GT(books.stage_loss_J, 1e-4 * books.throughput_J) << actuator;
     EXPECT_GT(books.lost_J, 0.1 * books.throughput_J) << actuator;

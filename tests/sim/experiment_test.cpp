@@ -32,7 +32,7 @@ double largest(const std::vector<double>& values) {
   return *std::ranges::max_element(values, {}, [](double value) { return std::abs(value); });
 }
 
-// The numbers of SPEC section 6 come from a prototype in which the rotor did not feel the slope of
+// The numbers of specification 6 come from a prototype in which the rotor did not feel the slope of
 // the kinematic error. With it the same prototype gives 10.16 Nm/deg, 1.25 Nm and 21.6 Nm (50) and
 // 19.94 Nm/deg, 1.41 Nm and 52.5 Nm (120): the brackets hold both.
 TEST(Sweep, LoopOfTheFiftyNmBenchIsThatOfThePrototype) {

@@ -24,7 +24,7 @@ constexpr double kTubeRatio = 2.0;
 constexpr double kGearRatio = 51.0;
 constexpr double kOutputCode_deg = 360.0 / (1U << 17U);
 
-/// The two-body model of SPEC section 2: rotor and output on the tube, an ideal gear between them.
+/// The two-body model of specification 2: rotor and output on the tube, an ideal gear between them.
 /// The wave generator is so light, and the gear so stiff, that each moves the modes by less than
 /// 0.3 %.
 PlantParameters ideal(const std::string& name) {
@@ -69,7 +69,7 @@ double mode_Hz(const PlantParameters& parts, bool is_motor_held, bool is_locked)
   return 0.5 * (crossings - 1) / (last_s - first_s);
 }
 
-// SPEC section 7 has two rows. That with the constant efficiency 0.5 (62.99, 37.23, 36.73 Hz, and
+// Specification 7 has two rows. That with the constant efficiency 0.5 (62.99, 37.23, 36.73 Hz, and
 // the rigid-body pole at -4.29 1/s) is the paper's linear model, whose stiffness matrix is not
 // symmetric: it gives back more work than it took (erratum 004-1), and no passive plant has those
 // modes. These are the modes for an efficiency of 1.
@@ -107,7 +107,7 @@ TEST(HarmonicDrive, RatedTorqueTwistsALosslessTubeByEightDegrees) {
 
 TEST(HarmonicDrive, RefusesAStepTooLongForTheRigidTubeAndNamesTheLimit) {
   const PlantParameters rigid = plant_parameters(data_sheet("harmonic-drive:rigid"));
-  EXPECT_NO_THROW(Plant(rigid, 5e-5)) << "SPEC section 4.6";
+  EXPECT_NO_THROW(Plant(rigid, 5e-5)) << "specification 4.6";
   EXPECT_NO_THROW(Plant(plant_parameters(data_sheet("harmonic-drive")), 1e-4));
   try {
     Plant(rigid, 1e-4);
@@ -118,7 +118,7 @@ TEST(HarmonicDrive, RefusesAStepTooLongForTheRigidTubeAndNamesTheLimit) {
   }
 }
 
-// SPEC section 2: at 20 Nm theta_a = 0.19 deg and theta_s = -0.55 deg.
+// Specification 2: at 20 Nm theta_a = 0.19 deg and theta_s = -0.55 deg.
 TEST(ImpedanceLoop, YieldsAsItsLinearModelSays) {
   PlantParameters parts = ideal("harmonic-drive");
   parts.joint_viscous_Nms_rad = 65.0;  // ten times: it settles sooner, where it would anyway
@@ -206,7 +206,7 @@ Recording pushed_as_the_prototype(const std::string& actuator, std::uint64_t see
   return pushed(actuator, kAny_Nm * kLargest_Nm / largest(trial.channel("torque_Nm").values), seed);
 }
 
-// The prototype of SPEC section 4.5: theta_s ranges over 2.4 deg (soft), 0.83 deg (stiff) and 0.01
+// The prototype of specification 4.5: theta_s ranges over 2.4 deg (soft), 0.83 deg (stiff) and 0.01
 // deg (rigid), theta_s1 of the rigid tube over 1.35 deg, and the best line of the torque over
 // theta_s is 18 to 20 % of the largest torque off; 17.9 to 21.9 % with two seeds.
 TEST(HumanTorque, TwistsTheTubesAsThePrototype) {

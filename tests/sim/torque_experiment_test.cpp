@@ -18,7 +18,7 @@
 #include "torsio/sim/sensor_set.hpp"
 #include "torsio/sim/torque_loop.hpp"
 
-// Tracking of a torque. What SPEC section 6 gives are MAD and STD of |e| of a controller whose
+// Tracking of a torque. What specification 6 gives are MAD and STD of |e| of a controller whose
 // straight line was fitted to sweeps, with 13 Nm on dfki-50 and 20 Nm on dfki-120.
 
 namespace torsio {
@@ -97,7 +97,7 @@ TrackingError chirp_error_with_sweep_line(const char* actuator, double amplitude
   return error_of(wanted, torque);
 }
 
-// The prototype has 1.32±0.51 and 1.49±1.14 Nm (SPEC section 6).
+// The prototype has 1.32±0.51 and 1.49±1.14 Nm (specification 6).
 TEST(Chirp, WithALineFromASweepErrsAsThePrototypeDoes) {
   const TrackingError fifty = chirp_error_with_sweep_line("dfki-50", 13.0);
   EXPECT_NEAR(fifty.mad, 1.32, 0.25);

@@ -67,7 +67,7 @@ TEST(Studies, OfTheElastomerCouplingClimbThePapersLadder) {
   const StudyRow& line = row_of(study, "bonded, triangles", "linear");
   const StudyRow& printed = row_of(study, "bonded, triangles", "viscoelastic 003a as printed");
   const StudyRow& a = row_of(study, "bonded, triangles", "viscoelastic 003a");
-  // SPEC section 4.3: 73.6, 90.6 and, refitted, 93.7 on the prototype's plant.
+  // Specification 4.3: 73.6, 90.6 and, refitted, 93.7 on the prototype's plant.
   EXPECT_NEAR(line.fit_percent, 73.6, 1.5);
   EXPECT_NEAR(printed.fit_percent, 90.6, 1.5);
   EXPECT_NEAR(a.fit_percent, 93.7, 1.5);

@@ -229,8 +229,8 @@ TEST(KernelPlain, RefusesNumbersThatDivideByNothing) {
   EXPECT_NO_THROW((void)kernel_plain(theta)) << "an offset may be 0";
 }
 
-/// Regressors of a NARX model of a rubber spring, 7 past torques and 8 deflections, as SPEC 3.3 has
-/// them.
+/// Regressors of a NARX model of a rubber spring, 7 past torques and 8 deflections, as
+/// specification 3.3 has them.
 TrainingData narx_data(double deflection_unit) {
   constexpr std::size_t kSamples = 3000;
   std::vector<double> u;

@@ -206,8 +206,8 @@ TEST(FitLinearCoulomb, NeedsARateThatMoves) {
             std::string::npos);
 }
 
-/// A spring beside one Maxwell-slip element (SPEC 3.7), swept slowly: a loop that neither family
-/// can hold exactly.
+/// A spring beside one Maxwell-slip element (specification 3.7), swept slowly: a loop that neither
+/// family can hold exactly.
 TrainingData hysteresis_sweep() {
   Matrix features(20000, 2);
   for (std::size_t n = 0; n < features.rows; ++n) {

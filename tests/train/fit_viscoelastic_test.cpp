@@ -100,7 +100,7 @@ TEST(FitViscoelastic, TellsErrorsThatHoldInNoise) {
   EXPECT_LT(squares, 5.0 * 4.0);
 }
 
-// SPEC section 3.6: six parameters, five coefficients.
+// Specification 3.6: six parameters, five coefficients.
 TEST(FitViscoelastic, SaysWhichCombinationTheDataCannotTell) {
   const char* near_b = "parallel(series(kv(k2=30, d2=40), k3=60), maxwell(k6=40, d3=350), k5=9)";
   const char* near_d =

@@ -12,7 +12,7 @@ namespace {
 
 struct Expectation {
   const char* actuator;
-  double linear_Nm;  ///< SPEC section 6, whose prototype left the gear's reaction out
+  double linear_Nm;  ///< specification 6, whose prototype left the gear's reaction out
                      ///< (docs/actuators.md)
 };
 

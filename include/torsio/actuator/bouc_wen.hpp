@@ -17,7 +17,7 @@ namespace torsio {
 /// pushing. Unloading is elastic, hence exact; loading takes midpoint steps of at most half a knee,
 /// which cannot overshoot f. At constant load the error falls with the square of the increment,
 /// under a changing load with the increment itself, since the load is that of the step's end.
-/// Source: Ismail, Ikhouane and Rodellar 2009; SPEC section 4.6.
+/// Source: Ismail, Ikhouane and Rodellar 2009; specification 4.6.
 class BoucWen {
  public:
   struct Parameters {

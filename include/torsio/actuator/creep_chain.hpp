@@ -17,7 +17,7 @@ namespace torsio {
 /// zeros −σⱼ of their Z(s) = k₀ + Σ kᵢ s / (s + pᵢ) interlace the poles, k = Z(∞), dⱼ = Z′(−σⱼ),
 /// kⱼ = σⱼ dⱼ. Unlike the branches, the creep form keeps a provable energy book behind a nonlinear
 /// output, and can lose and regain contact. u is deflection [rad], xⱼ creep [rad], T torque [Nm].
-/// Source: SPEC section 2.1 (a).
+/// Source: specification 2.1 (a).
 class CreepChain {
  public:
   static constexpr std::size_t kElements = 3;

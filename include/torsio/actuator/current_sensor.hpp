@@ -4,7 +4,7 @@
 
 namespace torsio {
 
-/// The motor current as the drive reports it: white noise on top. Source: SPEC section 4.1.
+/// The motor current as the drive reports it: white noise on top. Source: specification 4.1.
 class CurrentSensor {
  public:
   struct Parameters {

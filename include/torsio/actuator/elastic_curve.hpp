@@ -13,7 +13,7 @@ namespace torsio {
 ///     τ = K x (1 ± a) + K₂ max(|x| − δ₂, 0) sgn x            ± by the sign of x
 ///
 /// δ deflection [rad] (gear minus joint), τ torque of the spring on the joint [Nm], b half gap
-/// [rad], a asymmetry [–]. Source: SPEC section 4.1.
+/// [rad], a asymmetry [–]. Source: specification 4.1.
 class ElasticCurve {
  public:
   struct Parameters {

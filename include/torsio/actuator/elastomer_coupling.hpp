@@ -18,7 +18,7 @@ namespace torsio {
 /// T is the torque of a CreepChain [Nm], F that of Maxwell-slip elements; g is held constant outside
 /// the range around 0 where it rises. What is stored,
 /// G(T)/k + Σ G(kⱼ xⱼ)/kⱼ with G = ∫ g, only ever loses against the work, Σ (g(T) − g(kⱼ xⱼ)) ẋⱼ,
-/// because g rises. Source: SPEC sections 2.1 (a), 4.3 and 4.7; paper 003, Eq. 3.
+/// because g rises. Source: specification 2.1 (a), 4.3 and 4.7; paper 003, Eq. 3.
 ///
 /// *Unbonded*, each direction is carried by lobes of their own, 1/1.4 as stiff, that can only be
 /// pressed: they lose contact where their torque would turn, creep back without load, and meet the

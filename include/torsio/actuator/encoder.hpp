@@ -10,7 +10,8 @@ namespace torsio {
 ///
 ///     y = LSB ⌊(q + o) / LSB + ½ + σ n⌋ − o,   n ~ N(0, 1),  LSB = 2π / 2^bits
 ///
-/// plus the zero error. o is where the code edges lie, random within one LSB. Source: SPEC section 4.1.
+/// plus the zero error. o is where the code edges lie, random within one LSB. Source: specification
+/// 4.1.
 class Encoder {
  public:
   struct Parameters {

@@ -18,7 +18,8 @@ namespace torsio {
 /// neither speed nor load, since then F v − d/dt (F² / 2σ₀) = |v| F² / g >= 0: whatever speed and
 /// load do, what the bristle gives back it was given. The clip, where the level shrinks, only loses.
 /// At constant speed and load F approaches g exponentially, and the step uses that exact solution:
-/// explicit Euler is unstable at motor speed. Source: Canudas de Wit et al. 1995; SPEC section 4.1.
+/// explicit Euler is unstable at motor speed. Source: Canudas de Wit et al. 1995; specification
+/// 4.1.
 class LuGreFriction {
  public:
   struct Parameters {

@@ -16,7 +16,7 @@ namespace torsio {
 ///     τ_h (1 / N + ε′(θ_m))                   back on the rotor
 ///
 /// The error acts on the rotor by the same slope with which it moves the output (virtual work), so
-/// that it can store but not create energy. Source: SPEC section 4.1.
+/// that it can store but not create energy. Source: specification 4.1.
 class Gear {
  public:
   struct Parameters {

@@ -18,8 +18,8 @@ namespace torsio {
 /// too large. The bristle's stiffness f / X must not depend on the rate, as it would with the plain
 /// displacement X: loaded slowly and released fast, a stiffness that falls with the rate gives
 /// energy. The force is the state, clipped to ± r f after the update,
-/// so that a shrinking limit dissipates instead of pushing. Source: Canudas de Wit et al. 1995; SPEC
-/// section 4.6.
+/// so that a shrinking limit dissipates instead of pushing. Source: Canudas de Wit et al. 1995;
+/// specification 4.6.
 class LuGreSlip {
  public:
   struct Parameters {

@@ -15,7 +15,7 @@ namespace torsio {
 ///     żᵢ = kᵢ u̇ − zᵢ / Tᵢ,   F = Σ zᵢ
 ///
 /// u displacement [rad], kᵢ stiffness [Nm/rad], Tᵢ relaxation time [s]. Solved exactly for a
-/// displacement that is linear between two steps. Source: SPEC sections 4.3 and 4.4.
+/// displacement that is linear between two steps. Source: specification 4.3 and 4.4.
 template <std::size_t Count>
 class MaxwellBranches {
  public:

@@ -13,7 +13,7 @@ namespace torsio {
 ///     f = f₀ + μ |τ_el|,   Fᵢ ← clip(Fᵢ + wᵢ f Δx / Xᵢ, ± wᵢ f),   F = Σ Fᵢ
 ///
 /// x displacement [rad], Xᵢ break-away displacement [rad], wᵢ share of the force [–]. Fᵢ is clipped
-/// after the update, so that a shrinking limit dissipates instead of pushing. Source: SPEC sections
+/// after the update, so that a shrinking limit dissipates instead of pushing. Source: specification
 /// 4.1 and 4.6.
 template <std::size_t Count>
 class MaxwellSlip {

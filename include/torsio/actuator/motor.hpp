@@ -12,7 +12,7 @@ namespace torsio {
 ///     i̇ = (i_ref − i) / T_i,   |i_ref| ≤ i_max,   |R i_ref + k_e ω| ≤ U with k_e = k_t
 ///     τ = k_t i + r k_t i_max sin(n θ_m)
 ///
-/// The lag is solved exactly over a step. Source: SPEC section 4.1.
+/// The lag is solved exactly over a step. Source: specification 4.1.
 class Motor {
  public:
   struct Parameters {

@@ -14,7 +14,8 @@ namespace torsio {
 ///     τ = s τ_el(u) + Σ zᵢ + F[u],   τ_el = K₀ u + a |u| tanh(|u| / b)
 ///
 /// u deflection [rad], s share of the curve that never relaxes, zᵢ Maxwell branches, F Maxwell-slip
-/// elements. The secant tends to K₀ + a for u > 0 and to K₀ − a for u < 0. Source: SPEC section 4.4.
+/// elements. The secant tends to K₀ + a for u > 0 and to K₀ − a for u < 0. Source: specification
+/// 4.4.
 class RubberSpring {
  public:
   struct Parameters {

@@ -16,8 +16,8 @@ namespace torsio {
 ///     T = F + c ẋ while it sticks, at most T_s;   T = F while it slips
 ///
 /// A cable that stretches no further dissipates nothing: c is without effect in slip. Standing
-/// still, a clutch that slipped goes on at T_k when moved on. Source: SPEC section 4.4; c is
-/// assumed, SPEC has none.
+/// still, a clutch that slipped goes on at T_k when moved on. Source: specification 4.4; c is
+/// assumed.
 class SlipClutch {
  public:
   using Output = Gear::Output;
@@ -27,7 +27,7 @@ class SlipClutch {
     double stiffness_Nm_rad = 0.0;   ///< k, of the cable at the clutch
     double static_torque_Nm = 0.0;   ///< T_s
     double sliding_ratio = 0.9;      ///< T_k / T_s
-    double damping_Nms_rad = 0.005;  ///< c; with the 50 Nm/rad of SPEC c / k is 0.1 ms
+    double damping_Nms_rad = 0.005;  ///< c; c / k is 0.1 ms for 50 Nm/rad
   };
 
   /// @throws Error if ratio, stiffness or static torque is not positive, the sliding ratio not in

@@ -11,7 +11,7 @@
 
 namespace torsio {
 
-/// The inner friction of a spring, one alternative a variant of the plant (SPEC section 4.6). Each
+/// The inner friction of a spring, one alternative a variant of the plant (specification 4.6). Each
 /// has `Parameters`, `reset()`, `step(increment_rad, rate_rad_s, load_Nm)`, `energy()` and
 /// `stiffness(load_Nm)`.
 using SpringFriction = std::variant<MaxwellSlip<4>, BoucWen, LuGreSlip>;
@@ -21,7 +21,7 @@ using SpringFriction = std::variant<MaxwellSlip<4>, BoucWen, LuGreSlip>;
 ///
 ///     τ = τ_el(δ) + F[δ, |τ_el|] + d δ̇
 ///
-/// Source: SPEC section 4.1.
+/// Source: specification 4.1.
 class Spring {
  public:
   struct Parameters {

@@ -7,8 +7,8 @@
 namespace torsio {
 
 /// A load cell that is slower than the loop around it: it samples at its own rate, delivers late,
-/// and its last value is held between. Counts in ticks of the loop that reads it. Source: SPEC
-/// section 4.1.
+/// and its last value is held between. Counts in ticks of the loop that reads it. Source:
+/// specification 4.1.
 class TorqueSensor {
  public:
   struct Parameters {

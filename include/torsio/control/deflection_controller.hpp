@@ -22,7 +22,7 @@ namespace torsio {
 ///     θ̇* = ω (δ* − δ) + D[δ*]
 ///
 /// δ̇ is low-passed; the current stays within the peak, the integral by the scheme of `Pid`. Source:
-/// SPEC section 3.11.
+/// specification 3.11.
 class DeflectionController {
  public:
   enum class Actuation { current, velocity };

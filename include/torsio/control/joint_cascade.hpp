@@ -64,7 +64,7 @@ struct JointState {
 /// voltage) cuts further. A rate limit acts on what the mode wants; one that is slower than the
 /// override is refused. Without a torque sensor τ is 0 and d is the whole load.
 ///
-/// Source: paper 000 section 4 (SPEC section 3.11); the bounds and their proof are ours.
+/// Source: paper 000 section 4 (specification 3.11); the bounds and their proof are ours.
 class JointCascade {
  public:
   struct Gains {

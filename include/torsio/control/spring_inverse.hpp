@@ -43,12 +43,12 @@ class LinearInverse {
 };
 
 /// A model of the torque run backwards: δ = E[δ | τ*, δ̇, …] with everything but δ as measured
-/// (`AnyModel::invert`; SPEC section 3.1 for mixtures).
+/// (`AnyModel::invert`; specification 3.1 for mixtures).
 ///
 /// Guarded as an `Estimator` is: where another input, or the answer, has left its range in training,
 /// the model hands over to its linear fallback run backwards; until the filters have settled, and
 /// where the model has no answer, that alone tells. A slow sweep teaches nothing about the fast
-/// motions of a torque loop (SPEC section 6), so the answer may leave that line only by so many of
+/// motions of a torque loop (specification 6), so the answer may leave that line only by so many of
 /// its residual standard deviations.
 ///
 /// The memory of a model with state follows the deflection that is asked for, not the measured one:

@@ -94,7 +94,7 @@ class TorqueLoopCore {
 ///
 /// A wish that is not finite is a fault, and the last good one stands; without a usable measurement
 /// the current fades to 0. Where the inverse falls back on its line the loop goes on and
-/// `Output::inverse` says so. Source: paper 000 section 4, 001 section 6; SPEC section 3.11.
+/// `Output::inverse` says so. Source: paper 000 section 4, 001 section 6; specification 3.11.
 template <SpringInverse I>
 class TorqueController {
  public:

@@ -22,7 +22,7 @@ namespace torsio {
 ///     K = N_h k K_pp K_tp / (K_tp + k / N_g)
 ///
 /// and a damper alike. Paper 004 uses K_pp = 15, K_tp = 5 Nm/rad (high) and 0, 0.5 Nm/rad (zero).
-/// Source: paper 004 section 2.3, SPEC section 3.11; damping and the way from K to K_pp are ours.
+/// Source: paper 004 section 2.3, specification 3.11; damping and the way from K to K_pp are ours.
 class TubeImpedance {
  public:
   struct Gains {

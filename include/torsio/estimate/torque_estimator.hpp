@@ -21,7 +21,7 @@ struct JointSample {
   double joint_angle_rad = kNotMeasured;  ///< link: the spring's far side
   double motor_current_A = kNotMeasured;  ///< quadrature axis; positive drives the joint forward
 
-  /// The spring's deflection gear - joint (SPEC section 0): torque on the link rises with it.
+  /// The spring's deflection gear - joint (specification 0): torque on the link rises with it.
   [[nodiscard]] double spring_deflection_rad() const noexcept {
     return gear_angle_rad - joint_angle_rad;
   }

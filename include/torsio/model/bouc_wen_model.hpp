@@ -19,8 +19,8 @@ namespace torsio {
 /// that is, exactly where beta = gamma and z falls back to 0, else by midpoint steps of at most z_max / 8
 /// (of z_max / 100: 1e-4 z_max off at most) and, within a hundredth of z_max, in closed form. With
 /// (1 - alpha) k >= 0 and |gamma| <= beta no closed path gives work. After `reset()` z is 0.
-/// State: z / z_max. Source: Ismail, Ikhouane and Rodellar 2009; SPEC 3.7. Cost: two powers, and two
-/// more for every z_max / 8 of a longer step.
+/// State: z / z_max. Source: Ismail, Ikhouane and Rodellar 2009; specification 3.7. Cost: two
+/// powers, and two more for every z_max / 8 of a longer step.
 class BoucWenModel {
  public:
   static constexpr std::string_view kFamily = "bouc_wen";

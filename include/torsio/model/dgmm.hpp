@@ -46,7 +46,8 @@ struct LinearClamp {
 /// p(z~) is the density of the standardised inputs, so novelty has no unit. The same mixture run
 /// the other way tells the first input from the target and the other inputs.
 ///
-/// Source: papers 000 and 001, corrected in SPEC 1 and 3.1. Cost: see `MixtureRegression::query`.
+/// Source: papers 000 and 001, corrected in specification 1 and 3.1. Cost: see
+/// `MixtureRegression::query`.
 class Dgmm {
  public:
   static constexpr std::string_view kFamily = "dgmm";

@@ -178,8 +178,8 @@ struct GreyBoxResidual {
 /// w_i constant and >= 0, k_j >= 0 and an ascending curve it is passive. The residual, if there is
 /// one, is a small network or mixture, bounded, and faded out away from its training data. A fit
 /// chooses which terms there are by cross-validation (train/fit_grey_box.hpp). A family of its own:
-/// no paper has it; the parts are those of SPEC 3.6 and 3.7. Cost: some 4 (2 + 2 thresholds + branches
-/// + inputs) multiply-adds, and that of the residual.
+/// no paper has it; the parts are those of specification 3.6 and 3.7. Cost: some 4 (2 + 2
+/// thresholds + branches + inputs) multiply-adds, and that of the residual.
 class GreyBox {
  public:
   static constexpr std::string_view kFamily = "grey_box";

@@ -4,7 +4,7 @@
 
 namespace torsio {
 
-/// GRU layers, then dense ones. Source: SPEC section 3.4.
+/// GRU layers, then dense ones. Source: specification 3.4.
 using Gru = RecurrentModel<GruLayer>;
 
 }  // namespace torsio

@@ -19,16 +19,17 @@ namespace torsio {
 /// u the first input (the others are not used), P and C polynomials or piecewise linear, G of any
 /// order. x is held in lowest..highest, what it was in training as far as C is monotone there: beyond,
 /// a polynomial runs away or turns back; more than `kBorder` of that range beyond, a step says
-/// `Fault::outside_training_range`. The memory is that of G; after `reset()` it is that of a long rest at u = rest_input. A discrete model:
-/// it runs at the sample period that it was trained at.
+/// `Fault::outside_training_range`. The memory is that of G; after `reset()` it is that of a long
+/// rest at u = rest_input. A discrete model: it runs at the sample period that it was trained at.
 ///
 /// G runs as a cascade of second-order sections in transposed direct form II: two numbers of memory
 /// a section, which add up small differences of input and output rather than large sums that cancel,
 /// as those of direct form II do next to slow poles.
 ///
 /// Two scales and one offset are free (w, x -> their multiples, C made up for it): equal outputs, other
-/// numbers. A fit holds them (`fit_hammerstein_wiener`). Source: paper 003, SPEC section 3.5. Cost:
-/// 5 multiply-adds a section and those of the curves. Nothing is allocated after construction.
+/// numbers. A fit holds them (`fit_hammerstein_wiener`). Source: paper 003, specification 3.5.
+/// Cost: 5 multiply-adds a section and those of the curves. Nothing is allocated after
+/// construction.
 class HammersteinWiener {
  public:
   static constexpr std::string_view kFamily = "hammerstein_wiener";
@@ -85,7 +86,7 @@ class HammersteinWiener {
 };
 
 /// What paper 003 prints of its elastomer coupling, from the torsion in rad to the torque in Nm
-/// (printed: degrees and Nm) at 200 Hz; curves (2), (3), errata in SPEC section 1.
+/// (printed: degrees and Nm) at 200 Hz; curves (2), (3), errata in specification 1.
 enum class Paper003 : std::uint8_t {
   discrete,  ///< (5), (6)
   tustin,    ///< (8), the same by Tustin, rounded; run by an exact first-order hold

@@ -18,7 +18,8 @@ namespace torsio {
 ///
 /// P_i = x_0 - s_i the play of threshold r_i (1 + beta |x_r|), x_r the input that tells a rate. S
 /// rises everywhere. Where beta = 0 and w_i <= 0 no closed path gives work. Starts and state as
-/// `prandtl_ishlinskii`. Source: SPEC 3.7 (improved PI). Cost: 8 operations an element, 4 a g_j.
+/// `prandtl_ishlinskii`. Source: specification 3.7 (improved PI). Cost: 8 operations an element, 4
+/// a g_j.
 class ImprovedPrandtlIshlinskii {
  public:
   static constexpr std::string_view kFamily = "prandtl_ishlinskii_improved";

@@ -123,9 +123,9 @@ class KernelGradient {
 ///
 /// Its fitted numbers are the logarithms of amplitudes, length scales, periods and alpha, in the
 /// order of the nodes (amplitude, length scales, shape); the offset of a linear kernel stands as it
-/// is. Source: SPEC 3.3 (paper 002, equations 9 to 13, corrected), Rasmussen and Williams 2006
-/// chapter 4. Cost: 2 operations an input and point, some 20 a kernel and point (24 an input for a
-/// periodic one).
+/// is. Source: specification 3.3 (paper 002, equations 9 to 13, corrected), Rasmussen and Williams
+/// 2006 chapter 4. Cost: 2 operations an input and point, some 20 a kernel and point (24 an input
+/// for a periodic one).
 class Kernel {
  public:
   static constexpr std::size_t kMostNodes = 64;

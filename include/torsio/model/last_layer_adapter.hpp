@@ -94,7 +94,7 @@ struct AdaptationCounts {
 /// whose reference is beyond the largest error of both do not count there.
 ///
 /// All in double. What is kept is W - W0: without updates the value is the network's, to the bit.
-/// Source: paper 004, SPEC section 3.4. Cost for n features: NLMS 5 n multiply-adds; RLS one pass
+/// Source: paper 004, specification 3.4. Cost for n features: NLMS 5 n multiply-adds; RLS one pass
 /// over n^2 / 2 doubles. Nothing is allocated after construction.
 class LastLayerAdapter {
  public:

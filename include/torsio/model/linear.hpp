@@ -14,7 +14,8 @@ namespace torsio {
 ///
 /// y target, x_j inputs (the first is usually the spring deflection), k_j stiffness in the target's
 /// unit per input's unit, b in the target's unit. All coefficients may be scheduled over one input.
-/// Source: SPEC 3.7 (Hooke). Cost: one multiply-add an input, about four times that if scheduled.
+/// Source: specification 3.7 (Hooke). Cost: one multiply-add an input, about four times that if
+/// scheduled.
 class Linear {
  public:
   static constexpr std::string_view kFamily = "linear";

@@ -14,7 +14,8 @@ namespace torsio {
 ///
 /// r one of the inputs, the rate of the deflection; c half the loop's width in the target's unit;
 /// v in r's unit, the rate at which the friction reaches 76 % of c. All but v may be scheduled over
-/// one input. Source: SPEC 6 (mandatory cheap baselines). Cost: one tanh more than `Linear`.
+/// one input. Source: specification 6 (cheap baselines). Cost: one tanh more than
+/// `Linear`.
 class LinearCoulomb {
  public:
   static constexpr std::string_view kFamily = "linear_coulomb";

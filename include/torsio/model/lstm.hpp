@@ -4,7 +4,7 @@
 
 namespace torsio {
 
-/// LSTM layers, then dense ones. Source: paper 004, SPEC section 3.4.
+/// LSTM layers, then dense ones. Source: paper 004, specification 3.4.
 using Lstm = RecurrentModel<LstmLayer>;
 
 }  // namespace torsio

@@ -13,7 +13,7 @@
 namespace torsio {
 
 /// A static network: dense layers one behind the other, the last one linear with one output,
-/// evaluated in float32. Source: paper 001, SPEC section 3.2. Cost: its weights streamed once from
+/// evaluated in float32. Source: paper 001, specification 3.2. Cost: its weights streamed once from
 /// cache. Nothing is allocated after construction.
 class Mlp {
  public:

@@ -14,9 +14,9 @@ namespace torsio {
 ///     y = sum_j theta_j prod_i (x_i / s_i)^p_ji
 ///
 /// s_i a scale in the unit of input i, theta_j in the target's unit, p_ji whole numbers. Known to
-/// model files as the f of `narx_polynomial`, whose terms `frols` chooses. Source: SPEC section 3.3
-/// (NARX); Billings 2013, Nonlinear System Identification, section 2. Cost: a multiplication for
-/// each factor and an input in use, an addition for each term.
+/// model files as the f of `narx_polynomial`, whose terms `frols` chooses. Source: specification
+/// 3.3 (NARX); Billings 2013, Nonlinear System Identification, section 2. Cost: a multiplication
+/// for each factor and an input in use, an addition for each term.
 class MultivariatePolynomial {
  public:
   static constexpr std::string_view kFamily = "polynomial";

@@ -31,7 +31,7 @@ concept FeedsBack = Model<M> && requires(M model, double measured) {
 /// step ahead). Before the first sample the inputs are as in it, the outputs `start`. A discrete
 /// model: it runs at the sample period that it was trained at. Where f leaves lowest..highest, or is
 /// not finite, y stays at the end of that range, or as it was, with `Fault::diverged`. Source: paper
-/// 002, SPEC section 3.3. Cost: that of f. Nothing is allocated after construction.
+/// 002, specification 3.3. Cost: that of f. Nothing is allocated after construction.
 template <Model M>
 class Narx {
  public:

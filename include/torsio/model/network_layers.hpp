@@ -40,7 +40,7 @@ struct DenseLayer {
 /// A layer may keep the biases of W x and of R h₋ apart, as PyTorch does. It is then evaluated with PyTorch's
 /// rounding, a = (W x + b) + (R h₋ + b_R) in float32 and σ and tanh rounded from double, which takes longer.
 ///
-/// Source: paper 004 Eqs. 3-8, SPEC section 3.4.
+/// Source: paper 004 Eqs. 3-8, specification 3.4.
 struct LstmLayer {
   static constexpr std::string_view kFamily = "lstm";  ///< of a network of such layers
 
@@ -64,7 +64,7 @@ struct LstmLayer {
 ///     r = σ(W_r x + R_r h₋ + b_r),   z = σ(W_z x + R_z h₋ + b_z)
 ///     n = tanh(W_n x + b_n + r (R_n h₋ + b_Rn)),   h = (1 − z) n + z h₋
 ///
-/// Source: SPEC section 3.4.
+/// Source: specification 3.4.
 struct GruLayer {
   static constexpr std::string_view kFamily = "gru";  ///< of a network of such layers
 

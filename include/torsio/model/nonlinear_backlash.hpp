@@ -34,8 +34,8 @@ struct BacklashRate {
 /// turn. `nonlinear_backlash` has q = 1, `nonlinear_backlash_improved` q = 1 + beta |x_r|^alpha
 /// with x_r an input that tells a rate. After `reset()` and until x_0 moves, t is in the middle.
 /// Simple loops lose energy, since f_ac >= f_dc; paths that leave the boundary where it is
-/// steeper than k may gain some. State: t - q m. Source: Choi et al. 2016 as in SPEC 3.7 (NBM).
-/// Cost: two multiply-adds a power of x_0, and a power of x_r.
+/// steeper than k may gain some. State: t - q m. Source: Choi et al. 2016 as in specification 3.7
+/// (NBM). Cost: two multiply-adds a power of x_0, and a power of x_r.
 template <bool kByRate>
 class Backlash {
  public:

@@ -33,9 +33,9 @@ struct PlayOperator {
 /// stop and play add up to the input, both say the same with c_i of opposite sign, the sum of
 /// them moved into k_0. Where c_i >= 0 for stops or c_i <= 0 for plays, no closed path gives work:
 /// the integral of y dx_0 is >= 0. Independent of rate. After `reset()` all s_i are 0 and the first
-/// tick moves nothing. All but r_i may be scheduled over one input. State: s_i. Source: SPEC 3.7;
-/// the sign of play weights is corrected there: weights >= 0 would give work away. Cost: 8
-/// operations an element.
+/// tick moves nothing. All but r_i may be scheduled over one input. State: s_i. Source:
+/// specification 3.7, with play weights of the other sign, since weights >= 0 would give work away
+/// (docs/decisions/0018-hysteresis-definitions.md). Cost: 8 operations an element.
 template <class Operator>
 class OperatorSum {
  public:

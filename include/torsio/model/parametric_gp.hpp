@@ -23,8 +23,8 @@ namespace torsio {
 /// However u was found: sample by sample (paper 002), or as the optimum of a variational bound.
 /// Novelty is the share of the prior variance that the data have not explained.
 ///
-/// Source: paper 002 with the errata of SPEC 1, SPEC 3.3. Cost: M kernel values and M^2
-/// multiply-adds.
+/// Source: paper 002 with the errata of specification 1, specification 3.3. Cost: M kernel values
+/// and M^2 multiply-adds.
 class ParametricGp {
  public:
   static constexpr std::string_view kFamily = "parametric_gp";

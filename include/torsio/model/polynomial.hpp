@@ -19,8 +19,8 @@ namespace torsio {
 /// From `reset()` until the first movement beyond it the direction is unknown and P is the mean of
 /// both. All but centre, half_range and dead band may be scheduled over one input. Each curve knows
 /// the range of x_0 that it was fitted to: more than `kBorder` of it outside, x_0 is held there and
-/// the value comes with `Fault::outside_training_range`. Source: SPEC 3.7 (Polynomial, degree 5).
-/// Cost: `degree` multiply-adds, and as `Linear`.
+/// the value comes with `Fault::outside_training_range`. Source: specification 3.7 (Polynomial,
+/// degree 5). Cost: `degree` multiply-adds, and as `Linear`.
 class Polynomial {
  public:
   static constexpr std::string_view kFamily = "polynomial";

@@ -13,7 +13,7 @@ namespace torsio {
 
 /// A network with memory: recurrent layers, then dense ones, evaluated in float32.
 ///
-/// One call is one sample: the state goes on from call to call (SPEC section 3.4, streaming a). It
+/// One call is one sample: the state goes on from call to call (specification 3.4, streaming a). It
 /// starts at zero, and until `warm_up_samples` steps after a reset the value carries
 /// `Fault::warming_up`. A discrete model: it runs at the sample period that it was trained at and at
 /// no other. Cost: its weights streamed once from cache. Nothing is allocated after construction.

@@ -19,7 +19,7 @@ namespace torsio {
 /// the Maxwell-slip model of friction with memory. With k_i = 1 the F_i are plain stops s_i within
 /// their thresholds r_i = f_i, in x's unit, and x - s_i is the play operator of that threshold.
 /// Independent of rate; no element gives work away that it did not take. Four elements are moved at
-/// a time. Source: SPEC 3.7 (Maxwell-slip, PI). Cost: 5 operations an element.
+/// a time. Source: specification 3.7 (Maxwell-slip, PI). Cost: 5 operations an element.
 class SlipBank {
  public:
   SlipBank() = default;

@@ -72,8 +72,8 @@ inline constexpr double kLargestElement = 1e12;
 ///     hooke  maxwell  kelvin_voigt  standard_linear_solid  burgers  generalised_maxwell(n)
 ///     003a  003b  003c  003d
 ///
-/// the last four with the published values of paper 003 (Table 3, SPEC section 2.1; those of 003d do
-/// not describe the paper's coupling).
+/// the last four with the published values of paper 003 (Table 3, specification 2.1; those of 003d
+/// do not describe the paper's coupling).
 /// @throws UsageError that points at the place and says what was expected there.
 [[nodiscard]] SpringDashpotNetwork parse_network(std::string_view text);
 

@@ -58,7 +58,7 @@ struct ContinuousTransfer {
 /// @returns how many were moved
 std::size_t reflect_unstable_poles(Sections& sections);
 
-/// Bilinear transform z = (1 + s T/2) / (1 - s T/2). SPEC section 3.5.
+/// Bilinear transform z = (1 + s T/2) / (1 - s T/2). Specification 3.5.
 [[nodiscard]] ContinuousTransfer tustin(const DiscreteTransfer& transfer, double sample_period_s);
 /// Its inverse: s = 2/T (z - 1) / (z + 1).
 [[nodiscard]] DiscreteTransfer tustin(const ContinuousTransfer& transfer, double sample_period_s);
@@ -70,7 +70,7 @@ std::size_t reflect_unstable_poles(Sections& sections);
 
 /// What stands against reading a discrete system as a continuous one: a pole that is real and
 /// negative oscillates from sample to sample. No continuous system does that; the pole that Tustin
-/// makes of it lies beyond Nyquist. Empty if there is none. SPEC section 2.
+/// makes of it lies beyond Nyquist. Empty if there is none. Specification 2.
 [[nodiscard]] std::string continuous_warning(const Sections& sections, double sample_period_s);
 
 /// "(1.72 s^2 + 688 s + 151) / (s^2 + 975 s + 509)"

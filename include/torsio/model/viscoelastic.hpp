@@ -21,8 +21,8 @@ namespace torsio {
 ///     z_i <- exp(-p_i h) z_i + g_i (1 - exp(-p_i h)) / (p_i h) (u_n - u_n-1)
 ///
 /// A continuous-time model: model files run it at any sample rate. After `reset()` it is relaxed at the first
-/// deflection that it sees. The state is z, the torques [Nm] of the branches. Source: SPEC 3.6,
-/// paper 003. Cost: 3 multiply-adds a branch.
+/// deflection that it sees. The state is z, the torques [Nm] of the branches. Source: specification
+/// 3.6, paper 003. Cost: 3 multiply-adds a branch.
 class Viscoelastic {
  public:
   static constexpr std::string_view kFamily = "viscoelastic";

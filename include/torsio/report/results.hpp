@@ -7,8 +7,7 @@
 
 namespace torsio {
 
-/// The document that DESIGN section 5 fixes for `compare`, `evaluate` and `demo`; ends with a line
-/// feed.
+/// The JSON document of `compare`, `evaluate` and `demo`; ends with a line feed.
 [[nodiscard]] std::string results_json(const Results& results);
 
 /// The rows of a split ranked by RMSE, one line a model, with a column for each recording of the

@@ -88,7 +88,7 @@ class Triangle {
 
 /// A position that goes to and fro between +A and -A with a trapezoidal speed: from rest at 0 to
 /// +A, then between the ends, never faster than `speed` nor accelerated more than `acceleration`
-/// (a range too short for full speed is crossed without reaching it). SPEC 4.7, `sweep`.
+/// (a range too short for full speed is crossed without reaching it). Specification 4.7, `sweep`.
 class TrapezoidSweep {
  public:
   struct Parameters {
@@ -118,7 +118,7 @@ class TrapezoidSweep {
 };
 
 /// A sum of sines with random phases: y(t) = sum_i A_i sin(2 pi f_i t + phi_i), phi_i uniform in
-/// [0, 2 pi) by the seed. SPEC 1, 002-24.
+/// [0, 2 pi) by the seed. Specification 1, 002-24.
 class Multisine {
  public:
   struct Parameters {
@@ -137,7 +137,7 @@ class Multisine {
 };
 
 /// White Gaussian steps through a Butterworth low-pass, scaled to a standard deviation of `rms` in
-/// the long run; starts at rest. SPEC 4.7.
+/// the long run; starts at rest. Specification 4.7.
 class RandomWalk {
  public:
   struct Parameters {
@@ -163,7 +163,8 @@ class RandomWalk {
 ///     y = A_n sin(2 pi (t - t_n) / T_n),   t_n <= t < t_n + T_n = t_(n+1)
 ///     A_n = A (1 + s_A g),   T_n = (1 + s_T g') / f
 ///
-/// g and g' are standard normal, cut off at 3. Starts at 0, without jumps. SPEC 4.5, "human torque".
+/// g and g' are standard normal, cut off at 3. Starts at 0, without jumps. Specification 4.5,
+/// "human torque".
 class QuasiPeriodic {
  public:
   struct Parameters {

@@ -19,7 +19,7 @@ namespace torsio {
 /// An input that is not finite comes out as it is and leaves the state alone: the filter goes on
 /// at the next finite input as if there had been no sample.
 ///
-/// Cost: 6 multiplications. Source: SPEC 3.1, guard 3.
+/// Cost: 6 multiplications. Source: specification 3.1, guard 3.
 class Lowpass {
  public:
   /// The lowest cut-off, as a share of the sample rate.

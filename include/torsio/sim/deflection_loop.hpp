@@ -17,7 +17,7 @@ namespace torsio {
 ///
 /// δ is gear angle minus joint angle as the encoders tell them, δ̇ its difference behind a 120 Hz
 /// low-pass; the integral stops at the peak current. Which δ* gives a wanted torque is the
-/// caller's: a straight line (τ − b) / K, or the inverse of a model. Source: SPEC section 3.11.
+/// caller's: a straight line (τ − b) / K, or the inverse of a model. Source: specification 3.11.
 class DeflectionLoop {
  public:
   static constexpr double kLargest_rad = rad_from_deg(9.0);  ///< |δ*| is cut there

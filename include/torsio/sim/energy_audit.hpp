@@ -16,7 +16,7 @@ namespace torsio {
 /// alone. What a hysteretic element loses is its work minus what it stores, so that it is a check of
 /// its own for each: it must never fall, but for integration error and for what load-dependent slip
 /// elements keep: with k(load), F²/2k is not all that a later, stiffer or softer path can recover.
-/// Source: SPEC section 4.6.
+/// Source: specification 4.6.
 class EnergyAudit {
  public:
   /// Opens the books at the plant's present state.

@@ -46,7 +46,7 @@ struct ExperimentInfo {
 [[nodiscard]] std::vector<ExperimentInfo> experiments(const DataSheet& sheet);
 
 /// How the sweeps of one actuator are made: the lever with its 9 kg mass goes to and fro between
-/// +-amplitude (SPEC section 4.7). Levers of dfki-28, for which SPEC names none, are ours: its
+/// +-amplitude (specification 4.7). Levers of dfki-28, for which it has none, are ours: its
 /// torques reach the shares of the rating that those of the others do (0.2 to 0.55).
 struct SweepProtocol {
   double amplitude_rad = 0.0;

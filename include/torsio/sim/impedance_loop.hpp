@@ -14,7 +14,7 @@ namespace torsio {
 ///     θ = θ_m / N_g − N_h θ_a     that of tube and gear together (θ_s1)
 ///
 /// θ_m, θ_w, θ_a are the angles of rotor, wave generator and output. The motor limits the current;
-/// the loop has no memory. Source: SPEC section 3.11.
+/// the loop has no memory. Source: specification 3.11.
 class ImpedanceLoop {
  public:
   struct Gains {

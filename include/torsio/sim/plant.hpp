@@ -142,7 +142,7 @@ struct StoredEnergy {
 ///
 /// Semi-implicit Euler (speeds, then positions); the current, the friction bristles and the
 /// viscoelastic branches are solved exactly; order current, second stage, first stage, friction,
-/// speeds, positions. Source: SPEC sections 4.2 to 4.6.
+/// speeds, positions. Source: specification 4.2 to 4.6.
 class Plant {
  public:
   static constexpr double kDefaultStep_s = 1e-4;

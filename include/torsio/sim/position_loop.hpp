@@ -14,7 +14,7 @@ namespace torsio {
 ///
 /// v is the difference of θ_m / N behind a low-pass at 2.4 Hz a rad/s of ω_c (but at most a fifth of
 /// the sample rate), q̇* the difference of q*; the integral stops at the peak current. With the
-/// 25 rad/s of the levers k_p = k_i = 8 1/s and the low-pass lies at 60 Hz. Source: SPEC section
+/// 25 rad/s of the levers k_p = k_i = 8 1/s and the low-pass lies at 60 Hz. Source: specification
 /// 4.7; how the gains go with the bandwidth is ours.
 class PositionLoop {
  public:

@@ -20,7 +20,7 @@ struct StudyOptions {
   bool is_quick = false;    ///< shorter recordings and smaller networks: to see that it runs
 };
 
-/// How a model did in a torque loop; means over the runs, in `Study::unit` (SPEC section 3.10).
+/// How a model did in a torque loop; means over the runs, in `Study::unit` (specification 3.10).
 struct StudyTracking {
   double mad = kNotMeasured;
   double mad_std = kNotMeasured;  ///< of one run; NaN of fewer than two
@@ -133,8 +133,8 @@ struct StudyInfo {
   bool needs_recordings = false;  ///< in TORSIO_DATA or ../shared/data: must be named to be run
 };
 
-/// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets (SPEC
-/// section 5).
+/// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets
+/// (specification 5).
 [[nodiscard]] std::span<const StudyInfo> studies() noexcept;
 /// @throws UsageError that lists them.
 [[nodiscard]] const StudyInfo& find_study(std::string_view name);

@@ -14,7 +14,7 @@ namespace torsio {
 /// A torque that a loop is to follow, at the 1 kHz of the benches.
 struct TorqueReference {
   enum class Kind : std::uint8_t {
-    chirp,        ///< 0.01 to 0.3 Hz over 100 s (SPEC section 4.7)
+    chirp,        ///< 0.01 to 0.3 Hz over 100 s (specification 4.7)
     random_walk,  ///< noise below 1 Hz, with the RMS of the chirp
     steps,        ///< A, -A, A/2, -A/2, each for 2 s
     sweep,        ///< a logarithmic sweep through the loop's bandwidth, see `frequency_sweep`
@@ -22,7 +22,7 @@ struct TorqueReference {
   };
 
   Kind kind = Kind::chirp;
-  /// None: 13 Nm on dfki-50 and 20 Nm on dfki-120, as SPEC section 6 has it, else a fifth of the
+  /// None: 13 Nm on dfki-50 and 20 Nm on dfki-120, as specification 6 has it, else a fifth of the
   /// rating. Replay takes none.
   std::optional<double> amplitude_Nm = {};
   std::optional<double> duration_s =

@@ -22,7 +22,7 @@ namespace torsio {
 /// A torque loop on the simulated bench of a series-elastic actuator.
 struct TrackingSpec {
   JointOutput output = JointOutput::locked;
-  double lever_m = 0.8;  ///< free: where the 9 kg hang; gravity acts (SPEC section 4.2)
+  double lever_m = 0.8;  ///< free: where the 9 kg hang; gravity acts (specification 4.2)
   TorqueReference reference = {};
   double bandwidth_rad_s = 50.0;
   double damping = 0.9;

@@ -12,8 +12,8 @@
 namespace torsio {
 
 /// How well a torque was followed: e = wanted - torque, of the joint's torque without the noise of
-/// any sensor, in Nm. The first two seconds are not scored, but for `overshoot`. Source: SPEC section
-/// 3.10.
+/// any sensor, in Nm. The first two seconds are not scored, but for `overshoot`. Source:
+/// specification 3.10.
 struct TrackingScore {
   double mad = 0.0;             ///< mean |e|
   double std_abs = 0.0;         ///< standard deviation of |e|

@@ -87,7 +87,8 @@ struct Memory {
 /// which an absent input's whole window is replaced by that of the same input in a background
 /// window, v(S) being the mean over these; and permutation importance, the increase of the RMSE
 /// when one input is shuffled over all recordings in blocks no shorter than a window. The model
-/// alone is asked, without the estimator's guards. Source: SPEC 3.10; Lundberg and Lee 2017.
+/// alone is asked, without the estimator's guards. Source: specification 3.10; Lundberg and Lee
+/// 2017.
 ///
 /// Cost: windows x background x (2^inputs - 2) x window_samples steps of the model, and repeats x
 /// inputs passes over the data. `progress` is called from several threads, one at a time.

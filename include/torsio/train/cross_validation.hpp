@@ -17,7 +17,7 @@ namespace torsio {
 /// `FoldScheme::by` for leave-one-record-out; no channel can be called that, for want of a unit.
 inline constexpr std::string_view kByRecord = "record";
 
-/// How a dataset is cut into folds. Source: SPEC 3.10.
+/// How a dataset is cut into folds. Source: specification 3.10.
 struct FoldScheme {
   /// K-fold: whole records are dealt to the folds. Fewer records than folds: each record is cut
   /// into that many contiguous blocks, and a fold holds out one block of each.

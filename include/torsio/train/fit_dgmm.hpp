@@ -13,7 +13,7 @@ namespace torsio {
 
 struct DgmmOptions {
   /// NaN as `initial_spread` (the default here): chosen from the training records; as
-  /// `novelty_distance`: 5/3 of the initial spread, SPEC's ratio of 0.25 to 0.15.
+  /// `novelty_distance`: 5/3 of the initial spread, as 0.25 to 0.15 in specification 3.1.
   OnlineMixtureSettings online = {.novelty_distance = kNotMeasured, .initial_spread = kNotMeasured};
   std::size_t em_iterations = 10;   ///< refinement after the online pass; 0: none
   double clamp = 2.0;               ///< LinearClamp::width in RMSE of the linear model; 0: none
@@ -32,7 +32,7 @@ struct DgmmOptions {
 /// best when one record at a time is left out (a single record: every fifth of 50 blocks). The
 /// notes state choice and scores.
 ///
-/// Source: SPEC 3.1. Deterministic; independent of the number of threads.
+/// Source: specification 3.1. Deterministic; independent of the number of threads.
 /// @throws Error if no sample is usable, one lies a million times the spread of its channel away
 /// (naming record, channel and sample), or an option is out of range; Cancelled if `progress` asks.
 [[nodiscard]] Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options = {},
@@ -48,7 +48,7 @@ struct PaperDgmmOptions {
 /// comparison: the first samples become the components, their covariances stay spread^2 I, and
 /// each later sample moves the nearest mean. No guards. Expect it to be worse than a straight line:
 /// at 1 kHz all components are born within the first half second, and a covariance without
-/// correlation makes the regression a kernel average (SPEC 3.1).
+/// correlation makes the regression a kernel average (specification 3.1).
 [[nodiscard]] Fitted<Dgmm> fit_dgmm_paper(const TrainingData& data,
                                           const PaperDgmmOptions& options = {},
                                           const Progress& progress = {});

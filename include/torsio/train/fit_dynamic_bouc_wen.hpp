@@ -21,7 +21,7 @@ struct DynamicBoucWenOptions {
 /// Least squares of free runs over masses, springs and the Bouc-Wen element, each record's start
 /// searched for too. First a mass on a spring from a grid of frequencies and dampings; then from it
 /// twelve shares and shapes of the hysteretic part over a short horizon, the best of them over longer
-/// ones. Source of the method: SPEC 3.7, issue 6.
+/// ones. Source of the equations: specification 3.7; the search is ours.
 /// @throws Error unless the first input and the target move, and the search converges;
 /// Cancelled.
 [[nodiscard]] Fitted<DynamicBoucWen> fit_dynamic_bouc_wen(const TrainingData& data,

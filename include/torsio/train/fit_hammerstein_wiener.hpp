@@ -43,8 +43,8 @@ struct HammersteinWienerOptions {
 ///    the unit circle, each record starts from a state of its own (at rest where that would be more than
 ///    64 numbers).
 ///
-/// Source: SPEC section 3.5. The table tells the coefficients with standard errors; notes tell poles,
-/// zeros, the form in continuous time and what the data cannot tell apart.
+/// Source: specification 3.5. The table tells the coefficients with standard errors; notes tell
+/// poles, zeros, the form in continuous time and what the data cannot tell apart.
 /// @throws Error if the first input is constant, there are fewer than ten samples a number or no record
 /// outlasts the lags, nothing stable starts the search, or it does not converge; UsageError for an order
 /// or a degree out of range, or more zeros than poles in continuous time.

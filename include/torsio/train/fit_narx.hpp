@@ -47,8 +47,8 @@ struct NarxInner {
   std::function<AnyModel(const AnyModel& f, const Narx<Linear>::Parameters& rest)> wrap;
 };
 
-/// Trains f on `narx_data`, as `options.training` says. Deterministic for a seed. Source: SPEC section
-/// 3.3 (NARX evaluation).
+/// Trains f on `narx_data`, as `options.training` says. Deterministic for a seed. Source:
+/// specification 3.3 (NARX evaluation).
 /// @throws Error as f's fitter, or if no record outlasts the lags; UsageError for lags out of range.
 [[nodiscard]] FittedModel fit_narx(const TrainingData& data, const NarxOptions& options,
                                    const NarxInner& inner, const FitContext& context = {});
@@ -65,7 +65,7 @@ struct ArxOptions {
 ///     min_θ Σ (ŷ_k(θ) − y_k)²,   dŷ_k/dθ = φ_k + Σ_i a_i dŷ_{k−i}/dθ
 ///
 /// The refinement is dropped where it does not lower the error in free run, or leaves the output's
-/// range. Source: SPEC section 3.3.
+/// range. Source: specification 3.3.
 /// @throws Error if no record outlasts the lags; UsageError for lags out of range.
 [[nodiscard]] Fitted<Narx<Linear>> fit_arx(const TrainingData& data, const ArxOptions& options,
                                            const FitContext& context = {});

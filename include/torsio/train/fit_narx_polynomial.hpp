@@ -36,7 +36,7 @@ struct NarxPolynomialOptions {
 /// (two tenths of every long one; whole ones of five and more; else on the training records
 /// themselves, which a note says). Free run decides, not a criterion of one step ahead: AIC and its
 /// kin count how well the last value is continued, which a sensor never does. The coefficients are
-/// then fitted to all training records. Source: SPEC section 3.3; Billings 2013, chapter 3.
+/// then fitted to all training records. Source: specification 3.3; Billings 2013, chapter 3.
 /// @throws Error if no record outlasts the lags, or there are fewer than five samples for each term;
 /// UsageError for lags, degree or terms out of range, or too many candidates.
 [[nodiscard]] Fitted<Narx<MultivariatePolynomial>> fit_narx_polynomial(

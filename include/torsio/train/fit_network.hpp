@@ -68,9 +68,9 @@ struct RecurrentOptions {
 /// Initial weights: Glorot uniform; He normal in front of relu and elu; recurrent ones orthogonal;
 /// forget bias 1. Windows lie within one record and hold no input that is not finite.
 ///
-/// Source: papers 001 and 004, SPEC 3.2 and 3.4. Deterministic for a seed, whatever the number of
-/// threads. A loss that explodes (a million times that of a constant, or not finite) ends the training; the
-/// best weights so far are kept and a note says so.
+/// Source: papers 001 and 004, specification 3.2 and 3.4. Deterministic for a seed, whatever the
+/// number of threads. A loss that explodes (a million times that of a constant, or not finite) ends
+/// the training; the best weights so far are kept and a note says so.
 /// @throws Error if no stretch of the records is as long as a window, the target is constant or not
 /// finite in a sample to learn from, the network is larger than a model file or the memory, or the
 /// loss explodes in the first epoch; UsageError if an option is out of range or `context.resume` is

@@ -16,7 +16,7 @@ namespace torsio {
 /// What the kernel's numbers theta descend on, sample by sample, while (m, S) takes each sample in:
 ///
 ///     paper        (16) = ((y - mu)^2 + Sigma) / (2 sigma^2) + ln sigma^2 / 2; plain gradient steps of
-///                  0.1 from 0.3, no safeguard: expect it to shrink to nothing (SPEC 3.3)
+///                  0.1 from 0.3, no safeguard: expect it to shrink to nothing (specification 3.3)
 ///     nlml         m . K^-1 m / 2 + ln det K / 2 (Raissi); the noise on (16)
 ///     elbo         (16) + KL(N(m, S) | N(0, K)) / H, H the number of samples
 ///     recommended  elbo; S half way back to K every 1000 samples of the first 80 %, so that learning
@@ -25,7 +25,8 @@ namespace torsio {
 /// All but `paper` by Adam.
 enum class ParametricGpMode : std::uint8_t { paper, nlml, elbo, recommended };
 
-/// theta_1 ... theta_9 of the combined kernel (paper 002, equations 9 to 13 as corrected in SPEC 1).
+/// theta_1 ... theta_9 of the combined kernel (paper 002, equations 9 to 13 as corrected in
+/// specification 1).
 using PlainKernel = std::array<double, 9>;
 
 struct ParametricGpOptions {
@@ -45,16 +46,17 @@ struct ParametricGpOptions {
 ///     mu = a . m,   Sigma = k(x, x) - q . a + a . g
 ///     m += g (y - mu) / (Sigma + sigma^2),   S -= g g^T / (Sigma + sigma^2)
 ///
-/// (20) and (21) of paper 002 as corrected in SPEC 1; for a fixed kernel this is the FITC posterior.
-/// Z are the centres of k-means++. In the end the FITC posterior at the kernel found is computed in
-/// closed form over all samples, and kept if its error is less on the validation records, or without
-/// these on every fifth of 50 blocks of the training samples, held out for this.
+/// (20) and (21) of paper 002 as corrected in specification 1; for a fixed kernel this is the FITC
+/// posterior. Z are the centres of k-means++. In the end the FITC posterior at the kernel found is
+/// computed in closed form over all samples, and kept if its error is less on the validation
+/// records, or without these on every fifth of 50 blocks of the training samples, held out for
+/// this.
 ///
 /// With `kernel_plain` (Table II of the paper, read as plain numbers) inputs and target keep their
 /// units, theta stays, and only (m, S) and the noise are learned. A negative theta_8 makes a kernel
 /// that ends at r^2 = 2 |theta_8| theta_9^2: data beyond are refused.
 ///
-/// Source: SPEC 3.3. Deterministic for a seed.
+/// Source: specification 3.3. Deterministic for a seed.
 /// @throws UsageError if the kernel's text is none; Error if data lie outside the kernel's domain or
 /// its matrix has no factor at the start; Cancelled.
 [[nodiscard]] Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data,

@@ -35,9 +35,9 @@ struct ViscoelasticOptions {
 /// been measured once with this standard deviation, in units of the RMSE without it: a hold on what the
 /// data leave open.
 ///
-/// Source: SPEC 3.6. The standard errors hold for white residuals and are too small for coloured ones. The notes say
-/// which combinations of parameters the data cannot tell, which they hardly tell, and which relaxation
-/// times lie outside of the band that the records excite.
+/// Source: specification 3.6. The standard errors hold for white residuals and are too small for
+/// coloured ones. The notes say which combinations of parameters the data cannot tell, which they
+/// hardly tell, and which relaxation times lie outside of the band that the records excite.
 /// @throws UsageError for the network's text, a number of starts or a prior out of range; Error if
 /// deflection or target are constant, or the search does not converge; Cancelled.
 [[nodiscard]] Fitted<Viscoelastic> fit_viscoelastic(const TrainingData& data,

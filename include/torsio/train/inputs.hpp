@@ -12,7 +12,7 @@ namespace torsio {
 /// definition they need, so that the model's raw inputs are measured channels.
 ///
 /// Definitions are those of the recordings' mapping and, unless recorded themselves, the canonical
-/// ones (SPEC section 0):
+/// ones (specification 0):
 ///
 ///     spring_deflection_rad = gear_angle_rad - joint_angle_rad
 ///     spring_deflection_rate_rad_s = rate(spring_deflection_rad)

@@ -10,7 +10,7 @@ namespace torsio {
 
 /// How far a model is off, e = value - target; all but `fit_percent` in the target's unit. NaN
 /// where there is nothing to say it from. There is no "MAE": the papers use it for two different
-/// things. Source: SPEC 3.10.
+/// things. Source: specification 3.10.
 struct Metrics {
   std::size_t samples = 0;            ///< that were scored
   double rmse = kNotMeasured;         ///< sqrt(mean e^2)

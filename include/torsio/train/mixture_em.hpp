@@ -22,7 +22,8 @@ namespace torsio {
 /// that no component collapses. Double throughout; the result does not depend on the number of
 /// threads. Responsibilities below e^-40 of a sample's largest are dropped.
 ///
-/// Source: SPEC 3.1 step 4; Dempster, Laird, Rubin 1977. Cost: about N m (D^2 + 12) operations.
+/// Source: specification 3.1 step 4; Dempster, Laird, Rubin 1977. Cost: about N m (D^2 + 12)
+/// operations.
 class MixtureEm {
  public:
   struct Prior {

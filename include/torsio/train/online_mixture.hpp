@@ -56,8 +56,8 @@ struct OnlineMixtureSettings {
 /// component's neighbour is looked for again when one of the two has changed, or a new component
 /// came up for which it is the nearest.
 ///
-/// Source: SPEC 3.1 (000 Algorithm 1, whose sign diverges as printed). Nothing is allocated after
-/// construction but by `mixture`.
+/// Source: specification 3.1 (000 Algorithm 1, whose sign diverges as printed). Nothing is
+/// allocated after construction but by `mixture`.
 class OnlineMixture {
  public:
   /// @throws Error if a setting is out of range or the standardisation is not sound.
