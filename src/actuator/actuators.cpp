@@ -121,8 +121,8 @@ constexpr std::array<DataSheet, 7> kSheets = {
         .joint = {.bearing_friction_Nm = assumed(0.6)},
         .sensors = {.torque_range_Nm = assumed(400.0)},
     },
-    // Specification 4.3. 003 prints 15 Nm as the maximum of the drive and 24 V for its motor; 6 Nm is
-    // the limit of its models, which the experiments use as a rating. The rest of motor, gear and
+    // Specification 4.3. 003 prints 15 Nm as the maximum of the drive and 24 V for its motor; 6 Nm
+    // are the limit of its models, which the experiments use as a rating. The rest of motor, gear and
     // joint is assumed so that 6 Nm are reached at twice the highest frequency of the tests.
     DataSheet{
         .family = ActuatorFamily::elastomer,
@@ -166,7 +166,7 @@ constexpr std::array<DataSheet, 7> kSheets = {
                     .torque_latency_s = assumed(0.0),
                     .log_rate_Hz = printed(200.0)},
     },
-    // Specification 4.4; the motor's constants are assumed, its encoder's bits follow from its type.
+    // Specification 4.4; the motor's constants are assumed, the encoder's bits follow from the type.
     DataSheet{
         .family = ActuatorFamily::rubber_clutch,
         .name = "rubber-clutch",

@@ -207,7 +207,7 @@ struct SheetRow {
 /// @returns what `data_sheet` takes: the variant only where it is not the default
 [[nodiscard]] std::string full_name(const DataSheet& sheet);
 
-/// Identifies what is simulated: a hash of the full name, and so of the variant, and of every number.
+/// Identifies what is simulated: a hash of the full name, variant included, and of every number.
 /// @returns 16 hexadecimal digits, the same on every platform
 [[nodiscard]] std::string sheet_hash(const DataSheet& sheet);
 
