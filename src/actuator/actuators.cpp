@@ -26,9 +26,9 @@ constexpr TubeSheet kSoftTube{
 constexpr TubeSheet kRigidTube{.ratio = printed(2.0),
                                .stiffness_Nm_rad = assumed(4000.0),
                                .damping_Nms_rad = assumed(1.26e-2)};
-constexpr double kGlueCreep = 0.003;  // a load cycle, SPEC section 4.3
+constexpr double kGlueCreep = 0.003;  // a load cycle, specification 4.3
 
-// SPEC section 4.2. The winding resistance is assumed for motors of that class: it only bounds the
+// Specification 4.2. The winding resistance is assumed for motors of that class: it only bounds the
 // current at high speed.
 constexpr std::array<DataSheet, 7> kSheets = {
     DataSheet{
@@ -39,7 +39,8 @@ constexpr std::array<DataSheet, 7> kSheets = {
         .rating = {printed(28.0), printed(4.8), in_rad(printed(300.0))},
         .motor = {.torque_constant_Nm_A = printed(0.057),
                   .rotor_inertia_kg_m2 = assumed(2e-5),
-                  .winding_resistance_Ohm = assumed(0.6)},
+                  .winding_resistance_Ohm = assumed(0.6),
+                  .supply_V = printed(48.0)},
         .first = GearSheet{.ratio = printed(100.0), .stiffness_Nm_rad = assumed(4.7e3)},
         .friction = {.coulomb_Nm = derived(0.65), .viscous_Nms_rad = assumed(1.0)},
         .middle_inertia_kg_m2 = assumed(0.004),
@@ -60,7 +61,8 @@ constexpr std::array<DataSheet, 7> kSheets = {
         .rating = {printed(50.0), printed(5.0), in_rad(printed(157.0))},
         .motor = {.torque_constant_Nm_A = derived(0.104),
                   .rotor_inertia_kg_m2 = assumed(6e-5),
-                  .winding_resistance_Ohm = assumed(0.5)},
+                  .winding_resistance_Ohm = assumed(0.5),
+                  .supply_V = printed(48.0)},
         .first = GearSheet{.ratio = printed(120.0), .stiffness_Nm_rad = assumed(1.6e4)},
         .friction = {.coulomb_Nm = assumed(6.0), .viscous_Nms_rad = assumed(10.0)},
         .middle_inertia_kg_m2 = assumed(0.01),
@@ -83,7 +85,8 @@ constexpr std::array<DataSheet, 7> kSheets = {
         .rating = {printed(120.0), printed(7.0), in_rad(printed(95.0))},
         .motor = {.torque_constant_Nm_A = printed(0.180),
                   .rotor_inertia_kg_m2 = assumed(1.2e-4),
-                  .winding_resistance_Ohm = assumed(0.4)},
+                  .winding_resistance_Ohm = assumed(0.4),
+                  .supply_V = printed(48.0)},
         .first = GearSheet{.ratio = printed(120.0), .stiffness_Nm_rad = derived(30178.0)},
         .friction = {.coulomb_Nm = derived(13.99), .viscous_Nms_rad = assumed(15.0)},
         .middle_inertia_kg_m2 = assumed(0.02),
@@ -104,7 +107,8 @@ constexpr std::array<DataSheet, 7> kSheets = {
         .rating = {printed(300.0), printed(11.0), in_rad(printed(57.0))},
         .motor = {.torque_constant_Nm_A = printed(0.210),
                   .rotor_inertia_kg_m2 = assumed(3e-4),
-                  .winding_resistance_Ohm = assumed(0.25)},
+                  .winding_resistance_Ohm = assumed(0.25),
+                  .supply_V = printed(48.0)},
         .first = GearSheet{.ratio = printed(160.0), .stiffness_Nm_rad = derived(50094.0)},
         .friction = {.coulomb_Nm = derived(24.4), .viscous_Nms_rad = assumed(60.0)},
         .middle_inertia_kg_m2 = assumed(0.04),
@@ -117,18 +121,20 @@ constexpr std::array<DataSheet, 7> kSheets = {
         .joint = {.bearing_friction_Nm = assumed(0.6)},
         .sensors = {.torque_range_Nm = assumed(400.0)},
     },
-    // SPEC section 4.3; motor, gear and joint, for which it has no numbers, are assumed so that the
-    // coupling's 6 Nm are reached at twice the highest frequency of the tests.
+    // Specification 4.3. 003 prints 15 Nm as the maximum of the drive and 24 V for its motor; 6 Nm
+    // are the limit of its models, which the experiments use as a rating. The rest of motor, gear and
+    // joint is assumed so that 6 Nm are reached at twice the highest frequency of the tests.
     DataSheet{
         .family = ActuatorFamily::elastomer,
         .name = "elastomer",
-        .title = "6 Nm joint drive with an elastomer coupling",
+        .title = "15 Nm joint drive with an elastomer coupling, operated up to 6 Nm",
         .variants = {"bonded", "unbonded", "creeping"},
         .variant = "bonded",
-        .rating = {printed(6.0), assumed(2.5), assumed(10.0)},
+        .rating = {assumed(6.0), assumed(2.5), assumed(10.0)},
         .motor = {.torque_constant_Nm_A = assumed(0.05),
                   .rotor_inertia_kg_m2 = assumed(8e-6),
-                  .winding_resistance_Ohm = assumed(1.0)},
+                  .winding_resistance_Ohm = assumed(1.0),
+                  .supply_V = printed(24.0)},
         .first = GearSheet{.ratio = assumed(50.0), .stiffness_Nm_rad = assumed(3.4e3)},
         .friction = {.coulomb_Nm = assumed(0.4), .viscous_Nms_rad = assumed(0.15)},
         .middle_inertia_kg_m2 = assumed(0.003),
@@ -160,7 +166,7 @@ constexpr std::array<DataSheet, 7> kSheets = {
                     .torque_latency_s = assumed(0.0),
                     .log_rate_Hz = printed(200.0)},
     },
-    // SPEC section 4.4; the motor is assumed.
+    // Specification 4.4; the motor's constants are assumed, the encoder's bits follow from the type.
     DataSheet{
         .family = ActuatorFamily::rubber_clutch,
         .name = "rubber-clutch",
@@ -189,7 +195,7 @@ constexpr std::array<DataSheet, 7> kSheets = {
         .joint = {.inertia_kg_m2 = assumed(5e-4),
                   .bearing_friction_Nm = assumed(5e-4),
                   .viscous_Nms_rad = assumed(1e-5)},
-        .sensors = {.motor_encoder_bits = printed(12.0),
+        .sensors = {.motor_encoder_bits = derived(12.0),
                     .middle_encoder_bits = assumed(16.0),
                     .joint_encoder_bits = assumed(16.0),
                     .encoder_jitter_lsb = assumed(0.1),
@@ -199,19 +205,20 @@ constexpr std::array<DataSheet, 7> kSheets = {
                     .torque_latency_s = assumed(0.0),
                     .log_rate_Hz = assumed(50.0)},
     },
-    // SPEC section 4.5; torque constant and winding are assumed, for a motor that reaches 300 deg/s
-    // on 48 V.
+    // Specification 4.5; 292 Nm and 300 deg/s are printed as maxima. Torque constant, winding and
+    // supply are assumed, for a motor that reaches 300 deg/s.
     DataSheet{
         .family = ActuatorFamily::harmonic_drive,
         .name = "harmonic-drive",
-        .title = "292 Nm actuator with a torsion tube before its harmonic drive",
+        .title = "actuator of at most 292 Nm with a torsion tube before its harmonic drive",
         .variants = {"stiff", "soft", "rigid"},
         .variant = "stiff",
         .rating = {printed(292.0), assumed(27.8), in_rad(printed(300.0))},
         .motor = {.torque_constant_Nm_A = assumed(0.08),
                   .rotor_inertia_kg_m2 = printed(9.9e-5),
                   .winding_resistance_Ohm = assumed(0.05),
-                  .viscous_Nms_rad = assumed(2e-3)},
+                  .viscous_Nms_rad = assumed(2e-3),
+                  .supply_V = assumed(48.0)},
         .first = kStiffTube,
         .friction = {.coulomb_Nm = assumed(0.08 * 51.0),
                      .viscous_Nms_rad = assumed(0.0),

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
+#include <cstdint>
 #include <utility>
 
 #include "actuators.hpp"
 #include "piece_spread.hpp"
 #include "sheet_values.hpp"
+#include "text_hash.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
@@ -98,6 +101,14 @@ std::string full_name(const DataSheet& sheet) {
   if (sheet.variant != sheet.variants.front()) name += fmt::format(":{}", sheet.variant);
   if (sheet.serial) name += fmt::format("#{:02}", *sheet.serial);
   return name;
+}
+
+std::string sheet_hash(const DataSheet& sheet) {
+  // The name as well: the difference between two variants need not be a number.
+  std::string text = full_name(sheet);
+  for (const SheetRow& row : describe(sheet))
+    text += fmt::format(" {}={:016x}", row.name, std::bit_cast<std::uint64_t>(row.value.value));
+  return fmt::format("{:016x}", text_hash(text));
 }
 
 }  // namespace torsio

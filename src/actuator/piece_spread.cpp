@@ -2,21 +2,12 @@
 
 #include <cstdint>
 
+#include "text_hash.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
-
-/// FNV-1a: the same on every platform, which std::hash is not.
-std::uint64_t hash(std::string_view text) noexcept {
-  std::uint64_t value = 0xcbf29ce484222325U;
-  for (const char letter : text) {
-    value ^= static_cast<unsigned char>(letter);
-    value *= 0x100000001b3U;
-  }
-  return value;
-}
 
 /// What one piece has of each spread. The order of the draws is part of what a serial number means.
 struct PieceDraws {
@@ -78,7 +69,7 @@ void spread(const ClutchSheet& /*clutch*/, const PieceDraws& /*piece*/) noexcept
 
 void spread_piece(DataSheet& sheet) {
   if (!sheet.serial) return;
-  const PieceDraws piece(hash(sheet.name) + *sheet.serial);
+  const PieceDraws piece(text_hash(sheet.name) + *sheet.serial);
   const auto spread_part = [&](auto& part) { spread(part, piece); };
   std::visit(spread_part, sheet.first);
   std::visit(spread_part, sheet.second);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <utility>
@@ -117,10 +116,7 @@ std::vector<StudyRow> StudyRows::rows() const {
 }
 
 StudyPlant study_plant(std::string_view actuator) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const SheetRow& row : describe(data_sheet(actuator)))
-    hash = (hash ^ std::bit_cast<std::uint64_t>(row.value.value)) * 0x100000001b3U;
-  return {std::string(actuator), fmt::format("{:016x}", hash)};
+  return {std::string(actuator), sheet_hash(data_sheet(actuator))};
 }
 
 std::uint64_t repeat_seed(const StudyOptions& options, std::size_t k) noexcept {

@@ -81,7 +81,7 @@ class StudyRows {
   std::span<const PaperEntry> published_;
 };
 
-/// A hash of all numbers in the data sheet of an actuator.
+/// The name, and the hash of the data sheet (`sheet_hash`), which covers variant and numbers.
 [[nodiscard]] StudyPlant study_plant(std::string_view actuator);
 
 /// Of the k-th repeat; far enough apart for a dataset to count on from it.

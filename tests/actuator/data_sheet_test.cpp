@@ -9,6 +9,7 @@
 #include <string>
 #include <variant>
 
+#include "support/every_actuator.hpp"
 #include "support/series_elastic.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -30,14 +31,15 @@ std::size_t bytes_of_values(const DataSheet& sheet) {
   return bytes;
 }
 
-TEST(DataSheet, RatedTorqueOverStiffnessIsThePapersDeflection) {
-  const std::map<std::string_view, double> printed_deg = {
+// Derived from printed torques and stiffnesses; 000 prints 5 to 8 deg as its requirement.
+TEST(DataSheet, RatedTorqueTwistsTheSpringByFiveToEightDegrees) {
+  const std::map<std::string_view, double> derived_deg = {
       {"dfki-28", 5.0}, {"dfki-50", 5.0}, {"dfki-120", 6.06}, {"dfki-300", 7.63}};
-  ASSERT_EQ(test::series_elastic_sheets().size(), printed_deg.size());
+  ASSERT_EQ(test::series_elastic_sheets().size(), derived_deg.size());
   for (const DataSheet& sheet : test::series_elastic_sheets()) {
     const double deflection_rad =
         sheet.rating.torque_Nm.value / std::get<SpringSheet>(sheet.second).stiffness_Nm_rad.value;
-    EXPECT_NEAR(deg_from_rad(deflection_rad), printed_deg.at(sheet.name), 0.005) << sheet.name;
+    EXPECT_NEAR(deg_from_rad(deflection_rad), derived_deg.at(sheet.name), 0.005) << sheet.name;
   }
 }
 
@@ -93,6 +95,50 @@ TEST(DataSheet, TellsPrintedFromDerivedFromAssumed) {
   EXPECT_EQ(rows["spring_stiffness"].unit, "Nm/rad");
   EXPECT_EQ(rows["gear_stiffness"].value.origin, Origin::derived);
   EXPECT_EQ(rows["rotor_inertia"].value.origin, Origin::assumed);
+}
+
+TEST(DataSheet, OriginsAreThoseOfThePapers) {
+  const auto value_of = [](const char* actuator, std::string_view name) {
+    for (const SheetRow& row : describe(data_sheet(actuator)))
+      if (row.name == name) return row.value;
+    return SheetValue{.value = std::nan("")};
+  };
+  const auto expect = [&](const char* actuator, std::string_view name, SheetValue value) {
+    EXPECT_EQ(value_of(actuator, name).value, value.value) << actuator << " " << name;
+    EXPECT_EQ(value_of(actuator, name).origin, value.origin) << actuator << " " << name;
+  };
+  for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"})
+    expect(actuator, "supply", printed(48.0));
+  expect("elastomer", "supply", printed(24.0));
+  expect("rubber-clutch", "supply", assumed(24.0));
+  expect("harmonic-drive", "supply", assumed(48.0));
+  expect("elastomer", "rated_torque", assumed(6.0));
+  expect("elastomer", "twist_sensor_bits", printed(12.0));
+  expect("rubber-clutch", "motor_encoder_bits", derived(12.0));
+  expect("harmonic-drive", "rated_torque", printed(292.0));
+  expect("harmonic-drive", "motor_encoder_bits", printed(24.0));
+  expect("harmonic-drive", "middle_encoder_bits", assumed(19.0));
+  expect("harmonic-drive", "joint_encoder_bits", assumed(17.0));
+}
+
+TEST(DataSheet, EveryActuatorVariantAndPieceHasAHashOfItsOwn) {
+  std::map<std::string, std::string> names;  // by hash
+  for (const std::string& actuator : test::every_actuator()) {
+    for (const char* piece : {"", "#01", "#02"}) {
+      const std::string name = actuator + piece;
+      const auto [at, is_new] = names.emplace(sheet_hash(data_sheet(name)), name);
+      EXPECT_TRUE(is_new) << name << " and " << at->second;
+    }
+  }
+}
+
+TEST(DataSheet, TwoNamesOfTheSameSheetHaveTheSameHash) {
+  EXPECT_EQ(sheet_hash(data_sheet("harmonic-drive")),
+            sheet_hash(data_sheet("harmonic-drive:stiff")));
+  EXPECT_EQ(sheet_hash(data_sheet("dfki-50#3")), sheet_hash(data_sheet("dfki-50:maxwell-slip#03")));
+  DataSheet changed = data_sheet("dfki-50");
+  changed.motor.supply_V.value = 24.0;
+  EXPECT_NE(sheet_hash(changed), sheet_hash(data_sheet("dfki-50")));
 }
 
 TEST(DataSheet, UnknownNameListsTheKnownOnes) {

@@ -154,7 +154,8 @@ TEST(Triangles, ModelAOfThePaperFitsThemAsInThePrototype) {
   EXPECT_NEAR(best_fit(measured, on_line), 73.6, 2.5);
 }
 
-// 003 shows ±6 Nm at ±8 deg; its printed output curve is stiffer to the negative side.
+// No reference from 003: its ±8 deg at ±6 Nm (Fig. 7) are of another coupling, geometry α, than its
+// models, geometry ε. The printed output curve is stiffer to the negative side.
 TEST(SlowCycles, BondedLoopSpansSixNewtonMetres) {
   const Recording recording = run("elastomer", "slow-cycles");
   EXPECT_EQ(recording.size(), 30 * kSlowCycle);

@@ -266,8 +266,9 @@ TEST(RubberClutch, HalvesTheTorqueOfACollision) {
   RecordProperty("with_clutch_Nm", std::to_string(with_Nm));
   RecordProperty("without_clutch_Nm", std::to_string(without_Nm));
   EXPECT_NEAR(with_Nm, 0.5, 0.015);
-  EXPECT_NEAR(with_Nm / 0.0567, 8.82, 0.3) << "the paper's contact force";
-  EXPECT_NEAR(without_Nm, 1.037, 0.03);
+  // Not independent of the paper: the arm is 0.5 Nm / 8.82 N, and the way was fitted to 18.29 N.
+  EXPECT_NEAR(with_Nm / 0.0567, 8.82, 0.3);
+  EXPECT_NEAR(without_Nm / 0.0567, 18.29, 0.53);
 }
 
 TEST(RubberClutch, CollisionTouchesAtTheWallAndLetsGo) {

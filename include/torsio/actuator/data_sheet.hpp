@@ -28,7 +28,7 @@ constexpr SheetValue printed(double value) { return {value, Origin::printed}; }
 constexpr SheetValue derived(double value) { return {value, Origin::derived}; }
 constexpr SheetValue assumed(double value) { return {value, Origin::assumed}; }
 
-// The parts of a sheet. SI everywhere; a default is what SPEC section 4.1 gives to all.
+// The parts of a sheet. SI everywhere; a default is what specification 4.1 gives to all.
 
 struct RatingSheet {
   SheetValue torque_Nm;  ///< at the joint
@@ -41,7 +41,7 @@ struct MotorSheet {
   SheetValue rotor_inertia_kg_m2;
   SheetValue winding_resistance_Ohm;
   SheetValue viscous_Nms_rad = assumed(0.0);  ///< of the rotor's own bearing
-  SheetValue supply_V = printed(48.0);
+  SheetValue supply_V;
   SheetValue peak_current_ratio = assumed(2.0);  ///< over the rated current
   SheetValue current_time_constant_s = assumed(0.5e-3);
   SheetValue torque_ripple = assumed(0.002);  ///< share of the peak torque
@@ -68,7 +68,7 @@ struct TubeSheet {
   SheetValue damping_Nms_rad;
 };
 
-/// A cable drive that ends in a friction clutch.
+/// A planetary gearhead and a cable drive that end in a friction clutch.
 struct ClutchSheet {
   SheetValue ratio;
   SheetValue stiffness_Nm_rad;  ///< of the cable
@@ -87,7 +87,7 @@ struct FrictionSheet {
   SheetValue bristle_rad = assumed(0.02);    ///< angle of the gear's input
 };
 
-/// How the inner friction of a spring is modelled (SPEC section 4.6).
+/// How the inner friction of a spring is modelled (specification 4.6).
 enum class SpringVariant { maxwell_slip, bouc_wen, lugre };
 
 struct SpringSheet {
@@ -165,8 +165,8 @@ enum class ActuatorFamily { series_elastic, elastomer, rubber_clutch, harmonic_d
 /// Everything that the plant and the sensors of one actuator are built from, in SI.
 ///
 /// An actuator is a chain of three bodies: rotor, first stage, middle body, second stage, joint
-/// (see `Plant`). The values are fixed by SPEC sections 4.1 to 4.5 and are never tuned to what a
-/// method makes of them.
+/// (see `Plant`). The values are fixed by specification 4.1 to 4.5 and are never tuned to the
+/// results of a method.
 struct DataSheet {
   ActuatorFamily family = ActuatorFamily::series_elastic;
   std::string_view name;
@@ -199,12 +199,16 @@ struct SheetRow {
 [[nodiscard]] std::span<const DataSheet> data_sheets() noexcept;
 
 /// @param name NAME, NAME:VARIANT, NAME#SERIAL or NAME:VARIANT#SERIAL, as "dfki-50:bouc-wen#03". A
-/// serial number is a piece of its own, with the spread of SPEC section 4.6; the same one always
+/// serial number is a piece of its own, with the spread of specification 4.6; the same one always
 /// gives the same piece.
 /// @throws UsageError that lists the known names or variants.
 [[nodiscard]] DataSheet data_sheet(std::string_view name);
 
 /// @returns what `data_sheet` takes: the variant only where it is not the default
 [[nodiscard]] std::string full_name(const DataSheet& sheet);
+
+/// Identifies what is simulated: a hash of the full name, variant included, and of every number.
+/// @returns 16 hexadecimal digits, the same on every platform
+[[nodiscard]] std::string sheet_hash(const DataSheet& sheet);
 
 }  // namespace torsio
