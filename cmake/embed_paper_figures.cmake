@@ -15,7 +15,8 @@ set(items_emps published)
 
 function(refuse line_number problem expected found)
   list(JOIN expected ", " expected)
-  message(FATAL_ERROR "${FIGURES}:${line_number}: ${problem}\n  expected: ${expected}\n  found: ${found}")
+  # CMake breaks lines that are not indented.
+  message(FATAL_ERROR "\n  ${FIGURES}:${line_number}: ${problem}\n  expected: ${expected}\n  found: ${found}")
 endfunction()
 
 file(STRINGS ${FIGURES} lines)

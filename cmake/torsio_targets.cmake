@@ -28,7 +28,7 @@ function(torsio_library name)
   add_library(torsio::${name} ALIAS torsio_${name})
   target_compile_features(torsio_${name} PUBLIC cxx_std_20)
   set_target_properties(torsio_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON
-    CXX_EXTENSIONS OFF)
+    CXX_EXTENSIONS OFF VERIFY_INTERFACE_HEADER_SETS ON)  # each public header compiles alone
   target_include_directories(torsio_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(torsio_${name} PRIVATE $<BUILD_INTERFACE:torsio_build_settings>)
 endfunction()

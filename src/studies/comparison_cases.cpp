@@ -114,7 +114,7 @@ ComparisonCase rubber(std::uint64_t seed, const Progress& progress) {
 /// Pushes of 10 and 20 Nm under either impedance, then of 15 Nm.
 ComparisonCase pushes(const std::string& actuator, double duration_s, std::uint64_t seed,
                       const Progress& progress) {
-  // The twist of the tube; a rigid one's cannot be measured, and gear and tube stand for it (SPEC section 3.4).
+  // The twist of the tube; a rigid one's cannot be measured, and gear and tube stand for it (specification 3.4).
   const bool is_rigid = actuator.ends_with("rigid");
   const std::string twist = is_rigid ? "lowpass(motor_angle_rad / 2 - 51 * joint_angle_rad, 10Hz)"
                                      : "motor_angle_rad / 2 - wave_generator_angle_rad";

@@ -17,7 +17,7 @@
 namespace torsio {
 namespace {
 
-// The paper's encoder sets (SPEC section 3.4): the twist of the tube, the torque asked of the motor,
+// The paper's encoder sets (specification 3.4): the twist of the tube, the torque asked of the motor,
 // the joint's acceleration; the third one looks through tube and gear together.
 constexpr const char* kTwist = "motor_angle_rad / 2 - wave_generator_angle_rad";
 constexpr const char* kTwistThroughGear =

@@ -33,7 +33,7 @@ constexpr double kQuick_s = 20.0;
 constexpr std::uint64_t kJudged = 50;  // seeds of runs to be judged on
 constexpr double kObserver_Hz = 8.0;   // of the loop that does what a controller can
 
-/// What a loop is asked for (SPEC section 6).
+/// What a loop is asked for (specification 6).
 struct Task {
   const char* actuator;
   double amplitude_Nm;
@@ -62,7 +62,7 @@ bool exists(std::string_view family) {
 }
 
 /// The torque-mode recordings beside the sweeps: chirps (or walks) under the linear controller of the
-/// data sheet, other amplitudes, the same output (SPEC section 6, observation 1).
+/// data sheet, other amplitudes, the same output (specification 6, observation 1).
 void add_torque_mode(Dataset& dataset, const std::string& actuator, const Task& task, Kind kind,
                      std::uint64_t seed, bool is_quick) {
   const bool is_locked = task.output == JointOutput::locked;
