@@ -7,8 +7,10 @@
 #include "rows.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_impedance.hpp"
+#include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/train/online_mixture.hpp"
 
 namespace torsio::bench {

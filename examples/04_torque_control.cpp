@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/control/spring_inverse.hpp"
+#include "torsio/control/model_inverse.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
 

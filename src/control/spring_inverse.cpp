@@ -1,70 +1,13 @@
 #include "torsio/control/spring_inverse.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
-#include <string>
-#include <utility>
 
 #include "actuator/checks.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
 constexpr auto kPlace = "spring inverse";
-constexpr std::string_view kDeflection = "spring_deflection_rad";
-constexpr std::string_view kTorque = "torque_Nm";
-
-[[noreturn]] void refuse(std::string expected, std::string found, std::string advice = {}) {
-  throw Error({.place = kPlace,
-               .expected = std::move(expected),
-               .found = std::move(found),
-               .advice = std::move(advice)});
-}
-
-EstimatorSettings checked(EstimatorSettings settings, const AnyModel& model) {
-  if (!model.can_invert())
-    refuse("a family with an inverse", fmt::format("'{}'", model.family()),
-           "Train one the other way round: --target spring_deflection_rad.");
-  const std::vector<std::string>& inputs = settings.features.inputs;
-  if (inputs.empty() || inputs.front() != kDeflection)
-    refuse(fmt::format("{} as the first input", kDeflection),
-           inputs.empty() ? "no input" : fmt::format("'{}'", inputs.front()));
-  if (settings.fallback.slope.empty() || !(settings.fallback.slope.front() > 0.0))
-    refuse("a fallback whose torque rises with the deflection", "one that does not");
-  return settings;
-}
-
-double departure_rad(const EstimatorSettings& settings, double most_departure) {
-  require(most_departure >= 0.0, kPlace, "most_departure >= 0", most_departure);
-  const double residual_Nm = settings.fallback.residual_std;
-  return std::isfinite(residual_Nm) ? most_departure * residual_Nm / settings.fallback.slope.front()
-                                    : std::numeric_limits<double>::infinity();
-}
-
-/// Where the torque stands among the raw inputs of an inverse model.
-std::size_t torque_place(const Estimator& estimator) {
-  if (estimator.settings().target != kDeflection)
-    refuse(fmt::format("a model whose target is {}", kDeflection),
-           fmt::format("the target '{}'", estimator.settings().target));
-  for (const std::string& channel : estimator.settings().zeroed_channels)
-    if (channel == "gear_angle_rad" || channel == "joint_angle_rad" || channel == kDeflection)
-      refuse(
-          "a deflection as it is measured", fmt::format("one behind the zero of {}", channel),
-          "Train it without zero rules for the angles, or train the torque, which runs backwards.");
-  const auto place = std::ranges::find(estimator.raw_inputs(), kTorque);
-  if (place == estimator.raw_inputs().end())
-    refuse(fmt::format("a model with {} among its inputs", kTorque),
-           fmt::format("{}", fmt::join(estimator.raw_inputs(), ", ")));
-  return static_cast<std::size_t>(place - estimator.raw_inputs().begin());
-}
-
-std::vector<std::string> without_torque(std::vector<std::string> raw_inputs) {
-  std::erase(raw_inputs, kTorque);
-  return raw_inputs;
-}
 
 }  // namespace
 
@@ -72,123 +15,6 @@ LinearInverse::LinearInverse(double stiffness_Nm_rad, double offset_Nm)
     : stiffness_Nm_rad_(stiffness_Nm_rad), offset_Nm_(offset_Nm) {
   require_positive(kPlace, "stiffness_Nm_rad", stiffness_Nm_rad);
   require(std::isfinite(offset_Nm), kPlace, "a finite offset", offset_Nm);
-}
-
-ModelInverse::ModelInverse(EstimatorSettings settings, AnyModel model, double most_departure)
-    : core_(checked(std::move(settings), model), model.input_count()),
-      model_(std::move(model)),
-      inputs_(core_.raw_inputs(), core_.settings().target),
-      most_departure_rad_(departure_rad(core_.settings(), most_departure)),
-      // A mixture has no memory, and its step costs as much as its inverse.
-      is_stepped_(model_.get_if<Dgmm>() == nullptr),
-      asked_(model_.input_count()) {
-  reset();
-}
-
-void ModelInverse::reset() noexcept {
-  core_.reset();
-  model_.reset();
-  is_asked_ = false;
-  follows_answer_ = false;
-  last_rad_ = 0.0;
-}
-
-void ModelInverse::remember(Features features) noexcept {
-  if (!std::isfinite(model_.step(features).value)) model_.reset();
-}
-
-double ModelInverse::on_the_line(double torque_Nm, Features features) const noexcept {
-  const LinearFallback& line = core_.settings().fallback;
-  double rest_Nm = torque_Nm - line.intercept;
-  for (std::size_t j = 1; j < features.size(); ++j) rest_Nm -= line.slope[j] * features[j];
-  return rest_Nm / line.slope.front();
-}
-
-Estimate ModelInverse::guarded(double torque_Nm, Features features) noexcept {
-  const double line_rad = on_the_line(torque_Nm, features);
-  Estimate answer = {.value = line_rad};
-  if (!core_.is_settled()) {
-    answer.fault = Fault::warming_up;
-    return answer;
-  }
-  const Estimate told = model_.invert(torque_Nm, features);
-  answer.novelty = told.novelty;
-  if (told.fault != Fault::none || !std::isfinite(told.value)) {
-    answer.fault = told.fault != Fault::none ? told.fault : Fault::model_not_finite;
-    return answer;
-  }
-  std::ranges::copy(features, asked_.begin());
-  asked_.front() = told.value;
-  const double weight = core_.excursion(asked_);
-  if (weight > 1.0) {
-    answer.fault = Fault::outside_training_range;
-    return answer;
-  }
-  const double near_rad = std::max(std::min(told.value, line_rad + most_departure_rad_),
-                                   line_rad - most_departure_rad_);
-  answer.value = std::lerp(near_rad, line_rad, weight);
-  answer.std_dev = told.std_dev;
-  return answer;
-}
-
-Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcept {
-  if (is_asked_) remember(asked_);
-  is_asked_ = false;
-  follows_answer_ = false;
-  const EstimatorCore::Conditioned input = core_.condition(inputs_.from(sample));
-  if (input.fault != Fault::none || !std::isfinite(torque_Nm))
-    return {.value = last_rad_,
-            .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};
-  if (input.restarted) model_.reset();
-  const bool has_state = !model_.state().empty();
-  if (is_stepped_ && !has_state) remember(input.features);
-  Estimate answer = guarded(torque_Nm, input.features);
-  zero_rad_ = sample.spring_deflection_rad() - input.features.front();
-  if (has_state) {
-    // What the loop makes of the answer is not known yet: the memory goes there in the next step.
-    std::ranges::copy(input.features, asked_.begin());
-    follows_answer_ = answer.fault != Fault::warming_up;
-    if (follows_answer_) asked_.front() = answer.value;
-    is_asked_ = true;
-  }
-  if (!core_.unset_zeros().empty() && answer.fault != Fault::warming_up)
-    answer.fault = Fault::zero_not_set;
-  // The model's deflection lies off the measured one by the zeros of its channels.
-  answer.value += zero_rad_;
-  if (!std::isfinite(answer.value)) return {.value = last_rad_, .fault = Fault::model_not_finite};
-  last_rad_ = answer.value;
-  return answer;
-}
-
-TrainedInverse::TrainedInverse(Estimator estimator)
-    : estimator_(std::move(estimator)),
-      torque_(torque_place(estimator_)),
-      others_(without_torque(estimator_.raw_inputs()), std::string(kTorque)),
-      raw_(estimator_.raw_inputs().size()) {}
-
-Estimate TrainedInverse::step(double torque_Nm, const JointSample& sample) noexcept {
-  const std::span<const double> others = others_.from(sample);
-  std::ranges::copy(others.first(torque_), raw_.begin());
-  raw_[torque_] = torque_Nm;
-  std::ranges::copy(others.subspan(torque_),
-                    raw_.begin() + static_cast<std::ptrdiff_t>(torque_) + 1);
-  return estimator_.step(raw_);
-}
-
-AnyInverse AnyInverse::of(const EstimatorSettings& settings,
-                          const AnyModel::Parameters& parameters) {
-  if (settings.target == kDeflection)
-    return TrainedInverse(Estimator(settings, AnyModel(parameters)));
-  return ModelInverse(settings, AnyModel(parameters));
-}
-
-void AnyInverse::set_zero(std::string_view channel, double value) {
-  std::visit(
-      [&](auto& inverse) {
-        if constexpr (requires { inverse.set_zero(channel, value); })
-          inverse.set_zero(channel, value);
-      },
-      inverse_);
 }
 
 }  // namespace torsio

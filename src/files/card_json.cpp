@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "files/json_text.hpp"
+#include "files/known_families.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/units.hpp"
@@ -157,7 +158,7 @@ std::string card_json(const ModelFile& model) {
   ordered_json json_card;
   json_card["format_version"] = kModelFormatVersion;
   json_card["torsio_version"] = kVersion;
-  json_card["family"] = family_of(model.parameters);
+  json_card["family"] = model.parameters.family();
   json_card["fitted_as"] = card.fitted_as;
   json_card["target"] = settings.target;
   json_card["unit"] = unit_label(settings.target);
@@ -188,8 +189,8 @@ ModelFile model_of_card(std::string_view text, const std::string& place) {
   const json parsed = parse_json(text, place);
   const CardObject card(parsed, place);
   check_version(card, place);
-  ModelFile model;
-  model.parameters = empty_parameters(card.text("family"), place);
+  ModelFile model{
+      .card = {}, .settings = {}, .parameters = empty_parameters(card.text("family"), place)};
   model.settings.target = card.text("target");
   model.settings.sample_rate_Hz = card.number("sample_rate_Hz");
   model.settings.features.inputs = card.texts("inputs");

@@ -4,9 +4,9 @@
 
 #include <cmath>
 #include <utility>
-#include <variant>
 
 #include "files/card_json.hpp"
+#include "files/known_families.hpp"
 #include "files/leaf_tensors.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/safetensors.hpp"
@@ -55,53 +55,21 @@ void check_nothing_left(const Safetensors& contents, std::string_view place,
 /// Clocks that differ by less are one: a recording's rate is measured.
 constexpr double kSameRate = 1e-3;
 
-/// Of a discrete model [s]; 0 of any other.
-template <class Parameters>
-double sample_period_of(const Parameters& parameters) {
-  if constexpr (requires { requires Parameters::kRunsAtAnyRate; })
-    return 0.0;
-  else if constexpr (requires { parameters.sample_period_s; })
-    return parameters.sample_period_s;
-  else if constexpr (requires { parameters.time.sample_period_s; })
-    return parameters.time.sample_period_s;  // whose substeps are good for that period
-  if constexpr (requires { parameters.members; })
-    return parameters.members.empty() ? 0.0 : sample_period_of(parameters.members.front());
-  return 0.0;
-}
-
-/// A continuous-time model is discretised anew for the rate that it is to run at.
-AnyModel::Parameters at_rate(AnyModel::Parameters parameters, double sample_rate_Hz) {
-  const auto take = [sample_rate_Hz](double& sample_period_s) {
-    if (sample_period_s > 0.0 && sample_rate_Hz > 0.0) sample_period_s = 1.0 / sample_rate_Hz;
-  };
-  std::visit(
-      [&]<class P>(P& of) {
-        if constexpr (requires { requires P::kRunsAtAnyRate; })
-          take(of.sample_period_s);
-        else if constexpr (requires { of.terms.sample_period_s; })
-          take(of.terms.sample_period_s);  // a grey box, whose relaxation is exact at any
-      },
-      parameters);
-  return parameters;
-}
-
-/// A discrete model runs at the rate it was trained at; what is static is taken to any other.
-void check_sample_rate(const ModelFile& model) {
-  const double period_s =
-      std::visit([](const auto& of) { return sample_period_of(of); }, model.parameters);
-  if (!(period_s > 0.0)) return;
+/// A discrete model runs at the rate that it was trained at; a static one runs at any.
+void check_sample_rate(const AnyModel& model, double rate_Hz) {
+  const double period_s = model.sample_period();
+  if (model.is_rediscretised() || !(period_s > 0.0)) return;
   const double own_Hz = 1.0 / period_s;
-  const double rate_Hz = model.settings.sample_rate_Hz;
   if (std::abs(rate_Hz - own_Hz) <= kSameRate * own_Hz) return;
-  throw Error({.place = "sample rate",
-               .expected = fmt::format("{:.6g} Hz, at which the {} was trained", own_Hz,
-                                       family_of(model.parameters)),
-               .found = fmt::format("{:.6g} Hz", rate_Hz),
-               .advice = fmt::format(
-                   "A {} steps by its own sample period and runs at no other rate: resample what "
-                   "it is given to {:.6g} Hz (--rate, where recordings are read), or train one at "
-                   "{:.6g} Hz.",
-                   family_of(model.parameters), own_Hz, rate_Hz)});
+  throw Error(
+      {.place = "sample rate",
+       .expected = fmt::format("{:.6g} Hz, at which the {} was trained", own_Hz, model.family()),
+       .found = fmt::format("{:.6g} Hz", rate_Hz),
+       .advice = fmt::format(
+           "A {} steps by its own sample period and runs at no other rate: resample what "
+           "it is given to {:.6g} Hz (--rate, where recordings are read), or train one at "
+           "{:.6g} Hz.",
+           model.family(), own_Hz, rate_Hz)});
 }
 
 /// Checks what only the estimator itself can: that settings and model fit together.
@@ -121,13 +89,13 @@ ModelFile read_model(std::span<const std::byte> bytes, std::string_view place,
   Safetensors contents = parse_safetensors(bytes, place);
   ModelFile model = model_of_card(card_text(contents, place), fmt::format("{}: card", place));
   check_serial(model.card, place, expected_serial);
-  std::visit(
-      [&](auto& parameters) { take_leaves(contents, "model", place, parameters, is_error_bar); },
-      model.parameters);
+  with_own_type(model.parameters, [&](auto& parameters) {
+    take_leaves(contents, "model", place, parameters, is_error_bar);
+  });
   take_leaves(contents, "guards.ranges", place, model.settings.ranges, is_error_bar);
   take_leaves(contents, "fallback", place, model.settings.fallback, is_error_bar);
   take_leaves(contents, "residuals", place, model.settings.residuals, is_error_bar);
-  check_nothing_left(contents, place, family_of(model.parameters));
+  check_nothing_left(contents, place, model.parameters.family());
   return model;
 }
 
@@ -136,8 +104,8 @@ ModelFile read_model(std::span<const std::byte> bytes, std::string_view place,
 std::vector<std::byte> model_bytes(const ModelFile& model) {
   Safetensors contents;
   contents.metadata[kCardKey] = card_json(model);
-  std::visit([&](const auto& parameters) { put_leaves(contents, "model", parameters); },
-             model.parameters);
+  with_own_type(model.parameters,
+                [&](const auto& parameters) { put_leaves(contents, "model", parameters); });
   put_leaves(contents, "guards.ranges", model.settings.ranges);
   put_leaves(contents, "fallback", model.settings.fallback);
   put_leaves(contents, "residuals", model.settings.residuals);
@@ -162,10 +130,11 @@ ModelFile load_model(const std::filesystem::path& path, std::string_view expecte
 }
 
 Estimator make_estimator(const ModelFile& model) {
-  (void)AnyModel(model.parameters);  // as they are in the file
-  AnyModel checked(at_rate(model.parameters, model.settings.sample_rate_Hz));
-  check_sample_rate(model);
-  return {model.settings, std::move(checked)};
+  const double rate_Hz = model.settings.sample_rate_Hz;
+  const AnyModel as_in_file(model.parameters);
+  check_sample_rate(as_in_file, rate_Hz);
+  if (!(rate_Hz > 0.0)) return {model.settings, as_in_file};
+  return {model.settings, AnyModel(model.parameters.at_sample_period(1.0 / rate_Hz))};
 }
 
 Estimator load_estimator(const std::filesystem::path& path, std::string_view expected_serial) {

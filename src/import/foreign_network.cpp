@@ -8,6 +8,9 @@
 #include <utility>
 
 #include "torsio/core/error.hpp"
+#include "torsio/model/gru.hpp"
+#include "torsio/model/lstm.hpp"
+#include "torsio/model/mlp.hpp"
 
 namespace torsio {
 namespace {

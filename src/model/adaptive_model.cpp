@@ -1,34 +1,35 @@
 #include "torsio/model/adaptive_model.hpp"
 
 #include <string>
+#include <vector>
 
-#include "torsio/core/dispatch.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/model/gru.hpp"
+#include "torsio/model/lstm.hpp"
+#include "torsio/model/mlp.hpp"
 
 namespace torsio {
 namespace {
 
 static_assert(Model<AdaptiveModel>);
 
-/// The dense layers of a network, or null.
-template <class Parameters>
-auto* dense_layers(Parameters& parameters) {
-  if constexpr (requires { parameters.head; }) {
-    return &parameters.head;
-  } else if constexpr (requires { parameters.layers; }) {
-    return &parameters.layers;
-  } else {
-    return static_cast<const std::vector<DenseLayer>*>(nullptr);
-  }
+/// Calls `use` with the scaling and the dense layers of a network; not at all with other families.
+template <class Parameters, class Use>
+void with_network(Parameters& parameters, const Use& use) {
+  if (auto* const mlp = parameters.template get_if<Mlp::Parameters>())
+    use(mlp->scaling, mlp->layers);
+  else if (auto* const lstm = parameters.template get_if<Lstm::Parameters>())
+    use(lstm->scaling, lstm->head);
+  else if (auto* const gru = parameters.template get_if<Gru::Parameters>())
+    use(gru->scaling, gru->head);
 }
 
 LastLayerAdapter adapter_of(const AdaptiveModel::Parameters& parameters) {
-  const double target_scale = dispatch(parameters.network, [](const auto& own) {
-    if constexpr (requires { own.scaling.target_scale; })
-      return own.scaling.target_scale;
-    else
-      return 1.0;
-  });
+  double target_scale = 1.0;
+  with_network(parameters.network,
+               [&](const NetworkScaling& scaling, const std::vector<DenseLayer>& /*layers*/) {
+                 target_scale = scaling.target_scale;
+               });
   return {parameters.adaptation, require_last_layer(parameters.network), target_scale,
           parameters.sample_period_s};
 }
@@ -36,17 +37,19 @@ LastLayerAdapter adapter_of(const AdaptiveModel::Parameters& parameters) {
 }  // namespace
 
 const DenseLayer* last_layer(const AnyModel::Parameters& parameters) noexcept {
-  return dispatch(parameters, [](const auto& own) -> const DenseLayer* {
-    const auto* const layers = dense_layers(own);
-    return layers == nullptr || layers->empty() ? nullptr : &layers->back();
-  });
+  const DenseLayer* last = nullptr;
+  with_network(parameters,
+               [&](const NetworkScaling& /*scaling*/, const std::vector<DenseLayer>& layers) {
+                 if (!layers.empty()) last = &layers.back();
+               });
+  return last;
 }
 
 const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters) {
   if (const DenseLayer* const last = last_layer(parameters)) return *last;
   throw UsageError({.place = "adaptation",
                     .expected = "a network: mlp, lstm or gru",
-                    .found = std::string(family_of(parameters)),
+                    .found = std::string(parameters.family()),
                     .advice = "Only a single network has a last layer to adapt: fit one, without "
                               "members. Other families are fitted again."});
 }
@@ -68,10 +71,8 @@ Estimate AdaptiveModel::step(Features features) noexcept {
 
 AnyModel::Parameters AdaptiveModel::adapted() const {
   AnyModel::Parameters parameters = network_.parameters();
-  dispatch(parameters, [&](auto& own) {
-    if constexpr (requires { own.layers; }) {
-      dense_layers(own)->back() = adapter_.adapted();
-    }
+  with_network(parameters, [&](NetworkScaling& /*scaling*/, std::vector<DenseLayer>& layers) {
+    layers.back() = adapter_.adapted();
   });
   return parameters;
 }

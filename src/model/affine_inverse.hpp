@@ -7,12 +7,6 @@
 
 namespace torsio {
 
-/// Where a model has no inverse: the given x_0, or 0 where that is no number.
-inline Estimate no_inverse(Features features) noexcept {
-  return {.value = std::isfinite(features[0]) ? features[0] : 0.0,
-          .fault = Fault::model_not_finite};
-}
-
 /// x_0 from rest = sum_j c_(first + j) x_j.
 inline Estimate affine_inverse(const ScheduledCoefficients& coefficients,
                                const ScheduledCoefficients::Position& at, std::size_t first,

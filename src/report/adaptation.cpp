@@ -70,7 +70,7 @@ std::string adaptation_json(const AdaptedModel& adapted, const std::string& mode
   for (std::size_t i = 0; i < kLearningOutcomes; ++i)
     outcomes[std::string(name(static_cast<Learning>(i)))] = counts.outcomes[i];
   return Json{{"model", model},
-              {"family", family_of(adapted.file.parameters)},
+              {"family", adapted.file.parameters.family()},
               {"target", target},
               {"unit", unit_label(target)},
               {"method", method_of(adapted)},
@@ -98,7 +98,7 @@ std::string adaptation_text(const AdaptedModel& adapted, const std::string& mode
       "nothing was\nlearned from\n\n"
       "updates {}, of them drawn back to the largest change {}; passed over: {}\n"
       "roll-backs to the frozen weights {}{}; weights changed by {:.2g} % of their length\n",
-      model, family_of(adapted.file.parameters), method_of(adapted),
+      model, adapted.file.parameters.family(), method_of(adapted),
       unit_label(adapted.file.settings.target), table.text(), counts.updates(),
       counts.of(Learning::limited), skipped_text(counts), counts.roll_backs,
       counts.covariance_resets == 0

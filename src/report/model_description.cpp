@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string_view>
-#include <type_traits>
 #include <vector>
 
+#include "files/known_families.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/import/import_network.hpp"
 #include "torsio/model/network_layers.hpp"
@@ -53,13 +53,11 @@ Leaf leaf_of(const std::string& name, const Number& value) {
 
 std::vector<Leaf> leaves_of(const ModelFile& model) {
   std::vector<Leaf> leaves;
-  std::visit(
-      [&](const auto& parameters) {
-        for_each_leaf(parameters, [&](const std::string& name, const auto& value) {
-          leaves.push_back(leaf_of(name, value));
-        });
-      },
-      model.parameters);
+  with_own_type(model.parameters, [&](const auto& parameters) {
+    for_each_leaf(parameters, [&](const std::string& name, const auto& value) {
+      leaves.push_back(leaf_of(name, value));
+    });
+  });
   return leaves;
 }
 
@@ -102,7 +100,7 @@ std::string parameter_lines(const std::vector<Leaf>& leaves) {
 
 /// The linear part of a Hammerstein-Wiener model in words; else nothing.
 std::string linear_part_lines(const ModelFile& model) {
-  const auto* of = std::get_if<HammersteinWiener::Parameters>(&model.parameters);
+  const auto* of = model.parameters.get_if<HammersteinWiener::Parameters>();
   if (of == nullptr) return {};
   std::string text;
   for (const std::string& line : continuous_notes(*of)) text += line + "\n";
@@ -112,21 +110,19 @@ std::string linear_part_lines(const ModelFile& model) {
 /// A covariance function or a network of springs and dashpots as their texts, the numbers included;
 /// else nothing.
 std::string structure_line(const ModelFile& model) {
-  return std::visit(
-      []<class Parameters>(const Parameters& parameters) {
-        if constexpr (requires { parameters.kernel; })
-          return fmt::format("kernel {}\n", description_of(parameters.kernel));
-        else if constexpr (std::is_same_v<Parameters, Viscoelastic::Parameters>)
-          return fmt::format("network {}\n", text_of(parameters.network, 6));
-        else
-          return std::string();
-      },
-      model.parameters);
+  const AnyParameters& parameters = model.parameters;
+  if (const auto* const process = parameters.get_if<GaussianProcess::Parameters>())
+    return fmt::format("kernel {}\n", description_of(process->kernel));
+  if (const auto* const process = parameters.get_if<ParametricGp::Parameters>())
+    return fmt::format("kernel {}\n", description_of(process->kernel));
+  if (const auto* const network = parameters.get_if<Viscoelastic::Parameters>())
+    return fmt::format("network {}\n", text_of(network->network, 6));
+  return {};
 }
 
 /// The difference equation of a polynomial NARX model in words; else nothing.
 std::string equation_line(const ModelFile& model) {
-  const auto* const narx = std::get_if<Narx<MultivariatePolynomial>::Parameters>(&model.parameters);
+  const auto* const narx = model.parameters.get_if<Narx<MultivariatePolynomial>::Parameters>();
   if (narx == nullptr) return {};
   return equation_of(*narx, model.settings.features.inputs, model.settings.target) + "\n";
 }
@@ -168,7 +164,7 @@ std::string zero_line(const EstimatorSettings& settings) {
 }
 
 std::string family_of(const ModelFile& model) {
-  const std::string own(family_of(model.parameters));
+  const std::string own(model.parameters.family());
   const std::string& asked = model.card.fitted_as;
   return asked.empty() || asked == own ? own : fmt::format("{} ({})", asked, own);
 }

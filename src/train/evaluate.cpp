@@ -114,10 +114,10 @@ struct Tally {
 };
 
 /// What a model is usually wrong by in a record's first samples: root mean square over the regions of the
-/// residual table; NaN without one, and of a drive, whose errors are those of a drift that has hardly
-/// begun there: they would draw its speed to rest.
-double usual_error(const EstimatorSettings& settings, std::string_view family) {
-  if (family == FrictionDrive::kFamily) return kNotMeasured;
+/// residual table; NaN without one, and for a family that integrates its input (`FamilyTraits`), whose speed such a
+/// start would draw to rest.
+double usual_error(const EstimatorSettings& settings, FamilyTraits traits) {
+  if (traits.integrates) return kNotMeasured;
   double sum = 0.0;
   double count = 0.0;
   for (const double std_dev : settings.residuals.std_dev) {
@@ -148,7 +148,7 @@ std::size_t start_with(Estimator& estimator,
     if (pipeline.is_settled() && target.is_fresh(n)) measured[n] = target.values[n];
   }
   start_where_measured(estimator.model(), features, measured,
-                       usual_error(settings, estimator.model().family()));
+                       usual_error(settings, estimator.model().traits()));
   return samples;
 }
 

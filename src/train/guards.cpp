@@ -42,7 +42,7 @@ double edge_at(const std::vector<Residual>& sorted, std::size_t end) {
 /// An equation of motion holds beyond the forces that it was fitted to, and a straight line from force to
 /// displacement nowhere: the guard leaves such a model as much room again on either side.
 void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
-  if (model.get_if<DynamicBoucWen>() == nullptr && model.get_if<FrictionDrive>() == nullptr) return;
+  if (!model.traits().extrapolates) return;
   for (std::size_t j = 0; j < ranges.lowest.size(); ++j) {
     const double width = ranges.highest[j] - ranges.lowest[j];
     ranges.lowest[j] -= width;

@@ -5,9 +5,11 @@
 #include <cstddef>
 #include <string_view>
 #include <utility>
-#include <variant>
 
 #include "torsio/core/units.hpp"
+#include "torsio/model/linear.hpp"
+#include "torsio/model/linear_coulomb.hpp"
+#include "torsio/model/polynomial.hpp"
 #include "train/nnls.hpp"
 
 namespace torsio {
@@ -114,23 +116,22 @@ std::vector<FittedParameter> named_coefficients(const AnyModel::Parameters& para
                                                 const std::string& target,
                                                 std::span<const double> errors) {
   const Names names(inputs, target);
-  return std::visit(
-      [&]<class Parameters>(const Parameters& of) {
-        std::vector<FittedParameter> told;
-        if constexpr (requires { names.columns(of); }) {
-          const std::vector<Column> columns = names.columns(of);
-          const Matrix& values = of.coefficients.values;
-          for (std::size_t row = 0; row < values.rows; ++row)
-            for (std::size_t j = 0; j < columns.size(); ++j)
-              if (values(row, j) != 0.0)
-                told.push_back({columns[j].name + names.at_knot(of.coefficients, row),
-                                columns[j].unit, values(row, j),
-                                j < errors.size() ? errors[j] : kNotMeasured});
-          names.others(of, told);
-        }
-        return told;
-      },
-      parameters);
+  std::vector<FittedParameter> all;
+  const auto add = [&]<class Parameters>(const Parameters* of) {
+    if (of == nullptr) return;
+    const std::vector<Column> columns = names.columns(*of);
+    const Matrix& values = of->coefficients.values;
+    for (std::size_t row = 0; row < values.rows; ++row)
+      for (std::size_t j = 0; j < columns.size(); ++j)
+        if (values(row, j) != 0.0)
+          all.push_back({columns[j].name + names.at_knot(of->coefficients, row), columns[j].unit,
+                         values(row, j), j < errors.size() ? errors[j] : kNotMeasured});
+    names.others(*of, all);
+  };
+  add(parameters.get_if<Linear::Parameters>());
+  add(parameters.get_if<LinearCoulomb::Parameters>());
+  add(parameters.get_if<Polynomial::Parameters>());
+  return all;
 }
 
 std::vector<FittedParameter> fitted_coefficients(const AnyModel::Parameters& parameters,

@@ -9,6 +9,9 @@
 #include <vector>
 
 #include "torsio/core/error.hpp"
+#include "torsio/model/dgmm.hpp"
+#include "torsio/model/gaussian_process.hpp"
+#include "torsio/model/parametric_gp.hpp"
 #include "torsio/train/fit_narx.hpp"
 #include "torsio/train/fit_narx_polynomial.hpp"
 #include "torsio/train/frols.hpp"

@@ -13,7 +13,9 @@
 #include "support/error_message.hpp"
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
+#include "torsio/control/model_inverse.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/model/grey_box.hpp"
 
 namespace torsio {

@@ -12,6 +12,8 @@
 #include "support/error_message.hpp"
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
+#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/model/ensemble.hpp"
 
 namespace torsio {
 namespace {

@@ -13,6 +13,7 @@
 
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/estimate/any_estimator.hpp"
 
 namespace torsio {
 namespace {

@@ -9,6 +9,7 @@
 #include "support/error_message.hpp"
 #include "support/example_models.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/estimate/any_estimator.hpp"
 
 namespace torsio {
 namespace {

@@ -113,7 +113,7 @@ TEST(ModelFile, IsNotWrittenIfItCouldNotBeRead) {
   save_model(folder.path("m"), example_model_file(example<Linear>()));
   const auto before = read_whole_file(folder.path("m"), kMostModelFileBytes);
   ModelFile bad = example_model_file(example<Linear>());
-  std::get<Linear::Parameters>(bad.parameters).coefficients.values(0, 1) =
+  bad.parameters.get<Linear::Parameters>().coefficients.values(0, 1) =
       std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(error_message([&] { save_model(folder.path("m"), bad); }),
               HasSubstr("m: /model.coefficients.values: expected finite numbers, found nan at "
@@ -143,7 +143,7 @@ TEST(ModelFile, OfAContinuousTimeModelIsDiscretisedForAnotherRate) {
   model.settings.sample_rate_Hz = 250.0;
   const Estimator estimator = make_estimator(model);
   EXPECT_EQ(estimator.model().get_if<Viscoelastic>()->sample_period(), 4e-3);
-  EXPECT_EQ(std::get<Viscoelastic::Parameters>(model.parameters).sample_period_s, 1e-3);
+  EXPECT_EQ(model.parameters.get<Viscoelastic::Parameters>().sample_period_s, 1e-3);
 }
 
 TEST(ModelFile, OfAGreyBoxIsDiscretisedForAnotherRate) {
@@ -182,7 +182,7 @@ TEST(ModelFile, KeepsTheLayersOfANetworkByTheirNumber) {
       contents.tensors.at("model.layers.2.bias").values));
   EXPECT_FALSE(contents.tensors.contains("model.layers.3.bias"));
   const ModelFile loaded = parse_model(model_bytes(example_model_file(example<Lstm>())), "m");
-  EXPECT_EQ(std::get<Lstm::Parameters>(loaded.parameters), example<Lstm>().parameters());
+  EXPECT_EQ(loaded.parameters.get<Lstm::Parameters>(), example<Lstm>().parameters());
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "files/known_families.hpp"
 #include "support/example_model_file.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"
@@ -23,14 +24,17 @@ namespace {
 
 using Input = std::span<const std::uint8_t>;
 
-template <class... Family>
-auto a_file_of_each(std::type_identity<std::variant<Family...>> /*models*/) {
-  return std::array{
-      torsio::model_bytes(torsio::test::example_model_file(torsio::test::example<Family>()))...};
+std::vector<std::vector<std::byte>> a_file_of_each() {
+  std::vector<std::vector<std::byte>> files;
+  torsio::KnownFamilies::for_each([&]<class F>(std::type_identity<F> /*family*/) {
+    files.push_back(
+        torsio::model_bytes(torsio::test::example_model_file(torsio::test::example<F>())));
+  });
+  return files;
 }
 
 const std::vector<std::byte>& good_bytes(std::uint8_t which) {
-  static const auto files = a_file_of_each(std::type_identity<torsio::KnownFamilies::Models>{});
+  static const auto files = a_file_of_each();
   return files[which % files.size()];
 }
 

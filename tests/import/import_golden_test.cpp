@@ -12,6 +12,8 @@
 #include "import/read_network.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/import/import_network.hpp"
+#include "torsio/model/gru.hpp"
+#include "torsio/model/lstm.hpp"
 
 namespace torsio {
 namespace {
@@ -41,9 +43,8 @@ ImportedModel imported(const Json& one) {
 }
 
 std::size_t warm_up(const AnyModel::Parameters& parameters) {
-  if (const auto* const lstm = std::get_if<Lstm::Parameters>(&parameters))
-    return lstm->warm_up_samples;
-  const auto* const gru = std::get_if<Gru::Parameters>(&parameters);
+  if (const auto* const lstm = parameters.get_if<Lstm::Parameters>()) return lstm->warm_up_samples;
+  const auto* const gru = parameters.get_if<Gru::Parameters>();
   return gru == nullptr ? 0 : gru->warm_up_samples;
 }
 
@@ -52,7 +53,7 @@ class ImportGolden : public testing::TestWithParam<Json> {};
 TEST_P(ImportGolden, StreamsWhatPyTorchTells) {
   const Json& one = GetParam();
   const ImportedModel import = imported(one);
-  EXPECT_EQ(family_of(import.file.parameters), one.at("family"));
+  EXPECT_EQ(import.file.parameters.family(), one.at("family"));
   EXPECT_EQ(warm_up(import.file.parameters), one.value("window", std::size_t{0}));
   AnyModel model(import.file.parameters);
   const auto inputs = one.at("inputs").get<std::vector<double>>();

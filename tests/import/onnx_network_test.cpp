@@ -14,6 +14,7 @@
 
 #include "support/error_message.hpp"
 #include "torsio/import/import_network.hpp"
+#include "torsio/model/lstm.hpp"
 
 namespace torsio {
 namespace {
@@ -296,7 +297,7 @@ TEST(OnnxNetwork, CannotSwellTheConstantsOfASmallFile) {
 
 TEST(OnnxNetwork, KeepsItsScalesAsStandardisation) {
   const auto lstm =
-      std::get<Lstm::Parameters>(network_parameters(parse(file("torch_lstm.onnx")), 0.01, 0));
+      network_parameters(parse(file("torch_lstm.onnx")), 0.01, 0).get<Lstm::Parameters>();
   EXPECT_EQ(lstm.scaling.inputs.scale, (std::vector<double>{0.5, 4.0}));
   EXPECT_EQ(lstm.scaling.target_scale, 20.0);
 }

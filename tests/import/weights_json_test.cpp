@@ -8,6 +8,7 @@
 
 #include "support/error_message.hpp"
 #include "torsio/import/import_network.hpp"
+#include "torsio/model/lstm.hpp"
 
 namespace torsio {
 namespace {
@@ -38,7 +39,7 @@ std::string refusal(const std::string& text) {
 TEST(WeightsJson, TakesScalesIntoTheStandardisation) {
   const ForeignNetwork network = parse(
       small_lstm(tensor("in_scale", "1, 1, 1", "0.25") + "," + tensor("out_scale", "1", "20")));
-  const auto lstm = std::get<Lstm::Parameters>(network_parameters(network, 0.005, 0));
+  const auto lstm = network_parameters(network, 0.005, 0).get<Lstm::Parameters>();
   EXPECT_EQ(lstm.scaling.inputs.scale.at(0), 4.0);
   EXPECT_EQ(lstm.scaling.target_scale, 20.0);
   EXPECT_EQ(lstm.layers.at(0).input_weights.values, (std::vector<float>{1, 2, 3, 4}));
@@ -56,7 +57,7 @@ TEST(WeightsJson, KeepsTwoBiasesApartUnlessToldOtherwise) {
   ForeignNetwork network = parse(small_lstm(tensor("m.bias_ih_l0", "4", "1, 2, 3, 4") + "," +
                                             tensor("m.bias_hh_l0", "4", "5, 6, 7, 8")));
   const auto bias = [&] {
-    return std::get<Lstm::Parameters>(network_parameters(network, 0.005, 0)).layers.at(0).bias;
+    return network_parameters(network, 0.005, 0).get<Lstm::Parameters>().layers.at(0).bias;
   };
   EXPECT_EQ(bias(), (std::vector<float>{1, 2, 3, 4, 5, 6, 7, 8}));
   network.fold_biases = true;

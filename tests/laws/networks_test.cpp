@@ -1,4 +1,5 @@
 #include "laws/model_laws.hpp"
+#include "torsio/model/ensemble.hpp"
 
 namespace torsio::test {
 

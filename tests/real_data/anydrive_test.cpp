@@ -36,7 +36,7 @@ struct Deviation {
 };
 
 Deviation deviation(bool fold_biases = false) {
-  const auto parameters = std::get<Lstm::Parameters>(imported(fold_biases).file.parameters);
+  const auto parameters = imported(fold_biases).file.parameters.get<Lstm::Parameters>();
   const auto vectors = nlohmann::json::parse(std::ifstream(anydrive("test_vectors.json")));
   Deviation worst;
   for (const auto& sequence : vectors) {
@@ -54,7 +54,7 @@ Deviation deviation(bool fold_biases = false) {
 
 TEST(Anydrive, IsImportedWithoutLoss) {
   TORSIO_NEEDS_DATA("desr_dualcam");
-  const auto parameters = std::get<Lstm::Parameters>(imported().file.parameters);
+  const auto parameters = imported().file.parameters.get<Lstm::Parameters>();
   EXPECT_EQ(parameters.scaling.inputs.scale, (std::vector<double>{0.5, 4.0}));
   EXPECT_EQ(parameters.scaling.target_scale, 20.0);
   // PyTorch's own rounding: what an evaluation without any is away from it.

@@ -18,9 +18,11 @@
 #include "support/system_calls.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_impedance.hpp"
+#include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/signal/excitation.hpp"
 #include "torsio/signal/joint_move.hpp"
 

@@ -14,6 +14,7 @@
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
+#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/model/network_bank.hpp"
 #include "torsio/signal/feature_pipeline.hpp"

@@ -6,6 +6,7 @@
 #include "support/example_model_file.hpp"
 #include "support/example_models.hpp"
 #include "torsio/import/import_network.hpp"
+#include "torsio/model/ensemble.hpp"
 
 namespace torsio {
 namespace {

@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
+#include "files/known_families.hpp"
 #include "torsio/core/matrix.hpp"
-#include "torsio/model/any_model.hpp"
 #include "torsio/model/parameters.hpp"
 
 namespace torsio::test {
@@ -42,7 +42,9 @@ std::string dump(const Parameters& parameters) {
 }
 
 inline std::string dump(const AnyModel::Parameters& parameters) {
-  return std::visit([](const auto& own) { return dump(own); }, parameters);
+  std::string text;
+  with_own_type(parameters, [&](const auto& own) { text = dump(own); });
+  return text;
 }
 
 }  // namespace torsio::test

@@ -15,6 +15,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/data/mapping.hpp"
 #include "torsio/data/resample.hpp"
+#include "torsio/model/grey_box.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/experiment.hpp"
 #include "torsio/train/inputs.hpp"

@@ -12,6 +12,8 @@
 #include "support/example_data.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/model/linear.hpp"
+#include "torsio/model/polynomial.hpp"
 #include "torsio/train/families.hpp"
 
 namespace torsio {

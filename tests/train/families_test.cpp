@@ -8,6 +8,7 @@
 #include "support/every_family.hpp"
 #include "support/example_data.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/model/linear_coulomb.hpp"
 
 namespace torsio {
 namespace {

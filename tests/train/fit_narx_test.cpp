@@ -11,6 +11,8 @@
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/model/linear.hpp"
+#include "torsio/model/narx.hpp"
 #include "torsio/train/model_run.hpp"
 
 namespace torsio {

@@ -1,17 +1,10 @@
 #pragma once
 
 #include <concepts>
-#include <cstddef>
-#include <limits>
-#include <string_view>
-#include <utility>
-#include <variant>
-#include <vector>
 
-#include "torsio/core/dispatch.hpp"
 #include "torsio/core/realtime.hpp"
-#include "torsio/estimate/estimator.hpp"
-#include "torsio/estimate/torque_estimator.hpp"
+#include "torsio/estimate/joint_sample.hpp"
+#include "torsio/model/model.hpp"
 
 namespace torsio {
 
@@ -40,103 +33,6 @@ class LinearInverse {
  private:
   double stiffness_Nm_rad_;
   double offset_Nm_;
-};
-
-/// A model of the torque run backwards: δ = E[δ | τ*, δ̇, …] with everything but δ as measured
-/// (`AnyModel::invert`; specification 3.1 for mixtures).
-///
-/// Guarded as an `Estimator` is: where another input, or the answer, has left its range in training,
-/// the model hands over to its linear fallback run backwards; until the filters have settled, and
-/// where the model has no answer, that alone tells. A slow sweep teaches nothing about the fast
-/// motions of a torque loop (specification 6), so the answer may leave that line only by so many of
-/// its residual standard deviations.
-///
-/// The memory of a model with state follows the deflection that is asked for, not the measured one:
-/// along that it would take a joint that sticks for a spring that is stiff, and ask for less the
-/// longer it sticks. `follow` tells it what was really asked for behind the limits of the loop. A
-/// model that answers with what is not finite is reset.
-class ModelInverse {
- public:
-  /// Of the residual standard deviation of the linear fallback.
-  static constexpr double kMostDeparture = 3.0;
-
-  /// @throws Error as `Estimator`, or if the model's first input is not `spring_deflection_rad`, its
-  /// target no torque in Nm, its family has no inverse, its fallback no positive slope, or it needs a
-  /// channel that a `JointSample` does not have.
-  ModelInverse(EstimatorSettings settings, AnyModel model, double most_departure = kMostDeparture);
-
-  /// As `Estimator::set_zero`.
-  void set_zero(std::string_view channel, double value) { core_.set_zero(channel, value); }
-
-  void reset() noexcept;
-  Estimate step(double torque_Nm, const JointSample& sample) noexcept TORSIO_REALTIME;
-  /// @param asked_rad what the loop asks for instead of the last answer; without a call, that
-  void follow(double asked_rad) noexcept TORSIO_REALTIME {
-    if (follows_answer_) asked_.front() = asked_rad - zero_rad_;
-  }
-
- private:
-  void remember(Features features) noexcept;
-  [[nodiscard]] double on_the_line(double torque_Nm, Features features) const noexcept;
-  Estimate guarded(double torque_Nm, Features features) noexcept;
-
-  EstimatorCore core_;
-  AnyModel model_;
-  JointInputs inputs_;
-  double most_departure_rad_;
-  bool is_stepped_;
-  std::vector<double> asked_;  ///< features of this tick, the deflection being the answer
-  bool is_asked_ = false;      ///< the memory has yet to go there
-  bool follows_answer_ = false;
-  double zero_rad_ = 0.0;  ///< the measured deflection less the model's, of this tick
-  double last_rad_ = 0.0;
-};
-
-/// A model that was trained the other way round, with the target `spring_deflection_rad` and
-/// `torque_Nm` among its inputs; guarded by its own estimator.
-class TrainedInverse {
- public:
-  /// @throws Error if its target is not `spring_deflection_rad`, `torque_Nm` is not among its raw
-  /// inputs, another is not in a `JointSample`, or a channel behind its target was zeroed in training:
-  /// its deflection would be off the measured one by zeros that it is not told.
-  explicit TrainedInverse(Estimator estimator);
-
-  void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
-  void reset() noexcept { estimator_.reset(); }
-  Estimate step(double torque_Nm, const JointSample& sample) noexcept TORSIO_REALTIME;
-
- private:
-  Estimator estimator_;
-  std::size_t torque_;  ///< its place among the raw inputs
-  JointInputs others_;
-  std::vector<double> raw_;
-};
-
-/// Any of the above, where a file says which.
-class AnyInverse {
- public:
-  AnyInverse(LinearInverse inverse) : inverse_(inverse) {}
-  AnyInverse(ModelInverse inverse) : inverse_(std::move(inverse)) {}
-  AnyInverse(TrainedInverse inverse) : inverse_(std::move(inverse)) {}
-  /// A model file's inverse: `TrainedInverse` if its target is the deflection, else `ModelInverse`.
-  /// @throws Error as these do.
-  [[nodiscard]] static AnyInverse of(const EstimatorSettings& settings,
-                                     const AnyModel::Parameters& parameters);
-
-  /// As `Estimator::set_zero`; nothing to a line.
-  void set_zero(std::string_view channel, double value);
-  void reset() noexcept {
-    dispatch(inverse_, [](auto& inverse) { inverse.reset(); });
-  }
-  Estimate step(double torque_Nm, const JointSample& sample) noexcept TORSIO_REALTIME {
-    return dispatch(inverse_, [&](auto& inverse) { return inverse.step(torque_Nm, sample); });
-  }
-  void follow(double asked_rad) noexcept TORSIO_REALTIME {
-    if (auto* const model = std::get_if<ModelInverse>(&inverse_)) model->follow(asked_rad);
-  }
-
- private:
-  std::variant<LinearInverse, ModelInverse, TrainedInverse> inverse_;
 };
 
 }  // namespace torsio

@@ -11,9 +11,7 @@
 #include "torsio/core/realtime.hpp"
 #include "torsio/estimate/estimator_core.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
-#include "torsio/model/any_model.hpp"
 #include "torsio/model/model.hpp"
-#include "torsio/model/narx.hpp"
 
 namespace torsio {
 
@@ -101,8 +99,5 @@ class BasicEstimator {
   EstimatorCore core_;
   M model_;
 };
-
-/// An estimator around a model of any known family, as model files hold them.
-using Estimator = BasicEstimator<AnyModel>;
 
 }  // namespace torsio

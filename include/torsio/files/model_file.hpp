@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "torsio/core/provenance.hpp"
-#include "torsio/estimate/estimator.hpp"
+#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/model/any_model.hpp"
 

@@ -2,103 +2,94 @@
 
 #include <concepts>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
-#include <variant>
 
-#include "torsio/model/bouc_wen_model.hpp"
-#include "torsio/model/dgmm.hpp"
-#include "torsio/model/dynamic_bouc_wen.hpp"
-#include "torsio/model/ensemble.hpp"
-#include "torsio/model/exponential_loading.hpp"
-#include "torsio/model/friction_drive.hpp"
-#include "torsio/model/gaussian_process.hpp"
-#include "torsio/model/grey_box.hpp"
-#include "torsio/model/gru.hpp"
-#include "torsio/model/hammerstein_wiener.hpp"
-#include "torsio/model/improved_prandtl_ishlinskii.hpp"
-#include "torsio/model/linear.hpp"
-#include "torsio/model/linear_coulomb.hpp"
-#include "torsio/model/lstm.hpp"
-#include "torsio/model/mlp.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/model/family_traits.hpp"
 #include "torsio/model/model.hpp"
-#include "torsio/model/multivariate_polynomial.hpp"
-#include "torsio/model/narx.hpp"
-#include "torsio/model/nonlinear_backlash.hpp"
-#include "torsio/model/operator_sum.hpp"
-#include "torsio/model/parametric_gp.hpp"
-#include "torsio/model/polynomial.hpp"
-#include "torsio/model/viscoelastic.hpp"
 
 namespace torsio {
 
-template <class... Family>
-struct FamilyList {
-  using Models = std::variant<Family...>;
-  using Parameters = std::variant<typename Family::Parameters...>;
-  template <class M>
-  static constexpr bool kHolds = (std::same_as<M, Family> || ...);
-};
-
-/// Every family that model files and the command line know: one line each.
-using KnownFamilies = FamilyList<Linear,                        //
-                                 LinearCoulomb,                 //
-                                 Polynomial,                    //
-                                 MaxwellSlipModel,              //
-                                 PrandtlIshlinskii,             //
-                                 ImprovedPrandtlIshlinskii,     //
-                                 BoucWenModel,                  //
-                                 NonlinearBacklash,             //
-                                 ImprovedNonlinearBacklash,     //
-                                 ExponentialLoading,            //
-                                 GreyBox,                       //
-                                 Viscoelastic,                  //
-                                 HammersteinWiener,             //
-                                 DynamicBoucWen,                //
-                                 FrictionDrive,                 //
-                                 Dgmm,                          //
-                                 GaussianProcess,               //
-                                 ParametricGp,                  //
-                                 Mlp,                           //
-                                 Lstm,                          //
-                                 Gru,                           //
-                                 MlpEnsemble,                   //
-                                 LstmEnsemble,                  //
-                                 GruEnsemble,                   //
-                                 Narx<Linear>,                  //
-                                 Narx<MultivariatePolynomial>,  //
-                                 Narx<Dgmm>,                    //
-                                 Narx<Mlp>,                     //
-                                 Narx<GaussianProcess>,         //
-                                 Narx<ParametricGp>>;
-
-/// A model that can run backwards: from the target to its first input, whose value in `features`
-/// is at most where a search starts. `invert` says a finite value in every case; it may need scratch
-/// space, so it is not const.
+class AnyModel;
+namespace detail {
+class HeldModel;
+class HeldParameters;
 template <class M>
-concept Invertible = requires(M& model, double target, Features features) {
-  { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
-};
+class HeldModelOf;
+template <class P>
+class HeldParametersOf;
 
-/// A model whose family is known only at run time. Dispatch is a switch: no virtual call, nothing
-/// allocated.
-class AnyModel {
+/// Identifies a type by its address.
+template <class T>
+inline constexpr char kTypeTag = 0;
+}  // namespace detail
+
+/// The parameters of a model whose family is known only at run time. A value: a copy is deep.
+class AnyParameters {
  public:
-  using Parameters = KnownFamilies::Parameters;
-
-  /// @throws Error if the family refuses its parameters.
-  explicit AnyModel(const Parameters& parameters);
-  template <class Family>
-    requires KnownFamilies::kHolds<Family>
-  AnyModel(Family model) : model_(std::move(model)) {}
+  template <class P>
+    requires NamedFamily<typename P::Family>
+  AnyParameters(P parameters)
+      : held_(std::make_unique<detail::HeldParametersOf<P>>(std::move(parameters))) {}
+  AnyParameters(const AnyParameters& other);
+  AnyParameters& operator=(const AnyParameters& other);
+  AnyParameters(AnyParameters&& other) noexcept;
+  AnyParameters& operator=(AnyParameters&& other) noexcept;
+  ~AnyParameters();
 
   /// As model files spell it: "linear".
   [[nodiscard]] std::string_view family() const noexcept;
+  /// The same parameters at another sample rate, if the family is `Rediscretised` and the parameters
+  /// have a sample period; else as they are.
+  [[nodiscard]] AnyParameters at_sample_period(double sample_period_s) const;
+
+  /// The parameters as their own type, or null.
+  template <class P>
+  [[nodiscard]] const P* get_if() const noexcept;
+  template <class P>
+  [[nodiscard]] P* get_if() noexcept;
+  /// The same. @throws Error if they are those of another family.
+  template <class P>
+  [[nodiscard]] const P& get() const;
+  template <class P>
+  [[nodiscard]] P& get();
+
+ private:
+  friend class AnyModel;
+  std::unique_ptr<detail::HeldParameters> held_;
+};
+
+/// A model whose family is known only at run time. A value: a copy is deep, a step is one virtual
+/// call and allocates nothing. Any `NamedFamily` can be held, one of the user's own too; model files
+/// hold those of `known_families.hpp`.
+class AnyModel {
+ public:
+  using Parameters = AnyParameters;
+
+  /// @throws Error if the family refuses its parameters.
+  explicit AnyModel(const Parameters& parameters);
+  template <NamedFamily Family>
+  AnyModel(Family model) : held_(std::make_unique<detail::HeldModelOf<Family>>(std::move(model))) {}
+  AnyModel(const AnyModel& other);
+  AnyModel& operator=(const AnyModel& other);
+  AnyModel(AnyModel&& other) noexcept;
+  AnyModel& operator=(AnyModel&& other) noexcept;
+  ~AnyModel();
+
+  /// As model files spell it: "linear".
+  [[nodiscard]] std::string_view family() const noexcept;
+  [[nodiscard]] FamilyTraits traits() const noexcept;
   [[nodiscard]] Parameters parameters() const;
   [[nodiscard]] std::size_t input_count() const noexcept;
   [[nodiscard]] std::size_t parameter_count() const noexcept;
+  /// At which a discrete model runs [s]; NaN of a static one.
+  [[nodiscard]] double sample_period() const noexcept;
+  /// Whether `AnyParameters::at_sample_period` takes its parameters to another sample rate.
+  [[nodiscard]] bool is_rediscretised() const noexcept;
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;
@@ -110,34 +101,193 @@ class AnyModel {
   [[nodiscard]] std::span<const double> state() const noexcept;
   /// As the family's own; nothing to a family without. @param state `state().size()` numbers.
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
-  /// What the last layer of a network saw in the last step; empty for other families.
+  /// The input of a network's last layer in the last step; empty for other families.
   [[nodiscard]] std::span<const float> last_layer_input() const noexcept;
 
   [[nodiscard]] bool can_invert() const noexcept;
-  /// The first input at which the model says `target`, the others being as given; see the family's
-  /// own `invert`. Where `can_invert()` is false the given first input (0 if that is no
+  /// The first input at which the model estimates `target`, the others being as given; see the
+  /// family's own `invert`. Where `can_invert()` is false the given first input (0 if that is no
   /// number) comes back with `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
 
   /// The model as its own family, or null.
   template <class Family>
-    requires KnownFamilies::kHolds<Family>
-  [[nodiscard]] const Family* get_if() const noexcept {
-    return std::get_if<Family>(&model_);
+  [[nodiscard]] const Family* get_if() const noexcept;
+
+ private:
+  std::unique_ptr<detail::HeldModel> held_;
+};
+
+namespace detail {
+
+class HeldModel {
+ public:
+  virtual ~HeldModel() = default;
+  [[nodiscard]] virtual std::unique_ptr<HeldModel> copy() const = 0;
+  [[nodiscard]] virtual const void* tag() const noexcept = 0;
+  [[nodiscard]] virtual const void* model() const noexcept = 0;
+
+  [[nodiscard]] virtual std::string_view family() const noexcept = 0;
+  [[nodiscard]] virtual FamilyTraits traits() const noexcept = 0;
+  [[nodiscard]] virtual AnyParameters parameters() const = 0;
+  [[nodiscard]] virtual std::size_t input_count() const noexcept = 0;
+  [[nodiscard]] virtual std::size_t parameter_count() const noexcept = 0;
+  [[nodiscard]] virtual double sample_period() const noexcept = 0;
+  [[nodiscard]] virtual bool is_rediscretised() const noexcept = 0;
+  virtual void reset() noexcept = 0;
+  virtual Estimate step(Features features) noexcept = 0;
+  [[nodiscard]] virtual bool feeds_back() const noexcept = 0;
+  virtual void correct(double measured) noexcept = 0;
+  [[nodiscard]] virtual std::span<const double> state() const noexcept = 0;
+  virtual void set_state(std::span<const double> state) noexcept = 0;
+  [[nodiscard]] virtual std::span<const float> last_layer_input() const noexcept = 0;
+  [[nodiscard]] virtual bool can_invert() const noexcept = 0;
+  virtual Estimate invert(double target, Features features) noexcept = 0;
+
+ protected:
+  HeldModel() = default;
+  HeldModel(const HeldModel&) = default;
+  HeldModel& operator=(const HeldModel&) = default;
+};
+
+class HeldParameters {
+ public:
+  virtual ~HeldParameters() = default;
+  [[nodiscard]] virtual std::unique_ptr<HeldParameters> copy() const = 0;
+  [[nodiscard]] virtual const void* tag() const noexcept = 0;
+  [[nodiscard]] virtual void* parameters() noexcept = 0;
+  [[nodiscard]] virtual std::string_view family() const noexcept = 0;
+  [[nodiscard]] virtual std::unique_ptr<HeldModel> model() const = 0;
+  [[nodiscard]] virtual std::unique_ptr<HeldParameters> at_sample_period(double period_s) const = 0;
+
+ protected:
+  HeldParameters() = default;
+  HeldParameters(const HeldParameters&) = default;
+  HeldParameters& operator=(const HeldParameters&) = default;
+};
+
+template <class M>
+class HeldModelOf final : public HeldModel {
+ public:
+  explicit HeldModelOf(M model) : model_(std::move(model)) {}
+
+  [[nodiscard]] std::unique_ptr<HeldModel> copy() const override {
+    return std::make_unique<HeldModelOf>(*this);
+  }
+  [[nodiscard]] const void* tag() const noexcept override { return &kTypeTag<M>; }
+  [[nodiscard]] const void* model() const noexcept override { return &model_; }
+
+  [[nodiscard]] std::string_view family() const noexcept override { return M::kFamily; }
+  [[nodiscard]] FamilyTraits traits() const noexcept override { return traits_of<M>(); }
+  [[nodiscard]] AnyParameters parameters() const override {
+    return typename M::Parameters(model_.parameters());
+  }
+  [[nodiscard]] std::size_t input_count() const noexcept override { return model_.input_count(); }
+  [[nodiscard]] std::size_t parameter_count() const noexcept override {
+    return model_.parameter_count();
+  }
+  [[nodiscard]] double sample_period() const noexcept override {
+    if constexpr (HasSamplePeriod<M>) {
+      return model_.sample_period();
+    } else {
+      return kNotMeasured;
+    }
+  }
+  [[nodiscard]] bool is_rediscretised() const noexcept override { return Rediscretised<M>; }
+
+  void reset() noexcept override { model_.reset(); }
+  Estimate step(Features features) noexcept override { return model_.step(features); }
+
+  [[nodiscard]] bool feeds_back() const noexcept override { return FeedsBack<M>; }
+  void correct([[maybe_unused]] double measured) noexcept override {
+    if constexpr (FeedsBack<M>) model_.correct(measured);
+  }
+  [[nodiscard]] std::span<const double> state() const noexcept override {
+    if constexpr (HasState<M>) {
+      return model_.state();
+    } else {
+      return {};
+    }
+  }
+  void set_state([[maybe_unused]] std::span<const double> state) noexcept override {
+    if constexpr (HasState<M>) model_.set_state(state);
+  }
+  [[nodiscard]] std::span<const float> last_layer_input() const noexcept override {
+    if constexpr (HasLastLayer<M>) {
+      return model_.last_layer_input();
+    } else {
+      return {};
+    }
+  }
+  [[nodiscard]] bool can_invert() const noexcept override { return Invertible<M>; }
+  Estimate invert([[maybe_unused]] double target, Features features) noexcept override {
+    if constexpr (Invertible<M>) {
+      return model_.invert(target, features);
+    } else {
+      return no_inverse(features);
+    }
   }
 
  private:
-  KnownFamilies::Models model_;
+  M model_;
 };
 
-/// The family that a set of parameters belongs to.
-[[nodiscard]] std::string_view family_of(const AnyModel::Parameters& parameters) noexcept;
+template <class P>
+class HeldParametersOf final : public HeldParameters {
+ public:
+  using Family = typename P::Family;
+  explicit HeldParametersOf(P parameters) : parameters_(std::move(parameters)) {}
 
-/// Empty parameters of a family, to be filled by whoever reads them.
-/// @throws UsageError that lists the families if there is none of that name.
-[[nodiscard]] AnyModel::Parameters parameters_of_family(std::string_view family);
+  [[nodiscard]] std::unique_ptr<HeldParameters> copy() const override {
+    return std::make_unique<HeldParametersOf>(*this);
+  }
+  [[nodiscard]] const void* tag() const noexcept override { return &kTypeTag<P>; }
+  [[nodiscard]] void* parameters() noexcept override { return &parameters_; }
+  [[nodiscard]] std::string_view family() const noexcept override { return Family::kFamily; }
+  [[nodiscard]] std::unique_ptr<HeldModel> model() const override {
+    return std::make_unique<HeldModelOf<Family>>(Family(parameters_));
+  }
+  [[nodiscard]] std::unique_ptr<HeldParameters> at_sample_period(
+      [[maybe_unused]] double period_s) const override {
+    if constexpr (Rediscretised<Family>) {
+      return std::make_unique<HeldParametersOf>(Family::at_sample_period(parameters_, period_s));
+    } else {
+      return copy();
+    }
+  }
 
-/// "linear, linear_coulomb, ...": the families of `KnownFamilies`, for messages.
-[[nodiscard]] std::string known_model_families();
+ private:
+  P parameters_;
+};
+
+}  // namespace detail
+
+template <class P>
+P* AnyParameters::get_if() noexcept {
+  return held_->tag() == &detail::kTypeTag<P> ? static_cast<P*>(held_->parameters()) : nullptr;
+}
+template <class P>
+const P* AnyParameters::get_if() const noexcept {
+  return held_->tag() == &detail::kTypeTag<P> ? static_cast<const P*>(held_->parameters())
+                                              : nullptr;
+}
+template <class P>
+P& AnyParameters::get() {
+  if (P* const own = get_if<P>()) return *own;
+  throw Error({.place = "parameters",
+               .expected = "those of the family " + std::string(P::Family::kFamily),
+               .found = std::string(family())});
+}
+template <class P>
+const P& AnyParameters::get() const {
+  return const_cast<AnyParameters*>(this)
+      ->get<P>();  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+}
+
+template <class Family>
+const Family* AnyModel::get_if() const noexcept {
+  return held_->tag() == &detail::kTypeTag<Family> ? static_cast<const Family*>(held_->model())
+                                                   : nullptr;
+}
 
 }  // namespace torsio

@@ -26,6 +26,7 @@ class BoucWenModel {
   static constexpr std::string_view kFamily = "bouc_wen";
 
   struct Parameters {
+    using Family = BoucWenModel;
     double stiffness = 1.0;           ///< k, target's unit over x_0's
     double elastic_share = 1.0;       ///< alpha; (1 - alpha) k >= 0
     double beta = 0.5;                ///< > 0, x_0's unit to the power -n

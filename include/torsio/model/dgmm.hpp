@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/model/family_traits.hpp"
 #include "torsio/model/gaussian_mixture.hpp"
 #include "torsio/model/mixture_regression.hpp"
 #include "torsio/model/model.hpp"
@@ -51,8 +52,10 @@ struct LinearClamp {
 class Dgmm {
  public:
   static constexpr std::string_view kFamily = "dgmm";
+  static constexpr FamilyTraits kTraits{.has_memory = false};
 
   struct Parameters {
+    using Family = Dgmm;
     GaussianMixture mixture;  ///< quantities: target, then the inputs in their order
     LinearClamp clamp;
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/model/family_traits.hpp"
 #include "torsio/model/model.hpp"
 #include "torsio/model/sampled_time.hpp"
 #include "torsio/signal/causal_polynomial.hpp"
@@ -29,8 +30,10 @@ namespace torsio {
 class DynamicBoucWen {
  public:
   static constexpr std::string_view kFamily = "dynamic_bouc_wen";
+  static constexpr FamilyTraits kTraits{.is_spring = false, .extrapolates = true};
 
   struct Parameters {
+    using Family = DynamicBoucWen;
     double mass = 0.0;                  ///< m > 0, u / (y/s²)
     double damping = 0.0;               ///< c >= 0, u / (y/s)
     double stiffness = 0.0;             ///< k >= 0, u / y

@@ -36,6 +36,7 @@ class Ensemble {
   static constexpr std::string_view kFamily = JoinedName<M::kFamily, kSuffix>::kName;
 
   struct Parameters {
+    using Family = Ensemble;
     std::vector<typename M::Parameters> members;
     double residual_std = 0.0;  ///< r, in the target's unit
 

@@ -26,6 +26,7 @@ class ExponentialLoading {
   static constexpr std::string_view kFamily = "exponential_loading";
 
   struct Parameters {
+    using Family = ExponentialLoading;
     Envelope curves = {};             ///< upper: rising, lower: falling
     double rising_decay = 1.0;        ///< b+ > 0, one over x_0's unit
     double falling_decay = 1.0;       ///< b- > 0

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "torsio/actuator/stribeck.hpp"
+#include "torsio/model/family_traits.hpp"
 #include "torsio/model/model.hpp"
 #include "torsio/model/sampled_time.hpp"
 #include "torsio/signal/causal_polynomial.hpp"
@@ -30,8 +31,11 @@ namespace torsio {
 class FrictionDrive {
  public:
   static constexpr std::string_view kFamily = "friction_drive";
+  static constexpr FamilyTraits kTraits{
+      .is_spring = false, .extrapolates = true, .integrates = true};
 
   struct Parameters {
+    using Family = FrictionDrive;
     double inertia = 0.0;               ///< J > 0, force / (q/s²)
     double viscous = 0.0;               ///< Fv >= 0, force / (q/s)
     double coulomb = 0.0;               ///< Fc >= 0, force

@@ -31,6 +31,7 @@ class GaussianProcess {
   static constexpr std::size_t kMostPointsWithStdDev = 4096;
 
   struct Parameters {
+    using Family = GaussianProcess;
     NetworkScaling scaling;
     KernelExpression kernel;
     double noise_variance = 0.0;  ///< sigma^2, of the standardised target

@@ -185,6 +185,7 @@ class GreyBox {
   static constexpr std::string_view kFamily = "grey_box";
 
   struct Parameters {
+    using Family = GreyBox;
     GreyBoxTerms::Structure terms;
     CoefficientSchedule coefficients;  ///< columns as `GreyBoxTerms` lists them
     GreyBoxResidual residual;
@@ -207,6 +208,11 @@ class GreyBox {
   [[nodiscard]] double sample_period() const noexcept {
     return parameters_.terms.sample_period_s;
   }  ///< [s]
+  /// The same model at another sample period; without a relaxation it has none, and is as it was.
+  [[nodiscard]] static Parameters at_sample_period(Parameters parameters, double sample_period_s) {
+    if (parameters.terms.sample_period_s > 0.0) parameters.terms.sample_period_s = sample_period_s;
+    return parameters;
+  }
 
   void reset() noexcept { terms_.reset(); }
   Estimate step(Features features) noexcept TORSIO_REALTIME;

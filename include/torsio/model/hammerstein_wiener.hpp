@@ -36,6 +36,7 @@ class HammersteinWiener {
   static constexpr double kBorder = 0.1;  ///< of highest - lowest: beyond it x being held is told
 
   struct Parameters {
+    using Family = HammersteinWiener;
     std::size_t inputs = 1;  ///< of a tick
     double sample_period_s = 0.0;
     double rest_input = 0.0;  ///< u of a joint at rest

@@ -25,6 +25,7 @@ class ImprovedPrandtlIshlinskii {
   static constexpr std::string_view kFamily = "prandtl_ishlinskii_improved";
 
   struct Parameters {
+    using Family = ImprovedPrandtlIshlinskii;
     double bias = 0.0;                    ///< b, in the target's unit
     std::vector<double> slopes = {};      ///< w_0, k_1 .. k_m-1: one an input
     std::vector<double> weights = {};     ///< w_i

@@ -21,6 +21,7 @@ class Linear {
   static constexpr std::string_view kFamily = "linear";
 
   struct Parameters {
+    using Family = Linear;
     CoefficientSchedule coefficients =
         {};  ///< columns: b, k_1 .. k_n; k = 0 for an input without term
 

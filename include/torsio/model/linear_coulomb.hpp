@@ -21,6 +21,7 @@ class LinearCoulomb {
   static constexpr std::string_view kFamily = "linear_coulomb";
 
   struct Parameters {
+    using Family = LinearCoulomb;
     CoefficientSchedule coefficients = {};  ///< columns: b, k_1 .. k_n, c; k = 0: no term
     std::size_t rate_feature = 0;           ///< which input is r
     double rate_scale = 1.0;                ///< v > 0, in r's unit

@@ -20,6 +20,7 @@ class Mlp {
   static constexpr std::string_view kFamily = "mlp";
 
   struct Parameters {
+    using Family = Mlp;
     NetworkScaling scaling;
     std::vector<DenseLayer> layers;
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <span>
@@ -46,5 +47,31 @@ concept HasState = Model<M> && requires(M model, const M fixed, std::span<const 
   { fixed.state() } noexcept -> std::same_as<std::span<const double>>;
   { model.set_state(state) } noexcept;
 };
+
+/// A model that feeds its own past output back: its output depends on its outputs before.
+template <class M>
+concept FeedsBack = Model<M> && requires(M model, double measured) {
+  { model.correct(measured) } noexcept;
+};
+
+/// A model that can be inverted: from the target to its first input, whose value in `features` is at
+/// most where a search starts. `invert` returns a finite value in every case; it may need scratch
+/// space, so it is not const.
+template <class M>
+concept Invertible = requires(M& model, double target, Features features) {
+  { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
+};
+
+/// A network whose last layer can be adapted: it shows the input of that layer in the last step.
+template <class M>
+concept HasLastLayer = requires(const M& model) {
+  { model.last_layer_input() } noexcept -> std::same_as<std::span<const float>>;
+};
+
+/// Where a model has no inverse: the given first input, or 0 where that is no number.
+[[nodiscard]] inline Estimate no_inverse(Features features) noexcept {
+  return {.value = std::isfinite(features[0]) ? features[0] : 0.0,
+          .fault = Fault::model_not_finite};
+}
 
 }  // namespace torsio

@@ -23,6 +23,7 @@ class MultivariatePolynomial {
   static constexpr std::size_t kHighestDegree = 20;  ///< of one term, all inputs together
 
   struct Parameters {
+    using Family = MultivariatePolynomial;
     std::vector<double> scales;  ///< s: one an input, > 0
     Matrix powers;               ///< p: terms x inputs
     std::vector<double> coefficients;

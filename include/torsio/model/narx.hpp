@@ -16,12 +16,6 @@
 
 namespace torsio {
 
-/// A model that hears its own past output: what it says now hangs on what it said before.
-template <class M>
-concept FeedsBack = Model<M> && requires(M model, double measured) {
-  { model.correct(measured) } noexcept;
-};
-
 /// A nonlinear autoregressive model with exogenous inputs: any static family as the right side of a
 /// difference equation.
 ///
@@ -41,6 +35,7 @@ class Narx {
   static constexpr std::size_t kMostLags = 1000;
 
   struct Parameters {
+    using Family = Narx;
     typename M::Parameters model;  ///< f
     std::size_t inputs = 0;        ///< of a tick
     std::size_t input_lags = 0;    ///< n_u

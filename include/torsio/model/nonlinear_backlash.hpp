@@ -43,6 +43,7 @@ class Backlash {
       kByRate ? "nonlinear_backlash_improved" : "nonlinear_backlash";
 
   struct Parameters {
+    using Family = Backlash;
     double stiffness = 1.0;           ///< k > 0, target's unit over x_0's
     Envelope boundaries = {};         ///< f_ac = upper, f_dc = lower
     std::vector<double> slopes = {};  ///< 0, k_1 .. k_m-1: one an input

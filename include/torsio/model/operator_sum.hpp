@@ -42,6 +42,7 @@ class OperatorSum {
   static constexpr std::string_view kFamily = Operator::kFamily;
 
   struct Parameters {
+    using Family = OperatorSum;
     CoefficientSchedule coefficients = {};  ///< columns: b, k_0 .. k_m-1, c_1 .. c_n
     std::vector<double> thresholds = {};    ///< r_i > 0, ascending, in x_0's unit
 

@@ -31,6 +31,7 @@ class ParametricGp {
   static constexpr std::size_t kMostPoints = 4096;
 
   struct Parameters {
+    using Family = ParametricGp;
     NetworkScaling scaling;
     KernelExpression kernel;
     double noise_variance = 0.0;  ///< sigma^2, of the standardised target

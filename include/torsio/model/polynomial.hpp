@@ -28,6 +28,7 @@ class Polynomial {
   static constexpr double kBorder = 0.05;  ///< of a curve's range: so far it goes on beyond it
 
   struct Parameters {
+    using Family = Polynomial;
     /// Columns: P+ (degree + 1, constant first), P- likewise if `by_direction`, then k_0 .. k_n-1
     /// (k_0 is 0: that term stands in P).
     CoefficientSchedule coefficients = {};

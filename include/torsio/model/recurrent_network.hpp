@@ -14,9 +14,13 @@
 
 namespace torsio {
 
+template <class RecurrentLayer>
+class RecurrentModel;
+
 /// The parameters of a network with memory: recurrent layers, then dense ones.
 template <class Layer>
 struct RecurrentParameters {
+  using Family = RecurrentModel<Layer>;
   NetworkScaling scaling;
   std::vector<Layer> layers;
   std::vector<DenseLayer> head;

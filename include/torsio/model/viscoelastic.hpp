@@ -28,9 +28,7 @@ class Viscoelastic {
   static constexpr std::string_view kFamily = "viscoelastic";
 
   struct Parameters {
-    /// What another sample rate may be written into.
-    static constexpr bool kRunsAtAnyRate = true;
-
+    using Family = Viscoelastic;
     SpringDashpotNetwork network;  ///< values in target unit per input unit: Nm/rad and Nm s/rad
     double offset = 0.0;           ///< b, target's unit
     double sample_period_s = 0.0;  ///< h
@@ -57,6 +55,11 @@ class Viscoelastic {
   [[nodiscard]] double sample_period() const noexcept {
     return parameters_.sample_period_s;
   }  ///< [s]
+  /// The same network, discretised for another sample period.
+  [[nodiscard]] static Parameters at_sample_period(Parameters parameters, double sample_period_s) {
+    parameters.sample_period_s = sample_period_s;
+    return parameters;
+  }
   [[nodiscard]] const RelaxationSpectrum& spectrum() const noexcept { return spectrum_; }
 
   void reset() noexcept;

@@ -8,7 +8,7 @@
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/wear.hpp"
-#include "torsio/control/spring_inverse.hpp"
+#include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"

@@ -8,7 +8,7 @@
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
-#include "torsio/estimate/estimator.hpp"
+#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/train/metrics.hpp"
 
 namespace torsio {

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "torsio/model/any_model.hpp"
+#include "torsio/model/linear.hpp"
+#include "torsio/model/narx.hpp"
 #include "torsio/train/families.hpp"
 #include "torsio/train/fit_context.hpp"
 #include "torsio/train/fitted.hpp"

@@ -1,4 +1,4 @@
-#include "torsio/estimate/torque_estimator.hpp"
+#include "torsio/estimate/joint_sample.hpp"
 
 #include <fmt/format.h>
 
