@@ -29,7 +29,7 @@ constexpr TubeSheet kRigidTube{.ratio = printed(2.0),
 constexpr double kGlueCreep = 0.003;  // a load cycle, specification 4.3
 
 // Specification 4.2. The winding resistance is assumed for motors of that class: it only bounds the
-// current at high speed.
+// current at high speed. 001 prints the 125 Hz of the load cell for the 50 Nm actuator only.
 constexpr std::array<DataSheet, 7> kSheets = {
     DataSheet{
         .name = "dfki-28",
@@ -51,7 +51,7 @@ constexpr std::array<DataSheet, 7> kSheets = {
                               .load_friction = assumed(0.05),
                               .break_away_rad = kBreakAway},
         .joint = {.bearing_friction_Nm = assumed(0.1)},
-        .sensors = {.torque_range_Nm = printed(50.0)},
+        .sensors = {.torque_range_Nm = printed(50.0), .torque_rate_Hz = assumed(125.0)},
     },
     DataSheet{
         .name = "dfki-50",
@@ -97,7 +97,7 @@ constexpr std::array<DataSheet, 7> kSheets = {
                               .load_friction = derived(0.0317),
                               .break_away_rad = kBreakAway},
         .joint = {.bearing_friction_Nm = assumed(0.3)},
-        .sensors = {.torque_range_Nm = printed(200.0)},
+        .sensors = {.torque_range_Nm = printed(200.0), .torque_rate_Hz = assumed(125.0)},
     },
     DataSheet{
         .name = "dfki-300",
@@ -119,7 +119,7 @@ constexpr std::array<DataSheet, 7> kSheets = {
                               .load_friction = assumed(0.0317),
                               .break_away_rad = kBreakAway},
         .joint = {.bearing_friction_Nm = assumed(0.6)},
-        .sensors = {.torque_range_Nm = assumed(400.0)},
+        .sensors = {.torque_range_Nm = assumed(400.0), .torque_rate_Hz = assumed(125.0)},
     },
     // Specification 4.3. 003 prints 15 Nm as the maximum of the drive and 24 V for its motor; 6 Nm
     // are the limit of its models, which the experiments use as a rating. The rest of motor, gear and

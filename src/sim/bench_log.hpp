@@ -13,7 +13,7 @@
 
 namespace torsio {
 
-/// What the bench of one actuator writes down: the channels of its paper, and on request the
+/// What the bench of one actuator writes down: the channels of its sensors, and on request the
 /// `truth_` ones.
 class BenchLog {
  public:

@@ -98,7 +98,7 @@ BenchProgram triangles(const DataSheet& sheet, const ExperimentSpec& spec) {
         {.place = "triangles frequency",
          .expected = fmt::format("{} to {} Hz", kLowestTriangle_Hz, kHighestTriangle_Hz),
          .found = fmt::format("{} Hz", *spec.frequency_Hz),
-         .advice = "leave it out for the sequence of paper 003; slow-cycles is slower"});
+         .advice = "leave it out for the sequence of 0.4 to 4 Hz; slow-cycles is slower"});
   }
   return torque_tracking(sheet, kTriangles_s,
                          Triangle({amplitude_Nm, *spec.frequency_Hz}, kBenchRate_Hz));

@@ -34,7 +34,7 @@ constexpr double kPointPeriods = 8.0;
 
 // 20 frequencies by 11 amplitudes are the printed grid without 0 Hz; the paper prints no number of
 // records. A whole period of each closes every loop; a rest before each brings the log at 50 Hz to
-// the 44 554 samples that the paper prints.
+// 44 526 samples, near the 44 554 that the paper prints.
 constexpr int kGridFrequencies = 20;  // 0.05 to 1 Hz
 constexpr int kGridAmplitudes = 11;   // 4 to 9 deg
 constexpr double kGridPeriods = 1.0;

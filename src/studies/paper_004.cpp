@@ -36,7 +36,8 @@ const InputSet kSet2{"II", {kTwist, kMotorTorque}};
 const InputSet kSet2Plus{"II+", {kTwist, kMotorTorque, kGeneratorSpeed}};
 const InputSet kSet3{"III", {kTwistThroughGear, kMotorTorque}};
 
-/// The paper's network and training on each input set, beside what is cheap: a line, a static
+/// The paper's network and training on each input set (Table 2; stride, burn-in, learning rate and
+/// clipping are assumed), beside what is cheap: a line, a static
 /// network, and a line with friction that is given the twist's rate besides set II.
 std::vector<ModelChoice> choices_of(const Dataset& dataset, const StudyOptions& options) {
   const std::string models = fmt::format(

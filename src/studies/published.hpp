@@ -57,7 +57,7 @@ inline constexpr auto kPublishedTubes = entries_of_004(
                                             {"stiff", "lstm 250, II", "stiff tube"},
                                             {"rigid", "lstm 250, III", "rigid tube"}}));
 
-/// Paper 002: percent of a full scale that it does not name; its "MAE" is the largest error.
+/// Paper 002: percent; it names no normaliser. Its "MAE" is the largest error.
 inline constexpr auto kPublishedSensorModels =
     entries_of("002", "Table III",
                std::to_array<PublishedRow>({{"multisine", "GP", "GP"},
@@ -72,7 +72,7 @@ consteval PaperEntry best_fit(std::string_view model, std::string_view item,
   return {"bonded, triangles", model, RowQuantity::fit_percent,
           paper_figure("003", item, papers_model, "BF")};
 }
-/// The paper validates on another record of the same triangles, with a coupling of its own.
+/// The paper validates on another record of triangles, with a coupling of its own.
 inline constexpr std::array kPublishedCouplingModels{
     best_fit("Hammerstein-Wiener", "section 4.2.1", "Hammerstein-Wiener"),
     best_fit("refined in continuous time", "section 4.3", "Hammerstein-Wiener"),

@@ -201,7 +201,8 @@ constexpr std::array kShallowFamilies{
 constexpr std::array kMixtureFamilies{
     FamilyInfo{Dgmm::kFamily, "Gaussian mixture of target and inputs, learned sample by sample",
                kDgmmOptions, dgmm},
-    FamilyInfo{"dgmm_paper", "the same as printed in the paper: for comparison only",
+    FamilyInfo{"dgmm_paper",
+               "Algorithm 1 of paper 000, the sign of its update corrected: for comparison only",
                kDgmmPaperOptions, dgmm_paper},
 };
 

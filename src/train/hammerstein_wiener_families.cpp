@@ -23,7 +23,7 @@ constexpr std::array kOptions{
     OptionInfo{
         "structure", Kind::text, "search", 0, 0,
         "search: what stands at auto is chosen by the error on held-out blocks; given: auto is "
-        "1 zero, 2 poles, degrees 2 and 3, as in paper 003"},
+        "1 zero, 2 poles (in 1/z), degrees 2 and 3, as (2) to (6) of paper 003"},
     OptionInfo{"zeros", Kind::integer, "auto", 0, 100, "of the linear part"},
     OptionInfo{"poles", Kind::integer, "auto", 0, 100, "of the linear part"},
     OptionInfo{"map", Kind::text, "polynomial", 0, 0,

@@ -109,6 +109,9 @@ TEST(DataSheet, OriginsAreThoseOfThePapers) {
   };
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"})
     expect(actuator, "supply", printed(48.0));
+  expect("dfki-50", "torque_sensor_rate", printed(125.0));
+  for (const char* actuator : {"dfki-28", "dfki-120", "dfki-300"})
+    expect(actuator, "torque_sensor_rate", assumed(125.0));
   expect("elastomer", "supply", printed(24.0));
   expect("rubber-clutch", "supply", assumed(24.0));
   expect("harmonic-drive", "supply", assumed(48.0));

@@ -90,7 +90,7 @@ TEST_P(FitLaws, AFitIsDeterministic) {
 }
 
 TEST_P(FitLaws, AFitExplainsASpringWithFriction) {
-  // The paper's algorithm as printed is there for comparison: it need only beat the mean.
+  // The paper's algorithm (sign corrected) is there for comparison: it need only beat the mean.
   const double least_percent = GetParam().family->name == "dgmm_paper" ? 0.0 : 80.0;
   EXPECT_GT(evaluate(fit().model, data_).fit_percent, least_percent);
 }

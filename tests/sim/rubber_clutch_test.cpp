@@ -185,7 +185,7 @@ TEST(RubberClutch, InputAngleFollowsNineDegreesAtOneHertz) {
   EXPECT_LT(error_deg, 0.2);
 }
 
-TEST(RubberClutch, SensorsAreAsThePaperHasThem) {
+TEST(RubberClutch, SensorsAreThoseOfTheSheet) {
   const Recording recording = record("grid");
   EXPECT_EQ(recording.sample_rate_Hz(), 50.0);
   const auto& torque = values(recording, "torque_Nm");
@@ -215,7 +215,7 @@ TEST(RubberClutch, GridWalksAllItsPointsFromRest) {
   ASSERT_EQ(peaks_deg.size(), 221U) << "the first is before the first point";
   for (std::size_t i = 0; i < 220; ++i)
     EXPECT_NEAR(peaks_deg[i + 1], 4.0 + 0.5 * static_cast<double>(i % 11), 0.15) << i;
-  EXPECT_NEAR(static_cast<double>(input.size()), 44554.0, 50.0) << "the paper's samples";
+  EXPECT_NEAR(static_cast<double>(input.size()), 44554.0, 50.0) << "near the paper's samples";
   EXPECT_LT(range(slipped(recording)), 1e-4);
 }
 

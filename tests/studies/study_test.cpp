@@ -62,7 +62,7 @@ TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
     EXPECT_EQ(again.rows[i].rmse, study.rows[i].rmse) << study.rows[i].model;
 }
 
-TEST(Studies, OfTheElastomerCouplingClimbThePapersLadder) {
+TEST(Studies, OfTheElastomerCouplingHaveTheFitsOfThePrototype) {
   const Study study = run_study(find_study("003-ladder"), kQuick);
   const StudyRow& line = row_of(study, "bonded, triangles", "linear");
   const StudyRow& printed = row_of(study, "bonded, triangles", "viscoelastic 003a as printed");

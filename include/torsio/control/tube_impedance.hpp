@@ -21,7 +21,8 @@ namespace torsio {
 ///
 ///     K = N_h k K_pp K_tp / (K_tp + k / N_g)
 ///
-/// and a damper alike. Paper 004 uses K_pp = 15, K_tp = 5 Nm/rad (high) and 0, 0.5 Nm/rad (zero).
+/// and a damper alike. Paper 004 uses K_pp = 15, K_tp = 5 (high) and 0, 0.5 (zero), and prints no
+/// units: Nm/rad for K_tp is assumed.
 /// Source: paper 004 section 2.3, specification 3.11; damping and the way from K to K_pp are ours.
 class TubeImpedance {
  public:

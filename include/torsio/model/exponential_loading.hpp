@@ -18,7 +18,7 @@ namespace torsio {
 /// (x_r, t_r) the last reversal; E = m + h and b = b+ while x_0 rises, E = m - h and b = b- while it
 /// falls. This is t_r +- [c d + a (exp(b d) - 1)] of specification 3.7 (ELM) with d = |x_0 - x_r|,
 /// b < 0 and an a that depends on where the reversal was: with an a of its own for each direction,
-/// as printed there, up and down by the same way do not end where they began and the torque drifts
+/// as defined there, up and down by the same way do not end where they began and the torque drifts
 /// off. Independent of rate. After `reset()` t is in the middle. State: t - m(x_0). Cost: one exp,
 /// two multiply-adds a power of x_0.
 class ExponentialLoading {

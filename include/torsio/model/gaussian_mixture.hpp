@@ -15,7 +15,7 @@ inline constexpr std::size_t kMostMixtureQuantities = 64;
 ///
 ///     p(x~) = sum_i w_i N(x~; mu_i, Sigma_i),    sum_i w_i = 1
 ///
-/// Plain data. Source: specification 3.1 (papers 000 and 001, equations 3 to 7).
+/// Plain data. Source: specification 3.1 (paper 000, equations 1 to 7; 001, 1 to 5).
 struct GaussianMixture {
   std::vector<double> centre;   ///< [D], physical units
   std::vector<double> scale;    ///< [D], physical units, positive

@@ -41,8 +41,8 @@ struct Conditional {
 /// evaluates all components in double, one by one, and the log density to 1e-4. Where no component
 /// has a density that double can hold, the results are NaN.
 ///
-/// Source: specification 3.1 (papers 000 and 001, equations 8 to 11, with the variance of the
-/// mixture). Cost of `query`: 4 (d + d(d+1)/2 + 1) bytes a component from cache, d given
+/// Source: specification 3.1 (paper 000, equations 8 to 11, with the variance of the mixture).
+/// Cost of `query`: 4 (d + d(d+1)/2 + 1) bytes a component from cache, d given
 /// quantities, and `bytes_read()` in all. Nothing is allocated after construction.
 class MixtureRegression {
  public:

@@ -45,7 +45,7 @@ struct PaperFigure {
 /// Which quantity of a row a published figure is to be compared with.
 enum class RowQuantity {
   rmse,            ///< in `Study::unit`
-  rmse_percent,    ///< RMSE in percent of a full scale that the paper does not name
+  rmse_percent,    ///< RMSE in percent; paper 002 names no normaliser, ours is the full scale
   max_percent,     ///< largest |error|, likewise
   percent_of_max,  ///< RMSE in percent of the largest |target|
   fit_percent,     ///< best fit

@@ -21,7 +21,7 @@ enum class ContinuousForm : std::uint8_t {
 };
 
 struct HammersteinWienerOptions {
-  /// Empty: searched for, or 1 zero, 2 poles, degrees 2 and 3, as in paper 003.
+  /// Empty: searched for, or 1 zero, 2 poles (in 1/z), degrees 2 and 3, as (2) to (6) of paper 003.
   std::optional<std::size_t> zeros = {};
   std::optional<std::size_t> poles = {};
   std::optional<std::size_t> input_degree = {};
