@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "fit/mixture/online_mixture.hpp"
 #include "fitted_grey_box.hpp"
 #include "rows.hpp"
 #include "torsio/control/joint_cascade.hpp"
@@ -11,7 +12,6 @@
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
-#include "torsio/train/online_mixture.hpp"
 
 namespace torsio::bench {
 namespace {

@@ -1,11 +1,11 @@
 #include <cmath>
 #include <vector>
 
+#include "fit/mixture/mixture_em.hpp"
+#include "fit/mixture/online_mixture.hpp"
+#include "model/mixture/mixture_regression.hpp"
 #include "rows.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/model/mixture_regression.hpp"
-#include "torsio/train/mixture_em.hpp"
-#include "torsio/train/online_mixture.hpp"
 
 namespace torsio::bench {
 namespace {

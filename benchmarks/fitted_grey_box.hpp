@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "fit/grey_box/fit_grey_box.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/train/fit_grey_box.hpp"
 
 namespace torsio::bench {
 

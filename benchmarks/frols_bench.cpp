@@ -1,10 +1,10 @@
 #include <cstddef>
 #include <vector>
 
+#include "fit/narx/frols.hpp"
 #include "rows.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/train/frols.hpp"
-#include "torsio/train/training_data.hpp"
+#include "torsio/fit/common/training_data.hpp"
 
 namespace torsio::bench {
 namespace {

@@ -2,15 +2,15 @@
 #include <string>
 #include <vector>
 
+#include "fit/gaussian_process/kernel_data.hpp"
+#include "fit/gaussian_process/kernel_search.hpp"
+#include "fit/gaussian_process/likelihood_search.hpp"
+#include "fit/gaussian_process/marginal_likelihood.hpp"
+#include "fit/gaussian_process/parametric_gp_trainer.hpp"
+#include "model/gaussian_process/gaussian_process.hpp"
+#include "model/gaussian_process/parametric_gp.hpp"
 #include "rows.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/model/gaussian_process.hpp"
-#include "torsio/model/parametric_gp.hpp"
-#include "train/kernel_data.hpp"
-#include "train/kernel_search.hpp"
-#include "train/likelihood_search.hpp"
-#include "train/marginal_likelihood.hpp"
-#include "train/parametric_gp_trainer.hpp"
 
 namespace torsio::bench {
 namespace {

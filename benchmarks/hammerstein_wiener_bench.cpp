@@ -2,13 +2,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "fit/common/model_run.hpp"
+#include "fit/hammerstein_wiener/fit_hammerstein_wiener.hpp"
+#include "fit/hammerstein_wiener/wiener_start.hpp"
+#include "model/hammerstein_wiener/hammerstein_wiener.hpp"
 #include "rows.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/model/hammerstein_wiener.hpp"
-#include "torsio/train/fit_hammerstein_wiener.hpp"
-#include "torsio/train/model_run.hpp"
-#include "train/wiener_start.hpp"
 
 namespace torsio::bench {
 namespace {

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "fitted_grey_box.hpp"
+#include "model/hysteresis/slip_bank.hpp"
 #include "rows.hpp"
-#include "torsio/model/slip_bank.hpp"
 
 namespace torsio::bench {
 

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "model/common/parameters.hpp"
+#include "model/network/network_bank.hpp"
 #include "rows.hpp"
 #include "support/random_network.hpp"
-#include "torsio/model/last_layer_adapter.hpp"
-#include "torsio/model/network_bank.hpp"
-#include "torsio/model/parameters.hpp"
+#include "torsio/model/network/last_layer_adapter.hpp"
 
 namespace torsio::bench {
 namespace {

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
+#include "fit/network/network_initialisation.hpp"
+#include "fit/network/network_trainer.hpp"
 #include "rows.hpp"
 #include "torsio/core/random.hpp"
-#include "train/network_initialisation.hpp"
-#include "train/network_trainer.hpp"
 
 namespace torsio::bench {
 namespace {

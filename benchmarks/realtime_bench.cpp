@@ -3,8 +3,8 @@
 #include <chrono>
 #include <cstdint>
 
+#include "realtime/frame_ring.hpp"
 #include "rows.hpp"
-#include "torsio/realtime/frame_ring.hpp"
 #include "torsio/realtime/mailbox.hpp"
 
 namespace torsio::bench {

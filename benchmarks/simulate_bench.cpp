@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "rows.hpp"
+#include "sim/plant/plant_batch.hpp"
 #include "torsio/sim/experiment.hpp"
-#include "torsio/sim/plant_batch.hpp"
 
 namespace torsio::bench {
 namespace {

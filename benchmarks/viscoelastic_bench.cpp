@@ -2,8 +2,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "model/viscoelastic/viscoelastic.hpp"
 #include "rows.hpp"
-#include "torsio/model/viscoelastic.hpp"
 
 namespace torsio::bench {
 

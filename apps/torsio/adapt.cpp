@@ -6,10 +6,10 @@
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/evaluate/adaptation.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/model/adaptive_model.hpp"
 #include "torsio/report/adaptation.hpp"
-#include "torsio/train/adaptation.hpp"
 #include "verbs.hpp"
 
 namespace {

@@ -6,10 +6,10 @@
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/evaluate/attribution.hpp"
+#include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/attribution.hpp"
-#include "torsio/train/attribution.hpp"
-#include "torsio/train/comparison.hpp"
 #include "verbs.hpp"
 
 namespace {

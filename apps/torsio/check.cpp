@@ -1,4 +1,4 @@
-#include "torsio/train/check.hpp"
+#include "torsio/check/check.hpp"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
-#include "torsio/train/inputs.hpp"
+#include "torsio/fit/common/inputs.hpp"
 #include "verbs.hpp"
 
 namespace {

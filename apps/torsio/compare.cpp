@@ -7,11 +7,11 @@
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/evaluate/structure_search.hpp"
 #include "torsio/report/cross_validation.hpp"
 #include "torsio/report/html.hpp"
 #include "torsio/report/results.hpp"
-#include "torsio/train/comparison.hpp"
-#include "torsio/train/structure_search.hpp"
 #include "verbs.hpp"
 
 namespace {

@@ -9,9 +9,9 @@
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/fit/families.hpp"
 #include "torsio/report/cross_validation.hpp"
-#include "torsio/train/comparison.hpp"
-#include "torsio/train/families.hpp"
 #include "verbs.hpp"
 
 namespace {

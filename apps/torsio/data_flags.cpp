@@ -16,8 +16,8 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
+#include "torsio/fit/families.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
-#include "torsio/train/families.hpp"
 
 namespace {
 

@@ -7,12 +7,12 @@
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/report/terminal_plot.hpp"
 #include "torsio/sim/bench_dataset.hpp"
-#include "torsio/train/comparison.hpp"
-#include "torsio/train/inputs.hpp"
 #include "verbs.hpp"
 
 namespace {

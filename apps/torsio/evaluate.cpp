@@ -8,10 +8,10 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
+#include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/model_description.hpp"
 #include "torsio/report/results.hpp"
-#include "torsio/train/comparison.hpp"
 #include "verbs.hpp"
 
 namespace {

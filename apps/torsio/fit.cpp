@@ -11,13 +11,13 @@
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/evaluate/fit_report.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/files/training_checkpoint.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/families.hpp"
 #include "torsio/report/fit_report.hpp"
-#include "torsio/train/comparison.hpp"
-#include "torsio/train/families.hpp"
-#include "torsio/train/fit_report.hpp"
-#include "torsio/train/inputs.hpp"
 #include "verbs.hpp"
 
 namespace {

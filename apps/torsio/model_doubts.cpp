@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "output.hpp"
-#include "torsio/train/check.hpp"
+#include "torsio/check/check.hpp"
 
 namespace {
 

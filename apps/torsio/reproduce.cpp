@@ -8,10 +8,10 @@
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "studies/study.hpp"
+#include "studies/study_report.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/report/study.hpp"
 #include "torsio/report/text_table.hpp"
-#include "torsio/studies/study.hpp"
 #include "verbs.hpp"
 
 namespace {

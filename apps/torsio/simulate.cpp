@@ -16,7 +16,6 @@
 #include "torsio/report/svg_plot.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/sim/experiment.hpp"
-#include "torsio/sim/plant.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -92,15 +91,15 @@ std::string description(const torsio::DataSheet& sheet) {
   for (const torsio::SheetRow& row : torsio::describe(sheet))
     table.row({row.name, fmt::format("{:.6g}", row.value.value), std::string(row.unit),
                std::string(1, static_cast<char>(row.value.origin))});
-  const torsio::PlantParameters plant = torsio::plant_parameters(sheet);
-  const auto [low_Hz, high_Hz] = torsio::natural_frequencies(plant);
+  const torsio::PlantFigures plant = torsio::plant_figures(sheet);
+  const auto [low_Hz, high_Hz] = plant.natural_frequencies_Hz;
   return fmt::format(
       "{}: {}\n{}origin: P printed in a paper, D derived from printed numbers, A assumed\n"
       "longest step: {:.3g} us\n"
       "natural frequencies, both ends free: {:.4g} Hz, {:.4g} Hz\n"
       "faults can happen to the sensors {} and to {}\n",
-      torsio::full_name(sheet), sheet.title, table.text(), 1e6 * torsio::Plant::step_limit(plant),
-      low_Hz, high_Hz, fmt::join(torsio::fault_sensors(sheet), ", "),
+      torsio::full_name(sheet), sheet.title, table.text(), 1e6 * plant.longest_step_s, low_Hz,
+      high_Hz, fmt::join(torsio::fault_sensors(sheet), ", "),
       fmt::join(torsio::fault_parts(sheet), ", "));
 }
 
@@ -166,13 +165,13 @@ Json list_json() {
 }
 
 Json sheet_json(const torsio::DataSheet& sheet) {
-  const torsio::PlantParameters plant = torsio::plant_parameters(sheet);
+  const torsio::PlantFigures plant = torsio::plant_figures(sheet);
   Json document{{"name", torsio::full_name(sheet)},
                 {"title", sheet.title},
                 {"variant", sheet.variant.empty() ? Json(nullptr) : Json(sheet.variant)},
                 {"variants", variants(sheet)},
-                {"longest_step_s", torsio::Plant::step_limit(plant)},
-                {"natural_frequencies_Hz", torsio::natural_frequencies(plant)},
+                {"longest_step_s", plant.longest_step_s},
+                {"natural_frequencies_Hz", plant.natural_frequencies_Hz},
                 {"fault_sensors", torsio::fault_sensors(sheet)},
                 {"fault_parts", torsio::fault_parts(sheet)},
                 {"parameters", Json::array()}};

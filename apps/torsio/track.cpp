@@ -17,7 +17,7 @@
 #include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/report/tracking.hpp"
-#include "torsio/tracking/tracking.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
 #include "verbs.hpp"
 
 namespace {

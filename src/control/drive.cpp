@@ -4,7 +4,7 @@
 
 #include <variant>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

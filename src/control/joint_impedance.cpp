@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 #include "passive_sweep.hpp"
 
 namespace torsio {

@@ -9,7 +9,7 @@
 #include <unsupported/Eigen/MatrixFunctions>
 #include <utility>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -8,7 +8,7 @@
 #include <string>
 #include <variant>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 

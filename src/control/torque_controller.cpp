@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

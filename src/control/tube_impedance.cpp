@@ -6,7 +6,7 @@
 #include <cmath>
 #include <variant>
 
-#include "actuator/checks.hpp"
+#include "core/checks.hpp"
 #include "passive_sweep.hpp"
 #include "torsio/core/error.hpp"
 

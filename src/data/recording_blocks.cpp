@@ -10,9 +10,9 @@
 
 #include "data/byte_source.hpp"
 #include "data/names.hpp"
+#include "files/whole_file.hpp"
 #include "realtime/block_format.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/files/whole_file.hpp"
 
 namespace torsio {
 namespace {

@@ -7,10 +7,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "files/safetensors.hpp"
+#include "model/common/parameters.hpp"
 #include "torsio/core/matrix.hpp"
-#include "torsio/files/safetensors.hpp"
-#include "torsio/model/network_layers.hpp"
-#include "torsio/model/parameters.hpp"
+#include "torsio/model/network/network_layers.hpp"
 
 namespace torsio {
 

@@ -8,9 +8,9 @@
 #include "files/card_json.hpp"
 #include "files/known_families.hpp"
 #include "files/leaf_tensors.hpp"
+#include "files/safetensors.hpp"
+#include "files/whole_file.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/files/safetensors.hpp"
-#include "torsio/files/whole_file.hpp"
 
 namespace torsio {
 namespace {

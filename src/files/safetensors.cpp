@@ -1,4 +1,4 @@
-#include "torsio/files/safetensors.hpp"
+#include "files/safetensors.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include "files/leaf_tensors.hpp"
+#include "files/safetensors.hpp"
+#include "files/whole_file.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/files/safetensors.hpp"
-#include "torsio/files/whole_file.hpp"
 
 namespace torsio {
 namespace {

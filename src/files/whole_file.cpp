@@ -1,4 +1,4 @@
-#include "torsio/files/whole_file.hpp"
+#include "files/whole_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

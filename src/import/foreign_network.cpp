@@ -7,10 +7,10 @@
 #include <limits>
 #include <utility>
 
+#include "model/network/gru.hpp"
+#include "model/network/lstm.hpp"
+#include "model/network/mlp.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/model/gru.hpp"
-#include "torsio/model/lstm.hpp"
-#include "torsio/model/mlp.hpp"
 
 namespace torsio {
 namespace {

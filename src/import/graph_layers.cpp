@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "files/safetensors.hpp"
 #include "import/graph_evaluator.hpp"
-#include "torsio/files/safetensors.hpp"
 
 namespace torsio::graph {
 namespace {

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "data/byte_source.hpp"
+#include "fit/common/guards.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/train/guards.hpp"
-#include "torsio/train/training_data.hpp"
+#include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
 namespace {

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "files/json_text.hpp"
+#include "files/safetensors.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/files/safetensors.hpp"
 
 namespace torsio {
 namespace {

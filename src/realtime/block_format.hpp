@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/realtime/frame_ring.hpp"
+#include "realtime/frame_ring.hpp"
 
 namespace torsio {
 

@@ -1,4 +1,4 @@
-#include "torsio/realtime/frame_ring.hpp"
+#include "realtime/frame_ring.hpp"
 
 #include <algorithm>
 #include <bit>

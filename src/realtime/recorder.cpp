@@ -12,9 +12,9 @@
 
 #include "realtime/block_file.hpp"
 #include "realtime/block_format.hpp"
+#include "realtime/frame_ring.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/realtime/frame_ring.hpp"
 
 namespace torsio {
 namespace {

@@ -10,15 +10,15 @@
 #include <vector>
 
 #include "files/known_families.hpp"
+#include "fit/gaussian_process/kernel_search.hpp"
+#include "fit/hammerstein_wiener/fit_hammerstein_wiener.hpp"
+#include "fit/linear/named_coefficients.hpp"
+#include "fit/narx/fit_narx_polynomial.hpp"
+#include "model/common/parameters.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/import/import_network.hpp"
-#include "torsio/model/network_layers.hpp"
-#include "torsio/model/parameters.hpp"
+#include "torsio/model/network/network_layers.hpp"
 #include "torsio/report/text_table.hpp"
-#include "torsio/train/fit_hammerstein_wiener.hpp"
-#include "torsio/train/fit_narx_polynomial.hpp"
-#include "train/kernel_search.hpp"
-#include "train/named_coefficients.hpp"
 
 namespace torsio {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "torsio/train/results.hpp"
+#include "torsio/evaluate/results.hpp"
 
 // What the tables and documents of scores are made of.
 namespace torsio {

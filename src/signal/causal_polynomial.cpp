@@ -1,4 +1,4 @@
-#include "torsio/signal/causal_polynomial.hpp"
+#include "signal/causal_polynomial.hpp"
 
 #include <algorithm>
 #include <string>

@@ -5,11 +5,12 @@
 
 #include "experiment_table.hpp"
 #include "sensed_channels.hpp"
+#include "sim/fault_injector.hpp"
+#include "sim/plant/plant.hpp"
+#include "sim/sensor_set.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/wear.hpp"
 #include "torsio/sim/fault_schedule.hpp"
-#include "torsio/sim/plant.hpp"
-#include "torsio/sim/sensor_set.hpp"
 #include "truth_channels.hpp"
 
 namespace torsio {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "sensed_channels.hpp"
+#include "sim/sensor_set.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/sim/sensor_set.hpp"
 #include "truth_channels.hpp"
 
 namespace torsio {

@@ -1,4 +1,4 @@
-#include "torsio/sim/deflection_loop.hpp"
+#include "sim/deflection_loop.hpp"
 
 #include <fmt/format.h>
 

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "experiment_table.hpp"
+#include "sim/torque_loop.hpp"
 #include "torque_references.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/torque_loop.hpp"
 
 namespace torsio {
 namespace {

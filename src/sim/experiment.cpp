@@ -14,6 +14,7 @@
 #include "bench_log.hpp"
 #include "experiment_table.hpp"
 #include "sensed_channels.hpp"
+#include "sim/plant/plant.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
@@ -137,6 +138,12 @@ std::vector<double> measured_twist(const DataSheet& sheet, const Recording& reco
     case ActuatorFamily::series_elastic: break;
   }
   return difference("gear_angle_rad", 1.0, "joint_angle_rad");
+}
+
+PlantFigures plant_figures(const DataSheet& sheet) {
+  const PlantParameters parameters = plant_parameters(sheet);
+  return {.natural_frequencies_Hz = natural_frequencies(parameters),
+          .longest_step_s = Plant::step_limit(parameters)};
 }
 
 }  // namespace torsio

@@ -4,10 +4,10 @@
 #include <limits>
 #include <span>
 
+#include "sim/plant/plant.hpp"
+#include "sim/sensor_set.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/sim/experiment.hpp"
-#include "torsio/sim/plant.hpp"
-#include "torsio/sim/sensor_set.hpp"
 
 namespace torsio {
 

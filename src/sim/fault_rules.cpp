@@ -8,7 +8,7 @@
 
 #include "data/names.hpp"
 #include "sensed_channels.hpp"
-#include "stages.hpp"
+#include "sim/plant/stages.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 

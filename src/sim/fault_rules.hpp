@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "sim/plant/plant.hpp"
 #include "torsio/sim/fault_schedule.hpp"
 
 namespace torsio {

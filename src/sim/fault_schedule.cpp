@@ -7,6 +7,7 @@
 
 #include "fault_rules.hpp"
 #include "sensed_channels.hpp"
+#include "sim/fault_injector.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 

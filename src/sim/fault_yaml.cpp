@@ -6,6 +6,7 @@
 #include "data/names.hpp"
 #include "data/yaml_reader.hpp"
 #include "fault_rules.hpp"
+#include "sim/fault_injector.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 

@@ -1,9 +1,9 @@
 #include <array>
 
 #include "experiment_table.hpp"
+#include "sim/impedance_loop.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/impedance_loop.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/sim/impedance_loop.hpp"
+#include "sim/impedance_loop.hpp"
 
 #include <fmt/format.h>
 

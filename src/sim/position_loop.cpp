@@ -1,4 +1,4 @@
-#include "torsio/sim/position_loop.hpp"
+#include "sim/position_loop.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "experiment_table.hpp"
+#include "sim/position_loop.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/position_loop.hpp"
 
 // The bench of 002 (specification 4.4 and 4.7): the input angle is position controlled, the output
 // is clamped, but for the collision and the static cycle.

@@ -1,6 +1,6 @@
 #include "sensed_channels.hpp"
 
-#include "torsio/sim/plant.hpp"
+#include "sim/plant/plant.hpp"
 
 namespace torsio {
 namespace {

@@ -3,8 +3,8 @@
 #include <string_view>
 #include <vector>
 
+#include "sim/sensor_set.hpp"
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/sim/sensor_set.hpp"
 
 namespace torsio {
 

@@ -1,4 +1,4 @@
-#include "torsio/sim/sensor_set.hpp"
+#include "sim/sensor_set.hpp"
 
 namespace torsio {
 namespace {

@@ -5,12 +5,12 @@
 #include <cstddef>
 
 #include "experiment_table.hpp"
+#include "sim/deflection_loop.hpp"
+#include "sim/position_loop.hpp"
 #include "torque_references.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/deflection_loop.hpp"
-#include "torsio/sim/position_loop.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/sim/torque_loop.hpp"
+#include "sim/torque_loop.hpp"
 
 #include <fmt/format.h>
 

@@ -4,9 +4,9 @@
 #include <functional>
 #include <string>
 
+#include "sim/plant/plant.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/plant.hpp"
 
 // The torques that the benches of more than one family ask for (specification 4.7).
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "sim/plant/plant.hpp"
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/sim/plant.hpp"
 
 namespace torsio {
 

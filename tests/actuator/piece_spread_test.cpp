@@ -6,9 +6,9 @@
 #include <map>
 #include <string>
 
+#include "sim/plant/plant.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/sim/plant.hpp"
 
 namespace torsio {
 namespace {

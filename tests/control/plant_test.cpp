@@ -1,5 +1,5 @@
 // The controllers on the simulated actuators, with all their friction, play and gear errors.
-#include "torsio/sim/plant.hpp"
+#include "sim/plant/plant.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,12 +7,12 @@
 #include <cmath>
 #include <string>
 
+#include "sim/deflection_loop.hpp"
+#include "sim/impedance_loop.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/sim/deflection_loop.hpp"
-#include "torsio/sim/impedance_loop.hpp"
 
 namespace torsio {
 namespace {

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "model/grey_box/grey_box.hpp"
 #include "spring_joint.hpp"
 #include "support/error_message.hpp"
 #include "support/example_models.hpp"
@@ -16,7 +17,6 @@
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/any_estimator.hpp"
-#include "torsio/model/grey_box.hpp"
 
 namespace torsio {
 namespace {

@@ -8,12 +8,12 @@
 #include <limits>
 #include <vector>
 
+#include "model/network/ensemble.hpp"
 #include "support/dump.hpp"
 #include "support/error_message.hpp"
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "torsio/estimate/any_estimator.hpp"
-#include "torsio/model/ensemble.hpp"
 
 namespace torsio {
 namespace {

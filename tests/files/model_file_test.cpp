@@ -8,14 +8,14 @@
 #include <cstdint>
 #include <limits>
 
+#include "files/safetensors.hpp"
+#include "files/whole_file.hpp"
 #include "support/error_message.hpp"
 #include "support/every_family.hpp"
 #include "support/example_model_file.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
-#include "torsio/files/safetensors.hpp"
-#include "torsio/files/whole_file.hpp"
 
 namespace torsio {
 namespace {

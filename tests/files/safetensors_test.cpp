@@ -1,4 +1,4 @@
-#include "torsio/files/safetensors.hpp"
+#include "files/safetensors.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

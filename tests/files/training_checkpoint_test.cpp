@@ -6,11 +6,11 @@
 #include <limits>
 #include <string>
 
+#include "files/safetensors.hpp"
+#include "files/whole_file.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/files/safetensors.hpp"
-#include "torsio/files/whole_file.hpp"
 
 namespace torsio {
 namespace {

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "sim/fault_injector.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/sim/fault_schedule.hpp"

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "files/known_families.hpp"
+#include "files/safetensors.hpp"
 #include "support/example_model_file.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/files/safetensors.hpp"
 
 // Any bytes are refused as a model file with an Error, or give an estimator whose value is finite.
 // The first byte says how the others become a file: as they are, as changes to a good file (so that

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include "model/viscoelastic/viscoelastic.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/model/viscoelastic.hpp"
 
 // Any text must either be refused with an Error or give a network that comes back as its text and,
 // given the values that it lacks, can be stepped.

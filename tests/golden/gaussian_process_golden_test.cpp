@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "fit/gaussian_process/fit_gaussian_process.hpp"
+#include "fit/gaussian_process/marginal_likelihood.hpp"
+#include "model/gaussian_process/gaussian_process.hpp"
 #include "support/example_data.hpp"
-#include "torsio/model/gaussian_process.hpp"
-#include "torsio/train/fit_gaussian_process.hpp"
-#include "train/marginal_likelihood.hpp"
 
 namespace torsio {
 namespace {

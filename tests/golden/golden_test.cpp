@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
+#include "fit/linear/fit_linear.hpp"
+#include "model/common/schedule.hpp"
+#include "model/mixture/mixture_regression.hpp"
 #include "support/example_data.hpp"
-#include "torsio/model/mixture_regression.hpp"
-#include "torsio/model/schedule.hpp"
 #include "torsio/signal/lowpass.hpp"
-#include "torsio/train/fit_linear.hpp"
 
 namespace torsio {
 namespace {

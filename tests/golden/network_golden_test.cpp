@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "train/network_trainer.hpp"
+#include "fit/network/network_trainer.hpp"
 
 namespace torsio {
 namespace {

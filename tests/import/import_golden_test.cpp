@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "import/read_network.hpp"
+#include "model/network/gru.hpp"
+#include "model/network/lstm.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/import/import_network.hpp"
-#include "torsio/model/gru.hpp"
-#include "torsio/model/lstm.hpp"
 
 namespace torsio {
 namespace {

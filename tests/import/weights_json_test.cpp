@@ -6,9 +6,9 @@
 
 #include <string>
 
+#include "model/network/lstm.hpp"
 #include "support/error_message.hpp"
 #include "torsio/import/import_network.hpp"
-#include "torsio/model/lstm.hpp"
 
 namespace torsio {
 namespace {

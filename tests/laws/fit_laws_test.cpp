@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "fit/common/model_run.hpp"
 #include "support/driven_record.hpp"
 #include "support/dump.hpp"
 #include "support/example_data.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/train/families.hpp"
-#include "torsio/train/model_run.hpp"
+#include "torsio/fit/families.hpp"
 
 namespace torsio::test {
 namespace {

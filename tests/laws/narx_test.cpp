@@ -1,7 +1,7 @@
-#include "torsio/model/narx.hpp"
+#include "model/narx/narx.hpp"
 
 #include "laws/model_laws.hpp"
-#include "torsio/model/multivariate_polynomial.hpp"
+#include "model/narx/multivariate_polynomial.hpp"
 
 namespace torsio::test {
 

@@ -1,5 +1,5 @@
 #include "laws/model_laws.hpp"
-#include "torsio/model/ensemble.hpp"
+#include "model/network/ensemble.hpp"
 
 namespace torsio::test {
 

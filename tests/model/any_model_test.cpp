@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
+#include "model/common/parameters.hpp"
 #include "support/every_family.hpp"
 #include "support/example_models.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/model/parameters.hpp"
 
 namespace torsio {
 namespace {

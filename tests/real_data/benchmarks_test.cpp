@@ -6,10 +6,10 @@
 #include <string>
 
 #include "real_data/real_data.hpp"
+#include "studies/study.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/data/load.hpp"
-#include "torsio/studies/study.hpp"
-#include "torsio/train/comparison.hpp"
+#include "torsio/evaluate/comparison.hpp"
 
 namespace torsio {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "real_data/real_data.hpp"
 #include "torsio/data/load.hpp"
-#include "torsio/train/comparison.hpp"
+#include "torsio/evaluate/comparison.hpp"
 
 namespace torsio {
 namespace {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "model/random_mixture.hpp"
+#include "model/mixture/random_mixture.hpp"
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "support/system_calls.hpp"

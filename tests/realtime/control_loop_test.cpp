@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "realtime/simulated_clock.hpp"
+#include "sim/plant/plant.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/realtime/mailbox.hpp"
 #include "torsio/realtime/realtime_loop.hpp"
 #include "torsio/safety/command_watchdog.hpp"
-#include "torsio/sim/plant.hpp"
 
 namespace torsio {
 namespace {

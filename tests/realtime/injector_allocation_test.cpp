@@ -3,6 +3,7 @@
 #include <cmath>
 #include <vector>
 
+#include "sim/fault_injector.hpp"
 #include "support/allocation_counter.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/sim/fault_schedule.hpp"

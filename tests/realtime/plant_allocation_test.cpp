@@ -4,9 +4,9 @@
 #include <limits>
 #include <string>
 
+#include "sim/plant/plant_batch.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/plant_batches.hpp"
-#include "torsio/sim/plant_batch.hpp"
 
 namespace torsio {
 namespace {

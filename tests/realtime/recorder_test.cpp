@@ -20,11 +20,11 @@
 #include <thread>
 #include <vector>
 
+#include "files/whole_file.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/recording_blocks.hpp"
-#include "torsio/files/whole_file.hpp"
 
 namespace torsio {
 namespace {

@@ -9,6 +9,7 @@
 #include <set>
 #include <vector>
 
+#include "model/network/network_bank.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/every_family.hpp"
 #include "support/example_models.hpp"
@@ -16,7 +17,6 @@
 #include "torsio/estimate/adaptive_estimator.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
-#include "torsio/model/network_bank.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/bench_dataset.hpp"
-#include "torsio/train/comparison.hpp"
+#include "torsio/evaluate/comparison.hpp"
 
 namespace torsio {
 namespace {

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "model/network/ensemble.hpp"
 #include "support/example_model_file.hpp"
 #include "support/example_models.hpp"
 #include "torsio/import/import_network.hpp"
-#include "torsio/model/ensemble.hpp"
 
 namespace torsio {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "support/bench_dataset.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/train/comparison.hpp"
-#include "torsio/train/families.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/fit/families.hpp"
 
 namespace torsio {
 namespace {

@@ -9,15 +9,15 @@
 #include <string>
 #include <vector>
 
+#include "sim/plant/energy_audit.hpp"
+#include "sim/plant/plant.hpp"
+#include "sim/torque_loop.hpp"
 #include "support/error_message.hpp"
 #include "support/straight_line.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/energy_audit.hpp"
 #include "torsio/sim/experiment.hpp"
-#include "torsio/sim/plant.hpp"
-#include "torsio/sim/torque_loop.hpp"
 
 namespace torsio {
 namespace {

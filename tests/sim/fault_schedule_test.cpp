@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/fault_injector.hpp"
 #include "support/error_message.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"

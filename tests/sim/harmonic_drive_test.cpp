@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "sim/impedance_loop.hpp"
+#include "sim/plant/energy_audit.hpp"
+#include "sim/plant/plant.hpp"
 #include "support/straight_line.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/energy_audit.hpp"
 #include "torsio/sim/experiment.hpp"
-#include "torsio/sim/impedance_loop.hpp"
-#include "torsio/sim/plant.hpp"
 
 namespace torsio {
 namespace {

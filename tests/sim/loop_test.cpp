@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "sim/deflection_loop.hpp"
+#include "sim/impedance_loop.hpp"
+#include "sim/plant/plant.hpp"
+#include "sim/position_loop.hpp"
+#include "sim/torque_loop.hpp"
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/sim/deflection_loop.hpp"
-#include "torsio/sim/impedance_loop.hpp"
-#include "torsio/sim/plant.hpp"
-#include "torsio/sim/position_loop.hpp"
-#include "torsio/sim/torque_loop.hpp"
 
 namespace torsio {
 namespace {

@@ -10,13 +10,13 @@
 #include <variant>
 #include <vector>
 
+#include "sim/plant/energy_audit.hpp"
+#include "sim/position_loop.hpp"
 #include "support/refusal.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/energy_audit.hpp"
 #include "torsio/sim/experiment.hpp"
-#include "torsio/sim/position_loop.hpp"
 
 namespace torsio {
 namespace {

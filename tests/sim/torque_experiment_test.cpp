@@ -7,16 +7,16 @@
 #include <string>
 #include <vector>
 
+#include "sim/deflection_loop.hpp"
+#include "sim/sensor_set.hpp"
+#include "sim/torque_loop.hpp"
 #include "support/error_message.hpp"
 #include "support/series_elastic.hpp"
 #include "support/straight_line.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/deflection_loop.hpp"
 #include "torsio/sim/experiment.hpp"
-#include "torsio/sim/sensor_set.hpp"
-#include "torsio/sim/torque_loop.hpp"
 
 // Tracking of a torque. What specification 6 gives are MAD and STD of |e| of a controller whose
 // straight line was fitted to sweeps, with 13 Nm on dfki-50 and 20 Nm on dfki-120.

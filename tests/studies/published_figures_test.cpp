@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/report/study.hpp"
-#include "torsio/studies/study.hpp"
+#include "studies/study.hpp"
+#include "studies/study_report.hpp"
 
 // The tables in the docs are generated, and then kept in the repository: what they print as a figure of a paper must be
 // the figure of paper_figures.csv, which is compiled into `StudyInfo::published`.

@@ -1,4 +1,4 @@
-#include "torsio/studies/study.hpp"
+#include "studies/study.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "studies/study_report.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/report/study.hpp"
 
 namespace torsio {
 namespace {

@@ -5,11 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "model/second_order/dynamic_bouc_wen.hpp"
+#include "model/second_order/friction_drive.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/model/dynamic_bouc_wen.hpp"
-#include "torsio/model/friction_drive.hpp"
-#include "torsio/train/training_data.hpp"
+#include "torsio/fit/common/training_data.hpp"
 
 namespace torsio::test {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "files/known_families.hpp"
+#include "model/common/parameters.hpp"
 #include "torsio/core/matrix.hpp"
-#include "torsio/model/parameters.hpp"
 
 namespace torsio::test {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "torsio/core/random.hpp"
-#include "torsio/train/training_data.hpp"
+#include "torsio/fit/common/training_data.hpp"
 
 namespace torsio::test {
 

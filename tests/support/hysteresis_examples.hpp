@@ -2,11 +2,11 @@
 
 #include <vector>
 
-#include "torsio/model/bouc_wen_model.hpp"
-#include "torsio/model/exponential_loading.hpp"
-#include "torsio/model/improved_prandtl_ishlinskii.hpp"
-#include "torsio/model/nonlinear_backlash.hpp"
-#include "torsio/model/operator_sum.hpp"
+#include "model/hysteresis/bouc_wen_model.hpp"
+#include "model/hysteresis/exponential_loading.hpp"
+#include "model/hysteresis/improved_prandtl_ishlinskii.hpp"
+#include "model/hysteresis/nonlinear_backlash.hpp"
+#include "model/hysteresis/operator_sum.hpp"
 
 namespace torsio::test {
 

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "torsio/model/gru.hpp"
-#include "torsio/model/lstm.hpp"
-#include "torsio/model/mlp.hpp"
+#include "model/network/gru.hpp"
+#include "model/network/lstm.hpp"
+#include "model/network/mlp.hpp"
 
 namespace torsio::test {
 
@@ -35,7 +35,7 @@ inline double product(const FloatMatrix& matrix, std::size_t row, const Values& 
   return sum;
 }
 
-/// A network straight from its equations (model/network_layers.hpp), all in double.
+/// A network straight from its equations (model/network/network_layers.hpp), all in double.
 template <class Network>
 class NetworkReference {
  public:

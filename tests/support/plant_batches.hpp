@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "sim/plant/plant.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/sim/plant.hpp"
 
 namespace torsio::test {
 

@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "model/network/gru.hpp"
+#include "model/network/lstm.hpp"
+#include "model/network/mlp.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/model/gru.hpp"
-#include "torsio/model/lstm.hpp"
-#include "torsio/model/mlp.hpp"
 
 namespace torsio::test {
 

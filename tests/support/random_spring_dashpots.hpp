@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "model/viscoelastic/spring_dashpot_network.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/model/spring_dashpot_network.hpp"
 
 namespace torsio::test {
 

@@ -4,7 +4,7 @@
 
 #include "torsio/core/realtime.hpp"
 #include "torsio/estimate/joint_sample.hpp"
-#include "torsio/model/model.hpp"
+#include "torsio/model/common/model.hpp"
 
 namespace torsio {
 

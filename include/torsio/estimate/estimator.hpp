@@ -11,7 +11,7 @@
 #include "torsio/core/realtime.hpp"
 #include "torsio/estimate/estimator_core.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
-#include "torsio/model/model.hpp"
+#include "torsio/model/common/model.hpp"
 
 namespace torsio {
 

@@ -8,7 +8,7 @@
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
-#include "torsio/model/model.hpp"
+#include "torsio/model/common/model.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {

@@ -8,7 +8,7 @@
 
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/any_model.hpp"
-#include "torsio/model/network_layers.hpp"
+#include "torsio/model/network/network_layers.hpp"
 
 namespace torsio {
 

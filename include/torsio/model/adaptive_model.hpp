@@ -4,8 +4,8 @@
 
 #include "torsio/core/realtime.hpp"
 #include "torsio/model/any_model.hpp"
-#include "torsio/model/last_layer_adapter.hpp"
-#include "torsio/model/model.hpp"
+#include "torsio/model/common/model.hpp"
+#include "torsio/model/network/last_layer_adapter.hpp"
 
 namespace torsio {
 

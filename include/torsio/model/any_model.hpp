@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "torsio/core/error.hpp"
-#include "torsio/model/family_traits.hpp"
-#include "torsio/model/model.hpp"
+#include "torsio/model/common/family_traits.hpp"
+#include "torsio/model/common/model.hpp"
 
 namespace torsio {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "torsio/train/adaptation.hpp"
+#include "torsio/evaluate/adaptation.hpp"
 
 namespace torsio {
 

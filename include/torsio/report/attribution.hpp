@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "torsio/train/attribution.hpp"
+#include "torsio/evaluate/attribution.hpp"
 
 namespace torsio {
 

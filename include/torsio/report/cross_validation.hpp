@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "torsio/train/cross_validation.hpp"
+#include "torsio/evaluate/cross_validation.hpp"
 
 namespace torsio {
 

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "torsio/train/fit_report.hpp"
-#include "torsio/train/results.hpp"
+#include "torsio/evaluate/fit_report.hpp"
+#include "torsio/evaluate/results.hpp"
 
 namespace torsio {
 

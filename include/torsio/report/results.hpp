@@ -3,7 +3,7 @@
 #include <string>
 
 #include "torsio/data/dataset.hpp"
-#include "torsio/train/results.hpp"
+#include "torsio/evaluate/results.hpp"
 
 namespace torsio {
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <string>
 
-#include "torsio/tracking/tracking.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
 
 namespace torsio {
 

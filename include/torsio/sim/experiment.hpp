@@ -80,4 +80,12 @@ struct SweepProtocol {
 [[nodiscard]] std::vector<double> measured_twist(const DataSheet& sheet,
                                                  const Recording& recording);
 
+/// What a simulation of the actuator must follow.
+struct PlantFigures {
+  /// [Hz], the lower first: both ends free, no load on the joint, without damping.
+  std::array<double, 2> natural_frequencies_Hz{};
+  double longest_step_s = 0.0;  ///< that its stiffest mode and its strongest damping allow
+};
+[[nodiscard]] PlantFigures plant_figures(const DataSheet& sheet);
+
 }  // namespace torsio

@@ -1,6 +1,6 @@
 #include <cstdio>
 
-#include "torsio/train/families.hpp"
+#include "torsio/fit/families.hpp"
 #ifdef TORSIO_HAS_ONNX
 #include "torsio/core/error.hpp"
 #include "torsio/import/onnx_network.hpp"

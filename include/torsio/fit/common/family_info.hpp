@@ -1,0 +1,39 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/not_measured.hpp"
+#include "torsio/fit/common/fit_context.hpp"
+#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/options.hpp"
+#include "torsio/fit/common/training_data.hpp"
+#include "torsio/model/any_model.hpp"
+
+namespace torsio {
+
+/// A fitted model of any family, what the user should be told about the fit, and its parameters.
+struct FittedModel {
+  AnyModel model;
+  std::vector<std::string> notes;
+  std::vector<FittedParameter> table = {};
+  /// On training data that the fit held out to choose by; NaN of families that do not. Error bars that no
+  /// validation records tell are no narrower.
+  double held_out_rmse = kNotMeasured;
+};
+
+/// How one family is trained: what `fit --list`, the command line, cross-validation and `compare`
+/// know about it.
+struct FamilyInfo {
+  std::string_view name;
+  std::string_view summary;  ///< one line
+  std::span<const OptionInfo> options;
+  /// Deterministic for a seed. @throws Error if the data do not suffice, Cancelled.
+  FittedModel (*fit)(const TrainingData&, const Options&, const FitContext&);
+  bool can_resume = false;     ///< uses `FitContext::resume` and `keep`
+  bool only_if_named = false;  ///< not in `all`: slow, or made for other data than most have
+};
+
+}  // namespace torsio

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/fit/common/fit_context.hpp"
+#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/training_data.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// One model to train: a family, its settings, and the inputs it is given.
+struct ModelChoice {
+  std::string family;
+  std::map<std::string, std::string> options = {};  ///< as in `--set name=value`
+  std::string input_set = {};  ///< name of the dataset's input set, for tables; may be empty
+  FeatureSpec features;        ///< from `resolve_inputs`
+
+  /// "branch=true,schedule=support_m": the settings that differ from the defaults, as the user gave
+  /// them.
+  [[nodiscard]] std::string variant() const;
+};
+
+/// A fitted model with all that it needs to run (`make_estimator(file)`) and to be saved.
+struct TrainedModel {
+  ModelFile file;
+  std::vector<std::string> notes;  ///< what the user should be told about the fit
+  std::vector<FittedParameter> table = {};
+  double fit_seconds = 0.0;
+};
+
+/// Recording -> features -> fitted model -> guards: what `torsio fit` does. Learns from the records
+/// with the role train only; guards take their error bars from the validation records, if there are
+/// any. Deterministic for a seed.
+/// @throws Error if the data cannot be learned from or the training records disagree about which
+/// channels are zeroed, UsageError for a wrong setting, Cancelled if `progress` asks to stop.
+[[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
+                                       std::uint64_t seed, const Progress& progress = {});
+
+/// What the models of one input set learn from: the dataset after the feature pipeline.
+struct LearningData {
+  TrainingData training;
+  std::optional<TrainingData> validation;  ///< if any record has that role
+};
+/// @throws Error as `training_data`, or if the target never changes.
+[[nodiscard]] LearningData learning_data(const Dataset& dataset, const FeatureSpec& features);
+
+/// `train_model` for several models that share their inputs.
+/// @param data `learning_data(dataset, choice.features)`.
+[[nodiscard]] TrainedModel train_model(const Dataset& dataset, const LearningData& data,
+                                       const ModelChoice& choice, std::uint64_t seed,
+                                       const Progress& progress = {});
+
+/// `train_model` of a fit that can be stopped and resumed. The validation records of the dataset are
+/// the context's, unless it has some.
+/// @throws UsageError also if there is something to resume and the family keeps no checkpoints.
+[[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
+                                       const FitContext& context);
+
+}  // namespace torsio

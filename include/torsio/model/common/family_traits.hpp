@@ -1,0 +1,60 @@
+#pragma once
+
+#include <concepts>
+#include <string_view>
+
+#include "torsio/model/common/model.hpp"
+
+namespace torsio {
+
+/// What shared code asks about a family, instead of comparing its name. A family whose answer is not
+/// the default has a member `static constexpr FamilyTraits kTraits`.
+struct FamilyTraits {
+  /// The first input is the deflection of a spring; false: a force that drives a mass, whose motion
+  /// is the target.
+  bool is_spring = true;
+  /// An equation of motion, which holds beyond the inputs that it was fitted to: the range guard
+  /// leaves it as much room again on either side.
+  bool extrapolates = false;
+  /// The output is an integral of the input. The error of its first samples is that of a drift that
+  /// has hardly begun, so it does not show how uncertain the start is.
+  bool integrates = false;
+  /// The model depends on past inputs, so that a loop that uses its inverse must step it as well.
+  bool has_memory = true;
+};
+
+template <class Family>
+[[nodiscard]] constexpr FamilyTraits traits_of() noexcept {
+  if constexpr (requires { Family::kTraits; }) {
+    return Family::kTraits;
+  } else {
+    return {};
+  }
+}
+
+/// A model that names its family, and whose parameters name the model: what `AnyModel` holds.
+///
+///     class Mine {
+///      public:
+///       static constexpr std::string_view kFamily = "mine";
+///       struct Parameters { using Family = Mine; ... };
+template <class M>
+concept NamedFamily = Model<M> && requires {
+  { M::kFamily } -> std::convertible_to<std::string_view>;
+  requires std::same_as<typename M::Parameters::Family, M>;
+};
+
+/// A discrete model, which runs at one sample period [s].
+template <class M>
+concept HasSamplePeriod = requires(const M& model) {
+  { model.sample_period() } noexcept -> std::same_as<double>;
+};
+
+/// A continuous-time model, which is discretised anew for another sample period [s].
+template <class M>
+concept Rediscretised =
+    HasSamplePeriod<M> && requires(typename M::Parameters parameters, double sample_period_s) {
+      { M::at_sample_period(parameters, sample_period_s) } -> std::same_as<typename M::Parameters>;
+    };
+
+}  // namespace torsio

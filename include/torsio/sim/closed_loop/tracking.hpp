@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/actuator/wear.hpp"
+#include "torsio/control/model_inverse.hpp"
+#include "torsio/control/torque_controller.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/data/recording.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/sim/closed_loop/reference.hpp"
+#include "torsio/sim/closed_loop/tracking_score.hpp"
+#include "torsio/sim/fault_schedule.hpp"
+
+namespace torsio {
+
+/// A torque loop on the simulated bench of a series-elastic actuator.
+struct TrackingSpec {
+  JointOutput output = JointOutput::locked;
+  double lever_m = 0.8;  ///< free: where the 9 kg hang; gravity acts (specification 4.2)
+  TorqueReference reference = {};
+  double bandwidth_rad_s = 50.0;
+  double damping = 0.9;
+  std::optional<FrictionCompensation> friction = std::nullopt;
+  std::optional<double> observer_cutoff_Hz = std::nullopt;
+  bool feeds_rate_forward = false;
+  bool measures_bandwidth = true;  ///< by a run of its own with `frequency_sweep`
+  OperatingConditions conditions = {};
+  FaultSchedule faults = {};
+};
+
+/// Whether it can be run. @throws UsageError if the actuator is not series-elastic, the reference out
+/// of its rating, the lever would tip over, or as `FaultInjector`; Error if the loop would be unstable.
+void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed);
+
+struct TrackingRun {
+  TrackingScore score;  ///< of a run that has not diverged
+  /// As `bandwidth`: 0 below the sweep, infinite above it; none if not asked for, or if it diverged
+  std::optional<double> bandwidth_Hz = {};
+  bool has_diverged = false;  ///< stopped: the joint turned round, or the torque left any bound
+  /// What the sensors told, what the loop made of it with each term, and the `truth_` channels.
+  ///
+  ///     command = proportional + integral + derivative + feed_forward + rate_feed_forward +
+  ///               friction + observer + handover + rest,   all `..._current_A`
+  ///
+  /// where rest is what a limit cut, or what stands while a fault lets the command fade.
+  Recording record;
+};
+
+/// Follows the reference for its whole length, at 1 kHz, with the gains that the bandwidth gives on
+/// the actuator's data sheet. Equal calls give equal runs.
+/// @param seed of the sensors' noise, and of a random walk
+/// @throws as `check_tracking` before the first step; Error if the plant refuses; Cancelled.
+[[nodiscard]] TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec,
+                                const AnyInverse& inverse, std::uint64_t seed,
+                                const Progress& progress = {});
+
+/// The inverse that a model file's model gives a loop at 1 kHz.
+/// @throws Error as `AnyInverse::of`, or if the model cannot run at that rate, or wants the zero of
+/// a channel that no one sets here.
+[[nodiscard]] AnyInverse inverse_of(const ModelFile& model);
+
+/// The line that the sweeps of `sweep_dataset` give: what a loop has without a learned model.
+[[nodiscard]] LinearInverse sweep_line(const DataSheet& sheet, std::uint64_t seed,
+                                       const Progress& progress = {});
+
+struct NamedInverse {
+  std::string name;
+  AnyInverse inverse;
+};
+
+/// One model, one run.
+struct TrackingRow {
+  std::string actuator;
+  std::string variant;  ///< of the spring
+  JointOutput output = JointOutput::locked;
+  std::string reference;
+  double amplitude_Nm = 0.0;
+  std::string model;
+  std::uint64_t seed = 1;
+  TrackingScore score = {};
+  std::optional<double> mad_to_linear = {};  ///< MAD over that of the linear inverse, same seed
+  std::optional<double> bandwidth_Hz = {};   ///< as `TrackingRun`'s
+  std::string status = "ok";                 ///< "diverged", "failed"
+  std::string reason = {};
+};
+
+/// `linear` and each of the models under every seed, in this order; a run that fails is a row that
+/// says why.
+/// @throws as `check_tracking`, before the first run; Cancelled.
+[[nodiscard]] std::vector<TrackingRow> track_models(const DataSheet& sheet,
+                                                    const TrackingSpec& spec,
+                                                    const LinearInverse& linear,
+                                                    std::span<const NamedInverse> models,
+                                                    std::span<const std::uint64_t> seeds,
+                                                    const Progress& progress = {});
+
+}  // namespace torsio

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "torsio/data/recording.hpp"
+#include "torsio/signal/excitation.hpp"
+#include "torsio/sim/closed_loop/limit_cycle.hpp"
+
+namespace torsio {
+
+/// How well a torque was followed: e = wanted - torque, of the joint's torque without the noise of
+/// any sensor, in Nm. The first two seconds are not scored, but for `overshoot`. Source:
+/// specification 3.10.
+struct TrackingScore {
+  double mad = 0.0;             ///< mean |e|
+  double std_abs = 0.0;         ///< standard deviation of |e|
+  double rmse = 0.0;            ///< sqrt(mean e^2)
+  double max_abs = 0.0;         ///< largest |e|
+  double error_ratio = 0.0;     ///< MAD over the reference's amplitude
+  double load_cell_mad = 0.0;   ///< as `mad`, of the torque that the load cell tells: noisy, late
+  double load_cell_rmse = 0.0;  ///< as `rmse`, of the same
+  /// Largest of all steps from the start on, the first one from 0: how far the torque goes beyond, as
+  /// a share of the step. Steps only.
+  std::optional<double> overshoot = {};
+  std::optional<LimitCycle> limit_cycle = {};
+  std::size_t limit_events = 0;    ///< how often a limit began to cut
+  double limited_s = 0.0;          ///< for how long in all
+  std::size_t inverse_faults = 0;  ///< ticks in which the inverse told its line, not its model
+  std::size_t loop_faults = 0;     ///< ticks without a usable reference or measurement
+};
+
+/// Of a record that `track` made. @throws Error if it is not longer than what is not scored.
+[[nodiscard]] TrackingScore tracking_score(const Recording& record, double amplitude_Nm,
+                                           bool has_steps);
+
+/// The frequency [Hz] where the response to a sweep has fallen to -3 dB of what was wanted. Its first
+/// harmonic, in windows of a third of an octave.
+/// @returns 0 if it is below from the first window on, infinity if it never falls so far: the
+/// bandwidth lies below or above what the sweep covers
+[[nodiscard]] double bandwidth(std::span<const double> torque_Nm, const LogSweep::Parameters& sweep,
+                               double sample_rate_Hz);
+
+}  // namespace torsio

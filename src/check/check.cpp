@@ -1,0 +1,156 @@
+#include "torsio/check/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "check/checker.hpp"
+#include "fit/common/guards.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+namespace {
+
+bool has_segment(const DatasetRecord& record, Role role) {
+  return std::ranges::any_of(record.segments,
+                             [&](const Segment& segment) { return segment.role == role; });
+}
+
+}  // namespace
+
+std::vector<Finding> Checker::run() {
+  check_length();
+  if (has_failed()) return std::move(findings_);  // too short: nothing else can be said
+  check_missing();
+  check_constant();
+  check_saturation();
+  check_frozen();
+  check_resolution();
+  check_units();
+  check_sign_flips();
+  check_gaps();
+  check_delay();
+  check_sign();
+  check_change();
+  check_excitation();
+  check_offsets();
+  check_leak();
+  check_range();
+  return std::move(findings_);
+}
+
+void Checker::add(Verdict verdict, std::string check, std::string recording, std::string message,
+                  std::string advice) {
+  findings_.push_back(
+      {verdict, std::move(check), std::move(recording), std::move(message), std::move(advice)});
+}
+
+/// Adds a PASS unless the check that ran meanwhile found something.
+void Checker::pass_unless_found(const std::string& check, std::string message,
+                                const std::function<void()>& body) {
+  const std::size_t before = findings_.size();
+  body();
+  if (findings_.size() == before) add(Verdict::pass, check, "", std::move(message));
+}
+
+void Checker::check_length() {
+  pass_unless_found(
+      "length",
+      fmt::format("{} recordings at {:g} Hz", dataset_.records.size(), dataset_.sample_rate_Hz()),
+      [&] {
+        for (const DatasetRecord& record : dataset_.records)
+          if (record.recording.size() < kFewSamples)
+            add(Verdict::fail, "length", record.recording.name(),
+                fmt::format("{} samples", record.recording.size()),
+                fmt::format("Record at least {} samples.", kFewSamples));
+      });
+}
+
+// Hysteresis shows only at reversals; a rate that never changes cannot be told from a constant.
+void Checker::check_excitation() {
+  std::size_t reversals = 0;
+  Extent speeds;
+  const auto window = static_cast<std::size_t>(
+      std::max(1.0, std::round(kSpeedHalfWindow_s * dataset_.sample_rate_Hz())));
+  for (std::size_t r = 0; r < pairs_.size(); ++r) {
+    if (!has_segment(dataset_.records[r], Role::train)) continue;
+    reversals += count_reversals(pairs_[r].input);
+    for (const double speed : typical_speeds(movement(pairs_[r].input, window)))
+      speeds.include(speed);
+  }
+  if (speeds.width() < 0.0) return;  // nothing to train on: another check says so
+  if (reversals < kFewReversals)
+    add(Verdict::warn, "excitation", "",
+        fmt::format("{} reversals of {} in training", reversals, spec_.inputs.front()),
+        "Hysteresis shows only where the motion turns back: load and unload several times.");
+  if (speeds.highest < kSpeedRatio * speeds.lowest)
+    add(Verdict::warn, "excitation", "", "the training data move at one speed only",
+        "A model cannot learn what speed does; add recordings that are twice as slow and twice "
+        "as fast.");
+  if (findings_.empty() || findings_.back().check != "excitation")
+    add(Verdict::pass, "excitation", "",
+        fmt::format("{} reversals, several speeds in training", reversals));
+}
+
+void Checker::check_leak() {
+  const std::string leak = find_leak(dataset_, spec_);
+  if (leak.empty()) {
+    add(Verdict::pass, "leak", "", "the target was not computed from an input");
+  } else {
+    add(Verdict::fail, "leak", "",
+        leak.starts_with(kTruthPrefix)
+            ? fmt::format("{} is truth that no sensor sees", leak)
+            : fmt::format("{} was computed from {}", dataset_.target, leak),
+        "Leave it out of --inputs: a model would learn the formula, not the spring.");
+  }
+}
+
+// The guard acts on features, so features are compared; what cannot be learned from at all has failed above.
+void Checker::check_range() {
+  if (!dataset_.has_role(Role::test) || !dataset_.has_role(Role::train) || has_failed()) return;
+  const FeatureRanges trained = feature_ranges(training_data(dataset_, spec_, Role::train));
+  const FeatureRanges tested = feature_ranges(training_data(dataset_, spec_, Role::test));
+  pass_unless_found("range", "the test data lie inside the training range", [&] {
+    for (std::size_t j = 0; j < spec_.inputs.size(); ++j) {
+      const double slack = trained.margin * (trained.highest[j] - trained.lowest[j]);
+      if (tested.lowest[j] >= trained.lowest[j] - slack &&
+          tested.highest[j] <= trained.highest[j] + slack)
+        continue;
+      add(Verdict::warn, "range", "",
+          fmt::format("{}: tested on {:.4g} to {:.4g}, trained on {:.4g} to {:.4g}",
+                      spec_.inputs[j], tested.lowest[j], tested.highest[j], trained.lowest[j],
+                      trained.highest[j]),
+          "Models guess out there: the range guard answers with its linear fallback.");
+    }
+  });
+}
+
+bool Checker::has_failed() const {
+  return std::ranges::any_of(findings_, [](const Finding& finding) {
+    return finding.verdict == Verdict::fail && finding.check != "sign" && finding.check != "leak";
+  });
+}
+
+std::string_view name(Verdict verdict) noexcept {
+  switch (verdict) {
+    case Verdict::pass: return "PASS";
+    case Verdict::warn: return "WARN";
+    case Verdict::fail: return "FAIL";
+  }
+  return "unknown";
+}
+
+std::string unit_doubt(const Recording& recording, const EstimatorSettings& trained) {
+  if (trained.fallback.slope.empty() || !recording.has(trained.target)) return {};
+  const Pair pair{first_feature(recording, trained.features),
+                  bridged(recording.channel(trained.target))};
+  if (std::abs(correlation(pair.input, pair.target)) < kClearCorrelation) return {};
+  return std::string(unit_mistake(std::abs(line_through(pair).slope / trained.fallback.slope[0])));
+}
+
+std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec) {
+  return Checker(dataset, spec).run();
+}
+
+}  // namespace torsio

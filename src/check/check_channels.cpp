@@ -1,0 +1,266 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "check/checker.hpp"
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+
+// A locked output: next to the deflection the channel does not move, and the torque follows that
+// deflection, as it would not if a sensor were dead while its side moved.
+bool Checker::stands_still(std::size_t r, const std::string& name) const {
+  const Recording& recording = dataset_.records[r].recording;
+  if (sources_.size() < 2 || name == dataset_.target || is_condition(recording, name) ||
+      std::ranges::find(sources_, name) == sources_.end())
+    return false;
+  const Pair& pair = pairs_[r];
+  return extent_of(recording.channel(name).values).width() <
+             kStandstillShare * extent_of(pair.input).width() &&
+         std::abs(correlation(pair.input, pair.target)) > kFollows;
+}
+
+bool Checker::is_condition(const Recording& recording, const std::string& channel) {
+  return std::ranges::find(recording.conditions(), channel) != recording.conditions().end();
+}
+
+void Checker::check_missing() {
+  pass_unless_found("missing values", "none", [&] {
+    for_each_channel([&](const Recording& recording, const Channel& channel) {
+      const auto missing = static_cast<std::size_t>(
+          std::ranges::count_if(channel.values, [](double v) { return !is_finite(v); }));
+      if (missing == 0) return;
+      const bool is_target = channel.name == dataset_.target;
+      const double share =
+          static_cast<double>(missing) / static_cast<double>(channel.values.size());
+      add(is_target && share < 1.0 ? Verdict::warn : Verdict::fail, "missing values",
+          recording.name(),
+          fmt::format("{}: {} of {} samples are NaN", channel.name, missing, channel.values.size()),
+          is_target
+              ? "They are neither trained on nor scored."
+              : fmt::format("An input may not be missing. If it is a slower sensor: hold: [{}]",
+                            channel.name));
+    });
+  });
+}
+
+void Checker::check_constant() {
+  pass_unless_found("constant channels", "every input and the target move", [&] {
+    for_each_moving_channel([&](std::size_t, const Recording& recording, const Channel& channel) {
+      if (is_condition(recording, channel.name) || extent_of(channel.values).width() > 0.0) return;
+      add(Verdict::fail, "constant channels", recording.name(),
+          fmt::format("{} never changes from {:g}", channel.name, channel.values.front()),
+          "Is the sensor connected? If it is a condition of the record, name it under "
+          "conditions: in a manifest.");
+    });
+    for (std::size_t r = 0; r < pairs_.size(); ++r)
+      for (const std::string& name : channels_)
+        if (stands_still(r, name))
+          add(Verdict::pass, "constant channels", dataset_.records[r].recording.name(),
+              fmt::format("{} stands still, as behind a lock, and {} follows {}", name,
+                          dataset_.target, spec_.inputs.front()));
+  });
+}
+
+// A range limit shows as many samples in runs exactly at the extreme value.
+void Checker::check_saturation() {
+  pass_unless_found("saturation", "no channel rests at its extreme value", [&] {
+    for_each_moving_channel([&](std::size_t, const Recording& recording, const Channel& channel) {
+      const Extent span = extent_of(channel.values);
+      if (!(span.width() > 0.0)) return;
+      // A motion that turns within the last of few codes rests there, too.
+      const double by_code = kCodesAtATurn * finest_step(channel.values) / span.width();
+      for (const double extreme : {span.lowest, span.highest}) {
+        const auto count = static_cast<double>(std::ranges::count(channel.values, extreme));
+        const double share = count / static_cast<double>(channel.values.size());
+        if (share < std::max(kSaturatedShare, by_code) ||
+            approaches_gradually(channel, extreme, span))
+          continue;
+        add(Verdict::warn, "saturation", recording.name(),
+            fmt::format("{}: {:.1f} % of the samples are exactly {:g}", channel.name, 100.0 * share,
+                        extreme),
+            "Is that the sensor's limit? Then cut those parts out, or use a sensor of larger "
+            "range.");
+      }
+    });
+  });
+}
+
+// A signal that turns round at its extreme spends time near it too; one that is cut off sits
+// exactly on it.
+bool Checker::approaches_gradually(const Channel& channel, double extreme, const Extent& span) {
+  std::size_t at_extreme = 0;
+  std::size_t near_extreme = 0;
+  for (const double value : channel.values) {
+    if (value == extreme) ++at_extreme;
+    if (std::abs(value - extreme) < 0.01 * span.width()) ++near_extreme;
+  }
+  return 2 * at_extreme < near_extreme;
+}
+
+// A sensor that tells one number while the others move on is stuck; at a standstill it is right.
+void Checker::check_frozen() {
+  pass_unless_found("frozen sensors", "none rests while the others move", [&] {
+    for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
+      if (is_condition(recording, channel.name)) return;
+      const auto shortest = static_cast<std::size_t>(0.5 * kFrozen_s * recording.sample_rate_Hz());
+      const std::vector<Rest> rests = rests_of(channel, std::max<std::size_t>(shortest, 2));
+      if (rests.empty()) return;
+      const std::vector<Channel> others = others_of(r, channel.name);
+      for (const Rest& rest : rests) {
+        const auto samples = static_cast<double>(rest.length());
+        const double duration_s = samples / recording.sample_rate_Hz();
+        // A silent sensor delivers nothing where it should have delivered many times.
+        if (duration_s < kFrozen_s || share_fresh(channel) * samples < kFrozenDeliveries ||
+            rest.length() == channel.values.size())
+          return;
+        for (const Channel& other : others) {
+          const double moved = share_moved(other, rest);
+          if (moved < kMovedMeanwhile && !is_odd_one_out(rest, rests, channel, other)) continue;
+          add(Verdict::warn, "frozen sensors", recording.name(),
+              fmt::format("{} tells {:g} for {:.3g} s from t = {:.4g} s, while {} moves through "
+                          "{:.{}f} % of its range",
+                          channel.name, channel.values[rest.begin], duration_s,
+                          recording.time_s(rest.begin), other.name, 100.0 * moved,
+                          moved < 0.1 ? 1 : 0),
+              "Did its bus stall? Cut that part out: a model would learn the stall.");
+          leave_out(r, rest);
+          return;
+        }
+      }
+    });
+  });
+}
+
+/// What should move where a channel does; the target goes with the first input rather than with
+/// what that is made of.
+std::vector<Channel> Checker::others_of(std::size_t r, const std::string& name) const {
+  std::vector<Channel> others;
+  for (const std::string& each : channels_)
+    if (each != name) others.push_back(dataset_.records[r].recording.channel(each));
+  if (name == dataset_.target && sources_.size() > 1)
+    others.push_back({.name = spec_.inputs.front(), .values = pairs_[r].input});
+  return others;
+}
+
+/// What a stall tells of the other checks' questions is wrong.
+void Checker::leave_out(std::size_t r, const Rest& rest) {
+  for (std::size_t i = rest.begin; i < std::min(rest.end + 1, pairs_[r].input.size()); ++i)
+    pairs_[r].input[i] = kNotMeasured;
+  stalls_.emplace_back(r, rest);
+}
+
+bool Checker::is_end_of_stall(std::size_t r, std::size_t sample) const {
+  return std::ranges::any_of(stalls_, [&](const auto& stall) {
+    return stall.first == r && sample >= stall.second.end && sample <= stall.second.end + 1;
+  });
+}
+
+// What the first input is made of may move through much more than it does: codes of a gear's angle
+// are to be judged by the deflection.
+void Checker::check_resolution() {
+  const auto unit_of = [](const std::string& name) {
+    const auto parts = split_channel_name(name);
+    return parts ? parts->unit->si_suffix : std::string_view();
+  };
+  pass_unless_found("resolution", "no sensor's codes are coarse", [&] {
+    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+      const Recording& recording = dataset_.records[r].recording;
+      const double first_input = extent_of(pairs_[r].input).width();
+      for (const std::string& name : channels_) {
+        if (is_condition(recording, name) || stands_still(r, name)) continue;
+        const std::vector<double>& values = recording.channel(name).values;
+        double range = extent_of(values).width();
+        if (first_input > 0.0 && unit_of(name) == unit_of(channels_.front()) &&
+            name != dataset_.target)
+          range = std::min(range, first_input);
+        const double code = finest_step(values);
+        if (!(range > 0.0) || code < kCoarseShare * range) continue;
+        add(Verdict::warn, "resolution", recording.name(),
+            fmt::format("{} tells in steps of {:.3g}: {:.0f} of them are all that {} moves through",
+                        name, code, range / code,
+                        range == first_input ? spec_.inputs.front() : name),
+            "Has the sensor lost bits, or its log digits? A model cannot see finer.");
+      }
+    }
+  });
+}
+
+bool Checker::stands_out(const Jump& jump, const std::vector<double>& values) {
+  return jump.height > 0.0 && jump.height >= kJumpShare * extent_of(values).width() &&
+         jump.height >= kJumpOverOthers * jump.next_height;
+}
+
+void Checker::check_gaps() {
+  pass_unless_found("gaps", "no jump", [&] {
+    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+      check_jump_of_input(r);
+      const Recording& recording = dataset_.records[r].recording;
+      for (const std::string& name : channels_) {
+        const Channel& channel = recording.channel(name);
+        if (is_condition(recording, name) || stands_still(r, name)) continue;
+        const std::vector<double> values = bridged(channel);
+        const Jump jump = largest_jump(values);
+        if (!stands_out(jump, values) || is_end_of_stall(r, jump.sample) ||
+            is_sign_flip(r, name, jump) || (spoiled_[r] != 0 && is_source(name)))
+          continue;
+        add(Verdict::warn, "gaps", recording.name(), jump_text(recording, name, jump),
+            "Were samples lost there, or did the sensor slip? Cut the record in two.");
+      }
+    }
+  });
+}
+
+// A step that is small for an angle can be all that the deflection between two of them ever does.
+void Checker::check_jump_of_input(std::size_t r) {
+  const std::vector<double>& input = pairs_[r].input;
+  const Jump jump = largest_jump(input);
+  if (sources_.size() < 2 || !stands_out(jump, input) ||
+      jump.height < kInputJumpShare * extent_of(input).width())
+    return;
+  const Recording& recording = dataset_.records[r].recording;
+  spoiled_[r] = 1;
+  add(Verdict::warn, "gaps", recording.name(),
+      jump_text(recording, spec_.inputs.front(), jump) +
+          fmt::format("; it comes from {}", source_of(recording, jump)),
+      "Did that sensor slip, lose counts or samples, or did a part break? Cut the record in two "
+      "there, and take each part's zero anew.");
+}
+
+std::string Checker::jump_text(const Recording& recording, const std::string& name,
+                               const Jump& jump) {
+  return fmt::format("{} jumps by {:.3g} at t = {:.4g} s, {} anywhere else", name, jump.height,
+                     recording.time_s(jump.sample),
+                     jump.next_height > 0.0
+                         ? fmt::format("{:.0f} times more than", jump.height / jump.next_height)
+                         : "and does not move");
+}
+
+/// The channel that steps most beyond its steps next to a jump of the first input.
+const std::string& Checker::source_of(const Recording& recording, const Jump& jump) const {
+  const auto excess = [&](const std::string& name) {
+    const std::vector<double>& values = recording.channel(name).values;
+    const auto step = [&](std::size_t i) {
+      return i > 0 && i < values.size() ? values[i] - values[i - 1] : 0.0;
+    };
+    return std::abs(step(jump.sample) - 0.5 * (step(jump.sample - 1) + step(jump.sample + 1)));
+  };
+  return *std::ranges::max_element(sources_, {}, excess);
+}
+
+bool Checker::is_source(const std::string& name) const {
+  return std::ranges::find(sources_, name) != sources_.end();
+}
+
+bool Checker::is_sign_flip(std::size_t r, const std::string& name, const Jump& jump) const {
+  const double apart_s =
+      flips_[r]
+          ? std::abs(static_cast<double>(jump.sample) - static_cast<double>(flips_[r]->sample)) /
+                dataset_.sample_rate_Hz()
+          : kNotMeasured;
+  return name == dataset_.target && apart_s < kSameMoment_s;
+}
+
+}  // namespace torsio

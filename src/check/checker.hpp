@@ -1,0 +1,138 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "check/signal_pair.hpp"
+#include "check/torque_relation.hpp"
+#include "torsio/check/check.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// Runs the checks one after the other and collects what they find.
+class Checker {
+ public:
+  Checker(const Dataset& dataset, const FeatureSpec& spec)
+      : dataset_(dataset), spec_(spec), pipeline_(spec, dataset.sample_rate_Hz()) {
+    channels_ = pipeline_.raw_inputs();
+    FeatureSpec first = spec;
+    first.inputs.resize(1);
+    sources_ = FeaturePipeline(first, dataset.sample_rate_Hz()).raw_inputs();
+    channels_.push_back(dataset.target);
+    for (const DatasetRecord& record : dataset.records)
+      pairs_.push_back({first_feature(record.recording, spec),
+                        bridged(record.recording.channel(dataset.target))});
+    spoiled_.resize(pairs_.size());
+  }
+
+  std::vector<Finding> run();
+
+ private:
+  void add(Verdict verdict, std::string check, std::string recording, std::string message,
+           std::string advice = {});
+  void pass_unless_found(const std::string& check, std::string message,
+                         const std::function<void()>& body);
+  template <class Body>
+  void for_each_channel(Body&& body) {
+    for (const DatasetRecord& record : dataset_.records)
+      for (const std::string& channel : channels_)
+        body(record.recording, record.recording.channel(channel));
+  }
+
+  /// As above, without what stands still by design.
+  template <class Body>
+  void for_each_moving_channel(Body&& body) {
+    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+      const Recording& recording = dataset_.records[r].recording;
+      for (const std::string& channel : channels_)
+        if (!stands_still(r, channel)) body(r, recording, recording.channel(channel));
+    }
+  }
+
+  [[nodiscard]] bool stands_still(std::size_t r, const std::string& name) const;
+  [[nodiscard]] static bool is_condition(const Recording& recording, const std::string& channel);
+  void check_length();
+  void check_missing();
+  void check_constant();
+  void check_saturation();
+  [[nodiscard]] static bool approaches_gradually(const Channel& channel, double extreme,
+                                                 const Extent& span);
+  void check_frozen();
+  [[nodiscard]] std::vector<Channel> others_of(std::size_t r, const std::string& name) const;
+  void leave_out(std::size_t r, const Rest& rest);
+  [[nodiscard]] bool is_end_of_stall(std::size_t r, std::size_t sample) const;
+  void check_resolution();
+  void check_units();
+  void report_slope(std::size_t r, double slope, std::size_t usual, double usual_slope,
+                    bool is_majority);
+  [[nodiscard]] static std::size_t usual_slope(const std::vector<double>& slopes);
+  [[nodiscard]] static double ratio_of(double a, double b);
+  [[nodiscard]] bool is_clear(std::size_t r) const;
+  void check_units_within(std::size_t r);
+  void check_sign_flips();
+  [[nodiscard]] static bool stands_out(const Jump& jump, const std::vector<double>& values);
+  void check_gaps();
+  void check_jump_of_input(std::size_t r);
+  [[nodiscard]] static std::string jump_text(const Recording& recording, const std::string& name,
+                                             const Jump& jump);
+  [[nodiscard]] const std::string& source_of(const Recording& recording, const Jump& jump) const;
+  [[nodiscard]] bool is_source(const std::string& name) const;
+  [[nodiscard]] bool is_sign_flip(std::size_t r, const std::string& name, const Jump& jump) const;
+  void check_delay();
+  void check_sign();
+  void report_flip(std::size_t r);
+  [[nodiscard]] std::string flipped_source(const std::vector<double>& values) const;
+  [[nodiscard]] int order_of_difference(std::size_t r) const;
+  void check_change();
+  void check_excitation();
+  void check_offsets();
+  void check_leak();
+  void check_range();
+  [[nodiscard]] bool has_failed() const;
+  static constexpr std::size_t kFewSamples = 100;
+  static constexpr double kSaturatedShare = 0.005;
+  static constexpr double kCodesAtATurn = 2.0;
+  static constexpr double kFrozen_s = 0.2;
+  static constexpr double kFrozenDeliveries = 10.0;
+  static constexpr double kMovedMeanwhile = 0.4;  ///< of another channel's range
+  static constexpr double kTogether = 0.9;        ///< correlation
+  static constexpr double kCoarseShare = 0.02;    ///< of the range: 50 codes
+  static constexpr double kJumpShare = 0.02;
+  static constexpr double kJumpOverOthers = 5.0;
+  static constexpr double kInputJumpShare = 0.05;
+  static constexpr double kSameMoment_s = 0.05;
+  static constexpr double kStandstillShare = 0.02;  ///< of the first input's range
+  static constexpr double kFollows = 0.8;           ///< correlation
+  static constexpr double kOneMotion = 0.99;        ///< correlation
+  static constexpr double kNarrow = 0.5;
+  static constexpr double kSlopeRatio = 5.0;
+  static constexpr double kLongestDelay_s = 0.1;
+  static constexpr double kExplainsLittle =
+      0.2;  ///< of the variance: a fit that leaves more tells no delay
+  static constexpr double kDelayGain = 0.7;  ///< of what is unexplained without shift
+  static constexpr std::size_t kFewReversals = 3;
+  static constexpr double kSpeedHalfWindow_s = 0.05;
+  static constexpr double kSpeedRatio = 2.0;
+  static constexpr double kOffsetShare = 0.05;
+
+  const Dataset& dataset_;
+  const FeatureSpec& spec_;
+  FeaturePipeline pipeline_;
+  std::vector<std::string> channels_;  ///< raw inputs and the target
+  std::vector<std::string> sources_;   ///< what the first input is made of
+  std::vector<Pair> pairs_;
+  std::vector<std::uint8_t> spoiled_;  ///< by record: its relation is known to be wrong
+  std::vector<std::pair<std::size_t, Rest>> stalls_;  ///< record, samples
+  std::vector<std::optional<SignFlip>> flips_;        ///< by record
+  std::vector<Finding> findings_;
+};
+
+}  // namespace torsio

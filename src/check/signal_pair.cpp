@@ -1,0 +1,218 @@
+#include "check/signal_pair.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kHalfWindow_s = 0.005;
+constexpr double kSmallStep = 0.1;
+constexpr std::size_t kEnoughSamples = 20000;
+constexpr std::size_t kJumpNeighbourhood = 3;
+constexpr double kReversalShare = 0.05;
+constexpr double kStandstillShare = 0.05;
+
+}  // namespace
+
+Extent extent_of(const std::vector<double>& values) {
+  Extent extent;
+  for (const double value : values) extent.include(value);
+  return extent;
+}
+
+std::vector<double> bridged(const Channel& channel) {
+  std::vector<double> values(channel.values.size(), kNotMeasured);
+  std::size_t last = values.size();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!channel.is_fresh(i) || !is_finite(channel.values[i])) continue;
+    values[i] = channel.values[i];
+    if (last < i) {
+      const double slope = (values[i] - values[last]) / static_cast<double>(i - last);
+      for (std::size_t j = last + 1; j < i; ++j)
+        values[j] = values[last] + slope * static_cast<double>(j - last);
+    }
+    last = i;
+  }
+  return values;
+}
+
+double correlation(const std::vector<double>& x, const std::vector<double>& y) {
+  double n = 0.0;
+  double sx = 0.0;
+  double sy = 0.0;
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double a = x[i];
+    const double b = y[i];
+    if (!is_finite(a) || !is_finite(b)) continue;
+    n += 1.0, sx += a, sy += b, xx += a * a, xy += a * b, yy += b * b;
+  }
+  const double spread = (n * xx - sx * sx) * (n * yy - sy * sy);
+  return spread > 0.0 ? (n * xy - sx * sy) / std::sqrt(spread) : 0.0;
+}
+
+std::vector<double> movement(const std::vector<double>& values, std::size_t half_window) {
+  std::vector<double> differences(values.size(), kNotMeasured);
+  for (std::size_t i = half_window; i + half_window < values.size(); ++i)
+    differences[i] = values[i + half_window] - values[i - half_window];
+  return differences;
+}
+
+Jump largest_jump(const std::vector<double>& values) {
+  Jump jump;
+  const auto height = [&](std::size_t i) { return std::abs(values[i] - values[i - 1]); };
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (height(i) > jump.height) jump = {.sample = i, .height = height(i)};  // false for NaN
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (i + kJumpNeighbourhood < jump.sample || i > jump.sample + kJumpNeighbourhood)
+      if (height(i) > jump.next_height) jump.next_height = height(i);
+  return jump;
+}
+
+std::vector<Rest> rests_of(const Channel& channel, std::size_t shortest) {
+  std::vector<Rest> rests;
+  Rest rest;
+  const std::size_t size = channel.values.size();
+  for (std::size_t i = 0; i < size; ++i) {
+    rest.end = i + 1;
+    if (rest.end < size && channel.values[rest.end] == channel.values[i]) continue;
+    if (rest.length() >= shortest) rests.push_back(rest);
+    rest.begin = rest.end;
+  }
+  std::ranges::stable_sort(rests, std::greater<>(), &Rest::length);
+  return rests;
+}
+
+double finest_step(const std::vector<double>& values) {
+  double finest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double step = std::abs(values[i] - values[i - 1]);
+    if (step > 0.0) finest = std::min(finest, step);
+  }
+  return std::isfinite(finest) ? finest : 0.0;
+}
+
+double share_fresh(const Channel& channel) {
+  if (channel.fresh.empty()) return 1.0;
+  const auto fresh = std::ranges::count_if(channel.fresh, [](auto mark) { return mark != 0; });
+  return static_cast<double>(fresh) / static_cast<double>(channel.fresh.size());
+}
+
+double share_moved(const Channel& channel, const Rest& meanwhile) {
+  Extent passed;
+  for (std::size_t i = meanwhile.begin; i < meanwhile.end; ++i) passed.include(channel.values[i]);
+  const double whole = extent_of(channel.values).width();
+  return whole > 0.0 ? passed.width() / whole : 0.0;
+}
+
+bool is_odd_one_out(const Rest& rest, const std::vector<Rest>& rests, const Channel& channel,
+                    const Channel& other) {
+  constexpr double kLittle = 0.02;  // of the other's range
+  constexpr double kTogether = 0.9;
+  constexpr double kFewCodes = 5.0;
+  const double moved = share_moved(other, rest);
+  return moved >= kLittle &&
+         moved * extent_of(channel.values).width() >= kFewCodes * finest_step(channel.values) &&
+         std::abs(correlation(channel.values, other.values)) >= kTogether &&
+         std::ranges::none_of(rests, [&](const Rest& each) {
+           return !(each == rest) && 2 * each.length() >= rest.length() &&
+                  2.0 * share_moved(other, each) >= moved;
+         });
+}
+
+Line line_through(const Pair& pair) {
+  Line line;
+  double count = 0.0;
+  double xx = 0.0;
+  double xy = 0.0;
+  for (std::size_t i = 0; i < pair.input.size(); ++i) {
+    if (!is_finite(pair.input[i]) || !is_finite(pair.target[i])) continue;
+    count += 1.0;
+    const double dx = pair.input[i] - line.mean_input;
+    line.mean_input += dx / count;
+    line.mean_target += (pair.target[i] - line.mean_target) / count;
+    xx += dx * (pair.input[i] - line.mean_input);
+    xy += dx * (pair.target[i] - line.mean_target);
+  }
+  if (xx > 0.0) line.slope = xy / xx;
+  return line;
+}
+
+std::size_t count_reversals(const std::vector<double>& values) {
+  const double dead_band = kReversalShare * extent_of(values).width();
+  std::size_t count = 0;
+  double extreme = kNotMeasured;
+  int direction = 0;
+  for (const double value : values) {
+    if (!is_finite(value)) continue;
+    if (!is_finite(extreme)) extreme = value;
+    const double forward = (value - extreme) * (direction == 0 ? 1.0 : direction);
+    if (direction == 0 ? std::abs(forward) > dead_band : forward < -dead_band) {
+      if (direction != 0) ++count;
+      direction = value > extreme ? 1 : -1;
+      extreme = value;
+    } else if (direction != 0 && forward > 0.0) {
+      extreme = value;
+    }
+  }
+  return count;
+}
+
+std::vector<double> typical_speeds(const std::vector<double>& differences) {
+  std::vector<double> speeds;
+  for (const double difference : differences)
+    if (is_finite(difference)) speeds.push_back(std::abs(difference));
+  if (speeds.empty()) return {};
+  const double fastest = *std::ranges::max_element(speeds);
+  std::erase_if(speeds, [&](double speed) { return speed <= kStandstillShare * fastest; });
+  std::ranges::sort(speeds);
+  if (speeds.empty()) return {};
+  return {speeds[speeds.size() / 10], speeds[speeds.size() * 9 / 10]};
+}
+
+ShiftedFit::ShiftedFit(const Pair& pair, double sample_rate_Hz) : pair_(pair) {
+  const auto half_window =
+      static_cast<std::size_t>(std::max(1.0, std::round(kHalfWindow_s * sample_rate_Hz)));
+  direction_ = movement(pair.input, half_window);
+  double sum = 0.0;
+  double count = 0.0;
+  for (const double step : direction_)
+    if (is_finite(step)) sum += step * step, count += 1.0;
+  const double typical = count > 0.0 ? std::sqrt(sum / count) : 1.0;
+  for (double& step : direction_) step = std::tanh(step / (kSmallStep * typical));
+  stride_ =
+      static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, pair.input.size() / kEnoughSamples));
+}
+
+double ShiftedFit::unexplained(std::ptrdiff_t lag) const {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  double sum = 0.0;
+  double square_sum = 0.0;
+  const auto size = static_cast<std::ptrdiff_t>(pair_.input.size());
+  for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, lag); i < std::min(size, size + lag);
+       i += stride_) {
+    const auto now = static_cast<std::size_t>(i);
+    const auto then = static_cast<std::size_t>(i - lag);
+    const Eigen::Vector3d row(1.0, pair_.input[then], direction_[then]);
+    const double y = pair_.target[now];
+    if (!is_finite(y) || !row.allFinite()) continue;
+    normal += row * row.transpose();
+    moment += row * y;
+    sum += y;
+    square_sum += y * y;
+  }
+  const double variance = square_sum - sum * sum / std::max(1.0, normal(0, 0));
+  if (!(variance > 0.0)) return 1.0;
+  const Eigen::Vector3d solution = normal.completeOrthogonalDecomposition().solve(moment);
+  return std::max(0.0, square_sum - solution.dot(moment)) / variance;
+}
+
+}  // namespace torsio

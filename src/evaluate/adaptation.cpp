@@ -1,0 +1,259 @@
+#include "torsio/evaluate/adaptation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "evaluate/fit_and_score.hpp"
+#include "fit/common/guards.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/estimate/adaptive_estimator.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+namespace {
+
+using Kind = OptionInfo::Kind;
+
+constexpr auto kOptions = std::to_array<OptionInfo>({
+    {"step_size", Kind::number, "0.003", 1e-9, 1.999,
+     "nlms: mu, share of an error that is mended; about 1 / samples in a cycle of the work"},
+    {"leak", Kind::number, "1e-5", 0.0, 0.999,
+     "nlms: share of the change that an update takes back"},
+    {"regularisation", Kind::number, "1e-3", 1e-12, 1e12,
+     "nlms: beside the square of the features"},
+    {"forgetting", Kind::number, "0.9995", 0.9, 1.0, "rls: weight of the past at each update"},
+    {"initial_covariance", Kind::number, "0.001", 1e-12, 1e12,
+     "rls: larger learns faster at first"},
+    {"trace_cap", Kind::number, "1", 1.0, 1e12, "rls: how far the covariance may grow"},
+    {"sensor_std", Kind::number, "0", 0.0, 1e12,
+     "noise of the reference, target's unit; errors below dead_zone times that teach nothing"},
+    {"dead_zone", Kind::number, "3", 0.0, 1e6, "see sensor_std"},
+    {"largest_error", Kind::number, "auto", 1e-12, 1e300,
+     "larger ones teach nothing, target's unit; auto: the spread that the network was trained on"},
+    {"frozen_after_s", Kind::number, "0.2", 0.0, 1e6,
+     "a reference that has not changed for so long is stale; 0: it may rest"},
+    {"saturation", Kind::number, "auto", 1e-12, 1e300,
+     "where the reference sensor ends, target's unit; auto: nowhere"},
+    {"largest_change", Kind::number, "0.2", 1e-9, 1e6, "of the weights, as a share of them"},
+    {"comparison_s", Kind::number, "10", 1e-3, 1e6,
+     "back to the frozen weights if they were better over so long; a cycle of the work or more"},
+});
+
+constexpr std::size_t kReportEvery = 64;
+
+/// Errors before each update.
+struct Tally {
+  MetricsAccumulator frozen;
+  MetricsAccumulator adapted;
+
+  [[nodiscard]] AdaptationScore score(std::string recording) const {
+    return {std::move(recording), frozen.metrics(), adapted.metrics()};
+  }
+};
+
+/// One record through the adaptive estimator.
+class Replay {
+ public:
+  Replay(AdaptiveEstimator& adaptive, const DatasetRecord& record, const std::string& target)
+      : adaptive_(adaptive),
+        record_(record),
+        target_(record.recording.channel(target)),
+        raw_(adaptive.raw_inputs().size()) {
+    for (const std::string& input : adaptive.raw_inputs())
+      channels_.push_back(&record.recording.channel(input).values);
+  }
+
+  /// @param frozen what the frozen network says to the same record.
+  void run(const Prediction& frozen, Tally& own, Tally& together, const Progress& progress) {
+    const std::size_t samples = record_.recording.size();
+    const DenormalsOff denormals_off;
+    adaptive_.reset();
+    double age_s = kNotMeasured;
+    for (std::size_t n = 0; n < samples; ++n) {
+      if (n % kReportEvery == 0)
+        report_progress(progress, static_cast<double>(n) / static_cast<double>(samples),
+                        record_.recording.name());
+      age_s = target_.is_fresh(n) ? 0.0 : age_s + 1.0 / record_.recording.sample_rate_Hz();
+      std::ranges::transform(channels_, raw_.begin(),
+                             [n](const std::vector<double>* values) { return (*values)[n]; });
+      const Estimate told = adaptive_.step(raw_);
+      if (!is_lesson(n)) continue;
+      if (told.fault == Fault::none && target_.is_fresh(n))
+        for (Tally* tally : {&own, &together}) {
+          tally->adapted.add(told.value, target_.values[n]);
+          tally->frozen.add(frozen.estimates[n].value, target_.values[n]);
+        }
+      (void)adaptive_.learn({.value = target_.values[n], .age_s = age_s});
+    }
+  }
+
+ private:
+  [[nodiscard]] bool is_lesson(std::size_t sample) const {
+    return std::ranges::any_of(record_.segments, [sample](const Segment& segment) {
+      return segment.role == Role::train && segment.begin <= sample && sample < segment.end;
+    });
+  }
+
+  AdaptiveEstimator& adaptive_;
+  const DatasetRecord& record_;
+  const Channel& target_;
+  std::vector<const std::vector<double>*> channels_;
+  std::vector<double> raw_;
+};
+
+void require_role(const Dataset& dataset, Role role, const char* what, const char* advice) {
+  if (dataset.has_role(role)) return;
+  throw UsageError(
+      {.problem = fmt::format("nothing to {}: no recording has the role {}", what, name(role)),
+       .advice = advice});
+}
+
+[[noreturn]] void refuse_unusable(const AdaptationCounts& counts, const std::string& target) {
+  std::string reasons;
+  for (std::size_t i = 0; i < kLearningOutcomes; ++i)
+    if (counts.outcomes[i] > 0)
+      reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", counts.outcomes[i],
+                             name(static_cast<Learning>(i)));
+  throw Error(
+      {.problem = "not a single sample could be learned from",
+       .expected = fmt::format(
+           "samples with a measured {} after the model has warmed up, inside its range", target),
+       .found = reasons.empty() ? "none at all" : reasons,
+       .advice = "Give longer recordings, or a model that was trained on such ones."});
+}
+
+/// Both networks on what nothing was learned from: each recording, then all of them.
+std::vector<AdaptationScore> held_out_scores(const SplitScore& frozen, const SplitScore& adapted) {
+  std::vector<AdaptationScore> scores;
+  for (std::size_t i = 0; i < frozen.recordings.size(); ++i)
+    scores.push_back({frozen.recordings[i].recording, frozen.recordings[i].score.metrics,
+                      adapted.recordings[i].score.metrics});
+  scores.push_back({"", frozen.together.metrics, adapted.together.metrics});
+  return scores;
+}
+
+void note_adaptation(ModelCard& card, const AdaptationSettings& settings,
+                     const AdaptationCounts& counts, const Dataset& dataset) {
+  const auto note = [&](const std::string& key, auto value) {
+    card.options["adaptation." + key] = fmt::format("{}", value);
+  };
+  const bool is_rls = settings.rule == AdaptationRule::rls;
+  note("method", is_rls ? "rls" : "nlms");
+  note("updates", counts.updates());
+  note("roll_backs", counts.roll_backs);
+  note("largest_change", settings.largest_change);
+  if (is_rls) {
+    note("forgetting", settings.forgetting);
+    note("initial_covariance", settings.initial_covariance);
+  } else {
+    note("step_size", settings.step_size);
+    note("leak", settings.leak);
+  }
+  for (const DatasetRecord& record : dataset.records)
+    if (record.has_role(Role::train) &&
+        std::ranges::find(card.training_files, record.recording.source) ==
+            card.training_files.end())
+      card.training_files.push_back(record.recording.source);
+}
+
+}  // namespace
+
+std::span<const OptionInfo> adaptation_options() noexcept { return kOptions; }
+
+AdaptationSettings adaptation_settings(const std::string& method,
+                                       const std::map<std::string, std::string>& given) {
+  if (method != "nlms" && method != "rls")
+    throw UsageError(
+        {.place = "adaptation method", .expected = "nlms or rls", .found = '"' + method + '"'});
+  const Options options(kOptions, given);
+  return {.rule = method == "rls" ? AdaptationRule::rls : AdaptationRule::nlms,
+          .step_size = options.number("step_size"),
+          .leak = options.number("leak"),
+          .regularisation = options.number("regularisation"),
+          .forgetting = options.number("forgetting"),
+          .initial_covariance = options.number("initial_covariance"),
+          .trace_cap = options.number("trace_cap"),
+          .sensor_std = options.number("sensor_std"),
+          .dead_zone = options.number("dead_zone"),
+          .largest_error = options.number("largest_error"),
+          .frozen_after_s = options.number("frozen_after_s"),
+          .saturation = options.number("saturation"),
+          .largest_change = options.number("largest_change"),
+          .comparison_s = options.number("comparison_s")};
+}
+
+AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
+                         const AdaptationSettings& settings, const Progress& progress) {
+  dataset.check();
+  refuse_seen_test_records(dataset);
+  const Estimator frozen = estimator_at(model, dataset.sample_rate_Hz());
+  AdaptiveEstimator adaptive(frozen.settings(), model.parameters, settings);
+  require_role(dataset, Role::train, "adapt to", "Name recordings to learn from.");
+  require_role(dataset, Role::test, "score on", "Name held-out recordings with --test.");
+  for (const std::string& channel : frozen.settings().zeroed_channels)
+    adaptive.set_zero(channel, 0.0);  // a loaded recording had its own subtracted already
+  AdaptedModel adapted{.file = model};
+  Tally together;
+  const std::size_t parts = dataset.records.size() + 2;
+  for (std::size_t i = 0; i < dataset.records.size(); ++i) {
+    const DatasetRecord& record = dataset.records[i];
+    if (!record.has_role(Role::train)) continue;
+    Tally own;
+    const Prediction told = predict(frozen, record.recording);
+    Replay(adaptive, record, dataset.target)
+        .run(told, own, together, part_of(progress, i, parts, "adapting"));
+    adapted.as_it_ran.push_back(own.score(record.recording.name()));
+  }
+  adapted.as_it_ran.push_back(together.score(""));
+  adapted.counts = adaptive.adapter().counts();
+  if (adapted.as_it_ran.back().adapted.samples == 0)
+    refuse_unusable(adapted.counts, dataset.target);
+  adapted.relative_change = adaptive.adapter().relative_change();
+  adapted.file.parameters = adaptive.adapted();
+  note_adaptation(adapted.file.card, settings, adapted.counts, dataset);
+
+  const TrainingData lessons = training_data(dataset, model.settings.features, Role::train);
+  ResidualTable residuals = residual_table(AnyModel(adapted.file.parameters), lessons);
+  if (!residuals.std_dev.empty()) adapted.file.settings.residuals = std::move(residuals);
+  const SplitScore before =
+      evaluate(frozen, dataset, Role::test, part_of(progress, parts - 2, parts, "frozen"));
+  const SplitScore after = evaluate(estimator_at(adapted.file, dataset.sample_rate_Hz()), dataset,
+                                    Role::test, part_of(progress, parts - 1, parts, "adapted"));
+  if (after.together.metrics.samples == 0)
+    throw Error({.problem = "not a single held-out sample could be scored",
+                 .advice = "Hold out more: --test recordings, or a larger --held-out share."});
+  adapted.held_out = held_out_scores(before, after);
+  note_held_out_scores(adapted.file.card, {{.family = {}, .score = after.together}});
+  return adapted;
+}
+
+void hold_out_ends(Dataset& dataset, double share, double embargo_s) {
+  if (!(share > 0.0 && share < 1.0))
+    throw UsageError({.place = "--held-out",
+                      .expected = "a share between 0 and 1",
+                      .found = fmt::format("{}", share)});
+  for (DatasetRecord& record : dataset.records) {
+    const Recording& recording = record.recording;
+    if (record.segments != whole_record(recording.size(), Role::train))
+      throw UsageError({.place = recording.name(),
+                        .problem = "its manifest gives it roles, but none to be scored on",
+                        .advice = "Give records the role test there, or name them with --test."});
+    const auto embargo =
+        static_cast<std::size_t>(std::llround(embargo_s * recording.sample_rate_Hz()));
+    try {
+      record.segments = contiguous_blocks(recording.size(), 1.0 - share, embargo);
+    } catch (const Error& error) {
+      ErrorReport report = error.report();
+      report.place = recording.name();
+      report.advice = "Give longer recordings, or whole ones to be scored on: --test.";
+      throw Error(std::move(report));
+    }
+  }
+}
+
+}  // namespace torsio

@@ -1,0 +1,186 @@
+#include "torsio/evaluate/comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <limits>
+#include <set>
+
+#include "evaluate/fit_and_score.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/families.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kRoles = std::to_array<Role>({Role::train, Role::validation, Role::test});
+
+struct FamilyChoice {
+  std::string family;
+  std::map<std::string, std::string> options;
+  bool operator==(const FamilyChoice&) const = default;
+};
+
+/// "polynomial:degree=7:branch=true" -> family and settings.
+FamilyChoice parse_choice(std::string_view text) {
+  FamilyChoice choice;
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find(':', begin), text.size());
+    const std::string_view part = text.substr(begin, end - begin);
+    if (begin == 0) {
+      choice.family = find_family(part).name;
+    } else {
+      const std::size_t equals = part.find('=');
+      if (equals == std::string_view::npos)
+        throw UsageError({.place = "--models",
+                          .expected = "option=value behind a colon",
+                          .found = std::string(part)});
+      choice.options.emplace(part.substr(0, equals), part.substr(equals + 1));
+    }
+    begin = end + 1;
+  }
+  (void)Options(find_family(choice.family).options,
+                choice.options);  // refuses unknown settings before any work is done
+  return choice;
+}
+
+/// A condition among the inputs that takes more than one value in training: parameters may be
+/// interpolated over it.
+std::string schedulable_condition(const Dataset& dataset, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::set<double> values;
+    for (const DatasetRecord& record : dataset.records) {
+      const auto& conditions = record.recording.conditions();
+      if (std::ranges::find(conditions, input) == conditions.end()) continue;
+      if (record.has_role(Role::train))
+        values.insert(record.recording.channel(input).values.front());
+    }
+    if (values.size() > 1) return input;
+  }
+  return {};
+}
+
+bool is_on_by_default(const FamilyInfo& family, std::string_view option) {
+  return std::ranges::any_of(family.options, [&](const OptionInfo& known) {
+    return known.name == option && known.default_value == "true";
+  });
+}
+
+/// Every family as it comes, without its branches by direction, and scheduled over a condition
+/// where the data have one.
+std::vector<FamilyChoice> all_choices(const Dataset& dataset,
+                                      const std::vector<std::string>& inputs) {
+  const std::string condition = schedulable_condition(dataset, inputs);
+  std::vector<FamilyChoice> choices;
+  for (const FamilyInfo& family : families()) {
+    if (family.only_if_named) continue;
+    const std::string family_name(family.name);
+    choices.push_back({family_name, {}});
+    if (is_on_by_default(family, "branch")) choices.push_back({family_name, {{"branch", "false"}}});
+    if (!condition.empty() && has_option(family, "schedule"))
+      choices.push_back({family_name, {{"schedule", condition}}});
+  }
+  return choices;
+}
+
+const ResultRow* whole_split(const std::vector<ResultRow>& rows, Role role) {
+  for (const ResultRow& row : rows)
+    if (row.split == role && !row.recording && row.status == "ok") return &row;
+  return nullptr;
+}
+
+}  // namespace
+
+std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view models,
+                                       const std::vector<std::string>& wanted_inputs) {
+  auto input_sets = dataset.input_sets;
+  if (!wanted_inputs.empty() || input_sets.empty()) input_sets = {{"", wanted_inputs}};
+  if (models.empty())
+    throw UsageError({.place = "--models",
+                      .expected = "all, or families separated by commas",
+                      .found = "nothing"});
+  std::vector<ModelChoice> choices;
+  for (const auto& [set_name, inputs] : input_sets) {
+    const FeatureSpec features = resolve_inputs(dataset, inputs);
+    std::vector<FamilyChoice> wanted;
+    for (const std::string& model : split_inputs(models)) {
+      const auto meant = model == "all" ? all_choices(dataset, features.inputs)
+                                        : std::vector<FamilyChoice>{parse_choice(model)};
+      for (const FamilyChoice& choice : meant)
+        if (std::ranges::find(wanted, choice) == wanted.end()) wanted.push_back(choice);
+    }
+    for (FamilyChoice& choice : wanted)
+      choices.push_back({std::move(choice.family), std::move(choice.options), set_name, features});
+  }
+  return choices;
+}
+
+Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
+                   std::uint64_t seed, bool allow_leak, const Progress& progress) {
+  dataset.check();
+  refuse_seen_test_records(dataset);
+  if (!dataset.has_role(Role::test))
+    throw UsageError(
+        {.problem = "nothing to compare on: no recording has the role test",
+         .advice =
+             "Name held-out recordings with --test, or give them `role: test` in a manifest."});
+  Comparison comparison{.results = empty_results(dataset), .best = {}};
+  Results& results = comparison.results;
+  const Role judge = dataset.has_role(Role::validation) ? Role::validation : Role::test;
+  double best_rmse = std::numeric_limits<double>::infinity();
+  InputSets input_sets(dataset, allow_leak);
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    const ModelChoice& choice = choices[i];
+    note_inputs(results, choice);
+    const Progress part = part_of(progress, i, choices.size(), choice.family);
+    ScoredModel scored = fit_and_score(dataset, input_sets, choice, seed, kRoles, part);
+    const ResultRow* judged = whole_split(scored.rows, judge);
+    if (judged != nullptr && judged->score.metrics.rmse < best_rmse) {
+      best_rmse = judged->score.metrics.rmse;
+      ModelCard& card = scored.trained->file.card;
+      note_held_out_scores(card, scored.rows);
+      if (judge == Role::test)
+        card.held_out += fmt::format("; this score chose the model among {}", choices.size());
+      comparison.best = std::move(scored.trained);
+    }
+    std::ranges::move(scored.rows, std::back_inserter(results.rows));
+  }
+  forget_only_set(results);
+  return comparison;
+}
+
+Estimator estimator_at(const ModelFile& file, double sample_rate_Hz) {
+  ModelFile resampled = file;
+  resampled.settings.sample_rate_Hz = sample_rate_Hz;
+  return make_estimator(resampled);
+}
+
+Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Progress& progress) {
+  dataset.check();
+  Results results = empty_results(dataset);
+  results.inputs = file.settings.features.inputs;
+  const Estimator estimator = estimator_at(file, dataset.sample_rate_Hz());
+  results.rows = rows_for(file, estimator, dataset, kRoles, progress);
+  return results;
+}
+
+void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows) {
+  for (const Role role : {Role::test, Role::validation}) {
+    const ResultRow* row = whole_split(rows, role);
+    if (row == nullptr) continue;
+    const Metrics& metrics = row->score.metrics;
+    card.held_out = fmt::format("{} {} samples, free run", metrics.samples, name(role));
+    card.metrics = {{"rmse", metrics.rmse},
+                    {"mad", metrics.mad},
+                    {"std_abs", metrics.std_abs},
+                    {"max_abs", metrics.max_abs},
+                    {"fit_percent", metrics.fit_percent}};
+    return;
+  }
+}
+
+}  // namespace torsio

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/evaluate/results.hpp"
+#include "torsio/fit/train_model.hpp"
+
+// What `compare` and `crossvalidate` do with each model.
+namespace torsio {
+
+/// The data of one input set after another, made once for all models that share it: those stand
+/// next to each other in a list of choices.
+class InputSets {
+ public:
+  /// @param dataset must outlive this.
+  InputSets(const Dataset& dataset, bool allow_leak);
+
+  /// An input that the target was computed from, or empty. @throws UsageError as `refuse_leak`.
+  const std::string& leak_of(const FeatureSpec& features);
+  /// @throws Error as `learning_data`, each time again.
+  const LearningData& data_of(const FeatureSpec& features);
+  /// The dataset's segments were changed: a leak stays one, the data are made anew.
+  void forget_data() noexcept { data_.reset(); }
+
+ private:
+  const Dataset& dataset_;
+  bool allow_leak_;
+  std::optional<FeatureSpec> leak_features_;
+  std::string leak_;
+  FeatureSpec data_features_;
+  std::optional<LearningData> data_;
+};
+
+struct ScoredModel {
+  std::optional<TrainedModel> trained;  ///< none if the fit failed
+  std::vector<ResultRow> rows;
+};
+
+/// Trains a choice and scores it on `roles`. A fit that fails is one row that says why.
+/// @throws UsageError for a wrong setting or a leak that is not allowed, Cancelled.
+[[nodiscard]] ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets,
+                                        const ModelChoice& choice, std::uint64_t seed,
+                                        std::span<const Role> roles, const Progress& progress);
+
+/// The rows of one model: on each role, on each recording and on all of the role together.
+[[nodiscard]] std::vector<ResultRow> rows_for(const ModelFile& file, const Estimator& estimator,
+                                              const Dataset& dataset, std::span<const Role> roles,
+                                              const Progress& progress);
+
+/// What results say before there is a row.
+[[nodiscard]] Results empty_results(const Dataset& dataset);
+/// Enters the inputs of a choice, unless its input set is known already.
+void note_inputs(Results& results, const ModelChoice& choice);
+/// One input set without a name is none.
+void forget_only_set(Results& results);
+
+/// A file that is both trained and tested on would make every score a lie. (Blocks of one record are
+/// another matter.) @throws UsageError naming it.
+void refuse_seen_test_records(const Dataset& dataset);
+
+/// The share of work `index` of `count` in the whole work's progress. `progress` must outlive it.
+[[nodiscard]] Progress part_of(const Progress& progress, std::size_t index, std::size_t count,
+                               const std::string& doing);
+
+}  // namespace torsio

@@ -1,0 +1,145 @@
+#include "fit/common/guards.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "fit/common/model_run.hpp"
+#include "numerics/least_squares.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Residual {
+  double value = 0.0;  ///< what the model said
+  double error = 0.0;
+};
+
+std::vector<Residual> residuals(AnyModel& model, const TrainingData& data) {
+  std::vector<Residual> all;
+  for (const Sequence& sequence : data.sequences) {
+    const std::vector<Estimate> told = run(model, sequence);
+    for (std::size_t n = 0; n < told.size(); ++n)
+      if (sequence.use[n] != 0 && std::isfinite(told[n].value) && told[n].fault == Fault::none)
+        all.push_back({told[n].value, told[n].value - sequence.target[n]});
+  }
+  return all;
+}
+
+/// Where the region that ends before `end` ends, above all of its outputs but the last.
+double edge_at(const std::vector<Residual>& sorted, std::size_t end) {
+  if (end == sorted.size()) return sorted.back().value;
+  if (sorted[end].value < sorted.back().value) return sorted[end].value;
+  // What follows is one output: half way, for a region has a width.
+  return std::midpoint(sorted[end - 1].value, sorted[end].value);
+}
+
+/// An equation of motion holds beyond the forces that it was fitted to, and a straight line from force to
+/// displacement nowhere: the guard leaves such a model as much room again on either side.
+void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
+  if (!model.traits().extrapolates) return;
+  for (std::size_t j = 0; j < ranges.lowest.size(); ++j) {
+    const double width = ranges.highest[j] - ranges.lowest[j];
+    ranges.lowest[j] -= width;
+    ranges.highest[j] += width;
+  }
+}
+
+/// To a root mean square of `rmse` over its regions, which hold about equally many samples.
+void widen_to(ResidualTable& table, double rmse) {
+  double sum = 0.0;
+  for (const double std_dev : table.std_dev) sum += std_dev * std_dev;
+  const double usual = std::sqrt(sum / static_cast<double>(table.std_dev.size()));
+  if (!(rmse > usual)) return;
+  for (double& std_dev : table.std_dev) std_dev *= rmse / usual;
+}
+
+}  // namespace
+
+FeatureRanges feature_ranges(const TrainingData& data) {
+  FeatureRanges ranges;
+  ranges.lowest.assign(data.input_count(), kInfinity);
+  ranges.highest.assign(data.input_count(), -kInfinity);
+  const Matrix features = usable_table(data).features;
+  for (std::size_t n = 0; n < features.rows; ++n) {
+    for (std::size_t j = 0; j < features.columns; ++j) {
+      ranges.lowest[j] = std::min(ranges.lowest[j], features(n, j));
+      ranges.highest[j] = std::max(ranges.highest[j], features(n, j));
+    }
+  }
+  return ranges;
+}
+
+LinearFallback linear_fallback(const TrainingData& data) {
+  const Table table = usable_table(data);
+  // The columns of rates stay 0, so that least squares drops them.
+  Matrix design(table.features.rows, 1 + data.input_count());
+  for (std::size_t n = 0; n < design.rows; ++n) {
+    design(n, 0) = 1.0;
+    for (std::size_t j = 0; j < data.input_count(); ++j)
+      if (!data.inputs[j].is_rate) design(n, 1 + j) = table.features(n, j);
+  }
+  const LeastSquares solved = least_squares(design, table.target);
+  LinearFallback fallback;
+  fallback.intercept = solved.coefficients.front();
+  fallback.slope.assign(solved.coefficients.begin() + 1, solved.coefficients.end());
+  double square_sum = 0.0;
+  for (std::size_t n = 0; n < design.rows; ++n) {
+    double error = -table.target[n];
+    for (std::size_t j = 0; j < design.columns; ++j) error += design(n, j) * solved.coefficients[j];
+    square_sum += error * error;
+  }
+  const std::size_t terms = design.columns - solved.dropped.size();
+  if (design.rows > terms)
+    fallback.residual_std = std::sqrt(square_sum / static_cast<double>(design.rows - terms));
+  return fallback;
+}
+
+ResidualTable residual_table(AnyModel model, const TrainingData& data) {
+  std::vector<Residual> all = residuals(model, data);
+  const std::size_t regions = std::min(all.size() / kResidualsPerRegion, kMostResidualRegions);
+  if (regions == 0) return {};
+  std::ranges::stable_sort(all, {}, &Residual::value);
+  if (!(all.front().value < all.back().value)) return {};  // one output: no regions
+  ResidualTable table;
+  table.edges.push_back(all.front().value);
+  std::size_t begin = 0;
+  for (std::size_t region = 1; region <= regions; ++region) {
+    std::size_t end = all.size() * region / regions;
+    // Equal outputs stay in one region, so that edges ascend.
+    while (end < all.size() && all[end].value == all[end - 1].value) ++end;
+    if (end < begin + kResidualsPerRegion) continue;
+    if (all.size() - end < kResidualsPerRegion) end = all.size();
+    double square_sum = 0.0;
+    for (std::size_t n = begin; n < end; ++n) square_sum += all[n].error * all[n].error;
+    const double rms = std::sqrt(square_sum / static_cast<double>(end - begin));
+    table.edges.push_back(edge_at(all, end));
+    // Never 0, which would claim certainty: a model may meet its training data exactly.
+    table.std_dev.push_back(std::max(rms, std::numeric_limits<double>::min()));
+    begin = end;
+    if (begin == all.size()) break;
+  }
+  return table;
+}
+
+EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingData& training,
+                                   const AnyModel& model, const TrainingData* validation,
+                                   double held_out_rmse) {
+  EstimatorSettings settings;
+  settings.features = features;
+  settings.sample_rate_Hz = training.sample_rate_Hz;
+  settings.target = training.target;
+  settings.ranges = feature_ranges(training);
+  widen_for_physics(settings.ranges, model);
+  settings.fallback = linear_fallback(training);
+  settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
+  if (validation == nullptr) widen_to(settings.residuals, held_out_rmse);
+  return settings;
+}
+
+}  // namespace torsio

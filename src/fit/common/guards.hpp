@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+
+#include "torsio/core/not_measured.hpp"
+#include "torsio/estimate/estimator_settings.hpp"
+#include "torsio/fit/common/training_data.hpp"
+#include "torsio/model/any_model.hpp"
+
+namespace torsio {
+
+/// The range of each input over the usable samples.
+[[nodiscard]] FeatureRanges feature_ranges(const TrainingData& data);
+
+/// Least squares of the target on all inputs that are no rates: tasks reach rates that no training
+/// record has, and a slope there extrapolates without bound (docs/decisions/0004). Rates, and
+/// inputs that are constant or depend linearly on those before them, have slope 0. `residual_std`
+/// is sqrt(sum e^2 / (samples - terms)).
+[[nodiscard]] LinearFallback linear_fallback(const TrainingData& data);
+
+inline constexpr std::size_t kResidualsPerRegion = 50;
+inline constexpr std::size_t kMostResidualRegions = 16;
+
+/// Root mean square of the model's residuals by region of its own output: up to 16 regions of equal
+/// sample count, at least 50 samples each. It is the spread about 0, not about the region's mean: a
+/// model that is biased there is wrong by that too. Each sequence runs through the model from a
+/// reset, as in the loop. Empty where there are fewer than 50 samples.
+[[nodiscard]] ResidualTable residual_table(AnyModel model, const TrainingData& data);
+
+/// What goes around a fitted model into its file. The residual table is from `validation` where
+/// given (training residuals are too small for a model with many parameters). Else it is from training,
+/// widened as a whole to `held_out_rmse` where the fit knows that and it is larger. `zeroed_channels`
+/// are left to the caller, who knows the recordings.
+[[nodiscard]] EstimatorSettings guarded_settings(const FeatureSpec& features,
+                                                 const TrainingData& training,
+                                                 const AnyModel& model,
+                                                 const TrainingData* validation = nullptr,
+                                                 double held_out_rmse = kNotMeasured);
+
+}  // namespace torsio

@@ -1,0 +1,264 @@
+#include "torsio/fit/common/inputs.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "data/canonical_channels.hpp"
+#include "numerics/least_squares.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kDefaultInputs = std::to_array<const char*>({
+    "spring_deflection_rad",
+    "lowpass(spring_deflection_rate_rad_s, 10Hz)",
+    "lowpass(joint_speed_rad_s, 10Hz)",
+});
+
+bool defines(const std::vector<ChannelDefinition>& definitions, std::string_view name) {
+  return std::ranges::any_of(definitions,
+                             [&](const ChannelDefinition& known) { return known.name == name; });
+}
+
+bool every_record_has(const Dataset& dataset, std::string_view channel) {
+  return std::ranges::all_of(
+      dataset.records, [&](const DatasetRecord& record) { return record.recording.has(channel); });
+}
+
+/// Whether `expression` can be computed from recorded channels and `definitions`.
+bool is_computable(const Dataset& dataset, const std::vector<ChannelDefinition>& definitions,
+                   std::string_view expression) {
+  return std::ranges::all_of(channels_of(expression), [&](const std::string& channel) {
+    return every_record_has(dataset, channel) || defines(definitions, channel);
+  });
+}
+
+/// A name must mean the same in every record.
+void refuse_conflicts(const Dataset& dataset) {
+  std::map<std::string, std::pair<std::string, std::string>> met;  // name: expression, record
+  for (const DatasetRecord& record : dataset.records)
+    for (const ChannelDefinition& definition : record.recording.definitions) {
+      const auto& [expression, first] =
+          met.try_emplace(definition.name, definition.expression, record.recording.name())
+              .first->second;
+      if (expression != definition.expression)
+        throw Error({.place = record.recording.name() + ": " + definition.name,
+                     .problem = "the recordings define this channel differently",
+                     .expected = fmt::format("{}, as in {}", expression, first),
+                     .found = definition.expression,
+                     .advice = "Give both the same derive: in their mappings, or two names."});
+    }
+}
+
+/// The mapping's definitions whose sources are still there, then the canonical channels that nobody
+/// recorded.
+std::vector<ChannelDefinition> known_definitions(const Dataset& dataset) {
+  refuse_conflicts(dataset);
+  std::vector<ChannelDefinition> definitions;
+  for (const ChannelDefinition& definition : dataset.records.front().recording.definitions)
+    if (is_computable(dataset, definitions, definition.expression))
+      definitions.push_back(definition);
+  for (const CanonicalChannel& channel : kCanonicalChannels)
+    if (!defines(definitions, channel.name) && !every_record_has(dataset, channel.name) &&
+        is_computable(dataset, definitions, channel.expression))
+      definitions.push_back({std::string(channel.name), std::string(channel.expression)});
+  return definitions;
+}
+
+std::vector<std::string> channel_names(const Recording& recording) {
+  std::vector<std::string> names;
+  for (const Channel& channel : recording.channels()) names.push_back(channel.name);
+  return names;
+}
+
+/// Keeps the definitions that `inputs` reach, directly or through another definition.
+std::vector<ChannelDefinition> needed_definitions(const std::vector<ChannelDefinition>& definitions,
+                                                  const std::vector<std::string>& inputs) {
+  std::vector<std::string> wanted;
+  for (const std::string& input : inputs)
+    std::ranges::copy(channels_of(input), std::back_inserter(wanted));
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    for (const ChannelDefinition& definition : definitions)
+      if (definition.name == wanted[i])
+        for (std::string& channel : channels_of(definition.expression))
+          if (std::ranges::find(wanted, channel) == wanted.end())
+            wanted.push_back(std::move(channel));
+  std::vector<ChannelDefinition> needed;
+  std::ranges::copy_if(definitions, std::back_inserter(needed),
+                       [&](const ChannelDefinition& definition) {
+                         return std::ranges::find(wanted, definition.name) != wanted.end();
+                       });
+  return needed;
+}
+
+/// Whether target = slope * input + offset to one part in 10^9 of the variance, over all fresh
+/// samples: no sensor is that good.
+bool is_straight_line(const Dataset& dataset, const std::string& input) {
+  double n = 0.0;
+  double mean_x = 0.0;
+  double mean_y = 0.0;
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+  for (const DatasetRecord& record : dataset.records) {
+    const Channel& target = record.recording.channel(dataset.target);
+    const std::vector<double>& x_values = record.recording.channel(input).values;
+    for (std::size_t i = 0; i < x_values.size(); ++i) {
+      const double x = x_values[i];
+      const double y = target.values[i];
+      if (!target.is_fresh(i) || !std::isfinite(x) || !std::isfinite(y)) continue;
+      n += 1.0;
+      const double dx = x - mean_x;
+      const double dy = y - mean_y;
+      mean_x += dx / n;
+      mean_y += dy / n;
+      xx += dx * (x - mean_x);
+      xy += dx * (y - mean_y);
+      yy += dy * (y - mean_y);
+    }
+  }
+  constexpr double kUnexplained = 1e-9;
+  return n > 2.0 && xx > 0.0 && yy > 0.0 && yy - xy * xy / xx < kUnexplained * yy;
+}
+
+/// Whether the inputs together give the target in the same way: each source of a difference of two
+/// sensors is innocent alone.
+bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
+  constexpr std::size_t kEnough = 2000;  // samples a record
+  constexpr double kUnexplained = 1e-9;
+  std::vector<double> rows;
+  std::vector<double> measured;
+  for (const DatasetRecord& record : dataset.records) {
+    const Recording& recording = record.recording;
+    const Channel& target = recording.channel(dataset.target);
+    FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
+    std::vector<const std::vector<double>*> channels;
+    for (const std::string& input : pipeline.raw_inputs())
+      channels.push_back(&recording.channel(input).values);
+    std::vector<double> raw(channels.size());
+    const std::size_t stride = recording.size() / kEnough + 1;
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[i];
+      if (!std::ranges::all_of(raw, [](double value) { return std::isfinite(value); })) continue;
+      const std::span<const double> features = pipeline.step(raw);
+      if (i % stride != 0 || !target.is_fresh(i) || !std::isfinite(target.values[i])) continue;
+      rows.push_back(1.0);
+      rows.insert(rows.end(), features.begin(), features.end());
+      measured.push_back(target.values[i]);
+    }
+  }
+  Matrix design(measured.size(), spec.inputs.size() + 1);
+  if (design.rows <= design.columns) return false;
+  design.values = std::move(rows);
+  const std::vector<double> plane = least_squares(design, measured).coefficients;
+  double mean = 0.0;
+  for (const double value : measured) mean += value / static_cast<double>(measured.size());
+  double total = 0.0;
+  double missed = 0.0;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    double said = 0.0;
+    for (std::size_t j = 0; j < plane.size(); ++j) said += plane[j] * design(i, j);
+    missed += (measured[i] - said) * (measured[i] - said);
+    total += (measured[i] - mean) * (measured[i] - mean);
+  }
+  return missed < kUnexplained * total;
+}
+
+/// Runs `parse`; here it is the caller who wrote the expressions.
+template <class Parse>
+auto as_asked(const Parse& parse) {
+  try {
+    return parse();
+  } catch (const Error& error) {
+    throw UsageError(error.report());
+  }
+}
+
+}  // namespace
+
+FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string>& wanted) {
+  if (dataset.records.empty()) throw Error({.problem = "the dataset has no recordings"});
+  const std::vector<ChannelDefinition> definitions = known_definitions(dataset);
+  std::vector<std::string> inputs = wanted;
+  if (inputs.empty() && !dataset.input_sets.empty()) inputs = dataset.input_sets.front().second;
+  if (inputs.empty() && is_computable(dataset, definitions, kDefaultInputs[0])) {
+    for (const char* input : kDefaultInputs)
+      if (is_computable(dataset, definitions, input)) inputs.emplace_back(input);
+  }
+  const Recording& first = dataset.records.front().recording;
+  if (inputs.empty())
+    throw UsageError({.place = first.name(),
+                      .expected = "spring_deflection_rad, or gear_angle_rad and joint_angle_rad",
+                      .found = fmt::format("{}", fmt::join(channel_names(first), ", ")),
+                      .advice =
+                          "Name the model's inputs with --inputs, or bring the deflection in with "
+                          "--mapping: derive or rename it there."});
+  FeatureSpec spec = as_asked([&] {
+    return FeatureSpec{inputs, needed_definitions(definitions, inputs)};
+  });
+  const FeaturePipeline pipeline =
+      as_asked([&] { return FeaturePipeline(spec, dataset.sample_rate_Hz()); });
+  for (const std::string& channel : pipeline.raw_inputs())
+    for (const DatasetRecord& record : dataset.records)
+      if (!record.recording.has(channel))
+        throw UsageError(
+            {.place = record.recording.name(),
+             .expected = "the channel " + channel + ", which an input needs",
+             .found = fmt::format("{}", fmt::join(channel_names(record.recording), ", ")),
+             .advice = "Choose other --inputs, or bring the channel in with --mapping."});
+  if (std::ranges::find(pipeline.raw_inputs(), dataset.target) != pipeline.raw_inputs().end())
+    throw UsageError(
+        {.problem = "the target " + dataset.target + " is among the inputs of the model",
+         .advice = "A model that is given its answer learns nothing: choose other --inputs."});
+  return spec;
+}
+
+std::vector<double> first_feature(const Recording& recording, const FeatureSpec& spec) {
+  FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
+  std::vector<const std::vector<double>*> raw_channels;
+  for (const std::string& input : pipeline.raw_inputs())
+    raw_channels.push_back(&recording.channel(input).values);
+  std::vector<double> raw(raw_channels.size());
+  std::vector<double> values(recording.size(), kNotMeasured);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*raw_channels[j])[i];
+    if (std::ranges::all_of(raw, [](double value) { return std::isfinite(value); }))
+      values[i] = pipeline.step(raw).front();
+  }
+  return values;
+}
+
+std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
+  const FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
+  for (const std::string& input : pipeline.raw_inputs())
+    if (input.starts_with(kTruthPrefix) ||
+        std::ranges::find(dataset.target_computed_from, input) !=
+            dataset.target_computed_from.end() ||
+        is_straight_line(dataset, input))
+      return input;
+  if (is_plane(dataset, spec)) return fmt::format("{}", fmt::join(spec.inputs, ", "));
+  return {};
+}
+
+std::string refuse_leak(const Dataset& dataset, const FeatureSpec& spec, bool allow_leak) {
+  std::string leak = find_leak(dataset, spec);
+  if (!leak.empty() && !allow_leak)
+    throw UsageError({.place = leak,
+                      .problem = leak.starts_with(kTruthPrefix)
+                                     ? "no sensor sees this channel of a simulation"
+                                     : dataset.target + " was computed from this input: a model "
+                                                        "would learn the formula",
+                      .advice = "Leave it out of --inputs, or accept rows that are marked as leaks "
+                                "with --allow-leak."});
+  return leak;
+}
+
+}  // namespace torsio

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "torsio/core/error.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+
+/// Below this, spreads and errors of a flexible model mean nothing.
+inline constexpr std::size_t kLeastSamples = 10;
+
+/// @throws Error for fewer samples that may be learned from.
+inline void require_samples(const TrainingData& data) {
+  if (data.usable_samples() >= kLeastSamples) return;
+  throw Error({.problem = "too few training samples",
+               .expected = "at least " + std::to_string(kLeastSamples),
+               .found = std::to_string(data.usable_samples())});
+}
+
+}  // namespace torsio

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "model/gaussian_process/gaussian_process.hpp"
+#include "torsio/fit/common/fit_context.hpp"
+#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+
+struct GaussianProcessOptions {
+  std::string kernel = "linear_ard+matern52_ard";  ///< see `parse_kernel`
+  std::size_t samples = 500;  ///< at most so many training samples, drawn by chance; 0: all
+  std::size_t restarts = 3;   ///< of the search for the kernel's numbers, besides the first start
+  std::size_t iterations = 100;  ///< of one search, at most; 0: the numbers of the start
+  bool std_dev = true;           ///< know the error bar in every step, at N^2 / 2 operations
+};
+
+/// Fits an exact Gaussian process: standardises, draws `samples` usable samples, and finds kernel and
+/// noise by the largest marginal likelihood (L-BFGS with analytic gradients), from several starts on
+/// at most `kSearchedSamples` of them and from the best of these on all. The notes hold the kernel
+/// found, the likelihood and the scores of leaving one sample out.
+///
+/// Source: Rasmussen and Williams 2006, chapters 2 and 5. Deterministic for a seed. Memory
+/// 16 N^2 bytes, time N^3 operations an iteration.
+/// @throws UsageError if the kernel's text is none, or more samples are to have an error bar than
+/// `GaussianProcess` takes; Error if N samples do not fit into the memory (with the number that
+/// does) or no start gives a matrix with a factor; Cancelled.
+[[nodiscard]] Fitted<GaussianProcess> fit_gaussian_process(const TrainingData& data,
+                                                           const GaussianProcessOptions& options,
+                                                           const FitContext& context = {});
+inline constexpr std::size_t kSearchedSamples = 300;
+
+}  // namespace torsio

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "model/grey_box/grey_box.hpp"
+#include "torsio/core/not_measured.hpp"
+#include "torsio/fit/common/fit_context.hpp"
+#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+
+/// What may be learned on top of the box.
+enum class ResidualKind : std::uint8_t {
+  none,
+  mlp,        ///< a network of two layers of 16
+  dgmm,       ///< a mixture of 50 components
+  automatic,  ///< the network, if it lowers the error on a fifth of the data that it did not see by 2 %
+};
+
+struct GreyBoxOptions {
+  std::string schedule = {};  ///< expression of the input to schedule over; empty: constant
+  /// Only slip forces, branches and friction of rates >= 0, which take energy and never give it; no residual.
+  bool passive = false;
+  double bound = 3.0;  ///< of the residual, in RMSE of the box
+  ResidualKind residual = ResidualKind::automatic;
+};
+
+struct FittedGreyBox : Fitted<GreyBox> {
+  /// Root mean square error on what was held out, the residual's share taken off: what error bars are to
+  /// be wide as.
+  double held_out_rmse = kNotMeasured;
+};
+
+/// Chooses terms by cross-validation and fits them by least squares, slip forces and branches >= 0
+/// unless signed ones are clearly better.
+///
+/// Starting from a straight line, the step up (more knots of the curve, more slip elements, more
+/// knots of their forces, signed forces, relaxation, viscous and dry friction of rates, less smoothing)
+/// that lowers the held-out error most is taken as long as it lowers it by 1 %. Held out are: the
+/// records one at a time, if there are three; of a schedule the inner knots, one at a time, interpolated
+/// over the others; else fifths of interleaved blocks. Every candidate is judged on sums that are
+/// gathered once (AᵀA of all terms, for each fold), so the search does not see the data again.
+/// Smoothing: λ n Σ (second difference)² over the knots of curve and forces.
+/// Deterministic.
+/// @throws Error if the first input is constant, or as `groups_by`, or UsageError for a residual of a passive box.
+[[nodiscard]] FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
+                                         const FitContext& context = {});
+
+}  // namespace torsio

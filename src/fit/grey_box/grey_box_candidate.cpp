@@ -1,0 +1,272 @@
+#include "fit/grey_box/grey_box_candidate.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace torsio {
+namespace {
+
+using Index = Eigen::Index;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr std::array<std::size_t, GreyBoxChoice::kMostSlips + 1> kSlips{0, 1, 2, 4, 8};
+constexpr std::array<std::size_t, GreyBoxChoice::kMostBranches + 1> kBranches{0, 3, 6};
+constexpr std::array kSmoothing{1e-6, 1e-4, 1e-2};
+constexpr std::size_t kMostColumns = 160;
+
+/// Indices that n of `count` geometric values keep: from the finest on, evenly spread.
+std::vector<std::size_t> kept(std::size_t n, std::size_t count) {
+  std::vector<std::size_t> indices;
+  if (n == 1) return {1};  // the second finest: above the resolution, below any loop
+  const std::size_t stride = n == 0 ? 1 : count / n;
+  for (std::size_t i = 0; i < n; ++i) indices.push_back(i * stride);
+  return indices;
+}
+
+GreyBoxTerms::Structure structure_of(const GreyBoxTerms::Structure& all,
+                                     const GreyBoxChoice& choice) {
+  GreyBoxTerms::Structure own;
+  const double low = all.curve_knots.front();
+  const double high = all.curve_knots.back();
+  own.curve_knots = evenly(low, high, (std::size_t{1} << choice.curve) + 1);
+  own.friction_knots = choice.forces == 0
+                           ? std::vector<double>{0.5 * (low + high)}
+                           : evenly(low, high, (std::size_t{1} << choice.forces) + 1);
+  for (const std::size_t i : kept(kSlips[choice.slips], GreyBoxSums::kThresholds))
+    own.thresholds.push_back(all.thresholds[i]);
+  for (const std::size_t i : kept(kBranches[choice.branches], GreyBoxSums::kTimeConstants))
+    own.time_constants_s.push_back(all.time_constants_s[i]);
+  own.rate_scales.assign(all.inputs(), 0.0);
+  if (choice.has_coulomb) own.rate_scales = all.rate_scales;
+  own.sample_period_s = all.sample_period_s;
+  return own;
+}
+
+/// Of coarse hats in fine ones: hats at every 2^coarser-th knot.
+void add_hats(std::vector<Eigen::Triplet<double>>& triplets, std::size_t fine_first,
+              std::size_t coarse_first, std::size_t level, std::size_t places) {
+  const std::size_t step = (GreyBoxSums::kKnots - 1) >> level;
+  const auto index = [](std::size_t i) { return static_cast<int>(i); };
+  for (std::size_t fine = 0; fine < GreyBoxSums::kKnots; ++fine) {
+    const std::size_t left = std::min(fine / step, places - 2);
+    const double share = static_cast<double>(fine - left * step) / static_cast<double>(step);
+    if (share < 1.0)
+      triplets.emplace_back(index(fine_first + fine), index(coarse_first + left), 1.0 - share);
+    if (share > 0.0)
+      triplets.emplace_back(index(fine_first + fine), index(coarse_first + left + 1), share);
+  }
+}
+
+/// The terms of `own` as sums of all terms: all columns x own columns.
+Eigen::SparseMatrix<double> map_of(const GreyBoxSums& sums, const GreyBoxChoice& choice,
+                                   const GreyBoxTerms::Structure& own) {
+  std::vector<Eigen::Triplet<double>> triplets;
+  const auto one = [&](std::size_t from, std::size_t to) {
+    triplets.emplace_back(static_cast<int>(from), static_cast<int>(to), 1.0);
+  };
+  add_hats(triplets, 0, 0, choice.curve, own.curve_knots.size());
+  const std::size_t forces = own.friction_knots.size();
+  const auto slips = kept(kSlips[choice.slips], GreyBoxSums::kThresholds);
+  for (std::size_t i = 0; i < slips.size(); ++i) {
+    const std::size_t fine = sums.all.first_slip() + slips[i] * GreyBoxSums::kKnots;
+    const std::size_t coarse = own.first_slip() + i * forces;
+    if (forces > 1)
+      add_hats(triplets, fine, coarse, choice.forces, forces);
+    else
+      for (std::size_t k = 0; k < GreyBoxSums::kKnots; ++k) one(fine + k, coarse);
+  }
+  const auto branches = kept(kBranches[choice.branches], GreyBoxSums::kTimeConstants);
+  for (std::size_t i = 0; i < branches.size(); ++i)
+    one(sums.all.first_relaxation() + branches[i], own.first_relaxation() + i);
+  for (std::size_t j = 1; j < sums.all.inputs(); ++j) {
+    const bool schedules = sums.frame.scheduled && sums.frame.feature == j;
+    if (!schedules && (sums.is_rate[j] == 0 || choice.has_viscous))
+      one(sums.all.first_slope() + j, own.first_slope() + j);
+    if (choice.has_coulomb && sums.is_rate[j] != 0)
+      one(sums.all.first_coulomb() + j, own.first_coulomb() + j);
+  }
+  Eigen::SparseMatrix<double> map(static_cast<Index>(sums.all.columns()),
+                                  static_cast<Index>(own.columns()));
+  map.setFromTriplets(triplets.begin(), triplets.end());
+  return map;
+}
+
+/// λ |second differences|² over `count` neighbouring columns.
+void add_smoothing(Eigen::MatrixXd& product, std::size_t first, std::size_t count, double weight) {
+  constexpr std::array<double, 3> kDifference{1.0, -2.0, 1.0};
+  for (std::size_t i = 0; i + 2 < count; ++i)
+    for (std::size_t a = 0; a < 3; ++a)
+      for (std::size_t b = 0; b < 3; ++b)
+        product(static_cast<Index>(first + i + a), static_cast<Index>(first + i + b)) +=
+            weight * kDifference[a] * kDifference[b];
+}
+
+/// argmin over all columns, those that are not free >= 0: the free ones are eliminated first, so
+/// that the active sets are searched among few.
+Eigen::VectorXd solve_mixed(const Eigen::MatrixXd& product, const Eigen::VectorXd& projection,
+                            double square, const std::vector<std::uint8_t>& is_free) {
+  std::vector<Index> free;
+  std::vector<Index> bound;
+  for (std::size_t j = 0; j < is_free.size(); ++j)
+    (is_free[j] != 0 ? free : bound).push_back(static_cast<Index>(j));
+  const Eigen::LLT<Eigen::MatrixXd> inner(product(free, free));
+  Eigen::VectorXd solution = Eigen::VectorXd::Zero(projection.size());
+  const Eigen::VectorXd projection_free = projection(free);
+  Eigen::VectorXd rest = projection_free;
+  if (!bound.empty()) {
+    const Eigen::MatrixXd coupling = product(free, bound);
+    const Eigen::MatrixXd explained = inner.solve(coupling);
+    const Eigen::MatrixXd schur =
+        Eigen::MatrixXd(product(bound, bound)) - coupling.transpose() * explained;
+    const Eigen::VectorXd target =
+        Eigen::VectorXd(projection(bound)) - explained.transpose() * projection_free;
+    NormalEquations small(bound.size());
+    Eigen::Map<RowMajor>(small.product.values.data(), schur.rows(), schur.cols()) = schur;
+    std::ranges::copy(target, small.projection.begin());
+    small.square = square;
+    const NonNegativeFit fit =
+        non_negative_least_squares(small, std::vector<std::uint8_t>(bound.size(), 0));
+    // A search for active sets that went in circles is no fit: NaN is never chosen.
+    if (!fit.has_converged)
+      return Eigen::VectorXd::Constant(projection.size(), std::numeric_limits<double>::quiet_NaN());
+    const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(
+        fit.coefficients.data(), static_cast<Index>(fit.coefficients.size()));
+    for (std::size_t i = 0; i < bound.size(); ++i)
+      solution[bound[i]] = values[static_cast<Index>(i)];
+    rest -= coupling * values;
+  }
+  const Eigen::VectorXd values = inner.solve(rest);
+  for (std::size_t i = 0; i < free.size(); ++i) solution[free[i]] = values[static_cast<Index>(i)];
+  return solution;
+}
+
+}  // namespace
+
+GreyBoxCandidate::GreyBoxCandidate(const GreyBoxSums& sums, const GreyBoxChoice& choice)
+    : sums_(sums), choice_(choice), structure_(structure_of(sums.all, choice)) {}
+
+bool GreyBoxCandidate::is_possible() const noexcept {
+  const std::size_t columns = structure_.columns();
+  return columns <= kMostColumns && kSamplesPerTerm * columns * sums_.levels <= sums_.samples;
+}
+
+std::vector<NormalEquations> GreyBoxCandidate::projected(
+    const std::vector<NormalEquations>& all) const {
+  const Eigen::SparseMatrix<double> map = map_of(sums_, choice_, structure_);
+  std::vector<NormalEquations> cells;
+  cells.reserve(all.size());
+  for (const NormalEquations& cell : all) {
+    NormalEquations& small = cells.emplace_back(structure_.columns());
+    const Eigen::Map<const RowMajor> product(cell.product.values.data(),
+                                             static_cast<Index>(sums_.all.columns()),
+                                             static_cast<Index>(sums_.all.columns()));
+    const Eigen::MatrixXd half = product * map;
+    Eigen::Map<RowMajor>(small.product.values.data(), map.cols(), map.cols()) =
+        map.transpose() * half;
+    Eigen::Map<Eigen::VectorXd>(small.projection.data(), map.cols()) =
+        map.transpose() * Eigen::Map<const Eigen::VectorXd>(cell.projection.data(), map.rows());
+    small.square = cell.square;
+    small.rows = cell.rows;
+  }
+  return cells;
+}
+
+std::vector<double> GreyBoxCandidate::solved(const NormalEquations& equations) const {
+  const auto count = static_cast<Index>(structure_.columns());
+  Eigen::MatrixXd product =
+      Eigen::Map<const RowMajor>(equations.product.values.data(), count, count);
+  const Eigen::VectorXd projection =
+      Eigen::Map<const Eigen::VectorXd>(equations.projection.data(), count);
+  const double weight = kSmoothing[choice_.smoothing] * static_cast<double>(equations.rows);
+  add_smoothing(product, 0, structure_.curve_knots.size(), weight);
+  for (std::size_t i = 0; i < structure_.thresholds.size(); ++i)
+    add_smoothing(product, structure_.first_slip() + i * structure_.friction_knots.size(),
+                  structure_.friction_knots.size(), weight);
+  // What no sample tells stays 0.
+  constexpr double kRidge = 1e-9;
+  const double mean = product.trace() / static_cast<double>(count);
+  std::vector<std::uint8_t> is_free(structure_.columns(), 1);
+  for (Index j = 0; j < count; ++j) product(j, j) += kRidge * std::max(product(j, j), 1e-3 * mean);
+  for (std::size_t j = structure_.first_slip(); j < structure_.first_slope(); ++j)
+    if (!choice_.is_signed || j >= structure_.first_relaxation()) is_free[j] = 0;
+  for (std::size_t l = 0; choice_.is_passive && l < structure_.inputs(); ++l)
+    if (sums_.is_rate[l] != 0)
+      is_free[structure_.first_slope() + l] = is_free[structure_.first_coulomb() + l] = 0;
+  const Eigen::VectorXd solution = solve_mixed(product, projection, equations.square, is_free);
+  return {solution.begin(), solution.end()};
+}
+
+NormalEquations GreyBoxCandidate::of_level(const std::vector<NormalEquations>& cells,
+                                           std::size_t level) const {
+  NormalEquations sum(cells[0].columns());
+  for (std::size_t fold = 0; fold < sums_.folds; ++fold)
+    add(sum, cells[level * sums_.folds + fold]);
+  return sum;
+}
+
+double GreyBoxCandidate::left_out_levels(const std::vector<NormalEquations>& cells) const {
+  Matrix all(sums_.levels, cells[0].columns());
+  for (std::size_t level = 0; level < sums_.levels; ++level)
+    std::ranges::copy(solved(cells[level]), all.row(level).begin());
+  double error = 0.0;
+  std::size_t rows = 0;
+  for (std::size_t out = 1; out + 1 < sums_.levels; ++out) {
+    CoefficientSchedule others{.scheduled = true, .feature = 0, .knots = {}, .values = {}};
+    others.values = Matrix(sums_.levels - 1, all.columns);
+    for (std::size_t level = 0; level < sums_.levels; ++level) {
+      if (level == out) continue;
+      std::ranges::copy(all.row(level), others.values.row(others.knots.size()).begin());
+      others.knots.push_back(sums_.frame.knots[level]);
+    }
+    const ScheduledCoefficients between(others, 1, GreyBox::kFamily);
+    std::vector<double> coefficients(all.columns);
+    const std::array<double, 1> at{sums_.frame.knots[out]};
+    between.evaluate(at, coefficients);
+    error += cells[out].error(coefficients);
+    rows += cells[out].rows;
+  }
+  return std::sqrt(error / static_cast<double>(rows));
+}
+
+double GreyBoxCandidate::left_out_folds(const std::vector<NormalEquations>& cells) const {
+  const std::vector<NormalEquations> beyond = projected(sums_.beyond);
+  double error = 0.0;
+  std::size_t rows = 0;
+  for (std::size_t level = 0; level < sums_.levels; ++level) {
+    const NormalEquations sum = of_level(cells, level);
+    for (std::size_t fold = 0; fold < sums_.folds; ++fold) {
+      const NormalEquations& out = cells[level * sums_.folds + fold];
+      if (out.rows == 0 || out.rows == sum.rows) continue;
+      NormalEquations rest = sum;
+      add(rest, out, -1.0);
+      const std::vector<double> coefficients = solved(rest);
+      error += out.error(coefficients);
+      rows += out.rows;
+      if (beyond.empty()) continue;
+      error -= beyond[fold].error(coefficients);
+      rows -= beyond[fold].rows;
+    }
+  }
+  return std::sqrt(error / static_cast<double>(rows));
+}
+
+double GreyBoxCandidate::held_out_error() const {
+  const std::vector<NormalEquations> cells = projected(sums_.cells);
+  return sums_.folds == 1 ? left_out_levels(cells) : left_out_folds(cells);
+}
+
+GreyBox::Parameters GreyBoxCandidate::fitted() const {
+  const std::vector<NormalEquations> cells = projected(sums_.cells);
+  GreyBox::Parameters parameters{.terms = structure_, .coefficients = sums_.frame, .residual = {}};
+  Matrix& values = parameters.coefficients.values;
+  values = Matrix(sums_.levels, structure_.columns());
+  for (std::size_t level = 0; level < sums_.levels; ++level)
+    std::ranges::copy(solved(of_level(cells, level)), values.row(level).begin());
+  return parameters;
+}
+
+}  // namespace torsio

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "fit/grey_box/grey_box_sums.hpp"
+#include "model/grey_box/grey_box.hpp"
+
+namespace torsio {
+
+/// Which of all possible terms a grey box has: a place on each of these ladders.
+struct GreyBoxChoice {
+  std::size_t curve = 0;      ///< 2^curve + 1 knots
+  std::size_t slips = 0;      ///< 0, 1, 2, 4, 8 thresholds
+  std::size_t forces = 0;     ///< 0: the same everywhere; else 2^forces + 1 knots
+  std::size_t branches = 0;   ///< 0, 3, 6 time constants
+  std::size_t smoothing = 2;  ///< λ = 1e-6, 1e-4, 1e-2
+  bool is_signed = false;     ///< slip forces of any sign
+  bool is_passive = false;    ///< slopes and friction of rates >= 0, too
+  bool has_viscous = false;   ///< slopes of rates
+  bool has_coulomb = false;   ///< tanh of rates
+
+  static constexpr std::size_t kMostSlips = 4;     ///< the highest place
+  static constexpr std::size_t kMostBranches = 2;  ///< the highest place
+
+  bool operator==(const GreyBoxChoice&) const = default;
+};
+
+/// A choice of terms, fitted to sums over the data: one small solve a fold.
+class GreyBoxCandidate {
+ public:
+  /// @param sums must outlive this
+  GreyBoxCandidate(const GreyBoxSums& sums, const GreyBoxChoice& choice);
+
+  [[nodiscard]] const GreyBoxTerms::Structure& structure() const noexcept { return structure_; }
+  /// Whether the samples suffice for its columns.
+  [[nodiscard]] bool is_possible() const noexcept;
+
+  /// Root mean square error on what was held out.
+  [[nodiscard]] double held_out_error() const;
+  /// Fitted to all data.
+  [[nodiscard]] GreyBox::Parameters fitted() const;
+
+ private:
+  [[nodiscard]] std::vector<double> solved(const NormalEquations& equations) const;
+  [[nodiscard]] std::vector<NormalEquations> projected(
+      const std::vector<NormalEquations>& all) const;
+  [[nodiscard]] double left_out_levels(const std::vector<NormalEquations>& cells) const;
+  [[nodiscard]] double left_out_folds(const std::vector<NormalEquations>& cells) const;
+  [[nodiscard]] NormalEquations of_level(const std::vector<NormalEquations>& cells,
+                                         std::size_t level) const;
+
+  const GreyBoxSums& sums_;
+  GreyBoxChoice choice_;
+  GreyBoxTerms::Structure structure_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,214 @@
+#include "fit/grey_box/grey_box_sums.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "fit/common/folds.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kMostSummed = 100000;  // rows; of more every n-th is taken
+constexpr std::size_t kRecordsToLeaveOut = 3;
+
+/// [lowest, highest] first input. @throws Error if that is no range, or of few samples.
+std::pair<double, double> range_of(const Table& table, const TrainingData& data) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  for (std::size_t n = 0; n < table.features.rows; ++n) {
+    low = std::min(low, table.features(n, 0));
+    high = std::max(high, table.features(n, 0));
+  }
+  if (!(high > low))
+    throw Error({.problem = "a grey box needs a first input that varies",
+                 .found = data.inputs[0].expression + " is constant in the training data"});
+  constexpr std::size_t kLeast = 200;
+  if (table.features.rows < kLeast)
+    throw Error({.problem = "too few training samples for a grey box",
+                 .expected = fmt::format("at least {}", kLeast),
+                 .found = fmt::format("{}", table.features.rows)});
+  return {low, high};
+}
+
+/// From four samples to a quarter of the longest record.
+std::vector<double> time_constants(const TrainingData& data) {
+  std::size_t longest = 0;
+  for (const Sequence& sequence : data.sequences)
+    longest = std::max(longest, sequence.target.size());
+  const double period_s = 1.0 / data.sample_rate_Hz;
+  const double fastest_s = 4.0 * period_s;
+  const double slowest_s =
+      std::max(0.25 * static_cast<double>(longest) * period_s, 2.0 * fastest_s);
+  std::vector<double> all_s;
+  for (std::size_t i = 0; i < GreyBoxSums::kTimeConstants; ++i)
+    all_s.push_back(fastest_s * std::pow(slowest_s / fastest_s,
+                                         static_cast<double>(i) /
+                                             static_cast<double>(GreyBoxSums::kTimeConstants - 1)));
+  return all_s;
+}
+
+/// Rates at which dry friction is taken to have turned: a share of their root mean square.
+std::vector<double> rate_scales(const TrainingData& data, const Table& table, double share) {
+  std::vector<double> scales(data.input_count(), 0.0);
+  for (std::size_t j = 0; j < scales.size(); ++j) {
+    if (!data.inputs[j].is_rate) continue;
+    double squares = 0.0;
+    for (std::size_t n = 0; n < table.features.rows; ++n)
+      squares += table.features(n, j) * table.features(n, j);
+    scales[j] = share * std::sqrt(squares / static_cast<double>(table.features.rows));
+  }
+  return scales;
+}
+
+GreyBoxTerms::Structure finest(const TrainingData& data, const Table& table, double rate_share) {
+  GreyBoxTerms::Structure all;
+  const auto [low, high] = range_of(table, data);
+  all.sample_period_s = 1.0 / data.sample_rate_Hz;
+  all.curve_knots = all.friction_knots = evenly(low, high, GreyBoxSums::kKnots);
+  const double half = 0.5 * (high - low);
+  for (std::size_t i = GreyBoxSums::kThresholds; i-- > 0;)
+    all.thresholds.push_back(half * std::exp2(-static_cast<double>(i + 1)));
+  all.time_constants_s = time_constants(data);
+  all.rate_scales = rate_scales(data, table, rate_share);
+  return all;
+}
+
+std::size_t usable_samples(const Sequence& sequence) {
+  return static_cast<std::size_t>(std::ranges::count(sequence.use, 1));
+}
+
+/// Records in turn, blocks, or the schedule's inner knots.
+void choose_folds(GreyBoxSums& sums, const TrainingData& data) {
+  std::size_t records = 0;
+  for (const Sequence& sequence : data.sequences)
+    if (usable_samples(sequence) > 0) ++records;
+  sums.is_by_record = sums.levels == 1 && records >= kRecordsToLeaveOut;
+  sums.folds = sums.levels >= kRecordsToLeaveOut ? 1
+               : sums.is_by_record               ? std::min(records, 2 * kFolds)
+                                                 : kFolds;
+}
+
+/// Adds one row of terms to their products.
+class RowSum {
+ public:
+  void add(NormalEquations& sums, const GreyBoxTerms& terms, Features features, double target) {
+    row_.clear();
+    terms.visit(features, [&](std::size_t column, double value) {
+      if (value != 0.0) row_.emplace_back(column, value);
+    });
+    for (const auto& [i, a] : row_) {
+      for (const auto& [j, b] : row_) sums.product(i, j) += a * b;
+      sums.projection[i] += a * target;
+    }
+    sums.square += target * target;
+    ++sums.rows;
+  }
+
+ private:
+  std::vector<std::pair<std::size_t, double>> row_;  ///< what is not 0
+};
+
+struct Range {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void take(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  [[nodiscard]] bool holds(double value) const { return value >= low && value <= high; }
+};
+
+/// Of the first input in all records but those of each fold.
+std::vector<Range> ranges_of_others(const GreyBoxSums& sums, const TrainingData& data) {
+  std::vector<Range> ranges(sums.folds);
+  std::size_t record = 0;
+  for (const Sequence& sequence : data.sequences) {
+    if (usable_samples(sequence) == 0) continue;
+    const std::size_t own = record++ % sums.folds;
+    for (std::size_t n = 0; n < sequence.use.size(); ++n) {
+      if (sequence.use[n] == 0) continue;
+      for (std::size_t fold = 0; fold < sums.folds; ++fold)
+        if (fold != own) ranges[fold].take(sequence.features(n, 0));
+    }
+  }
+  return ranges;
+}
+
+void add_data(GreyBoxSums& sums, const TrainingData& data) {
+  const std::vector<Range> others =
+      sums.is_by_record ? ranges_of_others(sums, data) : std::vector<Range>{};
+  const std::size_t stride = (sums.samples + kMostSummed - 1) / kMostSummed;
+  RowSum row;
+  std::size_t record = 0;
+  std::size_t used = 0;
+  for (const Sequence& sequence : data.sequences) {
+    GreyBoxTerms terms(sums.all);
+    std::size_t own = 0;
+    const std::size_t usable = usable_samples(sequence);
+    for (std::size_t n = 0; n < sequence.target.size(); ++n) {
+      if (!sequence.has_features(n)) continue;
+      const Features features = sequence.features.row(n);
+      terms.move(features[0]);
+      if (sequence.use[n] == 0) continue;
+      const std::size_t fold = sums.is_by_record ? record % sums.folds
+                               : sums.folds == 1 ? 0
+                                                 : interleaved_fold(own, usable);
+      ++own;
+      if (used++ % stride != 0) continue;
+      std::size_t level = 0;
+      if (sums.frame.scheduled)
+        level = static_cast<std::size_t>(
+            std::ranges::find(sums.frame.knots, features[sums.frame.feature]) -
+            sums.frame.knots.begin());
+      row.add(sums.cells[level * sums.folds + fold], terms, features, sequence.target[n]);
+      if (sums.is_by_record && !others[fold].holds(features[0]))
+        row.add(sums.beyond[fold], terms, features, sequence.target[n]);
+    }
+    if (usable > 0) ++record;
+  }
+}
+
+}  // namespace
+
+std::vector<double> evenly(double low, double high, std::size_t count) {
+  std::vector<double> all(count);
+  for (std::size_t i = 0; i < count; ++i)
+    all[i] = low + (high - low) * static_cast<double>(i) / static_cast<double>(count - 1);
+  all.back() = high;
+  return all;
+}
+
+void add(NormalEquations& sum, const NormalEquations& part, double sign) {
+  for (std::size_t i = 0; i < sum.product.values.size(); ++i)
+    sum.product.values[i] += sign * part.product.values[i];
+  for (std::size_t i = 0; i < sum.projection.size(); ++i)
+    sum.projection[i] += sign * part.projection[i];
+  sum.square += sign * part.square;
+  sum.rows = sign > 0.0 ? sum.rows + part.rows : sum.rows - part.rows;
+}
+
+GreyBoxSums gather(const TrainingData& data, const std::string& schedule, double rate_share) {
+  const Table table = usable_table(data);
+  const Groups groups = groups_by(schedule, data, table.features);
+  GreyBoxSums sums{.all = finest(data, table, rate_share),
+                   .is_rate = {},
+                   .frame = groups.frame,
+                   .levels = groups.samples.size(),
+                   .cells = {},
+                   .beyond = {},
+                   .samples = table.features.rows};
+  for (const auto& input : data.inputs) sums.is_rate.push_back(input.is_rate ? 1 : 0);
+  choose_folds(sums, data);
+  sums.cells.assign(sums.levels * sums.folds, NormalEquations(sums.all.columns()));
+  if (sums.is_by_record) sums.beyond = sums.cells;
+  add_data(sums, data);
+  return sums;
+}
+
+}  // namespace torsio

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "fit/common/design.hpp"
+#include "model/grey_box/grey_box.hpp"
+#include "numerics/nnls.hpp"
+
+namespace torsio {
+
+/// Every knot, threshold and time constant that a grey box may take from, and AᵀA, Aᵀy of all of their
+/// terms, gathered once: any smaller structure is a projection of them.
+struct GreyBoxSums {
+  static constexpr std::size_t kFinest = 5;  ///< 2^5 + 1 knots
+  static constexpr std::size_t kKnots = (std::size_t{1} << kFinest) + 1;
+  static constexpr std::size_t kThresholds = 8;
+  static constexpr std::size_t kTimeConstants = 6;
+
+  GreyBoxTerms::Structure all;
+  std::vector<std::uint8_t> is_rate;   ///< of every input
+  CoefficientSchedule frame;           ///< without values
+  std::size_t levels = 1;              ///< of the schedule
+  std::size_t folds = 1;               ///< 1: levels are held out instead
+  bool is_by_record = false;           ///< a fold is some records; else blocks
+  std::vector<NormalEquations> cells;  ///< [level * folds + fold]
+  /// Of each cell, what lies beyond the first input's range in all other cells; empty unless folds are
+  /// records. A guard answers there, so it chooses no terms.
+  std::vector<NormalEquations> beyond;
+  std::size_t samples = 0;
+};
+
+/// Runs once through the data. @param schedule as `groups_by` takes it
+/// @param rate_share of a rate's root mean square: where its dry friction has turned
+/// @throws Error if the first input does not vary, or there are too few samples.
+[[nodiscard]] GreyBoxSums gather(const TrainingData& data, const std::string& schedule,
+                                 double rate_share);
+
+/// `count` knots over [low, high].
+[[nodiscard]] std::vector<double> evenly(double low, double high, std::size_t count);
+
+/// sum += sign * part
+void add(NormalEquations& sum, const NormalEquations& part, double sign = 1.0);
+
+}  // namespace torsio

@@ -1,0 +1,385 @@
+#include "fit/hammerstein_wiener/wiener_error.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/all_finite.hpp"
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kBlock = 256;  // samples at once: their columns stay in the nearest caches
+using Eigen::Index;
+using Block = Eigen::MatrixXd;
+
+std::size_t largest_of(std::span<const double> values, std::size_t not_this) {
+  std::size_t best = not_this == 0 ? 1 : 0;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (i != not_this && std::abs(values[i]) > std::abs(values[best])) best = i;
+  return best;
+}
+
+std::span<double> column(Block& block, std::size_t at, std::size_t samples) {
+  return {block.data() + at * kBlock, samples};
+}
+
+/// A signal, and where a block of it begins: its last two samples.
+struct Delayed {
+  std::array<double, 2> before{};
+
+  /// out(n) = signal(n - k), from block to block.
+  void shift(std::span<const double> signal, std::size_t k, std::span<double> out) const {
+    for (std::size_t n = 0; n < std::min(k, signal.size()); ++n) out[n] = before[2 - k + n];
+    if (signal.size() > k)
+      std::copy(signal.begin(), signal.end() - static_cast<std::ptrdiff_t>(k),
+                out.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  void keep(std::span<const double> signal) {
+    for (const double value : signal.last(std::min<std::size_t>(2, signal.size())))
+      before = {before[1], value};
+  }
+};
+
+}  // namespace
+
+void fill_basis(const StaticCurve& curve, double x, std::span<double> basis) {
+  if (!curve.knots.empty()) {
+    for (std::size_t i = 0; i < basis.size(); ++i) basis[i] = curve.basis(i, x);
+    return;
+  }
+  const double z = (x - curve.centre) / curve.half_range;
+  double power = 1.0;
+  for (double& each : basis) {
+    each = power;
+    power *= z;
+  }
+}
+
+double WienerData::slowest_pole() const {
+  constexpr double kLongestMemory = 10.0;  // records
+  std::size_t longest = 1;
+  for (const WienerRecord& record : records) longest = std::max(longest, record.input.size());
+  return std::exp(-1.0 / (kLongestMemory * static_cast<double>(longest)));
+}
+
+std::size_t WienerData::judged_samples() const {
+  std::size_t count = 0;
+  for (const WienerRecord& record : records)
+    count += static_cast<std::size_t>(std::ranges::count_if(record.judged, std::identity{}));
+  return count;
+}
+
+WienerData wiener_data(const TrainingData& data) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  WienerData made{.records = {},
+                  .sample_period_s = 1.0 / data.sample_rate_Hz,
+                  .range = {kInfinity, -kInfinity}};
+  double count = 0.0;
+  double mean = 0.0;
+  double squares = 0.0;
+  for (const Sequence& sequence : data.sequences) {
+    WienerRecord record;
+    for (std::size_t n = 0; n < sequence.target.size(); ++n) {
+      if (!sequence.has_features(n)) continue;
+      record.input.push_back(sequence.features(n, 0));
+      record.target.push_back(sequence.target[n]);
+      record.judged.push_back(sequence.use[n]);
+      if (sequence.use[n] == 0) continue;
+      made.range.lowest = std::min(made.range.lowest, record.input.back());
+      made.range.highest = std::max(made.range.highest, record.input.back());
+      const double distance = sequence.target[n] - mean;
+      mean += distance / ++count;
+      squares += distance * (sequence.target[n] - mean);
+    }
+    made.records.push_back(std::move(record));
+  }
+  made.rest_input =
+      std::clamp(0.0, made.range.lowest, std::max(made.range.lowest, made.range.highest));
+  made.deviation = std::sqrt(squares / std::max(count, 1.0));
+  return made;
+}
+
+std::size_t shifting_value(const StaticCurve& input, double rest_input) {
+  if (input.knots.empty()) return 0;
+  const auto next = std::ranges::min_element(
+      input.knots, {}, [&](double knot) { return std::abs(knot - rest_input); });
+  return static_cast<std::size_t>(next - input.knots.begin());
+}
+
+WienerData front_of(const WienerData& data, std::size_t samples) {
+  std::size_t all = 0;
+  for (const WienerRecord& record : data.records) all += record.input.size();
+  WienerData front = data;
+  for (WienerRecord& record : front.records) {
+    const std::size_t kept =
+        all <= samples ? record.input.size() : record.input.size() * samples / all;
+    record.input.resize(kept);
+    record.target.resize(kept);
+    record.judged.resize(kept);
+  }
+  return front;
+}
+
+void SectionCascade::run_section(std::size_t section, bool is_all_pole, std::span<double> signal) {
+  const auto g = sections_.row(section);
+  const double b0 = is_all_pole ? 1.0 : g[0];
+  const double b1 = is_all_pole ? 0.0 : g[1];
+  const double b2 = is_all_pole ? 0.0 : g[2];
+  const double a1 = g[3];
+  const double a2 = g[4];
+  double s1 = state_[2 * section];
+  double s2 = state_[2 * section + 1];
+  for (double& x : signal) {
+    const double y = b0 * x + s1;
+    s1 = b1 * x + s2 - a1 * y;
+    s2 = b2 * x - a2 * y;
+    x = y;
+  }
+  state_[2 * section] = s1;
+  state_[2 * section + 1] = s2;
+}
+
+void SectionCascade::run(std::span<double> signal, std::size_t first) {
+  for (std::size_t i = first; i < sections_.rows; ++i) run_section(i, false, signal);
+}
+
+WienerError::WienerError(const WienerData& data, WienerNumbers numbers, WienerFree free)
+    : data_(data), frame_(std::move(numbers)) {
+  const bool is_model = free == WienerFree::model;
+  const std::size_t shift = shifting_value(frame_.input, data_.rest_input);
+  const std::size_t held = largest_of(frame_.input.values, shift);
+  for (std::size_t k = 0; is_model && k < frame_.input.values.size(); ++k) {
+    if (k == shift || k == held) continue;
+    input_free_.push_back(k);
+    names_.push_back(fmt::format("p{}", k));
+  }
+  const Sections& g = frame_.sections;
+  for (std::size_t i = 0; i < g.rows; ++i) {
+    const std::size_t held_b = largest_of(g.row(i).first(3), 3);
+    for (std::size_t c = 0; c < kSectionColumns; ++c) {
+      if (is_model && (c == held_b || g(i, c) == 0.0)) continue;
+      section_free_.emplace_back(i, c);
+      names_.push_back(fmt::format("{}{}{}", c < 3 ? 'b' : 'f', c < 3 ? c : c - 2,
+                                   g.rows == 1 ? "" : fmt::format(" of section {}", i + 1)));
+    }
+  }
+  output_free_ = is_model ? frame_.output.values.size() : 0;
+  for (std::size_t k = 0; k < output_free_; ++k) names_.push_back(fmt::format("c{}", k));
+  model_size_ = names_.size();
+  for (std::size_t r = 0; r < frame_.start.rows; ++r)
+    for (std::size_t s = 0; s < frame_.start.columns; ++s)
+      names_.push_back(fmt::format("start {} of record {}", s + 1, r + 1));
+  for (const WienerRecord& record : data_.records) {
+    Matrix& basis = basis_.emplace_back(frame_.input.values.size(), record.input.size());
+    std::vector<double> at_rest(basis.rows);
+    std::vector<double> phi(basis.rows);
+    fill_basis(frame_.input, data_.rest_input, at_rest);
+    for (std::size_t n = 0; n < basis.columns; ++n) {
+      fill_basis(frame_.input, record.input[n], phi);
+      for (std::size_t k = 0; k < basis.rows; ++k) basis(k, n) = phi[k] - at_rest[k];
+    }
+  }
+}
+
+std::vector<double> WienerError::pack(const WienerNumbers& numbers) const {
+  std::vector<double> packed;
+  for (const std::size_t k : input_free_) packed.push_back(numbers.input.values[k]);
+  for (const auto& [i, c] : section_free_) packed.push_back(numbers.sections(i, c));
+  packed.insert(packed.end(), numbers.output.values.begin(),
+                numbers.output.values.begin() + static_cast<std::ptrdiff_t>(output_free_));
+  packed.insert(packed.end(), numbers.start.values.begin(), numbers.start.values.end());
+  return packed;
+}
+
+WienerNumbers WienerError::unpack(std::span<const double> packed) const {
+  WienerNumbers numbers = frame_;
+  auto next = packed.begin();
+  for (const std::size_t k : input_free_) numbers.input.values[k] = *next++;
+  for (const auto& [i, c] : section_free_) numbers.sections(i, c) = *next++;
+  for (std::size_t k = 0; k < output_free_; ++k) numbers.output.values[k] = *next++;
+  for (double& value : numbers.start.values) value = *next++;
+  return numbers;
+}
+
+std::size_t WienerError::at(std::size_t section, std::size_t column) const {
+  const auto found = std::ranges::find(section_free_, std::pair(section, column));
+  return found == section_free_.end()
+             ? kNowhere
+             : input_free_.size() + static_cast<std::size_t>(found - section_free_.begin());
+}
+
+std::pair<std::size_t, std::size_t> WienerError::poles_at(std::size_t section) const {
+  return {at(section, 3), at(section, 4)};
+}
+
+/// The filters of one record.
+struct WienerError::Pass {
+  SectionCascade x;
+  std::vector<SectionCascade> input;      ///< one a free value of P
+  std::vector<SectionCascade> numerator;  ///< one a section
+  std::vector<SectionCascade> denominator;
+  std::vector<SectionCascade> start;
+  std::vector<Delayed> numerator_past;
+  std::vector<Delayed> denominator_past;
+  std::vector<Delayed> start_past;
+
+  Pass(const Sections& g, std::size_t inputs)
+      : x(g),
+        input(inputs, SectionCascade(g)),
+        numerator(g.rows, SectionCascade(g)),
+        denominator(numerator),
+        start(numerator),
+        numerator_past(g.rows),
+        denominator_past(g.rows),
+        start_past(g.rows) {}
+};
+
+/// Calls take(columns, samples) for each block of each record: a row a sample, zero where not judged,
+/// the last column the error, the one before x.
+template <class Take>
+bool WienerError::pass(const WienerNumbers& numbers, bool with_slopes, const Take& take) const {
+  const Sections& g = numbers.sections;
+  const std::size_t error_at = with_slopes ? size() + 1 : 1;
+  const std::size_t x_at = error_at - 1;
+  const std::size_t output_at = input_free_.size() + section_free_.size();
+  Block block = Block::Zero(kBlock, static_cast<Index>(error_at) + 1);
+  std::vector<double> work(kBlock);
+  std::vector<double> slope(kBlock);
+  std::vector<double> phi_of_x(output_free_);
+  for (std::size_t r = 0; r < data_.records.size(); ++r) {
+    const WienerRecord& record = data_.records[r];
+    const bool has_start = numbers.start.rows > 0;
+    Pass of(g, with_slopes ? input_free_.size() : 0);
+    if (has_start) of.x.set_state(numbers.start.row(r));
+    for (std::size_t begin = 0; begin < record.input.size(); begin += kBlock) {
+      const std::size_t count = std::min(kBlock, record.input.size() - begin);
+      const auto part = [&](std::size_t at) { return column(block, at, count); };
+      const auto w = std::span(work).first(count);
+      const auto x = part(x_at);
+      std::ranges::fill(x, 0.0);
+      for (std::size_t k = 0; k < basis_[r].rows; ++k) {
+        const auto phi = basis_[r].row(k).subspan(begin, count);
+        const double value = numbers.input.values[k];
+        for (std::size_t n = 0; n < count; ++n) x[n] += value * phi[n];
+      }
+      // Through the cascade; on the way, what each section is given moves its numerator.
+      for (std::size_t i = 0; i < g.rows; ++i) {
+        if (with_slopes) {
+          std::ranges::copy(x, w.begin());
+          of.numerator[i].run_section(i, true, w);
+          of.numerator[i].run(w, i + 1);
+          for (std::size_t c = 0; c < 3; ++c)
+            if (const std::size_t to = at(i, c); to != kNowhere)
+              of.numerator_past[i].shift(w, c, part(to));
+          of.numerator_past[i].keep(w);
+        }
+        of.x.run_section(i, false, x);
+        if (with_slopes) {
+          std::ranges::transform(x, w.begin(), std::negate{});
+          of.denominator[i].run_section(i, true, w);
+          of.denominator[i].run(w, i + 1);
+          for (std::size_t c = 3; c < 5; ++c)
+            if (const std::size_t to = at(i, c); to != kNowhere)
+              of.denominator_past[i].shift(w, c - 2, part(to));
+          of.denominator_past[i].keep(w);
+        }
+      }
+      if (with_slopes) {
+        for (std::size_t k = 0; k < input_free_.size(); ++k) {
+          std::ranges::copy(basis_[r].row(input_free_[k]).subspan(begin, count), part(k).begin());
+          of.input[k].run(part(k));
+        }
+        for (std::size_t c = model_size_; c < size(); ++c) std::ranges::fill(part(c), 0.0);
+        for (std::size_t i = 0; has_start && i < g.rows; ++i) {
+          std::ranges::fill(w, 0.0);
+          if (begin == 0) w[0] = 1.0;
+          of.start[i].run_section(i, true, w);
+          of.start[i].run(w, i + 1);
+          const std::size_t to = model_size_ + r * numbers.start.columns + 2 * i;
+          of.start_past[i].shift(w, 0, part(to));
+          of.start_past[i].shift(w, 1, part(to + 1));
+          of.start_past[i].keep(w);
+        }
+        for (std::size_t n = 0; n < count && output_free_ > 0; ++n) {
+          fill_basis(numbers.output, x[n], phi_of_x);
+          for (std::size_t k = 0; k < output_free_; ++k) part(output_at + k)[n] = phi_of_x[k];
+        }
+        for (std::size_t n = 0; n < count; ++n) slope[n] = numbers.output.slope(x[n]);
+        const Eigen::Map<const Eigen::ArrayXd> c(slope.data(), static_cast<Index>(count));
+        for (std::size_t k = 0; k < size(); ++k) {
+          if (k < output_at || k >= model_size_)
+            block.col(static_cast<Index>(k)).head(static_cast<Index>(count)).array() *= c;
+        }
+      }
+      const auto error = part(error_at);
+      for (std::size_t n = 0; n < count; ++n) {
+        if (record.judged[begin + n] == 0) {
+          block.row(static_cast<Index>(n)).setZero();
+          continue;
+        }
+        error[n] = numbers.output(x[n]) - record.target[begin + n];
+        constexpr double kLargest = 1e100;
+        if (!(std::abs(error[n]) < kLargest)) return false;
+      }
+      take(block, begin, count, record);
+    }
+  }
+  return true;
+}
+
+double WienerError::sum_of_squares(const WienerNumbers& numbers) const {
+  double sum = 0.0;
+  const bool is_told =
+      pass(numbers, false, [&](const Block& block, auto, std::size_t count, auto&) {
+        sum += block.col(1).head(static_cast<Index>(count)).squaredNorm();
+      });
+  return is_told ? sum : kNotMeasured;
+}
+
+bool WienerError::products(const WienerNumbers& numbers, Matrix& gram) const {
+  const auto columns = static_cast<Index>(size()) + 2;
+  Block sum = Block::Zero(columns, columns);
+  const bool is_told = pass(numbers, true, [&](const Block& block, auto, std::size_t count, auto&) {
+    const auto part = block.topRows(static_cast<Index>(count));
+    sum.selfadjointView<Eigen::Upper>().rankUpdate(part.transpose());
+  });
+  gram = Matrix(size() + 1, size() + 1);
+  const auto source = [&](std::size_t k) { return static_cast<Index>(k < size() ? k : k + 1); };
+  for (std::size_t i = 0; i < gram.rows; ++i)
+    for (std::size_t j = i; j < gram.rows; ++j) gram(i, j) = gram(j, i) = sum(source(i), source(j));
+  return is_told && all_finite(gram.values);
+}
+
+Matrix WienerError::rows(const WienerNumbers& numbers) const {
+  Matrix all(data_.judged_samples(), size() + 1);
+  std::size_t row = 0;
+  (void)pass(numbers, true,
+             [&](const Block& block, std::size_t begin, std::size_t count, const WienerRecord& of) {
+               for (std::size_t n = 0; n < count; ++n) {
+                 if (of.judged[begin + n] == 0) continue;
+                 for (std::size_t k = 0; k <= size(); ++k)
+                   all(row, k) =
+                       block(static_cast<Index>(n), static_cast<Index>(k < size() ? k : k + 1));
+                 ++row;
+               }
+             });
+  return all;
+}
+
+std::vector<double> WienerError::inner(const WienerNumbers& numbers) const {
+  std::vector<double> all;
+  (void)pass(numbers, false,
+             [&](const Block& block, std::size_t begin, std::size_t count, const WienerRecord& of) {
+               for (std::size_t n = 0; n < count; ++n)
+                 if (of.judged[begin + n] != 0) all.push_back(block(static_cast<Index>(n), 0));
+             });
+  return all;
+}
+
+}  // namespace torsio

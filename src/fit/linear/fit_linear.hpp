@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+
+#include "model/linear/linear.hpp"
+#include "model/linear/linear_coulomb.hpp"
+#include "torsio/core/not_measured.hpp"
+#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+
+struct LinearOptions {
+  bool rates = false;         ///< give inputs that are rates a slope too
+  std::string schedule = {};  ///< expression of the input to schedule over; empty: constant
+};
+
+/// Least squares over the usable samples; scheduled, one fit at each distinct value of the
+/// scheduling input, which has no slope of its own. Inputs that are constant or depend linearly on
+/// those before them get no term, and a note says so.
+/// @throws Error if no input may have a slope, samples are too few, or the scheduling input has
+/// less than 2 or more than 64 values; UsageError if there is no such input.
+[[nodiscard]] Fitted<Linear> fit_linear(const TrainingData& data, const LinearOptions& options);
+
+struct LinearCoulombOptions {
+  bool rates = false;
+  std::string schedule = {};
+  double rate_scale = kNotMeasured;  ///< v, in the rate's unit; NaN: searched for
+};
+
+/// The same with a friction term on the first input that is a rate. v minimises the sum of squares
+/// of all groups together: a logarithmic grid from a thousandth of the rate's RMS to its maximum,
+/// then golden section, the linear coefficients eliminated at each step (variable projection, Golub
+/// & Pereyra 1973). Deterministic.
+/// @throws Error as `fit_linear`, and if no input is a rate or it never moves.
+[[nodiscard]] Fitted<LinearCoulomb> fit_linear_coulomb(const TrainingData& data,
+                                                       const LinearCoulombOptions& options);
+
+}  // namespace torsio

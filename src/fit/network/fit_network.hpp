@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "model/network/ensemble.hpp"
+#include "model/network/gru.hpp"
+#include "model/network/lstm.hpp"
+#include "model/network/mlp.hpp"
+#include "torsio/fit/common/fit_context.hpp"
+#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/training_data.hpp"
+#include "torsio/model/network/network_layers.hpp"
+
+namespace torsio {
+
+enum class Optimiser : std::uint8_t { adam, adamw };
+/// Of the learning rate: constant; half a cosine from its full value to 0 over all epochs; a tenth
+/// after half of the epochs and a hundredth after three quarters.
+enum class RateSchedule : std::uint8_t { constant, cosine, step };
+
+/// How the weights of a network are found. Adam after Kingma and Ba 2015, AdamW after Loshchilov and
+/// Hutter 2019, both with beta 0.9 and 0.999 and epsilon 1e-8.
+struct NetworkTraining {
+  std::size_t epochs = 30;  ///< at most
+  std::size_t batch = 64;   ///< windows an update
+  double learning_rate = 1e-3;
+  Optimiser optimiser = Optimiser::adam;
+  double weight_decay =
+      0.0;            ///< of weights, never of biases; adam: an L2 penalty, adamw: decoupled
+  double clip = 1.0;  ///< greatest norm of the gradient; 0: any
+  RateSchedule schedule = RateSchedule::constant;
+  std::size_t patience = 5;  ///< epochs without a better validation loss; 0: all epochs
+  std::size_t threads = 0;   ///< 0: as many as the machine has
+};
+
+struct MlpOptions {
+  std::vector<std::size_t> layers = {50, 20, 10};
+  Activation activation = Activation::relu;
+  NetworkTraining training = {.batch = 256, .clip = 0.0};
+};
+
+/// Stretches of a record that a network with memory is trained on, each from the zero state.
+struct TrainingWindows {
+  std::size_t length = 200;  ///< samples
+  std::size_t stride = 20;   ///< from the start of one to that of the next
+  std::size_t burn_in = 20;  ///< first samples, whose output is not in the loss
+  bool last_only = false;    ///< sequence to one: only the last output is in the loss
+};
+
+struct RecurrentOptions {
+  std::vector<std::size_t> layers = {32};
+  std::vector<std::size_t> head = {};  ///< dense layers before the output
+  Activation head_activation = Activation::relu;
+  TrainingWindows windows = {};
+  NetworkTraining training = {.learning_rate = 3e-3};
+};
+
+/// Trains a network on standardised inputs and target by mean square error and backpropagation
+/// (through time, from the end of each window to its start). Every learning sample is seen once an
+/// epoch, windows in a new order each epoch; the weights kept are those of the epoch with the
+/// least loss on the validation records, and training ends when there was no better one for
+/// `patience` epochs. Without validation records a fifth of the training records, whole ones chosen
+/// by the seed, is held out for this; of a single record its last fifth, a window away from the rest.
+///
+/// Initial weights: Glorot uniform; He normal in front of relu and elu; recurrent ones orthogonal;
+/// forget bias 1. Windows lie within one record and hold no input that is not finite.
+///
+/// Source: papers 001 and 004, specification 3.2 and 3.4. Deterministic for a seed, whatever the
+/// number of threads. A loss that explodes (a million times that of a constant, or not finite) ends
+/// the training; the best weights so far are kept and a note says so.
+/// @throws Error if no stretch of the records is as long as a window, the target is constant or not
+/// finite in a sample to learn from, the network is larger than a model file or the memory, or the
+/// loss explodes in the first epoch; UsageError if an option is out of range or `context.resume` is
+/// of another recipe; Cancelled, after `context.keep`.
+[[nodiscard]] Fitted<Mlp> fit_mlp(const TrainingData& data, const MlpOptions& options,
+                                  const FitContext& context = {});
+[[nodiscard]] Fitted<Lstm> fit_lstm(const TrainingData& data, const RecurrentOptions& options,
+                                    const FitContext& context = {});
+[[nodiscard]] Fitted<Gru> fit_gru(const TrainingData& data, const RecurrentOptions& options,
+                                  const FitContext& context = {});
+
+/// So many networks, each from initial weights, a split and an order of its own; the first is the
+/// one that the fit above gives. `residual_std` is the mean of the members' losses on what they did
+/// not learn from.
+/// @throws as above; UsageError unless there are 2 to `Ensemble::kMostMembers`.
+[[nodiscard]] Fitted<MlpEnsemble> fit_mlp_ensemble(const TrainingData& data,
+                                                   const MlpOptions& options, std::size_t members,
+                                                   const FitContext& context = {});
+[[nodiscard]] Fitted<LstmEnsemble> fit_lstm_ensemble(const TrainingData& data,
+                                                     const RecurrentOptions& options,
+                                                     std::size_t members,
+                                                     const FitContext& context = {});
+[[nodiscard]] Fitted<GruEnsemble> fit_gru_ensemble(const TrainingData& data,
+                                                   const RecurrentOptions& options,
+                                                   std::size_t members,
+                                                   const FitContext& context = {});
+
+}  // namespace torsio

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+
+#include "model/second_order/dynamic_bouc_wen.hpp"
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+
+struct DynamicBoucWenOptions {
+  double exponent = 1.0;  ///< n; NaN: searched for
+  std::size_t substeps = 4;
+  std::size_t input_order = 3;
+  std::size_t first_horizon = 500;  ///< samples that the first of the growing searches sees
+  std::size_t iterations = 200;     ///< at most, of the last search
+};
+
+/// Least squares of free runs over masses, springs and the Bouc-Wen element, each record's start
+/// searched for too. First a mass on a spring from a grid of frequencies and dampings; then from it
+/// twelve shares and shapes of the hysteretic part over a short horizon, the best of them over longer
+/// ones. Source of the equations: specification 3.7; the search is ours.
+/// @throws Error unless the first input and the target move, and the search converges;
+/// Cancelled.
+[[nodiscard]] Fitted<DynamicBoucWen> fit_dynamic_bouc_wen(const TrainingData& data,
+                                                          const DynamicBoucWenOptions& options,
+                                                          const Progress& progress = {});
+
+}  // namespace torsio

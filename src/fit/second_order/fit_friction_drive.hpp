@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "model/second_order/friction_drive.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio {
+
+struct FrictionDriveOptions {
+  double gain = 1.0;  ///< g, known beforehand: it only scales the other parameters
+  /// Besides J, Fv, Fc and offset: some of "stribeck", "lugre", "asymmetry", "quadratic", "spring",
+  /// "position", joined by +; "none"; "auto": added as long as they help on held-out blocks.
+  std::string terms = "none";
+  std::size_t substeps = 1;
+  std::size_t input_order = 3;
+  std::size_t first_horizon = 2000;  ///< samples that the first of the growing searches sees
+  std::size_t iterations = 200;      ///< at most, of the last search
+};
+
+/// Least squares of free runs, each from where the record's first 50 samples put it. The search
+/// starts where the force is a linear function of acceleration, speed and direction (inverse dynamics,
+/// differences over three widths). "auto": the training records in 4 blocks, each of them held out in
+/// turn and simulated from its own first 50 samples; a term stays if it lowers that error by a tenth.
+/// @throws UsageError for an unknown term, Error unless the first input and the target move
+/// in both directions, and the search converges; Cancelled.
+[[nodiscard]] Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
+                                                       const FrictionDriveOptions& options,
+                                                       const Progress& progress = {});
+
+}  // namespace torsio

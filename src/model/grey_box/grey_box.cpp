@@ -1,0 +1,262 @@
+#include "model/grey_box/grey_box.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "core/all_finite.hpp"
+#include "model/common/affine_inverse.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+void require(bool holds, const char* field, const char* expected, const std::string& found) {
+  if (!holds)
+    throw Error({.place = std::string("grey_box: ") + field, .expected = expected, .found = found});
+}
+
+bool is_ascending(std::span<const double> knots) {
+  return all_finite(knots) &&
+         std::ranges::adjacent_find(knots, std::greater_equal<>()) == knots.end();
+}
+
+bool is_positive(std::span<const double> values) {
+  return all_finite(values) && std::ranges::all_of(values, [](double v) { return v > 0.0; });
+}
+
+GreyBoxTerms::Structure checked(GreyBoxTerms::Structure structure) {
+  using Terms = GreyBoxTerms;
+  const auto count = [](const auto& list) { return std::to_string(list.size()) + " of them"; };
+  require(structure.curve_knots.size() >= 2 && structure.curve_knots.size() <= Terms::kMostKnots &&
+              is_ascending(structure.curve_knots),
+          "curve_knots", "2 to 1000 finite, ascending numbers", count(structure.curve_knots));
+  require(!structure.friction_knots.empty() &&
+              structure.friction_knots.size() <= Terms::kMostKnots &&
+              is_ascending(structure.friction_knots),
+          "friction_knots", "1 to 1000 finite, ascending numbers", count(structure.friction_knots));
+  require(
+      structure.thresholds.size() <= Terms::kMostThresholds && is_positive(structure.thresholds),
+      "thresholds", "at most 32 positive numbers", count(structure.thresholds));
+  require(structure.time_constants_s.size() <= Terms::kMostTimeConstants &&
+              is_positive(structure.time_constants_s),
+          "time_constants_s", "at most 32 positive numbers", count(structure.time_constants_s));
+  const auto is_scale = [](double scale) { return std::isfinite(scale) && scale >= 0.0; };
+  require(!structure.rate_scales.empty() && std::ranges::all_of(structure.rate_scales, is_scale),
+          "rate_scales", "one number >= 0 for each input", count(structure.rate_scales));
+  require(std::isfinite(structure.sample_period_s) && structure.sample_period_s > 0.0,
+          "sample_period_s", "a positive number", std::to_string(structure.sample_period_s));
+  return structure;
+}
+
+SlipBank bank_of(std::span<const double> thresholds) {
+  std::vector<double> per_threshold(thresholds.size());
+  std::ranges::transform(thresholds, per_threshold.begin(), [](double r) { return 1.0 / r; });
+  return {per_threshold, std::vector<double>(thresholds.size(), 1.0), GreyBox::kFamily};
+}
+
+}  // namespace
+
+GreyBoxTerms::GreyBoxTerms(Structure structure)
+    : structure_(checked(std::move(structure))),
+      slips_(bank_of(structure_.thresholds)),
+      state_(structure_.thresholds.size() + structure_.time_constants_s.size(), 0.0) {
+  for (const double time_constant : structure_.time_constants_s) {
+    const double periods = structure_.sample_period_s / time_constant;
+    decay_.push_back(std::exp(-periods));
+    gain_.push_back(-std::expm1(-periods) / periods);
+  }
+}
+
+void GreyBoxTerms::reset() noexcept {
+  slips_.reset();
+  std::ranges::fill(state_, 0.0);
+  last_ = 0.0;
+  is_started_ = false;
+}
+
+void GreyBoxTerms::move(double x) noexcept {
+  const double dx = is_started_ ? x - last_ : 0.0;
+  last_ = x;
+  is_started_ = true;
+  slips_.move(dx);
+  std::ranges::copy(slips_.forces(), state_.begin());
+  const std::size_t slips = slips_.size();
+  for (std::size_t j = 0; j < decay_.size(); ++j)
+    state_[slips + j] = decay_[j] * state_[slips + j] + gain_[j] * dx;
+}
+
+void GreyBoxTerms::set_state(std::span<const double> state) noexcept {
+  const std::size_t slips = slips_.size();
+  slips_.set_forces(state.first(slips));
+  std::ranges::copy(slips_.forces(), state_.begin());
+  for (std::size_t j = slips; j < state_.size(); ++j)
+    if (std::isfinite(state[j])) state_[j] = state[j];
+}
+
+GreyBoxTerms::Cell GreyBoxTerms::cell_of(std::span<const double> knots, double x) noexcept {
+  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, x);
+  const auto left = static_cast<std::size_t>(above - knots.begin()) - 1;
+  return {.left = left, .share = (x - knots[left]) / (knots[left + 1] - knots[left])};
+}
+
+GreyBox::GreyBox(Parameters parameters)
+    : parameters_(std::move(parameters)),
+      terms_(parameters_.terms),
+      coefficients_(parameters_.coefficients, parameters_.terms.inputs(), kFamily) {
+  require(coefficients_.size() == parameters_.terms.columns(), "coefficients",
+          "one column for each term", std::to_string(coefficients_.size()) + " columns");
+  const GreyBoxResidual& learned = parameters_.residual;
+  require(learned.mlp.size() + learned.dgmm.size() <= 1, "residual", "at most one",
+          std::to_string(learned.mlp.size() + learned.dgmm.size()));
+  for (const auto& each : learned.mlp) mlp_.emplace_back(each);
+  for (const auto& each : learned.dgmm) dgmm_.emplace_back(each);
+  if (mlp_.empty() && dgmm_.empty()) return;
+  const std::size_t inputs = mlp_.empty() ? dgmm_[0].input_count() : mlp_[0].input_count();
+  const std::size_t expected = input_count() + parameters_.terms.thresholds.size();
+  require(
+      inputs == expected && learned.lowest.size() == expected && learned.highest.size() == expected,
+      "residual", "the inputs of the box and its slips", std::to_string(inputs) + " inputs");
+  for (std::size_t j = 0; j < expected; ++j)
+    require(std::isfinite(learned.lowest[j]) && std::isfinite(learned.highest[j]) &&
+                learned.lowest[j] <= learned.highest[j],
+            "residual range", "lowest <= highest",
+            std::to_string(learned.lowest[j]) + ", " + std::to_string(learned.highest[j]));
+  require(std::isfinite(learned.bound) && learned.bound >= 0.0, "residual bound", "a number >= 0",
+          std::to_string(learned.bound));
+  residual_inputs_.resize(expected);
+}
+
+std::size_t GreyBox::parameter_count() const noexcept {
+  std::size_t count = coefficients_.fitted_count();
+  for (const Mlp& each : mlp_) count += each.parameter_count();
+  for (const Dgmm& each : dgmm_) count += each.parameter_count();
+  return count;
+}
+
+Estimate GreyBox::step(Features features) noexcept {
+  terms_.move(features[0]);
+  const auto at = coefficients_.locate(features);
+  double value = 0.0;
+  terms_.visit(features, [&](std::size_t column, double term) {
+    value += coefficients_.coefficient(at, column) * term;
+  });
+  return {.value = value + residual(features)};
+}
+
+double GreyBox::residual(Features features) noexcept {
+  if (mlp_.empty() && dgmm_.empty()) return 0.0;
+  const GreyBoxResidual& learned = parameters_.residual;
+  std::ranges::copy(features, residual_inputs_.begin());
+  residual_inputs_[0] = terms_.position();
+  std::ranges::copy(state().first(parameters_.terms.thresholds.size()),
+                    residual_inputs_.begin() + static_cast<std::ptrdiff_t>(features.size()));
+  double share = 1.0;
+  for (std::size_t j = 0; j < residual_inputs_.size(); ++j) {
+    const double low = learned.lowest[j];
+    const double high = learned.highest[j];
+    const double left_by = std::max(low - residual_inputs_[j], residual_inputs_[j] - high);
+    if (left_by <= 0.0) continue;
+    const double border = GreyBoxResidual::kBorder * (high - low);
+    if (!(left_by < border)) return 0.0;  // NaN too
+    share = std::min(share, 1.0 - left_by / border);
+  }
+  const double told =
+      mlp_.empty() ? dgmm_[0].step(residual_inputs_).value : mlp_[0].step(residual_inputs_).value;
+  if (!std::isfinite(told)) return 0.0;
+  return share * std::min(std::max(told, -learned.bound), learned.bound);
+}
+
+double GreyBox::at_jump(const ScheduledCoefficients::Position& at, double x) const noexcept {
+  double value = 0.0;
+  terms_.visit_jump(x, [&](std::size_t column, double term) {
+    value += coefficients_.coefficient(at, column) * term;
+  });
+  return value;
+}
+
+double GreyBox::others(const ScheduledCoefficients::Position& at,
+                       Features features) const noexcept {
+  const GreyBoxTerms::Structure& structure = parameters_.terms;
+  double value = 0.0;
+  for (std::size_t j = 1; j < features.size(); ++j) {
+    value += coefficients_.coefficient(at, structure.first_slope() + j) * features[j];
+    if (const double scale = structure.rate_scales[j]; scale > 0.0)
+      value += coefficients_.coefficient(at, structure.first_coulomb() + j) *
+               std::tanh(features[j] / scale);
+  }
+  return value;
+}
+
+/// From where the box is along the curve's mean slope, then by secants: most targets of a loop are a few
+/// knots away, and between knots the box is all but straight. NaN where that does not end soon.
+template <class Error>
+double GreyBox::near_root(const Error& error_at, const ScheduledCoefficients::Position& at,
+                          double wanted) const noexcept {
+  constexpr int kSteps = 8;
+  constexpr double kShare = 1e-13;
+  const std::vector<double>& knots = parameters_.terms.curve_knots;
+  double before = std::min(std::max(terms_.position(), knots.front()), knots.back());
+  double error_before = error_at(before);
+  const double rise =
+      coefficients_.coefficient(at, knots.size() - 1) - coefficients_.coefficient(at, 0);
+  const double enough = kShare * (std::abs(rise) + std::abs(wanted));
+  if (!std::isfinite(enough)) return std::numeric_limits<double>::quiet_NaN();
+  if (std::abs(error_before) <= enough) return before;
+  double x = before - error_before * (knots.back() - knots.front()) / rise;
+  for (int i = 0; i < kSteps && x >= knots.front() && x <= knots.back(); ++i) {
+    const double error = error_at(x);
+    if (std::abs(error) <= enough) return x;
+    const double next = x - error * (x - before) / (error - error_before);
+    before = x;
+    error_before = error;
+    x = next;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+Estimate GreyBox::invert(double target, Features features) noexcept {
+  const CoefficientSchedule& schedule = coefficients_.schedule();
+  if (schedule.scheduled && schedule.feature == 0) return no_inverse(features);
+  const auto at = coefficients_.locate(features);
+  const double wanted = target - others(at, features) - residual(features);
+  const auto error_at = [&](double x) { return at_jump(at, x) - wanted; };
+  double low = parameters_.terms.curve_knots.front();
+  double high = parameters_.terms.curve_knots.back();
+  if (const double near = near_root(error_at, at, wanted); near >= low && near <= high)
+    return {.value = near};
+  double error_low = error_at(low);
+  double error_high = error_at(high);
+  if (!(error_low * error_high <= 0.0)) {
+    const double nearer = std::abs(error_low) < std::abs(error_high) ? low : high;
+    return {.value = nearer, .fault = Fault::outside_training_range};
+  }
+  // Secants between the ends of the bracket; an end that stays twice is weighed down (Illinois), and
+  // now and then the bracket is halved, should that still crawl.
+  const double narrow = std::numeric_limits<double>::epsilon() * std::max(-low, high);
+  double x = low;
+  int stayed = 0;  // how often in a row: below 0 the lower end, above 0 the upper one
+  for (int i = 0; i < kInversionSteps && high - low > narrow; ++i) {
+    const double secant = (low * error_high - high * error_low) / (error_high - error_low);
+    const bool is_inside = secant > low && secant < high;
+    x = is_inside && i % 8 != 7 ? secant : 0.5 * (low + high);
+    const double error = error_at(x);
+    if (error == 0.0) break;
+    if ((error < 0.0) == (error_low < 0.0)) {
+      low = x;
+      error_low = error;
+      stayed = std::max(stayed, 0) + 1;
+      if (stayed > 1) error_high *= 0.5;
+    } else {
+      high = x;
+      error_high = error;
+      stayed = std::min(stayed, 0) - 1;
+      if (stayed < -1) error_low *= 0.5;
+    }
+  }
+  return {.value = x};
+}
+
+}  // namespace torsio

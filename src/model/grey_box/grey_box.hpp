@@ -1,0 +1,251 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "model/common/schedule.hpp"
+#include "model/hysteresis/slip_bank.hpp"
+#include "model/mixture/dgmm.hpp"
+#include "model/network/mlp.hpp"
+#include "torsio/model/common/model.hpp"
+
+namespace torsio {
+
+/// Which terms a grey box has, without their coefficients, and what they remember.
+///
+/// x is the first input. A hat function is 1 at its knot, 0 at its neighbours' and straight between
+/// them. Terms, in the order of the columns of the coefficients:
+///
+/// | term | columns |
+/// |---|---|
+/// | elastic curve: hats of x over `curve_knots`, straight beyond its ends | knots |
+/// | slip: stop s_i of threshold r_i, over r_i, times hats of x over `friction_knots` (held beyond) | thresholds x knots |
+/// | relaxation: v_j, a spring behind a dashpot of time constant T_j | time constants |
+/// | slope: every other input | inputs |
+/// | Coulomb: tanh of every input over its scale | inputs |
+///
+///     s_i <- clip(s_i + dx, +-r_i),   v_j <- e^(-h/T_j) v_j + (T_j / h) (1 - e^(-h/T_j)) dx
+///
+/// The v_j are exact where x runs straight between samples.
+class GreyBoxTerms {
+ public:
+  static constexpr std::size_t kMostThresholds = 32;
+  static constexpr std::size_t kMostKnots = 1000;
+  static constexpr std::size_t kMostTimeConstants = 32;
+
+  struct Structure {
+    std::vector<double> curve_knots;       ///< x's unit, ascending, at least 2
+    std::vector<double> thresholds;        ///< r_i, x's unit, > 0
+    std::vector<double> friction_knots;    ///< x's unit, ascending; one: the same everywhere
+    std::vector<double> time_constants_s;  ///< T_j > 0
+    std::vector<double> rate_scales;       ///< of every input, in its unit; 0: no Coulomb term
+    double sample_period_s = 0.0;
+
+    template <class Self, class Visit>
+    static void visit_fields(Self& self, Visit&& visit) {
+      visit("curve_knots", self.curve_knots);
+      visit("thresholds", self.thresholds);
+      visit("friction_knots", self.friction_knots);
+      visit("time_constants_s", self.time_constants_s);
+      visit("rate_scales", self.rate_scales);
+      visit("sample_period_s", self.sample_period_s);
+    }
+    bool operator==(const Structure&) const = default;
+
+    [[nodiscard]] std::size_t inputs() const noexcept { return rate_scales.size(); }
+    [[nodiscard]] std::size_t first_slip() const noexcept { return curve_knots.size(); }
+    [[nodiscard]] std::size_t first_relaxation() const noexcept {
+      return first_slip() + thresholds.size() * friction_knots.size();
+    }
+    [[nodiscard]] std::size_t first_slope() const noexcept {
+      return first_relaxation() + time_constants_s.size();
+    }
+    [[nodiscard]] std::size_t first_coulomb() const noexcept { return first_slope() + inputs(); }
+    [[nodiscard]] std::size_t columns() const noexcept { return first_coulomb() + inputs(); }
+  };
+
+  GreyBoxTerms() = default;
+  /// @throws Error naming the field that makes no sense.
+  explicit GreyBoxTerms(Structure structure);
+
+  [[nodiscard]] const Structure& structure() const noexcept { return structure_; }
+
+  /// As if x had long been where it is at the next `move`.
+  void reset() noexcept;
+  /// One sample period later x is here.
+  void move(double x) noexcept TORSIO_REALTIME;
+  /// Last x; 0 before the first.
+  [[nodiscard]] double position() const noexcept { return last_; }
+
+  /// s_i / r_i, then v_j.
+  [[nodiscard]] std::span<const double> state() const noexcept { return state_; }
+  void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
+
+  /// Calls term(column, value) for each term that is not 0, as of now.
+  /// @param features the first is not looked at
+  template <class Term>
+  void visit(Features features, Term&& term) const noexcept {
+    visit_motion(last_, state_, term);
+    for (std::size_t j = 1; j < features.size(); ++j) {
+      term(structure_.first_slope() + j, features[j]);
+      if (const double scale = structure_.rate_scales[j]; scale > 0.0)
+        term(structure_.first_coulomb() + j, std::tanh(features[j] / scale));
+    }
+  }
+
+  /// The terms of x alone, if x had jumped here at once: nothing relaxes on the way.
+  template <class Term>
+  void visit_jump(double x, Term&& term) const noexcept {
+    std::array<double, kMostThresholds + kMostTimeConstants> moved;
+    const double dx = is_started_ ? x - last_ : 0.0;  // a start has no way behind it
+    const std::size_t slips = slips_.size();
+    for (std::size_t i = 0; i < slips; ++i)
+      moved[i] = std::min(std::max(state_[i] + dx * slips_.stiffness()[i], -1.0), 1.0);
+    for (std::size_t j = slips; j < state_.size(); ++j) moved[j] = state_[j] + dx;
+    visit_motion(x, std::span(moved).first(state_.size()), term);
+  }
+
+ private:
+  /// Between which knots x lies, and how far it is on its way to the right one.
+  struct Cell {
+    std::size_t left = 0;
+    double share = 0.0;
+  };
+  [[nodiscard]] static Cell cell_of(std::span<const double> knots, double x) noexcept;
+
+  template <class Term>
+  void visit_motion(double x, std::span<const double> state, Term&& term) const noexcept {
+    const Cell curve = cell_of(structure_.curve_knots, x);
+    term(curve.left, 1.0 - curve.share);
+    term(curve.left + 1, curve.share);
+    const std::size_t knots = structure_.friction_knots.size();
+    Cell slip;
+    if (knots > 1) {
+      slip = cell_of(structure_.friction_knots, x);
+      slip.share = std::min(std::max(slip.share, 0.0), 1.0);
+    }
+    std::size_t column = structure_.first_slip() + slip.left;
+    for (std::size_t i = 0; i < slips_.size(); ++i, column += knots) {
+      term(column, (1.0 - slip.share) * state[i]);
+      if (knots > 1) term(column + 1, slip.share * state[i]);
+    }
+    for (std::size_t j = slips_.size(); j < state.size(); ++j)
+      term(structure_.first_relaxation() + j - slips_.size(), state[j]);
+  }
+
+  Structure structure_;
+  SlipBank slips_;             ///< of s_i / r_i
+  std::vector<double> decay_;  ///< e^(-h/T_j)
+  std::vector<double> gain_;   ///< (T_j / h) (1 - e^(-h/T_j))
+  std::vector<double> state_;
+  double last_ = 0.0;
+  bool is_started_ = false;
+};
+
+/// A learned correction to a grey box: a network or a mixture of the inputs and of the slips s_i / r_i,
+/// bounded, and faded out where an input leaves what it was trained on.
+struct GreyBoxResidual {
+  std::vector<Mlp::Parameters> mlp = {};    ///< at most one of these
+  std::vector<Dgmm::Parameters> dgmm = {};  ///< two lists holds one
+  double bound = 0.0;                       ///< largest |correction|, target's unit
+  std::vector<double> lowest = {};          ///< of each of its inputs in training
+  std::vector<double> highest = {};
+  static constexpr double kBorder = 0.1;  ///< of the range: how far beyond it the fading ends
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("mlp", self.mlp);
+    visit("dgmm", self.dgmm);
+    visit("bound", self.bound);
+    visit("lowest", self.lowest);
+    visit("highest", self.highest);
+  }
+};
+
+/// torsio's own spring model: what physics allows, and of that what the data ask for.
+///
+///     y = curve(x) + sum_i w_i(x) s_i / r_i + sum_j k_j v_j + sum_l (k_l x_l + f_l tanh(x_l / u_l))
+///         + residual
+///
+/// A stiffening and, if need be, asymmetric elastic curve; a bank of slip operators whose forces may
+/// depend on the deflection (friction under load); viscoelastic branches; viscous and dry friction of
+/// other inputs (rates); see `GreyBoxTerms`. All coefficients may be scheduled over one input. With
+/// w_i constant and >= 0, k_j >= 0 and an ascending curve it is passive. The residual, if there is
+/// one, is a small network or mixture, bounded, and faded out away from its training data. A fit
+/// chooses which terms there are by cross-validation (fit/grey_box/fit_grey_box.hpp). A family of its own:
+/// no paper has it; the parts are those of specification 3.6 and 3.7. Cost: some 4 (2 + 2
+/// thresholds + branches + inputs) multiply-adds, and that of the residual.
+class GreyBox {
+ public:
+  static constexpr std::string_view kFamily = "grey_box";
+
+  struct Parameters {
+    using Family = GreyBox;
+    GreyBoxTerms::Structure terms;
+    CoefficientSchedule coefficients;  ///< columns as `GreyBoxTerms` lists them
+    GreyBoxResidual residual;
+
+    template <class Self, class Visit>
+    static void visit_fields(Self& self, Visit&& visit) {
+      visit("terms", self.terms);
+      visit("coefficients", self.coefficients);
+      visit("residual", self.residual);
+    }
+  };
+
+  /// @throws Error if the structure makes no sense, the coefficients do not fit it, or the residual
+  /// has other inputs than the box.
+  explicit GreyBox(Parameters parameters);
+
+  [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
+  [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.terms.inputs(); }
+  [[nodiscard]] std::size_t parameter_count() const noexcept;
+  [[nodiscard]] double sample_period() const noexcept {
+    return parameters_.terms.sample_period_s;
+  }  ///< [s]
+  /// The same model at another sample period; without a relaxation it has none, and is as it was.
+  [[nodiscard]] static Parameters at_sample_period(Parameters parameters, double sample_period_s) {
+    if (parameters.terms.sample_period_s > 0.0) parameters.terms.sample_period_s = sample_period_s;
+    return parameters;
+  }
+
+  void reset() noexcept { terms_.reset(); }
+  Estimate step(Features features) noexcept TORSIO_REALTIME;
+
+  /// s_i / r_i, then v_j in the first input's unit.
+  [[nodiscard]] std::span<const double> state() const noexcept { return terms_.state(); }
+  void set_state(std::span<const double> state) noexcept TORSIO_REALTIME {
+    terms_.set_state(state);
+  }
+
+  /// The first input at which the box would say `target` if it went there at once from where it is,
+  /// the others as given and the residual as where it is (secants kept inside a bracket, at most `kInversionSteps`). Where the ends
+  /// of the curve do not enclose the target, the nearer end comes back with
+  /// `Fault::outside_training_range`; where the schedule runs over the first input,
+  /// `Fault::model_not_finite`.
+  [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
+  static constexpr int kInversionSteps = 100;
+
+ private:
+  [[nodiscard]] double at_jump(const ScheduledCoefficients::Position& at, double x) const noexcept;
+  template <class Error>
+  [[nodiscard]] double near_root(const Error& error_at, const ScheduledCoefficients::Position& at,
+                                 double wanted) const noexcept;
+  [[nodiscard]] double others(const ScheduledCoefficients::Position& at,
+                              Features features) const noexcept;
+  [[nodiscard]] double residual(Features features) noexcept;
+
+  Parameters parameters_;
+  GreyBoxTerms terms_;
+  ScheduledCoefficients coefficients_;
+  std::vector<Mlp> mlp_;
+  std::vector<Dgmm> dgmm_;
+  std::vector<double> residual_inputs_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "model/mixture/gaussian_mixture.hpp"
+#include "torsio/core/aligned_vector.hpp"
+#include "torsio/core/matrix.hpp"
+#include "torsio/core/realtime.hpp"
+#include "torsio/model/common/model.hpp"
+
+namespace torsio {
+
+/// What a mixture says about one of its quantities once the others are known.
+struct Conditional {
+  double mean = 0.0;         ///< the quantity's unit
+  double variance = 0.0;     ///< unit squared
+  double log_density = 0.0;  ///< ln p(z~) of the given quantities, standardised: no unit
+};
+
+/// Gaussian mixture regression: one quantity y of a mixture given all the others z, in any
+/// direction from one mixture.
+///
+///     l_i = ln w_i - sum ln diag L_i - d/2 ln 2 pi - |L_i^-1 (z - mu_i^Z)|^2 / 2
+///           with L_i L_i^T = S_i^ZZ
+///     m_i = mu_i^Y + B_i (z - mu_i^Z),   B_i = S_i^YZ (S_i^ZZ)^-1
+///     s_i^2 = S_i^YY - B_i S_i^ZY
+///     pi_i = exp(l_i) / sum_j exp(l_j)
+///     mean = sum pi_i m_i
+///     variance = sum pi_i (s_i^2 + (m_i - mean)^2)
+///
+/// `query` scans all components in float32 for those whose weight can matter at all. Few are then
+/// evaluated in double. Where many matter and float32 can be trusted, they are evaluated in
+/// float32, with differences to the means that keep what rounding takes from them.
+///
+/// How exact that is: for each query a bound on the scan's rounding sees to it that the dropped
+/// components hold less than 1e-10 of the weight. Whether float32 can be trusted is an estimate
+/// from the size of the numbers (a log weight that counts off by 5e-5), not a bound. Tests hold
+/// mean and standard deviation to 1e-4 standard deviations of the output from `query_exact`, which
+/// evaluates all components in double, one by one, and the log density to 1e-4. Where no component
+/// has a density that double can hold, the results are NaN.
+///
+/// Source: specification 3.1 (paper 000, equations 8 to 11, with the variance of the mixture).
+/// Cost of `query`: 4 (d + d(d+1)/2 + 1) bytes a component from cache, d given
+/// quantities, and `bytes_read()` in all. Nothing is allocated after construction.
+class MixtureRegression {
+ public:
+  /// @param output index of y among the mixture's quantities; z are the others in their order.
+  /// @throws Error if the mixture is not sound (see `check`), has less than two quantities, or
+  /// lacks `output`.
+  MixtureRegression(const GaussianMixture& mixture, std::size_t output);
+
+  [[nodiscard]] std::size_t input_count() const noexcept { return inputs_; }
+  [[nodiscard]] std::size_t size() const noexcept { return components_; }
+
+  /// @param inputs `input_count()` values, physical units.
+  [[nodiscard]] Conditional query(Features inputs) noexcept TORSIO_REALTIME;
+
+  /// The same for each row of `inputs`, to the bit.
+  void query(const Matrix& inputs, std::span<Conditional> results) noexcept TORSIO_REALTIME;
+
+  /// The reference path.
+  [[nodiscard]] Conditional query_exact(Features inputs) const noexcept TORSIO_REALTIME;
+
+  /// Bytes that `query` read last: for measuring against the machine's floor.
+  [[nodiscard]] std::size_t bytes_read() const noexcept { return bytes_read_; }
+
+ private:
+  void pack(const GaussianMixture& mixture, std::size_t output);
+  void standardise(Features inputs) noexcept;
+  [[nodiscard]] bool float_is_enough(double largest) const noexcept;
+  [[nodiscard]] double threshold(double largest) const noexcept;
+  [[nodiscard]] Conditional physical(const Conditional& standardised) const noexcept;
+
+  std::size_t inputs_ = 0;
+  std::size_t components_ = 0;
+  double output_centre_ = 0.0;
+  double output_scale_ = 1.0;
+  std::vector<double> input_centre_;
+  std::vector<double> input_scale_;
+  // Bounds from which `query` knows how far a float32 log weight may be off.
+  double largest_mean_ = 0.0;
+  double largest_whitening_ = 0.0;
+  double largest_offset_ = 0.0;
+  // The components, packed as src/model/mixture/mixture_kernels.hpp says.
+  AlignedVector<float> scan_;
+  AlignedVector<float> rounded_;
+  AlignedVector<double> exact_;
+  // Scratch of one query.
+  std::size_t bytes_read_ = 0;
+  std::vector<double> standardised_;
+  AlignedVector<float> scan_input_;
+  AlignedVector<float> scan_log_weights_;
+  AlignedVector<double> log_weights_;
+  std::vector<std::size_t> candidates_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include "torsio/model/common/model.hpp"
+
+namespace torsio {
+
+/// What a driven mass says of its state {position, speed, ...}: the position, or, beyond the range, the range's
+/// end, where it then stands still.
+inline Estimate bounded_position(std::span<double> state, double lowest, double highest) noexcept {
+  if (state[0] >= lowest && state[0] <= highest) return {.value = state[0]};
+  state[0] = std::clamp(state[0], lowest, highest);
+  state[1] = 0.0;
+  return {.value = state[0], .fault = Fault::diverged};
+}
+
+}  // namespace torsio

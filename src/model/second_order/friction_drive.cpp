@@ -1,0 +1,135 @@
+#include "model/second_order/friction_drive.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "actuator/parts/bristle.hpp"
+#include "core/all_finite.hpp"
+#include "model/second_order/bounded_motion.hpp"
+#include "model/second_order/check_dynamics.hpp"
+
+namespace torsio {
+namespace {
+
+std::vector<double> middles(std::size_t substeps) {
+  std::vector<double> places;
+  for (std::size_t i = 0; i < substeps; ++i)
+    places.push_back((static_cast<double>(i) + 0.5) / static_cast<double>(substeps));
+  return places;
+}
+
+double bristle_stiffness(const FrictionDrive::Parameters& p) {
+  return p.bristle > 0.0 ? p.static_ratio * p.coulomb / p.bristle : 0.0;
+}
+
+void check_signs(const FrictionDrive::Parameters& p) {
+  const auto require = [&](bool holds, const char* field, const char* expected, double found) {
+    require_parameter(holds && std::isfinite(found), FrictionDrive::kFamily, field, expected,
+                      found);
+  };
+  require(p.inertia > 0.0, "inertia", "a positive number", p.inertia);
+  require(p.viscous >= 0.0, "viscous", "a number not below 0", p.viscous);
+  require(p.coulomb >= 0.0, "coulomb", "a number not below 0", p.coulomb);
+  require(true, "offset", "a number", p.offset);
+  require(p.static_ratio >= 1.0, "static_ratio", "a number not below 1", p.static_ratio);
+  require(p.stribeck_speed > 0.0, "stribeck_speed", "a positive number", p.stribeck_speed);
+  require(p.bristle >= 0.0, "bristle", "a number not below 0", p.bristle);
+  require(std::abs(p.viscous_asymmetry) <= p.viscous, "viscous_asymmetry",
+          "a number no larger than viscous", p.viscous_asymmetry);
+  require(p.viscous_quadratic >= 0.0, "viscous_quadratic", "a number not below 0",
+          p.viscous_quadratic);
+  require(true, "spring", "a number", p.spring);
+  require(true, "coulomb_slope", "a number", p.coulomb_slope);
+}
+
+const FrictionDrive::Parameters& checked(const FrictionDrive::Parameters& p) {
+  check_signs(p);
+  check_gains(p.gains, FrictionDrive::kFamily);
+  check_sampled_time(p.time, FrictionDrive::kFamily);
+  check_end_stops(p.lowest, p.highest, FrictionDrive::kFamily);
+  constexpr double kStable = 2.0;  // of the leapfrog
+  const double turn = std::sqrt((std::max(p.spring, 0.0) + bristle_stiffness(p)) / p.inertia) *
+                      p.time.sample_period_s / static_cast<double>(p.time.substeps);
+  require_parameter(turn < kStable, FrictionDrive::kFamily, "substeps",
+                    "sub-steps of less than 2 over the fastest rate", turn);
+  return p;
+}
+
+}  // namespace
+
+FrictionDrive::FrictionDrive(const Parameters& parameters)
+    : parameters_(checked(parameters)),
+      substep_s_(parameters.time.sample_period_s / static_cast<double>(parameters.time.substeps)),
+      input_(parameters.time.input_order, middles(parameters.time.substeps)),
+      stribeck_(parameters.static_ratio, parameters.stribeck_speed),
+      bristle_stiffness_(bristle_stiffness(parameters)) {}
+
+std::size_t FrictionDrive::parameter_count() const noexcept {
+  const Parameters& p = parameters_;
+  std::size_t count = 3 + input_count();
+  if (p.static_ratio > 1.0) count += 2;
+  for (const double term :
+       {p.bristle, p.viscous_asymmetry, p.viscous_quadratic, p.spring, p.coulomb_slope})
+    if (term != 0.0) ++count;
+  return count;
+}
+
+void FrictionDrive::reset() noexcept {
+  input_.reset();
+  state_ = {};
+}
+
+void FrictionDrive::set_state(std::span<const double> state) noexcept {
+  for (std::size_t i = 0; i < state_.size() && i < state.size(); ++i)
+    if (std::isfinite(state[i])) state_[i] = state[i];
+  state_[0] = std::clamp(state_[0], parameters_.lowest, parameters_.highest);
+  const double most =
+      bristle_stiffness_ > 0.0 ? parameters_.static_ratio * parameters_.coulomb : 0.0;
+  state_[2] = std::clamp(state_[2], -most, most);
+}
+
+double FrictionDrive::dry_level() const noexcept {
+  return parameters_.coulomb * std::max(0.0, 1.0 + parameters_.coulomb_slope * state_[0]) *
+         stribeck_(state_[1]);
+}
+
+void FrictionDrive::coast(double dt_s) noexcept {
+  state_[0] += dt_s * state_[1];
+  if (bristle_stiffness_ == 0.0) return;
+  const double level = dry_level();
+  state_[2] =
+      level > 0.0 ? relaxed_bristle(state_[2], state_[1], level, bristle_stiffness_, dt_s) : 0.0;
+}
+
+void FrictionDrive::advance(double force) noexcept {
+  const Parameters& p = parameters_;
+  coast(0.5 * substep_s_);
+  const double speed = state_[1];
+  const double drag = p.viscous + std::copysign(p.viscous_asymmetry, speed * p.viscous_asymmetry) +
+                      p.viscous_quadratic * std::abs(speed);
+  const double driving = force - p.offset - p.spring * state_[0] - state_[2];
+  const double half = 0.5 * substep_s_ / p.inertia;
+  const double damped = 1.0 + half * drag;
+  const double wanted = ((1.0 - half * drag) * speed + 2.0 * half * driving) / damped;
+  const double dry =
+      bristle_stiffness_ > 0.0 ? 0.0 : 2.0 * half * dry_level() / damped;  // what it can take away
+  state_[1] = std::copysign(std::max(std::abs(wanted) - dry, 0.0), wanted);
+  coast(0.5 * substep_s_);
+}
+
+Estimate FrictionDrive::step(Features features) noexcept {
+  const bool is_first = !input_.is_started();
+  const auto forces = input_.step(driving_force(parameters_.gains, features));
+  if (is_first) return {.value = state_[0]};
+  const double before = state_[0];
+  for (const double force : forces) advance(force);
+  if (!all_finite(state_)) {
+    reset();
+    state_[0] = before;
+    return {.value = before, .fault = Fault::diverged};
+  }
+  return bounded_position(state_, parameters_.lowest, parameters_.highest);
+}
+
+}  // namespace torsio

@@ -1,0 +1,285 @@
+#include "torsio/sim/closed_loop/tracking.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "evaluate/fit_and_score.hpp"
+#include "sim/bench.hpp"
+#include "sim/bench_log.hpp"
+#include "sim/torque_references.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/sim/bench_dataset.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr auto kPlace = "track";
+constexpr double kTurnedRound_rad = rad_from_deg(200.0);
+constexpr double kMostTorque = 10.0;  // over the rating
+constexpr double kSweep_s = 20.0;
+
+Load load_of(const TrackingSpec& spec) {
+  if (spec.output == JointOutput::locked) return {.is_locked = true};
+  return lever(kLeverMass_kg, spec.lever_m);
+}
+
+TorqueLoopCore::Settings loop_settings(const DataSheet& sheet, const TrackingSpec& spec,
+                                       const Load& load) {
+  SeriesElasticJoint joint = series_elastic_joint(sheet);
+  joint.joint_inertia_kg_m2 += load.inertia_kg_m2;
+  return {.deflection = {.joint = joint,
+                         .bandwidth_rad_s = spec.bandwidth_rad_s,
+                         .damping = spec.damping},
+          .largest_torque_Nm = sheet.rating.torque_Nm.value,
+          .friction = spec.friction,
+          .observer_cutoff_Hz = spec.observer_cutoff_Hz,
+          .feeds_rate_forward = spec.feeds_rate_forward};
+}
+
+/// What the controller made of each tick, as channels.
+class LoopLog {
+ public:
+  explicit LoopLog(std::size_t ticks) {
+    for (auto& values : columns_) values.reserve(ticks);
+  }
+
+  void add(double wanted_Nm, const TorqueLoopCore::Output& out) {
+    const double terms_A = out.proportional_A + out.integral_A + out.derivative_A +
+                           out.feed_forward_A + out.rate_feed_forward_A + out.friction_A +
+                           out.observer_A + out.handover_A;
+    const std::array<double, kNames.size()> row{wanted_Nm,
+                                                out.wanted_torque_Nm,
+                                                out.wanted_deflection_rad,
+                                                out.proportional_A,
+                                                out.integral_A,
+                                                out.derivative_A,
+                                                out.feed_forward_A,
+                                                out.rate_feed_forward_A,
+                                                out.friction_A,
+                                                out.observer_A,
+                                                out.handover_A,
+                                                out.current_A - terms_A,
+                                                out.current_A,
+                                                out.is_limited ? 1.0 : 0.0,
+                                                static_cast<double>(out.inverse),
+                                                static_cast<double>(out.fault)};
+    for (std::size_t i = 0; i < row.size(); ++i) columns_[i].push_back(row[i]);
+  }
+  void add_to(Recording& recording) && {
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+      recording.add({.name = kNames[i], .values = std::move(columns_[i])});
+  }
+
+ private:
+  static constexpr std::array kNames{"wanted_torque_Nm",       "limited_torque_Nm",
+                                     "wanted_deflection_rad",  "proportional_current_A",
+                                     "integral_current_A",     "derivative_current_A",
+                                     "feed_forward_current_A", "rate_feed_forward_current_A",
+                                     "friction_current_A",     "observer_current_A",
+                                     "handover_current_A",     "rest_current_A",
+                                     "command_current_A",      "is_limited_1",
+                                     "inverse_fault_1",        "fault_1"};
+  std::array<std::vector<double>, kNames.size()> columns_;
+};
+
+/// A run that is ready for its first step.
+class Loop {
+ public:
+  Loop(const DataSheet& sheet, const TrackingSpec& spec, const AnyInverse& inverse,
+       std::uint64_t seed)
+      : name_(fmt::format("{} {} seed {}", full_name(sheet), name(spec.reference.kind), seed)),
+        reference_Nm_(reference_torque(spec.reference, sheet, seed)),
+        load_(load_of(spec)),
+        bench_(sheet,
+               {.name = kPlace,
+                .duration_s = static_cast<double>(reference_Nm_.size()) / kBenchRate_Hz,
+                .seed = seed,
+                .conditions = spec.conditions,
+                .faults = spec.faults},
+               {.start = load_, .next = {}}),
+        bench_log_(sheet, reference_Nm_.size(), true),
+        loop_log_(reference_Nm_.size()),
+        controller_(inverse, loop_settings(sheet, spec, load_), kBenchRate_Hz),
+        most_Nm_(kMostTorque * sheet.rating.torque_Nm.value) {
+    if (load_.is_locked) return;
+    check_swing(
+        {.place = kPlace,
+         .load = load_,
+         .duration_s = static_cast<double>(reference_Nm_.size()) / kBenchRate_Hz,
+         .reference = [this, tick = std::size_t{0}]() mutable { return reference_Nm_[tick++]; }},
+        sheet);
+  }
+
+  /// @returns whether it stayed within bounds
+  bool run(const Progress& progress) {
+    const std::size_t ticks = reference_Nm_.size();
+    for (std::size_t tick = 0; tick < ticks; ++tick) {
+      if (tick % 1000 == 0)
+        report_progress(progress, static_cast<double>(tick) / static_cast<double>(ticks),
+                        "tracking");
+      const Measurement measured = bench_.sense();
+      const BenchTruth truth = bench_.truth();
+      bench_log_.add(measured, truth);
+      const TorqueLoopCore::Output out =
+          controller_.step(reference_Nm_[tick], {.t_s = bench_.time_s(),
+                                                 .motor_angle_rad = measured.motor_angle_rad,
+                                                 .gear_angle_rad = measured.middle_angle_rad,
+                                                 .joint_angle_rad = measured.joint_angle_rad,
+                                                 .motor_current_A = measured.motor_current_A});
+      loop_log_.add(reference_Nm_[tick], out);
+      if (!(std::abs(truth.plant.state().joint_angle_rad) < kTurnedRound_rad &&
+            std::abs(truth.load_cell_Nm) < most_Nm_))
+        return false;
+      bench_.act({.command = {.current_A = out.current_A}, .load = load_});
+    }
+    return true;
+  }
+  Recording finish() && {
+    Recording record = bench_log_.finish(name_);
+    std::move(loop_log_).add_to(record);
+    return record;
+  }
+
+ private:
+  std::string name_;
+  std::vector<double> reference_Nm_;
+  Load load_;
+  Bench bench_;
+  BenchLog bench_log_;
+  LoopLog loop_log_;
+  TorqueController<AnyInverse> controller_;
+  double most_Nm_;
+};
+
+/// The reference's amplitude, through the frequencies of the loop.
+std::optional<double> measured_bandwidth(const DataSheet& sheet, TrackingSpec spec,
+                                         const AnyInverse& inverse, std::uint64_t seed,
+                                         const Progress& progress) {
+  const double amplitude_Nm = amplitude_of(spec.reference, sheet);
+  spec.reference = {
+      .kind = TorqueReference::Kind::sweep, .amplitude_Nm = amplitude_Nm, .duration_s = kSweep_s};
+  spec.faults = {};
+  Loop loop(sheet, spec, inverse, seed);
+  if (!loop.run(progress)) return std::nullopt;
+  const Recording record = std::move(loop).finish();
+  return bandwidth(record.channel("truth_torque_Nm").values,
+                   frequency_sweep(amplitude_Nm, kSweep_s), kBenchRate_Hz);
+}
+
+TrackingRow row_of(const DataSheet& sheet, const TrackingSpec& spec, const std::string& model,
+                   std::uint64_t seed) {
+  return {.actuator = sheet.serial ? fmt::format("{}#{:02}", sheet.name, *sheet.serial)
+                                   : std::string(sheet.name),
+          .variant = std::string(sheet.variant),
+          .output = spec.output,
+          .reference = std::string(name(spec.reference.kind)),
+          .amplitude_Nm = amplitude_of(spec.reference, sheet),
+          .model = model,
+          .seed = seed};
+}
+
+void run_into(TrackingRow& row, const DataSheet& sheet, const TrackingSpec& spec,
+              const AnyInverse& inverse, const Progress& progress) {
+  try {
+    const TrackingRun run = track(sheet, spec, inverse, row.seed, progress);
+    row.score = run.score;
+    row.bandwidth_Hz = run.bandwidth_Hz;
+    if (!run.has_diverged) return;
+    row.status = "diverged";
+    row.reason = fmt::format("stopped after {:.3g} s",
+                             static_cast<double>(run.record.size()) / kBenchRate_Hz);
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    row.status = "failed";
+    row.reason = error.what();
+  }
+}
+
+}  // namespace
+
+void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed) {
+  if (nominal.family != ActuatorFamily::series_elastic)
+    throw UsageError({.place = kPlace,
+                      .expected = "a series-elastic actuator, dfki-28 to dfki-300",
+                      .found = std::string(nominal.name)});
+  check(spec.conditions);
+  const DataSheet sheet = aged(nominal, spec.conditions.age);
+  (void)Loop(sheet, spec, LinearInverse(1.0), seed);
+}
+
+TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, const AnyInverse& inverse,
+                  std::uint64_t seed, const Progress& progress) {
+  check_tracking(nominal, spec, seed);
+  const DataSheet sheet = aged(nominal, spec.conditions.age);
+  Loop loop(sheet, spec, inverse, seed);
+  const bool has_held = loop.run(progress);
+  TrackingRun done{.score = {}, .has_diverged = !has_held, .record = std::move(loop).finish()};
+  if (!has_held) return done;
+  done.score = tracking_score(done.record, amplitude_of(spec.reference, sheet),
+                              spec.reference.kind == TorqueReference::Kind::steps);
+  if (spec.measures_bandwidth)
+    done.bandwidth_Hz = measured_bandwidth(sheet, spec, inverse, seed, progress);
+  return done;
+}
+
+AnyInverse inverse_of(const ModelFile& model) {
+  const Estimator estimator = estimator_at(model, kBenchRate_Hz);
+  const EstimatorSettings& settings = estimator.settings();
+  if (!settings.zeroed_channels.empty())
+    throw Error({.place = kPlace,
+                 .expected = "a model that takes the channels as they are measured",
+                 .found = fmt::format("one that wants the zero of {}",
+                                      fmt::join(settings.zeroed_channels, ", ")),
+                 .advice = "Train it without zero rules: simulated encoders have none."});
+  return AnyInverse::of(settings, estimator.model().parameters());
+}
+
+LinearInverse sweep_line(const DataSheet& sheet, std::uint64_t seed, const Progress& progress) {
+  const Dataset sweeps = sweep_dataset(full_name(sheet), seed, progress);
+  const TrainedModel trained = train_model(
+      sweeps, {.family = "linear", .features = resolve_inputs(sweeps, {"spring_deflection_rad"})},
+      seed);
+  const LinearFallback& line = trained.file.settings.fallback;
+  return LinearInverse(line.slope.front(), line.intercept);
+}
+
+std::vector<TrackingRow> track_models(const DataSheet& sheet, const TrackingSpec& spec,
+                                      const LinearInverse& linear,
+                                      std::span<const NamedInverse> models,
+                                      std::span<const std::uint64_t> seeds,
+                                      const Progress& progress) {
+  for (const std::uint64_t seed : seeds) check_tracking(sheet, spec, seed);
+  std::vector<TrackingRow> rows;
+  const std::size_t runs = seeds.size() * (models.size() + 1);
+  const auto part = [&](const std::string& doing) {
+    return part_of(progress, rows.size(), runs, doing);
+  };
+  for (const std::uint64_t seed : seeds) {
+    TrackingRow line = row_of(sheet, spec, "linear", seed);
+    run_into(line, sheet, spec, linear, part("linear"));
+    rows.push_back(line);
+    for (const NamedInverse& model : models) {
+      TrackingRow row = row_of(sheet, spec, model.name, seed);
+      run_into(row, sheet, spec, model.inverse, part(model.name));
+      if (row.status == "ok" && line.status == "ok")
+        row.mad_to_linear = row.score.mad / line.score.mad;
+      rows.push_back(std::move(row));
+    }
+    rows[rows.size() - models.size() - 1].mad_to_linear =
+        line.status == "ok" ? std::optional(1.0) : std::nullopt;
+  }
+  return rows;
+}
+
+}  // namespace torsio

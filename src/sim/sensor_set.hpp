@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+
+#include "actuator/parts/current_sensor.hpp"
+#include "actuator/parts/encoder.hpp"
+#include "actuator/parts/torque_sensor.hpp"
+#include "sim/plant/plant.hpp"
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/random.hpp"
+
+namespace torsio {
+
+/// What the loop and the logger see at one tick.
+struct Measurement {
+  double motor_angle_rad = 0.0;   ///< of the rotor
+  double middle_angle_rad = 0.0;  ///< of the body between the stages
+  double joint_angle_rad = 0.0;
+  double twist_rad = 0.0;  ///< of the second stage, where a sensor of its own tells it
+  double motor_current_A = 0.0;
+  double torque_Nm = 0.0;  ///< load cell: held between its samples, late
+  // Whether the sensor delivered at this tick; where not, its last value is held.
+  bool is_motor_angle_fresh = true;
+  bool is_middle_angle_fresh = true;
+  bool is_joint_angle_fresh = true;
+  bool is_twist_fresh = true;
+  bool is_motor_current_fresh = true;
+  bool is_torque_fresh = false;
+};
+
+/// The sensors of one actuator with their noise. A tick draws the same numbers whatever the plant
+/// does, so that equal seeds compare plants under equal noise.
+class SensorSet {
+ public:
+  /// @throws Error if the loop's rate is no multiple of the load cell's.
+  SensorSet(const DataSheet& sheet, double sample_rate_Hz, std::uint64_t seed);
+
+  /// As if the load cell had been running at this torque for long. Goes on in the same noise.
+  void reset(double torque_Nm) noexcept;
+  /// @param torque_Nm what the load cell feels
+  Measurement step(const Plant& plant, double torque_Nm) noexcept;
+
+ private:
+  Random random_;
+  Encoder motor_encoder_;
+  Encoder middle_encoder_;
+  Encoder joint_encoder_;
+  std::optional<Encoder> twist_sensor_;
+  CurrentSensor current_sensor_;
+  TorqueSensor torque_sensor_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,146 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "comparison_cases.hpp"
+#include "studies.hpp"
+#include "study_rows.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/fit/families.hpp"
+
+namespace torsio {
+namespace {
+
+/// A model of the table: what its rows are called, and how `--models` asks for it.
+struct Rival {
+  std::string_view label;
+  std::string_view model;
+  bool is_quick = false;  ///< also in the quick study
+};
+
+// Where a family's own settings would take minutes a case, cheaper ones: fewer starts, samples, epochs.
+constexpr std::array kRivals{
+    Rival{"linear", "linear", true},
+    Rival{"linear_coulomb", "linear_coulomb"},
+    Rival{"polynomial", "polynomial", true},
+    Rival{"maxwell_slip", "maxwell_slip", true},
+    Rival{"prandtl_ishlinskii", "prandtl_ishlinskii"},
+    Rival{"prandtl_ishlinskii_improved", "prandtl_ishlinskii_improved"},
+    Rival{"bouc_wen", "bouc_wen"},
+    Rival{"nonlinear_backlash", "nonlinear_backlash"},
+    Rival{"nonlinear_backlash_improved", "nonlinear_backlash_improved"},
+    Rival{"exponential_loading", "exponential_loading"},
+    Rival{"hammerstein_wiener", "hammerstein_wiener:structure=given:iterations=500", true},
+    Rival{"viscoelastic", "viscoelastic:network=003a:starts=2"},
+    Rival{"grey_box", "grey_box", true},
+    Rival{"grey_box, no residual", "grey_box:residual=none", true},
+    Rival{"dgmm", "dgmm"},
+    Rival{"gaussian_process", "gaussian_process:std_dev=false:restarts=0"},
+    Rival{"parametric_gp", "parametric_gp:updates=5000"},
+    Rival{"parametric_gp_variational", "parametric_gp_variational:points=50:samples=1000"},
+    Rival{"mlp", "mlp"},
+    Rival{"arx", "arx", true},
+    Rival{"narx_polynomial", "narx_polynomial:training=one_step"},
+    Rival{"lstm", "lstm:layers=16:epochs=10:stride=100"},
+};
+
+constexpr std::string_view kJudgedModel = "grey_box";
+
+struct Choice {
+  std::string label;
+  ModelChoice model;
+};
+
+std::vector<Choice> choices_of(const ComparisonCase& of, bool is_quick) {
+  std::vector<Choice> choices;
+  for (const Rival& rival : kRivals) {
+    if (is_quick && !rival.is_quick) continue;
+    std::string model(rival.model);
+    const std::string_view family = rival.model.substr(0, rival.model.find(':'));
+    if (!of.schedule.empty() && has_option(find_family(family), "schedule"))
+      model += ":schedule=" + of.schedule;
+    choices.push_back(
+        {std::string(rival.label), model_choices(of.dataset, model, of.inputs).front()});
+  }
+  return choices;
+}
+
+/// The rows of one fit on the judged records: of each condition, or of all together.
+void add(StudyRows& rows, const ComparisonPlan& plan, const ComparisonCase& of,
+         const std::string& model, const ResultRow& row) {
+  if (of.conditions.empty()) {
+    if (row.status == "failed") rows.failed(plan.name, model, row.reason);
+    if (row.status != "failed" && row.split == Role::test && !row.recording)
+      rows.add(plan.name, model, row, of.dataset);
+    return;
+  }
+  for (const auto& [recording, condition] : of.conditions) {
+    if (row.status == "failed") rows.failed(condition, model, row.reason);
+    if (row.status != "failed" && row.split == Role::test && row.recording == recording)
+      rows.add(condition, model, row, of.dataset);
+  }
+}
+
+void run_case(StudyRows& rows, const ComparisonPlan& plan, const ComparisonCase& of,
+              std::uint64_t seed, bool is_quick, const Progress& progress) {
+  const std::vector<Choice> choices = choices_of(of, is_quick);
+  std::vector<ModelChoice> models;
+  std::ranges::transform(choices, std::back_inserter(models), &Choice::model);
+  const Results results = compare(of.dataset, models, seed, false, progress).results;
+  for (const ResultRow& row : results.rows) {
+    const auto found = std::ranges::find_if(choices, [&](const Choice& choice) {
+      return choice.model.family == row.family && choice.model.variant() == row.variant;
+    });
+    add(rows, plan, of, found->label, row);
+  }
+}
+
+}  // namespace
+
+Study model_comparison(const StudyOptions& options, const Progress& progress) {
+  Study study{
+      .protocol =
+          "every family on every simulated actuator and on the real recordings with a torque, in "
+          "free run. dfki: three sweeps, judged on a fourth lever in an inclined plane (new "
+          "lever); "
+          "torque chirps of 0.8 and 0.3 of the rating, output locked, judged on noise of 0.25 "
+          "(random walk), both at the load cell's 125 Hz, its latency taken off. elastomer: "
+          "triangles of 0.4 to 4 Hz. "
+          "rubber-clutch: sines, judged on "
+          "multisines. harmonic-drive: pushes of 10 and 20 Nm, high and zero impedance, judged on "
+          "15 Nm. Real ones: docs/model_comparison.md",
+      .unit = "Nm",
+      .options = options,
+      .judged = std::string(kJudgedModel)};
+  std::vector<ComparisonPlan> plans = simulated_plans(options.is_quick);
+  if (!options.is_quick) std::ranges::move(recorded_plans(), std::back_inserter(plans));
+  StudyRows rows;
+  for (std::size_t p = 0; p < plans.size(); ++p) {
+    const ComparisonPlan& plan = plans[p];
+    const bool is_new =
+        !plan.plant.empty() &&
+        std::ranges::find(study.plants, plan.plant, &StudyPlant::name) == study.plants.end();
+    if (is_new) study.plants.push_back(study_plant(plan.plant));
+    const std::size_t repeats = plan.plant.empty() ? 1 : options.repeats;
+    for (std::size_t k = 0; k < repeats; ++k) {
+      const Progress part = nth_of(progress, p * repeats + k, plans.size() * repeats, plan.name);
+      const std::uint64_t seed = repeat_seed(options, k);
+      run_case(rows, plan, plan.make(seed, part), seed, options.is_quick, part);
+    }
+  }
+  study.rows = rows.rows();
+  for (const Rival& rival : kRivals)
+    if (rival.model != rival.label && (rival.is_quick || !options.is_quick))
+      study.notes.push_back(fmt::format("model {}: {}", rival.label, rival.model));
+  return study;
+}
+
+}  // namespace torsio

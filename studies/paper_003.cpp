@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "published.hpp"
+#include "studies.hpp"
+#include "study_rows.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/sim/experiment.hpp"
+
+namespace torsio {
+namespace {
+
+/// A model of the sequence that the paper goes through, or one of ours beside it.
+struct Rung {
+  std::string_view choice;  ///< as `--models` takes it
+  std::string_view name;    ///< of its rows
+};
+
+constexpr std::array kLadder{
+    Rung{"linear", "linear"},
+    Rung{"polynomial", "polynomial"},
+    Rung{"grey_box", "grey_box"},
+    Rung{"hammerstein_wiener:published=discrete", "Hammerstein-Wiener as printed"},
+    Rung{"hammerstein_wiener:published=tustin", "its Tustin form as printed"},
+    Rung{"hammerstein_wiener:published=refined", "refined, as printed"},
+    Rung{"hammerstein_wiener:structure=given", "Hammerstein-Wiener"},
+    Rung{"hammerstein_wiener:structure=given:continuous=tustin", "its Tustin form"},
+    Rung{"hammerstein_wiener:structure=given:continuous=refined", "refined in continuous time"},
+    Rung{"viscoelastic:network=003a:refine=false", "viscoelastic 003a as printed"},
+    Rung{"viscoelastic:network=003a", "viscoelastic 003a"},
+    Rung{"viscoelastic:network=003b", "viscoelastic 003b"},
+    Rung{"viscoelastic:network=003c", "viscoelastic 003c"},
+    Rung{"viscoelastic:network=003d", "viscoelastic 003d"},
+};
+
+/// What is judged: a bench run that no model has learned from.
+struct Judged {
+  const char* experiment;
+  const char* condition;
+};
+constexpr std::array kJudged{Judged{"triangles", "triangles"}, Judged{"random-walk", "random walk"},
+                             Judged{"slow-cycles", "slow cycles"}};
+constexpr std::array kCouplings{"bonded", "unbonded"};
+constexpr std::uint64_t kJudgedSeed = 50;
+
+struct Ladder {
+  Dataset dataset;
+  std::vector<std::pair<std::string, std::string>> conditions;  ///< recording, condition
+
+  void add(const std::string& coupling, const char* experiment, const std::string& condition,
+           std::uint64_t seed, Role role, bool is_quick) {
+    ExperimentSpec spec{
+        .actuator = "elastomer:" + coupling, .experiment = experiment, .seed = seed};
+    // One slow cycle takes 20 s; thirty of them say the same.
+    if (experiment == std::string_view("slow-cycles")) spec.duration_s = is_quick ? 20.0 : 100.0;
+    Recording recording = simulate(spec);
+    conditions.emplace_back(recording.name(), condition);
+    const std::size_t samples = recording.size();
+    dataset.records.push_back({std::move(recording), whole_record(samples, role)});
+  }
+  [[nodiscard]] std::string condition_of(const std::string& recording) const {
+    for (const auto& [name, condition] : conditions)
+      if (name == recording) return condition;
+    return recording;
+  }
+};
+
+Ladder ladder_of(const std::string& coupling, std::uint64_t seed, bool is_quick) {
+  Ladder ladder;
+  ladder.dataset.initialise_samples = 0;  // every run starts at rest
+  ladder.add(coupling, "triangles", {}, seed, Role::train, is_quick);
+  for (std::size_t i = 0; i < kJudged.size(); ++i)
+    ladder.add(coupling, kJudged[i].experiment,
+               fmt::format("{}, {}", coupling, kJudged[i].condition), seed + kJudgedSeed + i,
+               Role::test, is_quick);
+  return ladder;
+}
+
+std::string models() {
+  std::string text;
+  for (const Rung& rung : kLadder)
+    text += fmt::format("{}{}", text.empty() ? "" : ",", rung.choice);
+  return text;
+}
+
+}  // namespace
+
+Study ladder_003(const StudyOptions& options, const Progress& progress) {
+  Study study{.protocol =
+                  "elastomer coupling, torsion alone, all runs from rest: trained on triangles of "
+                  "0.4 to 4 Hz, tested on the same with other noise, a random walk and slow cycles "
+                  "of 6 Nm",
+              .unit = "Nm",
+              .options = options};
+  StudyRows rows(kPublishedCouplingModels);
+  for (std::size_t c = 0; c < kCouplings.size(); ++c) {
+    study.plants.push_back(study_plant(std::string("elastomer:") + kCouplings[c]));
+    for (std::size_t k = 0; k < options.repeats; ++k) {
+      const Progress part = nth_of(progress, c * options.repeats + k,
+                                   kCouplings.size() * options.repeats, kCouplings[c]);
+      const std::uint64_t seed = repeat_seed(options, k);
+      Ladder ladder = ladder_of(kCouplings[c], seed, options.is_quick);
+      const auto choices = model_choices(ladder.dataset, models(), {"spring_deflection_rad"});
+      const Results results = compare(ladder.dataset, choices, seed, false, part).results;
+      rows.add(
+          results, ladder.dataset, Role::test,
+          [&](const std::string& recording) { return ladder.condition_of(recording); },
+          [&](const ResultRow& row) {
+            const auto choice = std::ranges::find_if(choices, [&](const ModelChoice& each) {
+              return each.family == row.family && each.variant() == row.variant;
+            });
+            return std::string(kLadder[static_cast<std::size_t>(choice - choices.begin())].name);
+          });
+    }
+  }
+  study.rows = rows.rows();
+  return study;
+}
+
+}  // namespace torsio

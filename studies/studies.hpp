@@ -1,0 +1,23 @@
+#pragma once
+
+#include "studies/study.hpp"
+
+namespace torsio {
+
+// One function a study, in the file of its paper.
+
+Study spring_models_001(const StudyOptions& options, const Progress& progress);
+Study inverse_models_001(const StudyOptions& options, const Progress& progress);
+Study sensor_models_002(const StudyOptions& options, const Progress& progress);
+Study slow_loops_002(const StudyOptions& options, const Progress& progress);
+Study collision_002(const StudyOptions& options, const Progress& progress);
+Study ladder_003(const StudyOptions& options, const Progress& progress);
+Study torque_tracking_000(const StudyOptions& options, const Progress& progress);
+Study encoders_004(const StudyOptions& options, const Progress& progress);
+Study torque_levels_004(const StudyOptions& options, const Progress& progress);
+Study impedances_004(const StudyOptions& options, const Progress& progress);
+Study tubes_004(const StudyOptions& options, const Progress& progress);
+Study model_comparison(const StudyOptions& options, const Progress& progress);
+Study public_benchmarks(const StudyOptions& options, const Progress& progress);
+
+}  // namespace torsio

@@ -1,0 +1,97 @@
+#include "studies/study.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "published.hpp"
+#include "studies.hpp"
+#include "torsio/core/did_you_mean.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::array kStudies{
+    StudyInfo{"001-models", "001, Figure 4", "Errors of spring models on a new sweep",
+              spring_models_001},
+    StudyInfo{"001-inverse", "001, section 4.2",
+              "Errors of the inverse models, from torque to deflection", inverse_models_001},
+    StudyInfo{"002-table3", "002, Table III", "Errors of models of a rubber torque sensor",
+              sensor_models_002, kPublishedSensorModels},
+    StudyInfo{"002-slow", "002, Figure 8", "Slow loops, until its clutch slips and after it",
+              slow_loops_002},
+    StudyInfo{"002-collision", "002, Figure 10", "The same in a fast slip and a collision",
+              collision_002},
+    StudyInfo{"003-ladder", "003, sections 4.2.1 and 4.3, Table 3",
+              "What models of an elastomer coupling explain of its torque", ladder_003,
+              kPublishedCouplingModels},
+    StudyInfo{"000-tracking", "000, Figure 8; 001, Figure 6",
+              "How well a torque loop follows through a learned inverse of the spring",
+              torque_tracking_000, kPublishedTracking},
+    StudyInfo{"004-encoders", "004, Table 4", "Which encoders an LSTM needs to estimate the torque",
+              encoders_004, kPublishedEncoders},
+    StudyInfo{"004-torque", "004, Table 5", "Trained on 10 to 20 Nm, tested on 5 to 50 Nm",
+              torque_levels_004, kPublishedTorqueLevels},
+    StudyInfo{"004-impedance", "004, section 5.2",
+              "Trained under one impedance of the joint, tested under another", impedances_004,
+              kPublishedImpedances},
+    StudyInfo{"004-tubes", "004, Table 6", "How soft the torsion tube should be", tubes_004,
+              kPublishedTubes},
+    StudyInfo{"model-comparison",
+              "all",
+              "Every family on every simulated actuator and on the real recordings",
+              model_comparison,
+              {},
+              true},
+    StudyInfo{"public-benchmarks", "official records",
+              "Bouc-Wen and EMPS: our free runs beside published ones", public_benchmarks,
+              kPublishedBenchmarks, true}};
+
+}  // namespace
+
+std::span<const StudyInfo> studies() noexcept { return kStudies; }
+
+const StudyInfo& find_study(std::string_view name) {
+  const auto* const found = std::ranges::find(kStudies, name, &StudyInfo::name);
+  if (found != kStudies.end()) return *found;
+  std::array<std::string_view, kStudies.size()> names{};
+  std::ranges::transform(kStudies, names.begin(), &StudyInfo::name);
+  throw UsageError({.problem = fmt::format("no study is called \"{}\"", name),
+                    .expected = fmt::format("one of {}", fmt::join(names, ", ")),
+                    .advice = did_you_mean(name, names)});
+}
+
+Study run_study(const StudyInfo& study, const StudyOptions& options, const Progress& progress) {
+  constexpr std::size_t kMostRepeats = 100;
+  if (options.repeats < 1 || options.repeats > kMostRepeats)
+    throw UsageError({.place = "repeats",
+                      .expected = fmt::format("1 to {}", kMostRepeats),
+                      .found = fmt::format("{}", options.repeats)});
+  return study.run(options, progress);
+}
+
+std::vector<StudyVerdict> verdicts(const Study& study) {
+  std::vector<StudyVerdict> all;
+  for (const StudyRow& row : study.rows) {
+    auto found = std::ranges::find(all, row.condition, &StudyVerdict::condition);
+    if (found == all.end())
+      found = all.insert(found, {.condition = row.condition,
+                                 .best_rmse = std::numeric_limits<double>::infinity()});
+    if (!row.is_ranked()) continue;
+    if (row.model == study.judged) found->rmse = row.rmse;
+    if (row.rmse < found->best_rmse) {
+      found->best = row.model;
+      found->best_rmse = row.rmse;
+    }
+  }
+  for (const StudyVerdict& verdict : all)
+    if (verdict.best.empty())
+      throw Error({.place = verdict.condition, .problem = "no model could be fitted"});
+  return all;
+}
+
+}  // namespace torsio

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/running_mean.hpp"
+#include "studies/study.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/evaluate/results.hpp"
+
+namespace torsio {
+
+/// Gathers a study's rows from the results of its fits.
+class StudyRows {
+ public:
+  /// @param published figures to be shown in the rows of their condition and model
+  explicit StudyRows(std::span<const PaperEntry> published = {}) : published_(published) {}
+
+  /// The rows of single recordings in a split, each under its condition.
+  /// @param condition_of (recording) -> condition
+  /// @param model_of (row) -> what the study calls its model
+  /// @throws Error if a fit failed: a study has no holes. A free run that diverged counts with its error.
+  template <class ConditionOf, class ModelOf>
+  void add(const Results& results, const Dataset& dataset, Role split,
+           const ConditionOf& condition_of, const ModelOf& model_of) {
+    for (const ResultRow& row : results.rows) {
+      if (row.split != split) continue;
+      require_fitted(row);
+      if (!row.recording) continue;
+      sum_of({condition_of(*row.recording), model_of(row)})
+          .add(row, largest_target(dataset, *row.recording));
+    }
+  }
+  /// The same with families' own names.
+  template <class ConditionOf>
+  void add(const Results& results, const Dataset& dataset, Role split,
+           const ConditionOf& condition_of) {
+    add(results, dataset, split, condition_of, model_of);
+  }
+
+  /// One row, whatever its split.
+  void add(const std::string& condition, const std::string& model, const ResultRow& row,
+           const Dataset& dataset);
+  /// A fit that failed: a row that says why. A study that compares all families has such holes.
+  void failed(const std::string& condition, const std::string& model, const std::string& reason);
+
+  [[nodiscard]] std::vector<StudyRow> rows() const;
+
+ private:
+  struct Sum {
+    RunningMean rmse, percent, largest, one_step, fit_percent, fit_seconds, within, within_2,
+        step_ns;
+    double max_abs = 0.0;
+    std::size_t blank = 0;
+    std::size_t samples = 0;
+    std::size_t guarded = 0;
+    std::size_t diverged = 0;
+    std::string failure;
+    void add(const ResultRow& row, double largest_target);
+  };
+  struct Key {
+    std::string condition;
+    std::string model;
+    bool operator==(const Key&) const = default;
+  };
+
+  static void require_fitted(const ResultRow& row);
+  static std::string model_of(const ResultRow& row);
+  Sum& sum_of(Key key);
+
+  /// Of one recording, or of all.
+  static double largest_target(const Dataset& dataset, const std::optional<std::string>& recording);
+
+  std::vector<std::pair<Key, Sum>> sums_;
+  std::span<const PaperEntry> published_;
+};
+
+/// The name, and the hash of the data sheet (`sheet_hash`), which covers variant and numbers.
+[[nodiscard]] StudyPlant study_plant(std::string_view actuator);
+
+/// Of the k-th repeat; far enough apart for a dataset to count on from it.
+[[nodiscard]] std::uint64_t repeat_seed(const StudyOptions& options, std::size_t k) noexcept;
+
+/// The deflection becomes the torque's function, with the rates of the forward models.
+void turn_round(Dataset& dataset);
+
+/// The share of one fit's progress among so many.
+[[nodiscard]] Progress nth_of(const Progress& progress, std::size_t n, std::size_t count,
+                              std::string_view doing);
+
+}  // namespace torsio

@@ -1,0 +1,269 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/running_mean.hpp"
+#include "published.hpp"
+#include "studies.hpp"
+#include "study_rows.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/families.hpp"
+#include "torsio/fit/train_model.hpp"
+#include "torsio/sim/bench_dataset.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
+#include "torsio/sim/experiment.hpp"
+
+namespace torsio {
+namespace {
+
+using Kind = TorqueReference::Kind;
+
+constexpr std::array kVariants{"maxwell-slip", "bouc-wen", "lugre"};
+constexpr double kQuick_s = 20.0;
+constexpr std::uint64_t kJudged = 50;  // seeds of runs to be judged on
+constexpr double kObserver_Hz = 8.0;   // of the loop that does what a controller can
+
+/// What a loop is asked for (specification 6).
+struct Task {
+  const char* actuator;
+  double amplitude_Nm;
+  JointOutput output;
+  bool is_helped = false;  ///< also by a loop with feed-forward of the rate and an observer
+};
+constexpr std::array kTasks{
+    Task{"dfki-50", 13.0, JointOutput::locked, true}, Task{"dfki-50", 13.0, JointOutput::free},
+    Task{"dfki-120", 20.0, JointOutput::locked, true}, Task{"dfki-120", 20.0, JointOutput::free},
+    Task{"dfki-120", 70.0, JointOutput::locked}};
+
+/// A family in the inverse; those that this build does not have are left out.
+struct Learner {
+  std::string_view family;
+  bool is_turned_round = false;  ///< trained with the deflection as its target
+  bool is_quick = false;         ///< also in the quick study
+};
+constexpr std::array kLearners{Learner{"linear", false, true},     Learner{"linear_coulomb"},
+                               Learner{"polynomial", false, true}, Learner{"maxwell_slip"},
+                               Learner{"prandtl_ishlinskii"},      Learner{"grey_box"},
+                               Learner{"dgmm", false, true},       Learner{"mlp", true}};
+
+bool exists(std::string_view family) {
+  return std::ranges::any_of(families(),
+                             [&](const FamilyInfo& info) { return info.name == family; });
+}
+
+/// The torque-mode recordings beside the sweeps: chirps (or walks) under the linear controller of the
+/// data sheet, other amplitudes, the same output (specification 6, observation 1).
+void add_torque_mode(Dataset& dataset, const std::string& actuator, const Task& task, Kind kind,
+                     std::uint64_t seed, bool is_quick) {
+  const bool is_locked = task.output == JointOutput::locked;
+  for (const double share : {is_locked ? 1.1 : 0.9, 0.5, 0.25}) {
+    ExperimentSpec spec{.actuator = actuator,
+                        .experiment = std::string(name(kind)),
+                        .seed = seed + 10 + dataset.records.size(),
+                        .torque_amplitude_Nm = share * task.amplitude_Nm};
+    if (!is_locked) spec.lever_m = TrackingSpec{}.lever_m;
+    if (is_quick) spec.duration_s = kQuick_s;
+    Recording recording = simulate(spec);
+    const std::size_t samples = recording.size();
+    dataset.records.push_back({std::move(recording), whole_record(samples, Role::train)});
+  }
+}
+
+AnyInverse learned(const Learner& learner, const Dataset& dataset, std::uint64_t seed) {
+  ModelChoice choice{.family = std::string(learner.family), .features = {}};
+  if (learner.is_turned_round) {
+    Dataset turned = dataset;
+    turn_round(turned);
+    choice.features = resolve_inputs(turned, turned.input_sets.front().second);
+    return inverse_of(train_model(turned, choice, seed).file);
+  }
+  const bool is_line = learner.family == "linear";
+  choice.features =
+      resolve_inputs(dataset, is_line ? std::vector<std::string>{"spring_deflection_rad"}
+                                      : std::vector<std::string>{});
+  return inverse_of(train_model(dataset, choice, seed).file);
+}
+
+/// Every family of this study on the same data.
+std::vector<NamedInverse> all_learned(const Dataset& dataset, std::string_view trained_on,
+                                      std::uint64_t seed, bool is_quick) {
+  std::vector<NamedInverse> inverses;
+  for (const Learner& learner : kLearners) {
+    if (!exists(learner.family) || (is_quick && !learner.is_quick)) continue;
+    inverses.push_back(
+        {fmt::format("{}, {}", learner.family, trained_on), learned(learner, dataset, seed)});
+  }
+  return inverses;
+}
+
+/// Means over the runs of one model under one condition.
+class TrackingRows {
+ public:
+  void add(const std::string& condition, const Task& task, Kind kind, const TrackingRow& run) {
+    const auto found = std::ranges::find_if(sums_, [&](const Sum& sum) {
+      return sum.row.condition == condition && sum.row.model == run.model;
+    });
+    Sum& sum = found != sums_.end() ? *found : begin(condition, task, kind, run);
+    if (run.status != "ok") {
+      ++sum.row.tracking->stopped;
+      return;
+    }
+    if (run.score.limit_cycle) ++sum.row.tracking->limit_cycles;
+    sum.mad.add(run.score.mad);
+    sum.std_abs.add(run.score.std_abs);
+    sum.rmse.add(run.score.rmse);
+    sum.to_linear.add(run.mad_to_linear);
+  }
+
+  /// A condition that no joint of the kind can be under.
+  void left_out(const std::string& condition, std::string_view reason) {
+    std::string note = fmt::format("left out: {}: {}", condition, reason);
+    if (std::ranges::find(notes_, note) == notes_.end()) notes_.push_back(std::move(note));
+  }
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+
+  [[nodiscard]] std::vector<StudyRow> rows() const {
+    std::vector<StudyRow> all;
+    for (const Sum& sum : sums_) {
+      StudyRow& row = all.emplace_back(sum.row);
+      row.runs = sum.rmse.count();
+      row.rmse = sum.rmse.mean();
+      row.rmse_std = sum.rmse.std_dev();
+      row.tracking->mad = sum.mad.mean();
+      row.tracking->mad_std = sum.mad.std_dev();
+      row.tracking->std_abs = sum.std_abs.mean();
+      row.tracking->mad_to_linear = sum.to_linear.mean();
+    }
+    return all;
+  }
+
+ private:
+  struct Sum {
+    StudyRow row;
+    RunningMean mad = {}, std_abs = {}, rmse = {}, to_linear = {};
+  };
+
+  Sum& begin(const std::string& condition, const Task& task, Kind kind, const TrackingRow& run) {
+    StudyRow row{.condition = condition, .model = run.model, .tracking = StudyTracking{}};
+    const std::string_view family = std::string_view(run.model).substr(0, run.model.find(','));
+    // Whatever the friction of the spring and the output were: the papers do not print them.
+    const std::string at =
+        fmt::format("{}, {:g} Nm, {}", task.actuator, task.amplitude_Nm, name(kind));
+    for (const PaperEntry& entry : kPublishedTracking)
+      if (entry.condition == at && entry.model == family)
+        row.published.emplace_back(entry.quantity, entry.figure);
+    return sums_.emplace_back(Sum{.row = std::move(row)});
+  }
+
+  std::vector<Sum> sums_;
+  std::vector<std::string> notes_;
+};
+
+/// Everything that is tried on one task on one spring, with one seed.
+struct Trial {
+  const Task& task;
+  const std::string& actuator;
+  std::uint64_t seed;
+  const LinearInverse& line;
+  std::span<const NamedInverse> inverses;
+  bool is_quick;
+};
+
+/// Both references, where rating and lever allow them.
+void judge(const Trial& trial, bool is_helped, TrackingRows& rows, const Progress& progress) {
+  const Task& task = trial.task;
+  const DataSheet sheet = data_sheet(trial.actuator);
+  for (const Kind kind : {Kind::chirp, Kind::random_walk}) {
+    TrackingSpec spec{.output = task.output,
+                      .reference = {.kind = kind, .amplitude_Nm = task.amplitude_Nm},
+                      .feeds_rate_forward = is_helped,
+                      .measures_bandwidth = false};
+    if (is_helped) spec.observer_cutoff_Hz = kObserver_Hz;
+    if (trial.is_quick) spec.reference.duration_s = kQuick_s;
+    const std::array<std::uint64_t, 1> seeds{trial.seed + kJudged};
+    const std::string condition =
+        fmt::format("{}, {:g} Nm {}, {}{}", trial.actuator, task.amplitude_Nm,
+                    task.output == JointOutput::locked ? "locked" : "free", name(kind),
+                    is_helped ? ", fed forward and observed" : "");
+    try {
+      check_tracking(sheet, spec, seeds.front());
+    } catch (const UsageError& error) {  // beyond the rating, or the lever would tip over
+      rows.left_out(condition, error.what());
+      continue;
+    }
+    for (const TrackingRow& run :
+         track_models(sheet, spec, trial.line, trial.inverses, seeds, progress))
+      rows.add(condition, task, kind, run);
+  }
+}
+
+/// One task on one spring, one repeat.
+void run_task(const Task& task, const std::string& actuator, std::uint64_t seed,
+              const StudyOptions& options, TrackingRows& rows, const Progress& progress) {
+  Dataset dataset = sweep_dataset(actuator, seed, progress);
+  std::vector<NamedInverse> inverses = all_learned(dataset, "sweeps", seed, options.is_quick);
+  inverses.erase(inverses.begin());  // the line of the sweeps is run anyway
+  const auto train_more = [&](Kind kind, std::string_view trained_on) {
+    add_torque_mode(dataset, actuator, task, kind, seed, options.is_quick);
+    for (NamedInverse& more : all_learned(dataset, trained_on, seed, options.is_quick))
+      inverses.push_back(std::move(more));
+  };
+  const auto of_sweeps = static_cast<std::ptrdiff_t>(inverses.size());
+  train_more(Kind::chirp, "+ torque mode");
+  const LinearInverse line = sweep_line(data_sheet(actuator), seed, progress);
+  judge({task, actuator, seed, line, inverses, options.is_quick}, false, rows, progress);
+  if (!task.is_helped) return;
+  inverses.erase(inverses.begin(), inverses.begin() + of_sweeps);
+  train_more(Kind::random_walk, "+ walks");
+  judge({task, actuator, seed, line, inverses, options.is_quick}, true, rows, progress);
+}
+
+}  // namespace
+
+Study torque_tracking_000(const StudyOptions& options, const Progress& progress) {
+  Study study{
+      .protocol =
+          "deflection control (50 rad/s) through the inverse of a model; trained on three sweeps, "
+          "or "
+          "also on chirps of 1.1 (free: 0.9), 0.5 and 0.25 times the amplitude under the linear "
+          "controller (+ torque mode); tested on the chirp and on noise with its RMS, where the "
+          "rating "
+          "and the 0.8 m lever of a free output allow it; errors of the torque without sensor "
+          "noise; fed forward and observed: with the rate of the reference torque fed forward and "
+          "a "
+          "disturbance observer of 8 Hz, trained also on such noise (+ walks)",
+      .unit = "Nm",
+      .options = options};
+  const std::span<const Task> tasks = std::span(kTasks).first(options.is_quick ? 1 : kTasks.size());
+  const std::size_t variants = options.is_quick ? 1 : kVariants.size();
+  const std::size_t parts = tasks.size() * variants * options.repeats;
+  TrackingRows rows;
+  std::size_t done = 0;
+  for (const Task& task : tasks) {
+    for (std::size_t v = 0; v < variants; ++v) {
+      const std::string actuator = fmt::format("{}:{}", task.actuator, kVariants[v]);
+      const bool is_new = std::ranges::none_of(
+          study.plants, [&](const StudyPlant& plant) { return plant.name == actuator; });
+      if (is_new) study.plants.push_back(study_plant(actuator));
+      for (std::size_t k = 0; k < options.repeats; ++k) {
+        run_task(task, actuator, repeat_seed(options, k), options, rows,
+                 nth_of(progress, done++, parts, actuator));
+      }
+    }
+  }
+  study.rows = rows.rows();
+  study.notes = rows.notes();
+  return study;
+}
+
+}  // namespace torsio

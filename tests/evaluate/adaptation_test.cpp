@@ -1,0 +1,241 @@
+#include "torsio/evaluate/adaptation.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "support/bench_dataset.hpp"
+#include "support/dump.hpp"
+#include "support/error_message.hpp"
+#include "support/temporary_folder.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/train_model.hpp"
+#include "torsio/sim/experiment.hpp"
+
+namespace torsio {
+namespace {
+
+using test::add_record;
+using test::bench_recording;
+using test::dump;
+using test::error_message;
+using testing::HasSubstr;
+
+/// A small network of the bench whose torque is the reference.
+const ModelFile& bench_model() {
+  static const ModelFile model = [] {
+    const Dataset dataset = test::bench_dataset();
+    const FeatureSpec features = resolve_inputs(dataset, {});
+    return train_model(dataset,
+                       {.family = "mlp", .options = {{"layers", "16"}}, .features = features}, 1)
+        .file;
+  }();
+  return model;
+}
+
+/// Another piece: its torque is off by an offset, and its spring is softer.
+Dataset other_piece(std::size_t samples = 20000) {
+  Dataset dataset;
+  add_record(
+      dataset,
+      bench_recording("lesson",
+                      {.stiffness_Nm_rad = 470.0, .offset_Nm = 2.0, .samples = samples, .seed = 5}),
+      Role::train);
+  add_record(dataset,
+             bench_recording("exam", {.stiffness_Nm_rad = 470.0,
+                                      .offset_Nm = 2.0,
+                                      .amplitude_rad = 0.027,
+                                      .samples = 8000,
+                                      .seed = 6}),
+             Role::test);
+  return dataset;
+}
+
+AdaptationSettings settings_for(const std::string& method) {
+  return adaptation_settings(method, {});
+}
+
+TEST(AdaptModel, ImprovesOnAnotherPieceByEitherMethod) {
+  for (const char* method : {"nlms", "rls"}) {
+    const AdaptedModel adapted = adapt_model(bench_model(), other_piece(), settings_for(method));
+    EXPECT_LT(adapted.held_out.back().adapted.rmse, 0.7 * adapted.held_out.back().frozen.rmse)
+        << method;
+    EXPECT_LT(adapted.as_it_ran.back().adapted.rmse, adapted.as_it_ran.back().frozen.rmse);
+    EXPECT_GT(adapted.counts.updates(), 10000U);
+    EXPECT_GT(adapted.counts.of(Learning::warming_up), 0U);
+    EXPECT_GT(adapted.relative_change, 0.0);
+  }
+}
+
+TEST(AdaptModel, ScoresAreThoseOfTheFilesItTells) {
+  const Dataset dataset = other_piece();
+  const AdaptedModel adapted = adapt_model(bench_model(), dataset, settings_for("nlms"));
+  const TemporaryFolder folder;
+  save_model(folder.path("adapted.safetensors"), adapted.file);
+  const ModelFile loaded = load_model(folder.path("adapted.safetensors"));
+  EXPECT_EQ(dump(loaded.parameters), dump(adapted.file.parameters));
+  EXPECT_NE(dump(loaded.parameters), dump(bench_model().parameters));
+  const auto rmse_of = [&](const ModelFile& file) {
+    return evaluate(estimator_at(file, dataset.sample_rate_Hz()), dataset, Role::test)
+        .together.metrics.rmse;
+  };
+  ASSERT_EQ(adapted.held_out.size(), 2U);
+  EXPECT_EQ(rmse_of(loaded), adapted.held_out.back().adapted.rmse);
+  EXPECT_EQ(rmse_of(bench_model()), adapted.held_out.back().frozen.rmse);
+  EXPECT_EQ(loaded.card.metrics.at("rmse"), adapted.held_out.back().adapted.rmse);
+}
+
+TEST(AdaptModel, IsDeterministic) {
+  const auto run = [] { return adapt_model(bench_model(), other_piece(), settings_for("rls")); };
+  const AdaptedModel one = run();
+  const AdaptedModel two = run();
+  EXPECT_EQ(model_bytes(one.file), model_bytes(two.file));
+  EXPECT_EQ(one.counts, two.counts);
+}
+
+TEST(AdaptModel, TheCardSaysWhereTheWeightsComeFrom) {
+  Dataset dataset = other_piece();
+  dataset.records[0].recording.source = {"lesson.csv", "abc"};
+  const ModelCard card = adapt_model(bench_model(), dataset, settings_for("nlms")).file.card;
+  EXPECT_EQ(card.options.at("adaptation.method"), "nlms");
+  EXPECT_EQ(card.options.at("adaptation.step_size"), "0.003");
+  EXPECT_EQ(card.options.at("layers"), "16");
+  EXPECT_EQ(card.training_files.back(), (Source{"lesson.csv", "abc"}));
+  EXPECT_THAT(card.held_out, HasSubstr("test samples"));
+}
+
+TEST(AdaptModel, ErrorBarsAreThoseOfTheAdaptedWeights) {
+  const AdaptedModel adapted = adapt_model(bench_model(), other_piece(), settings_for("nlms"));
+  EXPECT_NE(adapted.file.settings.residuals.std_dev, bench_model().settings.residuals.std_dev);
+  EXPECT_FALSE(adapted.file.settings.residuals.std_dev.empty());
+}
+
+TEST(AdaptModel, LearnsFromSegmentsWithTheRoleTrainOnly) {
+  Dataset dataset = other_piece();
+  dataset.records.erase(dataset.records.begin() + 1);
+  hold_out_ends(dataset, 0.25, 1.0);
+  ASSERT_EQ(dataset.records[0].segments.size(), 2U);
+  EXPECT_EQ(dataset.records[0].segments[0].end, 14000U);
+  EXPECT_EQ(dataset.records[0].segments[1].begin, 15000U);
+  const AdaptedModel whole = adapt_model(bench_model(), dataset, settings_for("nlms"));
+  // What comes after the lessons, whatever it is, changes nothing.
+  Channel spoilt = dataset.records[0].recording.channel("torque_Nm");
+  Recording changed("lesson", 1000.0);
+  for (std::size_t n = 14000; n < spoilt.values.size(); ++n) spoilt.values[n] = 1.0;
+  for (const char* name : {"gear_angle_rad", "joint_angle_rad"})
+    changed.add(dataset.records[0].recording.channel(name));
+  changed.add(std::move(spoilt));
+  dataset.records[0].recording = std::move(changed);
+  const AdaptedModel again = adapt_model(bench_model(), dataset, settings_for("nlms"));
+  EXPECT_EQ(dump(whole.file.parameters), dump(again.file.parameters));
+  EXPECT_EQ(whole.as_it_ran.back().adapted.rmse, again.as_it_ran.back().adapted.rmse);
+  EXPECT_NE(whole.held_out.back().adapted.rmse, again.held_out.back().adapted.rmse);
+}
+
+TEST(AdaptModel, HeldAndMissingReferencesTeachNothing) {
+  Dataset dataset = other_piece();
+  const Recording& given = dataset.records[0].recording;
+  Recording slow("lesson", 1000.0);
+  Channel torque = given.channel("torque_Nm");
+  torque.fresh.assign(torque.values.size(), 0);
+  for (std::size_t n = 0; n < torque.values.size(); ++n) {
+    if (n % 8 == 0)
+      torque.fresh[n] = 1;
+    else
+      torque.values[n] = torque.values[n - 1];  // 125 Hz
+  }
+  for (std::size_t n = 8000; n < 9600; ++n) torque.values[n] = std::nan("");
+  for (const char* name : {"gear_angle_rad", "joint_angle_rad"}) slow.add(given.channel(name));
+  slow.add(std::move(torque));
+  dataset.records[0].recording = std::move(slow);
+  const AdaptedModel adapted = adapt_model(bench_model(), dataset, settings_for("nlms"));
+  EXPECT_EQ(adapted.counts.of(Learning::reference_not_finite), 1600U);
+  EXPECT_NEAR(static_cast<double>(adapted.counts.of(Learning::reference_stale)), 18400 * 7 / 8.0,
+              300);
+  EXPECT_NEAR(static_cast<double>(adapted.counts.updates()), 18400 / 8.0, 50);
+  EXPECT_LT(adapted.held_out.back().adapted.rmse, adapted.held_out.back().frozen.rmse);
+}
+
+TEST(AdaptModel, RefusesWhatItCannotLearnFrom) {
+  Dataset no_exam = other_piece();
+  no_exam.records.erase(no_exam.records.begin() + 1);
+  EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), no_exam, {}); }),
+              HasSubstr("nothing to score on"));
+  Dataset no_lesson = other_piece();
+  no_lesson.records.erase(no_lesson.records.begin());
+  EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), no_lesson, {}); }),
+              HasSubstr("nothing to adapt to"));
+  EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), other_piece(20), {}); }),
+              HasSubstr("not a single sample could be learned from"));
+  EXPECT_THAT(error_message([&] { hold_out_ends(no_exam, 0.99, 1.0); }),
+              HasSubstr("lesson: a training block"));
+  EXPECT_THAT(error_message([&] { hold_out_ends(no_exam, 1.0, 1.0); }), HasSubstr("--held-out"));
+}
+
+TEST(AdaptModel, StopsWhenAsked) {
+  const Progress stop = [](double, std::string_view) { return false; };
+  EXPECT_THROW((void)adapt_model(bench_model(), other_piece(), {}, stop), Cancelled);
+}
+
+TEST(AdaptationSettings, AreCheckedAgainstTheirTable) {
+  EXPECT_EQ(adaptation_settings("rls", {{"forgetting", "0.99"}}).forgetting, 0.99);
+  EXPECT_EQ(adaptation_settings("rls", {}).rule, AdaptationRule::rls);
+  EXPECT_THAT(error_message([] { (void)adaptation_settings("lms", {}); }),
+              HasSubstr("expected nlms or rls"));
+  EXPECT_THAT(error_message([] {
+                (void)adaptation_settings("nlms", {{"step_size", "2"}});
+              }),
+              HasSubstr("step_size"));
+  EXPECT_THAT(error_message([] {
+                (void)adaptation_settings("nlms", {{"mu", "1"}});
+              }),
+              HasSubstr("one of step_size, leak"));
+  // The table's defaults are the struct's.
+  const AdaptationSettings from_table = adaptation_settings("nlms", {});
+  const AdaptationSettings own;
+  EXPECT_EQ(from_table.step_size, own.step_size);
+  EXPECT_EQ(from_table.leak, own.leak);
+  EXPECT_EQ(from_table.regularisation, own.regularisation);
+  EXPECT_EQ(from_table.forgetting, own.forgetting);
+  EXPECT_EQ(from_table.initial_covariance, own.initial_covariance);
+  EXPECT_EQ(from_table.trace_cap, own.trace_cap);
+  EXPECT_EQ(from_table.sensor_std, own.sensor_std);
+  EXPECT_EQ(from_table.dead_zone, own.dead_zone);
+  EXPECT_EQ(from_table.frozen_after_s, own.frozen_after_s);
+  EXPECT_EQ(from_table.largest_change, own.largest_change);
+  EXPECT_EQ(from_table.comparison_s, own.comparison_s);
+}
+
+// ---- the experiment of docs/adaptation.md -------------------------------------------------------
+
+Recording human_torque(const std::string& actuator, std::uint64_t seed) {
+  return simulate(
+      {.actuator = actuator, .experiment = "human-torque", .seed = seed, .duration_s = 60.0});
+}
+
+TEST(AdaptModel, AnLstmOfOneHarmonicDriveImprovesOnOthers) {
+  Dataset first;
+  for (const std::uint64_t seed : {1U, 2U, 3U})
+    add_record(first, human_torque("harmonic-drive:soft#01", seed), Role::train);
+  const FeatureSpec features =
+      resolve_inputs(first, {"motor_angle_rad - wave_generator_angle_rad", "motor_torque_Nm"});
+  const ModelFile lstm = train_model(first, {.family = "lstm", .features = features}, 1).file;
+  for (const char* piece : {"#02", "#03", "#04"}) {
+    Dataset other;
+    const std::string actuator = std::string("harmonic-drive:soft") + piece;
+    add_record(other, human_torque(actuator, 11), Role::train);
+    add_record(other, human_torque(actuator, 12), Role::test);
+    for (const char* method : {"nlms", "rls"}) {
+      const AdaptedModel adapted = adapt_model(lstm, other, settings_for(method));
+      const AdaptationScore& held_out = adapted.held_out.back();
+      EXPECT_LT(held_out.adapted.rmse, 0.95 * held_out.frozen.rmse) << piece << ' ' << method;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace torsio

@@ -1,0 +1,164 @@
+#include "torsio/evaluate/evaluate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "support/bench_dataset.hpp"
+#include "support/error_message.hpp"
+#include "support/every_family.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/families.hpp"
+#include "torsio/fit/train_model.hpp"
+
+namespace torsio {
+namespace {
+
+TrainedModel trained(const Dataset& dataset, const std::string& family) {
+  return train_model(dataset, {.family = family, .features = resolve_inputs(dataset, {})}, 1);
+}
+
+TEST(Evaluate, FindsTheNoiseThatARightModelCannotExplain) {
+  const Dataset dataset = test::bench_dataset();
+  Estimator estimator = make_estimator(trained(dataset, "linear_coulomb").file);
+  const SplitScore score = evaluate(estimator, dataset, Role::test);
+  ASSERT_EQ(score.recordings.size(), 1U);
+  EXPECT_EQ(score.recordings.front().recording, "held out");
+  EXPECT_LT(score.together.metrics.rmse, 0.4);
+  EXPECT_GT(score.together.metrics.rmse, 0.05);
+  EXPECT_EQ(score.together.metrics.samples + score.together.initialised_samples,
+            dataset.records.back().recording.size());
+}
+
+TEST(Evaluate, CountsHowOftenTheTruthIsWithinTheErrorBar) {
+  const Dataset dataset = test::bench_dataset();
+  ModelFile file = trained(dataset, "linear_coulomb").file;
+  const Score told = evaluate(make_estimator(file), dataset, Role::test).together;
+  EXPECT_GT(told.within_std_dev, 0.5);
+  EXPECT_GT(told.within_2_std_dev, told.within_std_dev);
+  for (double& std_dev : file.settings.residuals.std_dev) std_dev *= 2.0;
+  const Score wider = evaluate(make_estimator(file), dataset, Role::test).together;
+  EXPECT_EQ(wider.within_std_dev, told.within_2_std_dev);
+  file.settings.residuals = {};
+  EXPECT_TRUE(
+      std::isnan(evaluate(make_estimator(file), dataset, Role::test).together.within_std_dev));
+}
+
+TEST(Evaluate, ScoresOnlyFreshSamples) {
+  Dataset dataset = test::bench_dataset();
+  Estimator estimator = make_estimator(trained(dataset, "linear").file);
+  const std::size_t all = evaluate(estimator, dataset, Role::test).together.metrics.samples;
+
+  const Recording& old = dataset.records.back().recording;
+  Recording held("held", 1000.0);
+  for (Channel channel : old.channels()) {
+    if (channel.name == "torque_Nm")
+      for (std::size_t i = 0; i < old.size(); ++i) channel.fresh.push_back(i % 8 == 0 ? 1 : 0);
+    held.add(std::move(channel));
+  }
+  dataset.records.pop_back();
+  test::add_record(dataset, std::move(held), Role::test);
+  EXPECT_NEAR(
+      static_cast<double>(evaluate(estimator, dataset, Role::test).together.metrics.samples),
+      static_cast<double>(all) / 8.0, 1.0);
+}
+
+TEST(Evaluate, LeavesTheEmbargoOut) {
+  Dataset dataset;
+  Recording recording = test::bench_recording("blocks");
+  const std::size_t samples = recording.size();
+  dataset.records.push_back({std::move(recording), interleaved_blocks(samples, 10, 5, 50)});
+  Estimator estimator = make_estimator(trained(dataset, "linear").file);
+  const SplitScore score = evaluate(estimator, dataset, Role::test);
+  EXPECT_EQ(score.together.metrics.samples, 2 * samples / 10);
+}
+
+TEST(Evaluate, PredictsWhatAnEstimatorFedByHandSays) {
+  const Dataset dataset = test::bench_dataset();
+  const Recording& recording = dataset.records.back().recording;
+  for (const FamilyInfo& family : families()) {
+    if (!test::is_for_springs(family.name)) continue;
+    SCOPED_TRACE(family.name);
+    const TrainedModel model = trained(dataset, std::string(family.name));
+    Estimator estimator = make_estimator(model.file);
+    (void)predict(estimator, dataset.records.front().recording);  // must leave no trace
+    const Prediction offline = predict(estimator, recording);
+    ASSERT_EQ(offline.estimates.size(), recording.size());
+
+    Estimator in_the_loop = make_estimator(model.file);
+    std::vector<double> raw(in_the_loop.raw_inputs().size());
+    for (std::size_t n = 0; n < recording.size(); ++n) {
+      for (std::size_t j = 0; j < raw.size(); ++j)
+        raw[j] = recording.channel(in_the_loop.raw_inputs()[j]).values[n];
+      const Estimate streamed = in_the_loop.step(raw);
+      const Estimate& told = offline.estimates[n];
+      ASSERT_EQ(told.value, streamed.value) << "sample " << n;
+      ASSERT_EQ(told.fault, streamed.fault) << "sample " << n;
+      ASSERT_TRUE(told.std_dev == streamed.std_dev ||
+                  (std::isnan(told.std_dev) && std::isnan(streamed.std_dev)))
+          << "sample " << n;
+    }
+  }
+}
+
+TEST(Evaluate, SaysWhereAnInputIsMissing) {
+  Dataset dataset = test::bench_dataset();
+  Estimator estimator = make_estimator(trained(dataset, "linear").file);
+  const Recording good = test::bench_recording("holes");
+  Recording holes("holes", 1000.0);
+  for (Channel channel : good.channels()) {
+    if (channel.name == "gear_angle_rad")
+      channel.values[123] = std::numeric_limits<double>::quiet_NaN();
+    holes.add(std::move(channel));
+  }
+  const std::string message = test::error_message([&] { (void)predict(estimator, holes); });
+  EXPECT_NE(message.find("holes: gear_angle_rad"), std::string::npos) << message;
+  EXPECT_NE(message.find("t = 0.123 s"), std::string::npos) << message;
+}
+
+TEST(Evaluate, KnowsThatTheZerosOfRecordingsWereSubtracted) {
+  Dataset dataset = test::bench_dataset();
+  const SplitScore plain =
+      evaluate(make_estimator(trained(dataset, "linear").file), dataset, Role::test);
+  for (DatasetRecord& record : dataset.records)
+    record.recording.zeros = {{.channel = "joint_angle_rad", .first_s = 0.1, .mid_range = false},
+                              {.channel = "torque_Nm", .first_s = 0.1, .mid_range = false}};
+  const TrainedModel model = trained(dataset, "linear");
+  EXPECT_EQ(model.file.settings.zeroed_channels, std::vector<std::string>{"joint_angle_rad"})
+      << "the target has no zero at run time";
+  Estimator estimator = make_estimator(model.file);
+  estimator.set_zero("joint_angle_rad", 0.7);  // the robot's own
+  const SplitScore score = evaluate(estimator, dataset, Role::test);
+  EXPECT_EQ(score.together.guarded_samples, plain.together.guarded_samples);
+  EXPECT_EQ(score.together.metrics.rmse, plain.together.metrics.rmse);
+  EXPECT_EQ(
+      predict(make_estimator(model.file), dataset.records[2].recording).estimates.back().fault,
+      Fault::none);
+}
+
+TEST(TrainModel, IsTheSameForTheSameSeedAndKnowsWhereItCameFrom) {
+  const Dataset dataset = test::bench_dataset();
+  for (const char* family : {"linear", "linear_coulomb", "polynomial", "dgmm"})
+    EXPECT_EQ(model_bytes(trained(dataset, family).file),
+              model_bytes(trained(dataset, family).file))
+        << family;
+  const TrainedModel model = trained(dataset, "dgmm");
+  EXPECT_EQ(model.file.card.fitted_as, "dgmm");
+  EXPECT_EQ(model.file.card.training_files.size(), 2U);
+  EXPECT_EQ(model.file.settings.target, "torque_Nm");
+}
+
+TEST(TrainModel, StopsWhenAskedTo) {
+  const Dataset dataset = test::bench_dataset();
+  const ModelChoice choice{.family = "dgmm", .features = resolve_inputs(dataset, {})};
+  EXPECT_THROW(
+      (void)train_model(dataset, choice, 1, [](double, std::string_view) { return false; }),
+      Cancelled);
+}
+
+}  // namespace
+}  // namespace torsio

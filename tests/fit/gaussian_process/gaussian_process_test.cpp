@@ -1,0 +1,307 @@
+// What the fits of Gaussian processes rest on, against finite differences and dense algebra.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "fit/gaussian_process/marginal_likelihood.hpp"
+#include "fit/gaussian_process/parametric_gp_trainer.hpp"
+#include "fit/gaussian_process/sparse_posterior.hpp"
+#include "numerics/lbfgs.hpp"
+#include "support/error_message.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/random.hpp"
+
+namespace torsio {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr std::size_t kInputs = 5;
+const std::string kCombined = "se*(linear+periodic*rq)";
+
+Matrix random_points(std::size_t count, std::uint64_t seed) {
+  Random random(seed);
+  Matrix points(count, kInputs);
+  for (double& value : points.values) value = random.normal();
+  return points;
+}
+
+std::vector<double> targets_of(const Matrix& points) {
+  Random random(11);
+  std::vector<double> target;
+  for (std::size_t n = 0; n < points.rows; ++n)
+    target.push_back(std::sin(points(n, 0)) + 0.3 * points(n, 1) + 0.1 * random.normal());
+  return target;
+}
+
+Kernel some_kernel(const std::string& text = kCombined) {
+  Kernel kernel(parse_kernel(text, kInputs), kInputs);
+  std::vector<double> numbers = kernel.log_parameters();
+  for (std::size_t p = 0; p < numbers.size(); ++p)
+    numbers[p] = 0.3 * std::sin(1.3 * static_cast<double>(p)) + 0.3;
+  kernel.set_log_parameters(numbers);
+  return kernel;
+}
+
+/// k of all rows of two tables.
+MatrixXd covariance(const Kernel& kernel, const Matrix& a, const Matrix& b) {
+  const PackedPoints points(b);
+  AlignedVector<double> values(points.padded_size());
+  MatrixXd result(a.rows, b.rows);
+  for (std::size_t i = 0; i < a.rows; ++i) {
+    kernel.row(a.row(i).data(), points, b.rows, values.data());
+    for (std::size_t j = 0; j < b.rows; ++j)
+      result(static_cast<Index>(i), static_cast<Index>(j)) = values[j];
+  }
+  return result;
+}
+
+VectorXd vector_of(std::span<const double> values) {
+  return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
+}
+
+double log_normal(const MatrixXd& covariance_of_y, const VectorXd& y) {
+  const Eigen::LLT<MatrixXd> factor(covariance_of_y);
+  return -0.5 * (y.dot(factor.solve(y)) + 2.0 * factor.matrixLLT().diagonal().array().log().sum() +
+                 static_cast<double>(y.size()) * std::log(2.0 * std::numbers::pi));
+}
+
+using Objective = std::function<double(const std::vector<double>&)>;
+
+void expect_gradient(const std::vector<double>& gradient, const std::vector<double>& at,
+                     const Objective& f, double scale) {
+  constexpr double kStep = 1e-5;
+  for (std::size_t p = 0; p < at.size(); ++p) {
+    auto more = at;
+    auto less = at;
+    more[p] += kStep;
+    less[p] -= kStep;
+    const double expected = (f(more) - f(less)) / (2.0 * kStep);
+    EXPECT_NEAR(gradient[p], expected, 1e-6 * std::max(scale, std::abs(expected)))
+        << "number " << p;
+  }
+}
+
+TEST(Lbfgs, FindsTheBottomOfABananaAndOfABoundedOne) {
+  const Differentiable banana = [](std::span<const double> x, std::span<double> gradient) {
+    const double off = x[1] - x[0] * x[0];
+    gradient[0] = -2.0 * (1.0 - x[0]) - 400.0 * x[0] * off;
+    gradient[1] = 200.0 * off;
+    return (1.0 - x[0]) * (1.0 - x[0]) + 100.0 * off * off;
+  };
+  const LbfgsResult free = minimise(banana, {-1.2, 1.0}, {.tolerance = 1e-16});
+  EXPECT_NEAR(free.at[0], 1.0, 1e-5);
+  EXPECT_NEAR(free.at[1], 1.0, 1e-5);
+  const LbfgsResult bound = minimise(
+      banana, {-1.2, 1.0}, {.tolerance = 1e-16, .lowest = {-5.0, -5.0}, .highest = {0.5, 5.0}});
+  EXPECT_DOUBLE_EQ(bound.at[0], 0.5);
+  EXPECT_NEAR(bound.at[1], 0.25, 1e-6);
+}
+
+TEST(Lbfgs, StepsBackFromWhereTheFunctionEnds) {
+  const Differentiable f = [](std::span<const double> x, std::span<double> gradient) {
+    gradient[0] = 1.0 - 1.0 / x[0];
+    return x[0] - std::log(x[0]);  // NaN below 0
+  };
+  EXPECT_NEAR(minimise(f, {1.9}, {.tolerance = 1e-14}).at[0], 1.0, 1e-5);
+  EXPECT_EQ(minimise(f, {-1.0}, {}).at[0], -1.0) << "a start of no value stays";
+}
+
+TEST(MarginalLikelihood, IsTheDensityOfTheTargetsAndHasItsGradient) {
+  const Matrix points = random_points(60, 1);
+  const std::vector<double> target = targets_of(points);
+  for (const std::string& text :
+       {kCombined, std::string("se_ard+linear_ard"), std::string("matern32*periodic_ard+rq_ard"),
+        std::string("matern52_ard")}) {
+    SCOPED_TRACE(text);
+    const Kernel kernel = some_kernel(text);
+    MarginalLikelihood process(kernel, points, target);
+    std::vector<double> at = kernel.log_parameters();
+    at.push_back(std::log(0.05));
+    std::vector<double> gradient(at.size());
+    const double value = process.evaluate(at, gradient);
+    const MatrixXd k = covariance(kernel, points, points) + 0.05 * MatrixXd::Identity(60, 60);
+    EXPECT_NEAR(value, -log_normal(k, vector_of(target)), 1e-9 * std::abs(value));
+    expect_gradient(
+        gradient, at, [&](const auto& x) { return process.fix(x); }, 1.0);
+  }
+}
+
+TEST(MarginalLikelihood, LeavesOneOutAsIfItWereNotThere) {
+  const Matrix points = random_points(25, 2);
+  const std::vector<double> target = targets_of(points);
+  const Kernel kernel = some_kernel();
+  MarginalLikelihood process(kernel, points, target);
+  std::vector<double> at = kernel.log_parameters();
+  at.push_back(std::log(0.05));
+  (void)process.fix(at);
+  const LeaveOneOut found = process.leave_one_out();
+
+  const MatrixXd k = covariance(kernel, points, points) + 0.05 * MatrixXd::Identity(25, 25);
+  double squares = 0.0;
+  double log_density = 0.0;
+  for (Index out = 0; out < 25; ++out) {
+    std::vector<Index> rest;
+    for (Index i = 0; i < 25; ++i)
+      if (i != out) rest.push_back(i);
+    const MatrixXd kept = k(rest, rest);
+    const VectorXd q = k(rest, out);
+    const VectorXd y = vector_of(target)(rest);
+    const double mean = q.dot(kept.llt().solve(y));
+    const double variance = k(out, out) - q.dot(kept.llt().solve(q));
+    const double error = target[static_cast<std::size_t>(out)] - mean;
+    squares += error * error;
+    log_density -= 0.5 * (std::log(2.0 * std::numbers::pi * variance) + error * error / variance);
+  }
+  EXPECT_NEAR(found.rmse, std::sqrt(squares / 25.0), 1e-10);
+  EXPECT_NEAR(found.log_density, log_density / 25.0, 1e-10);
+}
+
+/// A trainer that has seen some samples and is asked about another.
+struct Trained {
+  Matrix points = random_points(7, 3);
+  Matrix features = random_points(40, 4);
+  std::vector<double> target = targets_of(features);
+  ParametricGpTrainer trainer{some_kernel(), points, 0.05};
+
+  Trained() {
+    for (std::size_t n = 1; n < features.rows; ++n) {
+      (void)trainer.predict(features.row(n));
+      trainer.take_in(target[n]);
+    }
+  }
+
+  /// What `f` says of another trainer with those numbers and the same (m, S).
+  Objective objective(const std::function<double(ParametricGpTrainer&)>& f) const {
+    return [this, f](const std::vector<double>& numbers) {
+      ParametricGpTrainer other = trainer;
+      EXPECT_TRUE(other.set_parameters(numbers));
+      return f(other);
+    };
+  }
+};
+
+double divergence(const ParametricGpTrainer& trainer) {
+  const MatrixXd& s = trainer.covariance();
+  const MatrixXd& k = trainer.prior();
+  const auto log_det = [](const MatrixXd& matrix) { return std::log(matrix.determinant()); };
+  return 0.5 * ((k.llt().solve(s)).trace() + trainer.mean().dot(k.llt().solve(trainer.mean())) -
+                static_cast<double>(s.rows()) + log_det(k) - log_det(s));
+}
+
+TEST(ParametricGpTrainer, ItsGradientsAreThoseOfFiniteDifferences) {
+  const Trained t;
+  ParametricGpTrainer trainer = t.trainer;
+  const std::vector<double> at = trainer.parameters();
+  std::vector<double> gradient(at.size());
+  (void)trainer.predict(t.features.row(0));
+  trainer.add_data_gradient(t.target[0], 1.0);
+  trainer.add_noise_gradient(t.target[0], 1.0);
+  trainer.take_gradient(gradient);
+  expect_gradient(gradient, at, t.objective([&](ParametricGpTrainer& other) {
+    const auto [mean, variance] = other.predict(t.features.row(0));
+    const double error = t.target[0] - mean;
+    const double noise = other.noise_variance();
+    return (error * error + variance) / (2.0 * noise) + 0.5 * std::log(noise);
+  }),
+                  0.1);
+
+  trainer.add_divergence_gradient(0.25);
+  trainer.take_gradient(gradient);
+  expect_gradient(gradient, at,
+                  t.objective([](ParametricGpTrainer& other) { return 0.25 * divergence(other); }),
+                  0.1);
+
+  trainer.add_nlml_gradient();
+  trainer.take_gradient(gradient);
+  expect_gradient(gradient, at, t.objective([](ParametricGpTrainer& other) {
+    const MatrixXd& k = other.prior();
+    return 0.5 * (other.mean().dot(k.llt().solve(other.mean())) + std::log(k.determinant()));
+  }),
+                  0.1);
+}
+
+TEST(ParametricGpTrainer, SampleBySampleItIsFitc) {
+  const Matrix points = random_points(7, 3);
+  const Matrix features = random_points(60, 4);
+  const std::vector<double> target = targets_of(features);
+  const Kernel kernel = some_kernel();
+  ParametricGpTrainer trainer(kernel, points, 0.01);
+  for (std::size_t n = 0; n < features.rows; ++n) {
+    (void)trainer.predict(features.row(n));
+    trainer.take_in(target[n]);
+  }
+  // The posterior of a batch, dense.
+  const MatrixXd& k = trainer.prior();
+  const MatrixXd p = covariance(kernel, points, features);
+  VectorXd lambda(60);
+  for (Index n = 0; n < 60; ++n)
+    lambda(n) = kernel.self(features.row(static_cast<std::size_t>(n)).data()) -
+                p.col(n).dot(k.llt().solve(p.col(n))) + 0.01;
+  const MatrixXd a = k + p * lambda.cwiseInverse().asDiagonal() * p.transpose();
+  const VectorXd b = p * vector_of(target).cwiseQuotient(lambda);
+  const VectorXd m = k * a.llt().solve(b);
+  const MatrixXd s = k * a.llt().solve(k);
+  EXPECT_LT((trainer.mean() - m).cwiseAbs().maxCoeff(), 1e-10);
+  EXPECT_LT((trainer.covariance() - s).cwiseAbs().maxCoeff(), 1e-10);
+
+  const SparsePosterior posterior =
+      sparse_posterior(kernel, points, 0.01, features, target, SparseNoise::fitc);
+  EXPECT_LT((vector_of(posterior.weights) - a.llt().solve(b)).cwiseAbs().maxCoeff(), 1e-10);
+  const MatrixXd c = k.inverse() - a.inverse();
+  EXPECT_LT((vector_of(posterior.explained.values) -
+             Eigen::Map<const VectorXd>(MatrixXd(c.transpose()).data(), c.size()))
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-10);
+}
+
+TEST(ParametricGpTrainer, TakesBackNumbersThatHaveNoKernel) {
+  Trained t;
+  const std::vector<double> before = t.trainer.parameters();
+  std::vector<double> bad = before;
+  bad[2] = std::nan("");
+  EXPECT_FALSE(t.trainer.set_parameters(bad));
+  EXPECT_EQ(t.trainer.parameters(), before);
+}
+
+TEST(CollapsedBound, IsTitsiasBoundAndHasItsGradient) {
+  const Matrix points = random_points(7, 3);
+  const Matrix features = random_points(50, 4);
+  const std::vector<double> target = targets_of(features);
+  for (const std::string& text : {kCombined, std::string("se_ard+linear_ard")}) {
+    SCOPED_TRACE(text);
+    const Kernel kernel = some_kernel(text);
+    CollapsedBound bound(kernel, points, features, target);
+    std::vector<double> at = kernel.log_parameters();
+    at.push_back(std::log(0.05));
+    std::vector<double> gradient(at.size());
+    const double value = bound.evaluate(at, gradient);
+
+    const MatrixXd p = covariance(kernel, points, features);
+    MatrixXd k = covariance(kernel, points, points);
+    k.diagonal().array() += 1e-8 * k.trace() / 7.0;
+    const MatrixXd q = p.transpose() * k.llt().solve(p);
+    const MatrixXd noise = 0.05 * MatrixXd::Identity(50, 50);
+    const MatrixXd full = covariance(kernel, features, features);
+    const double expected =
+        log_normal(q + noise, vector_of(target)) - (full - q).trace() / (2.0 * 0.05);
+    EXPECT_NEAR(value, -expected, 1e-8 * std::abs(expected));
+    EXPECT_LT(expected, log_normal(full + noise, vector_of(target)));
+    std::vector<double> unused(at.size());
+    expect_gradient(
+        gradient, at, [&](const auto& x) { return bound.evaluate(x, unused); }, 1.0);
+  }
+}
+
+}  // namespace
+}  // namespace torsio

@@ -1,0 +1,208 @@
+#include "model/grey_box/grey_box.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "support/error_message.hpp"
+#include "torsio/core/random.hpp"
+
+namespace torsio {
+namespace {
+
+using testing::HasSubstr;
+
+/// Curve over -1, 0, 1; the coefficients are 0 until a test sets them.
+GreyBox::Parameters plain(std::vector<double> thresholds = {}, std::vector<double> friction = {0.0},
+                          std::vector<double> time_constants = {}) {
+  GreyBox::Parameters parameters;
+  parameters.terms = {.curve_knots = {-1.0, 0.0, 1.0},
+                      .thresholds = std::move(thresholds),
+                      .friction_knots = std::move(friction),
+                      .time_constants_s = std::move(time_constants),
+                      .rate_scales = {0.0},
+                      .sample_period_s = 0.01};
+  parameters.coefficients.values = Matrix(1, parameters.terms.columns());
+  return parameters;
+}
+
+double told(GreyBox& box, double x) { return box.step(std::array{x}).value; }
+
+TEST(GreyBox, ItsCurveIsStraightBetweenKnotsAndBeyondThem) {
+  GreyBox::Parameters parameters = plain();
+  parameters.coefficients.values.values = {-10.0, 0.0, 20.0, 0.0, 0.0};
+  GreyBox box(parameters);
+  EXPECT_DOUBLE_EQ(told(box, -0.5), -5.0);
+  EXPECT_DOUBLE_EQ(told(box, 0.25), 5.0);
+  EXPECT_DOUBLE_EQ(told(box, 2.0), 40.0);
+  EXPECT_DOUBLE_EQ(told(box, -3.0), -30.0);
+}
+
+TEST(GreyBox, ASlipElementHoldsUntilItsThresholdAndThenSlides) {
+  GreyBox::Parameters parameters = plain({0.1});
+  parameters.coefficients.values.values = {0.0, 0.0, 0.0, 4.0, 0.0, 0.0};
+  GreyBox box(parameters);
+  EXPECT_DOUBLE_EQ(told(box, 0.0), 0.0);
+  EXPECT_DOUBLE_EQ(told(box, 0.05), 2.0);
+  EXPECT_DOUBLE_EQ(told(box, 0.5), 4.0);
+  EXPECT_NEAR(told(box, 0.45), 2.0, 1e-12);
+  EXPECT_DOUBLE_EQ(told(box, 0.0), -4.0);
+}
+
+TEST(GreyBox, ItsFrictionGrowsWithTheDeflectionAndIsHeldBeyondTheKnots) {
+  GreyBox::Parameters parameters = plain({0.1}, {0.0, 1.0});
+  parameters.coefficients.values.values = {0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0};
+  GreyBox box(parameters);
+  told(box, 0.0);
+  EXPECT_DOUBLE_EQ(told(box, 0.5), 2.0);
+  EXPECT_DOUBLE_EQ(told(box, 5.0), 3.0);
+  EXPECT_DOUBLE_EQ(told(box, -5.0), -1.0);
+}
+
+TEST(GreyBox, ABranchRelaxesExactlyOnARamp) {
+  constexpr double kTimeConstant_s = 0.05;
+  constexpr double kRate = 3.0;
+  GreyBox::Parameters parameters = plain({}, {0.0}, {kTimeConstant_s});
+  parameters.coefficients.values.values = {0.0, 0.0, 0.0, 2.0, 0.0, 0.0};
+  GreyBox box(parameters);
+  for (int n = 0; n <= 40; ++n) {
+    const double t = 0.01 * n;
+    EXPECT_NEAR(told(box, kRate * t),
+                2.0 * kRate * kTimeConstant_s * (1.0 - std::exp(-t / kTimeConstant_s)), 1e-13);
+  }
+}
+
+TEST(GreyBox, WithForcesThatAreNotNegativeItGivesNoWorkAway) {
+  GreyBox::Parameters parameters = plain({0.02, 0.2}, {0.0}, {0.03, 0.4});
+  parameters.coefficients.values.values = {-9.0, 1.0, 8.0, 0.7, 1.5, 2.0, 3.0, 0.0, 0.0};
+  Random random(11);
+  for (int loop = 0; loop < 100; ++loop) {
+    GreyBox box(parameters);
+    const double amplitude = random.uniform();
+    const double second = random.uniform();
+    const auto at = [&](double turns) {
+      const double phase = 2.0 * std::numbers::pi * turns;
+      return amplitude * (std::sin(phase) + second * std::sin(3.0 * phase));
+    };
+    constexpr int kSamples = 2000;
+    double x = at(0.0);
+    double torque = told(box, x);
+    double work = 0.0;
+    double elastic_return = 0.0;
+    for (int n = 1; n <= 3 * kSamples; ++n) {
+      const double next = at(static_cast<double>(n) / kSamples);
+      const double next_torque = told(box, next);
+      work += 0.5 * (torque + next_torque) * (next - x);
+      elastic_return = std::abs(next_torque) * std::abs(next - x);
+      x = next;
+      torque = next_torque;
+    }
+    EXPECT_GE(work, -elastic_return) << "loop " << loop;
+  }
+}
+
+TEST(GreyBox, GoesOnFromAStateThatItIsGiven) {
+  GreyBox::Parameters parameters = plain({0.02, 0.2}, {0.0}, {0.3});
+  parameters.coefficients.values.values = {-9.0, 1.0, 8.0, 0.7, 1.5, 2.0, 0.0, 0.0};
+  GreyBox first(parameters);
+  for (int n = 0; n < 50; ++n) told(first, 0.3 * std::sin(0.3 * n));
+  const std::vector<double> state(first.state().begin(), first.state().end());
+  const double x = 0.3 * std::sin(0.3 * 49);
+  GreyBox second(parameters);
+  second.set_state(state);
+  // A start has no step behind it: the branch decays for a period more.
+  first.step(std::array{x});
+  EXPECT_DOUBLE_EQ(told(first, x), (told(second, x), told(second, x)));
+}
+
+TEST(GreyBox, BringsAStateOutOfBoundsToItsBoundAndPassesOverWhatIsNoNumber) {
+  GreyBox box(plain({0.02, 0.2}));
+  box.set_state(std::array{7.0, -0.5});
+  EXPECT_THAT(box.state(), testing::ElementsAre(1.0, -0.5));
+  box.set_state(std::array{std::nan(""), 0.25});
+  EXPECT_THAT(box.state(), testing::ElementsAre(1.0, 0.25));
+}
+
+/// A network that says `value` whatever it is told.
+Mlp::Parameters constant_network(std::size_t inputs, double value) {
+  Mlp::Parameters network;
+  network.scaling.inputs.centre.assign(inputs, 0.0);
+  network.scaling.inputs.scale.assign(inputs, 1.0);
+  network.scaling.target_centre = value;
+  network.scaling.target_scale = 1.0;
+  DenseLayer layer;
+  layer.weights = FloatMatrix(1, inputs);
+  layer.bias = {0.0F};
+  layer.activation = static_cast<std::size_t>(Activation::linear);
+  network.layers = {layer};
+  return network;
+}
+
+TEST(GreyBox, ItsResidualIsBoundedAndFadesOutBeyondItsTrainingData) {
+  GreyBox::Parameters parameters = plain({0.1});
+  parameters.residual = {.mlp = {constant_network(2, 5.0)},
+                         .dgmm = {},
+                         .bound = 2.0,
+                         .lowest = {-1.0, -1.0},
+                         .highest = {1.0, 1.0}};
+  GreyBox box(parameters);
+  EXPECT_DOUBLE_EQ(told(box, 0.5), 2.0) << "bounded";
+  EXPECT_NEAR(told(box, 1.1), 1.0, 1e-12) << "half of the border";
+  EXPECT_DOUBLE_EQ(told(box, 1.3), 0.0) << "beyond it";
+}
+
+TEST(GreyBox, InvertsFromWhereItIsWithinItsCurve) {
+  GreyBox::Parameters parameters = plain({0.02, 0.2});
+  parameters.coefficients.values.values = {-9.0, 1.0, 18.0, 0.7, 1.5, 0.0, 0.0};
+  GreyBox box(parameters);
+  Random random(5);
+  double x = 0.0;
+  for (int n = 0; n < 1000; ++n) {
+    const double target = -8.0 + 24.0 * random.uniform();
+    const Estimate found = box.invert(target, std::array{x});
+    ASSERT_EQ(found.fault, Fault::none);
+    x = found.value;
+    EXPECT_NEAR(told(box, x), target, 1e-9);
+  }
+}
+
+TEST(GreyBox, SaysWhereATargetIsBeyondItsCurve) {
+  GreyBox::Parameters parameters = plain();
+  parameters.coefficients.values.values = {-10.0, 0.0, 20.0, 0.0, 0.0};
+  GreyBox box(parameters);
+  const Estimate found = box.invert(50.0, std::array{0.0});
+  EXPECT_EQ(found.value, 1.0);
+  EXPECT_EQ(found.fault, Fault::outside_training_range);
+}
+
+TEST(GreyBox, RefusesAStructureThatMakesNoSense) {
+  const auto refused = [](auto change) {
+    GreyBox::Parameters parameters = plain({0.1});
+    change(parameters);
+    return test::error_message([&] { GreyBox box(parameters); });
+  };
+  EXPECT_THAT(refused([](auto& p) {
+                p.terms.curve_knots = {1.0, 0.0, 2.0};
+              }),
+              HasSubstr("curve_knots"));
+  EXPECT_THAT(refused([](auto& p) { p.terms.curve_knots = {1.0}; }), HasSubstr("curve_knots"));
+  EXPECT_THAT(refused([](auto& p) { p.terms.thresholds = {-0.1}; }), HasSubstr("thresholds"));
+  EXPECT_THAT(refused([](auto& p) { p.terms.friction_knots.clear(); }),
+              HasSubstr("friction_knots"));
+  EXPECT_THAT(refused([](auto& p) { p.terms.time_constants_s = {0.0}; }),
+              HasSubstr("time_constants_s"));
+  EXPECT_THAT(refused([](auto& p) { p.terms.rate_scales = {}; }), HasSubstr("rate_scales"));
+  EXPECT_THAT(refused([](auto& p) { p.terms.sample_period_s = 0.0; }),
+              HasSubstr("sample_period_s"));
+  EXPECT_THAT(refused([](auto& p) { p.coefficients.values = Matrix(1, 3); }),
+              HasSubstr("coefficients"));
+  EXPECT_THAT(refused([](auto& p) { p.residual.mlp = {constant_network(1, 0.0)}; }),
+              HasSubstr("residual"));
+}
+
+}  // namespace
+}  // namespace torsio

@@ -1,0 +1,184 @@
+#include "model/second_order/friction_drive.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "support/error_message.hpp"
+
+namespace torsio {
+namespace {
+
+using testing::HasSubstr;
+
+FrictionDrive::Parameters sliding(std::size_t substeps = 1) {
+  return {.inertia = 95.0,
+          .viscous = 200.0,
+          .coulomb = 20.0,
+          .time = {.sample_period_s = 1e-3, .substeps = substeps},
+          .lowest = -10.0,
+          .highest = 10.0};
+}
+
+double step(FrictionDrive& model, double force) { return model.step({&force, 1}).value; }
+
+TEST(FrictionDrive, BrakesAsCoulombSaysAndStays) {
+  auto parameters = sliding();
+  parameters.viscous = 0.0;
+  parameters.time.input_order = 1;  // a cubic would overshoot where the force jumps
+  FrictionDrive model(parameters);
+  model.set_state(std::vector<double>{0.0, 0.1, 0.0});
+  // Stops after v J / Fc = 0.475 s, v^2 J / (2 Fc) = 23.75 mm away.
+  double q = 0.0;
+  for (int n = 0; n < 2000; ++n) {
+    q = step(model, 0.0);
+    if (n != 200) continue;
+    EXPECT_NEAR(q, 0.1 * 0.2 - 0.5 * 20.0 / 95.0 * 0.04, 1e-9);
+  }
+  EXPECT_NEAR(q, 0.02375, 2e-7);  // the sample in which it stops
+  EXPECT_EQ(model.state()[1], 0.0);
+  EXPECT_EQ(step(model, 19.9), q);
+  EXPECT_EQ(step(model, 19.9), q);
+  for (int n = 0; n < 100; ++n) (void)step(model, 20.1);
+  EXPECT_GT(model.state()[0], q);
+}
+
+/// Miss of the position after half a second of a constant force, against the exact answer.
+double drag_error(std::size_t substeps) {
+  auto parameters = sliding(substeps);
+  parameters.viscous = 2000.0;
+  parameters.time.sample_period_s = 0.01;
+  FrictionDrive model(parameters);
+  double q = 0.0;
+  for (int n = 0; n <= 50; ++n) q = step(model, 120.0);
+  const double rate = 2000.0 / 95.0;
+  const double speed = 100.0 / 2000.0;
+  return std::abs(q - speed * (0.5 - (1.0 - std::exp(-rate * 0.5)) / rate));
+}
+
+TEST(FrictionDrive, ConvergesWithTheSecondPowerOfTheSubstep) {
+  EXPECT_NEAR(std::log2(drag_error(2) / drag_error(4)), 2.0, 0.1);
+}
+
+TEST(FrictionDrive, SlidesSteadilyWhereItsForcesBalance) {
+  auto parameters = sliding();
+  parameters.offset = -3.0;
+  parameters.static_ratio = 1.4;
+  parameters.stribeck_speed = 0.01;
+  parameters.viscous_asymmetry = -30.0;
+  parameters.viscous_quadratic = 100.0;
+  for (const double force : {80.0, -80.0}) {
+    FrictionDrive model(parameters);
+    for (int n = 0; n < 10000; ++n) (void)step(model, force);
+    const double v = model.state()[1];
+    const double resisted =
+        -3.0 + 200.0 * v - 30.0 * std::abs(v) + 100.0 * std::abs(v) * v + std::copysign(20.0, v);
+    EXPECT_NEAR(resisted, force, 1e-6);
+  }
+}
+
+TEST(FrictionDrive, NeedsTheBreakawayForceToStart) {
+  auto parameters = sliding();
+  parameters.static_ratio = 1.5;
+  parameters.stribeck_speed = 0.01;
+  FrictionDrive model(parameters);
+  for (int n = 0; n < 100; ++n) (void)step(model, 29.9);
+  EXPECT_EQ(model.state()[0], 0.0);
+  for (int n = 0; n < 1000; ++n) (void)step(model, 30.5);
+  EXPECT_GT(model.state()[1], 0.01);  // and then slides against less
+}
+
+TEST(FrictionDrive, FeelsMoreFrictionWhereItsSlopeSays) {
+  auto parameters = sliding();
+  parameters.coulomb_slope = 0.5;
+  FrictionDrive model(parameters);
+  for (const double q : {-1.0, 0.0, 1.0}) {
+    const double level = 20.0 * (1.0 + 0.5 * q);
+    model.reset();
+    model.set_state(std::vector<double>{q, 0.0, 0.0});
+    for (int n = 0; n < 20; ++n) EXPECT_EQ(step(model, 0.999 * level), q);
+    for (int n = 0; n < 20; ++n) (void)step(model, 1.01 * level);
+    EXPECT_GT(model.state()[0], q);
+  }
+}
+
+TEST(FrictionDrive, WithABristleIsASpringBeforeItSlides) {
+  auto parameters = sliding();
+  parameters.bristle = 1e-3;  // 20 kN/m
+  FrictionDrive model(parameters);
+  for (int n = 0; n < 5000; ++n) (void)step(model, std::min(0.001 * n, 1.0));
+  const double z = model.state()[2];
+  EXPECT_NEAR(z, 1.0, 1e-3);
+  EXPECT_NEAR(model.state()[0], -1e-3 * std::log1p(-1.0 / 20.0), 2e-6);  // F' = s (1 - F / Fc) v
+}
+
+TEST(FrictionDrive, TakesMoreEnergyThanItHolds) {
+  for (const double bristle : {0.0, 1e-3}) {
+    auto parameters = sliding(2);
+    parameters.bristle = bristle;
+    parameters.static_ratio = 1.5;
+    parameters.stribeck_speed = 0.02;
+    parameters.spring = 300.0;
+    FrictionDrive model(parameters);
+    double work = 0.0;
+    double before = 0.0;
+    for (int n = 1; n < 20000; ++n) {
+      const double force = 60.0 * std::sin(0.004 * n) * std::sin(0.0007 * n);
+      const double q = step(model, force);
+      work += force * (q - before);
+      before = q;
+      const auto state = model.state();
+      const double held = 0.5 * 95.0 * state[1] * state[1] + 150.0 * q * q +
+                          (bristle > 0.0 ? 0.5 * state[2] * state[2] * bristle / 30.0 : 0.0);
+      ASSERT_GE(work, held - 1e-3) << bristle << ", " << n;
+    }
+    EXPECT_GT(work, 1.0);
+  }
+}
+
+TEST(FrictionDrive, StopsAtTheEndOfItsRangeAndGoesOnAfterNaN) {
+  FrictionDrive model(sliding());
+  double force = 1e7;
+  Estimate told;
+  for (int n = 0; n < 1000; ++n) told = model.step({&force, 1});
+  EXPECT_EQ(told.fault, Fault::diverged);
+  EXPECT_EQ(told.value, 10.0);
+  force = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(model.step({&force, 1}).fault, Fault::none);
+  force = -1.0;
+  for (int n = 0; n < 10; ++n) told = model.step({&force, 1});
+  EXPECT_EQ(told.fault, Fault::none);
+  EXPECT_EQ(told.value, 10.0);
+}
+
+TEST(FrictionDrive, KeepsABristleBelowWhatItCanHold) {
+  auto parameters = sliding();
+  parameters.bristle = 1e-3;
+  FrictionDrive with(parameters);
+  with.set_state(std::vector<double>{0.0, NAN, 1e9});
+  EXPECT_THAT(with.state(), testing::ElementsAre(0.0, 0.0, 20.0));
+  FrictionDrive without(sliding());
+  without.set_state(std::vector<double>{20.0, 1.0, 5.0});
+  EXPECT_THAT(without.state(), testing::ElementsAre(10.0, 1.0, 0.0));
+}
+
+TEST(FrictionDrive, RefusesWhatIsNoDrive) {
+  const auto refused = [](auto change) {
+    auto parameters = sliding();
+    change(parameters);
+    return test::error_message([&] { FrictionDrive model(parameters); });
+  };
+  EXPECT_THAT(refused([](auto& p) { p.inertia = 0.0; }), HasSubstr("friction_drive: inertia"));
+  EXPECT_THAT(refused([](auto& p) { p.static_ratio = 0.9; }), HasSubstr("static_ratio"));
+  EXPECT_THAT(refused([](auto& p) { p.viscous_asymmetry = 300.0; }),
+              HasSubstr("viscous_asymmetry"));
+  EXPECT_THAT(refused([](auto& p) { p.gains = {0.0}; }), HasSubstr("gains"));
+  EXPECT_THAT(refused([](auto& p) { p.bristle = 1e-9; }), HasSubstr("substeps"));
+}
+
+}  // namespace
+}  // namespace torsio

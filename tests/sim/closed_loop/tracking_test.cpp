@@ -1,0 +1,316 @@
+#include "torsio/sim/closed_loop/tracking.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "model/grey_box/grey_box.hpp"
+#include "support/error_message.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/data/mapping.hpp"
+#include "torsio/data/resample.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/train_model.hpp"
+#include "torsio/report/tracking.hpp"
+#include "torsio/sim/experiment.hpp"
+
+namespace torsio {
+namespace {
+
+using Kind = TorqueReference::Kind;
+using test::error_message;
+
+const DataSheet kSheet = data_sheet("dfki-50");
+
+/// What the sweeps of dfki-50 give, roughly.
+LinearInverse line() { return LinearInverse(600.0); }
+
+TrackingSpec short_spec(Kind kind = Kind::chirp) {
+  return {.reference = {.kind = kind, .duration_s = 12.0}, .measures_bandwidth = false};
+}
+
+/// Two chirps of the deflection loop, output locked, as recordings to learn from, either way round.
+Dataset torque_mode() {
+  Dataset dataset;
+  for (const double amplitude_Nm : {15.0, 8.0}) {
+    Recording chirp = simulate({.actuator = "dfki-50",
+                                .experiment = "chirp",
+                                .seed = 11,
+                                .duration_s = 30.0,
+                                .torque_amplitude_Nm = amplitude_Nm});
+    add_derived(chirp, {{"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"}});
+    const std::size_t samples = chirp.size();
+    dataset.records.push_back({std::move(chirp), whole_record(samples, Role::train)});
+  }
+  return dataset;
+}
+
+ModelFile fitted(Dataset dataset, const std::string& family, const std::vector<std::string>& inputs,
+                 const std::string& target = "torque_Nm") {
+  dataset.target = target;
+  return train_model(dataset, {.family = family, .features = resolve_inputs(dataset, inputs)}, 1)
+      .file;
+}
+
+TEST(Track, WithALineFollowsWithinTheSpringsFriction) {
+  for (const JointOutput output : {JointOutput::locked, JointOutput::free}) {
+    TrackingSpec spec = short_spec();
+    spec.output = output;
+    const TrackingRun run = track(kSheet, spec, line(), 1);
+    EXPECT_FALSE(run.has_diverged);
+    EXPECT_EQ(run.record.size(), 12000U);
+    EXPECT_LT(run.score.mad, 2.0);
+    EXPECT_GT(run.score.mad, 0.2) << "the inner friction of the spring is 1.36 Nm";
+    EXPECT_NEAR(run.score.rmse * run.score.rmse,
+                run.score.mad * run.score.mad + run.score.std_abs * run.score.std_abs, 1e-9);
+    EXPECT_NEAR(run.score.load_cell_mad, run.score.mad, 0.1);
+    EXPECT_EQ(run.score.limit_events, 0U);
+    EXPECT_EQ(run.score.loop_faults + run.score.inverse_faults, 0U);
+    EXPECT_FALSE(run.score.limit_cycle);
+  }
+}
+
+TEST(Track, RecordsTermsThatAddUpToTheCommand) {
+  TrackingSpec spec = short_spec();
+  spec.friction = FrictionCompensation{.share = 0.3};
+  spec.observer_cutoff_Hz = 2.0;
+  spec.feeds_rate_forward = true;
+  const Recording record = track(kSheet, spec, line(), 1).record;
+  const auto at = [&](const char* channel, std::size_t i) {
+    return record.channel(channel).values[i];
+  };
+  double most_rest = 0.0;
+  double most_friction = 0.0;
+  double most_observer = 0.0;
+  double most_forward = 0.0;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    double sum = 0.0;
+    for (const char* term :
+         {"proportional_current_A", "integral_current_A", "derivative_current_A",
+          "feed_forward_current_A", "rate_feed_forward_current_A", "friction_current_A",
+          "observer_current_A", "handover_current_A", "rest_current_A"})
+      sum += at(term, i);
+    ASSERT_NEAR(sum, at("command_current_A", i), 1e-12);
+    if (at("is_limited_1", i) == 0.0)
+      most_rest = std::max(most_rest, std::abs(at("rest_current_A", i)));
+    most_friction = std::max(most_friction, std::abs(at("friction_current_A", i)));
+    most_observer = std::max(most_observer, std::abs(at("observer_current_A", i)));
+    most_forward = std::max(most_forward, std::abs(at("rate_feed_forward_current_A", i)));
+  }
+  EXPECT_LT(most_rest, 1e-12);
+  EXPECT_GT(most_friction, 0.01);
+  EXPECT_GT(most_observer, 0.01);
+  EXPECT_GT(most_forward, 0.01);
+}
+
+TEST(Track, FollowsNoiseFasterThanTheLoopWhereItsRateIsFedForward) {
+  TrackingSpec spec = short_spec(Kind::random_walk);
+  const double plain_Nm = track(kSheet, spec, line(), 1).score.rmse;
+  spec.feeds_rate_forward = true;
+  EXPECT_LT(track(kSheet, spec, line(), 1).score.rmse, 0.6 * plain_Nm);
+}
+
+TEST(Track, AModelFilesInverseBeatsTheLineWhereItLearned) {
+  const std::vector<std::string> inputs{"spring_deflection_rad",
+                                        "lowpass(rate(spring_deflection_rad), 10Hz)"};
+  const AnyInverse inverse = inverse_of(fitted(torque_mode(), "linear_coulomb", inputs));
+  const std::array<NamedInverse, 1> models{NamedInverse{"coulomb", inverse}};
+  const std::array<std::uint64_t, 2> seeds{3, 4};
+  TrackingSpec spec = short_spec();
+  spec.reference.duration_s = 30.0;
+  const auto rows = track_models(kSheet, spec, line(), models, seeds);
+  ASSERT_EQ(rows.size(), 4U);
+  EXPECT_EQ(rows[0].mad_to_linear, 1.0);
+  EXPECT_EQ(rows[3].model, "coulomb");
+  EXPECT_EQ(rows[3].seed, 4U);
+  EXPECT_NEAR(rows[3].mad_to_linear.value(), rows[3].score.mad / rows[2].score.mad, 1e-12);
+  EXPECT_LT(rows[3].mad_to_linear.value(), 0.9);
+}
+
+TEST(Track, AModelThatWasTrainedTheOtherWayRoundClosesTheLoopToo) {
+  const ModelFile model =
+      fitted(torque_mode(), "linear", {"torque_Nm", "lowpass(rate(joint_angle_rad), 10Hz)"},
+             "spring_deflection_rad");
+  const TrackingRun run = track(kSheet, short_spec(), inverse_of(model), 1);
+  EXPECT_LT(run.score.mad, 2.0);
+}
+
+TEST(Track, AContinuousModelOfAnotherRateIsDiscretisedAnew) {
+  ModelFile model = fitted(torque_mode(), "linear", {"spring_deflection_rad"});
+  const auto mad_of = [&](double sample_period_s) {
+    GreyBox::Parameters box;
+    box.terms = {.curve_knots = {-0.1, 0.1},
+                 .thresholds = {},
+                 .friction_knots = {0.0},
+                 .time_constants_s = {0.05},
+                 .rate_scales = {0.0},
+                 .sample_period_s = sample_period_s};
+    box.coefficients.values = Matrix(1, box.terms.columns());
+    box.coefficients.values.values = {-57.0, 57.0, 200.0, 0.0, 0.0};
+    model.parameters = box;
+    return track(kSheet, short_spec(), inverse_of(model), 1).score.mad;
+  };
+  EXPECT_EQ(mad_of(0.005), mad_of(0.001));
+}
+
+TEST(Track, MeasuresTheBandwidthThatTheGainsWereMadeFor) {
+  TrackingSpec spec = short_spec();
+  spec.measures_bandwidth = true;
+  // |s² + 2 ζ ω s + ω²| = √2 ω² at 0.746 ω for ζ = 0.9; friction takes some.
+  const auto slow = track(kSheet, spec, line(), 1).bandwidth_Hz;
+  ASSERT_TRUE(slow);
+  EXPECT_NEAR(*slow, 5.9, 1.5);
+  spec.bandwidth_rad_s = 80.0;
+  const auto fast = track(kSheet, spec, line(), 1).bandwidth_Hz;
+  ASSERT_TRUE(fast);
+  EXPECT_GT(*fast, 1.3 * *slow);
+}
+
+TEST(Track, OfStepsTellsTheOvershoot) {
+  const TrackingScore score = track(kSheet, short_spec(Kind::steps), line(), 1).score;
+  ASSERT_TRUE(score.overshoot);
+  EXPECT_LT(*score.overshoot, 0.5);
+}
+
+TEST(Track, CountsLimitsWhereTheCurrentIsNotEnough) {
+  TrackingSpec spec = short_spec(Kind::steps);
+  spec.reference.amplitude_Nm = 48.0;
+  spec.bandwidth_rad_s = 100.0;
+  const TrackingScore score = track(kSheet, spec, line(), 1).score;
+  EXPECT_GT(score.limit_events, 0U);
+  EXPECT_GT(score.limited_s, 0.0);
+}
+
+TEST(Track, IsTheSameForTheSameSeed) {
+  const Recording one = track(kSheet, short_spec(Kind::random_walk), line(), 7).record;
+  const Recording other = track(kSheet, short_spec(Kind::random_walk), line(), 7).record;
+  const Recording third = track(kSheet, short_spec(Kind::random_walk), line(), 8).record;
+  EXPECT_EQ(one.channel("command_current_A").values, other.channel("command_current_A").values);
+  EXPECT_NE(one.channel("command_current_A").values, third.channel("command_current_A").values);
+}
+
+TEST(Track, WithoutASensorFadesTheCurrentAndGoesOn) {
+  TrackingSpec spec = short_spec();
+  spec.faults = parse_fault_schedule(
+      "faults:\n  - {sensor: joint_angle_rad, fault: nan, at: 5s, for: 0.5s}\n", "faults", kSheet);
+  const TrackingRun run = track(kSheet, spec, line(), 1);
+  EXPECT_EQ(run.score.loop_faults, 500U);
+  EXPECT_FALSE(run.has_diverged);
+  const auto& command = run.record.channel("command_current_A").values;
+  EXPECT_NEAR(command[5490], 0.0, 1e-6);
+  for (const double current_A : command) ASSERT_TRUE(std::isfinite(current_A));
+  const auto& wanted = run.record.channel("wanted_torque_Nm").values;
+  const auto& torque = run.record.channel("truth_torque_Nm").values;
+  for (std::size_t i = 7000; i < wanted.size(); ++i) ASSERT_NEAR(torque[i], wanted[i], 4.0);
+}
+
+TEST(Track, StopsARunWhoseLeverTurnsRound) {
+  TrackingSpec spec = short_spec();
+  spec.output = JointOutput::free;
+  const LinearInverse far_too_soft(50.0);
+  EXPECT_TRUE(track(kSheet, spec, far_too_soft, 1).has_diverged);
+  const std::array<NamedInverse, 1> models{NamedInverse{"soft", far_too_soft}};
+  const std::array<std::uint64_t, 1> seeds{1};
+  const auto rows = track_models(kSheet, spec, line(), models, seeds);
+  EXPECT_EQ(rows[0].status, "ok");
+  EXPECT_EQ(rows[1].status, "diverged");
+  EXPECT_NE(rows[1].reason.find("stopped after"), std::string::npos);
+  EXPECT_FALSE(rows[1].mad_to_linear);
+}
+
+TEST(Track, RefusesWhatItCannotRunBeforeTheFirstStep) {
+  const auto refusal = [](const DataSheet& sheet, const TrackingSpec& spec) {
+    return error_message([&] { (void)track(sheet, spec, line(), 1); });
+  };
+  EXPECT_NE(refusal(data_sheet("elastomer"), short_spec()).find("series-elastic"),
+            std::string::npos);
+  TrackingSpec far = short_spec();
+  far.reference.amplitude_Nm = 60.0;
+  EXPECT_NE(refusal(kSheet, far).find("rated for"), std::string::npos);
+  TrackingSpec swung = short_spec();
+  swung.output = JointOutput::free;
+  swung.lever_m = 0.1;
+  EXPECT_NE(refusal(kSheet, swung).find("would tip the lever over"), std::string::npos);
+  TrackingSpec wild = short_spec();
+  wild.bandwidth_rad_s = 3000.0;
+  EXPECT_NE(refusal(kSheet, wild).find("margin"), std::string::npos);
+}
+
+TEST(Track, RefusesModelsThatTheLoopCannotFeed) {
+  const auto refusal = [](const ModelFile& model) {
+    return error_message([&] { (void)inverse_of(model); });
+  };
+  Dataset dataset = torque_mode();
+  for (DatasetRecord& record : dataset.records)
+    record.recording.add_condition("support_m", &record == &dataset.records.front() ? 0.03 : 0.04);
+  ModelFile unknown = fitted(dataset, "linear", {"spring_deflection_rad", "support_m"});
+  EXPECT_NE(refusal(unknown).find("support_m"), std::string::npos);
+  ModelFile zeroed = fitted(dataset, "linear", {"spring_deflection_rad"});
+  zeroed.settings.zeroed_channels = {"gear_angle_rad"};
+  EXPECT_NE(refusal(zeroed).find("gear_angle_rad"), std::string::npos);
+  const ModelFile one_way = fitted(dataset, "mlp", {"spring_deflection_rad"});
+  EXPECT_NE(refusal(one_way).find("--target spring_deflection_rad"), std::string::npos);
+  for (DatasetRecord& record : dataset.records) {
+    record.recording = resample(record.recording, 100.0);
+    record.segments = whole_record(record.recording.size(), Role::train);
+  }
+  const ModelFile slow = fitted(dataset, "arx", {"torque_Nm"}, "spring_deflection_rad");
+  EXPECT_NE(refusal(slow).find("100 Hz, at which"), std::string::npos) << refusal(slow);
+}
+
+TEST(TrackingReport, HasTheFieldsOfItsSchemaAndNoNumbersOfARunThatFailed) {
+  const std::array<std::uint64_t, 1> seeds{1};
+  std::vector<TrackingRow> rows = track_models(kSheet, short_spec(), line(), {}, seeds);
+  rows.push_back(rows.front());
+  rows.back().model = "m";
+  rows.back().status = "failed";
+  rows.back().reason = "why";
+  const auto json = nlohmann::ordered_json::parse(tracking_json(rows));
+  const auto& row = json.at("results").at(0);
+  auto field = row.begin();  // those of the schema, in its order; others follow
+  for (const char* key :
+       {"actuator", "variant", "output", "reference", "amplitude_Nm", "model", "seed", "mad",
+        "std_abs", "rmse", "mad_to_linear", "bandwidth_Hz", "limit_events", "status", "reason"})
+    EXPECT_EQ((field++).key(), key);
+  EXPECT_EQ(row.at("output"), "locked");
+  EXPECT_EQ(row.at("variant"), "maxwell-slip");
+  EXPECT_EQ(row.at("status"), "ok");
+  EXPECT_TRUE(row.at("bandwidth_Hz").is_null());
+  EXPECT_TRUE(json.at("results").at(1).at("mad").is_null());
+  const std::string text = tracking_text(rows);
+  EXPECT_NE(text.find("chirp of 13 Nm"), std::string::npos) << text;
+  EXPECT_NE(text.find("m, seed 1: failed: why"), std::string::npos) << text;
+}
+
+// Never down to -3 dB is the best that there is, down from the start the worst, and none is neither.
+TEST(TrackingReport, TellsABandwidthAboveTheSweepFromOneBelowItAndFromNone) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  TrackingRow row;
+  row.model = "m";
+  std::vector<TrackingRow> rows(4, row);
+  rows[0].bandwidth_Hz = 6.0;
+  rows[1].bandwidth_Hz = kInfinity;
+  rows[2].bandwidth_Hz = 0.0;
+  for (std::size_t n = 0; n < rows.size(); ++n) rows[n].seed = n + 1;
+  const auto json = nlohmann::json::parse(tracking_json(rows)).at("results");
+  const std::array<const char*, 4> outcomes{"measured", "above_sweep", "below_sweep",
+                                            "not_measured"};
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    EXPECT_EQ(json.at(n).at("bandwidth"), outcomes.at(n));
+    EXPECT_EQ(json.at(n).at("bandwidth_Hz").is_null(), n > 0);
+  }
+  const std::string text = tracking_text(rows);
+  EXPECT_NE(text.find("6.00"), std::string::npos) << text;
+  EXPECT_NE(text.find("m, seed 2: bandwidth above the sweep"), std::string::npos) << text;
+  EXPECT_NE(text.find("m, seed 3: bandwidth below the sweep"), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace torsio
