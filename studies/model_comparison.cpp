@@ -52,7 +52,7 @@ constexpr std::array kRivals{
     Rival{"lstm", "lstm:layers=16:epochs=10:stride=100"},
 };
 
-constexpr std::string_view kJudgedModel = "grey_box";
+constexpr std::string_view kSubject = "grey_box";
 
 struct Choice {
   std::string label;
@@ -73,7 +73,7 @@ std::vector<Choice> choices_of(const ComparisonCase& of, bool is_quick) {
   return choices;
 }
 
-/// The rows of one fit on the judged records: of each condition, or of all together.
+/// The rows of one fit on the test records: of each condition, or of all together.
 void add(StudyRows& rows, const ComparisonPlan& plan, const ComparisonCase& of,
          const std::string& model, const ResultRow& row) {
   if (of.conditions.empty()) {
@@ -109,17 +109,16 @@ Study model_comparison(const StudyOptions& options, const Progress& progress) {
   Study study{
       .protocol =
           "every family on every simulated actuator and on the real recordings with a torque, in "
-          "free run. dfki: three sweeps, judged on a fourth lever in an inclined plane (new "
+          "free run. dfki: three sweeps, tested on a fourth lever in an inclined plane (new "
           "lever); "
-          "torque chirps of 0.8 and 0.3 of the rating, output locked, judged on noise of 0.25 "
+          "torque chirps of 0.8 and 0.3 of the rating, output locked, tested on noise of 0.25 "
           "(random walk), both at the load cell's 125 Hz, its latency taken off. elastomer: "
           "triangles of 0.4 to 4 Hz. "
-          "rubber-clutch: sines, judged on "
-          "multisines. harmonic-drive: pushes of 10 and 20 Nm, high and zero impedance, judged on "
+          "rubber-clutch: sines, tested on "
+          "multisines. harmonic-drive: pushes of 10 and 20 Nm, high and zero impedance, tested on "
           "15 Nm. Real ones: docs/model_comparison.md",
       .unit = "Nm",
-      .options = options,
-      .judged = std::string(kJudgedModel)};
+      .options = options};
   std::vector<ComparisonPlan> plans = simulated_plans(options.is_quick);
   if (!options.is_quick) std::ranges::move(recorded_plans(), std::back_inserter(plans));
   StudyRows rows;
@@ -136,7 +135,7 @@ Study model_comparison(const StudyOptions& options, const Progress& progress) {
       run_case(rows, plan, plan.make(seed, part), seed, options.is_quick, part);
     }
   }
-  study.rows = rows.rows();
+  study.table = ComparisonTable{.rows = rows.comparisons(), .subject = std::string(kSubject)};
   for (const Rival& rival : kRivals)
     if (rival.model != rival.label && (rival.is_quick || !options.is_quick))
       study.notes.push_back(fmt::format("model {}: {}", rival.label, rival.model));

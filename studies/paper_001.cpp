@@ -32,7 +32,7 @@ Study sweep_study(Study study, bool is_inverse, const Progress& progress) {
       rows.add(results, dataset, Role::test, [&](const std::string&) { return kVariants[v]; });
     }
   }
-  study.rows = rows.rows();
+  study.table = ErrorTable{.rows = rows.errors()};
   return study;
 }
 

@@ -168,27 +168,27 @@ void compare_into(StudyRows& rows, const Bench& bench, const std::vector<Rival>&
       });
 }
 
-const StudyRow& best_of(const std::vector<StudyRow>& rows, std::string_view named) {
-  return *std::ranges::min_element(rows, {}, [&](const StudyRow& row) {
+const ErrorRow& best_of(const std::vector<ErrorRow>& rows, std::string_view named) {
+  return *std::ranges::min_element(rows, {}, [&](const ErrorRow& row) {
     return std::pair(!row.model.starts_with(named), row.rmse);
   });
 }
 
 /// What the rows of one condition say about the paper's claim.
-std::vector<std::string> verdicts(const std::vector<StudyRow>& rows) {
-  const StudyRow& arx = best_of(rows, "ARX");
+std::vector<std::string> verdicts(const std::vector<ErrorRow>& rows) {
+  const ErrorRow& arx = best_of(rows, "ARX");
   std::vector<std::string> notes;
-  for (const StudyRow& row : rows) {
+  for (const ErrorRow& row : rows) {
     if (row.blank > 0)
-      notes.push_back(fmt::format("{}: tells no more than the mean torque does in {} of {} runs",
-                                  row.model, row.blank, row.runs));
+      notes.push_back(fmt::format("{}: no better than the mean torque in {} of {} runs", row.model,
+                                  row.blank, row.runs));
     if (row.model.find("PGPR") == std::string::npos) continue;
     notes.push_back(fmt::format("{}: {} a linear ARX ({:.2f} % of FS against {:.2f} of {})",
                                 row.model, row.rmse < arx.rmse ? "beats" : "does not beat",
                                 100.0 * row.rmse / kFullScale_Nm, 100.0 * arx.rmse / kFullScale_Nm,
                                 arx.model));
   }
-  const StudyRow& best = best_of(rows, "");
+  const ErrorRow& best = best_of(rows, "");
   notes.push_back(
       fmt::format("best: {}, {:.2f} % of FS", best.model, 100.0 * best.rmse / kFullScale_Nm));
   return notes;
@@ -199,11 +199,14 @@ Study study_of(std::string protocol, const StudyOptions& options,
   Study study{.protocol = std::move(protocol),
               .unit = "Nm",
               .options = options,
-              .plants = {study_plant(kActuator)},
-              .full_scale = kFullScale_Nm};
+              .plants = {study_plant(kActuator)}};
   for (const Rival& rival : rivals)
     study.notes.push_back(fmt::format("model {}: {}", rival.label, rival.model));
   return study;
+}
+
+ErrorTable sensor_table(const StudyRows& rows) {
+  return {.rows = rows.errors(), .full_scale = kFullScale_Nm};
 }
 
 /// A study of experiments that the clutch may slip in, until it does and once it has.
@@ -224,7 +227,7 @@ Study beyond_slip(Study study, const std::vector<std::string>& experiments,
     compare_into(rows, bench, few_rivals(options.is_quick), seed,
                  nth_of(progress, k, options.repeats, "beyond slip"));
   }
-  study.rows = rows.rows();
+  study.table = sensor_table(rows);
   return study;
 }
 
@@ -249,12 +252,13 @@ Study sensor_models_002(const StudyOptions& options, const Progress& progress) {
     }
     compare_into(rows, bench, rivals, seed, nth_of(progress, k, options.repeats, kActuator));
   }
-  study.rows = rows.rows();
+  const ErrorTable table = sensor_table(rows);
+  study.table = table;
   study.notes.emplace_back(
       "paper %, paper max %: Table III, measured on its own hardware; the paper prints no "
       "normaliser and no "
       "parameters of its multisine, and trained its GP on part of the data");
-  std::ranges::move(verdicts(study.rows), std::back_inserter(study.notes));
+  std::ranges::move(verdicts(table.rows), std::back_inserter(study.notes));
   return study;
 }
 

@@ -121,7 +121,7 @@ Study ladder_003(const StudyOptions& options, const Progress& progress) {
           });
     }
   }
-  study.rows = rows.rows();
+  study.table = ErrorTable{.rows = rows.errors()};
   return study;
 }
 

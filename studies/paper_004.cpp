@@ -143,7 +143,7 @@ Study encoders_004(const StudyOptions& options, const Progress& progress) {
     cross_validate_into(rows, {.condition = "20 Nm"}, {kSet1, kSet2, kSet3}, options,
                         repeat_seed(options, k),
                         nth_of(progress, k, options.repeats, "encoder sets"));
-  study.rows = rows.rows();
+  study.table = ErrorTable{.rows = rows.errors()};
   return study;
 }
 
@@ -166,7 +166,7 @@ Study torque_levels_004(const StudyOptions& options, const Progress& progress) {
     compare_into(rows, pushes, kSet2, options, repeat_seed(options, k),
                  nth_of(progress, k, options.repeats, "torque levels"));
   }
-  study.rows = rows.rows();
+  study.table = ErrorTable{.rows = rows.errors()};
   return study;
 }
 
@@ -210,7 +210,7 @@ Study impedances_004(const StudyOptions& options, const Progress& progress) {
                           fmt::format("impedance {}", of.name)));
     }
   }
-  study.rows = rows.rows();
+  study.table = ErrorTable{.rows = rows.errors()};
   return study;
 }
 
@@ -233,7 +233,7 @@ Study tubes_004(const StudyOptions& options, const Progress& progress) {
           repeat_seed(options, k),
           nth_of(progress, t * options.repeats + k, kTubes.size() * options.repeats, kTubes[t]));
   }
-  study.rows = rows.rows();
+  study.table = ErrorTable{.rows = rows.errors()};
   return study;
 }
 

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
@@ -133,12 +135,12 @@ void add_rows(const Benchmark& benchmark, std::span<const Entry> entries, Study&
                [&](const ResultRow& /*row*/) { return std::string(entry.name); });
     }
   }
-  const std::vector<StudyRow> ours = rows.rows();
-  study.rows.insert(study.rows.end(), ours.begin(), ours.end());
+  auto& table = std::get<ErrorTable>(study.table);
+  std::ranges::move(rows.errors(), std::back_inserter(table.rows));
   for (const PaperEntry& each : benchmark.published)
-    study.rows.push_back({.condition = std::string(each.condition),
-                          .model = std::string(each.model),
-                          .published = {{each.quantity, each.figure}}});
+    table.rows.push_back({StudyRow{.condition = std::string(each.condition),
+                                   .model = std::string(each.model),
+                                   .published = {{each.quantity, each.figure}}}});
 }
 
 }  // namespace
@@ -151,7 +153,7 @@ Study public_benchmarks(const StudyOptions& options, const Progress& progress) {
           "published figures of boucwen are those of its multisine test",
       .unit = "m",
       .options = options,
-      .tells_fit_time = true};
+      .table = ErrorTable{.shows_fit_time = true}};
   add_rows(kBoucWen, kBoucWenModels, study, nth_of(progress, 0, 2, kBoucWen.name));
   add_rows(kEmps, kEmpsModels, study, nth_of(progress, 1, 2, kEmps.name));
   return study;

@@ -74,15 +74,15 @@ Study run_study(const StudyInfo& study, const StudyOptions& options, const Progr
   return study.run(options, progress);
 }
 
-std::vector<StudyVerdict> verdicts(const Study& study) {
+std::vector<StudyVerdict> verdicts(const ComparisonTable& table) {
   std::vector<StudyVerdict> all;
-  for (const StudyRow& row : study.rows) {
+  for (const ComparisonRow& row : table.rows) {
     auto found = std::ranges::find(all, row.condition, &StudyVerdict::condition);
     if (found == all.end())
       found = all.insert(found, {.condition = row.condition,
                                  .best_rmse = std::numeric_limits<double>::infinity()});
     if (!row.is_ranked()) continue;
-    if (row.model == study.judged) found->rmse = row.rmse;
+    if (row.model == table.subject) found->rmse = row.rmse;
     if (row.rmse < found->best_rmse) {
       found->best = row.model;
       found->best_rmse = row.rmse;

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "torsio/core/not_measured.hpp"
@@ -18,17 +19,6 @@ struct StudyOptions {
   std::uint64_t seed = 1;
   std::size_t repeats = 3;  ///< each with plants' noise, weights and folds of its own
   bool is_quick = false;    ///< shorter recordings and smaller networks: to see that it runs
-};
-
-/// How a model did in a torque loop; means over the runs, in `Study::unit` (specification 3.10).
-struct StudyTracking {
-  double mad = kNotMeasured;
-  double mad_std = kNotMeasured;  ///< of one run; NaN of fewer than two
-  double std_abs = kNotMeasured;
-  double mad_to_linear =
-      kNotMeasured;  ///< MAD over that of the line of the sweeps, where both came to their end
-  std::size_t limit_cycles = 0;  ///< runs with one
-  std::size_t stopped = 0;       ///< runs that diverged or failed, in no mean
 };
 
 /// A figure that a paper prints, as it prints it.
@@ -63,39 +53,74 @@ struct PaperEntry {
   PaperFigure figure;
 };
 
-/// One model under one condition, over all repeats and folds.
+/// One model under one condition, over all repeats and folds: what every kind of study has.
 struct StudyRow {
-  std::string condition;
-  std::string model;
+  std::string condition = {};
+  std::string model = {};
   std::size_t runs = 0;            ///< fits that the statistics are of; 0: only published figures
-  double rmse = kNotMeasured;      ///< mean, in `Study::unit`; NaN of no run, as all means
+  double rmse = kNotMeasured;      ///< mean, in `Study::unit`; NaN without a run, as all means
   double rmse_std = kNotMeasured;  ///< of one run; NaN of fewer than two
-  double percent = kNotMeasured;  ///< mean of 100 rmse / (largest |target| of the judged recording)
-  double largest = kNotMeasured;  ///< mean of that largest |target|
-  double max_abs = kNotMeasured;  ///< largest |error| of all runs
-  std::optional<double> one_step = {};  ///< mean RMSE one step ahead, of a model that feeds back
-  std::size_t blank = 0;                ///< of the runs: fit_percent below 5, no more than the mean
-  double guarded_percent = 0.0;         ///< of the scored samples, answered by a guard
-  std::size_t diverged = 0;             ///< of the runs
-  double fit_percent = kNotMeasured;    ///< mean of `Metrics::fit_percent` (BF)
   std::vector<std::pair<RowQuantity, PaperFigure>> published = {};
-  std::optional<StudyTracking> tracking = {};  ///< of all rows of a study, or of none
-  double fit_seconds = kNotMeasured;           ///< mean of the runs
-  double step_ns = kNotMeasured;               ///< mean of the runs' medians
+};
+
+/// Errors of a model on records that it was not trained on.
+struct ErrorRow : StudyRow {
+  double percent = kNotMeasured;   ///< mean of 100 rmse / (largest |target| of the test recording)
+  double largest = kNotMeasured;   ///< mean of that largest |target|
+  double max_abs = kNotMeasured;   ///< largest |error| of all runs
+  double one_step = kNotMeasured;  ///< mean RMSE one step ahead; NaN of a model without feedback
+  std::size_t blank = 0;           ///< runs with fit_percent below 5, no more than the mean
+  double guarded_percent = 0.0;    ///< of the scored samples, estimated by a guard
+  std::size_t diverged = 0;        ///< of the runs
+  double fit_percent = kNotMeasured;  ///< mean of `Metrics::fit_percent` (BF)
+  double fit_seconds = kNotMeasured;  ///< mean of the runs
+};
+
+struct ErrorTable {
+  std::vector<ErrorRow> rows = {};  ///< condition by condition, in the order of their first fit
+  std::optional<double> full_scale = {};  ///< of the sensor: errors are also shown in % of it
+  bool shows_fit_time = false;
+};
+
+/// The same where all families are compared, and one may fail.
+struct ComparisonRow : StudyRow {
+  double percent = kNotMeasured;
+  double step_ns = kNotMeasured;         ///< mean of the runs' medians
   double within_std_dev = kNotMeasured;  ///< mean of `Score::within_std_dev`; NaN: no error bar
   double within_2_std_dev = kNotMeasured;
-  std::string failure = {};  ///< why a fit failed, of a study that goes on then
+  std::size_t diverged = 0;
+  std::string failure = {};  ///< why a fit failed; the study goes on
 
   /// Every run was fitted and stayed within the output's range.
   [[nodiscard]] bool is_ranked() const { return runs > 0 && diverged == 0 && failure.empty(); }
 };
 
-/// How one model of a study stands to the best under a condition.
+struct ComparisonTable {
+  std::vector<ComparisonRow> rows = {};
+  std::string subject;  ///< the model that the study is about
+};
+
+/// Errors of a torque loop through the inverse of a model; means over the runs (specification 3.10).
+struct LoopRow : StudyRow {
+  double mad = kNotMeasured;
+  double mad_std = kNotMeasured;  ///< of one run; NaN of fewer than two
+  double std_abs = kNotMeasured;
+  /// MAD over that of the linear model of the sweeps, where both completed the run.
+  double mad_to_linear = kNotMeasured;
+  std::size_t limit_cycles = 0;  ///< runs with one
+  std::size_t stopped = 0;       ///< runs that diverged or failed, in no mean
+};
+
+struct LoopTable {
+  std::vector<LoopRow> rows = {};
+};
+
+/// How far the subject of a comparison is from the best model under a condition.
 struct StudyVerdict {
   std::string condition;
   std::string best = {};  ///< model of the least RMSE among those that are ranked
   double best_rmse = 0.0;
-  std::optional<double> rmse = {};  ///< of the judged model; none if it is not ranked
+  std::optional<double> rmse = {};  ///< of the subject; none if it is not ranked
 
   [[nodiscard]] bool is_near_best() const { return rmse && *rmse <= kNear * best_rmse; }
   static constexpr double kNear = 1.05;
@@ -104,25 +129,21 @@ struct StudyVerdict {
 /// A simulated bench that a study used.
 struct StudyPlant {
   std::string name;
-  std::string fingerprint;  ///< of every number of its data sheet
+  std::string fingerprint;  ///< of name, variant and every number of its data sheet
 };
 
 /// A paper's experiment, run here.
 struct Study {
-  std::string protocol;  ///< what was recorded, trained on and judged on
+  std::string protocol;  ///< what was recorded, trained on and tested on
   std::string unit;      ///< of the errors
   StudyOptions options;
   std::vector<StudyPlant> plants = {};
-  std::vector<StudyRow> rows = {};  ///< condition by condition, in the order of their first fit
-  std::optional<double> full_scale =
-      {};                   ///< of the sensor, in `unit`: errors are also told in % of it
-  std::string judged = {};  ///< model that the study is about: ratios and verdicts are told
-  std::vector<std::string> notes = {};  ///< what the rows say in words, settings behind their names
-  bool tells_fit_time = false;          ///< how long a fit took is part of what it asks
+  std::variant<ErrorTable, ComparisonTable, LoopTable> table = {};
+  std::vector<std::string> notes = {};  ///< conclusions in words, settings behind the models' names
 };
 
 /// Condition by condition. @throws Error if none is ranked under one.
-[[nodiscard]] std::vector<StudyVerdict> verdicts(const Study& study);
+[[nodiscard]] std::vector<StudyVerdict> verdicts(const ComparisonTable& table);
 
 struct StudyInfo {
   std::string_view name;

@@ -78,41 +78,55 @@ double StudyRows::largest_target(const Dataset& dataset,
   return largest;
 }
 
-std::vector<StudyRow> StudyRows::rows() const {
-  std::vector<StudyRow> rows;
+template <class Row, class Fill>
+std::vector<Row> StudyRows::rows(const Fill& fill) const {
+  std::vector<Row> rows;
   for (const auto& [key, sum] : sums_) {
-    StudyRow row{.condition = key.condition,
-                 .model = key.model,
-                 .runs = sum.rmse.count(),
-                 .rmse = sum.rmse.mean(),
-                 .rmse_std = sum.rmse.std_dev(),
-                 .percent = sum.percent.mean(),
-                 .largest = sum.largest.mean(),
-                 .max_abs = sum.rmse.count() > 0 ? sum.max_abs : kNotMeasured,
-                 .blank = sum.blank,
-                 .guarded_percent = 100.0 * static_cast<double>(sum.guarded) /
-                                    static_cast<double>(std::max<std::size_t>(sum.samples, 1)),
-                 .diverged = sum.diverged,
-                 .fit_percent = sum.fit_percent.mean(),
-                 .fit_seconds = sum.fit_seconds.mean(),
-                 .step_ns = sum.step_ns.mean(),
-                 .within_std_dev = sum.within.mean(),
-                 .within_2_std_dev = sum.within_2.mean(),
-                 .failure = sum.failure};
-    if (sum.one_step.count() > 0) row.one_step = sum.one_step.mean();
+    Row row;
+    row.condition = key.condition;
+    row.model = key.model;
+    row.runs = sum.rmse.count();
+    row.rmse = sum.rmse.mean();
+    row.rmse_std = sum.rmse.std_dev();
     for (const PaperEntry& entry : published_)
       if (entry.condition == key.condition && entry.model == key.model)
         row.published.emplace_back(entry.quantity, entry.figure);
+    fill(sum, row);
     rows.push_back(std::move(row));
   }
-  // Condition by condition, as they were met first.
   std::vector<std::string> order;
-  for (const StudyRow& row : rows)
+  for (const Row& row : rows)
     if (std::ranges::find(order, row.condition) == order.end()) order.push_back(row.condition);
-  std::ranges::stable_sort(rows, {}, [&](const StudyRow& row) {
+  std::ranges::stable_sort(rows, {}, [&](const Row& row) {
     return std::ranges::find(order, row.condition) - order.begin();
   });
   return rows;
+}
+
+std::vector<ErrorRow> StudyRows::errors() const {
+  return rows<ErrorRow>([](const Sum& sum, ErrorRow& row) {
+    row.percent = sum.percent.mean();
+    row.largest = sum.largest.mean();
+    row.max_abs = row.runs > 0 ? sum.max_abs : kNotMeasured;
+    row.one_step = sum.one_step.mean();
+    row.blank = sum.blank;
+    row.guarded_percent = 100.0 * static_cast<double>(sum.guarded) /
+                          static_cast<double>(std::max<std::size_t>(sum.samples, 1));
+    row.diverged = sum.diverged;
+    row.fit_percent = sum.fit_percent.mean();
+    row.fit_seconds = sum.fit_seconds.mean();
+  });
+}
+
+std::vector<ComparisonRow> StudyRows::comparisons() const {
+  return rows<ComparisonRow>([](const Sum& sum, ComparisonRow& row) {
+    row.percent = sum.percent.mean();
+    row.step_ns = sum.step_ns.mean();
+    row.within_std_dev = sum.within.mean();
+    row.within_2_std_dev = sum.within_2.mean();
+    row.diverged = sum.diverged;
+    row.failure = sum.failure;
+  });
 }
 
 StudyPlant study_plant(std::string_view actuator) {

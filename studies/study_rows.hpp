@@ -50,7 +50,8 @@ class StudyRows {
   /// A fit that failed: a row that says why. A study that compares all families has such holes.
   void failed(const std::string& condition, const std::string& model, const std::string& reason);
 
-  [[nodiscard]] std::vector<StudyRow> rows() const;
+  [[nodiscard]] std::vector<ErrorRow> errors() const;
+  [[nodiscard]] std::vector<ComparisonRow> comparisons() const;
 
  private:
   struct Sum {
@@ -69,6 +70,10 @@ class StudyRows {
     std::string model;
     bool operator==(const Key&) const = default;
   };
+
+  /// Condition by condition, in the order of their first row. @param fill writes the row's own fields.
+  template <class Row, class Fill>
+  [[nodiscard]] std::vector<Row> rows(const Fill& fill) const;
 
   static void require_fitted(const ResultRow& row);
   static std::string model_of(const ResultRow& row);

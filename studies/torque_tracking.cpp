@@ -115,10 +115,10 @@ class TrackingRows {
     });
     Sum& sum = found != sums_.end() ? *found : begin(condition, task, kind, run);
     if (run.status != "ok") {
-      ++sum.row.tracking->stopped;
+      ++sum.row.stopped;
       return;
     }
-    if (run.score.limit_cycle) ++sum.row.tracking->limit_cycles;
+    if (run.score.limit_cycle) ++sum.row.limit_cycles;
     sum.mad.add(run.score.mad);
     sum.std_abs.add(run.score.std_abs);
     sum.rmse.add(run.score.rmse);
@@ -132,29 +132,29 @@ class TrackingRows {
   }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
-  [[nodiscard]] std::vector<StudyRow> rows() const {
-    std::vector<StudyRow> all;
+  [[nodiscard]] std::vector<LoopRow> rows() const {
+    std::vector<LoopRow> all;
     for (const Sum& sum : sums_) {
-      StudyRow& row = all.emplace_back(sum.row);
+      LoopRow& row = all.emplace_back(sum.row);
       row.runs = sum.rmse.count();
       row.rmse = sum.rmse.mean();
       row.rmse_std = sum.rmse.std_dev();
-      row.tracking->mad = sum.mad.mean();
-      row.tracking->mad_std = sum.mad.std_dev();
-      row.tracking->std_abs = sum.std_abs.mean();
-      row.tracking->mad_to_linear = sum.to_linear.mean();
+      row.mad = sum.mad.mean();
+      row.mad_std = sum.mad.std_dev();
+      row.std_abs = sum.std_abs.mean();
+      row.mad_to_linear = sum.to_linear.mean();
     }
     return all;
   }
 
  private:
   struct Sum {
-    StudyRow row;
+    LoopRow row;
     RunningMean mad = {}, std_abs = {}, rmse = {}, to_linear = {};
   };
 
   Sum& begin(const std::string& condition, const Task& task, Kind kind, const TrackingRow& run) {
-    StudyRow row{.condition = condition, .model = run.model, .tracking = StudyTracking{}};
+    LoopRow row{StudyRow{.condition = condition, .model = run.model}};
     const std::string_view family = std::string_view(run.model).substr(0, run.model.find(','));
     // Whatever the friction of the spring and the output were: the papers do not print them.
     const std::string at =
@@ -261,7 +261,7 @@ Study torque_tracking_000(const StudyOptions& options, const Progress& progress)
       }
     }
   }
-  study.rows = rows.rows();
+  study.table = LoopTable{.rows = rows.rows()};
   study.notes = rows.notes();
   return study;
 }

@@ -100,9 +100,10 @@ TEST(PublicBenchmarks, StandBesidePublishedFigures) {
   setenv("TORSIO_DATA", data_folder(read_manifest(manifest_path("emps"))).c_str(), 1);
   const StudyOptions quick{.seed = 1, .repeats = 2, .is_quick = true};
   const Study study = run_study(find_study("public-benchmarks"), quick);
-  EXPECT_TRUE(study.tells_fit_time);
+  const auto& table = std::get<ErrorTable>(study.table);
+  EXPECT_TRUE(table.shows_fit_time);
   std::size_t published = 0;
-  for (const StudyRow& row : study.rows) {
+  for (const ErrorRow& row : table.rows) {
     SCOPED_TRACE(row.condition + ", " + row.model);
     EXPECT_EQ(row.published.empty(), row.runs > 0);
     if (!row.published.empty()) {
@@ -113,10 +114,10 @@ TEST(PublicBenchmarks, StandBesidePublishedFigures) {
   }
   EXPECT_EQ(published, 17U);
   const auto rmse_of = [&](const std::string& condition, const std::string& model) {
-    const auto found = std::ranges::find_if(study.rows, [&](const StudyRow& row) {
+    const auto found = std::ranges::find_if(table.rows, [&](const ErrorRow& row) {
       return row.condition == condition && row.model == model;
     });
-    return found == study.rows.end() ? kNotMeasured : found->rmse;
+    return found == table.rows.end() ? kNotMeasured : found->rmse;
   };
   EXPECT_LT(rmse_of("boucwen test_sinesweep", "narx_mlp, 16 lags, 128 units"),
             rmse_of("boucwen test_sinesweep", "arx"));

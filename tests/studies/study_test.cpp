@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "studies/study_report.hpp"
@@ -18,12 +20,17 @@ using testing::HasSubstr;
 
 constexpr StudyOptions kQuick{.seed = 3, .repeats = 1, .is_quick = true};
 
-const StudyRow& row_of(const Study& study, const std::string& condition, const std::string& model) {
-  const auto found = std::ranges::find_if(study.rows, [&](const StudyRow& row) {
-    return row.condition == condition && row.model == model;
-  });
-  if (found == study.rows.end()) throw Error({.problem = condition + " " + model});
+template <class Table>
+const auto& row_in(const Study& study, const std::string& condition, const std::string& model) {
+  const auto& rows = std::get<Table>(study.table).rows;
+  const auto found = std::ranges::find_if(
+      rows, [&](const auto& row) { return row.condition == condition && row.model == model; });
+  if (found == rows.end()) throw Error({.problem = condition + " " + model});
   return *found;
+}
+
+const ErrorRow& row_of(const Study& study, const std::string& condition, const std::string& model) {
+  return row_in<ErrorTable>(study, condition, model);
 }
 
 /// The text of the published figure beside a quantity of a row; empty if there is none.
@@ -45,7 +52,7 @@ TEST(Studies, OfSpringModelsJudgeEveryModelOnTheNewSweep) {
   const Study study = run_study(find_study("001-models"), kQuick);
   ASSERT_EQ(study.plants.size(), 1U);
   EXPECT_EQ(study.plants.front().fingerprint.size(), 16U);
-  const StudyRow& line = row_of(study, "maxwell-slip", "linear");
+  const ErrorRow& line = row_of(study, "maxwell-slip", "linear");
   EXPECT_EQ(line.runs, 1U);
   EXPECT_NEAR(line.percent, 100.0 * line.rmse / line.largest, 1e-9);
   EXPECT_LT(row_of(study, "maxwell-slip", "dgmm").rmse, line.rmse);
@@ -57,16 +64,18 @@ TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
   EXPECT_LT(row_of(study, "20 Nm", "linear, II").rmse, row_of(study, "50 Nm", "linear, II").rmse);
   EXPECT_GT(row_of(study, "50 Nm", "lstm 32, II").largest, 40.0);
   const Study again = run_study(find_study("004-torque"), kQuick);
-  ASSERT_EQ(again.rows.size(), study.rows.size());
-  for (std::size_t i = 0; i < study.rows.size(); ++i)
-    EXPECT_EQ(again.rows[i].rmse, study.rows[i].rmse) << study.rows[i].model;
+  const std::vector<ErrorRow>& first = std::get<ErrorTable>(study.table).rows;
+  const std::vector<ErrorRow>& second = std::get<ErrorTable>(again.table).rows;
+  ASSERT_EQ(second.size(), first.size());
+  for (std::size_t i = 0; i < first.size(); ++i)
+    EXPECT_EQ(second[i].rmse, first[i].rmse) << first[i].model;
 }
 
 TEST(Studies, OfTheElastomerCouplingHaveTheFitsOfThePrototype) {
   const Study study = run_study(find_study("003-ladder"), kQuick);
-  const StudyRow& line = row_of(study, "bonded, triangles", "linear");
-  const StudyRow& printed = row_of(study, "bonded, triangles", "viscoelastic 003a as printed");
-  const StudyRow& a = row_of(study, "bonded, triangles", "viscoelastic 003a");
+  const ErrorRow& line = row_of(study, "bonded, triangles", "linear");
+  const ErrorRow& printed = row_of(study, "bonded, triangles", "viscoelastic 003a as printed");
+  const ErrorRow& a = row_of(study, "bonded, triangles", "viscoelastic 003a");
   // Specification 4.3: 73.6, 90.6 and, refitted, 93.7 on the prototype's plant.
   EXPECT_NEAR(line.fit_percent, 73.6, 1.5);
   EXPECT_NEAR(printed.fit_percent, 90.6, 1.5);
@@ -77,7 +86,7 @@ TEST(Studies, OfTheElastomerCouplingHaveTheFitsOfThePrototype) {
               0.5);
   EXPECT_NEAR(row_of(study, "bonded, triangles", "viscoelastic 003c").fit_percent, a.fit_percent,
               0.5);
-  const StudyRow& curves = row_of(study, "bonded, triangles", "Hammerstein-Wiener");
+  const ErrorRow& curves = row_of(study, "bonded, triangles", "Hammerstein-Wiener");
   EXPECT_LT(curves.rmse, line.rmse);
   EXPECT_EQ(published(curves, RowQuantity::fit_percent), "77.73");
   EXPECT_THAT(study_text(find_study("003-ladder"), study), HasSubstr("paper fit %"));
@@ -85,15 +94,14 @@ TEST(Studies, OfTheElastomerCouplingHaveTheFitsOfThePrototype) {
 
 TEST(Studies, OfTheRubberSensorSayWhetherPgprBeatsALine) {
   const Study study = run_study(find_study("002-table3"), kQuick);
-  EXPECT_EQ(study.full_scale, 0.5);
-  const StudyRow& arx = row_of(study, "multisine", "ARX 5");
+  EXPECT_EQ(std::get<ErrorTable>(study.table).full_scale, 0.5);
+  const ErrorRow& arx = row_of(study, "multisine", "ARX 5");
   EXPECT_EQ(arx.runs, 2U);
-  ASSERT_TRUE(arx.one_step.has_value());
-  EXPECT_LT(*arx.one_step, 0.5 * arx.rmse);
+  EXPECT_LT(arx.one_step, 0.5 * arx.rmse);
   EXPECT_GT(arx.max_abs, arx.rmse);
   EXPECT_LT(arx.rmse, row_of(study, "multisine", "line").rmse);
-  EXPECT_FALSE(row_of(study, "multisine", "line").one_step.has_value());
-  const StudyRow& proposed = row_of(study, "multisine", "improved PGPR");
+  EXPECT_TRUE(std::isnan(row_of(study, "multisine", "line").one_step));
+  const ErrorRow& proposed = row_of(study, "multisine", "improved PGPR");
   EXPECT_EQ(published(proposed, RowQuantity::rmse_percent), "1.86");
   EXPECT_EQ(published(proposed, RowQuantity::max_percent), "5.24");
   const double best_arx = std::min(arx.rmse, row_of(study, "multisine", "ARX 15").rmse);
@@ -107,56 +115,66 @@ TEST(Studies, OfTheRubberSensorSayWhetherPgprBeatsALine) {
 TEST(Studies, OfTheRubberSensorAreWorseOnceTheClutchHasSlipped) {
   for (const char* item : {"002-slow", "002-collision"}) {
     const Study study = run_study(find_study(item), kQuick);
-    for (const StudyRow& row : study.rows) {
+    const std::vector<ErrorRow>& rows = std::get<ErrorTable>(study.table).rows;
+    for (const ErrorRow& row : rows) {
       const auto holds = row.condition.find(", clutch holds");
       if (holds == std::string::npos) continue;
       EXPECT_GT(row_of(study, row.condition.substr(0, holds) + ", has slipped", row.model).rmse,
                 3.0 * row.rmse)
           << row.condition << ' ' << row.model;
     }
-    EXPECT_EQ(study.rows.size(), item == std::string("002-slow") ? 8U : 16U);
+    EXPECT_EQ(rows.size(), item == std::string("002-slow") ? 8U : 16U);
   }
 }
 
 TEST(Studies, OfAllFamiliesSayWhereGreyBoxStandsAndRankNoFailure) {
   const StudyInfo& info = find_study("model-comparison");
   const Study study = run_study(info, kQuick);
-  const std::vector<StudyVerdict> all = verdicts(study);
+  const auto& table = std::get<ComparisonTable>(study.table);
+  const std::vector<StudyVerdict> all = verdicts(table);
   ASSERT_EQ(all.size(), 4U);
   for (const StudyVerdict& verdict : all) {
-    const StudyRow& best = row_of(study, verdict.condition, verdict.best);
+    const ComparisonRow& best = row_in<ComparisonTable>(study, verdict.condition, verdict.best);
     EXPECT_TRUE(best.is_ranked());
-    EXPECT_EQ(verdict.rmse, row_of(study, verdict.condition, "grey_box").rmse);
+    EXPECT_EQ(verdict.rmse, row_in<ComparisonTable>(study, verdict.condition, "grey_box").rmse);
     EXPECT_EQ(verdict.is_near_best(), *verdict.rmse <= 1.05 * best.rmse);
-    for (const StudyRow& row : study.rows)
+    for (const ComparisonRow& row : table.rows)
       if (row.condition == verdict.condition && row.is_ranked()) {
         EXPECT_GE(row.rmse, best.rmse) << row.model;
       }
   }
-  const StudyRow& box = row_of(study, "elastomer:bonded, random walk", "grey_box");
-  EXPECT_LT(box.rmse, 0.5 * row_of(study, box.condition, "maxwell_slip").rmse);
+  const ComparisonRow& box =
+      row_in<ComparisonTable>(study, "elastomer:bonded, random walk", "grey_box");
+  EXPECT_LT(box.rmse, 0.5 * row_in<ComparisonTable>(study, box.condition, "maxwell_slip").rmse);
   EXPECT_GT(box.within_2_std_dev, box.within_std_dev);
   EXPECT_THAT(study_text(info, study), HasSubstr("is lowest or within 5 % of the lowest in"));
 }
 
 TEST(Studies, WithAModelToJudgeTellRatiosAndWhyARowIsNotRanked) {
   const StudyInfo info{"009-x", "all", "a title", nullptr};
-  const Study study{
-      .protocol = "a protocol",
-      .unit = "Nm",
-      .options = {},
-      .rows = {{.condition = "new lever",
-                .model = "grey_box",
-                .runs = 1,
-                .rmse = 0.103,
-                .percent = 1.5,
-                .step_ns = 90.0,
-                .within_std_dev = 0.66,
-                .within_2_std_dev = 0.93},
-               {.condition = "new lever", .model = "bouc_wen", .runs = 1, .rmse = 0.1},
-               {.condition = "new lever", .model = "arx", .runs = 1, .rmse = 0.01, .diverged = 1},
-               {.condition = "new lever", .model = "viscoelastic", .failure = "no convergence"}},
-      .judged = "grey_box"};
+  const auto row = [](const char* model, double rmse) {
+    ComparisonRow made;
+    made.condition = "new lever";
+    made.model = model;
+    made.runs = 1;
+    made.rmse = rmse;
+    return made;
+  };
+  ComparisonRow box = row("grey_box", 0.103);
+  box.percent = 1.5;
+  box.step_ns = 90.0;
+  box.within_std_dev = 0.66;
+  box.within_2_std_dev = 0.93;
+  ComparisonRow diverged = row("arx", 0.01);
+  diverged.diverged = 1;
+  ComparisonRow failed = row("viscoelastic", kNotMeasured);
+  failed.runs = 0;
+  failed.failure = "no convergence";
+  const Study study{.protocol = "a protocol",
+                    .unit = "Nm",
+                    .options = {},
+                    .table = ComparisonTable{.rows = {box, row("bouc_wen", 0.1), diverged, failed},
+                                             .subject = "grey_box"}};
   const std::string text = study_text(info, study);
   EXPECT_THAT(text, testing::ContainsRegex("grey_box +0.103 +1.03 +1.5 +66.0 +93.0 +90"));
   EXPECT_THAT(text, testing::ContainsRegex("arx +0.01 +- .*diverged in 1 of 1"));
@@ -169,46 +187,47 @@ TEST(Studies, WithAModelToJudgeTellRatiosAndWhyARowIsNotRanked) {
   EXPECT_EQ(json["verdicts"][0]["within_5_percent"], true);
   EXPECT_EQ(json["rows"][2]["ranked"], false);
   EXPECT_EQ(json["rows"][3]["failure"], "no convergence");
-  for (const char* key :
-       {"rmse", "rmse_std", "percent_of_max_abs", "max_abs", "fit_percent", "step_ns"})
+  for (const char* key : {"rmse", "rmse_std", "percent_of_max_abs", "step_ns"})
     EXPECT_TRUE(json["rows"][3][key].is_null()) << key;
   EXPECT_TRUE(json["rows"][0]["rmse_std"].is_null()) << "of one run";
 }
 
-TEST(Studies, OfTorqueTrackingJudgeInversesInTheLoop) {
+TEST(Studies, OfTorqueTrackingScoreInversesInTheLoop) {
   const Study study = run_study(find_study("000-tracking"), kQuick);
   const std::string condition = "dfki-50:maxwell-slip, 13 Nm locked, chirp";
-  const StudyRow& line = row_of(study, condition, "linear");
-  ASSERT_TRUE(line.tracking);
+  const auto row = [&](const char* model) -> const LoopRow& {
+    return row_in<LoopTable>(study, condition, model);
+  };
+  const LoopRow& line = row("linear");
   EXPECT_EQ(line.runs, 1U);
-  EXPECT_EQ(line.tracking->mad_to_linear, 1.0);
+  EXPECT_EQ(line.mad_to_linear, 1.0);
   EXPECT_EQ(published(line, RowQuantity::rmse), "1.77");
-  const StudyRow& mixture = row_of(study, condition, "dgmm, + torque mode");
-  EXPECT_NEAR(mixture.tracking->mad_to_linear, mixture.tracking->mad / line.tracking->mad, 1e-12);
-  EXPECT_LT(mixture.tracking->mad_to_linear, 0.8);
-  EXPECT_LT(mixture.tracking->mad, row_of(study, condition, "dgmm, sweeps").tracking->mad);
+  const LoopRow& mixture = row("dgmm, + torque mode");
+  EXPECT_NEAR(mixture.mad_to_linear, mixture.mad / line.mad, 1e-12);
+  EXPECT_LT(mixture.mad_to_linear, 0.8);
+  EXPECT_LT(mixture.mad, row("dgmm, sweeps").mad);
 }
 
 TEST(Studies, OfTrackingShowMadAndRatio) {
   const StudyInfo info{"007-x", "000", "a title", nullptr};
-  Study study{.protocol = "a protocol",
-              .unit = "Nm",
-              .options = {},
-              .rows = {{.condition = "locked",
-                        .model = "dgmm",
-                        .runs = 3,
-                        .rmse = 1.5,
-                        .tracking = StudyTracking{.mad = 0.9,
-                                                  .mad_std = 0.01,
-                                                  .std_abs = 1.2,
-                                                  .mad_to_linear = 0.6,
-                                                  .limit_cycles = 1}}}};
-  study.rows[0].published = {{RowQuantity::mad_to_linear, kFigure}};
+  LoopRow row;
+  row.condition = "locked";
+  row.model = "dgmm";
+  row.runs = 3;
+  row.rmse = 1.5;
+  row.mad = 0.9;
+  row.mad_std = 0.01;
+  row.std_abs = 1.2;
+  row.mad_to_linear = 0.6;
+  row.limit_cycles = 1;
+  row.published = {{RowQuantity::mad_to_linear, kFigure}};
+  const Study study{
+      .protocol = "a protocol", .unit = "Nm", .options = {}, .table = LoopTable{.rows = {row}}};
   EXPECT_THAT(
       study_text(info, study),
       testing::ContainsRegex("locked +dgmm +0.900 +0.01 +1.200 +1.500 +0.600 +3 +1 +0 +0.6660"));
   const auto json = nlohmann::json::parse(study_json(info, study));
-  EXPECT_EQ(json["rows"][0]["tracking"]["mad_to_linear"], 0.6);
+  EXPECT_EQ(json["rows"][0]["mad_to_linear"], 0.6);
   EXPECT_EQ(json["rows"][0]["published"]["mad_to_linear"]["value"], 0.666);
 }
 
@@ -220,24 +239,34 @@ TEST(Studies, AreFoundByNameAndRefuseNoRepeats) {
                Cancelled);
 }
 
+ErrorRow error_row(const char* condition, const char* model, std::size_t runs, double rmse) {
+  ErrorRow row;
+  row.condition = condition;
+  row.model = model;
+  row.runs = runs;
+  row.rmse = rmse;
+  return row;
+}
+
+ErrorRow published_row() {
+  ErrorRow row = error_row("published", "theirs", 0, kNotMeasured);
+  row.published = {{RowQuantity::rmse, kFigure}};
+  return row;
+}
+
 TEST(Studies, ShowTheirFiguresBesideThePapers) {
   const StudyInfo info{"004-x", "004, Table 0", "a title", nullptr};
-  const Study study{.protocol = "a protocol",
-                    .unit = "Nm",
-                    .options = {.seed = 7, .repeats = 2},
-                    .plants = {{"bench", "0123"}},
-                    .rows = {{.condition = "soft",
-                              .model = "lstm 250",
-                              .runs = 2,
-                              .rmse = 0.5,
-                              .rmse_std = 0.01,
-                              .percent = 2.5,
-                              .largest = 20.0,
-                              .published = {{RowQuantity::rmse, kFigure}}},
-                             {.condition = "soft", .model = "linear", .runs = 2, .rmse = 3.0},
-                             {.condition = "published",
-                              .model = "theirs",
-                              .published = {{RowQuantity::rmse, kFigure}}}}};
+  ErrorRow soft = error_row("soft", "lstm 250", 2, 0.5);
+  soft.rmse_std = 0.01;
+  soft.percent = 2.5;
+  soft.largest = 20.0;
+  soft.published = {{RowQuantity::rmse, kFigure}};
+  const Study study{
+      .protocol = "a protocol",
+      .unit = "Nm",
+      .options = {.seed = 7, .repeats = 2},
+      .plants = {{"bench", "0123"}},
+      .table = ErrorTable{.rows = {soft, error_row("soft", "linear", 2, 3.0), published_row()}}};
   const std::string text = study_text(info, study);
   EXPECT_THAT(text, HasSubstr("004-x (004, Table 0): a title\na protocol\nseed 7, 2 repeats\n"));
   EXPECT_THAT(text, HasSubstr("plant bench, data sheet 0123"));
@@ -252,41 +281,37 @@ TEST(Studies, ShowTheirFiguresBesideThePapers) {
   EXPECT_TRUE(json["full_scale"].is_null());
 }
 
-TEST(Studies, TellHowLongAFitTookIfThatIsAsked) {
+TEST(Studies, ShowHowLongAFitTookIfThatIsAsked) {
   const StudyInfo info{"bench", "official", "a title", nullptr};
+  ErrorRow arx = error_row("test", "arx", 1, kNotMeasured);
+  arx.fit_seconds = 12.34;
   Study study{.protocol = "a protocol",
               .unit = "m",
               .options = {},
-              .rows = {{.condition = "test", .model = "arx", .runs = 1, .fit_seconds = 12.34},
-                       {.condition = "published",
-                        .model = "theirs",
-                        .published = {{RowQuantity::rmse, kFigure}}}}};
+              .table = ErrorTable{.rows = {arx, published_row()}}};
   EXPECT_THAT(study_text(info, study), testing::Not(HasSubstr("fit s")));
   EXPECT_FALSE(nlohmann::json::parse(study_json(info, study))["rows"][0].contains("fit_seconds"));
-  study.tells_fit_time = true;
+  std::get<ErrorTable>(study.table).shows_fit_time = true;
   EXPECT_THAT(study_text(info, study), testing::ContainsRegex("fit s +paper\ntest +arx .* 12.3\n"));
   const auto rows = nlohmann::json::parse(study_json(info, study))["rows"];
   EXPECT_EQ(rows[0]["fit_seconds"], 12.34);
   EXPECT_FALSE(rows[1].contains("fit_seconds"));
 }
 
-TEST(Studies, OfASensorTellErrorsOfItsFullScaleAndWhatDiverged) {
+TEST(Studies, OfASensorShowErrorsInPercentOfItsFullScaleAndWhatDiverged) {
   const StudyInfo info{"002-x", "002, Table 0", "a title", nullptr};
+  ErrorRow network = error_row("multisine", "NN", 3, 0.01);
+  network.rmse_std = 0.003;
+  network.percent = 4.0;
+  network.largest = 0.25;
+  network.max_abs = 0.04;
+  network.one_step = 0.002;
+  network.diverged = 2;
   const Study study{.protocol = "a protocol",
                     .unit = "Nm",
                     .options = {},
-                    .rows = {{.condition = "multisine",
-                              .model = "NN",
-                              .runs = 3,
-                              .rmse = 0.01,
-                              .rmse_std = 0.003,
-                              .percent = 4.0,
-                              .largest = 0.25,
-                              .max_abs = 0.04,
-                              .one_step = 0.002,
-                              .diverged = 2},
-                             {.condition = "multisine", .model = "line", .runs = 3, .rmse = 0.02}},
-                    .full_scale = 0.5,
+                    .table = ErrorTable{.rows = {network, error_row("multisine", "line", 3, 0.02)},
+                                        .full_scale = 0.5},
                     .notes = {"a note"}};
   const std::string text = study_text(info, study);
   EXPECT_THAT(text,
