@@ -67,8 +67,7 @@ int run(const char* model_file) {
 
 int main(int argc, char** argv) {
   if (argc != 2) {
-    std::fprintf(stderr, "usage: %s MODEL.safetensors (torsio fit --model dgmm writes one)\n",
-                 argv[0]);
+    std::fprintf(stderr, "usage: %s MODEL.safetensors (written by torsio fit)\n", argv[0]);
     return 2;
   }
   try {

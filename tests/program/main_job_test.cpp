@@ -238,6 +238,26 @@ TEST_F(MainJob, RunsTheExamples) {
   EXPECT_EQ(torsio("evaluate adapted.safetensors b.csv").exit_code, 0);
 }
 
+TEST_F(MainJob, RunsFromCodeWhatTheProgramDoes) {
+  record();
+  const std::string example = std::string(TORSIO_EXAMPLES) + "/example_07_fit_from_code";
+  const Outcome fit = shell(example + " b.csv code.safetensors a.csv");
+  EXPECT_EQ(fit.exit_code, 0) << fit.err;
+  EXPECT_NE(fit.out.find("Nm on "), std::string::npos) << fit.out;
+  ASSERT_EQ(torsio("fit a.csv --model grey_box --set passive=true --seed 1 -o program.safetensors")
+                .exit_code,
+            0);
+  const std::string score = "evaluate --json - b.csv ";
+  const auto rmse = [&](const char* model) {
+    return nlohmann::json::parse(torsio(score + model).out).at("results").at(0).at("rmse");
+  };
+  EXPECT_EQ(rmse("code.safetensors"), rmse("program.safetensors"));
+  EXPECT_EQ(shell(example).exit_code, 2);
+  const Outcome missing = shell(example + " none.csv x.safetensors a.csv");
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_NE(missing.err.find("none.csv"), std::string::npos) << missing.err;
+}
+
 TEST_F(MainJob, TellsMachinesWhatItSimulated) {
   const Outcome outcome = torsio("simulate dfki-28 sweep --duration 2s -o a.csv --json -");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
