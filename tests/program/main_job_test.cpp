@@ -247,9 +247,9 @@ TEST_F(MainJob, RunsFromCodeWhatTheProgramDoes) {
   ASSERT_EQ(torsio("fit a.csv --model grey_box --set passive=true --seed 1 -o program.safetensors")
                 .exit_code,
             0);
-  const std::string score = "evaluate --json - b.csv ";
-  const auto rmse = [&](const char* model) {
-    return nlohmann::json::parse(torsio(score + model).out).at("results").at(0).at("rmse");
+  const auto rmse = [&](const std::string& model) {
+    const Outcome outcome = torsio("evaluate " + model + " b.csv --json -");
+    return nlohmann::json::parse(outcome.out).at("results").at(0).at("rmse");
   };
   EXPECT_EQ(rmse("code.safetensors"), rmse("program.safetensors"));
   EXPECT_EQ(shell(example).exit_code, 2);
