@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "model/network/ensemble.hpp"
-#include "support/dump.hpp"
+#include "support/dump_any.hpp"
 #include "support/error_message.hpp"
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"

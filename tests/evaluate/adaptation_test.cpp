@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "support/bench_dataset.hpp"
-#include "support/dump.hpp"
+#include "support/dump_any.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/evaluate/comparison.hpp"

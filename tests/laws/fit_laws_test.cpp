@@ -9,7 +9,7 @@
 
 #include "fit/common/model_run.hpp"
 #include "support/driven_record.hpp"
-#include "support/dump.hpp"
+#include "support/dump_any.hpp"
 #include "support/example_data.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/families.hpp"

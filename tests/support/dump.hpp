@@ -4,14 +4,16 @@
 #include <cstdio>
 #include <string>
 #include <type_traits>
-#include <variant>
 #include <vector>
 
-#include "files/known_families.hpp"
 #include "model/common/parameters.hpp"
 #include "torsio/core/matrix.hpp"
+#include "torsio/model/any_model.hpp"
 
 namespace torsio::test {
+
+/// Of parameters whose family is known only at run time; defined in support/dump_any.hpp.
+std::string dump(const AnyParameters& parameters);
 
 /// Every leaf of a set of parameters, written out exactly.
 template <class Parameters>
@@ -38,12 +40,6 @@ std::string dump(const Parameters& parameters) {
       number(static_cast<double>(leaf));
     }
   });
-  return text;
-}
-
-inline std::string dump(const AnyModel::Parameters& parameters) {
-  std::string text;
-  with_own_type(parameters, [&](const auto& own) { text = dump(own); });
   return text;
 }
 
