@@ -10,6 +10,12 @@ if(TORSIO_SANITIZE)
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(torsio_build_settings INTERFACE -fsanitize=${TORSIO_SANITIZE})
 endif()
+if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+  # Kernels hold vectors in arrays and structures, which those of unknown length cannot be in: machines that have
+  # them use their NEON.
+  target_compile_definitions(torsio_build_settings INTERFACE
+    "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV)")
+endif()
 
 # torsio_folder(<target> <folder> HEADERS a.hpp ... SOURCES a.cpp ...): one folder of one library.
 # Headers are named relative to include/torsio/<folder>, sources relative to src/<folder>.

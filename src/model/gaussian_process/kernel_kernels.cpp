@@ -89,6 +89,12 @@ HWY_INLINE SineCosine sine_cosine(V u) {
 
 // A kernel and its derivatives, at some points.
 struct Value {
+  // Not left implicit: GCC would compile them without the target's instructions, and NEON's vectors
+  // need these.
+  Value() = default;
+  HWY_INLINE Value(V k_, V by_scale_, V slope_, V by_shape_)
+      : k(k_), by_scale(by_scale_), slope(slope_), by_shape(by_shape_) {}
+
   V k;
   V by_scale;  // dk / d ln l of a shared length scale
   V slope;  // dk / d ln l_i = slope w_i times: D_i^2; sin^2 of a periodic, (x-s)(z-s) of a linear

@@ -10,7 +10,6 @@
 namespace torsio {
 namespace {
 
-constexpr auto kFamily = BoucWenModel::kFamily;
 constexpr double kMostExponent = 20.0;
 constexpr double kLongestStep = 0.125;  ///< in z_max
 

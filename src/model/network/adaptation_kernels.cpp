@@ -3,10 +3,7 @@
 #include <algorithm>
 
 // Highway compiles this file once for each instruction set; the order of its headers matters.
-// Sums are held in arrays of vectors, which those of unknown length cannot be in: machines that have
-// them use their NEON.
 // clang-format off
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "model/network/adaptation_kernels.cpp"
 #include <hwy/foreach_target.h>

@@ -15,7 +15,6 @@
 namespace torsio {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMostTicks = 1e9;
 
 constexpr std::array<std::string_view, kLearningOutcomes> kNames{
