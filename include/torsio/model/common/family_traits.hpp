@@ -38,11 +38,12 @@ template <class Family>
 ///      public:
 ///       static constexpr std::string_view kFamily = "mine";
 ///       struct Parameters { using Family = Mine; ... };
+// `Model` comes last: it asks whether M can be copied, and so whether an `AnyModel` can be made of it.
 template <class M>
-concept NamedFamily = Model<M> && requires {
+concept NamedFamily = requires {
   { M::kFamily } -> std::convertible_to<std::string_view>;
   requires std::same_as<typename M::Parameters::Family, M>;
-};
+} && Model<M>;
 
 /// A discrete model, which runs at one sample period [s].
 template <class M>
