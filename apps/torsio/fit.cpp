@@ -44,11 +44,9 @@ std::string family_list() {
   for (const torsio::FamilyInfo& family : torsio::families()) {
     text += fmt::format("{}: {}\n", family.name, family.summary);
     for (const torsio::OptionInfo& option : family.options) {
-      const bool is_ranged = option.minimum < option.maximum;
-      text += fmt::format(
-          "  --set {}={}  {}{}\n", option.name,
-          option.default_value.empty() ? "(none)" : option.default_value, option.help,
-          is_ranged ? fmt::format(" ({:g} to {:g})", option.minimum, option.maximum) : "");
+      text += fmt::format("  --set {}={}  {}{}\n", option.name,
+                          option.default_value.empty() ? "(none)" : option.default_value,
+                          option.help, torsio::range_of(option));
     }
   }
   return text;

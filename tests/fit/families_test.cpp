@@ -24,22 +24,20 @@ TEST(Families, StandInTheTableOnceEachWithOptionsThatTheirOwnCheckAccepts) {
       EXPECT_NO_THROW(Options(family.options, as_default)) << family.name << ": " << option.name;
       EXPECT_FALSE(option.help.empty()) << family.name << ": " << option.name;
     }
+    for (const auto& [option, value] : family.variations)
+      EXPECT_NO_THROW(Options(family.options, {{std::string(option), std::string(value)}}))
+          << family.name << ": " << option;
   }
 }
 
-TEST(Families, FindThemselvesAndFitModelsOfTheirName) {
+TEST(Families, FindThemselvesAndFitModelsOfTheirFamily) {
   for (const FamilyInfo& family : families()) {
     const FamilyInfo& found = find_family(family.name);
     EXPECT_EQ(&found, &family);
-    if (!test::is_for_springs(family.name)) continue;
+    if (!test::is_for_springs(family)) continue;
     const FittedModel fitted =
         found.fit(test::noisy_spring(), Options(found.options, {}), {.seed = 1});
-    // A second way to train a family carries its name in front: dgmm_paper fits a dgmm.
-    // The field's own name for a line that feeds back is arx.
-    if (family.name == "arx")
-      EXPECT_EQ(fitted.model.family(), "narx_linear");
-    else
-      EXPECT_TRUE(family.name.starts_with(fitted.model.family())) << family.name;
+    EXPECT_EQ(fitted.model.family(), family.model_family) << family.name;
   }
 }
 

@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "fit/common/model_run.hpp"
-#include "support/driven_record.hpp"
+#include "laws/law_data.hpp"
 #include "support/dump_any.hpp"
-#include "support/example_data.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/families.hpp"
 
@@ -43,34 +42,6 @@ std::string case_name(const testing::TestParamInfo<FitCase>& info) {
   return name;
 }
 
-/// `noisy_spring` recorded at two places of a support, the second with a stiffer spring.
-TrainingData two_springs() {
-  TrainingData data = noisy_spring();
-  data.inputs.push_back({.expression = "support_m"});
-  data.sequences.push_back(data.sequences.front());
-  for (std::size_t i = 0; i < data.sequences.size(); ++i) {
-    Sequence& sequence = data.sequences[i];
-    const Matrix two = sequence.features;
-    sequence.features = Matrix(two.rows, 3);
-    for (std::size_t n = 0; n < two.rows; ++n) {
-      std::ranges::copy(two.row(n), sequence.features.row(n).begin());
-      sequence.features(n, 2) = 0.1 * static_cast<double>(i);
-      sequence.target[n] += 50.0 * static_cast<double>(i) * two(n, 0);
-    }
-  }
-  return data;
-}
-
-/// A spring, or for families whose input is a force the motion that one of them made of it.
-TrainingData data_for(const FamilyInfo& family) {
-  constexpr std::size_t kSamples = 600;
-  if (family.name == DynamicBoucWen::kFamily)
-    return recorded(hysteretic(), multisine(kSamples, 750.0, 5.0, 100.0, 60.0), 5e-6);
-  if (family.name == FrictionDrive::kFamily)
-    return recorded(carriage(), multisine(kSamples, 1000.0, 2.0, 20.0, 200.0), 1e-6);
-  return two_springs();
-}
-
 class FitLaws : public testing::TestWithParam<FitCase> {
  protected:
   FittedModel fit(const Progress& progress = {}) {
@@ -78,7 +49,7 @@ class FitLaws : public testing::TestWithParam<FitCase> {
     return family->fit(data_, Options(family->options, options), {.seed = 5, .progress = progress});
   }
 
-  TrainingData data_ = data_for(*GetParam().family);
+  TrainingData data_ = data_for(*GetParam().family, 4000);
 };
 
 TEST_P(FitLaws, AFitIsDeterministic) {

@@ -2,22 +2,54 @@
 
 #include <gtest/gtest.h>
 
-#include <string_view>
+#include <string>
 #include <type_traits>
 
 #include "files/known_families.hpp"
+#include "torsio/fit/common/family_info.hpp"
 
 namespace torsio::test {
 
 /// The families of `KnownFamilies` for TYPED_TEST_SUITE: a new one is tested without another line.
 using EveryFamily = KnownFamilies::In<testing::Types>;
 
-/// Whether a family of the table can be fitted to a spring: those driven by a force need a motion as
-/// their target.
-inline bool is_for_springs(std::string_view family) {
+/// The same and the model of any family.
+template <class... Family>
+using WithAnyModel = testing::Types<Family..., AnyModel>;
+using EveryModel = KnownFamilies::In<WithAnyModel>;
+
+template <class Kept, class... Rest>
+struct InvertibleOf {
+  using Type = Kept;
+};
+template <class... Kept, class First, class... Rest>
+struct InvertibleOf<testing::Types<Kept...>, First, Rest...> {
+  using Next = std::conditional_t<Invertible<First>, testing::Types<Kept..., First>,
+                                  testing::Types<Kept...>>;
+  using Type = typename InvertibleOf<Next, Rest...>::Type;
+};
+template <class... Family>
+using InvertibleAndAny = typename InvertibleOf<testing::Types<>, Family..., AnyModel>::Type;
+using EveryInvertibleModel = KnownFamilies::In<InvertibleAndAny>;
+
+/// Names typed tests after the family.
+struct ModelName {
+  template <class M>
+  static std::string GetName(int /*index*/) {
+    if constexpr (NamedFamily<M>) {
+      return std::string(M::kFamily);
+    } else {
+      return "any_model";
+    }
+  }
+};
+
+/// Whether a row of the table of families can be fitted to a spring: those driven by a force need a
+/// motion as their target.
+inline bool is_for_springs(const FamilyInfo& family) {
   bool is_spring = true;
   KnownFamilies::for_each([&]<class F>(std::type_identity<F> /*family*/) {
-    if (F::kFamily == family) is_spring = traits_of<F>().is_spring;
+    if (F::kFamily == family.model_family) is_spring = traits_of<F>().is_spring;
   });
   return is_spring;
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -33,7 +34,11 @@ namespace torsio::test {
 /// `example_features` makes them). A new family specialises this once, for the laws and for every
 /// test that needs "some model".
 template <class Family>
-Family example();
+Family example() {
+  static_assert(std::is_void_v<Family>,
+                "tests/support/example_models.hpp has no example() of this family of AllFamilies");
+  throw;
+}
 
 template <>
 inline Linear example<Linear>() {

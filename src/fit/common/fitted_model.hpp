@@ -1,7 +1,11 @@
 #pragma once
 
+#include <concepts>
+#include <string>
 #include <utility>
 
+#include "fit/common/option_fields.hpp"
+#include "torsio/core/progress.hpp"
 #include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fitted.hpp"
 
@@ -10,7 +14,52 @@ namespace torsio {
 /// What a family's fitter gives, as the table of families gives it.
 template <class Family>
 FittedModel fitted_model(Fitted<Family> fitted) {
-  return {Family(std::move(fitted.parameters)), std::move(fitted.notes), std::move(fitted.table)};
+  return {Family(std::move(fitted.parameters)), std::move(fitted.notes), std::move(fitted.table),
+          fitted.held_out_rmse};
+}
+inline FittedModel fitted_model(FittedModel fitted) { return fitted; }
+
+namespace detail {
+
+template <class Fitter>
+struct OptionsOfFitter;
+template <class Result, class Own, class... Rest>
+struct OptionsOfFitter<Result (*)(const TrainingData&, const Own&, Rest...)> {
+  using Type = Own;
+};
+
+/// "fitting linear", of fitters that are done before they could report more.
+template <class Family>
+void report_start(const Progress& progress, const Fitted<Family>* /*result*/) {
+  report_progress(progress, 0.0, "fitting " + std::string(Family::kFamily));
+}
+
+template <auto kFit>
+FittedModel fit_with_options(const TrainingData& data, const Options& given,
+                             const FitContext& context) {
+  using Own = typename OptionsOfFitter<decltype(kFit)>::Type;
+  const Own own = filled<Own>(given);
+  if constexpr (std::invocable<decltype(kFit), const TrainingData&, const Own&,
+                               const FitContext&>) {
+    return fitted_model(kFit(data, own, context));
+  } else if constexpr (std::invocable<decltype(kFit), const TrainingData&, const Own&,
+                                      const Progress&>) {
+    return fitted_model(kFit(data, own, context.progress));
+  } else {
+    report_start(context.progress, static_cast<decltype(kFit(data, own))*>(nullptr));
+    return fitted_model(kFit(data, own));
+  }
+}
+
+}  // namespace detail
+
+/// A row of the table of families, its options and their adapter made from the fitter's signature:
+/// (data, options), followed by nothing, a `Progress` or a `FitContext`.
+template <auto kFit>
+[[nodiscard]] FamilyInfo family_of(FamilyInfo stated) {
+  stated.options = options_of<typename detail::OptionsOfFitter<decltype(kFit)>::Type>();
+  stated.fit = detail::fit_with_options<kFit>;
+  return stated;
 }
 
 }  // namespace torsio

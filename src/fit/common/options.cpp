@@ -1,10 +1,15 @@
 #include "torsio/fit/common/options.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <vector>
 
+#include "fit/common/option_fields.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
@@ -26,13 +31,18 @@ std::string written(double number) {
   return {text.data(), end};
 }
 
+bool takes_auto(const OptionInfo& option) {
+  return option.takes_auto || option.default_value == kAuto;
+}
+
 std::string expected_of(const OptionInfo& option) {
   const std::string range = " from " + written(option.minimum) + " to " + written(option.maximum);
-  const std::string or_auto = option.default_value == kAuto ? " or auto" : "";
+  const std::string or_auto = takes_auto(option) ? " or auto" : "";
   switch (option.kind) {
     case OptionInfo::Kind::number: return "a number" + range + or_auto;
     case OptionInfo::Kind::integer: return "a whole number" + range + or_auto;
     case OptionInfo::Kind::boolean: return "true or false";
+    case OptionInfo::Kind::choice: return fmt::format("one of {}", fmt::join(option.choices, ", "));
     case OptionInfo::Kind::text: break;
   }
   return "text";
@@ -41,7 +51,9 @@ std::string expected_of(const OptionInfo& option) {
 bool is_valid(const OptionInfo& option, std::string_view text) {
   if (option.kind == OptionInfo::Kind::text) return true;
   if (option.kind == OptionInfo::Kind::boolean) return text == "true" || text == "false";
-  if (text == kAuto && option.default_value == kAuto) return true;
+  if (option.kind == OptionInfo::Kind::choice)
+    return std::ranges::find(option.choices, text) != option.choices.end();
+  if (text == kAuto && takes_auto(option)) return true;
   double number = 0.0;
   if (option.kind == OptionInfo::Kind::integer) {
     std::size_t whole = 0;
@@ -62,7 +74,20 @@ std::string names_of(std::span<const OptionInfo> options) {
   return list.empty() ? "no option at all" : "one of " + list;
 }
 
+[[noreturn]] void refuse(const OptionInfo& option, std::string expected, std::string_view found) {
+  throw UsageError({.place = fmt::format("option {}", option.name),
+                    .expected = std::move(expected),
+                    .found = fmt::format("\"{}\"", found)});
+}
+
 }  // namespace
+
+std::string range_of(const OptionInfo& option) {
+  if (option.kind == OptionInfo::Kind::choice)
+    return fmt::format(" ({})", fmt::join(option.choices, ", "));
+  if (!(option.minimum < option.maximum)) return {};
+  return fmt::format(" ({:g} to {:g})", option.minimum, option.maximum);
+}
 
 Options::Options(std::span<const OptionInfo> known,
                  const std::map<std::string, std::string>& given) {
@@ -76,10 +101,7 @@ Options::Options(std::span<const OptionInfo> known,
                         .expected = names_of(known),
                         .advice = did_you_mean(option_name, names)});
     }
-    if (!is_valid(*option, value))
-      throw UsageError({.place = "option " + option_name,
-                        .expected = expected_of(*option),
-                        .found = '"' + value + '"'});
+    if (!is_valid(*option, value)) refuse(*option, expected_of(*option), value);
     values_.find(option_name)->second = value;
   }
 }
@@ -105,5 +127,79 @@ std::size_t Options::integer(std::string_view name) const {
 }
 
 bool Options::boolean(std::string_view name) const { return text(name) == "true"; }
+
+namespace detail {
+
+std::string option_text(bool value) { return value ? "true" : "false"; }
+std::string option_text(double value) {
+  return std::isnan(value) ? std::string(kAuto) : written(value);
+}
+std::string option_text(std::size_t value) { return fmt::format("{}", value); }
+std::string option_text(const std::string& value) { return value; }
+std::string option_text(const std::optional<std::size_t>& value) {
+  return value ? option_text(*value) : std::string(kAuto);
+}
+std::string option_text(const std::vector<std::size_t>& value) {
+  return fmt::format("{}", fmt::join(value, "-"));
+}
+std::string option_text(const std::optional<NineNumbers>& value) {
+  return value ? fmt::format("{}", fmt::join(*value, "/")) : std::string();
+}
+
+void read_option(std::string_view text, const OptionInfo& /*stated*/, bool& value) {
+  value = text == "true";
+}
+void read_option(std::string_view text, const OptionInfo& /*stated*/, double& value) {
+  value = kNotMeasured;
+  if (text != kAuto) read(text, value);
+}
+void read_option(std::string_view text, const OptionInfo& /*stated*/, std::size_t& value) {
+  read(text, value);
+}
+void read_option(std::string_view text, const OptionInfo& /*stated*/, std::string& value) {
+  value = text;
+}
+void read_option(std::string_view text, const OptionInfo& /*stated*/,
+                 std::optional<std::size_t>& value) {
+  value.reset();
+  if (text != kAuto) read(text, value.emplace());
+}
+
+void read_option(std::string_view text, const OptionInfo& stated, std::vector<std::size_t>& value) {
+  value.clear();
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (at != end) {
+    const auto [next, failure] = std::from_chars(at, end, value.emplace_back());
+    const bool goes_on = next != end && (*next == '-' || *next == ',') && next + 1 != end;
+    if (failure != std::errc{} || (next != end && !goes_on))
+      refuse(stated, "numbers of units with - between them: 50-20-10", text);
+    at = goes_on ? next + 1 : next;
+  }
+}
+
+void read_option(std::string_view text, const OptionInfo& stated,
+                 std::optional<NineNumbers>& value) {
+  value.reset();
+  if (text.empty()) return;
+  NineNumbers& numbers = value.emplace();
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (std::size_t j = 0; j < numbers.size(); ++j) {
+    const auto [next, code] = std::from_chars(at, end, numbers[j]);
+    const bool is_last = j + 1 == numbers.size();
+    if (code != std::errc() || (is_last ? next != end : next == end || *next != '/'))
+      refuse(stated, "nine numbers joined by /", text);
+    at = next + (is_last ? 0 : 1);
+  }
+}
+
+std::size_t chosen(std::string_view text, const OptionInfo& stated) {
+  const auto at = std::ranges::find(stated.choices, text);
+  if (at == stated.choices.end()) refuse(stated, expected_of(stated), text);
+  return static_cast<std::size_t>(at - stated.choices.begin());
+}
+
+}  // namespace detail
 
 }  // namespace torsio

@@ -6,9 +6,16 @@
 #include "model/gaussian_process/gaussian_process.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
+
+inline constexpr OptionInfo kKernelOption{
+    .name = "kernel",
+    .help =
+        "se, linear, periodic, rq, matern32, matern52, each perhaps with _ard (a length scale an "
+        "input), joined by +, * and brackets"};
 
 struct GaussianProcessOptions {
   std::string kernel = "linear_ard+matern52_ard";  ///< see `parse_kernel`
@@ -16,6 +23,22 @@ struct GaussianProcessOptions {
   std::size_t restarts = 3;   ///< of the search for the kernel's numbers, besides the first start
   std::size_t iterations = 100;  ///< of one search, at most; 0: the numbers of the start
   bool std_dev = true;           ///< know the error bar in every step, at N^2 / 2 operations
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.kernel, kKernelOption);
+    visit(self.samples, {.name = "samples",
+                         .maximum = GaussianProcess::kMostPoints,
+                         .help = "at most so many training samples, drawn by chance; 0: all"});
+    visit(self.restarts,
+          {.name = "restarts",
+           .maximum = 1000,
+           .help = "of the search for the kernel's numbers, besides the first start"});
+    visit(self.iterations,
+          {.name = "iterations", .maximum = 1e6, .help = "of one search, at most"});
+    visit(self.std_dev, {.name = "std_dev",
+                         .help = "know an error bar in every step, at samples^2 / 2 operations"});
+  }
 };
 
 /// Fits an exact Gaussian process: standardises, draws `samples` usable samples, and finds kernel and

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
+#include "fit/gaussian_process/fit_gaussian_process.hpp"
 #include "model/gaussian_process/parametric_gp.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"
@@ -26,6 +28,9 @@ namespace torsio {
 /// All but `paper` by Adam.
 enum class ParametricGpMode : std::uint8_t { paper, nlml, elbo, recommended };
 
+inline constexpr std::array<std::string_view, 4> kParametricGpModes{"paper", "nlml", "elbo",
+                                                                    "recommended"};
+
 /// theta_1 ... theta_9 of the combined kernel (paper 002, equations 9 to 13 as corrected in
 /// specification 1).
 using PlainKernel = std::array<double, 9>;
@@ -39,6 +44,31 @@ struct ParametricGpOptions {
   double learning_rate = 0.01;  ///< of Adam; `paper` has its own
   bool refit = true;            ///< try the closed form over all samples at the end
   std::optional<PlainKernel> kernel_plain = {};  ///< in place of `kernel`, in physical units, fixed
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.mode,
+          {.name = "mode", .help = "what the kernel descends on", .choices = kParametricGpModes});
+    visit(self.kernel, kKernelOption);
+    visit(self.clusters, {.name = "clusters",
+                          .minimum = 1,
+                          .maximum = ParametricGp::kMostPoints,
+                          .help = "hypothetical inputs"});
+    visit(self.updates,
+          {.name = "updates", .maximum = 1e9, .help = "samples taken in, drawn by chance"});
+    visit(self.batch, {.name = "batch",
+                       .minimum = 1,
+                       .maximum = 1e6,
+                       .help = "samples between two steps of the kernel's numbers"});
+    visit(self.learning_rate, {.name = "learning_rate",
+                               .minimum = 1e-9,
+                               .maximum = 1e3,
+                               .help = "of Adam; not of paper"});
+    visit(self.refit, {.name = "refit", .help = "try the closed form over all samples at the end"});
+    visit(self.kernel_plain, {.name = "kernel_plain",
+                              .help = "theta 1 to 9 of paper 002 as plain numbers, joined by /, in "
+                                      "place of kernel"});
+  }
 };
 
 /// Learns a parametric Gaussian process sample by sample. With a = K^-1 q of a sample (x, y) and
@@ -74,6 +104,20 @@ struct VariationalGpOptions {
   std::size_t points = 100;                        ///< M
   std::size_t samples = 5000;    ///< that the kernel's numbers are found on, at most; 0: all
   std::size_t iterations = 100;  ///< at most
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.kernel, kKernelOption);
+    visit(self.points, {.name = "points",
+                        .minimum = 1,
+                        .maximum = ParametricGp::kMostPoints,
+                        .help = "hypothetical inputs"});
+    visit(self.samples, {.name = "samples",
+                         .maximum = 1e9,
+                         .help = "that the kernel's numbers are found on, at most; 0: all"});
+    visit(self.iterations,
+          {.name = "iterations", .maximum = 1e6, .help = "of that search, at most"});
+  }
 };
 
 /// A sparse Gaussian process by the variational bound of Titsias 2009, collapsed over u:

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
+#include "fit/common/shared_options.hpp"
 #include "model/grey_box/grey_box.hpp"
-#include "torsio/core/not_measured.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"
@@ -20,19 +22,35 @@ enum class ResidualKind : std::uint8_t {
   automatic,  ///< the network, if it lowers the error on a fifth of the data that it did not see by 2 %
 };
 
+inline constexpr std::array<std::string_view, 4> kResidualNames{"none", "mlp", "dgmm", "auto"};
+
 struct GreyBoxOptions {
   std::string schedule = {};  ///< expression of the input to schedule over; empty: constant
   /// Only slip forces, branches and friction of rates >= 0, which take energy and never give it; no residual.
   bool passive = false;
   double bound = 3.0;  ///< of the residual, in RMSE of the box
   ResidualKind residual = ResidualKind::automatic;
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.schedule, kScheduleOption);
+    visit(self.passive,
+          {.name = "passive",
+           .help = "only friction and relaxation that take energy, as true ones do; no residual"});
+    visit(self.residual,
+          {.name = "residual",
+           .help = "learned on what the terms leave over; auto: mlp if it lowers the error on data "
+                   "that it did not see",
+           .choices = kResidualNames});
+    visit(self.bound, {.name = "bound",
+                       .maximum = 1e6,
+                       .help = "of the residual, in root mean squares of what is left over"});
+  }
 };
 
-struct FittedGreyBox : Fitted<GreyBox> {
-  /// Root mean square error on what was held out, the residual's share taken off: what error bars are to
-  /// be wide as.
-  double held_out_rmse = kNotMeasured;
-};
+/// `held_out_rmse`: root mean square error on what was held out, the residual's share taken off: what
+/// error bars are to be wide as.
+using FittedGreyBox = Fitted<GreyBox>;
 
 /// Chooses terms by cross-validation and fits them by least squares, slip forces and branches >= 0
 /// unless signed ones are clearly better.

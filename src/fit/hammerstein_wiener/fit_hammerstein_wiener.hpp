@@ -1,14 +1,17 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "model/hammerstein_wiener/hammerstein_wiener.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
@@ -20,6 +23,12 @@ enum class ContinuousForm : std::uint8_t {
   refined,  ///< second stage: refined in continuous time, the curves as found
 };
 
+inline constexpr std::array<std::string_view, 3> kContinuousForms{"none", "tustin", "refined"};
+inline constexpr std::array<std::string_view, 2> kStructures{"given", "search"};
+inline constexpr std::array<std::string_view, 2> kMaps{"polynomial", "piecewise_linear"};
+inline constexpr std::array<std::string_view, 4> kPublished{"none", "discrete", "tustin",
+                                                            "refined"};
+
 struct HammersteinWienerOptions {
   /// Empty: searched for, or 1 zero, 2 poles (in 1/z), degrees 2 and 3, as (2) to (6) of paper 003.
   std::optional<std::size_t> zeros = {};
@@ -30,7 +39,42 @@ struct HammersteinWienerOptions {
   std::size_t knots = 5;  ///< of each curve, if piecewise linear
   bool is_searched = true;
   ContinuousForm continuous = ContinuousForm::none;
-  std::size_t iterations = 200;  ///< of one search, at most
+  std::size_t iterations = 200;            ///< of one search, at most
+  std::optional<Paper003> published = {};  ///< the paper's own numbers in place of a fit
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.is_searched,
+          {.name = "structure",
+           .help = "search: what stands at auto is chosen by the error on held-out blocks; given: "
+                   "auto is 1 zero, 2 poles (in 1/z), degrees 2 and 3, as (2) to (6) of paper 003",
+           .choices = kStructures});
+    visit(self.zeros, {.name = "zeros", .maximum = 100, .help = "of the linear part"});
+    visit(self.poles, {.name = "poles", .maximum = 100, .help = "of the linear part"});
+    visit(self.is_piecewise_linear,
+          {.name = "map", .help = "curves before and behind the linear part", .choices = kMaps});
+    visit(self.input_degree,
+          {.name = "input_degree", .minimum = 1, .maximum = 20, .help = "of the curve before it"});
+    visit(self.output_degree,
+          {.name = "output_degree", .minimum = 1, .maximum = 20, .help = "of the curve behind it"});
+    visit(self.knots, {.name = "knots",
+                       .minimum = 3,
+                       .maximum = 100,
+                       .help = "of each curve, of map=piecewise_linear"});
+    visit(self.continuous,
+          {.name = "continuous",
+           .help = "tustin: the linear part as Tustin's continuous form runs between samples; "
+                   "refined: refined in continuous time, the curves as found",
+           .choices = kContinuousForms});
+    visit(
+        self.iterations,
+        {.name = "iterations", .minimum = 1, .maximum = 100000, .help = "of one search, at most"});
+    visit(self.published,
+          {.name = "published",
+           .help = "what paper 003 prints of its coupling in place of a fit; first input in rad, "
+                   "target in Nm, 200 Hz",
+           .choices = kPublished});
+  }
 };
 
 /// A Hammerstein-Wiener model of the first input by least simulation error (output error: what is

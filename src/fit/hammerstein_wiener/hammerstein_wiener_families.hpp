@@ -1,12 +1,12 @@
 #pragma once
 
-#include <span>
+#include <vector>
 
 #include "torsio/fit/common/family_info.hpp"
 
 namespace torsio {
 
 /// `hammerstein_wiener`.
-[[nodiscard]] std::span<const FamilyInfo> hammerstein_wiener_families() noexcept;
+[[nodiscard]] std::vector<FamilyInfo> hammerstein_wiener_families();
 
 }  // namespace torsio

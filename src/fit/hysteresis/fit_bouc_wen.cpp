@@ -125,7 +125,7 @@ std::vector<FittedParameter> table_of(BoucWenSearch& search, const OperatorData&
 
 }  // namespace
 
-Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const HysteresisSearchOptions& options,
+Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const BoucWenOptions& options,
                                   const Progress& progress) {
   const OperatorData runs =
       operator_data(data, options.rates, 0, kMostResiduals / 4, 6 + data.input_count());

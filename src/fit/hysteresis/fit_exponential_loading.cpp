@@ -60,7 +60,7 @@ class LoadingSearch {
 }  // namespace
 
 Fitted<ExponentialLoading> fit_exponential_loading(const TrainingData& data,
-                                                   const HysteresisSearchOptions& options,
+                                                   const ExponentialLoadingOptions& options,
                                                    const Progress& progress) {
   const std::size_t size = options.degree + 1;
   const OperatorData runs =

@@ -153,7 +153,8 @@ SearchOptions bounds_of(const ImprovedRun& run, const Parameters& start) {
 }  // namespace
 
 Fitted<ImprovedPrandtlIshlinskii> fit_improved_prandtl_ishlinskii(
-    const TrainingData& data, const HysteresisSearchOptions& options, const Progress& progress) {
+    const TrainingData& data, const ImprovedPrandtlIshlinskiiOptions& options,
+    const Progress& progress) {
   constexpr auto kFamily = ImprovedPrandtlIshlinskii::kFamily;
   const std::size_t rate = first_rate(data, kFamily);
   const OperatorData runs =

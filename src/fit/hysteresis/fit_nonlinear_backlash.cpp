@@ -194,7 +194,7 @@ Starts starts_of(const OperatorData& data, const Layout& layout, std::vector<dou
 }
 
 template <bool kByRate>
-Fitted<Backlash<kByRate>> fit(const TrainingData& data, const HysteresisSearchOptions& options,
+Fitted<Backlash<kByRate>> fit(const TrainingData& data, const BacklashOptions& options,
                               const Progress& progress) {
   constexpr auto kFamily = Backlash<kByRate>::kFamily;
   const std::size_t rate = kByRate ? first_rate(data, kFamily) : 0;
@@ -249,13 +249,14 @@ Fitted<Backlash<kByRate>> fit(const TrainingData& data, const HysteresisSearchOp
 }  // namespace
 
 Fitted<NonlinearBacklash> fit_nonlinear_backlash(const TrainingData& data,
-                                                 const HysteresisSearchOptions& options,
+                                                 const BacklashOptions& options,
                                                  const Progress& progress) {
   return fit<false>(data, options, progress);
 }
 
-Fitted<ImprovedNonlinearBacklash> fit_improved_nonlinear_backlash(
-    const TrainingData& data, const HysteresisSearchOptions& options, const Progress& progress) {
+Fitted<ImprovedNonlinearBacklash> fit_improved_nonlinear_backlash(const TrainingData& data,
+                                                                  const BacklashOptions& options,
+                                                                  const Progress& progress) {
   return fit<true>(data, options, progress);
 }
 

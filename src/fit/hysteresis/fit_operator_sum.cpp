@@ -99,9 +99,8 @@ std::vector<FittedParameter> table_of(const OperatorData& data, const Design& de
   return table;
 }
 
-template <class Operator>
-Fitted<OperatorSum<Operator>> fit(const TrainingData& data, const OperatorSumOptions& options,
-                                  bool is_passive) {
+template <class Operator, class Own>
+Fitted<OperatorSum<Operator>> fit(const TrainingData& data, const Own& options, bool is_passive) {
   const OperatorData runs =
       operator_data(data, options.rates, 0, std::numeric_limits<std::size_t>::max() / 2, 1);
   Fitted<OperatorSum<Operator>> fitted;
@@ -143,12 +142,12 @@ Fitted<OperatorSum<Operator>> fit(const TrainingData& data, const OperatorSumOpt
 }  // namespace
 
 Fitted<MaxwellSlipModel> fit_maxwell_slip(const TrainingData& data,
-                                          const OperatorSumOptions& options) {
+                                          const MaxwellSlipOptions& options) {
   return fit<StopOperator>(data, options, true);
 }
 
 Fitted<PrandtlIshlinskii> fit_prandtl_ishlinskii(const TrainingData& data,
-                                                 const OperatorSumOptions& options) {
+                                                 const PrandtlIshlinskiiOptions& options) {
   return fit<PlayOperator>(data, options, options.passive);
 }
 

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <span>
+#include <vector>
 
 #include "torsio/fit/common/family_info.hpp"
 
 namespace torsio {
 
 /// The rows of the hysteresis operators in the table of families.
-[[nodiscard]] std::span<const FamilyInfo> hysteresis_families() noexcept;
+[[nodiscard]] std::vector<FamilyInfo> hysteresis_families();
 
 }  // namespace torsio

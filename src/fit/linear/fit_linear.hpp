@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "fit/common/shared_options.hpp"
 #include "model/linear/linear.hpp"
 #include "model/linear/linear_coulomb.hpp"
 #include "torsio/core/not_measured.hpp"
@@ -13,6 +14,12 @@ namespace torsio {
 struct LinearOptions {
   bool rates = false;         ///< give inputs that are rates a slope too
   std::string schedule = {};  ///< expression of the input to schedule over; empty: constant
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.rates, kRatesOption);
+    visit(self.schedule, kScheduleOption);
+  }
 };
 
 /// Least squares over the usable samples; scheduled, one fit at each distinct value of the
@@ -26,6 +33,17 @@ struct LinearCoulombOptions {
   bool rates = false;
   std::string schedule = {};
   double rate_scale = kNotMeasured;  ///< v, in the rate's unit; NaN: searched for
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.rate_scale,
+          {.name = "rate_scale",
+           .minimum = 1e-12,
+           .maximum = 1e12,
+           .help = "rate at which friction reaches 76 % of its full value; auto: searched for"});
+    visit(self.rates, kRatesOption);
+    visit(self.schedule, kScheduleOption);
+  }
 };
 
 /// The same with a friction term on the first input that is a rate. v minimises the sum of squares

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "fit/common/shared_options.hpp"
 #include "model/linear/polynomial.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/fit/common/fitted.hpp"
@@ -17,6 +18,21 @@ struct PolynomialOptions {
       kNotMeasured;           ///< first input's unit; NaN: `default_dead_band`. Only by branch.
   bool rates = false;         ///< give other inputs that are rates a slope too
   std::string schedule = {};  ///< expression of the input to schedule over; empty: constant
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.degree, {.name = "degree",
+                        .maximum = Polynomial::kHighestDegree,
+                        .help = "of the curve; 0: chosen by cross-validation"});
+    visit(self.branch,
+          {.name = "branch", .help = "one curve for each direction of the first input"});
+    visit(self.dead_band,
+          {.name = "dead_band",
+           .maximum = 1e12,
+           .help = "how far the first input moves back before its direction turns"});
+    visit(self.rates, kRatesOption);
+    visit(self.schedule, kScheduleOption);
+  }
 };
 
 inline constexpr std::size_t kHighestChosenDegree = 9;

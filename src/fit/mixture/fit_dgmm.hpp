@@ -19,6 +19,51 @@ struct DgmmOptions {
   double clamp = 2.0;               ///< LinearClamp::width in RMSE of the linear model; 0: none
   double background_weight = 1e-3;  ///< of the one Gaussian over all data; 0: none
   std::size_t threads = 0;          ///< for search and refinement; 0: as many as the machine has
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit_online(self.online, visit);
+    visit(self.em_iterations,
+          {.name = "em_iterations",
+           .maximum = 10000,
+           .help = "of expectation maximisation after the online pass; 0: none"});
+    visit(self.clamp,
+          {.name = "clamp",
+           .maximum = 1e6,
+           .help = "where data are thin, stay this many RMSE from the straight line; 0: off"});
+    visit(self.background_weight, {.name = "background_weight",
+                                   .maximum = 0.999,
+                                   .help = "of one Gaussian over all data; 0: none"});
+  }
+
+ private:
+  template <class Online, class Visit>
+  static void visit_online(Online& self, const Visit& visit) {
+    visit(self.components, {.name = "components",
+                            .minimum = 1,
+                            .maximum = 100000,
+                            .help = "at most this many Gaussians"});
+    visit(self.novelty_distance,
+          {.name = "novelty_distance",
+           .maximum = 100,
+           .help = "in standard deviations: a sample farther from all Gaussians becomes a new one; "
+                   "auto: 5/3 of the initial spread"});
+    visit(self.initial_spread,
+          {.name = "initial_spread",
+           .minimum = 1e-6,
+           .maximum = 100,
+           .help = "standard deviation of a Gaussian that has seen one sample, in standard "
+                   "deviations; auto: found by leaving one training record out at a time"});
+    visit(self.learning_rate_floor, {.name = "learning_rate_floor",
+                                     .maximum = 1,
+                                     .help = "0: means settle; above: they keep following"});
+    visit(self.forgetting,
+          {.name = "forgetting", .maximum = 1, .help = "of a Gaussian's past with each sample"});
+    visit(self.prune_count,
+          {.name = "prune_count", .maximum = 1e12, .help = "drop Gaussians of fewer samples ..."});
+    visit(self.prune_age,
+          {.name = "prune_age", .maximum = 1e12, .help = "... once so many samples old; 0: never"});
+  }
 };
 
 /// Learns the joint density of target and inputs from the usable samples in the order of recording
@@ -42,6 +87,18 @@ struct PaperDgmmOptions {
   std::size_t components = 500;
   double learning_rate = 0.02;
   double spread = 0.15;  ///< of every component in every direction, standardised
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.components,
+          {.name = "components", .minimum = 1, .maximum = 100000, .help = "Gaussians"});
+    visit(self.learning_rate,
+          {.name = "learning_rate", .maximum = 1, .help = "of the nearest Gaussian's mean"});
+    visit(self.spread, {.name = "spread",
+                        .minimum = 1e-6,
+                        .maximum = 100,
+                        .help = "of every Gaussian in every direction, in standard deviations"});
+  }
 };
 
 /// Algorithm 1 of paper 000 as printed, only with the sign of the mean's update mended, for

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string_view>
 #include <vector>
 
 #include "model/linear/linear.hpp"
@@ -10,6 +12,7 @@
 #include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/any_model.hpp"
 
@@ -18,6 +21,17 @@ namespace torsio {
 struct NarxLags {
   std::size_t inputs = 2;   ///< n_u
   std::size_t outputs = 2;  ///< n_y
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.inputs, {.name = "input_lags",
+                        .maximum = 1000,
+                        .help = "past samples of each input that the model sees"});
+    visit(self.outputs, {.name = "output_lags",
+                         .minimum = 1,
+                         .maximum = 1000,
+                         .help = "past outputs of its own that it sees"});
+  }
 };
 
 /// What f learns from in the place of its past outputs.
@@ -27,12 +41,39 @@ enum class NarxTraining : std::uint8_t {
   free_run,  ///< its own, round after round; the round with the least error in free run is kept
 };
 
+inline constexpr std::array<std::string_view, 3> kNarxTrainings{"one_step", "noise", "free_run"};
+
+/// Options that NARX models share.
+inline constexpr OptionInfo kOutputRangeOption{
+    .name = "output_range",
+    .minimum = 1,
+    .maximum = 1e6,
+    .help = "times the largest training |target|: where the output is clipped"};
+inline constexpr OptionInfo kFeedbackNoiseOption{
+    .name = "feedback_noise",
+    .maximum = 10,
+    .help = "of training=noise, as a share of the target's standard deviation"};
+
 struct NarxOptions {
   NarxLags lags = {};
   NarxTraining training = NarxTraining::free_run;
   double noise = 0.02;     ///< standard deviation, as a share of the target's
   std::size_t rounds = 5;  ///< of free_run, behind the first fit one step ahead
   double range = 1.2;      ///< of the largest |target|: where the output is clipped
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    NarxLags::visit_options(self.lags, visit);
+    visit(self.training,
+          {.name = "training",
+           .help = "what past outputs are while it learns: one_step (measured), noise (measured, "
+                   "with noise), free_run (its own, in rounds)",
+           .choices = kNarxTrainings});
+    visit(self.noise, kFeedbackNoiseOption);
+    visit(self.rounds,
+          {.name = "rounds", .minimum = 1, .maximum = 1000, .help = "of training=free_run"});
+    visit(self.range, kOutputRangeOption);
+  }
 };
 
 /// The regressors of a NARX model as data to fit f on: the inputs, their lags, and past outputs. A
@@ -59,6 +100,14 @@ struct ArxOptions {
   NarxLags lags = {};
   bool is_refined = true;
   double range = 1.2;
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    NarxLags::visit_options(self.lags, visit);
+    visit(self.is_refined,
+          {.name = "refine", .help = "from one step ahead to least error in free run"});
+    visit(self.range, kOutputRangeOption);
+  }
 };
 
 /// A linear NARX model (ARX) by least squares one step ahead, refined by Ceres so that its free run

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "fit/narx/fit_narx.hpp"
+#include "fit/narx/frols.hpp"
 #include "model/narx/multivariate_polynomial.hpp"
 #include "model/narx/narx.hpp"
 #include "torsio/fit/common/fit_context.hpp"
@@ -26,6 +27,28 @@ struct NarxPolynomialOptions {
   double range = 1.2;   ///< of the largest |target|: where the output is clipped
 
   static constexpr std::size_t kMostAutomatic = 20;
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    NarxLags::visit_options(self.lags, visit);
+    visit(self.degree, {.name = "degree",
+                        .minimum = 1,
+                        .maximum = MultivariatePolynomial::kHighestDegree,
+                        .help = "of the terms to choose from"});
+    visit(self.terms,
+          {.name = "terms",
+           .maximum = kMostTerms,
+           .help = "to choose; 0: as many as free run on held-out records wants, up to 20"});
+    visit(self.exchange,
+          {.name = "exchange", .help = "swap chosen terms for others wherever that explains more"});
+    visit(self.training,
+          {.name = "training",
+           .help = "of the coefficients: one_step (on measured past outputs), noise (on these with "
+                   "noise), free_run (then refined to least error in free run)",
+           .choices = kNarxTrainings});
+    visit(self.noise, kFeedbackNoiseOption);
+    visit(self.range, kOutputRangeOption);
+  }
 };
 
 /// A polynomial NARX model whose terms `frols` chooses from all monomials of inputs, their lags and

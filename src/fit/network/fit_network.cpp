@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <string>
@@ -337,6 +338,13 @@ Fitted<Family> fitted(Trained<Family> trained) {
 }
 
 }  // namespace
+
+std::span<const std::string_view> activation_names() noexcept {
+  static const std::array<std::string_view, 5> names{
+      name(Activation::linear), name(Activation::relu), name(Activation::tanh),
+      name(Activation::softsign), name(Activation::elu)};
+  return names;
+}
 
 Fitted<Mlp> fit_mlp(const TrainingData& data, const MlpOptions& options,
                     const FitContext& context) {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include "model/network/mlp.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/network/network_layers.hpp"
 
@@ -20,6 +23,12 @@ enum class Optimiser : std::uint8_t { adam, adamw };
 /// Of the learning rate: constant; half a cosine from its full value to 0 over all epochs; a tenth
 /// after half of the epochs and a hundredth after three quarters.
 enum class RateSchedule : std::uint8_t { constant, cosine, step };
+
+inline constexpr std::array<std::string_view, 2> kOptimisers{"adam", "adamw"};
+inline constexpr std::array<std::string_view, 3> kRateSchedules{"constant", "cosine", "step"};
+/// Names of the enumeration `Activation`, in its order.
+[[nodiscard]] std::span<const std::string_view> activation_names() noexcept;
+inline constexpr std::array<std::string_view, 2> kWindowModes{"sequence", "last"};
 
 /// How the weights of a network are found. Adam after Kingma and Ba 2015, AdamW after Loshchilov and
 /// Hutter 2019, both with beta 0.9 and 0.999 and epsilon 1e-8.
@@ -34,12 +43,46 @@ struct NetworkTraining {
   RateSchedule schedule = RateSchedule::constant;
   std::size_t patience = 5;  ///< epochs without a better validation loss; 0: all epochs
   std::size_t threads = 0;   ///< 0: as many as the machine has
+
+  /// @param batch_help what a batch is made of
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit, std::string_view batch_help) {
+    visit(self.epochs, {.name = "epochs", .minimum = 1, .maximum = 1e6, .help = "at most"});
+    visit(self.batch, {.name = "batch", .minimum = 1, .maximum = 1e6, .help = batch_help});
+    visit(self.learning_rate,
+          {.name = "learning_rate", .minimum = 1e-12, .maximum = 1e3, .help = "of Adam"});
+    visit(self.schedule,
+          {.name = "learning_rate_schedule",
+           .help = "cosine: to 0 over all epochs; step: a tenth after half of them, a hundredth "
+                   "after three quarters",
+           .choices = kRateSchedules});
+    visit(self.optimiser, {.name = "optimiser", .help = "of the weights", .choices = kOptimisers});
+    visit(self.weight_decay,
+          {.name = "weight_decay",
+           .maximum = 1e3,
+           .help = "of weights, not of biases; adam: an L2 penalty, adamw: apart from the "
+                   "gradient"});
+    visit(self.clip,
+          {.name = "clip", .maximum = 1e12, .help = "greatest norm of the gradient; 0: any"});
+    visit(self.patience,
+          {.name = "patience",
+           .maximum = 1e6,
+           .help = "epochs without a better validation loss before it stops; 0: all"});
+  }
 };
 
 struct MlpOptions {
   std::vector<std::size_t> layers = {50, 20, 10};
   Activation activation = Activation::relu;
   NetworkTraining training = {.batch = 256, .clip = 0.0};
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.layers, {.name = "layers", .help = "units of the hidden layers"});
+    visit(self.activation,
+          {.name = "activation", .help = "of the hidden layers", .choices = activation_names()});
+    NetworkTraining::visit_options(self.training, visit, "samples an update");
+  }
 };
 
 /// Stretches of a record that a network with memory is trained on, each from the zero state.
@@ -48,6 +91,26 @@ struct TrainingWindows {
   std::size_t stride = 20;   ///< from the start of one to that of the next
   std::size_t burn_in = 20;  ///< first samples, whose output is not in the loss
   bool last_only = false;    ///< sequence to one: only the last output is in the loss
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.length, {.name = "window",
+                        .minimum = 1,
+                        .maximum = 1e9,
+                        .help = "samples that training looks back over"});
+    visit(self.stride, {.name = "stride",
+                        .minimum = 1,
+                        .maximum = 1e9,
+                        .help = "samples from the start of a window to that of the next"});
+    visit(self.burn_in, {.name = "burn_in",
+                         .maximum = 1e9,
+                         .help = "first samples of a window, whose output is not judged"});
+    visit(self.last_only,
+          {.name = "mode",
+           .help = "sequence: every output behind the burn-in is judged; last: only the window's "
+                   "last",
+           .choices = kWindowModes});
+  }
 };
 
 struct RecurrentOptions {
@@ -56,6 +119,17 @@ struct RecurrentOptions {
   Activation head_activation = Activation::relu;
   TrainingWindows windows = {};
   NetworkTraining training = {.learning_rate = 3e-3};
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.layers, {.name = "layers", .help = "units of the layers with memory: 32, 64-32"});
+    visit(self.head,
+          {.name = "head", .help = "units of dense layers between these and the output"});
+    visit(self.head_activation,
+          {.name = "head_activation", .help = "of the head", .choices = activation_names()});
+    TrainingWindows::visit_options(self.windows, visit);
+    NetworkTraining::visit_options(self.training, visit, "windows an update");
+  }
 };
 
 /// Trains a network on standardised inputs and target by mean square error and backpropagation

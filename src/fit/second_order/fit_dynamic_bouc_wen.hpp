@@ -6,9 +6,31 @@
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
+
+/// Of the searches over free runs of both second-order families.
+template <class Self, class Visit>
+void visit_free_run_options(Self& self, const Visit& visit) {
+  visit(self.substeps, {.name = "substeps",
+                        .minimum = 1,
+                        .maximum = 1000,
+                        .help = "of the integrator in one sample period"});
+  visit(self.input_order,
+        {.name = "input_order",
+         .maximum = CausalPolynomial::kHighestOrder,
+         .help = "of the polynomial that tells the force between its samples; 0: held"});
+  visit(self.first_horizon,
+        {.name = "first_horizon",
+         .minimum = 10,
+         .maximum = 1e9,
+         .help = "samples that the first search sees; each further one sees four times as many"});
+  visit(
+      self.iterations,
+      {.name = "iterations", .minimum = 1, .maximum = 1e6, .help = "at most, of the last search"});
+}
 
 struct DynamicBoucWenOptions {
   double exponent = 1.0;  ///< n; NaN: searched for
@@ -16,6 +38,16 @@ struct DynamicBoucWenOptions {
   std::size_t input_order = 3;
   std::size_t first_horizon = 500;  ///< samples that the first of the growing searches sees
   std::size_t iterations = 200;     ///< at most, of the last search
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.exponent, {.name = "exponent",
+                          .minimum = 1,
+                          .maximum = 10,
+                          .help = "n: how sharply the hysteretic force bends; auto: searched for",
+                          .takes_auto = true});
+    visit_free_run_options(self, visit);
+  }
 };
 
 /// Least squares of free runs over masses, springs and the Bouc-Wen element, each record's start

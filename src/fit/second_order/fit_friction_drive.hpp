@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <string>
 
+#include "fit/second_order/fit_dynamic_bouc_wen.hpp"
 #include "model/second_order/friction_drive.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
@@ -19,6 +21,21 @@ struct FrictionDriveOptions {
   std::size_t input_order = 3;
   std::size_t first_horizon = 2000;  ///< samples that the first of the growing searches sees
   std::size_t iterations = 200;      ///< at most, of the last search
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.gain,
+          {.name = "gain",
+           .minimum = -1e12,
+           .maximum = 1e12,
+           .help = "force of one unit of the first input; known beforehand, it scales the others"});
+    visit(self.terms,
+          {.name = "terms",
+           .help = "besides inertia, viscous and Coulomb friction and offset: some of stribeck, "
+                   "lugre, asymmetry, quadratic, spring, position, joined by +; auto: by held-out "
+                   "blocks"});
+    visit_free_run_options(self, visit);
+  }
 };
 
 /// Least squares of free runs, each from where the record's first 50 samples put it. The search

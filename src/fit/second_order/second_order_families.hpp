@@ -1,12 +1,12 @@
 #pragma once
 
-#include <span>
+#include <vector>
 
 #include "torsio/fit/common/family_info.hpp"
 
 namespace torsio {
 
 /// Masses with friction and hysteresis, driven by a force: `dynamic_bouc_wen`, `friction_drive`.
-[[nodiscard]] std::span<const FamilyInfo> second_order_families() noexcept;
+[[nodiscard]] std::vector<FamilyInfo> second_order_families();
 
 }  // namespace torsio

@@ -16,6 +16,26 @@ struct ViscoelasticOptions {
   double prior = 0.0;                              ///< see `fit_viscoelastic`; 0: none
   bool is_refined = true;  ///< false: the given values as they are, the offset alone is fitted
   bool is_at_rest = true;  ///< each record starts relaxed; false: from a state that is fitted too
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.network,
+          {.name = "network",
+           .help = "springs and dashpots, like series(kv(k1, d1), k2), or a name: hooke, maxwell, "
+                   "kelvin_voigt, standard_linear_solid, burgers, generalised_maxwell(n), 003a to "
+                   "003d"});
+    visit(self.is_refined,
+          {.name = "refine",
+           .help = "false: the given values (k1=300) as they are, the offset alone is fitted"});
+    visit(self.is_at_rest,
+          {.name = "at_rest",
+           .help = "each record starts relaxed; false: from a state that is fitted too"});
+    visit(self.starts, {.name = "starts", .minimum = 1, .maximum = 1000, .help = "of the search"});
+    visit(self.prior, {.name = "prior",
+                       .maximum = 1000,
+                       .help = "draws the logarithm of each parameter towards its start value, "
+                               "within this; 0: off"});
+  }
 };
 
 /// Least squares over the free run:

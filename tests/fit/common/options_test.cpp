@@ -4,8 +4,15 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "fit/common/option_fields.hpp"
+#include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
@@ -72,6 +79,81 @@ TEST(Options, RefuseEveryWrongValue) {
 }
 
 TEST(Options, HaveNoOtherNames) { EXPECT_THROW((void)Options(kKnown, {}).number("grade"), Error); }
+
+enum class Shape : std::uint8_t { round, square };
+constexpr std::array<std::string_view, 2> kShapes{"round", "square"};
+constexpr std::array<std::string_view, 3> kPerhapsShapes{"none", "round", "square"};
+
+struct OwnOptions {
+  double scale = 0.003;
+  double width = kNotMeasured;
+  std::optional<std::size_t> order = {};
+  Shape shape = Shape::square;
+  std::optional<Shape> other = {};
+  bool is_searched = true;
+  std::vector<std::size_t> layers = {50, 20};
+
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.scale, {.name = "scale", .maximum = 1, .help = "a", .takes_auto = true});
+    visit(self.width, {.name = "width", .maximum = 1, .help = "b"});
+    visit(self.order, {.name = "order", .maximum = 9, .help = "c"});
+    visit(self.shape, {.name = "shape", .help = "d", .choices = kShapes});
+    visit(self.other, {.name = "other", .help = "e", .choices = kPerhapsShapes});
+    visit(self.is_searched, {.name = "search", .help = "f"});
+    visit(self.layers, {.name = "layers", .help = "g"});
+  }
+};
+
+TEST(OptionFields, TakeKindAndDefaultFromTheField) {
+  using Kind = OptionInfo::Kind;
+  const auto options = options_of<OwnOptions>();
+  std::string defaults;
+  std::vector<Kind> kinds;
+  for (const OptionInfo& option : options) {
+    defaults += std::string(option.default_value) + " ";
+    kinds.push_back(option.kind);
+  }
+  EXPECT_EQ(defaults, "0.003 auto auto square none true 50-20 ");
+  EXPECT_EQ(kinds, (std::vector{Kind::number, Kind::number, Kind::integer, Kind::choice,
+                                Kind::choice, Kind::boolean, Kind::text}));
+  EXPECT_EQ(range_of(options[0]), " (0 to 1)");
+  EXPECT_EQ(range_of(options[3]), " (round, square)");
+}
+
+TEST(OptionFields, AreFilledFromWhatIsGiven) {
+  const OwnOptions plain = filled<OwnOptions>(Options(options_of<OwnOptions>(), {}));
+  EXPECT_EQ(plain.scale, 0.003);
+  EXPECT_TRUE(std::isnan(plain.width));
+  EXPECT_FALSE(plain.order.has_value());
+  EXPECT_EQ(plain.shape, Shape::square);
+  EXPECT_FALSE(plain.other.has_value());
+  EXPECT_EQ(plain.layers, (std::vector<std::size_t>{50, 20}));
+  const OwnOptions own = filled<OwnOptions>(Options(options_of<OwnOptions>(), {{"scale", "auto"},
+                                                                               {"width", "0.5"},
+                                                                               {"order", "0"},
+                                                                               {"shape", "round"},
+                                                                               {"other", "square"},
+                                                                               {"search", "false"},
+                                                                               {"layers", "7,3"}}));
+  EXPECT_TRUE(std::isnan(own.scale));
+  EXPECT_EQ(own.width, 0.5);
+  EXPECT_EQ(own.order, 0U);
+  EXPECT_EQ(own.shape, Shape::round);
+  EXPECT_EQ(own.other, Shape::square);
+  EXPECT_FALSE(own.is_searched);
+  EXPECT_EQ(own.layers, (std::vector<std::size_t>{7, 3}));
+}
+
+TEST(OptionFields, RefuseWhatIsNoChoice) {
+  EXPECT_EQ(test::error_message([] {
+              (void)Options(options_of<OwnOptions>(), {{"shape", "oval"}});
+            }),
+            "option shape: expected one of round, square, found \"oval\"");
+  const Options wrong(options_of<OwnOptions>(), {{"layers", "7-"}});
+  EXPECT_EQ(test::error_message([&] { (void)filled<OwnOptions>(wrong); }),
+            "option layers: expected numbers of units with - between them: 50-20-10, found \"7-\"");
+}
 
 }  // namespace
 }  // namespace torsio

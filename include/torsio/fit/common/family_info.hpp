@@ -24,16 +24,25 @@ struct FittedModel {
   double held_out_rmse = kNotMeasured;
 };
 
-/// How one family is trained: what `fit --list`, the command line, cross-validation and `compare`
-/// know about it.
+/// One setting besides the defaults that a structure search tries.
+struct OptionVariation {
+  std::string_view option;
+  std::string_view value;
+};
+
+/// How one family is trained: what `fit --list`, the command line, cross-validation, `compare` and the
+/// structure search know about it.
 struct FamilyInfo {
   std::string_view name;
-  std::string_view summary;  ///< one line
-  std::span<const OptionInfo> options;
+  std::string_view summary;              ///< one line
+  std::string_view model_family = name;  ///< of the models that it fits: "dgmm" of "dgmm_paper"
+  std::span<const OptionInfo> options = {};
   /// Deterministic for a seed. @throws Error if the data do not suffice, Cancelled.
-  FittedModel (*fit)(const TrainingData&, const Options&, const FitContext&);
-  bool can_resume = false;     ///< uses `FitContext::resume` and `keep`
-  bool only_if_named = false;  ///< not in `all`: slow, or made for other data than most have
+  FittedModel (*fit)(const TrainingData&, const Options&, const FitContext&) = nullptr;
+  bool can_resume = false;          ///< uses `FitContext::resume` and `keep`
+  bool only_if_named = false;       ///< not in `all`: slow, or made for other data than most have
+  bool in_search = !only_if_named;  ///< a structure search tries it
+  std::vector<OptionVariation> variations = {};  ///< orders, sizes, structures that a search tries
 };
 
 }  // namespace torsio

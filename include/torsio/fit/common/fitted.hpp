@@ -23,6 +23,8 @@ struct Fitted {
   typename Family::Parameters parameters;
   std::vector<std::string> notes;
   std::vector<FittedParameter> table = {};  ///< of families whose numbers have a meaning
+  /// On training data that the fit held out to choose by; NaN of families that do not.
+  double held_out_rmse = kNotMeasured;
 };
 
 }  // namespace torsio

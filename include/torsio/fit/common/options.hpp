@@ -9,17 +9,22 @@
 
 namespace torsio {
 
-/// One setting of a fitter: its name, range and default stand in one table, which `--help`, the
-/// checks and later tuning read.
+/// One setting of a fitter, as `--help`, the checks and later tuning read it. Options structs state it
+/// beside their fields (`fit/common/option_fields.hpp`), from which the tables are made.
 struct OptionInfo {
-  enum class Kind { number, integer, boolean, text };
+  enum class Kind { number, integer, boolean, text, choice };
   std::string_view name;
   Kind kind = Kind::number;
-  std::string_view default_value;  ///< "auto": the fitter finds it, and `auto` may be given too
-  double minimum = 0.0;            ///< numbers and integers only
+  std::string_view default_value = {};  ///< "auto": the fitter finds it
+  double minimum = 0.0;                 ///< numbers and integers only
   double maximum = 0.0;
-  std::string_view help;
+  std::string_view help = {};
+  std::span<const std::string_view> choices = {};  ///< of `Kind::choice`
+  bool takes_auto = false;  ///< `auto` may be given though it is not the default
 };
+
+/// Range or choices as help lists them: " (0 to 1)", " (adam, adamw)"; empty of other kinds.
+[[nodiscard]] std::string range_of(const OptionInfo& option);
 
 /// Settings of one fit as given by the user (`--set name=value`), checked against a family's table.
 class Options {
