@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -348,7 +349,7 @@ std::string study_json(const StudyInfo& info, const Study& study) {
                                       {"rmse", verdict.rmse ? Json(*verdict.rmse) : Json(nullptr)},
                                       {"within_5_percent", verdict.is_near_best()}});
   }
-  return document.dump(2) + "\n";
+  return json_text(document);
 }
 
 }  // namespace torsio
