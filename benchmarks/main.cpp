@@ -12,6 +12,7 @@
 
 #include "bench_row.hpp"
 #include "rows.hpp"
+#include "torsio/report/json_text.hpp"
 
 namespace torsio::bench {
 namespace {
@@ -123,9 +124,15 @@ double peer_value(const Peer& peer, std::string_view row, const std::string& com
 
 Json measure(const Bench& bench, const std::string& peers) {
   const Row row = bench.run();
-  Json result = {{"name", bench.name},    {"value", row.value}, {"unit", row.unit},
-                 {"floor", nullptr},      {"x_floor", nullptr}, {"peer", nullptr},
-                 {"peer_value", nullptr}, {"x_peer", nullptr}};
+  Json result = {{"schema_version", kJsonSchemaVersion},
+                 {"name", bench.name},
+                 {"value", row.value},
+                 {"unit", row.unit},
+                 {"floor", nullptr},
+                 {"x_floor", nullptr},
+                 {"peer", nullptr},
+                 {"peer_value", nullptr},
+                 {"x_peer", nullptr}};
   if (row.floor) {
     result["floor"] = *row.floor;
     result["x_floor"] = ratio(row, *row.floor, row.value);

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -357,7 +358,7 @@ std::string study_json(const StudyInfo& info, const Study& study) {
   for (const StudyPlant& plant : study.plants)
     document["plants"].push_back({{"name", plant.name}, {"data_sheet", plant.fingerprint}});
   std::visit([&](const auto& table) { write(document, table); }, study.table);
-  return document.dump(2) + "\n";
+  return json_text(document);
 }
 
 }  // namespace torsio

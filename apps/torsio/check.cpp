@@ -11,6 +11,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
 #include "torsio/fit/common/inputs.hpp"
+#include "torsio/report/json_text.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -48,7 +49,7 @@ std::string json_of(const std::vector<torsio::Finding>& findings) {
                                                  : nlohmann::ordered_json(finding.recording)},
          {"message", finding.message},
          {"advice", finding.advice}});
-  return document.dump(2) + "\n";
+  return torsio::json_text(document);
 }
 
 /// A clock that is not uniform keeps a recording from being read: that is a finding, too.

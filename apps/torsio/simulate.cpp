@@ -13,6 +13,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/svg_plot.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/sim/experiment.hpp"
@@ -228,7 +229,7 @@ std::string loop_picture(const SimulateFlags& flags, const torsio::Recording& re
 /// What a person or, with --json, a machine is shown.
 void show(const SimulateFlags& flags, const std::string& text, const Json& document) {
   if (flags.json.wants_tables()) print(text);
-  flags.json.write(document.dump(2) + "\n");
+  flags.json.write(torsio::json_text(document));
 }
 
 void run(const SimulateFlags& flags) {
@@ -255,7 +256,7 @@ void run(const SimulateFlags& flags) {
   const torsio::Recording recording = torsio::simulate(spec, bar.listener());
   torsio::write_csv(recording, flags.output);
   if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, recording));
-  flags.json.write(recording_json(flags, spec, recording).dump(2) + "\n");
+  flags.json.write(torsio::json_text(recording_json(flags, spec, recording)));
   remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),
                      recording.sample_rate_Hz()));
   const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);

@@ -15,6 +15,7 @@
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 #include "verbs.hpp"
 
@@ -165,7 +166,7 @@ void run(const TuneFlags& flags) {
   DataFlags().check_outputs({flags.json.destination});
   const Tuned loop = tuned(flags);
   if (flags.json.wants_tables()) print(text_of(flags, loop));
-  flags.json.write(json_of(flags, loop).dump(2) + "\n");
+  flags.json.write(torsio::json_text(json_of(flags, loop)));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/recording_blocks.hpp"
+#include "torsio/report/json_text.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -36,15 +37,14 @@ std::string text_of(const torsio::RecordingBlocks& blocks, const UnpackFlags& fl
 }
 
 std::string json_of(const torsio::RecordingBlocks& blocks) {
-  return nlohmann::ordered_json{{"frames", blocks.frames},
-                                {"blocks", blocks.blocks},
-                                {"missing", missing_frames(blocks)},
-                                {"dropped", blocks.dropped},
-                                {"torn_bytes", blocks.torn_bytes},
-                                {"was_closed", blocks.was_closed},
-                                {"sample_rate_Hz", blocks.recording.sample_rate_Hz()}}
-             .dump(2) +
-         "\n";
+  return torsio::json_text(
+      nlohmann::ordered_json{{"frames", blocks.frames},
+                             {"blocks", blocks.blocks},
+                             {"missing", missing_frames(blocks)},
+                             {"dropped", blocks.dropped},
+                             {"torn_bytes", blocks.torn_bytes},
+                             {"was_closed", blocks.was_closed},
+                             {"sample_rate_Hz", blocks.recording.sample_rate_Hz()}});
 }
 
 void run(const UnpackFlags& flags) {

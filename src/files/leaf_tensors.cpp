@@ -7,6 +7,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <iterator>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -143,6 +144,37 @@ std::size_t list_size(const Safetensors& contents, const std::string& name, std:
     refuse(fmt::format("{}: /{}.{}", file, name, missing - seen.begin()), "a tensor of that name",
            fmt::format("none, but {}.{}", name, seen.size() - 1));
   return seen.size();
+}
+
+bool has_tensors_of(const Safetensors& contents, const std::string& name) {
+  const std::string prefix = name + ".";
+  const auto first = contents.tensors.lower_bound(prefix);
+  return first != contents.tensors.end() && first->first.starts_with(prefix);
+}
+
+std::size_t alternative_index(const Safetensors& contents, const std::string& name,
+                              std::span<const std::string_view> alternatives,
+                              std::string_view file) {
+  const std::string prefix = name + ".";
+  std::vector<std::string_view> named;
+  std::ranges::copy_if(alternatives, std::back_inserter(named), [](auto n) { return !n.empty(); });
+  const std::string expected = fmt::format("tensors of one of {}", fmt::join(named, ", "));
+  auto chosen = alternatives.end();
+  for (auto at = contents.tensors.lower_bound(prefix);
+       at != contents.tensors.end() && at->first.starts_with(prefix); ++at) {
+    const std::string_view rest = std::string_view(at->first).substr(prefix.size());
+    const std::string_view alternative = rest.substr(0, rest.find('.'));
+    const std::string place = fmt::format("{}: /{}", file, at->first);
+    const auto found = std::ranges::find(alternatives, alternative);
+    if (alternative.empty() || alternative.size() == rest.size() || found == alternatives.end())
+      refuse(place, expected, fmt::format("'{}'", alternative));
+    if (chosen != alternatives.end() && chosen != found)
+      refuse(place, expected, fmt::format("{} and {}", *chosen, *found));
+    chosen = found;
+  }
+  if (chosen == alternatives.end()) chosen = std::ranges::find(alternatives, std::string_view());
+  if (chosen == alternatives.end()) refuse(fmt::format("{}: /{}", file, name), expected, "none");
+  return static_cast<std::size_t>(chosen - alternatives.begin());
 }
 
 Tensor take_tensor(Safetensors& contents, const std::string& name, std::string_view file,

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "files/safetensors.hpp"
@@ -58,19 +61,56 @@ inline constexpr std::size_t kMostElements = kMostLayers;
 [[nodiscard]] std::size_t list_size(const Safetensors& contents, const std::string& name,
                                     std::string_view file);
 
-/// Gives every list in `fields` as many elements as `contents` has of it.
+/// Whether `contents` has a tensor below that name: "name.field".
+[[nodiscard]] bool has_tensors_of(const Safetensors& contents, const std::string& name);
+
+/// Which of the alternatives `contents` has of the variant of that name: its tensors are called
+/// "name.alternative.field". An empty name among the alternatives is chosen where there is no tensor.
+/// @throws Error that names a tensor of a second alternative, or of one that is not in the list, or
+/// the variant if it has no tensor and must have one.
+[[nodiscard]] std::size_t alternative_index(const Safetensors& contents, const std::string& name,
+                                            std::span<const std::string_view> alternatives,
+                                            std::string_view file);
+
 template <HasFields Fields>
-void size_lists(const Safetensors& contents, const std::string& prefix, std::string_view file,
-                Fields& fields) {
+void shape_fields(const Safetensors& contents, const std::string& prefix, std::string_view file,
+                  Fields& fields);
+
+/// Gives a variant the alternative that `contents` has.
+template <class... Alternative>
+void shape_variant(const Safetensors& contents, const std::string& path, std::string_view file,
+                   std::variant<Alternative...>& field) {
+  static constexpr std::array<std::string_view, sizeof...(Alternative)> kNames{
+      alternative_name<Alternative>()...};
+  const std::size_t index = alternative_index(contents, path, kNames, file);
+  const auto take = [&]<class Chosen>(std::type_identity<Chosen> /*alternative*/) {
+    auto& chosen = field.template emplace<Chosen>();
+    if constexpr (HasFields<Chosen>)
+      shape_fields(contents, path + "." + std::string(kNames[index]), file, chosen);
+  };
+  std::size_t i = 0;
+  ((i++ == index ? take(std::type_identity<Alternative>()) : void()), ...);
+}
+
+/// Gives every list in `fields` as many elements as `contents` has of it, and every optional and
+/// variant the value that `contents` has.
+template <HasFields Fields>
+void shape_fields(const Safetensors& contents, const std::string& prefix, std::string_view file,
+                  Fields& fields) {
   Fields::visit_fields(fields, [&](std::string_view field_name, auto& field) {
     using Field = std::remove_cvref_t<decltype(field)>;
     const std::string path = prefix + "." + std::string(field_name);
     if constexpr (FieldList<Field>) {
       field.resize(list_size(contents, path, file));
       for (std::size_t i = 0; i < field.size(); ++i)
-        size_lists(contents, path + "." + std::to_string(i), file, field[i]);
+        shape_fields(contents, path + "." + std::to_string(i), file, field[i]);
+    } else if constexpr (OptionalFields<Field>) {
+      field.reset();
+      if (has_tensors_of(contents, path)) shape_fields(contents, path, file, field.emplace());
+    } else if constexpr (VariantFields<Field>) {
+      shape_variant(contents, path, file, field);
     } else if constexpr (HasFields<Field>) {
-      size_lists(contents, path, file, field);
+      shape_fields(contents, path, file, field);
     }
   });
 }
@@ -79,7 +119,7 @@ void size_lists(const Safetensors& contents, const std::string& prefix, std::str
 template <HasFields Fields>
 void take_leaves(Safetensors& contents, const std::string& prefix, std::string_view file,
                  Fields& fields, const std::function<bool(std::string_view)>& may_be_nan) {
-  size_lists(contents, prefix, file, fields);
+  shape_fields(contents, prefix, file, fields);
   for_each_leaf(
       fields,
       [&](const std::string& path, auto& leaf) {

@@ -6,6 +6,7 @@
 
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -69,20 +70,18 @@ std::string adaptation_json(const AdaptedModel& adapted, const std::string& mode
   Json outcomes = Json::object();
   for (std::size_t i = 0; i < kLearningOutcomes; ++i)
     outcomes[std::string(name(static_cast<Learning>(i)))] = counts.outcomes[i];
-  return Json{{"model", model},
-              {"family", adapted.file.parameters.family()},
-              {"target", target},
-              {"unit", unit_label(target)},
-              {"method", method_of(adapted)},
-              {"updates", counts.updates()},
-              {"outcomes", std::move(outcomes)},
-              {"roll_backs", counts.roll_backs},
-              {"covariance_resets", counts.covariance_resets},
-              {"relative_change", adapted.relative_change},
-              {"as_it_ran", scores_json(adapted.as_it_ran)},
-              {"held_out", scores_json(adapted.held_out)}}
-             .dump(2) +
-         "\n";
+  return json_text(Json{{"model", model},
+                        {"family", adapted.file.parameters.family()},
+                        {"target", target},
+                        {"unit", unit_label(target)},
+                        {"method", method_of(adapted)},
+                        {"updates", counts.updates()},
+                        {"outcomes", std::move(outcomes)},
+                        {"roll_backs", counts.roll_backs},
+                        {"covariance_resets", counts.covariance_resets},
+                        {"relative_change", adapted.relative_change},
+                        {"as_it_ran", scores_json(adapted.as_it_ran)},
+                        {"held_out", scores_json(adapted.held_out)}});
 }
 
 std::string adaptation_text(const AdaptedModel& adapted, const std::string& model) {

@@ -7,6 +7,7 @@
 
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -95,7 +96,7 @@ std::string attribution_json(const Attribution& attribution, const AttributionSu
                                      {"value", window.value},
                                      {"shapley", std::move(shapley)}});
   }
-  return document.dump(2) + "\n";
+  return json_text(document);
 }
 
 std::string attribution_text(const Attribution& attribution, const AttributionSubject& subject) {

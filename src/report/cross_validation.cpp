@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "report/result_parts.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -70,14 +71,14 @@ std::string held_out_list(const FoldPlan& plan) {
 std::string cross_validation_json(const CrossValidation& validation) {
   Json document = results_document(validation.results);
   add_folds_and_summary(document, validation);
-  return document.dump(2) + "\n";
+  return json_text(document);
 }
 
 std::string search_json(const Results& results, const CrossValidation& search) {
   Json document = results_document(results);
   document["search"] = {{"label", search.results.label}};
   add_folds_and_summary(document["search"], search);
-  return document.dump(2) + "\n";
+  return json_text(document);
 }
 
 std::string cross_validation_table(const CrossValidation& validation) {

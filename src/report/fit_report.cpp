@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "report/result_parts.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -90,7 +91,7 @@ std::string fit_json(const Results& results, const FitReport& report,
   Json document = results_document(results);
   document["fit_report"] = report_json(report);
   document["notes"] = notes;
-  return document.dump(2) + "\n";
+  return json_text(document);
 }
 
 }  // namespace torsio

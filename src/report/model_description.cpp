@@ -18,6 +18,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/import/import_network.hpp"
 #include "torsio/model/network/network_layers.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -225,7 +226,7 @@ std::string model_description_json(const ModelFile& model) {
   for (const Source& source : model.card.training_files)
     document["trained_on"].push_back({{"file", source.file}, {"sha256", source.sha256}});
   for (const Leaf& leaf : leaves_of(model)) document["parameters"][leaf.name] = leaf.values;
-  return document.dump(2) + "\n";
+  return json_text(document);
 }
 
 }  // namespace torsio

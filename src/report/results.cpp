@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "report/result_parts.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -124,9 +125,7 @@ Json results_document(const Results& results) {
   return document;
 }
 
-std::string results_json(const Results& results) {
-  return results_document(results).dump(2) + "\n";
-}
+std::string results_json(const Results& results) { return json_text(results_document(results)); }
 
 std::string ranked_table(const Results& results, Role split) {
   const std::vector<std::string> recordings = recordings_of(results, split);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/running_mean.hpp"
+#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -148,7 +149,7 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
 std::string tracking_json(std::span<const TrackingRow> rows) {
   Json document{{"results", Json::array()}};
   for (const TrackingRow& row : rows) document["results"].push_back(row_json(row));
-  return document.dump(2) + "\n";
+  return json_text(document);
 }
 
 }  // namespace torsio

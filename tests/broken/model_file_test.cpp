@@ -12,6 +12,7 @@
 #include "files/whole_file.hpp"
 #include "support/error_message.hpp"
 #include "support/example_model_file.hpp"
+#include "support/grey_box_examples.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
@@ -265,6 +266,39 @@ TEST(BrokenModelFile, WithWeightsThatLie) {
                         "index 5"));
   EXPECT_THAT(with("model.sample_period_s", {{}, std::vector{0.01}}),
               HasSubstr("elbow: sample rate: expected 100 Hz, at which the lstm was trained"));
+}
+
+TEST(BrokenModelFile, WithAResidualThatIsNotOneModel) {
+  const auto after = [](const std::function<void(Safetensors&)>& spoil) {
+    const GreyBox box = test::example<test::GreyBoxWithMlp>();
+    Safetensors contents = parse_safetensors(model_bytes(test::example_model_file(box)), "elbow");
+    spoil(contents);
+    return complaint(safetensors_bytes(contents));
+  };
+  const auto add = [&](const char* name) {
+    return after([&](Safetensors& contents) { contents.tensors[name] = {{}, std::vector{1.0}}; });
+  };
+  const auto without = [&](const std::string& prefix) {
+    return after([&](Safetensors& contents) {
+      std::erase_if(contents.tensors,
+                    [&](const auto& named) { return named.first.starts_with(prefix); });
+    });
+  };
+  EXPECT_EQ(without("nothing"), "");
+  EXPECT_EQ(without("model.residual."), "") << "a box without a residual";
+  EXPECT_THAT(add("model.residual.model.dgmm.clamp.width"),
+              AllOf(HasSubstr("elbow: /model.residual.model.mlp."),
+                    HasSubstr("expected tensors of one of mlp, dgmm, found dgmm and mlp")));
+  EXPECT_THAT(add("model.residual.model.lstm.sample_period_s"),
+              HasSubstr("elbow: /model.residual.model.lstm.sample_period_s: expected tensors of "
+                        "one of mlp, dgmm, found 'lstm'"));
+  EXPECT_THAT(add("model.residual.mlp"), HasSubstr("elbow: /model.residual.mlp: expected only"));
+  EXPECT_THAT(without("model.residual.model."),
+              HasSubstr("elbow: /model.residual.model: expected tensors of one of mlp, dgmm, "
+                        "found none"));
+  EXPECT_THAT(without("model.residual.bound"),
+              HasSubstr("elbow: /model.residual.bound: expected a tensor, found none"));
+  EXPECT_THAT(add("model.residual.model.mlp.layers.64.bias"), HasSubstr("at most 64 elements"));
 }
 
 TEST(BrokenModelFile, WithTensorsThatOverlapOrRunOut) {

@@ -13,6 +13,7 @@
 #include "support/error_message.hpp"
 #include "support/every_family.hpp"
 #include "support/example_model_file.hpp"
+#include "support/grey_box_examples.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
@@ -41,11 +42,14 @@ std::vector<std::uint64_t> run(Estimator estimator) {
 
 template <class Family>
 class EveryFamily : public testing::Test {};
-TYPED_TEST_SUITE(EveryFamily, test::EveryFamily);
+template <class... Family>
+using WithResiduals = testing::Types<Family..., test::GreyBoxWithMlp, test::GreyBoxWithDgmm>;
+TYPED_TEST_SUITE(EveryFamily, KnownFamilies::In<WithResiduals>);
 
 TYPED_TEST(EveryFamily, ComesBackBitForBit) {
   const TemporaryFolder folder;
-  const ModelFile saved = example_model_file(example<TypeParam>());
+  using Family = typename TypeParam::Parameters::Family;
+  const ModelFile saved = example_model_file(Family(example<TypeParam>()));
   save_model(folder.path("m.safetensors"), saved);
   const ModelFile loaded = load_model(folder.path("m.safetensors"));
   EXPECT_EQ(model_bytes(loaded), model_bytes(saved));
@@ -93,6 +97,22 @@ TEST(ModelFile, NamesItsTensorsAfterTheFields) {
   EXPECT_EQ(contents.tensors.at("model.rate_scale").shape, std::vector<std::size_t>{});
   ASSERT_EQ(contents.metadata.size(), 1U);
   EXPECT_THAT(contents.metadata.at("torsio"), HasSubstr(R"("family":"linear_coulomb")"));
+}
+
+TEST(ModelFile, NamesTheResidualOfAGreyBoxByItsFamily) {
+  const auto names_of = [](const GreyBox& model) {
+    std::vector<std::string> names;
+    for (const auto& [name, tensor] :
+         parse_safetensors(model_bytes(example_model_file(model)), "m").tensors)
+      if (name.starts_with("model.residual")) names.push_back(name);
+    return names;
+  };
+  EXPECT_THAT(names_of(example<GreyBox>()), testing::IsEmpty());
+  EXPECT_THAT(names_of(example<test::GreyBoxWithMlp>()),
+              testing::IsSupersetOf({"model.residual.bound", "model.residual.lowest",
+                                     "model.residual.model.mlp.layers.0.weights"}));
+  EXPECT_THAT(names_of(example<test::GreyBoxWithDgmm>()),
+              testing::Contains("model.residual.model.dgmm.mixture.means"));
 }
 
 TEST(ModelFile, IsBoundToItsDevice) {

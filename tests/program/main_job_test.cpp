@@ -70,6 +70,7 @@ TEST_F(MainJob, SearchesStructuresWithinTheTrainingRecords) {
   EXPECT_NE(search.out.find("maxwell_slip[thresholds=16]"), std::string::npos) << search.out;
   EXPECT_NE(search.out.find("held-out (test) errors"), std::string::npos) << search.out;
   const auto json = nlohmann::json::parse(contents("s.json"));
+  EXPECT_EQ(json.at("schema_version"), 1);
   const auto& tried = json.at("search").at("summary");
   EXPECT_EQ(json.at("search").at("folds").size(), 3U);
   std::map<std::string, std::string> winner;  // variant by family

@@ -264,8 +264,7 @@ TEST(ControlCalls, OfTorqueControllerWithAGreyBoxAndItsResidualAreNone) {
   mixture.mixture.centre = {0.0, 0.0, 0.0, 0.0, 0.0};
   mixture.mixture.scale = {0.5, 0.02, 5.0, 0.01, 0.01};
   GreyBox::Parameters parameters = test::example<GreyBox>().parameters();
-  parameters.residual = {.mlp = {},
-                         .dgmm = {mixture},
+  parameters.residual = {.model = mixture,
                          .bound = 0.5,
                          .lowest = {-0.03, -10.0, -0.03, -0.03},
                          .highest = {0.03, 10.0, 0.03, 0.03}};

@@ -183,6 +183,7 @@ TEST(Studies, WithAModelToJudgeTellRatiosAndWhyARowIsNotRanked) {
       text, testing::ContainsRegex("new lever +bouc_wen +0.1 +0.103 +1.030 +yes +66.0 +93.0 +90"));
   EXPECT_THAT(text, HasSubstr("lowest in 1 of 1"));
   const auto json = nlohmann::json::parse(study_json(info, study));
+  EXPECT_EQ(json["schema_version"], 1);
   EXPECT_EQ(json["verdicts"][0]["best"], "bouc_wen");
   EXPECT_EQ(json["verdicts"][0]["within_5_percent"], true);
   EXPECT_EQ(json["rows"][2]["ranked"], false);

@@ -84,11 +84,10 @@ std::pair<TrainingData, TrainingData> parted(const TrainingData& data) {
   return parts;
 }
 
-void take_in(GreyBoxResidual& residual, const AnyModel& model, const TrainingData& data,
-             double bound) {
-  if (const Mlp* const mlp = model.get_if<Mlp>()) residual.mlp = {mlp->parameters()};
-  if (const Dgmm* const dgmm = model.get_if<Dgmm>()) residual.dgmm = {dgmm->parameters()};
-  residual.bound = bound;
+GreyBoxResidual residual_of(const AnyModel& model, const TrainingData& data, double bound) {
+  GreyBoxResidual residual{.bound = bound};
+  if (const Mlp* const mlp = model.get_if<Mlp>()) residual.model = mlp->parameters();
+  if (const Dgmm* const dgmm = model.get_if<Dgmm>()) residual.model = dgmm->parameters();
   residual.lowest.assign(data.input_count(), std::numeric_limits<double>::infinity());
   residual.highest.assign(data.input_count(), -std::numeric_limits<double>::infinity());
   for (const Sequence& sequence : data.sequences) {
@@ -100,6 +99,7 @@ void take_in(GreyBoxResidual& residual, const AnyModel& model, const TrainingDat
       }
     }
   }
+  return residual;
 }
 
 void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyBoxOptions& options,
@@ -120,8 +120,8 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
     if (!is_kept) return;
     fitted.held_out_rmse *= with / without;
   }
-  take_in(fitted.parameters.residual, residual_model(left, options.residual, context), left,
-          options.bound * rms);
+  fitted.parameters.residual =
+      residual_of(residual_model(left, options.residual, context), left, options.bound * rms);
 }
 
 /// The box of the terms that predict best what is held out.

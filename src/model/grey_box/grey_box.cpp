@@ -57,6 +57,15 @@ SlipBank bank_of(std::span<const double> thresholds) {
   return {per_threshold, std::vector<double>(thresholds.size(), 1.0), GreyBox::kFamily};
 }
 
+/// What `use` returns of the residual's model; where there is none, 0.
+template <class Residual, class Use>
+auto of_residual(Residual& residual, const Use& use) noexcept
+    -> decltype(use(*std::get_if<Mlp>(&residual))) {
+  if (auto* const mlp = std::get_if<Mlp>(&residual)) return use(*mlp);
+  if (auto* const dgmm = std::get_if<Dgmm>(&residual)) return use(*dgmm);
+  return {};
+}
+
 }  // namespace
 
 GreyBoxTerms::GreyBoxTerms(Structure structure)
@@ -108,13 +117,12 @@ GreyBox::GreyBox(Parameters parameters)
       coefficients_(parameters_.coefficients, parameters_.terms.inputs(), kFamily) {
   require(coefficients_.size() == parameters_.terms.columns(), "coefficients",
           "one column for each term", std::to_string(coefficients_.size()) + " columns");
-  const GreyBoxResidual& learned = parameters_.residual;
-  require(learned.mlp.size() + learned.dgmm.size() <= 1, "residual", "at most one",
-          std::to_string(learned.mlp.size() + learned.dgmm.size()));
-  for (const auto& each : learned.mlp) mlp_.emplace_back(each);
-  for (const auto& each : learned.dgmm) dgmm_.emplace_back(each);
-  if (mlp_.empty() && dgmm_.empty()) return;
-  const std::size_t inputs = mlp_.empty() ? dgmm_[0].input_count() : mlp_[0].input_count();
+  if (!parameters_.residual) return;
+  const GreyBoxResidual& learned = *parameters_.residual;
+  std::visit([this]<class P>(const P& own) { residual_.emplace<typename P::Family>(own); },
+             learned.model);
+  const std::size_t inputs =
+      of_residual(residual_, [](const auto& model) { return model.input_count(); });
   const std::size_t expected = input_count() + parameters_.terms.thresholds.size();
   require(
       inputs == expected && learned.lowest.size() == expected && learned.highest.size() == expected,
@@ -130,10 +138,8 @@ GreyBox::GreyBox(Parameters parameters)
 }
 
 std::size_t GreyBox::parameter_count() const noexcept {
-  std::size_t count = coefficients_.fitted_count();
-  for (const Mlp& each : mlp_) count += each.parameter_count();
-  for (const Dgmm& each : dgmm_) count += each.parameter_count();
-  return count;
+  return coefficients_.fitted_count() +
+         of_residual(residual_, [](const auto& model) { return model.parameter_count(); });
 }
 
 Estimate GreyBox::step(Features features) noexcept {
@@ -147,8 +153,8 @@ Estimate GreyBox::step(Features features) noexcept {
 }
 
 double GreyBox::residual(Features features) noexcept {
-  if (mlp_.empty() && dgmm_.empty()) return 0.0;
-  const GreyBoxResidual& learned = parameters_.residual;
+  if (!parameters_.residual) return 0.0;
+  const GreyBoxResidual& learned = *parameters_.residual;
   std::ranges::copy(features, residual_inputs_.begin());
   residual_inputs_[0] = terms_.position();
   std::ranges::copy(state().first(parameters_.terms.thresholds.size()),
@@ -163,10 +169,10 @@ double GreyBox::residual(Features features) noexcept {
     if (!(left_by < border)) return 0.0;  // NaN too
     share = std::min(share, 1.0 - left_by / border);
   }
-  const double told =
-      mlp_.empty() ? dgmm_[0].step(residual_inputs_).value : mlp_[0].step(residual_inputs_).value;
-  if (!std::isfinite(told)) return 0.0;
-  return share * std::min(std::max(told, -learned.bound), learned.bound);
+  const double correction =
+      of_residual(residual_, [this](auto& model) { return model.step(residual_inputs_).value; });
+  if (!std::isfinite(correction)) return 0.0;
+  return share * std::min(std::max(correction, -learned.bound), learned.bound);
 }
 
 double GreyBox::at_jump(const ScheduledCoefficients::Position& at, double x) const noexcept {

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "model/common/schedule.hpp"
@@ -150,17 +152,15 @@ class GreyBoxTerms {
 /// A learned correction to a grey box: a network or a mixture of the inputs and of the slips s_i / r_i,
 /// bounded, and faded out where an input leaves what it was trained on.
 struct GreyBoxResidual {
-  std::vector<Mlp::Parameters> mlp = {};    ///< at most one of these
-  std::vector<Dgmm::Parameters> dgmm = {};  ///< two lists holds one
-  double bound = 0.0;                       ///< largest |correction|, target's unit
-  std::vector<double> lowest = {};          ///< of each of its inputs in training
+  std::variant<Mlp::Parameters, Dgmm::Parameters> model = {};
+  double bound = 0.0;               ///< largest |correction|, target's unit
+  std::vector<double> lowest = {};  ///< of each of its inputs in training
   std::vector<double> highest = {};
   static constexpr double kBorder = 0.1;  ///< of the range: how far beyond it the fading ends
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
-    visit("mlp", self.mlp);
-    visit("dgmm", self.dgmm);
+    visit("model", self.model);
     visit("bound", self.bound);
     visit("lowest", self.lowest);
     visit("highest", self.highest);
@@ -188,7 +188,7 @@ class GreyBox {
     using Family = GreyBox;
     GreyBoxTerms::Structure terms;
     CoefficientSchedule coefficients;  ///< columns as `GreyBoxTerms` lists them
-    GreyBoxResidual residual;
+    std::optional<GreyBoxResidual> residual = {};
 
     template <class Self, class Visit>
     static void visit_fields(Self& self, Visit&& visit) {
@@ -243,8 +243,7 @@ class GreyBox {
   Parameters parameters_;
   GreyBoxTerms terms_;
   ScheduledCoefficients coefficients_;
-  std::vector<Mlp> mlp_;
-  std::vector<Dgmm> dgmm_;
+  std::variant<std::monostate, Mlp, Dgmm> residual_;  ///< the first: none
   std::vector<double> residual_inputs_;
 };
 

@@ -144,8 +144,7 @@ Mlp::Parameters constant_network(std::size_t inputs, double value) {
 
 TEST(GreyBox, ItsResidualIsBoundedAndFadesOutBeyondItsTrainingData) {
   GreyBox::Parameters parameters = plain({0.1});
-  parameters.residual = {.mlp = {constant_network(2, 5.0)},
-                         .dgmm = {},
+  parameters.residual = {.model = constant_network(2, 5.0),
                          .bound = 2.0,
                          .lowest = {-1.0, -1.0},
                          .highest = {1.0, 1.0}};
@@ -200,7 +199,7 @@ TEST(GreyBox, RefusesAStructureThatMakesNoSense) {
               HasSubstr("sample_period_s"));
   EXPECT_THAT(refused([](auto& p) { p.coefficients.values = Matrix(1, 3); }),
               HasSubstr("coefficients"));
-  EXPECT_THAT(refused([](auto& p) { p.residual.mlp = {constant_network(1, 0.0)}; }),
+  EXPECT_THAT(refused([](auto& p) { p.residual = {.model = constant_network(1, 0.0)}; }),
               HasSubstr("residual"));
 }
 

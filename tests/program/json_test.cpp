@@ -1,0 +1,77 @@
+// Each verb with --json writes documents that begin with their schema_version (docs/json.md).
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <string>
+
+#include "program/program.hpp"
+
+namespace torsio::test {
+namespace {
+
+struct JsonCase {
+  const char* name;
+  const char* before;  ///< what the verb reads is made by these calls; one a line
+  const char* call;
+};
+
+constexpr const char* kRecord =
+    "{torsio} simulate dfki-50 sweep --duration 20s --lever 0.24m --seed 1 -o a.csv\n";
+constexpr const char* kTwoRecords =
+    "{torsio} simulate dfki-50 sweep --duration 20s --lever 0.24m --seed 1 -o a.csv\n"
+    "{torsio} simulate dfki-50 sweep --duration 20s --lever 0.17m --seed 2 -o b.csv\n";
+constexpr const char* kModel =
+    "{torsio} simulate dfki-50 sweep --duration 20s --lever 0.24m --seed 1 -o a.csv\n"
+    "{torsio} fit a.csv --model linear -o m.safetensors\n";
+constexpr const char* kNetwork =
+    "{torsio} simulate dfki-50 sweep --duration 20s --lever 0.24m --seed 1 -o a.csv\n"
+    "{torsio} fit a.csv --model mlp --set epochs=2 -o m.safetensors\n";
+
+const JsonCase kCases[] = {
+    {"Adapt", kNetwork, "adapt m.safetensors a.csv"},
+    {"Attribute", kModel, "attribute m.safetensors a.csv --windows 10"},
+    {"Check", kRecord, "check a.csv"},
+    {"Compare", kTwoRecords, "compare a.csv --test b.csv --models linear"},
+    {"CrossValidate", kRecord, "crossvalidate a.csv --models linear"},
+    {"Demo", kTwoRecords, "demo a.csv --test b.csv --models linear"},
+    {"Evaluate", kModel, "evaluate m.safetensors a.csv"},
+    {"EvaluateAModelAlone", kModel, "evaluate m.safetensors"},
+    {"Fit", kRecord, "fit a.csv --model linear -o m.safetensors"},
+    {"Import", "",
+     "import '" TORSIO_SOURCE "/tests/golden/import/weights_mlp.json' --activation softsign "
+     "--inputs a_rad,b_rad,c_rad --rate 100Hz -o m.safetensors"},
+    {"Reproduce", "", "reproduce 001-models --quick --repeats 1"},
+    {"Simulate", "", "simulate dfki-50 sweep --duration 2s -o a.csv"},
+    {"SimulateDescribe", "", "simulate --describe dfki-50"},
+    {"SimulateList", "", "simulate --list"},
+    {"Track", "", "track --actuator dfki-50 --duration 5s"},
+    {"TuneLoop", "", "tune-loop --actuator dfki-50"},
+    {"Unpack", TORSIO_EXAMPLES "/example_06_realtime_loop\n", "unpack run.tsr -o run.csv"},
+};
+
+void PrintTo(const JsonCase& verb, std::ostream* out) { *out << verb.call; }
+
+class JsonOfVerb : public Program, public testing::WithParamInterface<JsonCase> {};
+
+TEST_P(JsonOfVerb, BeginsWithItsSchemaVersion) {
+  std::istringstream before(GetParam().before);
+  for (std::string line; std::getline(before, line);) {
+    const Outcome outcome = shell(line);
+    ASSERT_EQ(outcome.exit_code, 0) << line << '\n' << outcome.err;
+  }
+  const Outcome outcome = torsio(std::string(GetParam().call) + " --json -");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  auto document = nlohmann::ordered_json::parse(outcome.out);
+  if (document.is_array()) {  // reproduce: one document for each study
+    ASSERT_EQ(document.size(), 1U);
+    document = document.front();
+  }
+  ASSERT_TRUE(document.is_object());
+  EXPECT_EQ(document.begin().key(), "schema_version");
+  EXPECT_EQ(document.begin().value(), 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(EachVerb, JsonOfVerb, testing::ValuesIn(kCases),
+                         [](const auto& verb) { return std::string(verb.param.name); });
+
+}  // namespace
+}  // namespace torsio::test

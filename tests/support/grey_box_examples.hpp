@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <utility>
+
+#include "support/example_models.hpp"
+
+namespace torsio::test {
+
+/// A grey box with a network as its residual. A type of its own, so that laws run on it.
+struct GreyBoxWithMlp : GreyBox {
+  using GreyBox::GreyBox;
+};
+/// The same with a mixture.
+struct GreyBoxWithDgmm : GreyBox {
+  using GreyBox::GreyBox;
+};
+
+/// The example of a grey box, with a residual of its two inputs and two slips.
+inline GreyBox::Parameters grey_box_with(decltype(GreyBoxResidual::model) residual) {
+  GreyBox::Parameters parameters = example<GreyBox>().parameters();
+  parameters.residual = {.model = std::move(residual),
+                         .bound = 1.5,
+                         .lowest = {-0.1, -0.4, -1.0, -1.0},
+                         .highest = {0.1, 0.4, 1.0, 1.0}};
+  return parameters;
+}
+
+template <>
+inline GreyBoxWithMlp example<GreyBoxWithMlp>() {
+  return GreyBoxWithMlp(grey_box_with(random_network<Mlp>({.inputs = 4, .hidden = {5}}, 11)));
+}
+
+template <>
+inline GreyBoxWithDgmm example<GreyBoxWithDgmm>() {
+  constexpr std::size_t kDimension = 5;
+  constexpr std::size_t kComponents = 3;
+  GaussianMixture mixture{.centre = {0.2, 0.0, 0.0, 0.0, 0.0},
+                          .scale = {1.0, 0.07, 0.3, 0.5, 0.5},
+                          .weights = {0.5, 0.3, 0.2},
+                          .means = Matrix(kComponents, kDimension),
+                          .covariances = Matrix(kComponents, kDimension * kDimension)};
+  for (std::size_t i = 0; i < kComponents; ++i) {
+    for (std::size_t j = 0; j < kDimension; ++j) {
+      mixture.means(i, j) = 0.7 * (static_cast<double>(i) - 1.0);
+      mixture.covariances(i, j * kDimension + j) = 0.3;
+    }
+  }
+  return GreyBoxWithDgmm(grey_box_with(Dgmm::Parameters{
+      .mixture = std::move(mixture), .clamp = {.slope = {0.0, 0.0, 0.0, 0.0}, .width = 0.5}}));
+}
+
+}  // namespace torsio::test
