@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "laws/law_data.hpp"
-#include "support/dump.hpp"
+#include "support/dump_any.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/families.hpp"
 
