@@ -5,13 +5,14 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "model/linear/linear.hpp"
 #include "model/linear/polynomial.hpp"
 #include "support/error_message.hpp"
-#include "support/every_family.hpp"
 #include "support/example_data.hpp"
+#include "support/fitted_families.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/fit/families.hpp"
@@ -193,17 +194,20 @@ TEST(Attribute, DependsOnTheSeedButNotOnTheThreads) {
   EXPECT_NE(values(1, 1), values(2, 1));
 }
 
-TEST(Attribute, TakesEveryFamily) {
+class AttributeEveryFamily : public testing::TestWithParam<std::string> {};
+
+TEST_P(AttributeEveryFamily, FindsThatItIsASpring) {
   const TrainingData data = test::noisy_spring();
-  for (const FamilyInfo& family : families()) {
-    if (!test::is_for_springs(family)) continue;
-    SCOPED_TRACE(family.name);
-    const AnyModel model = family.fit(data, Options(family.options, {}), {.seed = 1}).model;
-    const Attribution attribution = attribute(model, data, {.windows = 20, .background = 10});
-    EXPECT_LT(attribution.additivity_error, 1e-9);
-    EXPECT_GT(attribution.inputs[0].share, 0.5) << "it is a spring";
-  }
+  const FamilyInfo& family = find_family(GetParam());
+  const Options options(family.options, test::quick_options(family.name));
+  const AnyModel model = family.fit(data, options, {.seed = 1}).model;
+  const Attribution attribution = attribute(model, data, {.windows = 20, .background = 10});
+  EXPECT_LT(attribution.additivity_error, 1e-9);
+  EXPECT_GT(attribution.inputs[0].share, 0.5);
 }
+
+INSTANTIATE_TEST_SUITE_P(EveryFamily, AttributeEveryFamily,
+                         testing::ValuesIn(test::spring_families()), test::kFamilyName);
 
 TEST(Attribute, PassesOverFeaturesThatAreNotFinite) {
   TrainingData data = spring_data();

@@ -9,7 +9,7 @@
 
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
-#include "support/every_family.hpp"
+#include "support/fitted_families.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
@@ -77,33 +77,38 @@ TEST(Evaluate, LeavesTheEmbargoOut) {
   EXPECT_EQ(score.together.metrics.samples, 2 * samples / 10);
 }
 
-TEST(Evaluate, PredictsWhatAnEstimatorFedByHandSays) {
+class PredictEveryFamily : public testing::TestWithParam<std::string> {};
+
+TEST_P(PredictEveryFamily, EqualsAnEstimatorThatIsFedSampleBySample) {
   const Dataset dataset = test::bench_dataset();
   const Recording& recording = dataset.records.back().recording;
-  for (const FamilyInfo& family : families()) {
-    if (!test::is_for_springs(family)) continue;
-    SCOPED_TRACE(family.name);
-    const TrainedModel model = trained(dataset, std::string(family.name));
-    Estimator estimator = make_estimator(model.file);
-    (void)predict(estimator, dataset.records.front().recording);  // must leave no trace
-    const Prediction offline = predict(estimator, recording);
-    ASSERT_EQ(offline.estimates.size(), recording.size());
+  const TrainedModel model = train_model(dataset,
+                                         {.family = GetParam(),
+                                          .options = test::quick_options(GetParam()),
+                                          .features = resolve_inputs(dataset, {})},
+                                         1);
+  Estimator estimator = make_estimator(model.file);
+  (void)predict(estimator, dataset.records.front().recording);  // must leave no trace
+  const Prediction offline = predict(estimator, recording);
+  ASSERT_EQ(offline.estimates.size(), recording.size());
 
-    Estimator in_the_loop = make_estimator(model.file);
-    std::vector<double> raw(in_the_loop.raw_inputs().size());
-    for (std::size_t n = 0; n < recording.size(); ++n) {
-      for (std::size_t j = 0; j < raw.size(); ++j)
-        raw[j] = recording.channel(in_the_loop.raw_inputs()[j]).values[n];
-      const Estimate streamed = in_the_loop.step(raw);
-      const Estimate& told = offline.estimates[n];
-      ASSERT_EQ(told.value, streamed.value) << "sample " << n;
-      ASSERT_EQ(told.fault, streamed.fault) << "sample " << n;
-      ASSERT_TRUE(told.std_dev == streamed.std_dev ||
-                  (std::isnan(told.std_dev) && std::isnan(streamed.std_dev)))
-          << "sample " << n;
-    }
+  Estimator in_the_loop = make_estimator(model.file);
+  std::vector<double> raw(in_the_loop.raw_inputs().size());
+  for (std::size_t n = 0; n < recording.size(); ++n) {
+    for (std::size_t j = 0; j < raw.size(); ++j)
+      raw[j] = recording.channel(in_the_loop.raw_inputs()[j]).values[n];
+    const Estimate streamed = in_the_loop.step(raw);
+    const Estimate& predicted = offline.estimates[n];
+    ASSERT_EQ(predicted.value, streamed.value) << "sample " << n;
+    ASSERT_EQ(predicted.fault, streamed.fault) << "sample " << n;
+    ASSERT_TRUE(predicted.std_dev == streamed.std_dev ||
+                (std::isnan(predicted.std_dev) && std::isnan(streamed.std_dev)))
+        << "sample " << n;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(EveryFamily, PredictEveryFamily,
+                         testing::ValuesIn(test::spring_families()), test::kFamilyName);
 
 TEST(Evaluate, SaysWhereAnInputIsMissing) {
   Dataset dataset = test::bench_dataset();

@@ -4,17 +4,20 @@
 
 #include <string>
 
+#include "support/every_family.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
-TEST(KnownFamilies, HaveEmptyParametersByName) {
-  KnownFamilies::for_each([]<class F>(std::type_identity<F> /*family*/) {
-    const AnyParameters parameters = parameters_of_family(F::kFamily);
-    EXPECT_NE(parameters.get_if<typename F::Parameters>(), nullptr) << F::kFamily;
-    EXPECT_EQ(parameters.family(), F::kFamily);
-  });
+template <class Family>
+class KnownFamily : public testing::Test {};
+TYPED_TEST_SUITE(KnownFamily, test::EveryFamily);
+
+TYPED_TEST(KnownFamily, HasEmptyParametersByItsName) {
+  const AnyParameters parameters = parameters_of_family(TypeParam::kFamily);
+  EXPECT_NE(parameters.get_if<typename TypeParam::Parameters>(), nullptr);
+  EXPECT_EQ(parameters.family(), TypeParam::kFamily);
 }
 
 TEST(KnownFamilies, AreListedWhenOneIsUnknown) {

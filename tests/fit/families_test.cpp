@@ -2,44 +2,55 @@
 
 #include <gtest/gtest.h>
 
-#include <set>
+#include <algorithm>
+#include <map>
 #include <string>
+#include <vector>
 
 #include "model/linear/linear_coulomb.hpp"
-#include "support/every_family.hpp"
 #include "support/example_data.hpp"
+#include "support/fitted_families.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
-TEST(Families, StandInTheTableOnceEachWithOptionsThatTheirOwnCheckAccepts) {
-  std::set<std::string_view> names;
-  for (const FamilyInfo& family : families()) {
-    EXPECT_TRUE(names.insert(family.name).second) << family.name;
-    EXPECT_FALSE(family.summary.empty());
-    for (const OptionInfo& option : family.options) {
-      const std::map<std::string, std::string> as_default{
-          {std::string(option.name), std::string(option.default_value)}};
-      EXPECT_NO_THROW(Options(family.options, as_default)) << family.name << ": " << option.name;
-      EXPECT_FALSE(option.help.empty()) << family.name << ": " << option.name;
-    }
-    for (const auto& [option, value] : family.variations)
-      EXPECT_NO_THROW(Options(family.options, {{std::string(option), std::string(value)}}))
-          << family.name << ": " << option;
-  }
+TEST(Families, HaveNamesThatDiffer) {
+  std::vector<std::string> names = test::fitted_families();
+  std::ranges::sort(names);
+  EXPECT_EQ(std::ranges::adjacent_find(names), names.end());
 }
 
-TEST(Families, FindThemselvesAndFitModelsOfTheirFamily) {
-  for (const FamilyInfo& family : families()) {
-    const FamilyInfo& found = find_family(family.name);
-    EXPECT_EQ(&found, &family);
-    if (!test::is_for_springs(family)) continue;
-    const FittedModel fitted =
-        found.fit(test::noisy_spring(), Options(found.options, {}), {.seed = 1});
-    EXPECT_EQ(fitted.model.family(), family.model_family) << family.name;
+class EntryOfFamilies : public testing::TestWithParam<std::string> {};
+
+TEST_P(EntryOfFamilies, IsFoundAndItsOptionsAcceptTheirDefaults) {
+  const FamilyInfo& family = find_family(GetParam());
+  EXPECT_EQ(family.name, GetParam());
+  EXPECT_FALSE(family.summary.empty());
+  for (const OptionInfo& option : family.options) {
+    const std::map<std::string, std::string> as_default{
+        {std::string(option.name), std::string(option.default_value)}};
+    EXPECT_NO_THROW(Options(family.options, as_default)) << option.name;
+    EXPECT_FALSE(option.help.empty()) << option.name;
   }
+  for (const auto& [option, value] : family.variations)
+    EXPECT_NO_THROW(Options(family.options, {{std::string(option), std::string(value)}})) << option;
 }
+
+INSTANTIATE_TEST_SUITE_P(EveryFamily, EntryOfFamilies, testing::ValuesIn(test::fitted_families()),
+                         test::kFamilyName);
+
+class SpringFamilies : public testing::TestWithParam<std::string> {};
+
+TEST_P(SpringFamilies, FitModelsOfTheirName) {
+  const FamilyInfo& family = find_family(GetParam());
+  const Options options(family.options, test::quick_options(family.name));
+  const FittedModel fitted = family.fit(test::noisy_spring(), options, {.seed = 1});
+  EXPECT_EQ(fitted.model.family(), family.model_family);
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryFamily, SpringFamilies, testing::ValuesIn(test::spring_families()),
+                         test::kFamilyName);
 
 TEST(Families, NameTheNearestWhenOneIsUnknown) {
   try {

@@ -1,4 +1,5 @@
 #include "laws/model_laws.hpp"
+
 #include "support/dump_any.hpp"
 
 namespace torsio::test {
