@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "files/family_names.hpp"
 #include "files/json_text.hpp"
-#include "files/known_families.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/units.hpp"

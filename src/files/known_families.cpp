@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "files/family_names.hpp"
+
 namespace torsio {
 
 AnyParameters parameters_of_family(std::string_view family) {

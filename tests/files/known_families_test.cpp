@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "files/family_names.hpp"
 #include "support/every_family.hpp"
 #include "torsio/core/error.hpp"
 

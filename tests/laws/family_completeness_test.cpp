@@ -53,6 +53,16 @@ bool is_on_a_page(std::string_view name) {
 
 class ModelFamily : public testing::TestWithParam<std::string_view> {};
 
+TEST_P(ModelFamily, HasTheTraitsThatItsRowsState) {
+  KnownFamilies::for_each([&]<class F>(std::type_identity<F> /*family*/) {
+    if (F::kFamily != GetParam()) return;
+    for (const FamilyInfo& row : families()) {
+      if (row.model_family != GetParam()) continue;
+      EXPECT_EQ(row.is_spring, traits_of<F>().is_spring) << row.name;
+    }
+  });
+}
+
 TEST_P(ModelFamily, IsFittedByARowOfTheTableOrHasAReason) {
   const std::map<std::string_view, std::string_view> without_row{
       {"mlp_ensemble", "fitted by mlp with members above 1"},

@@ -6,7 +6,6 @@
 #include <type_traits>
 
 #include "files/known_families.hpp"
-#include "torsio/fit/common/family_info.hpp"
 
 namespace torsio::test {
 
@@ -43,15 +42,5 @@ struct ModelName {
     }
   }
 };
-
-/// Whether a row of the table of families can be fitted to a spring: those driven by a force need a
-/// motion as their target.
-inline bool is_for_springs(const FamilyInfo& family) {
-  bool is_spring = true;
-  KnownFamilies::for_each([&]<class F>(std::type_identity<F> /*family*/) {
-    if (F::kFamily == family.model_family) is_spring = traits_of<F>().is_spring;
-  });
-  return is_spring;
-}
 
 }  // namespace torsio::test

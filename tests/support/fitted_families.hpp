@@ -6,7 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include "support/every_family.hpp"
 #include "torsio/fit/families.hpp"
 
 /// The table of fitters as parameters of tests, one test for each family:
@@ -23,7 +22,7 @@ inline std::vector<std::string> fitted_families() {
 /// Those that can be fitted to a spring.
 inline std::vector<std::string> spring_families() {
   std::vector<std::string> names = fitted_families();
-  std::erase_if(names, [](const std::string& name) { return !is_for_springs(find_family(name)); });
+  std::erase_if(names, [](const std::string& name) { return !find_family(name).is_spring; });
   return names;
 }
 

@@ -15,6 +15,7 @@
 #include "model/gaussian_process/gaussian_process.hpp"
 #include "model/gaussian_process/parametric_gp.hpp"
 #include "model/mixture/dgmm.hpp"
+#include "model/network/mlp.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/families.hpp"
 

@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "core/joined_name.hpp"
-#include "model/linear/linear.hpp"
-#include "model/network/mlp.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/model/common/model.hpp"
 

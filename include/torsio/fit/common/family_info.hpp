@@ -39,6 +39,7 @@ struct FamilyInfo {
   std::span<const OptionInfo> options = {};
   /// Deterministic for a seed. @throws Error if the data do not suffice, Cancelled.
   FittedModel (*fit)(const TrainingData&, const Options&, const FitContext&) = nullptr;
+  bool is_spring = true;            ///< of its models: `FamilyTraits::is_spring`
   bool can_resume = false;          ///< uses `FitContext::resume` and `keep`
   bool only_if_named = false;       ///< not in `all`: slow, or made for other data than most have
   bool in_search = !only_if_named;  ///< a structure search tries it
