@@ -56,7 +56,7 @@ void read_option(std::string_view text, const OptionInfo& stated,
 template <class Field>
 constexpr bool kIsOptionalChoice = false;
 template <class Choice>
-constexpr bool kIsOptionalChoice<std::optional<Choice>> = std::is_enum_v<Choice>;
+inline constexpr bool kIsOptionalChoice<std::optional<Choice>> = std::is_enum_v<Choice>;
 
 /// Fields that are set by a name: enumerations and switches by position; an optional one is empty at
 /// the first name.
