@@ -111,7 +111,7 @@ Recording recorded(const std::string& experiment, std::uint64_t seed) {
 
 struct Bench {
   Dataset dataset;
-  std::vector<std::pair<std::string, std::string>> conditions = {};  ///< recording, condition
+  StudyConditions conditions = {};
 
   void judge(const Recording& from, const std::string& condition, std::size_t begin,
              std::size_t end) {
@@ -119,13 +119,8 @@ struct Bench {
     Recording recording(fmt::format("{} {}", from.name(), conditions.size()), from.sample_rate_Hz(),
                         from.time_s(0));
     for (const Channel& channel : from.channels()) recording.add(channel);
-    conditions.emplace_back(recording.name(), condition);
+    conditions.add(recording.name(), condition);
     dataset.records.push_back({std::move(recording), {{begin, end, Role::test}}});
-  }
-  [[nodiscard]] std::string condition_of(const std::string& recording) const {
-    const auto found =
-        std::ranges::find(conditions, recording, &std::pair<std::string, std::string>::first);
-    return found == conditions.end() ? recording : found->second;
   }
 };
 
@@ -161,7 +156,7 @@ void compare_into(StudyRows& rows, const Bench& bench, const std::vector<Rival>&
   const Results results = compare(bench.dataset, choices, seed, false, progress).results;
   rows.add(
       results, bench.dataset, Role::test,
-      [&](const std::string& recording) { return bench.condition_of(recording); },
+      [&](const std::string& recording) { return bench.conditions.of(recording); },
       [&](const ResultRow& row) {
         const auto found = std::ranges::find(models, std::pair(row.family, row.variant));
         return rivals[static_cast<std::size_t>(found - models.begin())].label;

@@ -53,7 +53,7 @@ constexpr std::uint64_t kJudgedSeed = 50;
 
 struct Ladder {
   Dataset dataset;
-  std::vector<std::pair<std::string, std::string>> conditions;  ///< recording, condition
+  StudyConditions conditions;
 
   void add(const std::string& coupling, const char* experiment, const std::string& condition,
            std::uint64_t seed, Role role, bool is_quick) {
@@ -62,14 +62,9 @@ struct Ladder {
     // One slow cycle takes 20 s; thirty of them say the same.
     if (experiment == std::string_view("slow-cycles")) spec.duration_s = is_quick ? 20.0 : 100.0;
     Recording recording = simulate(spec);
-    conditions.emplace_back(recording.name(), condition);
+    conditions.add(recording.name(), condition);
     const std::size_t samples = recording.size();
     dataset.records.push_back({std::move(recording), whole_record(samples, role)});
-  }
-  [[nodiscard]] std::string condition_of(const std::string& recording) const {
-    for (const auto& [name, condition] : conditions)
-      if (name == recording) return condition;
-    return recording;
   }
 };
 
@@ -112,7 +107,7 @@ Study ladder_003(const StudyOptions& options, const Progress& progress) {
       const Results results = compare(ladder.dataset, choices, seed, false, part).results;
       rows.add(
           results, ladder.dataset, Role::test,
-          [&](const std::string& recording) { return ladder.condition_of(recording); },
+          [&](const std::string& recording) { return ladder.conditions.of(recording); },
           [&](const ResultRow& row) {
             const auto choice = std::ranges::find_if(choices, [&](const ModelChoice& each) {
               return each.family == row.family && each.variant() == row.variant;

@@ -64,13 +64,7 @@ struct Push {
 
 struct PushData {
   Dataset dataset;
-  std::vector<std::pair<std::string, std::string>> conditions;  ///< recording, condition
-
-  [[nodiscard]] std::string condition_of(const std::string& recording) const {
-    for (const auto& [name, condition] : conditions)
-      if (name == recording) return condition;
-    return recording;
-  }
+  StudyConditions conditions;
 };
 
 /// 150 s each, assumed: the paper prints no duration.
@@ -85,7 +79,7 @@ PushData record(const std::vector<Push>& pushes, const StudyOptions& options, st
                                     .torque_amplitude_Nm = push.torque_Nm,
                                     .is_impedance_zero = push.is_impedance_zero},
                                    progress);
-    data.conditions.emplace_back(recording.name(), push.condition);
+    data.conditions.add(recording.name(), push.condition);
     const std::size_t samples = recording.size();
     data.dataset.records.push_back({std::move(recording), whole_record(samples, push.role)});
   }
@@ -115,7 +109,7 @@ void compare_into(StudyRows& rows, const std::vector<Push>& pushes, const InputS
   const auto choices = choices_of(data.dataset, options);
   const Results results = compare(data.dataset, choices, seed, false, progress).results;
   rows.add(results, data.dataset, Role::test,
-           [&](const std::string& recording) { return data.condition_of(recording); });
+           [&](const std::string& recording) { return data.conditions.of(recording); });
 }
 
 std::vector<Push> five_between(double low_Nm, double high_Nm, bool is_impedance_zero) {

@@ -13,6 +13,19 @@
 
 namespace torsio {
 
+std::string StudyConditions::of(const std::string& recording) const {
+  for (const auto& [name, condition] : conditions_)
+    if (name == recording) return condition;
+  return recording;
+}
+
+void show_published(StudyRow& row, std::span<const PaperEntry> published,
+                    std::string_view condition, std::string_view model) {
+  for (const PaperEntry& entry : published)
+    if (entry.condition == condition && entry.model == model)
+      row.published.emplace_back(entry.quantity, entry.figure);
+}
+
 void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
   const double error = row.score.metrics.rmse;
   rmse.add(error);
@@ -88,9 +101,7 @@ std::vector<Row> StudyRows::rows(const Fill& fill) const {
     row.runs = sum.rmse.count();
     row.rmse = sum.rmse.mean();
     row.rmse_std = sum.rmse.std_dev();
-    for (const PaperEntry& entry : published_)
-      if (entry.condition == key.condition && entry.model == key.model)
-        row.published.emplace_back(entry.quantity, entry.figure);
+    show_published(row, published_, key.condition, key.model);
     fill(sum, row);
     rows.push_back(std::move(row));
   }

@@ -16,6 +16,24 @@
 
 namespace torsio {
 
+/// Under which condition of a study a recording is scored.
+class StudyConditions {
+ public:
+  void add(const std::string& recording, const std::string& condition) {
+    conditions_.emplace_back(recording, condition);
+  }
+  /// The recording's own name if it was not added.
+  [[nodiscard]] std::string of(const std::string& recording) const;
+  [[nodiscard]] std::size_t size() const noexcept { return conditions_.size(); }
+
+ private:
+  std::vector<std::pair<std::string, std::string>> conditions_;
+};
+
+/// Adds to a row the published figures of its condition and model.
+void show_published(StudyRow& row, std::span<const PaperEntry> published,
+                    std::string_view condition, std::string_view model);
+
 /// Gathers a study's rows from the results of its fits.
 class StudyRows {
  public:

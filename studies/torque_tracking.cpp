@@ -159,9 +159,7 @@ class TrackingRows {
     // Whatever the friction of the spring and the output were: the papers do not print them.
     const std::string at =
         fmt::format("{}, {:g} Nm, {}", task.actuator, task.amplitude_Nm, name(kind));
-    for (const PaperEntry& entry : kPublishedTracking)
-      if (entry.condition == at && entry.model == family)
-        row.published.emplace_back(entry.quantity, entry.figure);
+    show_published(row, kPublishedTracking, at, family);
     return sums_.emplace_back(Sum{.row = std::move(row)});
   }
 

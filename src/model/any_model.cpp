@@ -4,6 +4,8 @@ namespace torsio {
 
 static_assert(Model<AnyModel> && Invertible<AnyModel>);
 
+AnyParameters::AnyParameters(std::unique_ptr<detail::HeldParameters> held) noexcept
+    : held_(std::move(held)) {}
 AnyParameters::AnyParameters(const AnyParameters& other) : held_(other.held_->copy()) {}
 AnyParameters& AnyParameters::operator=(const AnyParameters& other) {
   if (this != &other) held_ = other.held_->copy();
@@ -16,9 +18,7 @@ AnyParameters::~AnyParameters() = default;
 std::string_view AnyParameters::family() const noexcept { return held_->family(); }
 
 AnyParameters AnyParameters::at_sample_period(double sample_period_s) const {
-  AnyParameters other = *this;
-  other.held_ = held_->at_sample_period(sample_period_s);
-  return other;
+  return AnyParameters(held_->at_sample_period(sample_period_s));
 }
 
 AnyModel::AnyModel(const Parameters& parameters) : held_(parameters.held_->model()) {}

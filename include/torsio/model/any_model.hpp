@@ -60,6 +60,7 @@ class AnyParameters {
 
  private:
   friend class AnyModel;
+  explicit AnyParameters(std::unique_ptr<detail::HeldParameters> held) noexcept;
   std::unique_ptr<detail::HeldParameters> held_;
 };
 
