@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
 #include "evaluate/fit_and_score.hpp"
 #include "fit/common/guards.hpp"
+#include "fit/common/option_fields.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
 #include "torsio/evaluate/comparison.hpp"
@@ -16,33 +16,6 @@
 
 namespace torsio {
 namespace {
-
-using Kind = OptionInfo::Kind;
-
-constexpr auto kOptions = std::to_array<OptionInfo>({
-    {"step_size", Kind::number, "0.003", 1e-9, 1.999,
-     "nlms: mu, share of an error that is mended; about 1 / samples in a cycle of the work"},
-    {"leak", Kind::number, "1e-5", 0.0, 0.999,
-     "nlms: share of the change that an update takes back"},
-    {"regularisation", Kind::number, "1e-3", 1e-12, 1e12,
-     "nlms: beside the square of the features"},
-    {"forgetting", Kind::number, "0.9995", 0.9, 1.0, "rls: weight of the past at each update"},
-    {"initial_covariance", Kind::number, "0.001", 1e-12, 1e12,
-     "rls: larger learns faster at first"},
-    {"trace_cap", Kind::number, "1", 1.0, 1e12, "rls: how far the covariance may grow"},
-    {"sensor_std", Kind::number, "0", 0.0, 1e12,
-     "noise of the reference, target's unit; errors below dead_zone times that teach nothing"},
-    {"dead_zone", Kind::number, "3", 0.0, 1e6, "see sensor_std"},
-    {"largest_error", Kind::number, "auto", 1e-12, 1e300,
-     "larger ones teach nothing, target's unit; auto: the spread that the network was trained on"},
-    {"frozen_after_s", Kind::number, "0.2", 0.0, 1e6,
-     "a reference that has not changed for so long is stale; 0: it may rest"},
-    {"saturation", Kind::number, "auto", 1e-12, 1e300,
-     "where the reference sensor ends, target's unit; auto: nowhere"},
-    {"largest_change", Kind::number, "0.2", 1e-9, 1e6, "of the weights, as a share of them"},
-    {"comparison_s", Kind::number, "10", 1e-3, 1e6,
-     "back to the frozen weights if they were better over so long; a cycle of the work or more"},
-});
 
 constexpr std::size_t kReportEvery = 64;
 
@@ -163,28 +136,16 @@ void note_adaptation(ModelCard& card, const AdaptationSettings& settings,
 
 }  // namespace
 
-std::span<const OptionInfo> adaptation_options() noexcept { return kOptions; }
+std::span<const OptionInfo> adaptation_options() { return options_of<AdaptationSettings>(); }
 
 AdaptationSettings adaptation_settings(const std::string& method,
                                        const std::map<std::string, std::string>& given) {
   if (method != "nlms" && method != "rls")
     throw UsageError(
         {.place = "adaptation method", .expected = "nlms or rls", .found = '"' + method + '"'});
-  const Options options(kOptions, given);
-  return {.rule = method == "rls" ? AdaptationRule::rls : AdaptationRule::nlms,
-          .step_size = options.number("step_size"),
-          .leak = options.number("leak"),
-          .regularisation = options.number("regularisation"),
-          .forgetting = options.number("forgetting"),
-          .initial_covariance = options.number("initial_covariance"),
-          .trace_cap = options.number("trace_cap"),
-          .sensor_std = options.number("sensor_std"),
-          .dead_zone = options.number("dead_zone"),
-          .largest_error = options.number("largest_error"),
-          .frozen_after_s = options.number("frozen_after_s"),
-          .saturation = options.number("saturation"),
-          .largest_change = options.number("largest_change"),
-          .comparison_s = options.number("comparison_s")};
+  auto settings = filled<AdaptationSettings>(Options(adaptation_options(), given));
+  settings.rule = method == "rls" ? AdaptationRule::rls : AdaptationRule::nlms;
+  return settings;
 }
 
 AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,

@@ -139,7 +139,9 @@ AnyModel::Parameters empty_parameters(const std::string& family, const std::stri
     throw Error({.place = place + "/family",
                  .expected = "one of " + known_model_families(),
                  .found = fmt::format("'{}'", family),
-                 .advice = "Update torsio if a newer one has this family."});
+                 .advice =
+                     "Update torsio if a newer one has this family. A build with -DTORSIO_FAMILIES "
+                     "knows only those that it names (docs/library.md): add this one there."});
   }
 }
 

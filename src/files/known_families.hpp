@@ -146,7 +146,8 @@ void with_own_type(Parameters& parameters, const Use& use) {
   if (!is_known)
     throw Error({.place = "family",
                  .expected = "one that this build of torsio knows",
-                 .found = std::string(parameters.family())});
+                 .found = std::string(parameters.family()),
+                 .advice = "A build with -DTORSIO_FAMILIES knows only those that it names."});
 }
 
 }  // namespace torsio

@@ -17,7 +17,7 @@
 namespace torsio {
 
 /// The settings of an adaptation as a user gives them, `name=value`.
-[[nodiscard]] std::span<const OptionInfo> adaptation_options() noexcept;
+[[nodiscard]] std::span<const OptionInfo> adaptation_options();
 
 /// @param method "nlms" or "rls". @throws UsageError for another one, or as `Options`.
 [[nodiscard]] AdaptationSettings adaptation_settings(

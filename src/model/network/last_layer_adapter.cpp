@@ -24,35 +24,42 @@ constexpr std::array<std::string_view, kLearningOutcomes> kNames{
     "reference_stale", "reference_saturated",
     "error_too_large", "dead_zone"};
 
-void require(bool is_met, const char* setting, const char* expected, double found) {
-  if (!is_met)
-    throw Error({.place = fmt::format("adaptation: {}", setting),
-                 .expected = expected,
-                 .found = fmt::format("{}", found)});
+/// What `AdaptationSettings::visit_options` states about a field, as far as it is used here: the
+/// libraries of a robot have no `OptionInfo`.
+struct StatedRange {
+  std::string_view name;
+  double minimum = 0.0;
+  double maximum = 0.0;
+  std::string_view help;
+};
+
+[[noreturn]] void refuse(std::string_view setting, std::string expected, double found) {
+  throw Error({.place = fmt::format("adaptation: {}", setting),
+               .expected = std::move(expected),
+               .found = fmt::format("{}", found)});
+}
+
+/// NaN, the default of some, stands for "auto".
+bool takes_auto(std::string_view name) {
+  bool found = false;
+  const AdaptationSettings defaults;
+  AdaptationSettings::visit_options(defaults, [&](double value, const StatedRange& stated) {
+    found = found || (stated.name == name && std::isnan(value));
+  });
+  return found;
 }
 
 void check(const AdaptationSettings& settings) {
-  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-  const auto not_negative = [](double value) { return value >= 0.0 && std::isfinite(value); };
-  const AdaptationSettings& s = settings;
-  require(s.step_size > 0.0 && s.step_size < 2.0, "step_size", "above 0 and below 2", s.step_size);
-  require(s.leak >= 0.0 && s.leak < 1.0, "leak", "at least 0 and below 1", s.leak);
-  require(positive(s.regularisation), "regularisation", "a positive number", s.regularisation);
-  require(s.forgetting >= 0.9 && s.forgetting <= 1.0, "forgetting", "0.9 to 1", s.forgetting);
-  require(s.initial_covariance > 0.0 && s.initial_covariance <= 1e12, "initial_covariance",
-          "above 0 and at most 1e12", s.initial_covariance);
-  require(s.trace_cap >= 1.0 && s.trace_cap <= 1e12, "trace_cap", "1 to 1e12", s.trace_cap);
-  require(not_negative(s.sensor_std), "sensor_std", "a number, at least 0", s.sensor_std);
-  require(not_negative(s.dead_zone), "dead_zone", "a number, at least 0", s.dead_zone);
-  require(std::isnan(s.largest_error) || positive(s.largest_error), "largest_error",
-          "a positive number, or NaN for the network's target_scale", s.largest_error);
-  require(s.oldest_reference_s >= 0.0, "oldest_reference_s", "at least 0", s.oldest_reference_s);
-  require(not_negative(s.frozen_after_s), "frozen_after_s", "a number, at least 0",
-          s.frozen_after_s);
-  require(std::isnan(s.saturation) || s.saturation > 0.0, "saturation", "above 0, or NaN for none",
-          s.saturation);
-  require(positive(s.largest_change), "largest_change", "a positive number", s.largest_change);
-  require(positive(s.comparison_s), "comparison_s", "a positive number", s.comparison_s);
+  AdaptationSettings::visit_options(settings, [](double value, const StatedRange& stated) {
+    if (value >= stated.minimum && value <= stated.maximum) return;
+    const bool has_auto = takes_auto(stated.name);
+    if (has_auto && std::isnan(value)) return;
+    refuse(stated.name,
+           fmt::format("{} to {}{}", stated.minimum, stated.maximum, has_auto ? ", or NaN" : ""),
+           value);
+  });
+  if (!(settings.oldest_reference_s >= 0.0))
+    refuse("oldest_reference_s", "at least 0", settings.oldest_reference_s);
 }
 
 double length_of(const DenseLayer& layer) {

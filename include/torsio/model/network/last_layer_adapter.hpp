@@ -18,26 +18,88 @@ namespace torsio {
 enum class AdaptationRule : std::uint8_t { nlms, rls };
 
 /// How a last layer is adapted, and what keeps that safe. Errors, noise and limits of the reference
-/// are in the target's unit.
+/// are in the target's unit. `LastLayerAdapter` accepts the ranges that `visit_options` states.
 struct AdaptationSettings {
   AdaptationRule rule = AdaptationRule::nlms;
-  double step_size = 0.003;          ///< NLMS: mu, above 0 and below 2; docs/decisions/0015
-  double leak = 1e-5;                ///< NLMS: gamma, share of W - W0 that an update takes back
-  double regularisation = 1e-3;      ///< NLMS: epsilon, beside the square of the features
-  double forgetting = 0.9995;        ///< RLS: lambda, 0.9 to 1
-  double initial_covariance = 1e-3;  ///< RLS: delta, P starts as delta I
-  double trace_cap = 1.0;            ///< RLS: tr P stays below this many times that of delta I
-  double sensor_std = 0.0;           ///< one standard deviation of the reference's own noise
-  double dead_zone = 3.0;            ///< errors below this many `sensor_std` teach nothing
-  double largest_error =
-      kNotMeasured;                 ///< larger ones teach nothing; NaN: the network's target_scale
-  double oldest_reference_s = 0.0;  ///< an older value is stale
-  double frozen_after_s =
-      0.2;  ///< a value that has not changed for so long is stale; 0: it may rest
-  double saturation = kNotMeasured;  ///< |reference| that the sensor ends at; NaN: nowhere
-  double largest_change = 0.2;       ///< rho: |W - W0| stays within this share of |W0|
-  double comparison_s =
-      10.0;  ///< over which the adapted model must not be worse than the frozen one
+  double step_size = 0.003;             ///< NLMS: mu; docs/decisions/0015
+  double leak = 1e-5;                   ///< NLMS: gamma, share of W - W0
+  double regularisation = 1e-3;         ///< NLMS: epsilon
+  double forgetting = 0.9995;           ///< RLS: lambda
+  double initial_covariance = 1e-3;     ///< RLS: delta, P starts as delta I
+  double trace_cap = 1.0;               ///< RLS: tr P over that of delta I
+  double sensor_std = 0.0;              ///< one standard deviation of the reference's own noise
+  double dead_zone = 3.0;               ///< in `sensor_std`
+  double largest_error = kNotMeasured;  ///< NaN: the network's target_scale
+  double oldest_reference_s = 0.0;      ///< an older value is stale; not negative
+  double frozen_after_s = 0.2;
+  double saturation = kNotMeasured;  ///< of |reference|; NaN: nowhere
+  double largest_change = 0.2;       ///< rho, of |W - W0| over |W0|
+  double comparison_s = 10.0;
+
+  /// The settings that a user gives by name, with range and help. `rule` has a flag of its own, and
+  /// a recording's references are never old.
+  template <class Self, class Visit>
+  static void visit_options(Self& self, const Visit& visit) {
+    visit(self.step_size,
+          {.name = "step_size",
+           .minimum = 1e-9,
+           .maximum = 1.999,
+           .help = "nlms: mu, share of an error that is corrected; about 1 / samples in a cycle of "
+                   "the work"});
+    visit(self.leak, {.name = "leak",
+                      .minimum = 0.0,
+                      .maximum = 0.999,
+                      .help = "nlms: share of the change that an update takes back"});
+    visit(self.regularisation, {.name = "regularisation",
+                                .minimum = 1e-12,
+                                .maximum = 1e12,
+                                .help = "nlms: added to the square of the features"});
+    visit(self.forgetting, {.name = "forgetting",
+                            .minimum = 0.9,
+                            .maximum = 1.0,
+                            .help = "rls: weight of the past at each update"});
+    visit(self.initial_covariance, {.name = "initial_covariance",
+                                    .minimum = 1e-12,
+                                    .maximum = 1e12,
+                                    .help = "rls: larger learns faster at first"});
+    visit(self.trace_cap, {.name = "trace_cap",
+                           .minimum = 1.0,
+                           .maximum = 1e12,
+                           .help = "rls: how far the covariance may grow"});
+    visit(self.sensor_std,
+          {.name = "sensor_std",
+           .minimum = 0.0,
+           .maximum = 1e12,
+           .help = "noise of the reference, target's unit; nothing is learned from "
+                   "errors below dead_zone times that"});
+    visit(self.dead_zone,
+          {.name = "dead_zone", .minimum = 0.0, .maximum = 1e6, .help = "see sensor_std"});
+    visit(self.largest_error, {.name = "largest_error",
+                               .minimum = 1e-12,
+                               .maximum = 1e300,
+                               .help = "nothing is learned from larger ones, target's unit; auto: "
+                                       "the spread that the network was trained on"});
+    visit(self.frozen_after_s, {.name = "frozen_after_s",
+                                .minimum = 0.0,
+                                .maximum = 1e6,
+                                .help = "a reference that has not changed for so long is stale; 0: "
+                                        "it may rest"});
+    visit(self.saturation,
+          {.name = "saturation",
+           .minimum = 1e-12,
+           .maximum = 1e300,
+           .help = "where the reference sensor ends, target's unit; auto: nowhere"});
+    visit(self.largest_change, {.name = "largest_change",
+                                .minimum = 1e-9,
+                                .maximum = 1e6,
+                                .help = "of the weights, as a share of them"});
+    visit(self.comparison_s,
+          {.name = "comparison_s",
+           .minimum = 1e-3,
+           .maximum = 1e6,
+           .help = "back to the frozen weights if they were better over so long; a "
+                   "cycle of the work or more"});
+  }
 };
 
 /// What the sensor to learn from says at one tick.
