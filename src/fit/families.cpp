@@ -11,6 +11,7 @@
 #include "fit/hysteresis/hysteresis_families.hpp"
 #include "fit/linear/fit_linear.hpp"
 #include "fit/linear/fit_polynomial.hpp"
+#include "fit/linear/named_coefficients.hpp"
 #include "fit/mixture/fit_dgmm.hpp"
 #include "fit/narx/narx_families.hpp"
 #include "fit/network/network_families.hpp"
@@ -21,17 +22,27 @@
 namespace torsio {
 namespace {
 
+ParameterDescription describe_network(const AnyParameters& parameters,
+                                      const EstimatorSettings& /*settings*/) {
+  constexpr int kDigits = 6;
+  const auto& network = parameters.get<Viscoelastic::Parameters>().network;
+  return {.lines = {"network " + text_of(network, kDigits)}, .covered = "network.nodes."};
+}
+
 std::vector<FamilyInfo> static_families() {
   return {
-      family_of<fit_linear>(
-          {.name = Linear::kFamily, .summary = "spring with a bias: b + sum k x"}),
+      family_of<fit_linear>({.name = Linear::kFamily,
+                             .summary = "spring with a bias: b + sum k x",
+                             .describe = describe_coefficients}),
       family_of<fit_linear_coulomb>(
           {.name = LinearCoulomb::kFamily,
-           .summary = "spring with a bias and friction: b + sum k x + c tanh(r/v)"}),
+           .summary = "spring with a bias and friction: b + sum k x + c tanh(r/v)",
+           .describe = describe_coefficients}),
       family_of<fit_polynomial>(
           {.name = Polynomial::kFamily,
            .summary = "curve of the first input, one for each direction: P(x) + sum k x",
-           .variations = {{"degree", "3"}, {"degree", "7"}}}),
+           .variations = {{"degree", "3"}, {"degree", "7"}},
+           .describe = describe_coefficients}),
       family_of<fit_grey_box>(
           {.name = GreyBox::kFamily,
            .summary =
@@ -43,7 +54,8 @@ std::vector<FamilyInfo> static_families() {
            .only_if_named = true,
            .in_search = true,
            .variations = {{"network", "standard_linear_solid"},
-                          {"network", "generalised_maxwell(3)"}}}),
+                          {"network", "generalised_maxwell(3)"}},
+           .describe = describe_network}),
   };
 }
 

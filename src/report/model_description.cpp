@@ -10,12 +10,9 @@
 #include <vector>
 
 #include "files/known_families.hpp"
-#include "fit/gaussian_process/kernel_search.hpp"
-#include "fit/hammerstein_wiener/fit_hammerstein_wiener.hpp"
-#include "fit/linear/named_coefficients.hpp"
-#include "fit/narx/fit_narx_polynomial.hpp"
 #include "model/common/parameters.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/fit/families.hpp"
 #include "torsio/import/import_network.hpp"
 #include "torsio/model/network/network_layers.hpp"
 #include "torsio/report/json_text.hpp"
@@ -99,33 +96,13 @@ std::string parameter_lines(const std::vector<Leaf>& leaves) {
   return fmt::format("{}\n", fmt::join(lines, "\n"));
 }
 
-/// The linear part of a Hammerstein-Wiener model in words; else nothing.
-std::string linear_part_lines(const ModelFile& model) {
-  const auto* of = model.parameters.get_if<HammersteinWiener::Parameters>();
-  if (of == nullptr) return {};
-  std::string text;
-  for (const std::string& line : continuous_notes(*of)) text += line + "\n";
-  return text;
-}
-
-/// A covariance function or a network of springs and dashpots as their texts, the numbers included;
-/// else nothing.
-std::string structure_line(const ModelFile& model) {
-  const AnyParameters& parameters = model.parameters;
-  if (const auto* const process = parameters.get_if<GaussianProcess::Parameters>())
-    return fmt::format("kernel {}\n", description_of(process->kernel));
-  if (const auto* const process = parameters.get_if<ParametricGp::Parameters>())
-    return fmt::format("kernel {}\n", description_of(process->kernel));
-  if (const auto* const network = parameters.get_if<Viscoelastic::Parameters>())
-    return fmt::format("network {}\n", text_of(network->network, 6));
+/// As the first family that describes such models does.
+ParameterDescription description_of(const ModelFile& model) {
+  const std::string_view of = model.parameters.family();
+  for (const FamilyInfo& family : families())
+    if (family.model_family == of && family.describe != nullptr)
+      return family.describe(model.parameters, model.settings);
   return {};
-}
-
-/// The difference equation of a polynomial NARX model in words; else nothing.
-std::string equation_line(const ModelFile& model) {
-  const auto* const narx = model.parameters.get_if<Narx<MultivariatePolynomial>::Parameters>();
-  if (narx == nullptr) return {};
-  return equation_of(*narx, model.settings.features.inputs, model.settings.target) + "\n";
 }
 
 std::string coefficient_table(const std::vector<FittedParameter>& told) {
@@ -195,16 +172,16 @@ std::string model_description(const ModelFile& model) {
   text += fmt::format("\n{}", range_table(settings));
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
-  const std::vector<FittedParameter> told =
-      named_coefficients(model.parameters, settings.features.inputs, settings.target);
-  if (!told.empty() && told.size() <= kReadable) return text + "\n" + coefficient_table(told);
+  const ParameterDescription told = description_of(model);
+  if (!told.coefficients.empty() && told.coefficients.size() <= kReadable)
+    return text + "\n" + coefficient_table(told.coefficients);
   std::vector<Leaf> leaves = leaves_of(model);
-  std::erase_if(leaves, [](const Leaf& leaf) {
-    return leaf.name.starts_with("kernel.") || leaf.name.starts_with("network.nodes.");
+  std::erase_if(leaves, [&](const Leaf& leaf) {
+    return !told.covered.empty() && leaf.name.starts_with(told.covered);
   });
-  text += fmt::format("\n{}{}{}{}", structure_line(model), equation_line(model),
-                      linear_part_lines(model), parameter_lines(leaves));
-  return text;
+  text += "\n";
+  for (const std::string& line : told.lines) text += line + "\n";
+  return text + parameter_lines(leaves);
 }
 
 std::string model_description_json(const ModelFile& model) {

@@ -3,17 +3,30 @@
 #include "fit/common/fitted_model.hpp"
 #include "fit/gaussian_process/fit_gaussian_process.hpp"
 #include "fit/gaussian_process/fit_parametric_gp.hpp"
+#include "fit/gaussian_process/kernel_search.hpp"
 
 namespace torsio {
+namespace {
+
+template <class Process>
+ParameterDescription describe_kernel(const AnyParameters& parameters,
+                                     const EstimatorSettings& /*settings*/) {
+  const auto& kernel = parameters.get<typename Process::Parameters>().kernel;
+  return {.lines = {"kernel " + description_of(kernel)}, .covered = "kernel."};
+}
+
+}  // namespace
 
 std::vector<FamilyInfo> gaussian_process_families() {
   return {
       family_of<fit_gaussian_process>(
           {.name = GaussianProcess::kFamily,
-           .summary = "exact Gaussian process over some hundred samples"}),
+           .summary = "exact Gaussian process over some hundred samples",
+           .describe = describe_kernel<GaussianProcess>}),
       family_of<fit_parametric_gp>(
           {.name = ParametricGp::kFamily,
-           .summary = "Gaussian process at a few hypothetical inputs, learned sample by sample"}),
+           .summary = "Gaussian process at a few hypothetical inputs, learned sample by sample",
+           .describe = describe_kernel<ParametricGp>}),
       family_of<fit_variational_gp>({.name = "parametric_gp_variational",
                                      .summary = "the same by a variational bound, in closed form",
                                      .model_family = ParametricGp::kFamily})};

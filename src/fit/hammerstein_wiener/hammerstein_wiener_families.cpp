@@ -39,6 +39,12 @@ FittedModel fit(const TrainingData& data, const HammersteinWienerOptions& option
   return fitted_model(fit_hammerstein_wiener(data, options, context));
 }
 
+/// Its linear part in words.
+ParameterDescription describe(const AnyParameters& parameters,
+                              const EstimatorSettings& /*settings*/) {
+  return {.lines = continuous_notes(parameters.get<HammersteinWiener::Parameters>())};
+}
+
 }  // namespace
 
 std::vector<FamilyInfo> hammerstein_wiener_families() {
@@ -46,7 +52,8 @@ std::vector<FamilyInfo> hammerstein_wiener_families() {
                           .summary = "linear system between two curves, least error in free run",
                           .only_if_named = true,
                           .in_search = true,
-                          .variations = {{"map", "piecewise_linear"}}})};
+                          .variations = {{"map", "piecewise_linear"}},
+                          .describe = describe})};
 }
 
 }  // namespace torsio

@@ -134,6 +134,12 @@ std::vector<FittedParameter> named_coefficients(const AnyModel::Parameters& para
   return all;
 }
 
+ParameterDescription describe_coefficients(const AnyParameters& parameters,
+                                           const EstimatorSettings& settings) {
+  return {.coefficients =
+              named_coefficients(parameters, settings.features.inputs, settings.target)};
+}
+
 std::vector<FittedParameter> fitted_coefficients(const AnyModel::Parameters& parameters,
                                                  const Matrix& coefficients, const Design& design,
                                                  const TrainingData& data) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fit/common/design.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/any_model.hpp"
@@ -19,6 +20,10 @@ namespace torsio {
 [[nodiscard]] std::vector<FittedParameter> named_coefficients(
     const AnyModel::Parameters& parameters, std::span<const std::string> inputs,
     const std::string& target, std::span<const double> errors = {});
+
+/// The same as `FamilyInfo::describe` of these families.
+[[nodiscard]] ParameterDescription describe_coefficients(const AnyParameters& parameters,
+                                                         const EstimatorSettings& settings);
 
 /// The same of a model that was just fitted to a design, with its standard errors unless the
 /// coefficients are scheduled.

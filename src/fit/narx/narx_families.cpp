@@ -59,6 +59,13 @@ FittedModel narx_variational(const TrainingData& data, const Options& options,
   return narx_by<ParametricGp>(kVariational, data, options, context);
 }
 
+/// The difference equation in words.
+ParameterDescription describe_equation(const AnyParameters& parameters,
+                                       const EstimatorSettings& settings) {
+  return {.lines = {equation_of(parameters.get<Narx<MultivariatePolynomial>::Parameters>(),
+                                settings.features.inputs, settings.target)}};
+}
+
 struct NarxFamily {
   std::string_view name;
   std::string_view inner;
@@ -105,7 +112,8 @@ std::vector<FamilyInfo> narx_families(std::span<const FamilyInfo> known) {
            .summary = "few products of inputs and its own past output, chosen one by one",
            .only_if_named = true,
            .in_search = true,
-           .variations = {{"degree", "2"}}})};
+           .variations = {{"degree", "2"}},
+           .describe = describe_equation})};
   for (std::size_t i = 0; i < kNarxFamilies.size(); ++i) {
     const NarxFamily& of = kNarxFamilies[i];
     options[i] = options_with(std::ranges::find(known, of.inner, &FamilyInfo::name)->options);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "torsio/core/not_measured.hpp"
+#include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/options.hpp"
@@ -30,6 +31,13 @@ struct OptionVariation {
   std::string_view value;
 };
 
+/// What the parameters of a model mean, for people.
+struct ParameterDescription {
+  std::vector<std::string> lines = {};             ///< "kernel se (length 1)"
+  std::string covered = {};                        ///< prefix of the fields that the lines state
+  std::vector<FittedParameter> coefficients = {};  ///< if a table of them states everything
+};
+
 /// How one family is trained: what `fit --list`, the command line, cross-validation, `compare` and the
 /// structure search know about it.
 struct FamilyInfo {
@@ -44,6 +52,8 @@ struct FamilyInfo {
   bool only_if_named = false;       ///< not in `all`: slow, or made for other data than most have
   bool in_search = !only_if_named;  ///< a structure search tries it
   std::vector<OptionVariation> variations = {};  ///< orders, sizes, structures that a search tries
+  /// Of its models' parameters; null: their fields say all.
+  ParameterDescription (*describe)(const AnyParameters&, const EstimatorSettings&) = nullptr;
 };
 
 }  // namespace torsio
