@@ -543,7 +543,7 @@ std::string complaint(const AdaptationSettings& settings,
 }
 
 TEST(LastLayerAdapter, RefusesSettingsOutOfRange) {
-  EXPECT_THAT(complaint({.step_size = 2.0}), HasSubstr("step_size: expected 1e-09 to 1.999"));
+  EXPECT_THAT(complaint({.step_size = 2.0}), HasSubstr("step_size: expected 1e-09 to 1.999999"));
   EXPECT_THAT(complaint({.step_size = 0.0}), HasSubstr("step_size"));
   EXPECT_THAT(complaint({.step_size = kNaN}), HasSubstr("step_size"));
   EXPECT_THAT(complaint({.leak = 1.0}), HasSubstr("leak"));

@@ -43,7 +43,7 @@ struct AdaptationSettings {
     visit(self.step_size,
           {.name = "step_size",
            .minimum = 1e-9,
-           .maximum = 1.999,
+           .maximum = 1.999999,
            .help = "nlms: mu, share of an error that is corrected; about 1 / samples in a cycle of "
                    "the work"});
     visit(self.leak, {.name = "leak",
