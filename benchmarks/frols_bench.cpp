@@ -1,6 +1,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "fit/common/usable_table.hpp"
 #include "fit/narx/frols.hpp"
 #include "rows.hpp"
 #include "torsio/core/random.hpp"

@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/common/usable_table.hpp"
 #include "fit/gaussian_process/kernel_data.hpp"
 #include "fit/gaussian_process/kernel_search.hpp"
 #include "fit/gaussian_process/likelihood_search.hpp"

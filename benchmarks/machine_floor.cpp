@@ -70,7 +70,7 @@ HWY_EXPORT(multiply_add_chains);
 HWY_EXPORT(double_lanes);
 
 double stream_seconds(std::size_t bytes) {
-  const AlignedVector<std::uint64_t> data(bytes / sizeof(std::uint64_t), 1);
+  const detail::AlignedVector<std::uint64_t> data(bytes / sizeof(std::uint64_t), 1);
   constexpr std::size_t kPasses = 100;
   volatile std::uint64_t sink = 0;
   const double seconds = best_seconds([&] {

@@ -139,7 +139,7 @@ Row update_row(AdaptationRule rule, std::size_t pass_bytes, double multiply_adds
                            1e-3);
   Lstm network(parameters);
   const Matrix inputs = waves(kLstm250.inputs);
-  std::vector<AlignedVector<float>> features;
+  std::vector<detail::AlignedVector<float>> features;
   std::vector<double> frozen;
   for (std::size_t n = 0; n < kTimed; ++n) {
     frozen.push_back(network.step(inputs.row(n)).value);

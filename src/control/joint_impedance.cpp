@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/loop_design.hpp"
 #include "core/checks.hpp"
 #include "passive_sweep.hpp"
 

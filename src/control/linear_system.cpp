@@ -9,6 +9,7 @@
 #include <unsupported/Eigen/MatrixFunctions>
 #include <utility>
 
+#include "control/loop_design.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"

@@ -3,6 +3,7 @@
 #include <limits>
 #include <numbers>
 
+#include "control/loop_design.hpp"
 #include "torsio/control/linear_system.hpp"
 #include "torsio/core/error.hpp"
 

@@ -129,7 +129,7 @@ Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcep
   if (is_asked_) remember(asked_);
   is_asked_ = false;
   follows_answer_ = false;
-  const EstimatorCore::Conditioned input = core_.condition(inputs_.from(sample));
+  const detail::EstimatorCore::Conditioned input = core_.condition(inputs_.from(sample));
   if (input.fault != Fault::none || !std::isfinite(torque_Nm))
     return {.value = last_rad_,
             .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};

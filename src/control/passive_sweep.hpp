@@ -1,5 +1,6 @@
 #pragma once
 
+#include "control/loop_design.hpp"
 #include "torsio/control/series_elastic_joint.hpp"
 
 namespace torsio {

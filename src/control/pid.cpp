@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/loop_design.hpp"
 #include "core/checks.hpp"
 
 namespace torsio {

@@ -8,6 +8,7 @@
 #include <string>
 #include <variant>
 
+#include "control/loop_design.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <variant>
 
+#include "control/loop_design.hpp"
 #include "core/checks.hpp"
 #include "passive_sweep.hpp"
 #include "torsio/core/error.hpp"

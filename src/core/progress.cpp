@@ -1,5 +1,6 @@
 #include "torsio/core/progress.hpp"
 
+#include "core/report_progress.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/report_progress.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

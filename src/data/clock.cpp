@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "data/inspect_clock.hpp"
+
 namespace torsio {
 namespace {
 

@@ -8,6 +8,7 @@
 
 #include "data/byte_source.hpp"
 #include "data/csv_header.hpp"
+#include "data/csv_table.hpp"
 #include "data/decimal.hpp"
 #include "data/line_reader.hpp"
 #include "data/names.hpp"

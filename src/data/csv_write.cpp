@@ -2,6 +2,7 @@
 #include <set>
 #include <string>
 
+#include "data/csv_table.hpp"
 #include "text_sink.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "data/canonical_channels.hpp"
+#include "data/csv_table.hpp"
+#include "data/measured_recordings.hpp"
 #include "data/names.hpp"
 #include "data/whole_samples.hpp"
 #include "torsio/core/error.hpp"

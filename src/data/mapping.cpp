@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "data/columns.hpp"
+#include "data/csv_table.hpp"
+#include "data/measured_recordings.hpp"
 #include "data/names.hpp"
 #include "data/record_clock.hpp"
 #include "data/whole_samples.hpp"

@@ -8,6 +8,9 @@
 #include <span>
 #include <utility>
 
+#include "data/csv_table.hpp"
+#include "data/inspect_clock.hpp"
+#include "data/interpolate.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
 #include "torsio/data/resample.hpp"

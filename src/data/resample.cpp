@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "data/csv_table.hpp"
+#include "data/interpolate.hpp"
 #include "data/whole_samples.hpp"
 #include "torsio/data/csv.hpp"
 

@@ -14,7 +14,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
-namespace torsio {
+namespace torsio::detail {
 namespace {
 
 /// An error bar that says something; NaN for one that does not.
@@ -240,4 +240,4 @@ double EstimatorCore::residual_std_at(double value) const noexcept {
   return evidence(table.std_dev[static_cast<std::size_t>(region)]);
 }
 
-}  // namespace torsio
+}  // namespace torsio::detail

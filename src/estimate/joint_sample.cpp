@@ -38,7 +38,8 @@ std::string known_names() {
 
 }  // namespace
 
-JointInputs::JointInputs(const std::vector<std::string>& raw_inputs, const std::string& target)
+detail::JointInputs::JointInputs(const std::vector<std::string>& raw_inputs,
+                                 const std::string& target)
     : raw_(raw_inputs.size()) {
   if (const auto parts = split_channel_name(target); !parts || parts->unit->si_suffix != "Nm")
     throw Error({.place = "torque estimator",
@@ -56,7 +57,7 @@ JointInputs::JointInputs(const std::vector<std::string>& raw_inputs, const std::
   }
 }
 
-std::span<const double> JointInputs::from(const JointSample& sample) noexcept {
+std::span<const double> detail::JointInputs::from(const JointSample& sample) noexcept {
   std::ranges::transform(getters_, raw_.begin(), [&](Getter get) { return get(sample); });
   return raw_;
 }

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "fit/common/guards.hpp"
 #include "fit/common/option_fields.hpp"
+#include "numerics/metrics_accumulator.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
 #include "torsio/evaluate/comparison.hpp"

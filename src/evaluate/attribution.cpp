@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "evaluate/permutation_importance.hpp"
+#include "evaluate/shapley.hpp"
 #include "fit/common/model_run.hpp"
 #include "numerics/parallel.hpp"
 #include "numerics/shared_progress.hpp"

@@ -8,9 +8,11 @@
 #include <optional>
 #include <string_view>
 
+#include "core/report_progress.hpp"
 #include "evaluate/initial_state.hpp"
 #include "fit/common/finite_input.hpp"
 #include "model/second_order/friction_drive.hpp"
+#include "numerics/metrics_accumulator.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

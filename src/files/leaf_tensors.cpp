@@ -53,13 +53,13 @@ void check_numbers(const Tensor& tensor, const std::string& place, bool may_be_n
 }
 
 template <class Number>
-Tensor table_tensor(const Table2d<Number>& table) {
+Tensor table_tensor(const detail::Table2d<Number>& table) {
   return {.shape = {table.rows, table.columns}, .values = table.values};
 }
 
 template <class Number>
 void read_table(const Tensor& tensor, const std::string& place, std::string_view wanted,
-                Table2d<Number>& table) {
+                detail::Table2d<Number>& table) {
   table.values = values_of<Number>(tensor, place, 2, wanted);
   // An empty table has a shape that no file size bounds; a family may take memory by it.
   const std::size_t longest = std::max(tensor.shape[0], tensor.shape[1]);

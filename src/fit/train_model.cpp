@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "fit/common/guards.hpp"
+#include "fit/common/usable_table.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "import/network_parameters.hpp"
 #include "model/network/gru.hpp"
 #include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"

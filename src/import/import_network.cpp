@@ -10,6 +10,7 @@
 
 #include "data/byte_source.hpp"
 #include "fit/common/guards.hpp"
+#include "import/network_parameters.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/training_data.hpp"
 

@@ -32,7 +32,7 @@ class PackedMatrix {
 
   std::size_t rows_ = 0;
   std::size_t columns_ = 0;
-  AlignedVector<float> values_;  ///< [panel][row][kPanel]
+  detail::AlignedVector<float> values_;  ///< [panel][row][kPanel]
 };
 
 /// C = A B (+ C if `accumulate`), A row-major [rows x B.rows()] with that stride. C's rows are
@@ -42,8 +42,8 @@ void multiply(const float* a, std::size_t a_stride, std::size_t rows, const Pack
 
 /// Memory that `add_product_of_transposed` works in.
 struct Scratch {
-  AlignedVector<float> left;
-  AlignedVector<float> right;
+  detail::AlignedVector<float> left;
+  detail::AlignedVector<float> right;
 };
 
 /// C += A^T B for A [rows x left], B [rows x right]; C [left x right] is written in whole panels.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "numerics/metrics_accumulator.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

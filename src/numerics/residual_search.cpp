@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/report_progress.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 

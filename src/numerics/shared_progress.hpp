@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/report_progress.hpp"
 #include "torsio/core/progress.hpp"
 
 namespace torsio {

@@ -55,7 +55,8 @@ CommandWatchdog::State CommandWatchdog::step(std::int64_t now_ns, const Command&
   if (now_ns < last_ns_) stop_because(Reason::clock);
   last_ns_ = now_ns;
   // The future feeds as little as the past: a command from there would stand for too long.
-  const bool is_fresh = command.is_valid && distance_ns(now_ns, command.written_ns) < timeout_ns_;
+  const bool is_fresh =
+      command.is_valid && detail::distance_ns(now_ns, command.written_ns) < timeout_ns_;
   if (state_ == State::waiting && is_fresh && command.written_ns > armed_ns_) {
     state_ = State::running;
     reason_ = Reason::none;

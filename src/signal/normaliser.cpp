@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "signal/fit_normaliser.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

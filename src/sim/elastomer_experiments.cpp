@@ -161,7 +161,7 @@ BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double amplitude_Nm = spec.torque_amplitude_Nm.value_or(3.0);
   return {.start = kLocked,
           .duration_s = 3.0 * kPhase_s,
-          .next = [amplitude_Nm, clock = SampleClock(kBenchRate_Hz),
+          .next = [amplitude_Nm, clock = detail::SampleClock(kBenchRate_Hz),
                    loop = torque_loop(sheet)](const Measurement& measured) mutable -> BenchAction {
             const double time_s = clock.next_s();
             if (time_s >= kPhase_s && time_s < 2.0 * kPhase_s) {

@@ -12,6 +12,7 @@
 
 #include "bench.hpp"
 #include "bench_log.hpp"
+#include "core/report_progress.hpp"
 #include "experiment_table.hpp"
 #include "sensed_channels.hpp"
 #include "sim/plant/plant.hpp"

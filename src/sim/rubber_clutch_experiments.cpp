@@ -145,7 +145,7 @@ class SineWalk {
   double periods_;
   double rest_s_;
   std::size_t point_ = 0;
-  SampleClock clock_{kBenchRate_Hz};
+  detail::SampleClock clock_{kBenchRate_Hz};
 };
 
 /// The loop turns the input along the reference.
@@ -220,7 +220,7 @@ Multisine drawn_multisine(const ExperimentSpec& spec) {
 BenchProgram multisine(const DataSheet& sheet, const ExperimentSpec& spec) {
   struct FadingIn {
     Multisine sum;
-    SampleClock clock{kBenchRate_Hz};
+    detail::SampleClock clock{kBenchRate_Hz};
     double step() noexcept { return std::min(clock.next_s() / kFadeIn_s, 1.0) * sum.step(); }
   };
   return turning(sheet, kClamped, kMultisine_s, FadingIn{drawn_multisine(spec)});

@@ -10,6 +10,8 @@
 #include <thread>
 #include <vector>
 
+#include "data/csv_table.hpp"
+#include "data/measured_recordings.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"

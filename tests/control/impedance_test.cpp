@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "control/loop_design.hpp"
 #include "spring_joint.hpp"
 #include "support/error_message.hpp"
 #include "torsio/control/joint_impedance.hpp"

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "control/loop_design.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/signal/differentiator.hpp"

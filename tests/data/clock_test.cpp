@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "data/inspect_clock.hpp"
+
 namespace torsio {
 namespace {
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "data/csv_table.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 

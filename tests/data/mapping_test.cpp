@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "data/csv_table.hpp"
+#include "data/measured_recordings.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 

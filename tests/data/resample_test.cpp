@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "data/interpolate.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluate/shapley.hpp"
 #include "model/linear/linear.hpp"
 #include "model/linear/polynomial.hpp"
 #include "support/error_message.hpp"

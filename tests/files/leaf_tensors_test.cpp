@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "fit/common/usable_table.hpp"
 #include "support/dump.hpp"
 #include "support/error_message.hpp"
 

@@ -2,6 +2,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "data/csv_table.hpp"
+#include "data/measured_recordings.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/mapping.hpp"

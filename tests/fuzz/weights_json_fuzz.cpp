@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "import/network_parameters.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/import/weights_json.hpp"
 

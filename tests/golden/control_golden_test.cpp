@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "control/loop_design.hpp"
 #include "torsio/control/deflection_controller.hpp"
 
 namespace torsio {

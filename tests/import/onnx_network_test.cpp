@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string>
 
+#include "import/network_parameters.hpp"
 #include "model/network/lstm.hpp"
 #include "support/error_message.hpp"
 #include "torsio/import/import_network.hpp"

@@ -58,7 +58,7 @@ TEST_P(ModelFamily, HasTheTraitsThatItsRowsState) {
     if (F::kFamily != GetParam()) return;
     for (const FamilyInfo& row : families()) {
       if (row.model_family != GetParam()) continue;
-      EXPECT_EQ(row.is_spring, traits_of<F>().is_spring) << row.name;
+      EXPECT_EQ(row.is_spring, detail::traits_of<F>().is_spring) << row.name;
     }
   });
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "numerics/metrics_accumulator.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

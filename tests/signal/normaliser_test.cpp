@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "signal/fit_normaliser.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "fit/common/usable_table.hpp"
 #include "studies/study_report.hpp"
 #include "torsio/core/error.hpp"
 

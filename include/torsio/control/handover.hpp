@@ -4,7 +4,7 @@
 
 #include "torsio/core/realtime.hpp"
 
-namespace torsio {
+namespace torsio::detail {
 
 /// The bump that a change of gains or of mode would make, taken up whole and let go slowly:
 ///
@@ -33,4 +33,4 @@ class Handover {
   double bump_ = 0.0;
 };
 
-}  // namespace torsio
+}  // namespace torsio::detail

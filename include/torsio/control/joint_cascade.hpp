@@ -173,7 +173,7 @@ class JointCascade {
   Pid velocity_;
   Pid torque_;
   JointImpedance impedance_;
-  Handover handover_;
+  detail::Handover handover_;
   ThermalLimit thermal_;
   JointReference reference_;
   double current_A_ = 0.0;

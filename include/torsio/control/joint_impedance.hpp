@@ -69,7 +69,7 @@ class JointImpedance {
   double most_Nm_;
   double step_Nm_;
   double fault_keep_;
-  Handover handover_;
+  detail::Handover handover_;
   Wish wanted_;
   double behind_rad_ = 0.0;    ///< of the last step
   double behind_rad_s_ = 0.0;  ///< of the last step
@@ -77,12 +77,6 @@ class JointImpedance {
   bool is_returning_ = false;  ///< from a fault
   double torque_Nm_ = 0.0;
 };
-
-/// What deflection control feeds back when a `JointImpedance` gives its wish through the line
-/// δ* = τ* / K, q̇ being the low-passed difference of q. Allocates.
-[[nodiscard]] JointFeedback impedance_feedback(const DeflectionController& controller,
-                                               const JointImpedance::Gains& gains,
-                                               double speed_cutoff_Hz);
 
 /// The largest stiffness [Nm/rad] that an impedance on deflection control, with this damping, renders
 /// so that the joint is passive up to the frequency and stable with its output free; 0 if it is not

@@ -60,12 +60,6 @@ class LinearSystem {
 [[nodiscard]] LinearSystem operator*(const LinearSystem& after, const LinearSystem& before);
 /// Both on the same inputs, their outputs added. @throws Error if they do not fit.
 [[nodiscard]] LinearSystem operator+(const LinearSystem& one, const LinearSystem& other);
-/// Each on inputs of its own, their outputs added. @throws Error if they do not fit.
-[[nodiscard]] LinearSystem side_by_side(const LinearSystem& one, const LinearSystem& other);
-
-/// Whether the loop, closed with the sign turned, comes to rest; what stands still may stay where it
-/// is. @throws Error as `LinearSystem::closed`.
-[[nodiscard]] bool is_stable_closed(const LinearSystem& loop);
 
 /// How far a loop is from instability.
 struct Margins {

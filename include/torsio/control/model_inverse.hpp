@@ -54,9 +54,9 @@ class ModelInverse {
   [[nodiscard]] double on_the_line(double torque_Nm, Features features) const noexcept;
   Estimate guarded(double torque_Nm, Features features) noexcept;
 
-  EstimatorCore core_;
+  detail::EstimatorCore core_;
   AnyModel model_;
-  JointInputs inputs_;
+  detail::JointInputs inputs_;
   double most_departure_rad_;
   bool is_stepped_;
   std::vector<double> asked_;  ///< features of this tick, the deflection being the answer
@@ -82,7 +82,7 @@ class TrainedInverse {
  private:
   Estimator estimator_;
   std::size_t torque_;  ///< its place among the raw inputs
-  JointInputs others_;
+  detail::JointInputs others_;
   std::vector<double> raw_;
 };
 
@@ -100,10 +100,11 @@ class AnyInverse {
   /// As `Estimator::set_zero`; nothing to a line.
   void set_zero(std::string_view channel, double value);
   void reset() noexcept {
-    dispatch(inverse_, [](auto& inverse) { inverse.reset(); });
+    detail::dispatch(inverse_, [](auto& inverse) { inverse.reset(); });
   }
   Estimate step(double torque_Nm, const JointSample& sample) noexcept TORSIO_REALTIME {
-    return dispatch(inverse_, [&](auto& inverse) { return inverse.step(torque_Nm, sample); });
+    return detail::dispatch(inverse_,
+                            [&](auto& inverse) { return inverse.step(torque_Nm, sample); });
   }
   void follow(double asked_rad) noexcept TORSIO_REALTIME {
     if (auto* const model = std::get_if<ModelInverse>(&inverse_)) model->follow(asked_rad);

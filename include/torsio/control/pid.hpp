@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "torsio/control/handover.hpp"
-#include "torsio/control/linear_system.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/signal/differentiator.hpp"
@@ -103,7 +102,7 @@ class Pid {
   double step_limit_;            ///< of the command, a tick
   double tracking_share_ = 0.0;  ///< T / T_t
   Differentiator differentiator_;
-  Handover handover_;
+  detail::Handover handover_;
   Output last_;
   double integral_ = 0.0;
   double rate_ = 0.0;       ///< D, of the last step
@@ -111,10 +110,5 @@ class Pid {
   double increment_ = 0.0;  ///< of the integral by the last step's error
   bool is_starting_ = false;
 };
-
-/// From the measurement to minus the command, as `Pid` does it between its limits; terms without a
-/// gain are left out. Allocates.
-[[nodiscard]] LinearSystem linear_pid(const Pid::Gains& gains, double derivative_cutoff_Hz,
-                                      double sample_rate_Hz);
 
 }  // namespace torsio

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "torsio/control/drive.hpp"
 #include "torsio/control/linear_system.hpp"
 
@@ -36,13 +34,6 @@ struct JointFeedback {
   LinearSystem speed;       ///< C_θ̇
   LinearSystem joint;       ///< C_q
 };
-
-/// The loop cut at the current: feedback, one sample of delay, hold, joint.
-[[nodiscard]] LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& feedback,
-                                     JointOutput output);
-
-/// @throws Error naming the output and the phase margin if the loop is unstable when it is closed.
-void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output);
 
 /// Whether the joint, as its surroundings feel it through the spring, takes up energy.
 struct Passivity {

@@ -77,7 +77,7 @@ class TorqueLoopCore {
 
   Settings settings_;
   DeflectionController deflection_;
-  Handover handover_;  ///< of what is added to the deflection controller's current
+  detail::Handover handover_;  ///< of what is added to the deflection controller's current
   std::optional<DisturbanceObserver> observer_;
   Differentiator wanted_rate_;  ///< D[τ*]
   double amperes_per_Nm_;

@@ -100,7 +100,7 @@ class TubeImpedance {
   double gear_ratio_;
   double fault_keep_;
   Differentiator speed_;
-  Handover handover_;
+  detail::Handover handover_;
   bool has_wish_ = false;
   bool is_returning_ = false;  ///< from a fault
   double wanted_rad_ = 0.0;

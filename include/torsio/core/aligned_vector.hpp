@@ -4,7 +4,7 @@
 #include <new>
 #include <vector>
 
-namespace torsio {
+namespace torsio::detail {
 
 /// Allocates on cache lines, so that no vector load of a kernel straddles two of them.
 template <class T>
@@ -28,4 +28,4 @@ struct CacheLineAllocator {
 template <class T>
 using AlignedVector = std::vector<T, CacheLineAllocator<T>>;
 
-}  // namespace torsio
+}  // namespace torsio::detail

@@ -4,7 +4,7 @@
 #include <type_traits>
 #include <variant>
 
-namespace torsio {
+namespace torsio::detail {
 
 /// Calls `visit(alternative)` and returns what it returns: std::visit without the exception that it
 /// throws for a variant that holds nothing. No variant of torsio is left so: a failed assignment is
@@ -17,4 +17,4 @@ decltype(auto) dispatch(Variant& variant, const Visit& visit) noexcept {
   return visit(*std::get_if<Index>(&variant));
 }
 
-}  // namespace torsio
+}  // namespace torsio::detail

@@ -6,6 +6,8 @@
 
 namespace torsio {
 
+namespace detail {
+
 /// A dense row-major table: plain data at public borders, where no Eigen type may stand.
 template <class Number>
 struct Table2d {
@@ -30,7 +32,9 @@ struct Table2d {
   bool operator==(const Table2d&) const = default;
 };
 
-using Matrix = Table2d<double>;
-using FloatMatrix = Table2d<float>;  ///< weights of networks
+}  // namespace detail
+
+using Matrix = detail::Table2d<double>;
+using FloatMatrix = detail::Table2d<float>;  ///< weights of networks
 
 }  // namespace torsio

@@ -10,7 +10,4 @@ namespace torsio {
 /// nobody listens.
 using Progress = std::function<bool(double fraction, std::string_view doing)>;
 
-/// Reports and throws `Cancelled` if the listener asks to stop.
-void report_progress(const Progress& progress, double fraction, std::string_view doing);
-
 }  // namespace torsio

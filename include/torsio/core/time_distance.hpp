@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace torsio {
+namespace torsio::detail {
 
 /// How far two stamps of one clock are apart, whichever is earlier; stamps as far apart as may be, too.
 /// Never negative.
@@ -15,4 +15,4 @@ namespace torsio {
   return static_cast<std::int64_t>(std::min(later - earlier, kLargest));
 }
 
-}  // namespace torsio
+}  // namespace torsio::detail

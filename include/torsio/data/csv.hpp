@@ -1,75 +1,15 @@
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
-#include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
 
 namespace torsio {
-
-/// One column of a CSV file, as it stands there: nothing converted yet. An empty cell is NaN.
-struct CsvColumn {
-  std::string name;
-  std::size_t number = 0;  ///< counted from 1 in the header
-  std::vector<double> values;
-};
-
-/// A CSV file in memory.
-struct CsvTable {
-  Source source;
-  std::size_t header_line = 0;
-  std::vector<CsvColumn> columns;
-  /// (row, line) wherever the line numbers jump because of comments or blank lines.
-  std::vector<std::pair<std::size_t, std::size_t>> line_marks;
-
-  [[nodiscard]] std::size_t rows() const noexcept {
-    return columns.empty() ? 0 : columns.front().values.size();
-  }
-  [[nodiscard]] const CsvColumn* find(std::string_view name) const noexcept;
-  [[nodiscard]] std::size_t line_of(std::size_t row) const noexcept;
-  [[nodiscard]] std::string column_list() const;  ///< for error messages
-  /// "sweep.csv: line 12, column 3 (torque_Nm)"
-  [[nodiscard]] std::string place(std::size_t row, const CsvColumn& column) const;
-  [[nodiscard]] std::string header_place(const CsvColumn& column) const;
-};
-
-/// What a reader takes before it refuses: a pipe of endless zeros must not fill the memory.
-struct CsvLimits {
-  std::size_t header_bytes = std::size_t{64} << 10;  ///< the header line must end within these
-  std::size_t line_bytes = std::size_t{1} << 20;
-  std::size_t values = std::size_t{256} << 20;  ///< cells of numbers: 2 GiB of memory
-};
-
-struct CsvOptions {
-  std::vector<std::string> skip = {};  ///< columns that are not read and may hold anything
-  CsvLimits limits = {};
-  Progress progress =
-      {};  ///< told with each block that is read, also while a pipe keeps it waiting
-};
-
-/// Reads a CSV file, plain or gzipped (told by its first bytes); "-" is standard input. The header
-/// gives the names; separator comma, semicolon or tab; lines that start with '#' are comments.
-/// See docs/recordings.md.
-/// @throws Error with line and column for whatever is not a table of numbers, Cancelled if the
-/// progress asks to stop.
-[[nodiscard]] CsvTable read_csv(const std::string& path, const CsvOptions& options = {});
-
-/// The same from bytes in memory; `name` stands for the file in messages.
-[[nodiscard]] CsvTable parse_csv(std::string_view bytes, const std::string& name,
-                                 const CsvOptions& options = {});
 
 /// Writes `t_s` and every channel, each number with the fewest digits that read back bit by bit;
 /// the freshness of channel `torque_Nm` becomes the column `torque_fresh_1`. "-" is standard
 /// output; a file appears under its name only when it is complete.
 /// @throws Error if it cannot be written; then nothing is left behind.
 void write_csv(const Recording& recording, const std::string& path);
-
-/// The name of the column that holds the freshness of a channel: "torque_Nm" -> "torque_fresh_1".
-[[nodiscard]] std::string freshness_column(std::string_view channel_name);
 
 }  // namespace torsio

@@ -1,12 +1,10 @@
 #pragma once
 
-#include <cstddef>
 #include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "torsio/data/csv.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
@@ -56,16 +54,6 @@ struct Mapping {
 /// @throws Error naming file, line, key, the known keys and the nearest one.
 [[nodiscard]] Mapping read_mapping(const std::string& path);
 [[nodiscard]] Mapping parse_mapping(std::string_view text, const std::string& name);
-
-/// The measured channels of a table as recordings in SI: columns, splitting, clock, holding,
-/// latency and zeros, in this order. Derived channels come later (`add_derived`), behind resampling
-/// and conditions. `rate_Hz` is the clock of a log that has none and whose mapping tells none;
-/// `name` names the records, the file's own name if empty.
-/// @throws Error naming place, expected, found and the mapping line that would help.
-[[nodiscard]] std::vector<Recording> measured_recordings(const CsvTable& table,
-                                                         const Mapping& mapping,
-                                                         double rate_Hz = 0.0,
-                                                         const std::string& name = {});
 
 /// Evaluates the definitions over the recording and adds them as channels. Where a channel that one
 /// uses is NaN, so is the result, as long as the expression has no memory.

@@ -1,9 +1,5 @@
 #pragma once
 
-#include <span>
-#include <string>
-#include <vector>
-
 #include "torsio/data/recording.hpp"
 
 namespace torsio {
@@ -18,11 +14,5 @@ namespace torsio {
 /// before. NaN spreads to every sample that it takes part in.
 /// @throws Error if the rate is not positive and finite, or would give no or too many samples.
 [[nodiscard]] Recording resample(const Recording& recording, double sample_rate_Hz);
-
-/// Linear interpolation of samples with uneven, strictly increasing stamps at even times from the
-/// first stamp on.
-[[nodiscard]] std::vector<double> interpolate(std::span<const double> stamps_s,
-                                              std::span<const double> values, double sample_rate_Hz,
-                                              std::size_t samples);
 
 }  // namespace torsio

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -79,7 +78,7 @@ class BasicEstimator {
 
   /// @param raw one value for each of `raw_inputs()`; NaN for one that was not measured.
   Estimate step(std::span<const double> raw) noexcept TORSIO_REALTIME {
-    const EstimatorCore::Conditioned input = core_.condition(raw);
+    const detail::EstimatorCore::Conditioned input = core_.condition(raw);
     if (input.fault != Fault::none) return core_.held(input.fault);
     if (input.restarted) model_.reset();
     const Estimate told = model_.step(input.features);
@@ -96,7 +95,7 @@ class BasicEstimator {
   }
 
  private:
-  EstimatorCore core_;
+  detail::EstimatorCore core_;
   M model_;
 };
 

@@ -11,7 +11,7 @@
 #include "torsio/model/common/model.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
-namespace torsio {
+namespace torsio::detail {
 
 /// A gap in the inputs longer than this starts the filters and the model afresh; a shorter one they
 /// run across, as if its ticks had not been.
@@ -78,4 +78,4 @@ class EstimatorCore {
   double last_value_ = 0.0;
 };
 
-}  // namespace torsio
+}  // namespace torsio::detail

@@ -24,6 +24,8 @@ struct JointSample {
   }
 };
 
+namespace detail {
+
 /// Writes the raw channels that an estimator wants, taken by name from a `JointSample`: its fields
 /// and `spring_deflection_rad`.
 class JointInputs {
@@ -39,5 +41,7 @@ class JointInputs {
   std::vector<Getter> getters_;
   std::vector<double> raw_;
 };
+
+}  // namespace detail
 
 }  // namespace torsio

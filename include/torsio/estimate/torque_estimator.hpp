@@ -33,7 +33,7 @@ class BasicTorqueEstimator {
 
  private:
   BasicEstimator<M> estimator_;
-  JointInputs inputs_;
+  detail::JointInputs inputs_;
 };
 
 }  // namespace torsio

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -64,24 +63,6 @@ struct Attribution {
   std::size_t samples = 0;        ///< that `rmse` is of
   std::size_t block_samples = 0;  ///< what is shuffled as a whole
 };
-
-/// Exact Shapley values of a game:
-///
-///     phi_i = sum over S without i of |S|! (n-|S|-1)! / n! [v(S + i) - v(S)]
-///
-/// @param values v(S) for each of 2^n coalitions; bit i of the index: player i takes part.
-/// @throws Error if their number is not a power of two.
-[[nodiscard]] std::vector<double> shapley_values(std::span<const double> values);
-
-/// The samples after which a model has forgotten its start: the least power of two, up to 1024,
-/// after which it says in 95 % of the cases what it says in the course of the record, to 0.1 % of
-/// that value's spread. 1 for a model without memory.
-struct Memory {
-  std::size_t samples = 1;
-  bool is_longer = false;  ///< than 1024 samples, or than the records
-};
-[[nodiscard]] Memory memory_samples(const AnyModel& model, const TrainingData& data,
-                                    std::uint64_t seed);
 
 /// What a model makes of its inputs on some recordings: exact interventional Shapley values, in
 /// which an absent input's whole window is replaced by that of the same input in a background

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "torsio/core/matrix.hpp"
-#include "torsio/model/any_model.hpp"
 #include "torsio/model/network/network_layers.hpp"
 
 namespace torsio {
@@ -52,14 +51,5 @@ struct ForeignNetwork {
   std::vector<std::string> notes = {};
   bool fold_biases = false;  ///< an LSTM's two biases into one
 };
-
-/// The network as parameters of `mlp`, `lstm` or `gru`. Scales and offsets before the first layer and
-/// behind the last become its standardisation where they are positive; others, and linear layers
-/// in front of a recurrent one, are multiplied into the next layer.
-/// @throws Error for a network that torsio has no place for: more than one output, an activation in
-/// front of a recurrent layer, LSTM and GRU in one, weights beyond float32.
-[[nodiscard]] AnyModel::Parameters network_parameters(const ForeignNetwork& network,
-                                                      double sample_period_s,
-                                                      std::size_t warm_up_samples);
 
 }  // namespace torsio

@@ -179,7 +179,7 @@ class HeldModelOf final : public HeldModel {
   [[nodiscard]] const void* model() const noexcept override { return &model_; }
 
   [[nodiscard]] std::string_view family() const noexcept override { return M::kFamily; }
-  [[nodiscard]] FamilyTraits traits() const noexcept override { return traits_of<M>(); }
+  [[nodiscard]] FamilyTraits traits() const noexcept override { return detail::traits_of<M>(); }
   [[nodiscard]] AnyParameters parameters() const override {
     return typename M::Parameters(model_.parameters());
   }
@@ -225,7 +225,7 @@ class HeldModelOf final : public HeldModel {
     if constexpr (Invertible<M>) {
       return model_.invert(target, features);
     } else {
-      return no_inverse(features);
+      return detail::no_inverse(features);
     }
   }
 

@@ -34,7 +34,7 @@ class Mailbox {
     /// written yet: an initial value is no command.
     [[nodiscard]] std::int64_t age_ns(std::int64_t now_ns) const noexcept {
       return sequence == 0 ? std::numeric_limits<std::int64_t>::max()
-                           : distance_ns(now_ns, written_ns);
+                           : detail::distance_ns(now_ns, written_ns);
     }
   };
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -15,6 +14,8 @@
 
 namespace torsio {
 
+namespace detail {
+
 /// The time of a streamed signal: counted, so that it does not drift.
 class SampleClock {
  public:
@@ -26,6 +27,8 @@ class SampleClock {
   double sample_rate_Hz_;
   std::uint64_t sample_ = 0;
 };
+
+}  // namespace detail
 
 /// A sine whose frequency rises (or falls) linearly from f0 to f1 over the duration T and then
 /// stays:
@@ -45,7 +48,7 @@ class Chirp {
 
  private:
   Parameters parameters_;
-  SampleClock clock_;
+  detail::SampleClock clock_;
 };
 
 /// A sine whose frequency grows (or falls) by the same factor in equal times, from f0 to f1 over the
@@ -67,7 +70,7 @@ class LogSweep {
  private:
   Parameters parameters_;
   double log_ratio_;
-  SampleClock clock_;
+  detail::SampleClock clock_;
 };
 
 /// Straight lines between +A and -A, from 0 upwards.
@@ -83,7 +86,7 @@ class Triangle {
 
  private:
   Parameters parameters_;
-  SampleClock clock_;
+  detail::SampleClock clock_;
 };
 
 /// A position that goes to and fro between +A and -A with a trapezoidal speed: from rest at 0 to
@@ -114,7 +117,7 @@ class TrapezoidSweep {
   };
   Stroke first_;  // from 0 to +A
   Stroke next_;   // from end to end
-  SampleClock clock_;
+  detail::SampleClock clock_;
 };
 
 /// A sum of sines with random phases: y(t) = sum_i A_i sin(2 pi f_i t + phi_i), phi_i uniform in
@@ -133,7 +136,7 @@ class Multisine {
  private:
   Parameters parameters_;
   std::vector<double> phases_;
-  SampleClock clock_;
+  detail::SampleClock clock_;
 };
 
 /// White Gaussian steps through a Butterworth low-pass, scaled to a standard deviation of `rms` in
@@ -204,7 +207,7 @@ class Replay {
 
  private:
   Parameters parameters_;
-  SampleClock clock_;
+  detail::SampleClock clock_;
 };
 
 /// Each level for the hold time, one after the other, and again from the first.

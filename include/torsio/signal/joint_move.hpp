@@ -55,7 +55,7 @@ class JointMove {
   double last_rad_;
   double duration_s_ = 0.0;
   std::size_t part_ = 0;
-  SampleClock clock_;
+  detail::SampleClock clock_;
 };
 
 }  // namespace torsio

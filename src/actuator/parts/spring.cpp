@@ -25,19 +25,20 @@ Spring::Spring(const Parameters& parameters)
 void Spring::reset(double deflection_rad) noexcept {
   last_deflection_rad_ = deflection_rad;
   friction_Nm_ = 0.0;
-  dispatch(friction_, [](auto& friction) {
+  detail::dispatch(friction_, [](auto& friction) {
     friction.reset();
     return 0.0;
   });
 }
 
 double Spring::friction_energy() const noexcept {
-  return dispatch(friction_, [](const auto& friction) { return friction.energy(); });
+  return detail::dispatch(friction_, [](const auto& friction) { return friction.energy(); });
 }
 
 double Spring::steepest(double load_Nm) const noexcept {
-  return elastic_.steepest() +
-         dispatch(friction_, [=](const auto& friction) { return friction.stiffness(load_Nm); });
+  return elastic_.steepest() + detail::dispatch(friction_, [=](const auto& friction) {
+           return friction.stiffness(load_Nm);
+         });
 }
 
 }  // namespace torsio

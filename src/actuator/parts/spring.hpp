@@ -44,7 +44,7 @@ class Spring {
     const double elastic_Nm = elastic_.torque(deflection_rad);
     const double increment_rad = deflection_rad - last_deflection_rad_;
     last_deflection_rad_ = deflection_rad;
-    friction_Nm_ = dispatch(friction_, [&](auto& friction) {
+    friction_Nm_ = detail::dispatch(friction_, [&](auto& friction) {
       return friction.step(increment_rad, deflection_rate_rad_s, elastic_Nm);
     });
     return elastic_Nm + friction_Nm_ + viscosity_Nms_rad_ * deflection_rate_rad_s;

@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "core/report_progress.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/common/option_fields.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/fit/common/family_info.hpp"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fit/common/model_run.hpp"
+#include "fit/common/usable_table.hpp"
 #include "numerics/least_squares.hpp"
 
 namespace torsio {

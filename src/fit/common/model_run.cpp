@@ -1,5 +1,7 @@
 #include "fit/common/model_run.hpp"
 
+#include "numerics/metrics_accumulator.hpp"
+
 namespace torsio {
 
 std::vector<Estimate> run(AnyModel& model, const Sequence& sequence) {

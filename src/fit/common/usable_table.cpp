@@ -1,3 +1,5 @@
+#include "fit/common/usable_table.hpp"
+
 #include <algorithm>
 
 #include "torsio/fit/common/training_data.hpp"

@@ -6,8 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "core/report_progress.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/common/least_samples.hpp"
 #include "fit/common/memory_check.hpp"
+#include "fit/common/usable_table.hpp"
 #include "fit/gaussian_process/kernel_data.hpp"
 #include "fit/gaussian_process/kernel_search.hpp"
 #include "fit/gaussian_process/likelihood_search.hpp"

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "fit/common/fitted.hpp"
 #include "model/gaussian_process/gaussian_process.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"

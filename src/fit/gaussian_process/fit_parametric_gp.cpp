@@ -9,9 +9,12 @@
 #include <string_view>
 #include <utility>
 
+#include "core/report_progress.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/common/folds.hpp"
 #include "fit/common/least_samples.hpp"
 #include "fit/common/memory_check.hpp"
+#include "fit/common/usable_table.hpp"
 #include "fit/gaussian_process/kernel_data.hpp"
 #include "fit/gaussian_process/kernel_search.hpp"
 #include "fit/gaussian_process/parametric_gp_trainer.hpp"
@@ -249,7 +252,7 @@ void check_domain(const Kernel& kernel, const Matrix& centres, const Matrix& sam
                   const PlainKernel& theta) {
   if (theta[7] > 0.0) return;
   const PackedPoints packed(centres);
-  AlignedVector<double> row(packed.padded_size());
+  detail::AlignedVector<double> row(packed.padded_size());
   for (std::size_t n = 0; n < samples.rows; ++n) {
     kernel.row(samples.row(n).data(), packed, centres.rows, row.data());
     if (std::ranges::all_of(row, [](double value) { return std::isfinite(value); })) continue;

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "fit/common/fitted.hpp"
 #include "fit/gaussian_process/fit_gaussian_process.hpp"
 #include "model/gaussian_process/parametric_gp.hpp"
 #include "torsio/fit/common/fit_context.hpp"

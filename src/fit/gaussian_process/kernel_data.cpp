@@ -9,6 +9,8 @@
 #include <span>
 #include <utility>
 
+#include "fit/common/usable_table.hpp"
+#include "signal/fit_normaliser.hpp"
 #include "torsio/signal/normaliser.hpp"
 
 namespace torsio {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/common/usable_table.hpp"
 #include "model/gaussian_process/kernel.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/core/random.hpp"

@@ -7,6 +7,8 @@
 #include <memory>
 #include <utility>
 
+#include "core/report_progress.hpp"
+
 namespace torsio {
 namespace {
 

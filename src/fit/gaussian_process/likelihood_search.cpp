@@ -3,6 +3,7 @@
 #include <limits>
 #include <utility>
 
+#include "fit/common/usable_table.hpp"
 #include "fit/gaussian_process/fit_gaussian_process.hpp"
 #include "fit/gaussian_process/kernel_data.hpp"
 #include "fit/gaussian_process/kernel_search.hpp"

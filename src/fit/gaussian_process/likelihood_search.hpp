@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "fit/common/usable_table.hpp"
 #include "fit/gaussian_process/marginal_likelihood.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/fit/common/fit_context.hpp"

@@ -62,7 +62,7 @@ class MarginalLikelihood {
   double jitter_ = 0.0;
   SquareMatrix matrix_;
   KernelGradient gradient_;
-  AlignedVector<double> row_;
+  detail::AlignedVector<double> row_;
 };
 
 }  // namespace torsio

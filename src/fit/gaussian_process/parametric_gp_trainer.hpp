@@ -89,7 +89,7 @@ class ParametricGpTrainer {
   // Scratch.
   Eigen::MatrixXd product_;
   SquareMatrix factor_;
-  AlignedVector<double> row_;
+  detail::AlignedVector<double> row_;
 };
 
 }  // namespace torsio

@@ -37,7 +37,7 @@ double lower_factor(const Kernel& kernel, const Matrix& points, MatrixXd& lower)
 /// Columns q_n of the samples [begin, begin + columns).
 void fill_columns(const Kernel& kernel, const PackedPoints& packed, const Matrix& features,
                   std::size_t begin, Eigen::Ref<MatrixXd> columns) {
-  AlignedVector<double> row(packed.padded_size());
+  detail::AlignedVector<double> row(packed.padded_size());
   for (Index n = 0; n < columns.cols(); ++n) {
     kernel.row(features.row(begin + static_cast<std::size_t>(n)).data(), packed, packed.size(),
                row.data());
@@ -143,7 +143,7 @@ double CollapsedBound::evaluate(std::span<const double> parameters, std::span<do
   by_k = triangle.transpose().solve(MatrixXd(by_k.transpose()));
 
   KernelGradient sums(kernel_.parameter_count());
-  AlignedVector<double> row(packed_.padded_size(), 0.0);
+  detail::AlignedVector<double> row(packed_.padded_size(), 0.0);
   for (std::size_t n = 0; n < features_.rows; ++n) {
     Eigen::Map<VectorXd>(row.data(), size) = by_columns.col(static_cast<Index>(n));
     kernel_.add_gradient(features_.row(n).data(), packed_, points_.rows, row.data(), sums);
@@ -159,7 +159,7 @@ double CollapsedBound::evaluate(std::span<const double> parameters, std::span<do
   }
   // k(x_n, x_n), each with weight precision / 2
   PackedPoints self(Matrix(1, features_.columns));
-  AlignedVector<double> weight(self.padded_size(), 0.0);
+  detail::AlignedVector<double> weight(self.padded_size(), 0.0);
   weight[0] = 0.5 * precision;
   for (std::size_t n = 0; n < features_.rows; ++n) {
     self.set(0, features_.row(n));

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/report_progress.hpp"
 #include "fit/common/folds.hpp"
 #include "fit/common/model_run.hpp"
 #include "fit/grey_box/grey_box_search.hpp"

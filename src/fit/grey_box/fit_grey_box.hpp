@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "fit/common/fitted.hpp"
 #include "fit/common/shared_options.hpp"
 #include "model/grey_box/grey_box.hpp"
 #include "torsio/fit/common/fit_context.hpp"

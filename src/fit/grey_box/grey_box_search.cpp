@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/report_progress.hpp"
+
 namespace torsio {
 namespace {
 

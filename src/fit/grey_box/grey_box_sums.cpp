@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "fit/common/folds.hpp"
+#include "fit/common/usable_table.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

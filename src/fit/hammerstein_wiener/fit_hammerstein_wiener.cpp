@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "fit/common/excited_band.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/hammerstein_wiener/wiener_problem.hpp"
 #include "fit/hammerstein_wiener/wiener_search.hpp"
 #include "torsio/core/error.hpp"

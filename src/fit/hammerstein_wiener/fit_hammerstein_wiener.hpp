@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "fit/common/fitted.hpp"
 #include "model/hammerstein_wiener/hammerstein_wiener.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"

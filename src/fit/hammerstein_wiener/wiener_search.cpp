@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/report_progress.hpp"
 #include "fit/common/folds.hpp"
 #include "fit/hammerstein_wiener/wiener_problem.hpp"
 #include "numerics/shared_progress.hpp"

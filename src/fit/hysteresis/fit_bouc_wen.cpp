@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 
+#include "fit/common/fitted.hpp"
 #include "fit/hysteresis/fit_hysteresis.hpp"
 #include "fit/hysteresis/operator_data.hpp"
 

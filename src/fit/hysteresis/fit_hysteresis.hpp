@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "fit/common/fitted.hpp"
 #include "fit/common/shared_options.hpp"
 #include "model/hysteresis/bouc_wen_model.hpp"
 #include "model/hysteresis/exponential_loading.hpp"

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "fit/common/design.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/hysteresis/fit_hysteresis.hpp"
 #include "fit/hysteresis/operator_data.hpp"
 

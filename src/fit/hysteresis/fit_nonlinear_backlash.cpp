@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "fit/common/design.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/hysteresis/fit_hysteresis.hpp"
 #include "fit/hysteresis/operator_data.hpp"
 #include "fit/linear/fit_polynomial.hpp"

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "fit/common/design.hpp"
+#include "fit/common/fitted.hpp"
+#include "fit/common/usable_table.hpp"
 #include "fit/hysteresis/fit_hysteresis.hpp"
 #include "fit/hysteresis/operator_data.hpp"
 #include "numerics/nnls.hpp"

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "fit/common/design.hpp"
+#include "fit/common/usable_table.hpp"
 #include "model/linear/direction.hpp"
 #include "numerics/nnls.hpp"
 #include "torsio/core/error.hpp"

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "fit/common/design.hpp"
+#include "fit/common/fitted.hpp"
+#include "fit/common/usable_table.hpp"
 #include "fit/linear/named_coefficients.hpp"
 #include "numerics/least_squares.hpp"
 #include "torsio/core/error.hpp"

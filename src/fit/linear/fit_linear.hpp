@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "fit/common/fitted.hpp"
 #include "fit/common/shared_options.hpp"
 #include "model/linear/linear.hpp"
 #include "model/linear/linear_coulomb.hpp"

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "fit/common/fitted.hpp"
 #include "fit/common/shared_options.hpp"
 #include "model/linear/polynomial.hpp"
 #include "torsio/core/not_measured.hpp"

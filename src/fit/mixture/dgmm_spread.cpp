@@ -11,6 +11,7 @@
 #include <limits>
 #include <numeric>
 
+#include "core/report_progress.hpp"
 #include "fit/common/folds.hpp"
 #include "numerics/parallel.hpp"
 #include "torsio/estimate/estimator_settings.hpp"

@@ -13,6 +13,9 @@
 #include <string_view>
 #include <vector>
 
+#include "core/report_progress.hpp"
+#include "fit/common/fitted.hpp"
+#include "fit/common/usable_table.hpp"
 #include "fit/mixture/dgmm_spread.hpp"
 #include "fit/mixture/mixture_em.hpp"
 #include "torsio/core/error.hpp"

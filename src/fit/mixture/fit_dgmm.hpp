@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "fit/common/fitted.hpp"
 #include "fit/mixture/online_mixture.hpp"
 #include "model/mixture/dgmm.hpp"
 #include "torsio/core/not_measured.hpp"

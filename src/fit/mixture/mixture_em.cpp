@@ -25,7 +25,8 @@ constexpr std::size_t kTilesPerChunk = 32;
 // Fewer samples' worth than this is nobody's.
 constexpr double kDeadCount = 1e-9;
 
-void append_parameters(const GaussianMixture& mixture, std::size_t i, AlignedVector<double>& into) {
+void append_parameters(const GaussianMixture& mixture, std::size_t i,
+                       detail::AlignedVector<double>& into) {
   const auto d = static_cast<Eigen::Index>(mixture.dimension());
   const Eigen::LLT<Eigen::MatrixXd> cholesky(
       Eigen::Map<const Eigen::MatrixXd>(mixture.covariances.row(i).data(), d, d));
@@ -87,7 +88,7 @@ double MixtureEm::iterate(GaussianMixture& mixture, std::size_t threads) const {
                  .found = std::to_string(mixture.dimension())});
   const std::size_t m = mixture.size();
   const std::size_t size = m * mixture_em_kernel::rows(dimension_);
-  AlignedVector<double> parameters;
+  detail::AlignedVector<double> parameters;
   for (std::size_t i = 0; i < m; ++i) append_parameters(mixture, i, parameters);
 
   const std::size_t tiles = tiles_.size() / (kTile * dimension_);
@@ -95,8 +96,8 @@ double MixtureEm::iterate(GaussianMixture& mixture, std::size_t threads) const {
   std::vector<std::vector<double>> chunk_sums(chunks);
   std::vector<double> log_likelihoods(chunks, 0.0);
   for_each_chunk(chunks, threads, [&](std::size_t chunk) {
-    AlignedVector<double> scratch(m * kTile);
-    AlignedVector<double> lanes(size * kLanes, 0.0);
+    detail::AlignedVector<double> scratch(m * kTile);
+    detail::AlignedVector<double> lanes(size * kLanes, 0.0);
     const std::size_t end = std::min(tiles, (chunk + 1) * kTilesPerChunk);
     for (std::size_t tile = chunk * kTilesPerChunk; tile < end; ++tile)
       log_likelihoods[chunk] += mixture_em_kernel::add_tile(

@@ -46,7 +46,8 @@ class MixtureEm {
   Prior prior_;
   std::size_t dimension_;
   std::size_t samples_;
-  AlignedVector<double> tiles_;  ///< tiles of samples, in each a row of values for every quantity
+  detail::AlignedVector<double>
+      tiles_;  ///< tiles of samples, in each a row of values for every quantity
 };
 
 }  // namespace torsio

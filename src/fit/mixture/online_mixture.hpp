@@ -110,10 +110,11 @@ class OnlineMixture {
   std::vector<Pairing> pairings_;
   std::vector<std::uint64_t> births_;  ///< number of the sample that made the component
   Matrix means_;
-  Matrix scatters_;              ///< A, full matrices
-  AlignedVector<float> search_;  ///< means in blocks of 16 for the search; free slots far away
-  std::vector<double> sample_;   ///< standardised
-  std::vector<double> merged_;   ///< scratch: a covariance
+  Matrix scatters_;  ///< A, full matrices
+  detail::AlignedVector<float>
+      search_;                  ///< means in blocks of 16 for the search; free slots far away
+  std::vector<double> sample_;  ///< standardised
+  std::vector<double> merged_;  ///< scratch: a covariance
   std::vector<std::size_t> lightest_;
 };
 

@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/report_progress.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/common/memory_check.hpp"
 #include "fit/linear/fit_linear.hpp"
 #include "fit/narx/free_run_refinement.hpp"

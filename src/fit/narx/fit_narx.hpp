@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "fit/common/fitted.hpp"
 #include "model/linear/linear.hpp"
 #include "model/narx/narx.hpp"
 #include "torsio/fit/common/family_info.hpp"

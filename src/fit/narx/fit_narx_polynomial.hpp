@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "fit/common/fitted.hpp"
 #include "fit/narx/fit_narx.hpp"
 #include "fit/narx/frols.hpp"
 #include "model/narx/multivariate_polynomial.hpp"

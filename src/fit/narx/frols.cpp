@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/report_progress.hpp"
 #include "fit/narx/frols_kernel.hpp"
 #include "model/gaussian_process/kernel_kernels.hpp"
 #include "model/narx/multivariate_polynomial.hpp"
@@ -52,7 +53,7 @@ CandidateList candidates_of(std::size_t inputs, std::size_t degree) {
   return candidates;
 }
 
-double dot(const AlignedVector<double>& a, const AlignedVector<double>& b) {
+double dot(const detail::AlignedVector<double>& a, const detail::AlignedVector<double>& b) {
   return kernel_kernels::dot(a.data(), b.data(), a.size());
 }
 
@@ -79,8 +80,8 @@ class Columns {
   [[nodiscard]] const double* values() const noexcept { return values_.data(); }
   [[nodiscard]] const std::vector<double>& scales() const noexcept { return scales_; }
 
-  [[nodiscard]] AlignedVector<double> product(const Monomial& monomial) const {
-    AlignedVector<double> result(values_.begin(), values_.begin() + ending());
+  [[nodiscard]] detail::AlignedVector<double> product(const Monomial& monomial) const {
+    detail::AlignedVector<double> result(values_.begin(), values_.begin() + ending());
     for (const std::size_t i : monomial) {
       const double* factor = values_.data() + (i + 1) * size_;
       for (std::size_t n = 0; n < size_; ++n) result[n] *= factor[n];
@@ -92,7 +93,7 @@ class Columns {
   [[nodiscard]] std::ptrdiff_t ending() const { return static_cast<std::ptrdiff_t>(size_); }
 
   std::size_t size_;
-  AlignedVector<double> values_;  ///< ones first
+  detail::AlignedVector<double> values_;  ///< ones first
   std::vector<double> scales_;
 };
 
@@ -247,7 +248,7 @@ class Search {
     double reduction = 0.0;  ///< of y.y
   };
 
-  std::vector<double> products_with(const AlignedVector<double>& v,
+  std::vector<double> products_with(const detail::AlignedVector<double>& v,
                                     std::vector<double>* squares = nullptr) {
     std::vector<double> result(candidate_count(), 0.0);
     for (std::size_t first = 0; first < columns_.size(); first += kBlock)
@@ -294,9 +295,9 @@ class Search {
 
   /// @returns false, and never offers it again, if it is not as new as its products said.
   bool add(std::size_t candidate) {
-    AlignedVector<double> q = columns_.product(candidates_.monomial(candidate));
+    detail::AlignedVector<double> q = columns_.product(candidates_.monomial(candidate));
     for (int twice = 0; twice < 2; ++twice) {  // once leaves a trace in near-dependent ones
-      for (const AlignedVector<double>& direction : directions_) {
+      for (const detail::AlignedVector<double>& direction : directions_) {
         const double along = dot(direction, q);
         for (std::size_t n = 0; n < q.size(); ++n) q[n] -= along * direction[n];
       }
@@ -319,7 +320,7 @@ class Search {
     Products before = std::exchange(products_, std::move(without));
     for (const Rotation& rotation : rotations)
       rotation.apply(directions_[rotation.direction], directions_[rotation.direction + 1]);
-    AlignedVector<double> last = std::move(directions_.back());
+    detail::AlignedVector<double> last = std::move(directions_.back());
     directions_.pop_back();
     if (add(candidate)) return true;
     products_ = std::move(before);
@@ -332,13 +333,13 @@ class Search {
 
   Columns columns_;
   CandidateList candidates_;
-  AlignedVector<double> target_;
+  detail::AlignedVector<double> target_;
   double target_square_ = 0.0;
-  AlignedVector<double> scratch_;
+  detail::AlignedVector<double> scratch_;
   std::vector<double> squares_;          ///< phi . phi
   std::vector<double> target_products_;  ///< phi . y
   std::vector<std::uint8_t> is_useless_;
-  std::vector<AlignedVector<double>> directions_;  ///< q
+  std::vector<detail::AlignedVector<double>> directions_;  ///< q
   Products products_;
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "numerics/metrics_accumulator.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/numerics/metrics.hpp"

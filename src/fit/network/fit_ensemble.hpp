@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "fit/common/fitted.hpp"
 #include "model/network/ensemble.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"

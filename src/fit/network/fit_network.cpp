@@ -9,6 +9,8 @@
 #include <string>
 #include <utility>
 
+#include "core/report_progress.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/common/least_samples.hpp"
 #include "fit/common/memory_check.hpp"
 #include "fit/network/fit_ensemble.hpp"

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "fit/common/fitted.hpp"
 #include "model/network/ensemble.hpp"
 #include "model/network/gru.hpp"
 #include "model/network/lstm.hpp"

@@ -13,9 +13,9 @@ namespace torsio {
 struct SequenceBatch {
   std::size_t steps = 0;
   std::size_t rows = 0;
-  AlignedVector<float> inputs;   ///< [steps x rows x inputs]
-  AlignedVector<float> targets;  ///< [steps x rows]
-  AlignedVector<float> weights;  ///< [steps x rows]: 1 counts in the loss, 0 does not
+  detail::AlignedVector<float> inputs;   ///< [steps x rows x inputs]
+  detail::AlignedVector<float> targets;  ///< [steps x rows]
+  detail::AlignedVector<float> weights;  ///< [steps x rows]: 1 counts in the loss, 0 does not
 };
 
 /// The weights in the order in which products read them: made anew after each update.
@@ -54,11 +54,11 @@ class NetworkPass {
 
  private:
   struct LayerMemory {
-    std::size_t stride = 0;       ///< of `rows`
-    AlignedVector<float> rows;    ///< [(steps + 1) x rows]: 1, x, h- with padding
-    AlignedVector<float> values;  ///< dense: outputs; else gates, later their slopes
-    AlignedVector<float> cells;   ///< LSTM: [(steps + 1) x rows x width]
-    AlignedVector<float> slopes;  ///< of the outputs [steps x rows x width]
+    std::size_t stride = 0;               ///< of `rows`
+    detail::AlignedVector<float> rows;    ///< [(steps + 1) x rows]: 1, x, h- with padding
+    detail::AlignedVector<float> values;  ///< dense: outputs; else gates, later their slopes
+    detail::AlignedVector<float> cells;   ///< LSTM: [(steps + 1) x rows x width]
+    detail::AlignedVector<float> slopes;  ///< of the outputs [steps x rows x width]
   };
   struct Outputs {
     const float* values;
@@ -80,7 +80,7 @@ class NetworkPass {
   std::size_t steps_ = 0;
   std::size_t rows_ = 0;
   std::vector<LayerMemory> layers_;
-  AlignedVector<float> cell_slopes_;
+  detail::AlignedVector<float> cell_slopes_;
   float_gemm::Scratch scratch_;
 };
 

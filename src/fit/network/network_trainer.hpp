@@ -59,8 +59,8 @@ class NetworkTrainer {
   NetworkTraining settings_;
   std::size_t chunk_rows_;
   PackedNetwork packed_;
-  AlignedVector<float> gradients_;  ///< [chunk x parameters], the sum ends up in the first
-  std::mutex guard_;                ///< of `idle_`
+  detail::AlignedVector<float> gradients_;  ///< [chunk x parameters], the sum ends up in the first
+  std::mutex guard_;                        ///< of `idle_`
   std::vector<std::unique_ptr<Workspace>> idle_;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "signal/fit_normaliser.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 

@@ -10,6 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "core/report_progress.hpp"
+#include "fit/common/fitted.hpp"
+#include "fit/common/usable_table.hpp"
 #include "fit/second_order/simulation_fit.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "fit/common/fitted.hpp"
 #include "model/second_order/dynamic_bouc_wen.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/progress.hpp"

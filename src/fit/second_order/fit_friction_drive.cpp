@@ -11,7 +11,9 @@
 #include <string_view>
 #include <vector>
 
+#include "core/report_progress.hpp"
 #include "data/names.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/second_order/inverse_dynamics.hpp"
 #include "fit/second_order/simulation_fit.hpp"
 #include "torsio/core/error.hpp"

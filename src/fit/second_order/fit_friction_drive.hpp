@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "fit/common/fitted.hpp"
 #include "fit/second_order/fit_dynamic_bouc_wen.hpp"
 #include "model/second_order/friction_drive.hpp"
 #include "torsio/core/progress.hpp"

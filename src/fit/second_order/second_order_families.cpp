@@ -10,12 +10,12 @@ std::vector<FamilyInfo> second_order_families() {
   return {family_of<fit_dynamic_bouc_wen>(
               {.name = DynamicBoucWen::kFamily,
                .summary = "mass, damper and spring beside a Bouc-Wen element, driven by a force",
-               .is_spring = traits_of<DynamicBoucWen>().is_spring,
+               .is_spring = detail::traits_of<DynamicBoucWen>().is_spring,
                .only_if_named = true}),
           family_of<fit_friction_drive>(
               {.name = FrictionDrive::kFamily,
                .summary = "inertia with viscous and dry friction, driven by a force",
-               .is_spring = traits_of<FrictionDrive>().is_spring,
+               .is_spring = detail::traits_of<FrictionDrive>().is_spring,
                .only_if_named = true})};
 }
 

@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/report_progress.hpp"
+#include "fit/common/usable_table.hpp"
 #include "numerics/residual_search.hpp"
 #include "torsio/core/error.hpp"
 

@@ -7,7 +7,10 @@
 #include <numbers>
 #include <utility>
 
+#include "core/report_progress.hpp"
 #include "fit/common/excited_band.hpp"
+#include "fit/common/fitted.hpp"
+#include "fit/common/usable_table.hpp"
 #include "fit/viscoelastic/network_order.hpp"
 #include "fit/viscoelastic/viscoelastic_error.hpp"
 #include "fit/viscoelastic/viscoelastic_search.hpp"

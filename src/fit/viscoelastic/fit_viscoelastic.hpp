@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "fit/common/fitted.hpp"
 #include "model/viscoelastic/viscoelastic.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 #include "torsio/fit/common/fitted.hpp"

@@ -15,7 +15,7 @@ inline Estimate affine_inverse(const ScheduledCoefficients& coefficients,
   const double others = coefficients.weighted_sum(at, first, features, 1);
   const double value = (rest - others) / coefficients.coefficient(at, first);
   if (!std::isfinite(value) || (schedule.scheduled && schedule.feature == 0))
-    return no_inverse(features);
+    return detail::no_inverse(features);
   return {.value = value};
 }
 

@@ -198,7 +198,7 @@ class Triangle {
   }
 
   double_gemm::Scratch scratch_;
-  AlignedVector<double> kept_;
+  detail::AlignedVector<double> kept_;
 };
 
 View view_of(SquareMatrix& matrix) {

@@ -26,7 +26,7 @@ class SquareMatrix {
  private:
   std::size_t size_ = 0;
   std::size_t stride_ = 0;
-  AlignedVector<double> values_;
+  detail::AlignedVector<double> values_;
 };
 
 /// A = L L^T: reads the lower triangle only; what stands above it is spoilt.

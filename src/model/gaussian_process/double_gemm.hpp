@@ -28,8 +28,8 @@ enum class Mode { set, add, subtract };
 
 /// Memory that `multiply` works in.
 struct Scratch {
-  AlignedVector<double> left;
-  AlignedVector<double> right;
+  detail::AlignedVector<double> left;
+  detail::AlignedVector<double> right;
 };
 
 /// C = A B, C += A B or C -= A B, with A [C.rows x depth] and B [depth x C.columns].

@@ -24,10 +24,10 @@ GaussianProcess::Parameters checked(GaussianProcess::Parameters parameters) {
 }
 
 /// L as `whitened_square` reads it.
-AlignedVector<double> packed_factor(const SquareMatrix& factor) {
+detail::AlignedVector<double> packed_factor(const SquareMatrix& factor) {
   std::size_t places = 0;
   for (std::size_t i = 0; i < factor.size(); ++i) places += in_groups(i + 1);
-  AlignedVector<double> packed(places, 0.0);
+  detail::AlignedVector<double> packed(places, 0.0);
   double* to = packed.data();
   for (std::size_t i = 0; i < factor.size(); ++i) {
     std::copy_n(factor.row(i), i, to);

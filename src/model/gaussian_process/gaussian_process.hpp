@@ -71,10 +71,11 @@ class GaussianProcess {
   Parameters parameters_;
   Kernel kernel_;
   PackedPoints points_;
-  AlignedVector<double> weights_;
-  AlignedVector<double> factor_;  ///< L, rows one behind the other, as `whitened_square` reads it
-  AlignedVector<double> input_;
-  AlignedVector<double> values_;
+  detail::AlignedVector<double> weights_;
+  detail::AlignedVector<double>
+      factor_;  ///< L, rows one behind the other, as `whitened_square` reads it
+  detail::AlignedVector<double> input_;
+  detail::AlignedVector<double> values_;
 };
 
 }  // namespace torsio

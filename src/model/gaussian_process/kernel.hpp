@@ -104,7 +104,7 @@ class PackedPoints {
   std::size_t size_ = 0;
   std::size_t inputs_ = 0;
   std::size_t stride_ = 0;
-  AlignedVector<double> values_;  ///< [input][stride]
+  detail::AlignedVector<double> values_;  ///< [input][stride]
 };
 
 /// Sums of weights times derivatives, kept vector by vector until they are read.
@@ -116,7 +116,7 @@ class KernelGradient {
   [[nodiscard]] double* lanes() noexcept { return lanes_.data(); }
 
  private:
-  AlignedVector<double> lanes_;
+  detail::AlignedVector<double> lanes_;
 };
 
 /// A covariance function ready to be evaluated, row by row over many points.

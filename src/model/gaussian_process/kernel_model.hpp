@@ -35,8 +35,8 @@ void check_kernel_model(const Parameters& parameters, const std::string& place, 
 }
 
 /// Filled up to whole groups with 0.
-inline AlignedVector<double> padded(const std::vector<double>& values) {
-  AlignedVector<double> result(kernel_kernels::in_groups(values.size()), 0.0);
+inline detail::AlignedVector<double> padded(const std::vector<double>& values) {
+  detail::AlignedVector<double> result(kernel_kernels::in_groups(values.size()), 0.0);
   std::ranges::copy(values, result.begin());
   return result;
 }

@@ -22,9 +22,9 @@ ParametricGp::Parameters checked(ParametricGp::Parameters parameters) {
 }
 
 /// C, its rows filled up to whole groups with 0.
-AlignedVector<double> padded_rows(const Matrix& matrix) {
+detail::AlignedVector<double> padded_rows(const Matrix& matrix) {
   const std::size_t stride = in_groups(matrix.columns);
-  AlignedVector<double> rows(matrix.rows * stride, 0.0);
+  detail::AlignedVector<double> rows(matrix.rows * stride, 0.0);
   for (std::size_t i = 0; i < matrix.rows; ++i)
     std::ranges::copy(matrix.row(i), rows.begin() + static_cast<std::ptrdiff_t>(i * stride));
   return rows;

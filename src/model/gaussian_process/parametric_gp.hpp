@@ -71,10 +71,10 @@ class ParametricGp {
   Parameters parameters_;
   Kernel kernel_;
   PackedPoints points_;
-  AlignedVector<double> weights_;    ///< padded with 0
-  AlignedVector<double> explained_;  ///< M rows, padded with 0
-  AlignedVector<double> input_;
-  AlignedVector<double> values_;
+  detail::AlignedVector<double> weights_;    ///< padded with 0
+  detail::AlignedVector<double> explained_;  ///< M rows, padded with 0
+  detail::AlignedVector<double> input_;
+  detail::AlignedVector<double> values_;
 };
 
 }  // namespace torsio

@@ -225,7 +225,7 @@ double GreyBox::near_root(const Error& error_at, const ScheduledCoefficients::Po
 
 Estimate GreyBox::invert(double target, Features features) noexcept {
   const CoefficientSchedule& schedule = coefficients_.schedule();
-  if (schedule.scheduled && schedule.feature == 0) return no_inverse(features);
+  if (schedule.scheduled && schedule.feature == 0) return detail::no_inverse(features);
   const auto at = coefficients_.locate(features);
   const double wanted = target - others(at, features) - residual(features);
   const auto error_at = [&](double x) { return at_jump(at, x) - wanted; };

@@ -22,7 +22,8 @@ Estimate broken_line_inverse(double wanted, const SlipBank& stops, const Increme
   // Two points beyond the last corner on either side tell the slopes out there.
   const double farthest_down = curve(here - reach);
   const double farthest_up = curve(here + reach);
-  if (!std::isfinite(farthest_down) || !std::isfinite(farthest_up)) return no_inverse(features);
+  if (!std::isfinite(farthest_down) || !std::isfinite(farthest_up))
+    return detail::no_inverse(features);
   const double sign = farthest_up < farthest_down ? -1.0 : 1.0;
   struct Point {
     double x;
@@ -35,7 +36,7 @@ Estimate broken_line_inverse(double wanted, const SlipBank& stops, const Increme
     const double slope = sign * curve(end.x + outward) - end.y;
     const double x = end.x + outward * (aim - end.y) / slope;
     if (slope * outward > 0.0 && std::isfinite(x)) return {.value = x};
-    if (above.y == below.y) return no_inverse(features);
+    if (above.y == below.y) return detail::no_inverse(features);
     return {.value = end.x, .fault = Fault::outside_training_range};
   };
   if (!(aim >= below.y)) return extrapolated(below, -reach);
@@ -52,7 +53,7 @@ Estimate broken_line_inverse(double wanted, const SlipBank& stops, const Increme
   }
   const double share = above.y == below.y ? 0.5 : (aim - below.y) / (above.y - below.y);
   const double x = below.x + share * (above.x - below.x);
-  return std::isfinite(x) ? Estimate{.value = x} : no_inverse(features);
+  return std::isfinite(x) ? Estimate{.value = x} : detail::no_inverse(features);
 }
 
 }  // namespace torsio

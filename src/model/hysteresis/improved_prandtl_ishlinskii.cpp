@@ -117,7 +117,7 @@ Estimate ImprovedPrandtlIshlinskii::step(Features features) noexcept {
 Estimate ImprovedPrandtlIshlinskii::invert(double target, Features features) noexcept {
   const double wanted =
       straightened(target - parameters_.bias - other_inputs(parameters_.slopes, features));
-  if (parameters_.rate_feature == 0) return no_inverse(features);
+  if (parameters_.rate_feature == 0) return detail::no_inverse(features);
   const double scale = limit_scale(features);
   for (std::size_t i = 0; i < limits_.size(); ++i) limits_[i] = scale * parameters_.thresholds[i];
   const auto curve = [&](double x) {

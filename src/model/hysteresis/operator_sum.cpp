@@ -66,7 +66,7 @@ double OperatorSum<Operator>::curve(double x, double slope) const noexcept {
 template <class Operator>
 Estimate OperatorSum<Operator>::invert(double target, Features features) noexcept {
   const CoefficientSchedule& schedule = coefficients_.schedule();
-  if (schedule.scheduled && schedule.feature == 0) return no_inverse(features);
+  if (schedule.scheduled && schedule.feature == 0) return detail::no_inverse(features);
   const auto at = coefficients_.locate(features);
   const std::size_t first = 1 + input_count();
   for (std::size_t i = 0; i < weights_.size(); ++i)

@@ -119,9 +119,9 @@ class SlipBank {
 
   std::size_t size_ = 0;
   // Filled up to a multiple of kLanes by elements that hold no force.
-  AlignedVector<double> stiffness_;
-  AlignedVector<double> limit_;
-  AlignedVector<double> force_;
+  detail::AlignedVector<double> stiffness_;
+  detail::AlignedVector<double> limit_;
+  detail::AlignedVector<double> force_;
 };
 
 }  // namespace torsio

@@ -47,7 +47,7 @@ Estimate LinearCoulomb::step(Features features) const noexcept {
 }
 
 Estimate LinearCoulomb::invert(double target, Features features) const noexcept {
-  if (rate_feature_ == 0) return no_inverse(features);
+  if (rate_feature_ == 0) return detail::no_inverse(features);
   const auto at = coefficients_.locate(features);
   return affine_inverse(coefficients_, at, 1, target - without_slopes(at, features), features);
 }

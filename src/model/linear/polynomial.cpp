@@ -133,7 +133,7 @@ Estimate Polynomial::step(Features features) noexcept {
 
 Estimate Polynomial::invert(double target, Features features) const noexcept {
   const CoefficientSchedule& schedule = coefficients_.schedule();
-  if (schedule.scheduled && schedule.feature == 0) return no_inverse(features);
+  if (schedule.scheduled && schedule.feature == 0) return detail::no_inverse(features);
   const auto at = coefficients_.locate(features);
   const double wanted = target - coefficients_.weighted_sum(at, first_slope_, features, 1);
   const auto x = [this](double z) { return centre_ + half_range_ * z; };

@@ -84,15 +84,15 @@ class MixtureRegression {
   double largest_whitening_ = 0.0;
   double largest_offset_ = 0.0;
   // The components, packed as src/model/mixture/mixture_kernels.hpp says.
-  AlignedVector<float> scan_;
-  AlignedVector<float> rounded_;
-  AlignedVector<double> exact_;
+  detail::AlignedVector<float> scan_;
+  detail::AlignedVector<float> rounded_;
+  detail::AlignedVector<double> exact_;
   // Scratch of one query.
   std::size_t bytes_read_ = 0;
   std::vector<double> standardised_;
-  AlignedVector<float> scan_input_;
-  AlignedVector<float> scan_log_weights_;
-  AlignedVector<double> log_weights_;
+  detail::AlignedVector<float> scan_input_;
+  detail::AlignedVector<float> scan_log_weights_;
+  detail::AlignedVector<double> log_weights_;
   std::vector<std::size_t> candidates_;
 };
 

@@ -10,10 +10,10 @@
 namespace torsio {
 namespace {
 
-AlignedVector<float> packed(const DenseLayer& layer) {
+detail::AlignedVector<float> packed(const DenseLayer& layer) {
   const std::size_t lanes = network_kernels::lanes();
   const auto [units, inputs, values] = layer.weights;
-  AlignedVector<float> weights(padded_count(units) * (1 + inputs), 0.0F);
+  detail::AlignedVector<float> weights(padded_count(units) * (1 + inputs), 0.0F);
   for (std::size_t unit = 0; unit < units; ++unit) {
     float* const block = weights.data() + unit / lanes * (1 + inputs) * lanes + unit % lanes;
     block[0] = layer.bias[unit];
@@ -44,7 +44,7 @@ DenseStack::DenseStack(const std::vector<DenseLayer>& layers, std::size_t inputs
                        .blocks = padded_count(units) / network_kernels::lanes(),
                        .activation = static_cast<Activation>(layers[i].activation),
                        .weights = packed(layers[i]),
-                       .output = AlignedVector<float>(padded_count(units), 0.0F)});
+                       .output = detail::AlignedVector<float>(padded_count(units), 0.0F)});
     last_inputs_ = units;
   }
   const DenseLayer& last = layers.back();

@@ -36,12 +36,12 @@ class DenseStack {
     std::size_t units = 0;
     std::size_t blocks = 0;
     Activation activation = Activation::linear;
-    AlignedVector<float> weights;  ///< as src/model/network/network_kernels.hpp says
-    AlignedVector<float> output;   ///< of the last evaluation, padded
+    detail::AlignedVector<float> weights;  ///< as src/model/network/network_kernels.hpp says
+    detail::AlignedVector<float> output;   ///< of the last evaluation, padded
   };
 
   std::vector<Hidden> hidden_;
-  AlignedVector<float> last_weights_;  ///< padded
+  detail::AlignedVector<float> last_weights_;  ///< padded
   std::size_t last_inputs_ = 0;
   float last_bias_ = 0.0F;
 };

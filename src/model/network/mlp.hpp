@@ -56,7 +56,7 @@ class Mlp {
  private:
   Parameters parameters_;
   DenseStack layers_;
-  AlignedVector<float> input_;  ///< standardised, padded
+  detail::AlignedVector<float> input_;  ///< standardised, padded
 };
 
 }  // namespace torsio

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace torsio {
+namespace torsio::detail {
 namespace {
 
 constexpr std::size_t kBlocks = 100;
@@ -35,4 +35,4 @@ bool MovingComparison::step(double first_square, double second_square) noexcept 
   return total.first > total.second;
 }
 
-}  // namespace torsio
+}  // namespace torsio::detail

@@ -27,7 +27,7 @@ void check_finite(std::span<const Number> values, const std::string& place) {
 }
 
 template <class Number>
-void check_table(const Table2d<Number>& matrix, std::size_t rows, std::size_t columns,
+void check_table(const detail::Table2d<Number>& matrix, std::size_t rows, std::size_t columns,
                  const std::string& place) {
   const std::size_t count = matrix.values.size();
   if (matrix.rows != rows || matrix.columns != columns)

@@ -72,7 +72,7 @@ class RecurrentNetwork {
   RecurrentStack<Layer> stack_;
   DenseStack head_;
   std::size_t warm_up_samples_;
-  AlignedVector<float> inputs_;     ///< joints x inputs, standardised
+  detail::AlignedVector<float> inputs_;  ///< joints x inputs, standardised
   std::vector<std::size_t> steps_;  ///< of each joint since its reset, up to `warm_up_samples_`
 };
 

@@ -16,7 +16,7 @@ namespace {
 /// Rows of one block in the order of the kernels, filled unit by unit.
 class BlockWriter {
  public:
-  BlockWriter(AlignedVector<float>& weights, std::size_t rows, std::size_t unit)
+  BlockWriter(detail::AlignedVector<float>& weights, std::size_t rows, std::size_t unit)
       : lanes_(network_kernels::lanes()),
         at_(weights.data() + unit / lanes_ * rows * lanes_ + unit % lanes_) {}
 
@@ -35,11 +35,11 @@ class BlockWriter {
   float* at_;
 };
 
-AlignedVector<float> packed(const LstmLayer& layer) {
+detail::AlignedVector<float> packed(const LstmLayer& layer) {
   const std::size_t units = layer.units();
   const std::size_t biases = layer.bias.size() / units;
   const std::size_t rows = biases + 4 * (layer.input_weights.columns + units);
-  AlignedVector<float> weights(padded_count(units) * rows, 0.0F);
+  detail::AlignedVector<float> weights(padded_count(units) * rows, 0.0F);
   for (std::size_t unit = 0; unit < units; ++unit) {
     BlockWriter block(weights, rows, unit);
     for (std::size_t row = 0; row < biases; ++row) block.add(layer.bias[row * units + unit]);
@@ -49,10 +49,10 @@ AlignedVector<float> packed(const LstmLayer& layer) {
   return weights;
 }
 
-AlignedVector<float> packed(const GruLayer& layer) {
+detail::AlignedVector<float> packed(const GruLayer& layer) {
   const std::size_t units = layer.units();
   const std::size_t rows = 4 + 3 * (layer.input_weights.columns + units);
-  AlignedVector<float> weights(padded_count(units) * rows, 0.0F);
+  detail::AlignedVector<float> weights(padded_count(units) * rows, 0.0F);
   for (std::size_t unit = 0; unit < units; ++unit) {
     BlockWriter block(weights, rows, unit);
     for (const std::size_t row : {unit, units + unit})

@@ -51,12 +51,12 @@ class RecurrentStack {
   struct Packed {
     std::size_t inputs = 0;
     std::size_t units = 0;
-    std::size_t stride = 0;                  ///< units, padded
-    AlignedVector<float> weights = {};       ///< as src/model/network/network_kernels.hpp says
-    AlignedVector<float> hidden = {};        ///< joints x stride
-    AlignedVector<float> other_hidden = {};  ///< where a step writes the next h
-    AlignedVector<float> cell = {};          ///< joints x stride; empty for a GRU
-    bool biases_apart = false;               ///< `LstmLayer::keeps_biases_apart`
+    std::size_t stride = 0;                     ///< units, padded
+    detail::AlignedVector<float> weights = {};  ///< as src/model/network/network_kernels.hpp says
+    detail::AlignedVector<float> hidden = {};   ///< joints x stride
+    detail::AlignedVector<float> other_hidden = {};  ///< where a step writes the next h
+    detail::AlignedVector<float> cell = {};          ///< joints x stride; empty for a GRU
+    bool biases_apart = false;                       ///< `LstmLayer::keeps_biases_apart`
   };
 
   std::vector<Packed> layers_;

@@ -80,7 +80,8 @@ Estimate Viscoelastic::step(Features features) noexcept {
 
 Estimate Viscoelastic::invert(double target, Features features) const noexcept {
   const double value = (target - value_without_) / value_per_input_;
-  if (!std::isfinite(value) || !all_finite(features.subspan(1))) return no_inverse(features);
+  if (!std::isfinite(value) || !all_finite(features.subspan(1)))
+    return detail::no_inverse(features);
   return {.value = value};
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "sim/closed_loop/tracking_parts.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "sim/closed_loop/tracking_parts.hpp"
 #include "sim/experiment_table.hpp"
 #include "sim/torque_references.hpp"
 #include "torsio/core/did_you_mean.hpp"

@@ -8,9 +8,11 @@
 #include <cstddef>
 #include <utility>
 
+#include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "sim/bench.hpp"
 #include "sim/bench_log.hpp"
+#include "sim/closed_loop/tracking_parts.hpp"
 #include "sim/torque_references.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

@@ -8,6 +8,8 @@
 #include <numbers>
 #include <vector>
 
+#include "numerics/metrics_accumulator.hpp"
+#include "sim/closed_loop/tracking_parts.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/numerics/metrics.hpp"

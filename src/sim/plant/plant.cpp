@@ -52,10 +52,10 @@ StepLimits step_limits(const PlantParameters& parameters) {
   const auto stiffness = [&](const auto& stage) { return steepest(stage, load_Nm); };
   const auto damping = [](const auto& stage) { return strongest_damping(stage); };
   const auto ratio_of = [](const auto& stage) { return ratio(stage); };
-  const double first_ratio = dispatch(first, ratio_of);
-  const double second_ratio = dispatch(second, ratio_of);
-  const double first_Nm_rad = dispatch(first, stiffness);
-  const double second_Nm_rad = dispatch(second, stiffness);
+  const double first_ratio = detail::dispatch(first, ratio_of);
+  const double second_ratio = detail::dispatch(second, ratio_of);
+  const double first_Nm_rad = detail::dispatch(first, stiffness);
+  const double second_Nm_rad = detail::dispatch(second, stiffness);
   const double rotor_Nm_rad = first_Nm_rad / (first_ratio * first_ratio) +
                               LuGreFriction(parameters.rotor_friction).steepest();
   const double middle_Nm_rad = first_Nm_rad + second_Nm_rad / (second_ratio * second_ratio) +
@@ -69,8 +69,8 @@ StepLimits step_limits(const PlantParameters& parameters) {
                          second_Nm_rad / (second_ratio * std::sqrt(middle * joint));
   const double own = std::max({rotor_Nm_rad / rotor, middle_Nm_rad / middle, joint_Nm_rad / joint});
 
-  const double first_Nms = dispatch(first, damping);
-  const double second_Nms = dispatch(second, damping);
+  const double first_Nms = detail::dispatch(first, damping);
+  const double second_Nms = detail::dispatch(second, damping);
   const double rates_1_s = std::max(
       {(first_Nms / (first_ratio * first_ratio) + parameters.rotor_friction.viscous_Nms_rad) /
            rotor,
@@ -149,8 +149,8 @@ void Plant::set_period(double dt_s) noexcept {
   small_steps_ = small_steps(dt_s, longest_step_s_);
   dt_s_ = dt_s / static_cast<double>(small_steps_);
   motor_.set_period(dt_s_);
-  dispatch(first_, [this](auto& stage) { set_stage_period(stage, dt_s_); });
-  dispatch(second_, [this](auto& stage) { set_stage_period(stage, dt_s_); });
+  detail::dispatch(first_, [this](auto& stage) { set_stage_period(stage, dt_s_); });
+  detail::dispatch(second_, [this](auto& stage) { set_stage_period(stage, dt_s_); });
 }
 
 Fault Plant::reset(const PlantState& state) noexcept {
@@ -165,10 +165,12 @@ void Plant::start(const PlantState& state) noexcept {
   motor_.reset();
   rotor_friction_.reset();
   middle_friction_.reset();
-  dispatch(first_,
-           [&](auto& stage) { reset_stage(stage, state.rotor_angle_rad, state.middle_angle_rad); });
-  dispatch(second_,
-           [&](auto& stage) { reset_stage(stage, state.middle_angle_rad, state.joint_angle_rad); });
+  detail::dispatch(first_, [&](auto& stage) {
+    reset_stage(stage, state.rotor_angle_rad, state.middle_angle_rad);
+  });
+  detail::dispatch(second_, [&](auto& stage) {
+    reset_stage(stage, state.middle_angle_rad, state.joint_angle_rad);
+  });
   bearing_.reset();
 }
 
@@ -177,17 +179,17 @@ Fault Plant::reset(double joint_angle_rad, const Load& load) noexcept {
   const double torque_Nm =
       load.is_locked ? 0.0 : load.gravity_Nm * std::sin(joint_angle_rad) - load.external_torque_Nm;
   PlantState rest{.joint_angle_rad = joint_angle_rad};
-  rest.middle_angle_rad = dispatch(
+  rest.middle_angle_rad = detail::dispatch(
       second_, [&](const auto& stage) { return input_angle(stage, joint_angle_rad, torque_Nm); });
-  const double middle_Nm = torque_Nm * dispatch(second_, [&](const auto& stage) {
+  const double middle_Nm = torque_Nm * detail::dispatch(second_, [&](const auto& stage) {
                              return kinematics(stage, rest.middle_angle_rad).slope;
                            });
-  rest.rotor_angle_rad = dispatch(first_, [&](const auto& stage) {
+  rest.rotor_angle_rad = detail::dispatch(first_, [&](const auto& stage) {
     return input_angle(stage, rest.middle_angle_rad, middle_Nm);
   });
   if (!is_finite(rest)) return Fault::input_not_finite;
   start(rest);
-  const double rotor_Nm = middle_Nm * dispatch(first_, [&](const auto& stage) {
+  const double rotor_Nm = middle_Nm * detail::dispatch(first_, [&](const auto& stage) {
                             return kinematics(stage, rest.rotor_angle_rad).slope;
                           });
   motor_.reset(rotor_Nm / parameters_.motor.torque_constant_Nm_A);
@@ -221,7 +223,7 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
   const StageTorques second = step_second();
   t.second_Nm = second.output_Nm;
   t.second_on_middle_Nm = second.input_Nm;
-  const StageTorques first = dispatch(first_, [&](auto& stage) {
+  const StageTorques first = detail::dispatch(first_, [&](auto& stage) {
     return step_stage(
         stage, {s.rotor_angle_rad, s.rotor_speed_rad_s, s.middle_angle_rad, s.middle_speed_rad_s});
   });
@@ -257,11 +259,12 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
 StageTorques Plant::step_second() noexcept {
   const StageMotion motion{state_.middle_angle_rad, state_.middle_speed_rad_s,
                            state_.joint_angle_rad, state_.joint_speed_rad_s};
-  StageTorques torques = dispatch(second_, [&](auto& stage) { return step_stage(stage, motion); });
+  StageTorques torques =
+      detail::dispatch(second_, [&](auto& stage) { return step_stage(stage, motion); });
   if (is_sound_) return torques;
   torques.output_Nm *= condition_.second_stage_factor;
   torques.input_Nm *= condition_.second_stage_factor;
-  const Gear::Kinematics moved = dispatch(
+  const Gear::Kinematics moved = detail::dispatch(
       second_, [&](const auto& stage) { return kinematics(stage, motion.input_angle_rad); });
   const double twist_rad = moved.angle_rad - motion.output_angle_rad;
   const double beyond_rad = std::abs(twist_rad) - condition_.stop_twist_rad;

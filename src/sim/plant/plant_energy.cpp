@@ -18,7 +18,7 @@ template <class Stage>
 Twist twist(const Stage& stage, double input_rad, double input_rad_s, double output_rad,
             double output_rad_s) noexcept {
   const Gear::Kinematics moved =
-      dispatch(stage, [&](const auto& of) { return kinematics(of, input_rad); });
+      detail::dispatch(stage, [&](const auto& of) { return kinematics(of, input_rad); });
   return {moved.angle_rad - output_rad, moved.slope * input_rad_s - output_rad_s};
 }
 Twist first_twist_of(const FirstStage& stage, const PlantState& s) noexcept {
@@ -41,11 +41,11 @@ double Plant::first_twist() const noexcept { return first_twist_of(first_, state
 double Plant::second_twist() const noexcept { return second_twist_of(second_, state_).angle_rad; }
 
 double Plant::first_friction_torque() const noexcept {
-  return dispatch(first_, [](const auto& stage) { return friction_torque(stage); });
+  return detail::dispatch(first_, [](const auto& stage) { return friction_torque(stage); });
 }
 double Plant::second_friction_torque() const noexcept {
   return condition_.second_stage_factor *
-         dispatch(second_, [](const auto& stage) { return friction_torque(stage); });
+         detail::dispatch(second_, [](const auto& stage) { return friction_torque(stage); });
 }
 
 std::array<WorkPort, Plant::kWorkPorts> Plant::work_ports(const Load& load) const noexcept {
@@ -64,10 +64,12 @@ std::array<WorkPort, Plant::kWorkPorts> Plant::work_ports(const Load& load) cons
        middle_friction_.energy()},
       {hysteretic, torques_.bearing_Nm, joint, 0.0, bearing_.energy()},
       {loss, 0.0, joint, parameters_.joint_viscous_Nms_rad},
-      {loss, 0.0, first.rate_rad_s, dispatch(first_, damping)},
-      {loss, 0.0, second.rate_rad_s, dispatch(second_, damping)},
-      {hysteretic, first_friction_torque(), first.rate_rad_s, 0.0, dispatch(first_, stored)},
-      {hysteretic, second_friction_torque(), second.rate_rad_s, 0.0, dispatch(second_, stored)},
+      {loss, 0.0, first.rate_rad_s, detail::dispatch(first_, damping)},
+      {loss, 0.0, second.rate_rad_s, detail::dispatch(second_, damping)},
+      {hysteretic, first_friction_torque(), first.rate_rad_s, 0.0,
+       detail::dispatch(first_, stored)},
+      {hysteretic, second_friction_torque(), second.rate_rad_s, 0.0,
+       detail::dispatch(second_, stored)},
       {hysteretic, torques_.wall_Nm, joint, 0.0, wall_energy(load, state_.joint_angle_rad)},
   }};
 }
@@ -83,8 +85,8 @@ StoredEnergy Plant::stored_energy(const Load& load) const noexcept {
   const auto elastic = [](double twist_rad) {
     return [twist_rad](const auto& stage) { return elastic_energy(stage, twist_rad); };
   };
-  const double elastic_J =
-      dispatch(first_, elastic(first_twist())) + dispatch(second_, elastic(second_twist()));
+  const double elastic_J = detail::dispatch(first_, elastic(first_twist())) +
+                           detail::dispatch(second_, elastic(second_twist()));
   const double gravity_J = load.gravity_Nm * (1.0 - std::cos(state_.joint_angle_rad));
   return {.all_J = kinetic_J + elastic_J + gravity_J + hysteretic_J, .hysteretic_J = hysteretic_J};
 }

@@ -81,7 +81,8 @@ template <class... Chains>
 void make_blocks(BlocksOf<Chains...>& blocks, std::size_t kernel, std::size_t plants) {
   const std::size_t count = (plants + kPlantLanes - 1) / kPlantLanes;
   std::size_t at = 0;
-  static_cast<void>(((at++ == kernel && (blocks = AlignedVector<Chains>(count), true)) || ...));
+  static_cast<void>(
+      ((at++ == kernel && (blocks = detail::AlignedVector<Chains>(count), true)) || ...));
 }
 
 PlantBlocks blocks_for(std::span<const PlantParameters> parameters) {
@@ -158,11 +159,11 @@ PlantLanes::PlantLanes(std::span<const PlantParameters> parameters)
     : blocks_(blocks_for(parameters)) {}
 
 std::size_t PlantLanes::padded_size() const noexcept {
-  return dispatch(blocks_, [](const auto& blocks) { return blocks.size() * kPlantLanes; });
+  return detail::dispatch(blocks_, [](const auto& blocks) { return blocks.size() * kPlantLanes; });
 }
 
 void PlantLanes::set_parts(std::size_t at, const Plant& plant) noexcept {
-  dispatch(blocks_, [&](auto& blocks) {
+  detail::dispatch(blocks_, [&](auto& blocks) {
     auto& rows = block_of(blocks, at);
     const Lane lane = lane_of(at);
     const PlantParameters& of = plant.parameters();
@@ -178,7 +179,7 @@ void PlantLanes::set_parts(std::size_t at, const Plant& plant) noexcept {
 }
 
 void PlantLanes::set_period(std::size_t at, const Plant& plant, double dt_s) noexcept {
-  dispatch(blocks_, [&](auto& blocks) {
+  detail::dispatch(blocks_, [&](auto& blocks) {
     auto& rows = block_of(blocks, at);
     const Lane lane = lane_of(at);
     const PlantParameters& of = plant.parameters();
@@ -191,7 +192,7 @@ void PlantLanes::set_period(std::size_t at, const Plant& plant, double dt_s) noe
 }
 
 void PlantLanes::start(std::size_t at, const Plant& plant) noexcept {
-  dispatch(blocks_, [&](auto& blocks) {
+  detail::dispatch(blocks_, [&](auto& blocks) {
     auto& rows = block_of(blocks, at);
     const Lane lane = lane_of(at);
     const PlantState& state = plant.state();
@@ -221,7 +222,7 @@ void PlantLanes::start(std::size_t at, const Plant& plant) noexcept {
 }
 
 void PlantLanes::set_condition(std::size_t at, const PlantCondition& condition) noexcept {
-  dispatch(blocks_, [&](auto& blocks) {
+  detail::dispatch(blocks_, [&](auto& blocks) {
     auto& rows = block_of(blocks, at);
     const Lane lane = lane_of(at);
     lane(rows.friction_factor) = condition.friction_factor;
@@ -235,7 +236,7 @@ void PlantLanes::set_condition(std::size_t at, const PlantCondition& condition) 
 bool PlantLanes::step(std::span<const PlantCommand> commands, std::span<const Load> loads,
                       std::size_t steps, double dt_s, std::span<Fault> faults) noexcept {
   constexpr std::size_t kTogether = plant_kernels::kTogether * kPlantLanes;
-  return dispatch(blocks_, [&](auto& blocks) {
+  return detail::dispatch(blocks_, [&](auto& blocks) {
     bool took_all = true;
     for (std::size_t begin = 0; begin < faults.size(); begin += kTogether) {
       const std::size_t end = std::min(begin + kTogether, faults.size());
@@ -269,7 +270,7 @@ bool PlantLanes::step(std::span<const PlantCommand> commands, std::span<const Lo
 }
 
 PlantState PlantLanes::state(std::size_t at) const noexcept {
-  return dispatch(blocks_, [&](const auto& blocks) -> PlantState {
+  return detail::dispatch(blocks_, [&](const auto& blocks) -> PlantState {
     const auto& rows = block_of(blocks, at);
     const Lane lane = lane_of(at);
     return {lane(rows.rotor.angle_rad),  lane(rows.rotor.speed_rad_s),
@@ -279,7 +280,7 @@ PlantState PlantLanes::state(std::size_t at) const noexcept {
 }
 
 PlantTorques PlantLanes::torques(std::size_t at) const noexcept {
-  return dispatch(blocks_, [&](const auto& blocks) -> PlantTorques {
+  return detail::dispatch(blocks_, [&](const auto& blocks) -> PlantTorques {
     const auto& rows = block_of(blocks, at);
     const Lane lane = lane_of(at);
     return {.motor_Nm = lane(rows.motor.torque_Nm),
@@ -296,7 +297,7 @@ PlantTorques PlantLanes::torques(std::size_t at) const noexcept {
 }
 
 double PlantLanes::current(std::size_t at) const noexcept {
-  return dispatch(blocks_, [&](const auto& blocks) {
+  return detail::dispatch(blocks_, [&](const auto& blocks) {
     return lane_of(at)(block_of(blocks, at).motor.current_A);
   });
 }

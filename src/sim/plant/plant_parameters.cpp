@@ -137,7 +137,7 @@ LuGreFriction::Parameters friction_of(const FrictionSheet& friction, double rati
 
 /// A stage without a ratio transmits one to one.
 double ratio_of(const auto& stage) {
-  return dispatch(stage, [](const auto& of) {
+  return detail::dispatch(stage, [](const auto& of) {
     if constexpr (requires { of.ratio; }) return of.ratio;
     return 1.0;
   });
@@ -168,8 +168,8 @@ std::array<double, 2> natural_frequencies(const PlantParameters& parameters) {
   const double middle = parameters.middle_inertia_kg_m2 * second_ratio * second_ratio;
   const double joint = parameters.joint_inertia_kg_m2;
   const auto stiffness = [](const auto& stage) { return stiffness_of(stage); };
-  const double first = dispatch(parameters.first, stiffness) * second_ratio * second_ratio;
-  const double second = dispatch(parameters.second, stiffness);
+  const double first = detail::dispatch(parameters.first, stiffness) * second_ratio * second_ratio;
+  const double second = detail::dispatch(parameters.second, stiffness);
   const double sum = first * (1.0 / rotor + 1.0 / middle) + second * (1.0 / middle + 1.0 / joint);
   const double product = first * second * (rotor + middle + joint) / (rotor * middle * joint);
   const double high = 0.5 * (sum + std::sqrt(sum * sum - 4.0 * product));

@@ -134,7 +134,7 @@ using ClutchChain = ChainRows<ClutchRows, RubberRows>;
 using GearChain = ChainRows<GearRows, GearRows>;
 
 template <class... Chains>
-using BlocksOf = std::variant<AlignedVector<Chains>...>;
+using BlocksOf = std::variant<detail::AlignedVector<Chains>...>;
 using PlantBlocks = BlocksOf<MaxwellChain, BoucWenChain, LuGreChain, BondedChain, UnbondedChain,
                              ClutchChain, GearChain>;
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "fit/common/model_run.hpp"
+#include "fit/common/usable_table.hpp"
 #include "model/linear/linear.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"

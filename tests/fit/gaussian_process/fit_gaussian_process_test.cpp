@@ -204,7 +204,7 @@ TEST(KernelPlain, IsTheCombinedKernelOfThePaper) {
   Matrix z(1, 2);
   z.values = {-0.05, 0.12};
   const PackedPoints packed(z);
-  AlignedVector<double> value(packed.padded_size());
+  detail::AlignedVector<double> value(packed.padded_size());
   kernel.row(x.data(), packed, 1, value.data());
   double square = 0.0;
   double line = 0.0;
@@ -299,7 +299,7 @@ TEST(FitGaussianProcess, ItsIntervalsCoverDataFromThePrior) {
     for (double& value : points.values) value = 6.0 * random.uniform();
     const Kernel kernel(parse_kernel("se", 2), 2);
     const PackedPoints packed(points);
-    AlignedVector<double> row(packed.padded_size());
+    detail::AlignedVector<double> row(packed.padded_size());
     Eigen::MatrixXd k(kAll, kAll);
     for (std::size_t i = 0; i < kAll; ++i) {
       kernel.row(points.row(i).data(), packed, kAll, row.data());

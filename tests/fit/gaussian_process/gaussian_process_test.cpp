@@ -55,7 +55,7 @@ Kernel some_kernel(const std::string& text = kCombined) {
 /// k of all rows of two tables.
 MatrixXd covariance(const Kernel& kernel, const Matrix& a, const Matrix& b) {
   const PackedPoints points(b);
-  AlignedVector<double> values(points.padded_size());
+  detail::AlignedVector<double> values(points.padded_size());
   MatrixXd result(a.rows, b.rows);
   for (std::size_t i = 0; i < a.rows; ++i) {
     kernel.row(a.row(i).data(), points, b.rows, values.data());

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/common/fitted.hpp"
 #include "fit/common/model_run.hpp"
 #include "fit/linear/fit_linear.hpp"
 #include "support/error_message.hpp"

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/common/fitted.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/common/fitted.hpp"
 #include "fit/common/model_run.hpp"
 #include "model/linear/linear.hpp"
 #include "model/narx/narx.hpp"

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/common/fitted.hpp"
 #include "network_example.hpp"
 #include "support/error_message.hpp"
 #include "support/example_data.hpp"

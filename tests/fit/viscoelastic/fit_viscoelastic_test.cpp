@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "fit/common/excited_band.hpp"
+#include "fit/common/fitted.hpp"
 #include "fit/viscoelastic/network_order.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"

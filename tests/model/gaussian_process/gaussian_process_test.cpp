@@ -25,7 +25,7 @@ using testing::HasSubstr;
 Eigen::MatrixXd covariance(const KernelExpression& expression, const Matrix& a, const Matrix& b) {
   const Kernel kernel(expression, a.columns);
   const PackedPoints points(b);
-  AlignedVector<double> values(points.padded_size());
+  detail::AlignedVector<double> values(points.padded_size());
   Eigen::MatrixXd result(a.rows, b.rows);
   for (std::size_t i = 0; i < a.rows; ++i) {
     kernel.row(a.row(i).data(), points, b.rows, values.data());

@@ -97,7 +97,7 @@ TEST(Kernel, IsItsDefinitionOnEveryInstructionSet) {
   const Matrix points = random_points(21, 1);
   const Matrix at = random_points(4, 2);
   const PackedPoints packed(points);
-  AlignedVector<double> values(packed.padded_size());
+  detail::AlignedVector<double> values(packed.padded_size());
   test::on_each_instruction_set([&](const char* name) {
     SCOPED_TRACE(name);
     for (const std::string& text : kTexts) {
@@ -129,7 +129,7 @@ TEST(Kernel, ItsGradientIsThatOfFiniteDifferences) {
   const Matrix points = random_points(13, 3);
   const Matrix at = random_points(1, 4);
   const PackedPoints packed(points);
-  AlignedVector<double> padded(packed.padded_size(), 0.0);
+  detail::AlignedVector<double> padded(packed.padded_size(), 0.0);
   std::vector<double> weights(points.rows);
   Random random(5);
   for (std::size_t j = 0; j < weights.size(); ++j) padded[j] = weights[j] = random.normal();
@@ -161,7 +161,7 @@ TEST(Kernel, FarPointsHaveNoCovarianceRatherThanNone) {
   for (const char* text : {"se", "rq", "matern32", "matern52", "se*(linear+periodic*rq)"}) {
     const Kernel kernel(parse_kernel(text, 1), 1);
     PackedPoints points(Matrix(1, 1));
-    AlignedVector<double> value(points.padded_size());
+    detail::AlignedVector<double> value(points.padded_size());
     for (const double x : {1e3, 1e9, 1e100}) {
       kernel.row(&x, points, 1, value.data());
       EXPECT_TRUE(value[0] >= 0.0 && value[0] < 1e-2) << text << " at " << x << ": " << value[0];

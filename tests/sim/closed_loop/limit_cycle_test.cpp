@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/closed_loop/tracking_parts.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/random.hpp"
 

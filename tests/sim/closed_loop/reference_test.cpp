@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "sim/closed_loop/tracking_parts.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 

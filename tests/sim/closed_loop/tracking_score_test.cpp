@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "sim/closed_loop/tracking_parts.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"

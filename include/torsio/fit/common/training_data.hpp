@@ -41,13 +41,6 @@ struct TrainingData {
   [[nodiscard]] std::size_t usable_samples() const noexcept;
 };
 
-/// The usable samples of all sequences under each other, for families without memory.
-struct Table {
-  Matrix features;
-  std::vector<double> target;
-};
-[[nodiscard]] Table usable_table(const TrainingData& data);
-
 /// Runs each record of the dataset that has segments of `role` through the pipeline.
 /// @throws Error if a raw input is missing or not finite (naming record, channel, sample), or
 /// nothing usable remains. A feature that is not finite only spoils its own sample.

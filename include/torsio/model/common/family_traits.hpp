@@ -23,6 +23,8 @@ struct FamilyTraits {
   bool has_memory = true;
 };
 
+namespace detail {
+
 template <class Family>
 [[nodiscard]] constexpr FamilyTraits traits_of() noexcept {
   if constexpr (requires { Family::kTraits; }) {
@@ -31,6 +33,8 @@ template <class Family>
     return {};
   }
 }
+
+}  // namespace detail
 
 /// A model that names its family, and whose parameters name the model: what `AnyModel` holds.
 ///

@@ -68,10 +68,14 @@ concept HasLastLayer = requires(const M& model) {
   { model.last_layer_input() } noexcept -> std::same_as<std::span<const float>>;
 };
 
+namespace detail {
+
 /// Where a model has no inverse: the given first input, or 0 where that is no number.
 [[nodiscard]] inline Estimate no_inverse(Features features) noexcept {
   return {.value = std::isfinite(features[0]) ? features[0] : 0.0,
           .fault = Fault::model_not_finite};
 }
+
+}  // namespace detail
 
 }  // namespace torsio

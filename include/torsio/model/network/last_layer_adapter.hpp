@@ -210,23 +210,24 @@ class LastLayerAdapter {
   std::size_t frozen_after_ticks_;
   std::size_t features_;  ///< of the last layer, without the 1
 
-  AlignedVector<double> deviation_;  ///< W - W0, the bias behind the weights, padded
-  double square_ = 0.0;              ///< its square
-  AlignedVector<double> extended_;   ///< h~ of the last step, padded
+  detail::AlignedVector<double> deviation_;  ///< W - W0, the bias behind the weights, padded
+  double square_ = 0.0;                      ///< its square
+  detail::AlignedVector<double> extended_;   ///< h~ of the last step, padded
   double extended_square_ = 0.0;
   double frozen_value_ = 0.0;   ///< of the last step
   double adapted_value_ = 0.0;  ///< of the last step
   bool has_step_ = false;
 
   // RLS. The last rank-one update waits until the next pass over P, which then costs no more.
-  AlignedVector<double> covariance_;  ///< as src/model/network/adaptation_kernels.hpp says
-  AlignedVector<double> pending_;     ///< P is pending_scale_ (covariance_ - pending_ pending_')
-  AlignedVector<double> product_;     ///< P h~
+  detail::AlignedVector<double> covariance_;  ///< as src/model/network/adaptation_kernels.hpp says
+  detail::AlignedVector<double>
+      pending_;  ///< P is pending_scale_ (covariance_ - pending_ pending_')
+  detail::AlignedVector<double> product_;  ///< P h~
   double pending_scale_ = 1.0;
 
   double last_reference_ = kNotMeasured;
   std::size_t unchanged_ticks_ = 0;
-  MovingComparison comparison_;
+  detail::MovingComparison comparison_;
   AdaptationCounts counts_;
   bool paused_ = false;
 };

@@ -5,7 +5,7 @@
 
 #include "torsio/core/realtime.hpp"
 
-namespace torsio {
+namespace torsio::detail {
 
 /// Compares two mean square errors over the last stretch of time, in blocks of a hundredth of it:
 /// sums of blocks do not drift, as running sums would. Nothing is allocated after construction.
@@ -33,4 +33,4 @@ class MovingComparison {
   std::size_t next_ = 0;    ///< block to be replaced
 };
 
-}  // namespace torsio
+}  // namespace torsio::detail

@@ -42,10 +42,4 @@ struct TorqueReference {
 /// Of `Kind::sweep`: 1 to 40 Hz.
 [[nodiscard]] LogSweep::Parameters frequency_sweep(double amplitude_Nm, double duration_s);
 
-/// All of it, tick by tick.
-/// @param seed of a random walk
-/// @throws UsageError if a value is out of range, or the torque anywhere beyond the actuator's rating.
-[[nodiscard]] std::vector<double> reference_torque(const TorqueReference& reference,
-                                                   const DataSheet& sheet, std::uint64_t seed);
-
 }  // namespace torsio

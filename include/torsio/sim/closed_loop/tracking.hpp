@@ -40,7 +40,8 @@ void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uin
 
 struct TrackingRun {
   TrackingScore score;  ///< of a run that has not diverged
-  /// As `bandwidth`: 0 below the sweep, infinite above it; none if not asked for, or if it diverged
+  /// Where the response to `frequency_sweep` has fallen to -3 dB: 0 below the sweep, infinite above it; none
+  /// if not asked for, or if it diverged
   std::optional<double> bandwidth_Hz = {};
   bool has_diverged = false;  ///< stopped: the joint turned round, or the torque left any bound
   /// What the sensors told, what the loop made of it with each term, and the `truth_` channels.

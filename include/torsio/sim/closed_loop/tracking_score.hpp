@@ -2,11 +2,7 @@
 
 #include <cstddef>
 #include <optional>
-#include <span>
-#include <string>
 
-#include "torsio/data/recording.hpp"
-#include "torsio/signal/excitation.hpp"
 #include "torsio/sim/closed_loop/limit_cycle.hpp"
 
 namespace torsio {
@@ -31,16 +27,5 @@ struct TrackingScore {
   std::size_t inverse_faults = 0;  ///< ticks in which the inverse told its line, not its model
   std::size_t loop_faults = 0;     ///< ticks without a usable reference or measurement
 };
-
-/// Of a record that `track` made. @throws Error if it is not longer than what is not scored.
-[[nodiscard]] TrackingScore tracking_score(const Recording& record, double amplitude_Nm,
-                                           bool has_steps);
-
-/// The frequency [Hz] where the response to a sweep has fallen to -3 dB of what was wanted. Its first
-/// harmonic, in windows of a third of an octave.
-/// @returns 0 if it is below from the first window on, infinity if it never falls so far: the
-/// bandwidth lies below or above what the sweep covers
-[[nodiscard]] double bandwidth(std::span<const double> torque_Nm, const LogSweep::Parameters& sweep,
-                               double sample_rate_Hz);
 
 }  // namespace torsio

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string_view>
+
+#include "torsio/control/joint_impedance.hpp"
+#include "torsio/control/linear_system.hpp"
+#include "torsio/control/pid.hpp"
+#include "torsio/control/series_elastic_joint.hpp"
+
+namespace torsio {
+
+/// Each on inputs of its own, their outputs added. @throws Error if they do not fit.
+[[nodiscard]] LinearSystem side_by_side(const LinearSystem& one, const LinearSystem& other);
+
+/// Whether the loop, closed with the sign turned, comes to rest; what stands still may stay where it
+/// is. @throws Error as `LinearSystem::closed`.
+[[nodiscard]] bool is_stable_closed(const LinearSystem& loop);
+
+/// From the measurement to minus the command, as `Pid` does it between its limits; terms without a
+/// gain are left out. Allocates.
+[[nodiscard]] LinearSystem linear_pid(const Pid::Gains& gains, double derivative_cutoff_Hz,
+                                      double sample_rate_Hz);
+
+/// The loop cut at the current: feedback, one sample of delay, hold, joint.
+[[nodiscard]] LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& feedback,
+                                     JointOutput output);
+
+/// @throws Error naming the output and the phase margin if the loop is unstable when it is closed.
+void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output);
+
+/// What deflection control feeds back when a `JointImpedance` gives its wish through the line
+/// δ* = τ* / K, q̇ being the low-passed difference of q. Allocates.
+[[nodiscard]] JointFeedback impedance_feedback(const DeflectionController& controller,
+                                               const JointImpedance::Gains& gains,
+                                               double speed_cutoff_Hz);
+
+}  // namespace torsio

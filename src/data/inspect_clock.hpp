@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+namespace torsio {
+
+/// What the time stamps of a log say about its clock.
+struct ClockReport {
+  double sample_rate_Hz = 0.0;     ///< from the first and the last stamp; 0 if it cannot be told
+  double stamp_step_s = 0.0;       ///< median of the positive differences between neighbours
+  double largest_stray_s = 0.0;    ///< of a stamp from an even spread between first and last
+  std::size_t most_stray = 0;      ///< sample where that happens
+  std::size_t worst_interval = 0;  ///< the interval that ends at this sample is the oddest
+  std::size_t duplicated = 0;      ///< stamps equal to the one before
+  std::size_t backward = 0;        ///< stamps before the one before
+  std::size_t first_not_increasing = 0;  ///< 0: none
+  std::size_t not_finite = 0;
+
+  /// Strictly increasing, and no stamp strays by more than a quarter of a sample from an even
+  /// spread: a missing sample makes half a sample of stray, so none can hide.
+  [[nodiscard]] bool is_uniform() const noexcept;
+};
+
+[[nodiscard]] ClockReport inspect_clock(std::span<const double> stamps_s);
+
+/// The rate with the fewest digits, as a frequency or as a period, that agrees with `rate_Hz`
+/// within `relative_tolerance`: 833.33333333334 becomes exactly 1 / 0.0012 s.
+[[nodiscard]] double simplest_rate(double rate_Hz, double relative_tolerance);
+
+}  // namespace torsio
