@@ -11,7 +11,7 @@
 #include "core/report_progress.hpp"
 #include "evaluate/initial_state.hpp"
 #include "fit/common/finite_input.hpp"
-#include "model/second_order/friction_drive.hpp"
+#include "model/second_order/rigid_drive.hpp"
 #include "numerics/metrics_accumulator.hpp"
 #include "torsio/core/error.hpp"
 

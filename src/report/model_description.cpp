@@ -105,10 +105,10 @@ ParameterDescription description_of(const ModelFile& model) {
   return {};
 }
 
-std::string coefficient_table(const std::vector<FittedParameter>& told) {
+std::string coefficient_table(const std::vector<FittedParameter>& estimate) {
   TextTable table;
   table.header({"parameter", "value", "unit"});
-  for (const FittedParameter& each : told)
+  for (const FittedParameter& each : estimate)
     table.row({each.name, fmt::format("{:.6g}", each.value), each.unit});
   return table.text();
 }
@@ -172,15 +172,15 @@ std::string model_description(const ModelFile& model) {
   text += fmt::format("\n{}", range_table(settings));
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
-  const ParameterDescription told = description_of(model);
-  if (!told.coefficients.empty() && told.coefficients.size() <= kReadable)
-    return text + "\n" + coefficient_table(told.coefficients);
+  const ParameterDescription estimate = description_of(model);
+  if (!estimate.coefficients.empty() && estimate.coefficients.size() <= kReadable)
+    return text + "\n" + coefficient_table(estimate.coefficients);
   std::vector<Leaf> leaves = leaves_of(model);
   std::erase_if(leaves, [&](const Leaf& leaf) {
-    return !told.covered.empty() && leaf.name.starts_with(told.covered);
+    return !estimate.covered.empty() && leaf.name.starts_with(estimate.covered);
   });
   text += "\n";
-  for (const std::string& line : told.lines) text += line + "\n";
+  for (const std::string& line : estimate.lines) text += line + "\n";
   return text + parameter_lines(leaves);
 }
 

@@ -25,7 +25,7 @@ std::vector<FamilyInfo> gaussian_process_families() {
            .describe = describe_kernel<GaussianProcess>}),
       family_of<fit_parametric_gp>(
           {.name = ParametricGp::kFamily,
-           .summary = "Gaussian process at a few hypothetical inputs, learned sample by sample",
+           .summary = "Gaussian process at a few inducing points, learned sample by sample",
            .describe = describe_kernel<ParametricGp>}),
       family_of<fit_variational_gp>({.name = "parametric_gp_variational",
                                      .summary = "the same by a variational bound, in closed form",

@@ -18,8 +18,8 @@ using kernel_kernels::in_groups;
 
 GaussianProcess::Parameters checked(GaussianProcess::Parameters parameters) {
   check_kernel_model(parameters, "gaussian_process",
-                     parameters.with_std_dev ? GaussianProcess::kMostPointsWithStdDev
-                                             : GaussianProcess::kMostPoints);
+                     parameters.with_std_dev ? GaussianProcess::kMaxPointsWithStdDev
+                                             : GaussianProcess::kMaxPoints);
   return parameters;
 }
 
