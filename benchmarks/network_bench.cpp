@@ -151,8 +151,8 @@ Row update_row(AdaptationRule rule, std::size_t pass_bytes, double multiply_adds
       [&] {
         for (std::size_t n = 0; n < kTimed; ++n) {
           (void)adapter.step(features[n], frozen[n]);
-          const Learning outcome = adapter.learn({.value = frozen[n] + 0.1 * inputs(n, 0)});
-          if (outcome != Learning::updated && outcome != Learning::limited) ++missed;
+          const UpdateOutcome outcome = adapter.learn({.value = frozen[n] + 0.1 * inputs(n, 0)});
+          if (outcome != UpdateOutcome::updated && outcome != UpdateOutcome::limited) ++missed;
         }
       },
       2.0);

@@ -44,7 +44,7 @@ int run(const char* model_file, const char* adapted_file) {
   }
   const torsio::AdaptationCounts& counts = estimator.adapter().counts();
   std::printf("%zu updates, %zu within the noise, %zu roll-backs\n", counts.updates(),
-              counts.of(torsio::Learning::dead_zone), counts.roll_backs);
+              counts.of(torsio::UpdateOutcome::dead_zone), counts.roll_backs);
   model.parameters = estimator.adapted();
   torsio::save_model(adapted_file, model);
   return 0;

@@ -17,7 +17,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::uint64_t kJudged = 50;  // seeds of runs to be judged on
+constexpr std::uint64_t kScored = 50;  // seeds of runs to be judged on
 /// What a DFKI bench tells at the samples of its load cell (125 Hz), whose known latency is taken off: a log of
 /// 1 kHz tells no more of the torque, at eight times the cost.
 Recording at_load_cell(const Recording& log, const DataSheet& sheet) {
@@ -71,7 +71,7 @@ ComparisonCase torque_loop(const std::string& actuator, std::uint64_t seed,
     add(made,
         {.actuator = actuator,
          .experiment = experiment,
-         .seed = seed + (role == Role::test ? kJudged : 10 + made.dataset.records.size()),
+         .seed = seed + (role == Role::test ? kScored : 10 + made.dataset.records.size()),
          .torque_amplitude_Nm = share * rated_Nm},
         role, progress);
   };
@@ -88,12 +88,12 @@ ComparisonCase elastomer(const std::string& actuator, std::uint64_t seed,
       .inputs = {"spring_deflection_rad", "lowpass(rate(spring_deflection_rad), 10Hz)"}};
   made.dataset.initialise_samples = 0;  // every run starts at rest
   add(made, {.actuator = actuator, .experiment = "triangles", .seed = seed}, Role::train, progress);
-  add(made, {.actuator = actuator, .experiment = "random-walk", .seed = seed + kJudged}, Role::test,
+  add(made, {.actuator = actuator, .experiment = "random-walk", .seed = seed + kScored}, Role::test,
       progress, actuator + ", random walk");
   add(made,
       {.actuator = actuator,
        .experiment = "slow-cycles",
-       .seed = seed + kJudged + 1,
+       .seed = seed + kScored + 1,
        .duration_s = 100.0},
       Role::test, progress, actuator + ", slow cycles");
   return made;
@@ -106,7 +106,7 @@ ComparisonCase rubber(std::uint64_t seed, const Progress& progress) {
   made.dataset.initialise_samples = 0;
   add(made, {.actuator = kActuator, .experiment = "grid", .seed = seed}, Role::train, progress);
   for (std::size_t k = 0; k < 4; ++k)
-    add(made, {.actuator = kActuator, .experiment = "multisine", .seed = seed + kJudged + k},
+    add(made, {.actuator = kActuator, .experiment = "multisine", .seed = seed + kScored + k},
         Role::test, progress);
   return made;
 }
@@ -125,7 +125,7 @@ ComparisonCase pushes(const std::string& actuator, double duration_s, std::uint6
       add(made,
           {.actuator = actuator,
            .experiment = "human-torque",
-           .seed = seed + made.dataset.records.size() + (role == Role::test ? kJudged : 0),
+           .seed = seed + made.dataset.records.size() + (role == Role::test ? kScored : 0),
            .duration_s = duration_s,
            .torque_amplitude_Nm = torque_Nm,
            .is_impedance_zero = is_zero},

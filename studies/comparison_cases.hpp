@@ -16,7 +16,7 @@ struct ComparisonCase {
   Dataset dataset = {};
   std::vector<std::string> inputs = {};  ///< empty: the usual ones (`resolve_inputs`)
   std::string schedule = {};             ///< an input that families which can are scheduled over
-  /// Judged recording and the condition that it is a row of; none: all together are one, called as the
+  /// TestCase recording and the condition that it is a row of; none: all together are one, called as the
   /// case.
   std::vector<std::pair<std::string, std::string>> conditions = {};
 };

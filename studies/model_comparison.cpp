@@ -20,36 +20,37 @@ namespace torsio {
 namespace {
 
 /// A model of the table: what its rows are called, and how `--models` asks for it.
-struct Rival {
+struct Candidate {
   std::string_view label;
   std::string_view model;
   bool is_quick = false;  ///< also in the quick study
 };
 
 // Where a family's own settings would take minutes a case, cheaper ones: fewer starts, samples, epochs.
-constexpr std::array kRivals{
-    Rival{"linear", "linear", true},
-    Rival{"linear_coulomb", "linear_coulomb"},
-    Rival{"polynomial", "polynomial", true},
-    Rival{"maxwell_slip", "maxwell_slip", true},
-    Rival{"prandtl_ishlinskii", "prandtl_ishlinskii"},
-    Rival{"prandtl_ishlinskii_improved", "prandtl_ishlinskii_improved"},
-    Rival{"bouc_wen", "bouc_wen"},
-    Rival{"nonlinear_backlash", "nonlinear_backlash"},
-    Rival{"nonlinear_backlash_improved", "nonlinear_backlash_improved"},
-    Rival{"exponential_loading", "exponential_loading"},
-    Rival{"hammerstein_wiener", "hammerstein_wiener:structure=given:iterations=500", true},
-    Rival{"viscoelastic", "viscoelastic:network=003a:starts=2"},
-    Rival{"grey_box", "grey_box", true},
-    Rival{"grey_box, no residual", "grey_box:residual=none", true},
-    Rival{"dgmm", "dgmm"},
-    Rival{"gaussian_process", "gaussian_process:std_dev=false:restarts=0"},
-    Rival{"parametric_gp", "parametric_gp:updates=5000"},
-    Rival{"parametric_gp_variational", "parametric_gp_variational:points=50:samples=1000"},
-    Rival{"mlp", "mlp"},
-    Rival{"arx", "arx", true},
-    Rival{"narx_polynomial", "narx_polynomial:training=one_step"},
-    Rival{"lstm", "lstm:layers=16:epochs=10:stride=100"},
+constexpr std::array kCandidates{
+    Candidate{"linear", "linear", true},
+    Candidate{"linear_coulomb", "linear_coulomb"},
+    Candidate{"polynomial", "polynomial", true},
+    Candidate{"maxwell_slip", "maxwell_slip", true},
+    Candidate{"prandtl_ishlinskii", "prandtl_ishlinskii"},
+    Candidate{"prandtl_ishlinskii_improved", "prandtl_ishlinskii_improved"},
+    Candidate{"bouc_wen", "bouc_wen"},
+    Candidate{"nonlinear_backlash", "nonlinear_backlash"},
+    Candidate{"nonlinear_backlash_improved", "nonlinear_backlash_improved"},
+    Candidate{"exponential_loading", "exponential_loading"},
+    Candidate{"hammerstein_wiener", "hammerstein_wiener:structure=given:iterations=500", true},
+    Candidate{"viscoelastic", "viscoelastic:network=003a:starts=2"},
+    Candidate{"grey_box", "grey_box", true},
+    Candidate{"grey_box, no residual", "grey_box:residual=none", true},
+    Candidate{"dgmm", "dgmm"},
+    Candidate{"gaussian_process", "gaussian_process:std_dev=false:restarts=0"},
+    Candidate{"parametric_gp", "parametric_gp:updates=5000"},
+    Candidate{"parametric_gp_variational",
+              "parametric_gp_variational:inducing_points=50:samples=1000"},
+    Candidate{"mlp", "mlp"},
+    Candidate{"arx", "arx", true},
+    Candidate{"narx_polynomial", "narx_polynomial:training=one_step"},
+    Candidate{"lstm", "lstm:layers=16:epochs=10:stride=100"},
 };
 
 constexpr std::string_view kSubject = "grey_box";
@@ -61,14 +62,14 @@ struct Choice {
 
 std::vector<Choice> choices_of(const ComparisonCase& of, bool is_quick) {
   std::vector<Choice> choices;
-  for (const Rival& rival : kRivals) {
-    if (is_quick && !rival.is_quick) continue;
-    std::string model(rival.model);
-    const std::string_view family = rival.model.substr(0, rival.model.find(':'));
+  for (const Candidate& candidate : kCandidates) {
+    if (is_quick && !candidate.is_quick) continue;
+    std::string model(candidate.model);
+    const std::string_view family = candidate.model.substr(0, candidate.model.find(':'));
     if (!of.schedule.empty() && has_option(find_family(family), "schedule"))
       model += ":schedule=" + of.schedule;
     choices.push_back(
-        {std::string(rival.label), model_choices(of.dataset, model, of.inputs).front()});
+        {std::string(candidate.label), model_choices(of.dataset, model, of.inputs).front()});
   }
   return choices;
 }
@@ -136,9 +137,9 @@ Study model_comparison(const StudyOptions& options, const Progress& progress) {
     }
   }
   study.table = ComparisonTable{.rows = rows.comparisons(), .subject = std::string(kSubject)};
-  for (const Rival& rival : kRivals)
-    if (rival.model != rival.label && (rival.is_quick || !options.is_quick))
-      study.notes.push_back(fmt::format("model {}: {}", rival.label, rival.model));
+  for (const Candidate& candidate : kCandidates)
+    if (candidate.model != candidate.label && (candidate.is_quick || !options.is_quick))
+      study.notes.push_back(fmt::format("model {}: {}", candidate.label, candidate.model));
   return study;
 }
 

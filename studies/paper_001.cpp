@@ -26,7 +26,7 @@ Study sweep_study(Study study, bool is_inverse, const Progress& progress) {
           nth_of(progress, v * options.repeats + k, variants * options.repeats, actuator);
       const std::uint64_t seed = repeat_seed(options, k);
       Dataset dataset = sweep_dataset(actuator, seed, part);
-      if (is_inverse) turn_round(dataset);
+      if (is_inverse) swap_input_and_target(dataset);
       const Results results =
           compare(dataset, model_choices(dataset, kModels, {}), seed, false, part).results;
       rows.add(results, dataset, Role::test, [&](const std::string&) { return kVariants[v]; });

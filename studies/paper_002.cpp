@@ -25,7 +25,7 @@ constexpr double kFullScale_Nm = 0.5;  // where the clutch slips
 constexpr const char* kTwist = "input_angle_rad - joint_angle_rad";
 constexpr const char* kTwistRate = "lowpass(rate(input_angle_rad - joint_angle_rad), 10Hz)";
 constexpr const char* kMultisine = "multisine";
-constexpr std::uint64_t kJudged = 50;  // seeds of recordings to be judged on
+constexpr std::uint64_t kScored = 50;  // seeds of recordings to be judged on
 /// A network with memory tells nothing before; the others are not judged there either.
 constexpr std::size_t kWarmUp = 200;
 
@@ -36,7 +36,7 @@ constexpr const char* kTable2 =
     "21.5113/11.8339/-5.4362/-6.5416/-8.7194/5.9948/-2.5506/-5.3729/-5.1467";
 
 /// A model of the table: what it is called, and how `--models` would ask for it.
-struct Rival {
+struct Candidate {
   std::string label;
   std::string model;
   bool has_rate = false;  ///< given the twist's rate besides
@@ -44,7 +44,7 @@ struct Rival {
 
 /// The paper's: n_y = n_u = 8 (Table II), that is 7 past torques and 8 twists, trained one step ahead with the number
 /// of updates of Algorithm 1.
-std::vector<Rival> papers_rivals(bool is_quick) {
+std::vector<Candidate> papers_candidates(bool is_quick) {
   const std::string one_step = "input_lags=7:output_lags=7:training=one_step";
   const int updates = is_quick ? 2000 : 200000;
   const auto pgpr = [&](const char* mode, const char* kernel) {
@@ -66,7 +66,7 @@ std::vector<Rival> papers_rivals(bool is_quick) {
 }
 
 /// The same models, but that they learn to forget errors of what is fed back to them.
-std::vector<Rival> our_rivals(bool is_quick) {
+std::vector<Candidate> our_candidates(bool is_quick) {
   const std::string noise = "input_lags=7:output_lags=7:training=noise:feedback_noise=0.05";
   return {{"NN, noise", fmt::format("narx_mlp:{}:epochs={}", noise, is_quick ? 3 : 30)},
           {"improved PGPR, noise",
@@ -74,34 +74,34 @@ std::vector<Rival> our_rivals(bool is_quick) {
           {"GP, noise", fmt::format("narx_gaussian_process:{}:std_dev=false:samples={}", noise,
                                     is_quick ? 100 : 1000)},
           {"variational GP, noise",
-           fmt::format("narx_parametric_gp_variational:{}:points={}:samples={}", noise,
+           fmt::format("narx_parametric_gp_variational:{}:inducing_points={}:samples={}", noise,
                        is_quick ? 20 : 100, is_quick ? 500 : 5000)},
           {"GRU", fmt::format("gru:layers={}:epochs={}", is_quick ? 8 : 32, is_quick ? 2 : 30)}};
 }
 
-std::vector<Rival> baselines() {
+std::vector<Candidate> baselines() {
   return {{"line", "linear"},
           {"line, friction", "linear_coulomb", true},
           {"ARX 5", "arx"},
           {"ARX 15", "arx:input_lags=7:output_lags=7"}};
 }
 
-std::vector<Rival> all_rivals(bool is_quick) {
-  std::vector<Rival> rivals = baselines();
-  for (const auto& more : {papers_rivals(is_quick), our_rivals(is_quick)})
-    rivals.insert(rivals.end(), more.begin(), more.end());
-  return rivals;
+std::vector<Candidate> all_candidates(bool is_quick) {
+  std::vector<Candidate> candidates = baselines();
+  for (const auto& more : {papers_candidates(is_quick), our_candidates(is_quick)})
+    candidates.insert(candidates.end(), more.begin(), more.end());
+  return candidates;
 }
 
 /// Those of them that the other tests are judged with: none that still warms up when the clutch slips.
-std::vector<Rival> few_rivals(bool is_quick) {
-  std::vector<Rival> rivals = all_rivals(is_quick);
+std::vector<Candidate> few_candidates(bool is_quick) {
+  std::vector<Candidate> candidates = all_candidates(is_quick);
   constexpr std::array<std::string_view, 4> kFew{"line", "ARX 5", "improved PGPR, mended",
                                                  "variational GP, noise"};
-  std::erase_if(rivals, [&](const Rival& rival) {
-    return std::ranges::find(kFew, rival.label) == kFew.end();
+  std::erase_if(candidates, [&](const Candidate& candidate) {
+    return std::ranges::find(kFew, candidate.label) == kFew.end();
   });
-  return rivals;
+  return candidates;
 }
 
 Recording recorded(const std::string& experiment, std::uint64_t seed) {
@@ -143,14 +143,14 @@ std::size_t first_slip(const Recording& recording) {
       slip.begin());
 }
 
-void compare_into(StudyRows& rows, const Bench& bench, const std::vector<Rival>& rivals,
+void compare_into(StudyRows& rows, const Bench& bench, const std::vector<Candidate>& candidates,
                   std::uint64_t seed, const Progress& progress) {
   std::vector<ModelChoice> choices;
   std::vector<std::pair<std::string, std::string>> models;  // of each choice
-  for (const Rival& rival : rivals) {
+  for (const Candidate& candidate : candidates) {
     std::vector<std::string> inputs{kTwist};
-    if (rival.has_rate) inputs.emplace_back(kTwistRate);
-    choices.push_back(model_choices(bench.dataset, rival.model, inputs).front());
+    if (candidate.has_rate) inputs.emplace_back(kTwistRate);
+    choices.push_back(model_choices(bench.dataset, candidate.model, inputs).front());
     models.emplace_back(choices.back().family, choices.back().variant());
   }
   const Results results = compare(bench.dataset, choices, seed, false, progress).results;
@@ -159,7 +159,7 @@ void compare_into(StudyRows& rows, const Bench& bench, const std::vector<Rival>&
       [&](const std::string& recording) { return bench.conditions.of(recording); },
       [&](const ResultRow& row) {
         const auto found = std::ranges::find(models, std::pair(row.family, row.variant));
-        return rivals[static_cast<std::size_t>(found - models.begin())].label;
+        return candidates[static_cast<std::size_t>(found - models.begin())].label;
       });
 }
 
@@ -190,13 +190,13 @@ std::vector<std::string> verdicts(const std::vector<ErrorRow>& rows) {
 }
 
 Study study_of(std::string protocol, const StudyOptions& options,
-               const std::vector<Rival>& rivals) {
+               const std::vector<Candidate>& candidates) {
   Study study{.protocol = std::move(protocol),
               .unit = "Nm",
               .options = options,
               .plants = {study_plant(kActuator)}};
-  for (const Rival& rival : rivals)
-    study.notes.push_back(fmt::format("model {}: {}", rival.label, rival.model));
+  for (const Candidate& candidate : candidates)
+    study.notes.push_back(fmt::format("model {}: {}", candidate.label, candidate.model));
   return study;
 }
 
@@ -213,13 +213,13 @@ Study beyond_slip(Study study, const std::vector<std::string>& experiments,
     const std::uint64_t seed = repeat_seed(options, k);
     Bench bench = trained_on_grid(seed);
     for (const std::string& experiment : experiments) {
-      const Recording recording = recorded(experiment, seed + kJudged);
+      const Recording recording = recorded(experiment, seed + kScored);
       const std::size_t slip = first_slip(recording);
       bench.judge(recording, experiment + ", clutch holds", 0, slip);
       if (slip < recording.size())
         bench.judge(recording, experiment + ", has slipped", slip, recording.size());
     }
-    compare_into(rows, bench, few_rivals(options.is_quick), seed,
+    compare_into(rows, bench, few_candidates(options.is_quick), seed,
                  nth_of(progress, k, options.repeats, "beyond slip"));
   }
   study.table = sensor_table(rows);
@@ -229,23 +229,23 @@ Study beyond_slip(Study study, const std::vector<std::string>& experiments,
 }  // namespace
 
 Study sensor_models_002(const StudyOptions& options, const Progress& progress) {
-  const std::vector<Rival> rivals = all_rivals(options.is_quick);
+  const std::vector<Candidate> candidates = all_candidates(options.is_quick);
   Study study = study_of(
       "trained on the grid of sines, 0.05 to 1 Hz and 4 to 9 deg, tested in free run on other "
       "multisines from rest, scored after 4 s; no measured torque is fed back; input: twist of "
       "cable "
       "and rubber, 50 Hz",
-      options, rivals);
+      options, candidates);
   StudyRows rows(kPublishedSensorModels);
   const std::size_t multisines = options.is_quick ? 2 : 8;
   for (std::size_t k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = repeat_seed(options, k);
     Bench bench = trained_on_grid(seed);
     for (std::size_t i = 0; i < multisines; ++i) {
-      const Recording recording = recorded(kMultisine, seed + kJudged + i);
+      const Recording recording = recorded(kMultisine, seed + kScored + i);
       bench.judge(recording, kMultisine, kWarmUp, recording.size());
     }
-    compare_into(rows, bench, rivals, seed, nth_of(progress, k, options.repeats, kActuator));
+    compare_into(rows, bench, candidates, seed, nth_of(progress, k, options.repeats, kActuator));
   }
   const ErrorTable table = sensor_table(rows);
   study.table = table;
@@ -261,7 +261,7 @@ Study slow_loops_002(const StudyOptions& options, const Progress& progress) {
   return beyond_slip(study_of("trained on the grid of sines; tested at 1 rad/min to +-15 deg, "
                               "twice in each direction, until "
                               "the clutch first slips, which no sensor measures, and after it",
-                              options, few_rivals(options.is_quick)),
+                              options, few_candidates(options.is_quick)),
                      {"slow-cycles"}, progress);
 }
 
@@ -272,7 +272,7 @@ Study collision_002(const StudyOptions& options, const Progress& progress) {
           "paper) "
           "and in a driven link's collision with a wall (collision; the paper drops a mass on a "
           "sensor with a fixed input), until the clutch first slips and after it",
-          options, few_rivals(options.is_quick)),
+          options, few_candidates(options.is_quick)),
       {"slip", "collision"}, progress);
 }
 

@@ -19,39 +19,41 @@ namespace torsio {
 namespace {
 
 /// A model of the sequence that the paper goes through, or one of ours beside it.
-struct Rung {
+struct ModelStep {
   std::string_view choice;  ///< as `--models` takes it
   std::string_view name;    ///< of its rows
 };
 
-constexpr std::array kLadder{
-    Rung{"linear", "linear"},
-    Rung{"polynomial", "polynomial"},
-    Rung{"grey_box", "grey_box"},
-    Rung{"hammerstein_wiener:published=discrete", "Hammerstein-Wiener as printed"},
-    Rung{"hammerstein_wiener:published=tustin", "its Tustin form as printed"},
-    Rung{"hammerstein_wiener:published=refined", "refined, as printed"},
-    Rung{"hammerstein_wiener:structure=given", "Hammerstein-Wiener"},
-    Rung{"hammerstein_wiener:structure=given:continuous=tustin", "its Tustin form"},
-    Rung{"hammerstein_wiener:structure=given:continuous=refined", "refined in continuous time"},
-    Rung{"viscoelastic:network=003a:refine=false", "viscoelastic 003a as printed"},
-    Rung{"viscoelastic:network=003a", "viscoelastic 003a"},
-    Rung{"viscoelastic:network=003b", "viscoelastic 003b"},
-    Rung{"viscoelastic:network=003c", "viscoelastic 003c"},
-    Rung{"viscoelastic:network=003d", "viscoelastic 003d"},
+constexpr std::array kSequence{
+    ModelStep{"linear", "linear"},
+    ModelStep{"polynomial", "polynomial"},
+    ModelStep{"grey_box", "grey_box"},
+    ModelStep{"hammerstein_wiener:published=discrete", "Hammerstein-Wiener as printed"},
+    ModelStep{"hammerstein_wiener:published=tustin", "its Tustin form as printed"},
+    ModelStep{"hammerstein_wiener:published=refined", "refined, as printed"},
+    ModelStep{"hammerstein_wiener:structure=given", "Hammerstein-Wiener"},
+    ModelStep{"hammerstein_wiener:structure=given:continuous=tustin", "its Tustin form"},
+    ModelStep{"hammerstein_wiener:structure=given:continuous=refined",
+              "refined in continuous time"},
+    ModelStep{"viscoelastic:network=003a:refine=false", "viscoelastic 003a as printed"},
+    ModelStep{"viscoelastic:network=003a", "viscoelastic 003a"},
+    ModelStep{"viscoelastic:network=003b", "viscoelastic 003b"},
+    ModelStep{"viscoelastic:network=003c", "viscoelastic 003c"},
+    ModelStep{"viscoelastic:network=003d", "viscoelastic 003d"},
 };
 
 /// What is judged: a bench run that no model has learned from.
-struct Judged {
+struct TestCase {
   const char* experiment;
   const char* condition;
 };
-constexpr std::array kJudged{Judged{"triangles", "triangles"}, Judged{"random-walk", "random walk"},
-                             Judged{"slow-cycles", "slow cycles"}};
+constexpr std::array kScored{TestCase{"triangles", "triangles"},
+                             TestCase{"random-walk", "random walk"},
+                             TestCase{"slow-cycles", "slow cycles"}};
 constexpr std::array kCouplings{"bonded", "unbonded"};
-constexpr std::uint64_t kJudgedSeed = 50;
+constexpr std::uint64_t kTestSeed = 50;
 
-struct Ladder {
+struct ModelSequence {
   Dataset dataset;
   StudyConditions conditions;
 
@@ -68,27 +70,27 @@ struct Ladder {
   }
 };
 
-Ladder ladder_of(const std::string& coupling, std::uint64_t seed, bool is_quick) {
-  Ladder ladder;
-  ladder.dataset.initialise_samples = 0;  // every run starts at rest
-  ladder.add(coupling, "triangles", {}, seed, Role::train, is_quick);
-  for (std::size_t i = 0; i < kJudged.size(); ++i)
-    ladder.add(coupling, kJudged[i].experiment,
-               fmt::format("{}, {}", coupling, kJudged[i].condition), seed + kJudgedSeed + i,
-               Role::test, is_quick);
-  return ladder;
+ModelSequence sequence_of(const std::string& coupling, std::uint64_t seed, bool is_quick) {
+  ModelSequence sequence;
+  sequence.dataset.initialise_samples = 0;  // every run starts at rest
+  sequence.add(coupling, "triangles", {}, seed, Role::train, is_quick);
+  for (std::size_t i = 0; i < kScored.size(); ++i)
+    sequence.add(coupling, kScored[i].experiment,
+                 fmt::format("{}, {}", coupling, kScored[i].condition), seed + kTestSeed + i,
+                 Role::test, is_quick);
+  return sequence;
 }
 
 std::string models() {
   std::string text;
-  for (const Rung& rung : kLadder)
-    text += fmt::format("{}{}", text.empty() ? "" : ",", rung.choice);
+  for (const ModelStep& step : kSequence)
+    text += fmt::format("{}{}", text.empty() ? "" : ",", step.choice);
   return text;
 }
 
 }  // namespace
 
-Study ladder_003(const StudyOptions& options, const Progress& progress) {
+Study models_003(const StudyOptions& options, const Progress& progress) {
   Study study{.protocol =
                   "elastomer coupling, torsion alone, all runs from rest: trained on triangles of "
                   "0.4 to 4 Hz, tested on the same with other noise, a random walk and slow cycles "
@@ -102,17 +104,17 @@ Study ladder_003(const StudyOptions& options, const Progress& progress) {
       const Progress part = nth_of(progress, c * options.repeats + k,
                                    kCouplings.size() * options.repeats, kCouplings[c]);
       const std::uint64_t seed = repeat_seed(options, k);
-      Ladder ladder = ladder_of(kCouplings[c], seed, options.is_quick);
-      const auto choices = model_choices(ladder.dataset, models(), {"spring_deflection_rad"});
-      const Results results = compare(ladder.dataset, choices, seed, false, part).results;
+      ModelSequence sequence = sequence_of(kCouplings[c], seed, options.is_quick);
+      const auto choices = model_choices(sequence.dataset, models(), {"spring_deflection_rad"});
+      const Results results = compare(sequence.dataset, choices, seed, false, part).results;
       rows.add(
-          results, ladder.dataset, Role::test,
-          [&](const std::string& recording) { return ladder.conditions.of(recording); },
+          results, sequence.dataset, Role::test,
+          [&](const std::string& recording) { return sequence.conditions.of(recording); },
           [&](const ResultRow& row) {
             const auto choice = std::ranges::find_if(choices, [&](const ModelChoice& each) {
               return each.family == row.family && each.variant() == row.variant;
             });
-            return std::string(kLadder[static_cast<std::size_t>(choice - choices.begin())].name);
+            return std::string(kSequence[static_cast<std::size_t>(choice - choices.begin())].name);
           });
     }
   }

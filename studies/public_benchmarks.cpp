@@ -90,8 +90,8 @@ constexpr std::array kEmpsModels{
           "gru:layers=32:window=1000:stride=100:burn_in=100:epochs=40:learning_rate=0.01:learning_"
           "rate_schedule=cosine:patience=0",
           "", true},
-    Entry{"friction_drive, 4 numbers", "friction_drive", "friction_drive:iterations=50"},
-    Entry{"friction_drive, terms=auto", "friction_drive:terms=auto", ""}};
+    Entry{"rigid_drive, 4 numbers", "rigid_drive", "rigid_drive:iterations=50"},
+    Entry{"rigid_drive, terms=auto", "rigid_drive:terms=auto", ""}};
 
 std::string recordings_folder() {
   Manifest places;

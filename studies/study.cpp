@@ -26,8 +26,8 @@ constexpr std::array kStudies{
               slow_loops_002},
     StudyInfo{"002-collision", "002, Figure 10", "The same in a fast slip and a collision",
               collision_002},
-    StudyInfo{"003-ladder", "003, sections 4.2.1 and 4.3, Table 3",
-              "What models of an elastomer coupling explain of its torque", ladder_003,
+    StudyInfo{"003-models", "003, sections 4.2.1 and 4.3, Table 3",
+              "What models of an elastomer coupling explain of its torque", models_003,
               kPublishedCouplingModels},
     StudyInfo{"000-tracking", "000, Figure 8; 001, Figure 6",
               "How well a torque loop follows through a learned inverse of the spring",
@@ -66,10 +66,10 @@ const StudyInfo& find_study(std::string_view name) {
 }
 
 Study run_study(const StudyInfo& study, const StudyOptions& options, const Progress& progress) {
-  constexpr std::size_t kMostRepeats = 100;
-  if (options.repeats < 1 || options.repeats > kMostRepeats)
+  constexpr std::size_t kMaxRepeats = 100;
+  if (options.repeats < 1 || options.repeats > kMaxRepeats)
     throw UsageError({.place = "repeats",
-                      .expected = fmt::format("1 to {}", kMostRepeats),
+                      .expected = fmt::format("1 to {}", kMaxRepeats),
                       .found = fmt::format("{}", options.repeats)});
   return study.run(options, progress);
 }

@@ -148,7 +148,7 @@ std::uint64_t repeat_seed(const StudyOptions& options, std::size_t k) noexcept {
   return options.seed + 100 * k;
 }
 
-void turn_round(Dataset& dataset) {
+void swap_input_and_target(Dataset& dataset) {
   dataset.target = "spring_deflection_rad";
   for (DatasetRecord& record : dataset.records)
     add_derived(record.recording, {{"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"}});

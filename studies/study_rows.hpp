@@ -111,7 +111,7 @@ class StudyRows {
 [[nodiscard]] std::uint64_t repeat_seed(const StudyOptions& options, std::size_t k) noexcept;
 
 /// The deflection becomes the torque's function, with the rates of the forward models.
-void turn_round(Dataset& dataset);
+void swap_input_and_target(Dataset& dataset);
 
 /// The share of one fit's progress among so many.
 [[nodiscard]] Progress nth_of(const Progress& progress, std::size_t n, std::size_t count,

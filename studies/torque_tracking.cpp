@@ -30,7 +30,7 @@ using Kind = TorqueReference::Kind;
 
 constexpr std::array kVariants{"maxwell-slip", "bouc-wen", "lugre"};
 constexpr double kQuick_s = 20.0;
-constexpr std::uint64_t kJudged = 50;  // seeds of runs to be judged on
+constexpr std::uint64_t kScored = 50;  // seeds of runs to be judged on
 constexpr double kObserver_Hz = 8.0;   // of the loop that does what a controller can
 
 /// What a loop is asked for (specification 6).
@@ -83,7 +83,7 @@ AnyInverse learned(const Learner& learner, const Dataset& dataset, std::uint64_t
   ModelChoice choice{.family = std::string(learner.family), .features = {}};
   if (learner.is_turned_round) {
     Dataset turned = dataset;
-    turn_round(turned);
+    swap_input_and_target(turned);
     choice.features = resolve_inputs(turned, turned.input_sets.front().second);
     return inverse_of(train_model(turned, choice, seed).file);
   }
@@ -188,7 +188,7 @@ void judge(const Trial& trial, bool is_helped, TrackingRows& rows, const Progres
                       .measures_bandwidth = false};
     if (is_helped) spec.observer_cutoff_Hz = kObserver_Hz;
     if (trial.is_quick) spec.reference.duration_s = kQuick_s;
-    const std::array<std::uint64_t, 1> seeds{trial.seed + kJudged};
+    const std::array<std::uint64_t, 1> seeds{trial.seed + kScored};
     const std::string condition =
         fmt::format("{}, {:g} Nm {}, {}{}", trial.actuator, task.amplitude_Nm,
                     task.output == JointOutput::locked ? "locked" : "free", name(kind),

@@ -34,10 +34,10 @@ torsio::Recording prediction_recording(const torsio::Estimator& estimator,
   torsio::Channel estimate{"estimated_" + target, {}};
   torsio::Channel std_dev{std::string(parts.quantity) + "_std_dev" + unit, {}};
   torsio::Channel fault{"fault_1", {}};
-  for (const torsio::Estimate& told : prediction.estimates) {
-    estimate.values.push_back(told.value);
-    std_dev.values.push_back(told.std_dev);
-    fault.values.push_back(static_cast<double>(told.fault));
+  for (const torsio::Estimate& output : prediction.estimates) {
+    estimate.values.push_back(output.value);
+    std_dev.values.push_back(output.std_dev);
+    fault.values.push_back(static_cast<double>(output.fault));
   }
   torsio::Recording result(recording.name(), recording.sample_rate_Hz(), recording.time_s(0));
   result.add(recording.channel(target));

@@ -19,15 +19,15 @@ std::optional<double> deflection_range_rad(torsio::AnyInverse inverse, double to
   double range_rad = 0.0;
   for (const double sign : {-1.0, 1.0}) {
     inverse.reset();
-    torsio::Estimate told;
+    torsio::Estimate inverted;
     for (int tick = 0; tick < kSettled; ++tick)
-      told = inverse.step(sign * torque_Nm, {.t_s = 1e-3 * tick,
-                                             .motor_angle_rad = 0.0,
-                                             .gear_angle_rad = 0.0,
-                                             .joint_angle_rad = 0.0,
-                                             .motor_current_A = 0.0});
-    if (told.fault != torsio::Fault::none) return std::nullopt;
-    range_rad += sign * told.value;
+      inverted = inverse.step(sign * torque_Nm, {.t_s = 1e-3 * tick,
+                                                 .motor_angle_rad = 0.0,
+                                                 .gear_angle_rad = 0.0,
+                                                 .joint_angle_rad = 0.0,
+                                                 .motor_current_A = 0.0});
+    if (inverted.fault != torsio::Fault::none) return std::nullopt;
+    range_rad += sign * inverted.value;
   }
   return range_rad;
 }
@@ -38,10 +38,10 @@ void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse
                             const torsio::LinearInverse& line, const torsio::DataSheet& sheet,
                             double torque_Nm) {
   constexpr double kAnother = 1.4;  // hysteresis and wear of one spring stay below it
-  const auto told = deflection_range_rad(std::move(inverse), torque_Nm);
+  const auto inverted = deflection_range_rad(std::move(inverse), torque_Nm);
   const auto swept = deflection_range_rad(line, torque_Nm);
-  if (!told || !swept || !(*told > 0.0)) return;
-  const double ratio = *told / *swept;
+  if (!inverted || !swept || !(*inverted > 0.0)) return;
+  const double ratio = *inverted / *swept;
   if (ratio < kAnother && ratio > 1.0 / kAnother) return;
   remark(fmt::format(
       "warning: for {:.3g} Nm {} winds the spring {:.2g} times as far as sweeps of {} do: was it "

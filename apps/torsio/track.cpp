@@ -22,7 +22,7 @@
 
 namespace {
 
-constexpr std::size_t kMostSeeds = 100;
+constexpr std::size_t kMaxSeeds = 100;
 
 struct TrackFlags {
   std::string actuator = "dfki-120";
@@ -128,9 +128,9 @@ void check(const TrackFlags& flags) {
   read.push_back(flags.faults);
   read.push_back(flags.replayed);
   DataFlags().check_outputs({flags.record, flags.json.destination}, read);
-  if (flags.seeds < 1 || flags.seeds > kMostSeeds)
+  if (flags.seeds < 1 || flags.seeds > kMaxSeeds)
     throw torsio::UsageError({.place = "--seeds",
-                              .expected = fmt::format("1 to {}", kMostSeeds),
+                              .expected = fmt::format("1 to {}", kMaxSeeds),
                               .found = fmt::format("{}", flags.seeds)});
   if (!flags.record.empty() && flags.models.size() > 1)
     throw torsio::UsageError({.place = "--record",

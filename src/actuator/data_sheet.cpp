@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "actuators.hpp"
-#include "piece_spread.hpp"
 #include "sheet_values.hpp"
+#include "specimen_spread.hpp"
 #include "text_hash.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
@@ -92,7 +92,7 @@ DataSheet data_sheet(std::string_view name) {
     set_variant(sheet, parts.variant);
   }
   sheet.serial = parts.serial;
-  spread_piece(sheet);
+  spread_specimen(sheet);
   return sheet;
 }
 

@@ -106,7 +106,7 @@ std::vector<Passage> passages_of(const Pair& pair, double sample_rate_Hz) {
 }
 
 /// What a course in time tells of the passages' torque.
-struct Told {
+struct Explained {
   double explained = 0.0;  ///< share of the scatter at equal input and speed
   double offset = 0.0;     ///< in the middle of the input's range
   double slope = 0.0;
@@ -133,7 +133,7 @@ class Comparison {
   [[nodiscard]] double slope() const { return slope_; }
 
   /// `course`: 0 early, 1 late, one for each passage.
-  [[nodiscard]] Told told_by(const std::vector<double>& course) const {
+  [[nodiscard]] Explained explained_by(const std::vector<double>& course) const {
     std::vector<double> tilted;
     for (std::size_t i = 0; i < course.size(); ++i)
       tilted.push_back(course[i] * (passages_[i].input - middle_));
@@ -147,14 +147,14 @@ class Comparison {
     const double yy = product(torque_, torque_);
     const double determinant = aa * bb - ab * ab;
     if (!(determinant > 1e-9 * aa * bb) || !(yy > 0.0)) return {};
-    Told told{.offset = (bb * ay - ab * by) / determinant,
-              .slope = (aa * by - ab * ay) / determinant};
-    const double explained = told.offset * ay + told.slope * by;
-    told.explained = explained / yy;
+    Explained relation{.offset = (bb * ay - ab * by) / determinant,
+                       .slope = (aa * by - ab * ay) / determinant};
+    const double explained = relation.offset * ay + relation.slope * by;
+    relation.explained = explained / yy;
     double weight = 0.0;
     for (const Passage& each : passages_) weight += each.weight;
-    told.scatter = std::sqrt(std::max(0.0, yy - explained) / weight);
-    return told;
+    relation.scatter = std::sqrt(std::max(0.0, yy - explained) / weight);
+    return relation;
   }
 
   /// Cells that were passed both before and after a time.
@@ -237,7 +237,7 @@ std::optional<RelationChange> find_relation_change(const Pair& pair, double samp
   const Comparison comparison(std::move(passages), pair);
   const auto& all = comparison.passages();
   const auto samples = static_cast<double>(pair.input.size());
-  Told best;
+  Explained best;
   RelationChange change;
   std::vector<double> course(all.size());
   for (int k = 1; k < kCandidates; ++k) {
@@ -246,13 +246,15 @@ std::optional<RelationChange> find_relation_change(const Pair& pair, double samp
       continue;
     std::ranges::transform(all, course.begin(),
                            [&](const Passage& each) { return each.time < time ? 0.0 : 1.0; });
-    if (const Told told = comparison.told_by(course); told.explained > best.explained)
-      best = told, change.sample = static_cast<std::size_t>(time);
+    if (const Explained relation = comparison.explained_by(course);
+        relation.explained > best.explained)
+      best = relation, change.sample = static_cast<std::size_t>(time);
   }
   std::ranges::transform(all, course.begin(),
                          [&](const Passage& each) { return each.time / samples; });
-  if (const Told told = comparison.told_by(course); told.explained >= best.explained)
-    best = told, change.is_gradual = true;
+  if (const Explained relation = comparison.explained_by(course);
+      relation.explained >= best.explained)
+    best = relation, change.is_gradual = true;
   change.offset = best.offset;
   const double early = comparison.slope() - 0.5 * best.slope;
   const double late = comparison.slope() + 0.5 * best.slope;

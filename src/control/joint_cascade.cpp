@@ -15,20 +15,20 @@ constexpr auto kPlace = "joint cascade";
 /// Below a quarter the approach to a limit is overdamped; a fifth leaves room for the delays.
 constexpr double kApproachShare = 0.2;
 constexpr double kBrakingShare = 0.5;
-constexpr double kMostBandwidthShare = 0.2;  // of the sample rate, in rad a sample
+constexpr double kMaxBandwidthShare = 0.2;  // of the sample rate, in rad a sample
 
 JointCascade::Settings checked(const JointCascade::Settings& settings, double sample_rate_Hz) {
   settings.drive.check();
   require_positive(kPlace, "sample_rate_Hz", sample_rate_Hz);
-  const double most_rad_s = kMostBandwidthShare * sample_rate_Hz;
-  require(settings.bandwidth_rad_s > 0.0 && settings.bandwidth_rad_s <= most_rad_s, kPlace,
-          fmt::format("0 < bandwidth_rad_s <= {}", most_rad_s), settings.bandwidth_rad_s);
-  require_not_negative(kPlace, "load_Nm", settings.limits.load_Nm);
-  require_not_negative(kPlace, "carried_Nm", settings.limits.carried_Nm);
+  const double max_rad_s = kMaxBandwidthShare * sample_rate_Hz;
+  require(settings.bandwidth_rad_s > 0.0 && settings.bandwidth_rad_s <= max_rad_s, kPlace,
+          fmt::format("0 < bandwidth_rad_s <= {}", max_rad_s), settings.bandwidth_rad_s);
+  require_not_negative(kPlace, "load_Nm", settings.limits.max_unmeasured_load_Nm);
+  require_not_negative(kPlace, "max_measured_load_Nm", settings.limits.max_measured_load_Nm);
   require_positive(kPlace, "speed_rad_s", settings.limits.speed_rad_s);
   require(settings.limits.torque_Nm > 0.0, kPlace, "torque_Nm > 0", settings.limits.torque_Nm);
   require_positive(kPlace, "fault_decay_s", settings.fault_decay_s);
-  require_positive(kPlace, "handover_s", settings.handover_s);
+  require_positive(kPlace, "transfer_s", settings.transfer_s);
   return settings;
 }
 
@@ -77,12 +77,13 @@ JointCascade::JointCascade(const Settings& settings, double sample_rate_Hz)
       approach_1_s_(kApproachShare * settings.bandwidth_rad_s),
       braking_rad_s2_(kBrakingShare *
                       (settings.drive.rated_current_A * settings.drive.torque_per_current() -
-                       settings.limits.load_Nm - settings.limits.carried_Nm) /
+                       settings.limits.max_unmeasured_load_Nm -
+                       settings.limits.max_measured_load_Nm) /
                       settings.drive.inertia()),
-      margin_rad_(settings.limits.load_Nm /
+      margin_rad_(settings.limits.max_unmeasured_load_Nm /
                   (settings.drive.inertia() * settings.bandwidth_rad_s * approach_1_s_)),
       soft_speed_rad_s_(settings.limits.speed_rad_s -
-                        settings.limits.load_Nm /
+                        settings.limits.max_unmeasured_load_Nm /
                             (settings.drive.inertia() * settings.bandwidth_rad_s)),
       fault_keep_(std::exp(-period_s_ / settings.fault_decay_s)),
       position_1_s_(gains_of(settings).position_1_s),
@@ -90,9 +91,9 @@ JointCascade::JointCascade(const Settings& settings, double sample_rate_Hz)
       torque_(
           {.gains = gains_of(settings).torque, .derivative_cutoff_Hz = settings.torque_cutoff_Hz},
           sample_rate_Hz),
-      impedance_({.torque_Nm = settings.limits.torque_Nm, .handover_s = settings.handover_s},
+      impedance_({.torque_Nm = settings.limits.torque_Nm, .transfer_s = settings.transfer_s},
                  sample_rate_Hz),
-      handover_(settings.handover_s, sample_rate_Hz),
+      transfer_(settings.transfer_s, sample_rate_Hz),
       thermal_(settings.drive.rated_current_A, settings.drive.peak_current_A,
                settings.limits.thermal_time_s, sample_rate_Hz) {
   check_limits();
@@ -102,10 +103,11 @@ JointCascade::JointCascade(const Settings& settings, double sample_rate_Hz)
 void JointCascade::check_limits() const {
   const Limits& limits = settings_.limits;
   if (!(braking_rad_s2_ > 0.0))
-    contradict("the rated current cannot brake against the load",
-               fmt::format("load_Nm and carried_Nm together below {:.4g} Nm",
-                           settings_.drive.rated_current_A / amperes_per_Nm_),
-               fmt::format("{:.4g} Nm", limits.load_Nm + limits.carried_Nm));
+    contradict(
+        "the rated current cannot brake against the load",
+        fmt::format("load_Nm and max_measured_load_Nm together below {:.4g} Nm",
+                    settings_.drive.rated_current_A / amperes_per_Nm_),
+        fmt::format("{:.4g} Nm", limits.max_unmeasured_load_Nm + limits.max_measured_load_Nm));
   if (!(soft_speed_rad_s_ > 0.0))
     contradict("the load alone may use up the speed limit",
                fmt::format("a speed above {:.4g} rad/s, or more bandwidth",
@@ -130,7 +132,7 @@ void JointCascade::reset() noexcept {
   velocity_.reset();
   torque_.reset();
   impedance_.reset();
-  handover_.reset();
+  transfer_.reset();
   reference_ = {};
   current_A_ = 0.0;
   is_switching_ = false;
@@ -182,7 +184,7 @@ JointCascade::Output JointCascade::fade() noexcept {
   velocity_.reset();
   torque_.reset();
   impedance_.reset();
-  handover_.reset();
+  transfer_.reset();
   current_A_ *= fault_keep_;
   if (std::abs(current_A_) < 1e-9) current_A_ = 0.0;
   thermal_.step(current_A_);
@@ -228,10 +230,10 @@ double JointCascade::impedance_torque(const JointState& measured) noexcept {
   const JointReference& wanted = reference_;
   // Found to be valid where the reference was taken.
   static_cast<void>(impedance_.set_gains({wanted.stiffness_Nm_rad, wanted.damping_Nms_rad}));
-  const JointImpedance::Output told =
+  const JointImpedance::Output impedance =
       impedance_.step({wanted.position_rad, wanted.velocity_rad_s, wanted.torque_Nm},
                       {measured.angle_rad, measured.speed_rad_s});
-  return told.fault == Fault::none ? told.torque_Nm : kNotMeasured;
+  return impedance.fault == Fault::none ? impedance.torque_Nm : kNotMeasured;
 }
 
 double JointCascade::wanted_current(const JointState& measured, const Bounds& speed,
@@ -243,10 +245,10 @@ double JointCascade::wanted_current(const JointState& measured, const Bounds& sp
     case JointMode::current: break;
     case JointMode::velocity:
     case JointMode::position: {
-      const double behind_rad =
+      const double position_error_rad =
           wanted.mode == JointMode::position ? wanted.position_rad - measured.angle_rad : 0.0;
-      output.wanted_velocity_rad_s = std::clamp(position_1_s_ * behind_rad + wanted.velocity_rad_s,
-                                                speed.lowest, speed.highest);
+      output.wanted_velocity_rad_s = std::clamp(
+          position_1_s_ * position_error_rad + wanted.velocity_rad_s, speed.lowest, speed.highest);
       output.feed_forward_A +=
           (settings_.drive.inertia() * wanted.acceleration_rad_s2 + wanted.torque_Nm) *
           amperes_per_Nm_;
@@ -269,13 +271,13 @@ double JointCascade::wanted_current(const JointState& measured, const Bounds& sp
   output.derivative_A = loop.derivative;
   const double terms_A = loop.command + output.feed_forward_A;
   if (is_switching_) {
-    handover_.reset();
-    handover_.add(current_A_ - terms_A);
+    transfer_.reset();
+    transfer_.add(current_A_ - terms_A);
   }
   is_switching_ = false;
   // The loop's own handover, after a change of its gains, is part of ours.
-  const double fading_A = handover_.step();
-  output.handover_A = fading_A + loop.handover;
+  const double fading_A = transfer_.step();
+  output.transfer_A = fading_A + loop.handover;
   return terms_A + fading_A;
 }
 

@@ -18,7 +18,7 @@ JointImpedance::Settings checked(const JointImpedance::Settings& settings, doubl
   require(settings.torque_Nm > 0.0, kPlace, "torque_Nm > 0", settings.torque_Nm);
   require(settings.torque_rate_Nm_s > 0.0, kPlace, "torque_rate_Nm_s > 0",
           settings.torque_rate_Nm_s);
-  require_positive(kPlace, "handover_s", settings.handover_s);
+  require_positive(kPlace, "transfer_s", settings.transfer_s);
   require_positive(kPlace, "fault_decay_s", settings.fault_decay_s);
   return settings;
 }
@@ -27,17 +27,17 @@ JointImpedance::Settings checked(const JointImpedance::Settings& settings, doubl
 
 JointImpedance::JointImpedance(const Settings& settings, double sample_rate_Hz)
     : gains_(checked(settings, sample_rate_Hz).gains),
-      most_Nm_(settings.torque_Nm),
+      max_Nm_(settings.torque_Nm),
       step_Nm_(settings.torque_rate_Nm_s / sample_rate_Hz),
       fault_keep_(std::exp(-1.0 / (settings.fault_decay_s * sample_rate_Hz))),
-      handover_(settings.handover_s, sample_rate_Hz) {}
+      transfer_(settings.transfer_s, sample_rate_Hz) {}
 
 void JointImpedance::reset() noexcept {
-  handover_.reset();
+  transfer_.reset();
   wanted_ = {};
-  behind_rad_ = 0.0;
-  behind_rad_s_ = 0.0;
-  has_wish_ = false;
+  position_error_rad_ = 0.0;
+  speed_error_rad_s_ = 0.0;
+  has_reference_ = false;
   is_returning_ = false;
   torque_Nm_ = 0.0;
 }
@@ -46,8 +46,8 @@ bool JointImpedance::set_gains(const Gains& gains) noexcept {
   if (!(gains.stiffness_Nm_rad >= 0.0 && gains.damping_Nms_rad >= 0.0 &&
         std::isfinite(gains.stiffness_Nm_rad) && std::isfinite(gains.damping_Nms_rad)))
     return false;
-  handover_.add((gains_.stiffness_Nm_rad - gains.stiffness_Nm_rad) * behind_rad_ +
-                (gains_.damping_Nms_rad - gains.damping_Nms_rad) * behind_rad_s_);
+  transfer_.add((gains_.stiffness_Nm_rad - gains.stiffness_Nm_rad) * position_error_rad_ +
+                (gains_.damping_Nms_rad - gains.damping_Nms_rad) * speed_error_rad_s_);
   gains_ = gains;
   return true;
 }
@@ -59,33 +59,34 @@ JointImpedance::Output JointImpedance::fade() noexcept {
   return {.torque_Nm = torque_Nm_, .fault = Fault::input_not_finite};
 }
 
-JointImpedance::Output JointImpedance::step(const Wish& wanted, const State& measured) noexcept {
+JointImpedance::Output JointImpedance::step(const Reference& wanted,
+                                            const State& measured) noexcept {
   Output output;
   if (std::isfinite(wanted.angle_rad + wanted.speed_rad_s + wanted.torque_Nm)) {
     wanted_ = wanted;
-    has_wish_ = true;
+    has_reference_ = true;
   } else {
     output.fault = Fault::input_not_finite;
   }
-  const double behind_rad = wanted_.angle_rad - measured.angle_rad;
-  const double behind_rad_s = wanted_.speed_rad_s - measured.speed_rad_s;
-  output.spring_Nm = gains_.stiffness_Nm_rad * behind_rad;
-  output.damper_Nm = gains_.damping_Nms_rad * behind_rad_s;
+  const double position_error_rad = wanted_.angle_rad - measured.angle_rad;
+  const double speed_error_rad_s = wanted_.speed_rad_s - measured.speed_rad_s;
+  output.spring_Nm = gains_.stiffness_Nm_rad * position_error_rad;
+  output.damper_Nm = gains_.damping_Nms_rad * speed_error_rad_s;
   output.feed_forward_Nm = wanted_.torque_Nm;
   const double terms_Nm = output.spring_Nm + output.damper_Nm + output.feed_forward_Nm;
-  if (!std::isfinite(terms_Nm) || !has_wish_) return fade();
+  if (!std::isfinite(terms_Nm) || !has_reference_) return fade();
   if (is_returning_) {
-    handover_.reset();
-    handover_.add(torque_Nm_ - terms_Nm);
+    transfer_.reset();
+    transfer_.add(torque_Nm_ - terms_Nm);
   }
-  output.handover_Nm = handover_.step();
-  const double all_Nm = terms_Nm + output.handover_Nm;
+  output.transfer_Nm = transfer_.step();
+  const double all_Nm = terms_Nm + output.transfer_Nm;
   if (!std::isfinite(all_Nm)) return fade();
   is_returning_ = false;
-  behind_rad_ = behind_rad;
-  behind_rad_s_ = behind_rad_s;
+  position_error_rad_ = position_error_rad;
+  speed_error_rad_s_ = speed_error_rad_s;
   const double moved_Nm = std::clamp(all_Nm, torque_Nm_ - step_Nm_, torque_Nm_ + step_Nm_);
-  torque_Nm_ = std::clamp(moved_Nm, -most_Nm_, most_Nm_);
+  torque_Nm_ = std::clamp(moved_Nm, -max_Nm_, max_Nm_);
   output.torque_Nm = torque_Nm_;
   output.is_limited = torque_Nm_ != all_Nm;
   return output;
@@ -97,12 +98,12 @@ JointFeedback impedance_feedback(const DeflectionController& controller,
   const double rate_Hz = loop.deflection.sample_rate_Hz();
   const auto gain = [&](double value) { return LinearSystem::gain(value, rate_Hz); };
   const double per_Nm = 1.0 / controller.settings().joint.stiffness_Nm_rad;
-  LinearSystem wish = gain(gains.stiffness_Nm_rad * per_Nm);
+  LinearSystem reference = gain(gains.stiffness_Nm_rad * per_Nm);
   if (gains.damping_Nms_rad > 0.0)
-    wish = wish +
-           gain(gains.damping_Nms_rad * per_Nm) * (LinearSystem::lowpass(speed_cutoff_Hz, rate_Hz) *
-                                                   LinearSystem::difference(rate_Hz));
-  loop.joint = loop.joint + controller.reference_path() * wish;
+    reference = reference + gain(gains.damping_Nms_rad * per_Nm) *
+                                (LinearSystem::lowpass(speed_cutoff_Hz, rate_Hz) *
+                                 LinearSystem::difference(rate_Hz));
+  loop.joint = loop.joint + controller.reference_path() * reference;
   return loop;
 }
 

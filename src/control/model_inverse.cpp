@@ -38,10 +38,10 @@ EstimatorSettings checked(EstimatorSettings settings, const AnyModel& model) {
   return settings;
 }
 
-double departure_rad(const EstimatorSettings& settings, double most_departure) {
-  require(most_departure >= 0.0, kPlace, "most_departure >= 0", most_departure);
+double departure_rad(const EstimatorSettings& settings, double max_departure) {
+  require(max_departure >= 0.0, kPlace, "max_departure >= 0", max_departure);
   const double residual_Nm = settings.fallback.residual_std;
-  return std::isfinite(residual_Nm) ? most_departure * residual_Nm / settings.fallback.slope.front()
+  return std::isfinite(residual_Nm) ? max_departure * residual_Nm / settings.fallback.slope.front()
                                     : std::numeric_limits<double>::infinity();
 }
 
@@ -69,11 +69,11 @@ std::vector<std::string> without_torque(std::vector<std::string> raw_inputs) {
 
 }  // namespace
 
-ModelInverse::ModelInverse(EstimatorSettings settings, AnyModel model, double most_departure)
+ModelInverse::ModelInverse(EstimatorSettings settings, AnyModel model, double max_departure)
     : core_(checked(std::move(settings), model), model.input_count()),
       model_(std::move(model)),
       inputs_(core_.raw_inputs(), core_.settings().target),
-      most_departure_rad_(departure_rad(core_.settings(), most_departure)),
+      max_departure_rad_(departure_rad(core_.settings(), max_departure)),
       is_stepped_(model_.traits().has_memory),
       asked_(model_.input_count()) {
   reset();
@@ -105,23 +105,23 @@ Estimate ModelInverse::guarded(double torque_Nm, Features features) noexcept {
     answer.fault = Fault::warming_up;
     return answer;
   }
-  const Estimate told = model_.invert(torque_Nm, features);
-  answer.novelty = told.novelty;
-  if (told.fault != Fault::none || !std::isfinite(told.value)) {
-    answer.fault = told.fault != Fault::none ? told.fault : Fault::model_not_finite;
+  const Estimate estimate = model_.invert(torque_Nm, features);
+  answer.novelty = estimate.novelty;
+  if (estimate.fault != Fault::none || !std::isfinite(estimate.value)) {
+    answer.fault = estimate.fault != Fault::none ? estimate.fault : Fault::model_not_finite;
     return answer;
   }
   std::ranges::copy(features, asked_.begin());
-  asked_.front() = told.value;
+  asked_.front() = estimate.value;
   const double weight = core_.excursion(asked_);
   if (weight > 1.0) {
     answer.fault = Fault::outside_training_range;
     return answer;
   }
-  const double near_rad = std::max(std::min(told.value, line_rad + most_departure_rad_),
-                                   line_rad - most_departure_rad_);
+  const double near_rad = std::max(std::min(estimate.value, line_rad + max_departure_rad_),
+                                   line_rad - max_departure_rad_);
   answer.value = std::lerp(near_rad, line_rad, weight);
-  answer.std_dev = told.std_dev;
+  answer.std_dev = estimate.std_dev;
   return answer;
 }
 

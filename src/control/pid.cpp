@@ -39,7 +39,7 @@ Pid::Pid(const Settings& settings, double sample_rate_Hz)
       period_s_(1.0 / checked_rate(sample_rate_Hz)),
       step_limit_(settings.limits.rate_per_s * period_s_),
       differentiator_(sample_rate_Hz, settings.derivative_cutoff_Hz),
-      handover_(checked_time("handover_s", settings.handover_s), sample_rate_Hz) {
+      transfer_(checked_time("transfer_s", settings.transfer_s), sample_rate_Hz) {
   require_not_negative(kPlace, "proportional gain", gains_.proportional);
   require_not_negative(kPlace, "integral gain", gains_.integral);
   require_not_negative(kPlace, "derivative gain", gains_.derivative);
@@ -68,7 +68,7 @@ void Pid::reset() noexcept {
 
 void Pid::start(double command) noexcept {
   differentiator_.reset();
-  handover_.reset();
+  transfer_.reset();
   last_ = {.command = std::clamp(command, limits_.lowest, limits_.highest)};
   integral_ = 0.0;
   rate_ = 0.0;
@@ -93,8 +93,8 @@ Pid::Output Pid::step(double reference, double measurement, double feed_forward)
                    .feed_forward = feed_forward};
   const double terms =
       output.proportional + output.integral + output.derivative + output.feed_forward;
-  if (is_starting_) handover_.add(last_.command - terms);
-  output.handover = handover_.step();
+  if (is_starting_) transfer_.add(last_.command - terms);
+  output.handover = transfer_.step();
   const double wanted = terms + output.handover;
   if (!std::isfinite(wanted)) {
     start(last_.command);
@@ -141,7 +141,7 @@ void Pid::track(double applied) noexcept {
 
 bool Pid::set_gains(const Gains& gains) noexcept {
   if (!is_valid(gains)) return false;
-  handover_.add((gains_.proportional - gains.proportional) * error_ +
+  transfer_.add((gains_.proportional - gains.proportional) * error_ +
                 (gains_.derivative - gains.derivative) * rate_);
   gains_ = gains;
   set_tracking_share();

@@ -9,7 +9,7 @@ namespace torsio {
 namespace {
 
 constexpr auto kPlace = "torque controller";
-constexpr double kHandover_s = 0.1;  // as that of the deflection controller
+constexpr double kTransfer_s = 0.1;  // as that of the deflection controller
 
 TorqueLoopCore::Settings checked(const TorqueLoopCore::Settings& settings) {
   if (settings.deflection.actuation != DeflectionController::Actuation::current)
@@ -29,7 +29,7 @@ TorqueLoopCore::Settings checked(const TorqueLoopCore::Settings& settings) {
 TorqueLoopCore::TorqueLoopCore(const Settings& settings, double sample_rate_Hz)
     : settings_(checked(settings)),
       deflection_(settings.deflection, sample_rate_Hz),
-      handover_(kHandover_s, sample_rate_Hz),
+      transfer_(kTransfer_s, sample_rate_Hz),
       wanted_rate_(sample_rate_Hz, settings.deflection.rate_cutoff_Hz),
       amperes_per_Nm_(1.0 / settings.deflection.joint.drive.torque_per_current()) {
   if (!settings.observer_cutoff_Hz) return;
@@ -55,7 +55,7 @@ void TorqueLoopCore::reset() noexcept {
   deflection_.reset();
   if (observer_) observer_->reset();
   wanted_rate_.reset();
-  handover_.reset();
+  transfer_.reset();
   wanted_Nm_ = 0.0;
   is_refused_ = false;
   is_returning_ = false;
@@ -84,7 +84,7 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
                    .integral_A = loop.integral,
                    .derivative_A = loop.derivative,
                    .feed_forward_A = loop.feed_forward,
-                   .handover_A = loop.handover,
+                   .transfer_A = loop.handover,
                    .is_limited = loop.is_limited,
                    .inverse = wanted_rad.fault,
                    .fault = is_refused_ ? Fault::input_not_finite : loop.fault};
@@ -101,10 +101,10 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
     output.observer_A = observer_->step(applied_A_, sample.motor_angle_rad, deflection_rad);
   const double terms_A = output.rate_feed_forward_A + output.friction_A + output.observer_A;
   // The loop itself goes on from the current that was applied; the rest comes in slowly.
-  if (is_returning_) handover_.add(-terms_A);
+  if (is_returning_) transfer_.add(-terms_A);
   is_returning_ = false;
-  const double fading_A = handover_.step();
-  output.handover_A += fading_A;
+  const double fading_A = transfer_.step();
+  output.transfer_A += fading_A;
   const double added_A = terms_A + fading_A;
   const double all_A = loop.command + added_A;
   if (!std::isfinite(all_A)) return fade(output);
@@ -120,7 +120,7 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
 // The whole current fades, not the deflection controller's part of it.
 TorqueLoopCore::Output TorqueLoopCore::fade(Output output) noexcept {
   if (observer_) observer_->reset();
-  handover_.reset();
+  transfer_.reset();
   is_returning_ = true;
   applied_A_ = deflection_.fade(applied_A_);
   return {.current_A = applied_A_,

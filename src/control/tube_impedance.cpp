@@ -23,7 +23,7 @@ TubeImpedance::Settings checked(const TubeImpedance::Settings& settings) {
   require_not_negative(kPlace, "damping gain", settings.gains.damping_s);
   require_not_negative(kPlace, "torque gain", settings.gains.torque_Nm_rad);
   require_positive(kPlace, "fault_decay_s", settings.fault_decay_s);
-  require_positive(kPlace, "handover_s", settings.handover_s);
+  require_positive(kPlace, "transfer_s", settings.transfer_s);
   return settings;
 }
 
@@ -70,11 +70,11 @@ SeriesElasticJoint TubeImpedance::joint_of(const Settings& settings) {
 // At the joint the twist is θ_s / N_h.
 JointFeedback TubeImpedance::feedback_of(const Settings& settings, double sample_rate_Hz) {
   const double per_rad = settings.gains.torque_Nm_rad / settings.drive.torque_constant_Nm_A;
-  const LinearSystem wish = linear_pid({.proportional = per_rad * settings.gains.position,
-                                        .derivative = per_rad * settings.gains.damping_s},
-                                       settings.speed_cutoff_Hz, sample_rate_Hz);
+  const LinearSystem reference = linear_pid({.proportional = per_rad * settings.gains.position,
+                                             .derivative = per_rad * settings.gains.damping_s},
+                                            settings.speed_cutoff_Hz, sample_rate_Hz);
   return {LinearSystem::gain(per_rad * gear_ratio_of(settings), sample_rate_Hz),
-          LinearSystem::gain(0.0, sample_rate_Hz), wish};
+          LinearSystem::gain(0.0, sample_rate_Hz), reference};
 }
 
 TubeImpedance::TubeImpedance(const Settings& settings, double sample_rate_Hz)
@@ -82,7 +82,7 @@ TubeImpedance::TubeImpedance(const Settings& settings, double sample_rate_Hz)
       gear_ratio_(gear_ratio_of(settings)),
       fault_keep_(std::exp(-1.0 / (settings.fault_decay_s * sample_rate_Hz))),
       speed_(sample_rate_Hz, settings.speed_cutoff_Hz),
-      handover_(settings.handover_s, sample_rate_Hz) {
+      transfer_(settings.transfer_s, sample_rate_Hz) {
   joint_of(settings_).check();
   if (settings_.relies_on_friction) return;
   const JointFeedback loop = feedback_of(settings_, sample_rate_Hz);
@@ -92,8 +92,8 @@ TubeImpedance::TubeImpedance(const Settings& settings, double sample_rate_Hz)
 
 void TubeImpedance::reset() noexcept {
   speed_.reset();
-  handover_.reset();
-  has_wish_ = false;
+  transfer_.reset();
+  has_reference_ = false;
   is_returning_ = false;
   wanted_rad_ = 0.0;
   wanted_rad_s_ = 0.0;
@@ -102,7 +102,7 @@ void TubeImpedance::reset() noexcept {
 
 TubeImpedance::Output TubeImpedance::fade() noexcept {
   speed_.reset();
-  handover_.reset();
+  transfer_.reset();
   is_returning_ = true;
   current_A_ *= fault_keep_;
   if (std::abs(current_A_) < 1e-9) current_A_ = 0.0;
@@ -122,27 +122,27 @@ TubeImpedance::Output TubeImpedance::step(double wanted_rad, double wanted_rad_s
   if (std::isfinite(wanted_rad + wanted_rad_s)) {
     wanted_rad_ = wanted_rad;
     wanted_rad_s_ = wanted_rad_s;
-    has_wish_ = true;
+    has_reference_ = true;
   } else {
     output.fault = Fault::input_not_finite;
   }
   const Gains& gains = settings_.gains;
-  const double behind_rad =
+  const double position_error_rad =
       settings_.twist == Twist::tube ? measured.middle_rad : gear_ratio_ * measured.joint_rad;
-  output.twist_rad = measured.rotor_rad / settings_.tube_ratio - behind_rad;
-  if (!has_wish_ || !std::isfinite(output.twist_rad + measured.joint_rad)) return fade();
+  output.twist_rad = measured.rotor_rad / settings_.tube_ratio - position_error_rad;
+  if (!has_reference_ || !std::isfinite(output.twist_rad + measured.joint_rad)) return fade();
   output.position_rad = gains.position * (wanted_rad_ - measured.joint_rad);
   output.damping_rad = gains.damping_s * (wanted_rad_s_ - speed_.step(measured.joint_rad));
   output.motor_torque_Nm =
       gains.torque_Nm_rad * (output.position_rad + output.damping_rad - output.twist_rad);
-  const double most_A = settings_.drive.peak_current_A;
+  const double max_A = settings_.drive.peak_current_A;
   const double impedance_A = output.motor_torque_Nm / settings_.drive.torque_constant_Nm_A;
-  if (is_returning_) handover_.add(current_A_ - impedance_A);
+  if (is_returning_) transfer_.add(current_A_ - impedance_A);
   is_returning_ = false;
-  output.handover_A = handover_.step();
-  const double wanted_A = impedance_A + output.handover_A;
+  output.transfer_A = transfer_.step();
+  const double wanted_A = impedance_A + output.transfer_A;
   if (!std::isfinite(wanted_A)) return fade();
-  current_A_ = std::clamp(wanted_A, -most_A, most_A);
+  current_A_ = std::clamp(wanted_A, -max_A, max_A);
   output.current_A = current_A_;
   output.is_limited = current_A_ != wanted_A;
   return output;

@@ -64,7 +64,7 @@ ClockReport inspect_clock(std::span<const double> stamps) {
     const double stray = std::abs(stamps[i] - first - even);
     if (stray > report.largest_stray_s) {
       report.largest_stray_s = stray;
-      report.most_stray = i;
+      report.max_stray = i;
     }
     const double oddness = std::abs(stamps[i] - stamps[i - 1] - report.stamp_step_s);
     if (oddness > oddest) {
@@ -76,8 +76,8 @@ ClockReport inspect_clock(std::span<const double> stamps) {
 }
 
 double simplest_rate(double rate, double relative_tolerance) {
-  constexpr int kMostDigits = 15;
-  for (int digits = 1; digits <= kMostDigits; ++digits) {
+  constexpr int kMaxDigits = 15;
+  for (int digits = 1; digits <= kMaxDigits; ++digits) {
     const double frequency = rounded_to_digits(rate, digits);
     if (std::abs(frequency - rate) <= relative_tolerance * rate) return frequency;
     const double from_period = 1.0 / rounded_to_digits(1.0 / rate, digits);

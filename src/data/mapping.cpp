@@ -17,7 +17,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostRecords = 10000;
+constexpr std::size_t kMaxRecords = 10000;
 
 struct NamedRows {
   std::string name;
@@ -43,9 +43,9 @@ std::vector<NamedRows> runs_of_equal_value(const CsvTable& table, const Mapping&
     std::string name = fmt::format("{}[{}={}]", stem, column.name, values[begin]);
     if (times > 1) name += fmt::format("#{}", times);
     runs.push_back({.name = std::move(name), .rows = {.begin = begin, .end = end}});
-    if (runs.size() > kMostRecords)
+    if (runs.size() > kMaxRecords)
       throw Error({.place = table.header_place(column),
-                   .problem = fmt::format("split_by gives more than {} records", kMostRecords)});
+                   .problem = fmt::format("split_by gives more than {} records", kMaxRecords)});
   }
   for (const double value : mapping.keep)
     if (!met.contains(value))

@@ -155,7 +155,7 @@ double rebuilt_rate(const Stamps& stamps, double max_stray_steps) {
   const double steps = report.largest_stray_s / report.stamp_step_s;
   if (!(steps <= max_stray_steps))
     throw ClockError(
-        {.place = stamps.place(report.most_stray),
+        {.place = stamps.place(report.max_stray),
          .problem = "the samples were not taken evenly enough to rebuild the clock",
          .expected = fmt::format("at most {} stamp steps of {:.4g} s away from an even spread",
                                  max_stray_steps, report.stamp_step_s),
@@ -185,7 +185,7 @@ void refuse_gaps(const Stamps& stamps) {
   }
 }
 
-double told_rate(const CsvTable& table, const Mapping& mapping, double rate_Hz) {
+double given_rate(const CsvTable& table, const Mapping& mapping, double rate_Hz) {
   const double rate = mapping.rate_Hz > 0.0 ? mapping.rate_Hz : rate_Hz;
   if (rate > 0.0) return rate;
   throw Error({.place = fmt::format("{}: line {}", table.source.file, table.header_line),
@@ -199,7 +199,7 @@ double told_rate(const CsvTable& table, const Mapping& mapping, double rate_Hz) 
 
 RecordClock record_clock(const CsvTable& table, const TableChannels& columns, Rows rows,
                          const Mapping& mapping, double rate_Hz) {
-  if (!columns.clock) return {.sample_rate_Hz = told_rate(table, mapping, rate_Hz)};
+  if (!columns.clock) return {.sample_rate_Hz = given_rate(table, mapping, rate_Hz)};
   const CsvColumn& column = *columns.clock->column;
   if (mapping.rate_Hz > 0.0)
     throw Error({.place = mapping.file + ": rate",

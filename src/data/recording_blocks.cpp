@@ -17,8 +17,8 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostFileBytes = std::size_t{4} << 30;
-constexpr std::size_t kMostValues = std::size_t{256} << 20;  ///< as in a CSV file
+constexpr std::size_t kMaxFileBytes = std::size_t{4} << 30;
+constexpr std::size_t kMaxValues = std::size_t{256} << 20;  ///< as in a CSV file
 
 /// Sealed blocks one after the other, up to the first that is not whole.
 class SealedBlocks {
@@ -81,9 +81,9 @@ Recording recording_of(const RecordingHeader& header, const FrameBlock& frames,
                                           : static_cast<std::uint64_t>(frames.ticks.back()) -
                                                 static_cast<std::uint64_t>(first);
   const std::size_t channels = header.channels.size();
-  if (last_row >= kMostValues / channels)
+  if (last_row >= kMaxValues / channels)
     throw Error({.place = name,
-                 .expected = fmt::format("at most {} values", kMostValues),
+                 .expected = fmt::format("at most {} values", kMaxValues),
                  .found = fmt::format("{} channels from tick {} to {}", channels, first,
                                       frames.ticks.back())});
   const std::size_t rows = is_empty ? 0 : static_cast<std::size_t>(last_row) + 1;
@@ -143,7 +143,7 @@ RecordingBlocks parse_recording_blocks(std::span<const std::byte> bytes, const s
 }
 
 RecordingBlocks read_recording_blocks(const std::string& path) {
-  return parse_recording_blocks(read_whole_file(path, kMostFileBytes), path);
+  return parse_recording_blocks(read_whole_file(path, kMaxFileBytes), path);
 }
 
 }  // namespace torsio

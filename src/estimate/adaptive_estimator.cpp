@@ -15,16 +15,16 @@ void AdaptiveEstimator::reset() noexcept {
 }
 
 Estimate AdaptiveEstimator::step(std::span<const double> raw) noexcept {
-  const Estimate told = estimator_.step(raw);
-  last_fault_ = told.fault;
-  return told;
+  const Estimate estimate = estimator_.step(raw);
+  last_fault_ = estimate.fault;
+  return estimate;
 }
 
-Learning AdaptiveEstimator::learn(const ReferenceSample& reference) noexcept {
+UpdateOutcome AdaptiveEstimator::learn(const ReferenceSample& reference) noexcept {
   LastLayerAdapter& adapter = estimator_.model().adapter();
   if (last_fault_ == Fault::none) return adapter.learn(reference);
-  return adapter.pass_over(last_fault_ == Fault::warming_up ? Learning::warming_up
-                                                            : Learning::no_estimate);
+  return adapter.pass_over(last_fault_ == Fault::warming_up ? UpdateOutcome::warming_up
+                                                            : UpdateOutcome::no_estimate);
 }
 
 }  // namespace torsio

@@ -167,7 +167,7 @@ Estimate EstimatorCore::held(Fault fault) const noexcept {
   return {.value = last_value_, .fault = fault};
 }
 
-Estimate EstimatorCore::judge(Features features, const Estimate& told) noexcept {
+Estimate EstimatorCore::apply_guards(Features features, const Estimate& raw_estimate) noexcept {
   const double weight = excursion(features);
   const bool inside = weight <= 1.0;
   Estimate out;
@@ -175,19 +175,19 @@ Estimate EstimatorCore::judge(Features features, const Estimate& told) noexcept 
     out.fault = Fault::warming_up;
   } else if (!inside) {
     out.fault = Fault::outside_training_range;
-  } else if (told.fault != Fault::none) {
-    out.fault = told.fault;
-  } else if (!std::isfinite(told.value)) {
+  } else if (raw_estimate.fault != Fault::none) {
+    out.fault = raw_estimate.fault;
+  } else if (!std::isfinite(raw_estimate.value)) {
     out.fault = Fault::model_not_finite;
   }
   if (out.fault == Fault::none) {
-    out = weight > 0.0 ? blended(features, told, weight) : model_part(told);
+    out = weight > 0.0 ? blended(features, raw_estimate, weight) : model_part(raw_estimate);
   } else {
     out.value = fallback_value(features);
     // The fallback's residuals are evidence only where it was fitted.
     if (inside) out.std_dev = evidence(settings_.fallback.residual_std);
   }
-  out.novelty = told.novelty;
+  out.novelty = raw_estimate.novelty;
   if (!unset_zeros_.empty()) {
     // Off by an unknown amount, it says nothing that a channel seems to be outside its range.
     if (out.fault != Fault::warming_up) out.fault = Fault::zero_not_set;
@@ -207,14 +207,15 @@ double EstimatorCore::excursion(Features features) const noexcept {
   return worst;
 }
 
-Estimate EstimatorCore::model_part(const Estimate& told) const noexcept {
-  const double own = evidence(told.std_dev);
-  return {.value = told.value, .std_dev = std::isnan(own) ? residual_std_at(told.value) : own};
+Estimate EstimatorCore::model_part(const Estimate& raw_estimate) const noexcept {
+  const double own = evidence(raw_estimate.std_dev);
+  return {.value = raw_estimate.value,
+          .std_dev = std::isnan(own) ? residual_std_at(raw_estimate.value) : own};
 }
 
-Estimate EstimatorCore::blended(Features features, const Estimate& told,
+Estimate EstimatorCore::blended(Features features, const Estimate& raw_estimate,
                                 double weight) const noexcept {
-  const Estimate model = model_part(told);
+  const Estimate model = model_part(raw_estimate);
   const double fallback = fallback_value(features);
   // The second moment about the mean of a draw from the model with probability 1 - w, else from
   // the fallback: the two variances, and how far the two disagree.

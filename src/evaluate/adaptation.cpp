@@ -81,11 +81,11 @@ class Replay {
       age_s = target_.is_fresh(n) ? 0.0 : age_s + 1.0 / record_.recording.sample_rate_Hz();
       std::ranges::transform(channels_, raw_.begin(),
                              [n](const std::vector<double>* values) { return (*values)[n]; });
-      const Estimate told = adaptive_.step(raw_);
+      const Estimate output = adaptive_.step(raw_);
       if (!is_lesson(n)) continue;
-      if (told.fault == Fault::none && target_.is_fresh(n))
+      if (output.fault == Fault::none && target_.is_fresh(n))
         for (Tally* tally : {&own, &together}) {
-          tally->adapted.add(told.value, target_.values[n]);
+          tally->adapted.add(output.value, target_.values[n]);
           tally->frozen.add(frozen.estimates[n].value, target_.values[n]);
         }
       (void)adaptive_.learn({.value = target_.values[n], .age_s = age_s});
@@ -115,10 +115,10 @@ void require_role(const Dataset& dataset, Role role, const char* what, const cha
 
 [[noreturn]] void refuse_unusable(const AdaptationCounts& counts, const std::string& target) {
   std::string reasons;
-  for (std::size_t i = 0; i < kLearningOutcomes; ++i)
+  for (std::size_t i = 0; i < kUpdateOutcomes; ++i)
     if (counts.outcomes[i] > 0)
       reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", counts.outcomes[i],
-                             name(static_cast<Learning>(i)));
+                             name(static_cast<UpdateOutcome>(i)));
   throw Error(
       {.problem = "not a single sample could be learned from",
        .expected = fmt::format(
@@ -204,9 +204,9 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
     const DatasetRecord& record = dataset.records[i];
     if (!record.has_role(Role::train)) continue;
     Tally own;
-    const Prediction told = predict(frozen, record.recording);
+    const Prediction output = predict(frozen, record.recording);
     Replay(adaptive, record, dataset.target)
-        .run(told, own, together, part_of(progress, i, parts, "adapting"));
+        .run(output, own, together, part_of(progress, i, parts, "adapting"));
     adapted.as_it_ran.push_back(own.score(record.recording.name()));
   }
   adapted.as_it_ran.push_back(together.score(""));

@@ -63,8 +63,8 @@ class Windows {
 
   /// What the model says at the end of a window whose inputs come from `present` where their bit in
   /// the coalition is set, and from `absent` otherwise.
-  [[nodiscard]] Estimate told(AnyModel& model, const End& present, const End& absent,
-                              std::size_t coalition, std::vector<double>& scratch) const {
+  [[nodiscard]] Estimate estimate(AnyModel& model, const End& present, const End& absent,
+                                  std::size_t coalition, std::vector<double>& scratch) const {
     Estimate estimate;
     model.reset();
     for (std::size_t n = 0; n < length_; ++n) {
@@ -84,39 +84,39 @@ class Windows {
 
 std::vector<std::vector<Estimate>> run_all(const AnyModel& model, const TrainingData& data,
                                            std::size_t threads, const Progress& progress) {
-  std::vector<std::vector<Estimate>> told(data.sequences.size());
-  SharedProgress shared(progress, 0.0, 0.05, told.size(), "running the model");
-  for_each_chunk(told.size(), threads, [&](std::size_t k) {
+  std::vector<std::vector<Estimate>> estimates(data.sequences.size());
+  SharedProgress shared(progress, 0.0, 0.05, estimates.size(), "running the model");
+  for_each_chunk(estimates.size(), threads, [&](std::size_t k) {
     const DenormalsOff denormals_off;
     AnyModel own = model;
-    told[k] = run(own, data.sequences[k]);
+    estimates[k] = run(own, data.sequences[k]);
     shared.tick();
   });
-  return told;
+  return estimates;
 }
 
 /// Standard deviation of what the model says.
-double spread_of(const TrainingData& data, const std::vector<std::vector<Estimate>>& told) {
+double spread_of(const TrainingData& data, const std::vector<std::vector<Estimate>>& estimates) {
   double count = 0.0;
   double mean = 0.0;
   double square_sum = 0.0;
-  for (std::size_t k = 0; k < told.size(); ++k)
-    for (std::size_t n = 0; n < told[k].size(); ++n) {
+  for (std::size_t k = 0; k < estimates.size(); ++k)
+    for (std::size_t n = 0; n < estimates[k].size(); ++n) {
       if (data.sequences[k].use[n] == 0) continue;
       count += 1.0;
-      const double deviation = told[k][n].value - mean;
+      const double deviation = estimates[k][n].value - mean;
       mean += deviation / count;
-      square_sum += deviation * (told[k][n].value - mean);
+      square_sum += deviation * (estimates[k][n].value - mean);
     }
   return count > 0.0 ? std::sqrt(square_sum / count) : 0.0;
 }
 
 Memory memory_of(AnyModel model, const TrainingData& data,
-                 const std::vector<std::vector<Estimate>>& told, std::uint64_t seed) {
+                 const std::vector<std::vector<Estimate>>& estimates, std::uint64_t seed) {
   constexpr std::size_t kAsked = 100;
   constexpr double kTolerance = 1e-3;
   constexpr double kShare = 0.95;
-  const double tolerance = kTolerance * spread_of(data, told);
+  const double tolerance = kTolerance * spread_of(data, estimates);
   std::vector<double> scratch(data.input_count());
   Memory memory{.samples = 1, .is_longer = true};
   for (std::size_t length = 1; length <= kLongestMemory; length *= 2) {
@@ -128,9 +128,9 @@ Memory memory_of(AnyModel model, const TrainingData& data,
     std::size_t asked = 0;
     std::size_t agreed = 0;
     for (const End& end : ends) {
-      const Estimate& course = told[end.sequence][end.sample];
+      const Estimate& course = estimates[end.sequence][end.sample];
       if (course.fault != Fault::none) continue;
-      const Estimate start = windows.told(model, end, end, 0, scratch);
+      const Estimate start = windows.estimate(model, end, end, 0, scratch);
       ++asked;
       if (start.fault == Fault::none && std::abs(start.value - course.value) <= tolerance) ++agreed;
     }
@@ -151,15 +151,16 @@ std::vector<double> coalition_values(AnyModel& model, const Windows& windows, co
   const std::size_t all = (std::size_t{1} << inputs) - 1;
   const auto count = static_cast<double>(background.size());
   std::vector<double> scratch(inputs);
-  const double value = windows.told(model, explained, explained, all, scratch).value;
+  const double value = windows.estimate(model, explained, explained, all, scratch).value;
   std::vector<double> values(all + 1, value);
   for (std::size_t coalition = 0; coalition < all; ++coalition) {
     double distance = 0.0;
     for (std::size_t b = 0; b < background.size(); ++b)
-      distance += (coalition == 0
-                       ? background_values[b]
-                       : windows.told(model, explained, background[b], coalition, scratch).value) -
-                  value;
+      distance +=
+          (coalition == 0
+               ? background_values[b]
+               : windows.estimate(model, explained, background[b], coalition, scratch).value) -
+          value;
     values[coalition] += distance / count;
     progress.tick();
   }
@@ -195,11 +196,11 @@ void refuse_bad_calls(const AnyModel& model, const TrainingData& data,
   if (model.input_count() != data.input_count())
     throw Error({.expected = fmt::format("{} inputs, as the model has", model.input_count()),
                  .found = std::to_string(data.input_count())});
-  if (model.input_count() > kMostAttributedInputs)
+  if (model.input_count() > kMaxAttributedInputs)
     throw Error(
         {.problem = "this model has too many inputs for exact Shapley values",
          .expected =
-             fmt::format("at most {}: each one more doubles the work", kMostAttributedInputs),
+             fmt::format("at most {}: each one more doubles the work", kMaxAttributedInputs),
          .found = std::to_string(model.input_count()),
          .advice = "Fit a model with fewer inputs; torsio crossvalidate says what that costs."});
 }
@@ -270,8 +271,8 @@ Memory memory_samples(const AnyModel& model, const TrainingData& data, std::uint
 Attribution attribute(const AnyModel& model, const TrainingData& data,
                       const AttributionOptions& options, const Progress& progress) {
   refuse_bad_calls(model, data, options);
-  const auto told = run_all(model, data, options.threads, progress);
-  const Memory memory = memory_of(model, data, told, options.seed);
+  const auto estimates = run_all(model, data, options.threads, progress);
+  const Memory memory = memory_of(model, data, estimates, options.seed);
   Attribution attribution;
   attribution.window_samples = options.window_samples > 0 ? options.window_samples : memory.samples;
   attribution.window_is_long_enough =
@@ -295,7 +296,7 @@ Attribution attribute(const AnyModel& model, const TrainingData& data,
   std::vector<double> background_values;
   background_values.reserve(background.size());
   for (const End& end : background)
-    background_values.push_back(windows.told(own, end, end, 0, scratch).value);
+    background_values.push_back(windows.estimate(own, end, end, 0, scratch).value);
   attribution.expected_value =
       std::accumulate(background_values.begin(), background_values.end(), 0.0) /
       static_cast<double>(background.size());
@@ -303,7 +304,7 @@ Attribution attribute(const AnyModel& model, const TrainingData& data,
   attribution.explained = explain(model, data, windows, explained, background, background_values,
                                   options.threads, progress);
   enter_shapley(attribution);
-  enter_permutation(attribution, permutation_importance(model, data, told,
+  enter_permutation(attribution, permutation_importance(model, data, estimates,
                                                         attribution.window_samples, options.repeats,
                                                         options.seed, options.threads, progress));
   return attribution;

@@ -130,7 +130,7 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
              "Name held-out recordings with --test, or give them `role: test` in a manifest."});
   Comparison comparison{.results = empty_results(dataset), .best = {}};
   Results& results = comparison.results;
-  const Role judge = dataset.has_role(Role::validation) ? Role::validation : Role::test;
+  const Role chosen_on = dataset.has_role(Role::validation) ? Role::validation : Role::test;
   double best_rmse = std::numeric_limits<double>::infinity();
   InputSets input_sets(dataset, allow_leak);
   for (std::size_t i = 0; i < choices.size(); ++i) {
@@ -138,12 +138,12 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
     note_inputs(results, choice);
     const Progress part = part_of(progress, i, choices.size(), choice.family);
     ScoredModel scored = fit_and_score(dataset, input_sets, choice, seed, kRoles, part);
-    const ResultRow* judged = whole_split(scored.rows, judge);
-    if (judged != nullptr && judged->score.metrics.rmse < best_rmse) {
-      best_rmse = judged->score.metrics.rmse;
+    const ResultRow* scored_row = whole_split(scored.rows, chosen_on);
+    if (scored_row != nullptr && scored_row->score.metrics.rmse < best_rmse) {
+      best_rmse = scored_row->score.metrics.rmse;
       ModelCard& card = scored.trained->file.card;
       note_held_out_scores(card, scored.rows);
-      if (judge == Role::test)
+      if (chosen_on == Role::test)
         card.held_out += fmt::format("; this score chose the model among {}", choices.size());
       comparison.best = std::move(scored.trained);
     }

@@ -10,7 +10,7 @@
 
 #include "evaluate/initial_state.hpp"
 #include "fit/common/finite_input.hpp"
-#include "model/second_order/friction_drive.hpp"
+#include "model/second_order/rigid_drive.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

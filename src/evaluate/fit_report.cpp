@@ -18,12 +18,12 @@ struct Run {
   Matrix features;
 };
 
-std::size_t judged_samples(const Run& run) {
+std::size_t scored_samples(const Run& run) {
   return static_cast<std::size_t>(
       std::ranges::count_if(run.residual, [](double e) { return std::isfinite(e); }));
 }
 
-std::optional<Role> judged_role(const Dataset& dataset) {
+std::optional<Role> scored_role(const Dataset& dataset) {
   for (const Role role : {Role::test, Role::validation, Role::train})
     if (dataset.has_role(role)) return role;
   return std::nullopt;
@@ -37,12 +37,12 @@ std::vector<Run> runs_of(const TrainedModel& model, const Dataset& dataset, Role
   for (const DatasetRecord& record : dataset.records) {
     if (!record.has_role(role)) continue;
     const Channel& target = record.recording.channel(dataset.target);
-    const Prediction told =
+    const Prediction prediction =
         predict(estimator, record.recording, {&target, dataset.initialise_samples});
     std::vector<double> residual(target.values.size(), kNotMeasured);
-    for (std::size_t n = told.initialised; n < residual.size(); ++n)
-      if (sequence->use[n] != 0 && told.estimates[n].fault != Fault::warming_up)
-        residual[n] = told.estimates[n].value - target.values[n];
+    for (std::size_t n = prediction.initialised; n < residual.size(); ++n)
+      if (sequence->use[n] != 0 && prediction.estimates[n].fault != Fault::warming_up)
+        residual[n] = prediction.estimates[n].value - target.values[n];
     runs.push_back({std::move(residual), std::move(sequence->features)});
     ++sequence;
   }
@@ -126,18 +126,18 @@ ResidualCorrelation summary(std::string with, const std::vector<double>& r, std:
 
 FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
   FitReport report{.split = {}, .samples = 0, .correlations = {}, .table = model.table};
-  const std::optional<Role> role = judged_role(dataset);
+  const std::optional<Role> role = scored_role(dataset);
   if (!role) return report;
   report.split = name(*role);
   const std::vector<Run> runs = runs_of(model, dataset, *role);
   std::size_t longest = 0;
   for (const Run& run : runs) {
-    const std::size_t judged = judged_samples(run);
-    report.samples += judged;
-    longest = std::max(longest, judged);
+    const std::size_t scored = scored_samples(run);
+    report.samples += scored;
+    longest = std::max(longest, scored);
   }
   const std::size_t stride = stride_of(runs);
-  const std::size_t lags = std::min(kMostLags, longest / 10 + 1);
+  const std::size_t lags = std::min(kMaxLags, longest / 10 + 1);
   if (report.samples < 2 || lags < 2) return report;
   constexpr double kQuantile = 2.576;  // of |x|, 99 %, standard normal
   const auto samples = static_cast<double>(report.samples);

@@ -19,21 +19,21 @@ class Start {
     model_.reset();
     rest_.assign(model_.state().begin(), model_.state().end());
     for (std::size_t n = 0; n < target.size(); ++n)
-      if (std::isfinite(target[n]) && all_finite(features.row(n))) judged_.push_back(n);
-    if (judged_.empty()) return;
+      if (std::isfinite(target[n]) && all_finite(features.row(n))) scored_.push_back(n);
+    if (scored_.empty()) return;
     const auto [least, most] =
-        std::ranges::minmax_element(judged_, {}, [&](std::size_t n) { return target[n]; });
+        std::ranges::minmax_element(scored_, {}, [&](std::size_t n) { return target[n]; });
     const double lowest = target[*least];
     const double highest = target[*most];
     spread_ = std::max(highest - lowest, std::max(std::abs(lowest), std::abs(highest)));
     constexpr double kUnknownShare = 0.01;
     const double error = usual_error > 0.0 ? usual_error : kUnknownShare * spread_;
-    if (error > 0.0) weight_ = 1.0 / (error * std::sqrt(static_cast<double>(judged_.size())));
+    if (error > 0.0) weight_ = 1.0 / (error * std::sqrt(static_cast<double>(scored_.size())));
   }
 
   [[nodiscard]] const std::vector<double>& rest() const { return rest_; }
-  [[nodiscard]] bool is_told() const { return !rest_.empty() && !judged_.empty(); }
-  [[nodiscard]] std::size_t residuals() const { return judged_.size() + rest_.size(); }
+  [[nodiscard]] bool is_determined() const { return !rest_.empty() && !scored_.empty(); }
+  [[nodiscard]] std::size_t residuals() const { return scored_.size() + rest_.size(); }
 
   /// Of each state, what moves some output by the target's spread; 1 where nothing moves one.
   [[nodiscard]] std::vector<double> typical() {
@@ -50,7 +50,7 @@ class Start {
       evaluate(state, unit, moved);
       state[j] = rest_[j];
       double change = 0.0;
-      for (std::size_t n = 0; n < judged_.size(); ++n)
+      for (std::size_t n = 0; n < scored_.size(); ++n)
         change = std::max(change, std::abs(moved[n] - at_rest[n]));
       if (std::isfinite(change) && change > 0.0 && spread_ > 0.0)
         typical[j] = spread_ * weight_ * probe / change;
@@ -67,11 +67,11 @@ class Start {
     for (std::size_t n = 0; n < target_.size(); ++n) {
       if (!all_finite(features_.row(n))) continue;
       const double value = model_.step(features_.row(n)).value;
-      if (next < judged_.size() && judged_[next] == n)
+      if (next < scored_.size() && scored_[next] == n)
         residuals[next++] = weight_ * (value - target_[n]);
     }
     for (std::size_t j = 0; j < rest_.size(); ++j)
-      residuals[judged_.size() + j] = kRestWeight * (state[j] - rest_[j]) / typical[j];
+      residuals[scored_.size() + j] = kRestWeight * (state[j] - rest_[j]) / typical[j];
     return true;
   }
 
@@ -80,7 +80,7 @@ class Start {
   const Matrix& features_;
   std::span<const double> target_;
   std::vector<double> rest_;
-  std::vector<std::size_t> judged_;
+  std::vector<std::size_t> scored_;
   double spread_ = 0.0;  ///< of the measured outputs, about 0
   double weight_ = 1.0;  ///< of an output's miss
 };
@@ -90,7 +90,7 @@ class Start {
 void start_where_measured(AnyModel& model, const Matrix& features, std::span<const double> target,
                           double usual_error) {
   Start start(model, features, target, usual_error);
-  if (!start.is_told()) return;
+  if (!start.is_determined()) return;
   const std::vector<double>& rest = start.rest();
   const std::vector<double> typical = start.typical();
   const ResidualProblem problem{

@@ -64,13 +64,13 @@ Shuffle shuffled(std::size_t input, std::vector<Block> blocks, std::uint64_t see
   return {.input = input, .source = std::move(blocks)};
 }
 
-bool is_scored(const Sequence& sequence, const std::vector<Estimate>& told, std::size_t n) {
-  return sequence.use[n] != 0 && told[n].fault == Fault::none;
+bool is_scored(const Sequence& sequence, const std::vector<Estimate>& by_sequence, std::size_t n) {
+  return sequence.use[n] != 0 && by_sequence[n].fault == Fault::none;
 }
 
 /// Runs the model through all blocks in their order, with one input from elsewhere.
 double shuffled_rmse(AnyModel model, const TrainingData& data,
-                     const std::vector<std::vector<Estimate>>& told,
+                     const std::vector<std::vector<Estimate>>& by_sequence,
                      const std::vector<Block>& blocks, const Shuffle& shuffle, std::size_t length,
                      SharedProgress& progress) {
   const DenormalsOff denormals_off;
@@ -86,7 +86,7 @@ double shuffled_rmse(AnyModel model, const TrainingData& data,
       row[shuffle.input] = source(shuffle.source[b].begin + n, shuffle.input);
       if (!std::ranges::all_of(row, [](double value) { return std::isfinite(value); })) continue;
       const Estimate estimate = model.step(row);
-      if (is_scored(sequence, told[block.sequence], block.begin + n))
+      if (is_scored(sequence, by_sequence[block.sequence], block.begin + n))
         errors.add(estimate.value - sequence.target[block.begin + n]);
     }
     progress.tick();
@@ -97,7 +97,7 @@ double shuffled_rmse(AnyModel model, const TrainingData& data,
 }  // namespace
 
 PermutationImportance permutation_importance(const AnyModel& model, const TrainingData& data,
-                                             const std::vector<std::vector<Estimate>>& told,
+                                             const std::vector<std::vector<Estimate>>& by_sequence,
                                              std::size_t shortest_block, std::size_t repeats,
                                              std::uint64_t seed, std::size_t threads,
                                              const Progress& progress) {
@@ -107,7 +107,7 @@ PermutationImportance permutation_importance(const AnyModel& model, const Traini
   SquareSum baseline;
   for (const Block& block : blocks) {
     const Sequence& sequence = data.sequences[block.sequence];
-    const std::vector<Estimate>& estimates = told[block.sequence];
+    const std::vector<Estimate>& estimates = by_sequence[block.sequence];
     for (std::size_t n = block.begin; n < block.begin + length; ++n)
       if (is_scored(sequence, estimates, n)) baseline.add(estimates[n].value - sequence.target[n]);
   }
@@ -125,7 +125,7 @@ PermutationImportance permutation_importance(const AnyModel& model, const Traini
     const std::size_t input = run / repeats;
     const Shuffle shuffle = shuffled(input, blocks, seed + run);
     importance.increase[input][run % repeats] =
-        shuffled_rmse(model, data, told, blocks, shuffle, length, shared) - importance.rmse;
+        shuffled_rmse(model, data, by_sequence, blocks, shuffle, length, shared) - importance.rmse;
   });
   return importance;
 }

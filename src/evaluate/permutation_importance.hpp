@@ -21,8 +21,8 @@ struct PermutationImportance {
 /// @param shortest_block blocks are this long or a second, whichever is longer, but short enough for
 /// 20 of them if the data are few.
 [[nodiscard]] PermutationImportance permutation_importance(
-    const AnyModel& model, const TrainingData& data, const std::vector<std::vector<Estimate>>& told,
-    std::size_t shortest_block, std::size_t repeats, std::uint64_t seed, std::size_t threads,
-    const Progress& progress);
+    const AnyModel& model, const TrainingData& data,
+    const std::vector<std::vector<Estimate>>& by_sequence, std::size_t shortest_block,
+    std::size_t repeats, std::uint64_t seed, std::size_t threads, const Progress& progress);
 
 }  // namespace torsio

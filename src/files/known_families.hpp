@@ -28,7 +28,7 @@
 #include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"
 #include "model/second_order/dynamic_bouc_wen.hpp"
-#include "model/second_order/friction_drive.hpp"
+#include "model/second_order/rigid_drive.hpp"
 #include "model/viscoelastic/viscoelastic.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/model/any_model.hpp"
@@ -66,7 +66,7 @@ using AllFamilies = FamilyList<Linear,                        //
                                Viscoelastic,                  //
                                HammersteinWiener,             //
                                DynamicBoucWen,                //
-                               FrictionDrive,                 //
+                               RigidDrive,                    //
                                Dgmm,                          //
                                GaussianProcess,               //
                                ParametricGp,                  //

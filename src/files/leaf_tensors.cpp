@@ -132,9 +132,9 @@ std::size_t list_size(const Safetensors& contents, const std::string& name, std:
     const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), index);
     // Whatever else it is, it is no element; somebody else asks for it, or nobody does.
     if (error != std::errc() || end == rest.data() + rest.size() || *end != '.') continue;
-    if (index >= kMostElements)
+    if (index >= kMaxElements)
       refuse(fmt::format("{}: /{}", file, at->first),
-             fmt::format("at most {} elements of {}", kMostElements, name),
+             fmt::format("at most {} elements of {}", kMaxElements, name),
              fmt::format("one of index {}", index));
     if (index >= seen.size()) seen.resize(index + 1);
     seen[index] = true;

@@ -53,11 +53,11 @@ void put_leaves(Safetensors& contents, const std::string& prefix, const Fields& 
                                  std::string_view file, bool may_be_nan);
 
 /// No list of a model file is longer; a file that says so is refused before memory is taken.
-inline constexpr std::size_t kMostElements = kMostLayers;
+inline constexpr std::size_t kMaxElements = kMaxLayers;
 
 /// How many elements `contents` has of the list of that name: its tensors are called
 /// "name.0.field", "name.1.field", ...
-/// @throws Error if an index is left out or there are more elements than `kMostElements`.
+/// @throws Error if an index is left out or there are more elements than `kMaxElements`.
 [[nodiscard]] std::size_t list_size(const Safetensors& contents, const std::string& name,
                                     std::string_view file);
 

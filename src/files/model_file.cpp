@@ -126,7 +126,7 @@ void save_model(const std::filesystem::path& path, const ModelFile& model) {
 }
 
 ModelFile load_model(const std::filesystem::path& path, std::string_view expected_serial) {
-  return parse_model(read_whole_file(path, kMostModelFileBytes), path.string(), expected_serial);
+  return parse_model(read_whole_file(path, kMaxModelFileBytes), path.string(), expected_serial);
 }
 
 Estimator make_estimator(const ModelFile& model) {
@@ -139,7 +139,7 @@ Estimator make_estimator(const ModelFile& model) {
 
 Estimator load_estimator(const std::filesystem::path& path, std::string_view expected_serial) {
   const std::string place = path.string();
-  const auto bytes = read_whole_file(path, kMostModelFileBytes);
+  const auto bytes = read_whole_file(path, kMaxModelFileBytes);
   return make_estimator_at(read_model(bytes, place, expected_serial), place);
 }
 

@@ -23,7 +23,7 @@ using nlohmann::json;
 static_assert(std::endian::native == std::endian::little, "the format's byte order is ours");
 
 constexpr std::size_t kLengthBytes = 8;
-constexpr std::size_t kMostDimensions = 8;
+constexpr std::size_t kMaxDimensions = 8;
 constexpr std::string_view kMetadataKey = "__metadata__";
 constexpr std::string_view kDamaged = "The file is damaged: copy it again or fit the model again.";
 
@@ -92,7 +92,7 @@ Entry parse_entry(const std::string& name, const json& value, const std::string&
   if (known == kElementTypes.end())
     refuse(place + "/dtype", R"("F64", "I64", "F32" or "U8")", type.dump());
   entry.type = static_cast<std::size_t>(known - kElementTypes.begin());
-  entry.shape = sizes(member(value, "shape", place), kMostDimensions, place + "/shape");
+  entry.shape = sizes(member(value, "shape", place), kMaxDimensions, place + "/shape");
   const auto offsets = sizes(member(value, "data_offsets", place), 2, place + "/data_offsets");
   if (offsets.size() != 2 || offsets[0] > offsets[1])
     refuse(place + "/data_offsets", "begin and end", fmt::format("{}", offsets));
@@ -166,10 +166,10 @@ std::string_view header_of(std::span<const std::byte> bytes, std::string_view pl
            fmt::format("{} bytes", bytes.size()));
   std::uint64_t length = 0;
   std::memcpy(&length, bytes.data(), kLengthBytes);
-  if (length > kMostHeaderBytes)
+  if (length > kMaxHeaderBytes)
     throw Error(
         {.place = fmt::format("{}: header length", place),
-         .expected = fmt::format("at most {} bytes", kMostHeaderBytes),
+         .expected = fmt::format("at most {} bytes", kMaxHeaderBytes),
          .found = is_text(bytes.first(kLengthBytes)) ? "text" : fmt::format("{}", length),
          .advice = is_text(bytes.first(kLengthBytes))
                        ? "This is no model file. If it is a recording: the model comes first, "
@@ -248,9 +248,9 @@ std::vector<std::byte> safetensors_bytes(const Safetensors& contents) {
   // Bytes that are no UTF-8 (in a file's name) become the replacement character.
   std::string text = header.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   text.resize((text.size() + kLengthBytes - 1) / kLengthBytes * kLengthBytes, ' ');
-  if (text.size() > kMostHeaderBytes)
+  if (text.size() > kMaxHeaderBytes)
     throw Error({.place = "safetensors header",
-                 .expected = fmt::format("at most {} bytes", kMostHeaderBytes),
+                 .expected = fmt::format("at most {} bytes", kMaxHeaderBytes),
                  .found = fmt::format("{}", text.size())});
 
   std::vector<std::byte> bytes(kLengthBytes + text.size() + at);

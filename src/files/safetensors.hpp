@@ -12,7 +12,7 @@
 namespace torsio {
 
 /// A header longer than this is refused before it is read.
-inline constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 20;
+inline constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;
 
 /// Numbers with a shape, row-major. The element type is the file's: F64, I64, F32 or U8.
 struct Tensor {

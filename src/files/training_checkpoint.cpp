@@ -26,7 +26,7 @@ void save_checkpoint(const std::filesystem::path& path, const TrainingCheckpoint
 
 TrainingCheckpoint load_checkpoint(const std::filesystem::path& path) {
   const std::string place = path.string();
-  const auto bytes = read_whole_file(path, kTables * kMostModelFileBytes + kMostHeaderBytes);
+  const auto bytes = read_whole_file(path, kTables * kMaxModelFileBytes + kMaxHeaderBytes);
   Safetensors contents = parse_safetensors(bytes, place);
   const auto recipe = contents.metadata.find(kRecipeKey);
   if (recipe == contents.metadata.end())

@@ -47,16 +47,16 @@ class Descriptor {
 
 }  // namespace
 
-std::vector<std::byte> read_whole_file(const fs::path& path, std::size_t most_bytes) {
+std::vector<std::byte> read_whole_file(const fs::path& path, std::size_t max_bytes) {
   // Without O_NONBLOCK, opening a pipe would wait for its writer.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.number() < 0) refuse(path, "cannot open", errno);
   struct stat status {};
   if (::fstat(file.number(), &status) != 0) refuse(path, "cannot open", errno);
   if (!S_ISREG(status.st_mode)) refuse_kind(path);
-  if (std::cmp_greater(status.st_size, most_bytes))
+  if (std::cmp_greater(status.st_size, max_bytes))
     throw Error({.place = path.string(),
-                 .expected = fmt::format("at most {} bytes", most_bytes),
+                 .expected = fmt::format("at most {} bytes", max_bytes),
                  .found = fmt::format("{}", status.st_size)});
   std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size));
   std::size_t filled = 0;

@@ -8,10 +8,10 @@
 namespace torsio {
 
 /// The bytes of a regular file.
-/// @throws Error if it cannot be read, is no regular file, or is larger than `most_bytes`: memory
+/// @throws Error if it cannot be read, is no regular file, or is larger than `max_bytes`: memory
 /// is taken after its size is known.
 [[nodiscard]] std::vector<std::byte> read_whole_file(const std::filesystem::path& path,
-                                                     std::size_t most_bytes);
+                                                     std::size_t max_bytes);
 
 /// Writes a regular file whole or not at all (`OutputFile`).
 /// @throws Error (disk full, no such folder, no permission, the target is no regular file); the

@@ -73,8 +73,8 @@ void refuse_constant_target(const TrainingData& data) {
 }
 
 /// An inverse's target is compared with the measured deflection, and nobody tells it these zeros.
-void refuse_zeros_behind_an_inverse(const TrainingData& data, const FeaturePipeline& pipeline,
-                                    const std::vector<ZeroRule>& zeros) {
+void refuse_zeros_after_an_inverse(const TrainingData& data, const FeaturePipeline& pipeline,
+                                   const std::vector<ZeroRule>& zeros) {
   if (data.target != "spring_deflection_rad" ||
       std::ranges::find(pipeline.raw_inputs(), "torque_Nm") == pipeline.raw_inputs().end())
     return;
@@ -112,7 +112,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   const Options options(family.options, choice.options);
   ModelCard card = card_for(dataset, choice, options, context.seed);
   const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
-  refuse_zeros_behind_an_inverse(data.training, pipeline, card.zeros);
+  refuse_zeros_after_an_inverse(data.training, pipeline, card.zeros);
   if (context.validation == nullptr && data.validation) context.validation = &*data.validation;
 
   const auto start = std::chrono::steady_clock::now();

@@ -16,7 +16,7 @@ namespace torsio {
 namespace {
 
 // A layer that passes its inputs on has their number squared in weights.
-constexpr std::size_t kMostIdentity = 1024;
+constexpr std::size_t kMaxIdentity = 1024;
 
 struct ActivatedDense {
   DenseStage map;
@@ -51,7 +51,7 @@ void absorb(const DenseStage& before, Matrix& weights, std::vector<double>& bias
 }
 
 /// gain (W x + b) + offset as W' x + b'.
-void absorb_behind(const AffineStage& behind, DenseStage& dense) {
+void absorb_after(const AffineStage& behind, DenseStage& dense) {
   for (std::size_t row = 0; row < dense.weights.rows; ++row) {
     for (double& weight : dense.weights.row(row)) weight *= behind.gain[row];
     dense.bias[row] = behind.gain[row] * dense.bias[row] + behind.offset[row];
@@ -96,7 +96,7 @@ class Assembly {
         pending_->gain[j] *= stage.gain[j];
       }
     } else if (ends_linear() && is_offset_only(stage)) {
-      absorb_behind(stage, dense_.back().map);  // the bias of a bare product
+      absorb_after(stage, dense_.back().map);  // the bias of a bare product
     } else {
       pending_ = stage;
     }
@@ -111,13 +111,13 @@ class Assembly {
   void add(const ActivationStage& stage) {
     if (stage.function == Activation::linear) return;
     if (!ends_linear()) {
-      if (width_ > kMostIdentity)
+      if (width_ > kMaxIdentity)
         throw Error({.problem = "an activation without a layer before it, too wide to make one",
-                     .expected = fmt::format("at most {} units", kMostIdentity),
+                     .expected = fmt::format("at most {} units", kMaxIdentity),
                      .found = fmt::format("{}", width_)});
       add(DenseStage{identity(width_), std::vector<double>(width_, 0.0)});
     } else if (pending_) {
-      absorb_behind(*std::exchange(pending_, std::nullopt), dense_.back().map);
+      absorb_after(*std::exchange(pending_, std::nullopt), dense_.back().map);
     }
     dense_.back().activation = stage.function;
   }
@@ -159,7 +159,7 @@ class Assembly {
       scaling_.target_scale = behind->gain.front();
       scaling_.target_centre = behind->offset.front();
     } else {
-      absorb_behind(*behind, dense_.back().map);
+      absorb_after(*behind, dense_.back().map);
     }
   }
 

@@ -13,9 +13,9 @@
 namespace torsio::graph {
 namespace {
 
-constexpr std::size_t kMostRank = 8;
-constexpr std::size_t kMostNodes = 10000;
-constexpr std::size_t kMostStages = 8 * kMostLayers;
+constexpr std::size_t kMaxRank = 8;
+constexpr std::size_t kMaxNodes = 10000;
+constexpr std::size_t kMaxStages = 8 * kMaxLayers;
 
 }  // namespace
 
@@ -62,14 +62,14 @@ Evaluator::Evaluator(const Graph& graph) : graph_(graph) {
     throw Error({.place = graph.place, .expected = "a graph with an input", .found = "none"});
   const Graph::Input& first = graph.inputs.front();
   const std::size_t rank = first.shape.size();
-  if (rank == 0 || rank > kMostRank || !first.shape.back() || *first.shape.back() < 1)
+  if (rank == 0 || rank > kMaxRank || !first.shape.back() || *first.shape.back() < 1)
     throw Error({.place = fmt::format("{}: input '{}'", graph.place, first.name),
                  .expected = "a last axis of known size: the network's inputs",
                  .found = rank == 0 ? "no axis" : "another shape",
                  .advice = "Export with a fixed number of inputs; only batch and time may vary."});
-  if (*first.shape.back() > static_cast<std::int64_t>(kMostUnits))
+  if (*first.shape.back() > static_cast<std::int64_t>(kMaxUnits))
     throw Error({.place = fmt::format("{}: input '{}'", graph.place, first.name),
-                 .expected = fmt::format("at most {} inputs", kMostUnits),
+                 .expected = fmt::format("at most {} inputs", kMaxUnits),
                  .found = fmt::format("{}", *first.shape.back())});
   Signal signal;
   for (std::size_t i = 0; i < rank; ++i) {
@@ -125,17 +125,17 @@ void Evaluator::evaluate(const Node& node) {
 
 ForeignNetwork Evaluator::network(const std::string& output) {
   const Value* const value = find(output);
-  const auto* const told = value == nullptr ? nullptr : std::get_if<Signal>(value);
-  if (told == nullptr)
+  const auto* const estimate = value == nullptr ? nullptr : std::get_if<Signal>(value);
+  if (estimate == nullptr)
     throw Error({.place = fmt::format("{}: output '{}'", graph_.place, output),
                  .expected = "a value that the network computes from its first input",
                  .found = "another one",
                  .advice = "--output-name chooses among a graph's outputs."});
   const Signal& first = std::get<Signal>(values_.at(graph_.inputs.front().name));
   ForeignNetwork network{.place = graph_.place, .inputs = first.width};
-  for (const std::size_t stage : told->stages) network.stages.push_back(stages_[stage]);
+  for (const std::size_t stage : estimate->stages) network.stages.push_back(stages_[stage]);
   network.window = window_;
-  if (told->time && starts_from_zeros_)
+  if (estimate->time && starts_from_zeros_)
     network.notes.push_back(
         window_ ? fmt::format(
                       "the graph starts every window of {} samples from the zero state; here the "
@@ -192,10 +192,10 @@ std::optional<std::vector<std::int64_t>> Evaluator::whole_numbers(
 }
 
 std::vector<std::int64_t> Evaluator::whole_numbers(const Node& node, std::size_t index) const {
-  constexpr double kMost = 9.2e18;  // symbols are beyond it
+  constexpr double kMax = 9.2e18;  // symbols are beyond it
   std::vector<std::int64_t> numbers;
   for (const double value : constant(node, index).values) {
-    if (!(std::abs(value) <= kMost))
+    if (!(std::abs(value) <= kMax))
       refuse(graph_, node, "numbers that are known when the graph is read", "others");
     numbers.push_back(static_cast<std::int64_t>(value));
   }
@@ -203,9 +203,9 @@ std::vector<std::int64_t> Evaluator::whole_numbers(const Node& node, std::size_t
 }
 
 void Evaluator::reserve(const Node& node, std::size_t count) {
-  constexpr std::size_t kMost = kMostForeignBytes / sizeof(float);
-  if (count > kMost || folded_ + count > kMost)
-    refuse(graph_, node, fmt::format("at most {} numbers made from constants", kMost), "more");
+  constexpr std::size_t kMax = kMaxForeignBytes / sizeof(float);
+  if (count > kMax || folded_ + count > kMax)
+    refuse(graph_, node, fmt::format("at most {} numbers made from constants", kMax), "more");
   folded_ += count;
 }
 
@@ -223,8 +223,8 @@ Tensor Evaluator::taken_from(const Node& node, const Tensor& tensor, std::size_t
 }
 
 Signal Evaluator::behind(const Node& node, Signal signal, ForeignStage stage) {
-  if (signal.stages.size() >= kMostStages)
-    refuse(graph_, node, fmt::format("at most {} stages", kMostStages), "more");
+  if (signal.stages.size() >= kMaxStages)
+    refuse(graph_, node, fmt::format("at most {} stages", kMaxStages), "more");
   signal.stages.push_back(stages_.size());
   stages_.push_back(std::move(stage));
   return signal;
@@ -263,9 +263,9 @@ std::set<const Node*> needed(const Graph& graph, const std::string& output) {
 }  // namespace
 
 ForeignNetwork network_of(const Graph& graph, const std::string& output) {
-  if (graph.nodes.size() > kMostNodes)
+  if (graph.nodes.size() > kMaxNodes)
     throw Error({.place = graph.place,
-                 .expected = fmt::format("at most {} nodes", kMostNodes),
+                 .expected = fmt::format("at most {} nodes", kMaxNodes),
                  .found = fmt::format("{}", graph.nodes.size())});
   if (graph.outputs.empty())
     throw Error({.place = graph.place, .expected = "a graph with an output", .found = "none"});

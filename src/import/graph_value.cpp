@@ -22,9 +22,9 @@ bool fits(const Part& part, double target, bool is_only_one) {
 std::optional<std::size_t> element_count(const std::vector<std::int64_t>& shape) {
   std::size_t count = 1;  // without sizes of 0, so that no part of a shape overflows either
   for (const std::int64_t size : shape) {
-    if (size < 0 || static_cast<std::uint64_t>(size) > kMostForeignBytes) return std::nullopt;
+    if (size < 0 || static_cast<std::uint64_t>(size) > kMaxForeignBytes) return std::nullopt;
     count *= std::max(static_cast<std::size_t>(size), std::size_t{1});
-    if (count > kMostForeignBytes) return std::nullopt;
+    if (count > kMaxForeignBytes) return std::nullopt;
   }
   return std::ranges::find(shape, 0) == shape.end() ? count : 0;
 }

@@ -48,7 +48,7 @@ inline constexpr double kFirstSymbol = -1e300;
 [[nodiscard]] constexpr double symbol_of(int label) { return kFirstSymbol * (1.0 + label); }
 [[nodiscard]] constexpr bool is_symbol(double value) { return value <= kFirstSymbol; }
 
-/// The number of elements, or none if a size is negative or they are more than `kMostForeignBytes`.
+/// The number of elements, or none if a size is negative or they are more than `kMaxForeignBytes`.
 [[nodiscard]] std::optional<std::size_t> element_count(const std::vector<std::int64_t>& shape);
 
 /// The slices `indices` of a tensor along an axis.

@@ -104,9 +104,9 @@ ForeignFile read_foreign_file(const std::string& path) {
   while (const std::size_t size = source->read(chunk.data(), chunk.size())) {
     const auto bytes = std::as_bytes(std::span(chunk).first(size));
     file.bytes.insert(file.bytes.end(), bytes.begin(), bytes.end());
-    if (file.bytes.size() > kMostForeignBytes)
+    if (file.bytes.size() > kMaxForeignBytes)
       throw Error({.place = path,
-                   .expected = fmt::format("at most {} MiB of weights", kMostForeignBytes >> 20),
+                   .expected = fmt::format("at most {} MiB of weights", kMaxForeignBytes >> 20),
                    .found = "more"});
   }
   file.source = {path, source->sha256()};

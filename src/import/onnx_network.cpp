@@ -78,14 +78,14 @@ class Constants {
              "Save the model with its weights inside (save_as_external_data=False).");
     if (tensor.has_segment()) refuse(place, "a whole tensor", "a segment of one");
     const std::vector<std::int64_t> shape(tensor.dims().begin(), tensor.dims().end());
-    constexpr std::size_t kMostRank = 8;
+    constexpr std::size_t kMaxRank = 8;
     const auto count = graph::element_count(shape);
-    if (shape.size() > kMostRank || !count)
+    if (shape.size() > kMaxRank || !count)
       refuse(place, "as many numbers as its shape says", "a shape that no file holds");
     numbers_ += *count;
-    constexpr std::size_t kMost = kMostForeignBytes / sizeof(float);
-    if (numbers_ > kMost)
-      refuse(place, fmt::format("at most {} numbers in all constants", kMost), "more");
+    constexpr std::size_t kMax = kMaxForeignBytes / sizeof(float);
+    if (numbers_ > kMax)
+      refuse(place, fmt::format("at most {} numbers in all constants", kMax), "more");
     graph::Tensor result{shape, values_of(tensor, *count, place)};
     const auto bad =
         std::ranges::find_if_not(result.values, [](double x) { return std::isfinite(x); });
@@ -178,7 +178,7 @@ graph::Graph graph_of(const onnx::ModelProto& model, std::string_view place) {
 ForeignNetwork parse_onnx(std::span<const std::byte> bytes, std::string_view place,
                           const std::string& output) {
   onnx::ModelProto model;
-  if (bytes.size() > kMostForeignBytes ||
+  if (bytes.size() > kMaxForeignBytes ||
       !model.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) || !model.has_graph())
     refuse(std::string(place), "an ONNX model", "something else, or a part of one",
            "Is the file complete? torsio import reads ONNX and PyTorch weights as JSON.");

@@ -64,7 +64,7 @@ std::vector<std::size_t> shape_of(const json& tensor, const std::string& place) 
     refuse(place + "/shape", "a list of up to 8 sizes", "something else");
   std::vector<std::size_t> sizes;
   for (const json& size : *shape) {
-    if (!size.is_number_unsigned() || size.get<std::uint64_t>() > kMostForeignBytes)
+    if (!size.is_number_unsigned() || size.get<std::uint64_t>() > kMaxForeignBytes)
       refuse(place + "/shape", "sizes that a file can hold", size.dump());
     sizes.push_back(size.get<std::size_t>());
   }
@@ -80,7 +80,7 @@ Weights weights_of(const json& tensor, const std::string& place) {
   std::size_t count = 1;
   for (const std::size_t size : weights.shape) {
     count *= size;
-    if (count > kMostForeignBytes) break;
+    if (count > kMaxForeignBytes) break;
   }
   if (data->size() != count)
     refuse(place + "/data",

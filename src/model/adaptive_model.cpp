@@ -64,9 +64,9 @@ AdaptiveModel::Parameters AdaptiveModel::parameters() const {
 }
 
 Estimate AdaptiveModel::step(Features features) noexcept {
-  Estimate told = network_.step(features);
-  told.value = adapter_.step(network_.last_layer_input(), told.value);
-  return told;
+  Estimate estimate = network_.step(features);
+  estimate.value = adapter_.step(network_.last_layer_input(), estimate.value);
+  return estimate;
 }
 
 AnyModel::Parameters AdaptiveModel::adapted() const {

@@ -57,9 +57,9 @@ bool differentiate(const ResidualProblem& problem, std::span<const double> theta
 bool evaluate(const ResidualProblem& problem, std::span<const double> theta,
               std::span<const double> typical, std::span<double> residuals,
               std::span<double> jacobian) {
-  const bool is_told =
+  const bool is_determined =
       problem.evaluate(theta, residuals, problem.has_jacobian ? jacobian : std::span<double>());
-  if (!is_told || !all_finite(residuals)) return false;
+  if (!is_determined || !all_finite(residuals)) return false;
   if (jacobian.empty()) return true;
   if (!problem.has_jacobian && !differentiate(problem, theta, residuals, typical, jacobian))
     return false;
@@ -98,7 +98,7 @@ class Reporter : public ceres::IterationCallback {
       report_progress(
           options_.progress,
           static_cast<double>(at.iteration) /
-              static_cast<double>(std::max<std::size_t>(options_.most_iterations, 1)),
+              static_cast<double>(std::max<std::size_t>(options_.max_iterations, 1)),
           fmt::format("iteration {}, error {:.4g}", at.iteration, std::sqrt(2.0 * at.cost)));
     } catch (...) {
       thrown_ = std::current_exception();
@@ -181,7 +181,7 @@ std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<d
   if (!evaluate(problem, theta, options.typical, residuals, {})) return std::nullopt;
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::DENSE_QR;
-  settings.max_num_iterations = static_cast<int>(options.most_iterations);
+  settings.max_num_iterations = static_cast<int>(options.max_iterations);
   settings.function_tolerance = options.tolerance;
   settings.parameter_tolerance = 1e-10;
   settings.num_threads = 1;
@@ -285,14 +285,14 @@ ParameterUncertainty uncertainty_of(const ResidualProblem& problem, std::span<co
 std::string description_of(std::span<const double> direction, std::span<const std::string> names) {
   constexpr double kPart = 0.05;
   constexpr std::size_t kReadable = 8;
-  std::size_t told = 0;
+  std::size_t estimate = 0;
   const double largest =
       std::abs(*std::ranges::max_element(direction, {}, [](double x) { return std::abs(x); }));
   std::string text;
   for (std::size_t i = 0; i < direction.size(); ++i) {
     const double part = direction[i] / largest;
     if (std::abs(part) < kPart) continue;
-    if (++told > kReadable) return text + " + ...";
+    if (++estimate > kReadable) return text + " + ...";
     const char* sign = part < 0.0 ? "-" : "+";
     const std::string amount =
         std::abs(std::abs(part) - 1.0) < 5e-3 ? "" : fmt::format("{:.2g} ", std::abs(part));

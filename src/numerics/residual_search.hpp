@@ -27,7 +27,7 @@ struct ResidualProblem {
 };
 
 struct SearchOptions {
-  std::size_t most_iterations = 100;
+  std::size_t max_iterations = 100;
   std::vector<double> lower = {};  ///< bounds, one a parameter, or empty
   std::vector<double> upper = {};
   std::vector<double> typical = {};  ///< size of a change that matters, > 0; empty: |θ|, or 1 at 0

@@ -128,7 +128,7 @@ std::optional<Seal> read_seal(std::span<const std::byte> bytes) noexcept {
   std::memcpy(words.data(), bytes.data() + kKindAt, sizeof(words));
   const auto [kind, size, crc] = words;
   if (kind < static_cast<std::uint32_t>(BlockKind::header) ||
-      kind > static_cast<std::uint32_t>(BlockKind::end) || size > kMostPayloadBytes)
+      kind > static_cast<std::uint32_t>(BlockKind::end) || size > kMaxPayloadBytes)
     return std::nullopt;
   return Seal{.kind = static_cast<BlockKind>(kind), .payload_bytes = size, .crc = crc};
 }
@@ -145,7 +145,7 @@ std::optional<RecordingHeader> read_header(std::span<const std::byte> payload) {
   if (reader.take<std::uint32_t>() != kVersion) return std::nullopt;
   const auto channels = reader.take<std::uint32_t>();
   RecordingHeader header{.channels = {}, .period_s = reader.take<double>()};
-  if (channels == 0 || channels > kMostChannels) return std::nullopt;
+  if (channels == 0 || channels > kMaxChannels) return std::nullopt;
   for (std::uint32_t channel = 0; channel < channels; ++channel) {
     const auto name = reader.take_bytes(reader.take<std::uint32_t>());
     header.channels.emplace_back(reinterpret_cast<const char*>(name.data()), name.size());

@@ -20,8 +20,8 @@ namespace torsio {
 //     end      u64 dropped, u64 frames in the file
 
 inline constexpr std::size_t kSealBytes = 20;
-inline constexpr std::size_t kMostPayloadBytes = std::size_t{64} << 20;
-inline constexpr std::size_t kMostChannels = 1024;
+inline constexpr std::size_t kMaxPayloadBytes = std::size_t{64} << 20;
+inline constexpr std::size_t kMaxChannels = 1024;
 
 enum class BlockKind : std::uint32_t { header = 1, frames = 2, end = 3 };
 

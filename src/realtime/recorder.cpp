@@ -21,16 +21,16 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kMostRingFrames = std::size_t{1} << 24;
+constexpr std::size_t kMaxRingFrames = std::size_t{1} << 24;
 constexpr double kLongest_s = 3600.0;
-constexpr std::size_t kMostBlockHeadBytes = 64;
+constexpr std::size_t kMaxBlockHeadBytes = 64;
 /// How often the writing thread looks into the ring: nobody wakes it, for that could block.
 constexpr auto kPoll = std::chrono::milliseconds(5);
 
 void check_channels(const std::vector<std::string>& channels) {
-  if (channels.empty() || channels.size() > kMostChannels)
+  if (channels.empty() || channels.size() > kMaxChannels)
     throw UsageError({.place = "recorder: channels",
-                      .expected = fmt::format("from 1 to {}", kMostChannels),
+                      .expected = fmt::format("from 1 to {}", kMaxChannels),
                       .found = fmt::format("{}", channels.size())});
   std::set<std::string> names;
   for (const std::string& channel : channels) {
@@ -59,11 +59,11 @@ const RecorderOptions& checked(const RecorderOptions& options) {
   check_channels(options.channels);
   check_range("period_s", options.period_s, 1e-6, kLongest_s);
   check_range("ring_frames", static_cast<double>(options.ring_frames), 2.0,
-              static_cast<double>(kMostRingFrames));
+              static_cast<double>(kMaxRingFrames));
   const std::size_t frame_bytes = bytes_of_frame(options);
-  const std::size_t most_frames = kMostPayloadBytes / 2 / frame_bytes;
+  const std::size_t max_frames = kMaxPayloadBytes / 2 / frame_bytes;
   check_range("block_frames", static_cast<double>(options.block_frames), 1.0,
-              static_cast<double>(most_frames));
+              static_cast<double>(max_frames));
   check_range("seal_after_s", options.seal_after_s, 0.0, kLongest_s);
   check_range("sync_after_s", options.sync_after_s, 0.0, kLongest_s);
   return options;
@@ -94,7 +94,7 @@ class Recorder::Writer {
         file_(path) {
     block_.ticks.reserve(options_.block_frames);
     block_.values.reserve(options_.block_frames * ring_.channels());
-    bytes_.reserve(kMostBlockHeadBytes + options_.block_frames * bytes_of_frame(options_));
+    bytes_.reserve(kMaxBlockHeadBytes + options_.block_frames * bytes_of_frame(options_));
     seal({.channels = options_.channels, .period_s = options_.period_s}, bytes_);
     if (!file_.append(bytes_)) {
       const std::string trouble = file_.trouble();

@@ -52,9 +52,10 @@ void add_rows(TextTable& table, const std::string& samples,
 
 std::string skipped_text(const AdaptationCounts& counts) {
   std::string reasons;
-  for (std::size_t i = 0; i < kLearningOutcomes; ++i) {
-    const auto outcome = static_cast<Learning>(i);
-    if (outcome == Learning::updated || outcome == Learning::limited || counts.of(outcome) == 0)
+  for (std::size_t i = 0; i < kUpdateOutcomes; ++i) {
+    const auto outcome = static_cast<UpdateOutcome>(i);
+    if (outcome == UpdateOutcome::updated || outcome == UpdateOutcome::limited ||
+        counts.of(outcome) == 0)
       continue;
     reasons +=
         fmt::format("{}{} {}", reasons.empty() ? "" : ", ", name(outcome), counts.of(outcome));
@@ -68,8 +69,8 @@ std::string adaptation_json(const AdaptedModel& adapted, const std::string& mode
   const AdaptationCounts& counts = adapted.counts;
   const std::string& target = adapted.file.settings.target;
   Json outcomes = Json::object();
-  for (std::size_t i = 0; i < kLearningOutcomes; ++i)
-    outcomes[std::string(name(static_cast<Learning>(i)))] = counts.outcomes[i];
+  for (std::size_t i = 0; i < kUpdateOutcomes; ++i)
+    outcomes[std::string(name(static_cast<UpdateOutcome>(i)))] = counts.outcomes[i];
   return json_text(Json{{"model", model},
                         {"family", adapted.file.parameters.family()},
                         {"target", target},
@@ -99,7 +100,7 @@ std::string adaptation_text(const AdaptedModel& adapted, const std::string& mode
       "roll-backs to the frozen weights {}{}; weights changed by {:.2g} % of their length\n",
       model, adapted.file.parameters.family(), method_of(adapted),
       unit_label(adapted.file.settings.target), table.text(), counts.updates(),
-      counts.of(Learning::limited), skipped_text(counts), counts.roll_backs,
+      counts.of(UpdateOutcome::limited), skipped_text(counts), counts.roll_backs,
       counts.covariance_resets == 0
           ? ""
           : fmt::format(", resets of the covariance {}", counts.covariance_resets),

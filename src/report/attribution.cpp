@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::vector<InputAttribution> most_used_first(std::vector<InputAttribution> inputs) {
+std::vector<InputAttribution> by_use(std::vector<InputAttribution> inputs) {
   std::ranges::stable_sort(inputs, std::ranges::greater{}, &InputAttribution::mean_abs_shapley);
   return inputs;
 }
@@ -81,7 +81,7 @@ std::string attribution_json(const Attribution& attribution, const AttributionSu
                 {"results", Json::array()},
                 {"explained", Json::array()},
                 {"caveat", kAttributionCaveat}};
-  for (const InputAttribution& input : most_used_first(attribution.inputs))
+  for (const InputAttribution& input : by_use(attribution.inputs))
     document["results"].push_back({{"input", input.input},
                                    {"mean_abs_shapley", input.mean_abs_shapley},
                                    {"share", json_number(input.share)},
@@ -104,7 +104,7 @@ std::string attribution_text(const Attribution& attribution, const AttributionSu
   TextTable table;
   table.header({"input", fmt::format("mean |phi| {}", unit), "share %",
                 fmt::format("RMSE increase when shuffled {}", unit)});
-  for (const InputAttribution& input : most_used_first(attribution.inputs))
+  for (const InputAttribution& input : by_use(attribution.inputs))
     table.row({input.input, error_text(input.mean_abs_shapley), share_text(input.share),
                increase_text(input)});
   return fmt::format(

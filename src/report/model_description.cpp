@@ -128,10 +128,10 @@ std::string equation_line(const ModelFile& model) {
   return equation_of(*narx, model.settings.features.inputs, model.settings.target) + "\n";
 }
 
-std::string coefficient_table(const std::vector<FittedParameter>& told) {
+std::string coefficient_table(const std::vector<FittedParameter>& estimate) {
   TextTable table;
   table.header({"parameter", "value", "unit"});
-  for (const FittedParameter& each : told)
+  for (const FittedParameter& each : estimate)
     table.row({each.name, fmt::format("{:.6g}", each.value), each.unit});
   return table.text();
 }
@@ -195,9 +195,10 @@ std::string model_description(const ModelFile& model) {
   text += fmt::format("\n{}", range_table(settings));
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
-  const std::vector<FittedParameter> told =
+  const std::vector<FittedParameter> estimate =
       named_coefficients(model.parameters, settings.features.inputs, settings.target);
-  if (!told.empty() && told.size() <= kReadable) return text + "\n" + coefficient_table(told);
+  if (!estimate.empty() && estimate.size() <= kReadable)
+    return text + "\n" + coefficient_table(estimate);
   std::vector<Leaf> leaves = leaves_of(model);
   std::erase_if(leaves, [](const Leaf& leaf) {
     return leaf.name.starts_with("kernel.") || leaf.name.starts_with("network.nodes.");

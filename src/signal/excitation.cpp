@@ -14,7 +14,7 @@ namespace torsio {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kMostHoldSamples = 1e15;  // still counted exactly
+constexpr double kMaxHoldSamples = 1e15;  // still counted exactly
 
 void require(bool is_right, std::string_view signal, std::string_view parameter,
              std::string expected, double found) {
@@ -152,7 +152,7 @@ double Multisine::step() noexcept {
   return sum;
 }
 
-RandomWalk::RandomWalk(const Parameters& parameters, double sample_rate_Hz)
+BandLimitedNoise::BandLimitedNoise(const Parameters& parameters, double sample_rate_Hz)
     : seed_(parameters.seed),
       lowpass_(parameters.cutoff_Hz, sample_rate_Hz),
       step_std_(parameters.rms / lowpass_.noise_gain()),
@@ -161,13 +161,13 @@ RandomWalk::RandomWalk(const Parameters& parameters, double sample_rate_Hz)
   reset();
 }
 
-double RandomWalk::step() noexcept {
+double BandLimitedNoise::step() noexcept {
   const double output = output_;
   output_ = lowpass_.step(step_std_ * random_.normal());
   return output;
 }
 
-void RandomWalk::reset() noexcept {
+void BandLimitedNoise::reset() noexcept {
   random_ = Random(seed_);
   lowpass_.reset();
   output_ = lowpass_.step(0.0);  // at rest, instead of in the steady state of the first white step
@@ -242,8 +242,8 @@ Steps::Steps(Parameters parameters, double sample_rate_Hz) : levels_(std::move(p
   for (const double level : levels_) require_finite("steps", "level", level);
   const double hold_samples = std::round(parameters.hold_s * sample_rate_Hz);
   require(
-      hold_samples >= 1.0 && hold_samples < kMostHoldSamples, "steps", "hold time",
-      fmt::format("from one sample ({} s) to {} samples", 1.0 / sample_rate_Hz, kMostHoldSamples),
+      hold_samples >= 1.0 && hold_samples < kMaxHoldSamples, "steps", "hold time",
+      fmt::format("from one sample ({} s) to {} samples", 1.0 / sample_rate_Hz, kMaxHoldSamples),
       parameters.hold_s);
   hold_samples_ = static_cast<std::uint64_t>(hold_samples);
 }

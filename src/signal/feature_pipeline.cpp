@@ -18,7 +18,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostLagMemory = 1'000'000;  // samples, all lags of a pipeline together
+constexpr std::size_t kMaxLagMemory = 1'000'000;  // samples, all lags of a pipeline together
 
 /// The value `samples` ticks ago; before there is one, the first.
 class DelayLine {
@@ -161,9 +161,9 @@ std::size_t FeaturePipeline::Program::add(const Node& node, std::uint32_t target
       state = delay_lines.size();
       delay = static_cast<std::size_t>(node.parameter);
       lag_memory += delay;
-      if (lag_memory > kMostLagMemory)
+      if (lag_memory > kMaxLagMemory)
         throw Error({.place = "feature pipeline",
-                     .expected = fmt::format("lags of at most {} samples together", kMostLagMemory),
+                     .expected = fmt::format("lags of at most {} samples together", kMaxLagMemory),
                      .found = "more"});
       delay_lines.emplace_back(delay);
       break;

@@ -18,7 +18,7 @@ namespace torsio {
 /// delivery on. Neither `apply` nor `condition` allocates, locks or throws.
 class FaultInjector {
  public:
-  static constexpr std::size_t kMostFaults = 256;
+  static constexpr std::size_t kMaxFaults = 256;
 
   /// @param run_s how long the run lasts
   /// @throws UsageError if the actuator has no such sensor or part, if that cannot fail so, for an

@@ -34,13 +34,13 @@ constexpr auto kRules = std::to_array<FaultRule>({
      .amount_key = "per_second",
      .lowest = kSmallest,
      .highest = kLargest},
-    {.name = "flip", .kind = FaultKind::flip},
-    {.name = "coarse",
-     .kind = FaultKind::coarse,
+    {.name = "sign_flip", .kind = FaultKind::sign_flip},
+    {.name = "quantised",
+     .kind = FaultKind::quantised,
      .amount_key = "to",
      .lowest = kSmallest,
      .highest = kLargest},
-    {.name = "silent", .kind = FaultKind::silent},
+    {.name = "dropout", .kind = FaultKind::dropout},
     {.name = "nan", .kind = FaultKind::nan},
     {.name = "break",
      .kind = FaultKind::broken,
@@ -120,7 +120,7 @@ void check_amount(const ScheduledFault& fault, const FaultRule& rule) {
   if (rule.part.empty()) {
     if (const auto parts = split_channel_name(fault.what)) unit = parts->unit->suffix;
     // Only a resolution has no sign.
-    if (rule.kind != FaultKind::coarse) value = std::abs(value);
+    if (rule.kind != FaultKind::quantised) value = std::abs(value);
   }
   require_within(fault, rule.amount_key, value, rule.lowest, rule.highest, unit);
 }

@@ -25,9 +25,9 @@ bool FaultInjector::Window::holds(double time_s) const noexcept {
 }
 
 FaultInjector::FaultInjector(const FaultSchedule& schedule, const DataSheet& sheet, double run_s) {
-  if (schedule.faults.size() > kMostFaults)
+  if (schedule.faults.size() > kMaxFaults)
     throw UsageError({.place = "fault schedule",
-                      .expected = fmt::format("at most {} faults", kMostFaults),
+                      .expected = fmt::format("at most {} faults", kMaxFaults),
                       .found = fmt::format("{}", schedule.faults.size())});
   for (const ScheduledFault& fault : schedule.faults) {
     check_fault(fault, sheet, run_s);
@@ -70,10 +70,10 @@ double FaultInjector::changed(SensorFault& fault, double value, double time_s) n
     case FaultKind::freeze: return *fault.held;
     case FaultKind::jump: return value + fault.amount;
     case FaultKind::drift: return value + fault.amount * (time_s - fault.window.start_s);
-    case FaultKind::flip: return -value;
-    case FaultKind::coarse: return fault.amount * std::round(value / fault.amount);
+    case FaultKind::sign_flip: return -value;
+    case FaultKind::quantised: return fault.amount * std::round(value / fault.amount);
     case FaultKind::nan: return kNotMeasured;
-    case FaultKind::silent:  // `apply` holds the value
+    case FaultKind::dropout:  // `apply` holds the value
     case FaultKind::broken:
     case FaultKind::bottom: break;
   }
@@ -85,7 +85,7 @@ void FaultInjector::apply(Measurement& measured, double time_s) noexcept {
     double& value = measured.*sensor.value;
     bool& is_fresh = measured.*sensor.is_fresh;
     for (const SensorFault& fault : sensor.faults)
-      if (fault.kind == FaultKind::silent && fault.window.holds(time_s)) is_fresh = false;
+      if (fault.kind == FaultKind::dropout && fault.window.holds(time_s)) is_fresh = false;
     if (is_fresh || !sensor.delivered) {
       for (SensorFault& fault : sensor.faults) value = changed(fault, value, time_s);
       sensor.delivered = value;

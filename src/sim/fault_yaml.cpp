@@ -82,8 +82,8 @@ FaultSchedule schedule_from(const YamlValue& yaml, const DataSheet& sheet) {
   const YamlValue list = yaml.at("faults");
   if (!list.is_list()) list.refuse("a list of faults, '- {sensor: ...}'");
   const std::vector<YamlValue> items = list.items();
-  if (items.empty() || items.size() > FaultInjector::kMostFaults)
-    list.refuse(fmt::format("1 to {} faults", FaultInjector::kMostFaults));
+  if (items.empty() || items.size() > FaultInjector::kMaxFaults)
+    list.refuse(fmt::format("1 to {} faults", FaultInjector::kMaxFaults));
   FaultSchedule schedule;
   for (const YamlValue& item : items) schedule.faults.push_back(fault_from(item, sheet));
   // What is out of range is refused here, too, without a run.

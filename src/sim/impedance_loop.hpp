@@ -34,9 +34,9 @@ class ImpedanceLoop {
   /// @returns the motor current [A]; 0 if an angle is not finite
   [[nodiscard]] double step(double wanted_rad, double rotor_angle_rad, double middle_angle_rad,
                             double joint_angle_rad) const noexcept TORSIO_REALTIME {
-    const double behind_rad =
+    const double position_error_rad =
         twist_ == Twist::tube ? middle_angle_rad : gear_ratio_ * joint_angle_rad;
-    const double twist_rad = rotor_angle_rad * inverse_tube_ratio_ - behind_rad;
+    const double twist_rad = rotor_angle_rad * inverse_tube_ratio_ - position_error_rad;
     const double wanted_twist_rad = gains_.position * (wanted_rad - joint_angle_rad);
     const double torque_Nm = gains_.torque_Nm_rad * (wanted_twist_rad - twist_rad);
     return std::isfinite(torque_Nm) ? torque_Nm * inverse_torque_constant_ : 0.0;

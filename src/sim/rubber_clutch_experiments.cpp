@@ -99,8 +99,8 @@ class Path {
       stood_s_ = 0.0;
       if (++leg_ == legs_.size()) return now_rad;
     }
-    const double most_rad = legs_[leg_].speed_rad_s / kBenchRate_Hz;
-    angle_rad_ += std::clamp(legs_[leg_].to_rad - angle_rad_, -most_rad, most_rad);
+    const double max_rad = legs_[leg_].speed_rad_s / kBenchRate_Hz;
+    angle_rad_ += std::clamp(legs_[leg_].to_rad - angle_rad_, -max_rad, max_rad);
     return now_rad;
   }
 

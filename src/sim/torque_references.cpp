@@ -39,9 +39,9 @@ Chirp torque_chirp(double amplitude_Nm) {
           kBenchRate_Hz};
 }
 
-RandomWalk torque_walk(double amplitude_Nm, std::uint64_t seed) {
+BandLimitedNoise torque_walk(double amplitude_Nm, std::uint64_t seed) {
   // The sensors draw from `seed` itself.
-  const RandomWalk of_one({.rms = 1.0, .cutoff_Hz = 1.0, .seed = ~seed}, kBenchRate_Hz);
+  const BandLimitedNoise of_one({.rms = 1.0, .cutoff_Hz = 1.0, .seed = ~seed}, kBenchRate_Hz);
   const double scale = rms(torque_chirp(amplitude_Nm)) / rms(of_one);
   return {{.rms = scale, .cutoff_Hz = 1.0, .seed = ~seed}, kBenchRate_Hz};
 }

@@ -25,7 +25,7 @@ constexpr double kWalkAmplitude = 0.35;
 
 /// White steps behind a 1 Hz filter. Its first 100 s have, for every seed, the RMS that those of
 /// `torque_chirp(amplitude_Nm)` have.
-[[nodiscard]] RandomWalk torque_walk(double amplitude_Nm, std::uint64_t seed);
+[[nodiscard]] BandLimitedNoise torque_walk(double amplitude_Nm, std::uint64_t seed);
 
 /// Hangs on the levers of the benches.
 constexpr double kLeverMass_kg = 9.0;

@@ -30,7 +30,7 @@ PartNames part_names(ActuatorFamily family) {
 }
 
 /// Collects the channels of one plant.
-class Teller {
+class TruthWriter {
  public:
   using Value = std::function<double(const BenchTruth&)>;
 
@@ -41,7 +41,7 @@ class Teller {
   }
   /// One channel for each number of an array: `what` holds its place, from 1.
   template <class Array>
-  void tell_each(std::string_view part, std::string_view what, Array (*values)(const Plant&)) {
+  void write_each(std::string_view part, std::string_view what, Array (*values)(const Plant&)) {
     for (std::size_t i = 0; i < std::tuple_size_v<Array>; ++i) {
       tell(part, fmt::format(fmt::runtime(what), i + 1),
            [=](const BenchTruth& truth) { return values(truth.plant)[i]; });
@@ -58,7 +58,7 @@ const Stage& second(const Plant& plant) {
   return std::get<Stage>(plant.second());
 }
 
-void tell_stages(Teller& to, const PartNames& names) {
+void write_stages(TruthWriter& to, const PartNames& names) {
   to.tell(names.second, "torque_Nm",
           [](const BenchTruth& t) { return t.plant.torques().second_Nm; });
   to.tell(names.second, "friction_Nm",
@@ -71,7 +71,7 @@ void tell_stages(Teller& to, const PartNames& names) {
   to.tell(names.first, "deflection_rad", [](const BenchTruth& t) { return t.plant.first_twist(); });
 }
 
-void tell_bodies(Teller& to, const PartNames& names) {
+void write_bodies(TruthWriter& to, const PartNames& names) {
   to.tell("motor", "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().motor_Nm; });
   to.tell("motor", "current_A", [](const BenchTruth& t) { return t.plant.current(); });
   to.tell("motor", "angle_rad",
@@ -89,9 +89,9 @@ void tell_bodies(Teller& to, const PartNames& names) {
 }
 
 /// The friction of a body against the frame, and its share that is in the bristle.
-void tell_friction(Teller& to, std::string_view place, const LuGreFriction::Parameters& parts,
-                   double PlantTorques::*friction,
-                   const LuGreFriction& (Plant::*block)() const noexcept) {
+void write_friction(TruthWriter& to, std::string_view place, const LuGreFriction::Parameters& parts,
+                    double PlantTorques::*friction,
+                    const LuGreFriction& (Plant::*block)() const noexcept) {
   if (parts.coulomb_Nm == 0.0 && parts.viscous_Nms_rad == 0.0) return;
   to.tell(place, "friction_Nm", [=](const BenchTruth& t) { return t.plant.torques().*friction; });
   if (parts.coulomb_Nm == 0.0) return;
@@ -99,15 +99,15 @@ void tell_friction(Teller& to, std::string_view place, const LuGreFriction::Para
           [=](const BenchTruth& t) { return (t.plant.*block)().bristle_torque(); });
 }
 
-void tell_frictions(Teller& to, const PartNames& names, const PlantParameters& parts) {
-  tell_friction(to, "motor", parts.rotor_friction, &PlantTorques::rotor_friction_Nm,
-                &Plant::rotor_friction);
-  tell_friction(to, names.middle, parts.middle_friction, &PlantTorques::middle_friction_Nm,
-                &Plant::middle_friction);
-  tell_friction(to, "bearing", parts.bearing, &PlantTorques::bearing_Nm, &Plant::bearing);
+void write_frictions(TruthWriter& to, const PartNames& names, const PlantParameters& parts) {
+  write_friction(to, "motor", parts.rotor_friction, &PlantTorques::rotor_friction_Nm,
+                 &Plant::rotor_friction);
+  write_friction(to, names.middle, parts.middle_friction, &PlantTorques::middle_friction_Nm,
+                 &Plant::middle_friction);
+  write_friction(to, "bearing", parts.bearing, &PlantTorques::bearing_Nm, &Plant::bearing);
 }
 
-void tell_clutch(Teller& to) {
+void write_clutch(TruthWriter& to) {
   const auto clutch = [](const BenchTruth& t) -> const SlipClutch& {
     return std::get<SlipClutch>(t.plant.first());
   };
@@ -116,29 +116,29 @@ void tell_clutch(Teller& to) {
           [=](const BenchTruth& t) { return clutch(t).is_slipping() ? 1.0 : 0.0; });
 }
 
-void tell_coupling(Teller& to, bool is_bonded) {
-  to.tell_each(
+void write_coupling(TruthWriter& to, bool is_bonded) {
+  to.write_each(
       "coupling", is_bonded ? "creep{}_rad" : "positive_creep{}_rad", +[](const Plant& p) {
         return second<ElastomerCoupling>(p).creep(ElastomerCoupling::Side::positive);
       });
   if (!is_bonded) {
-    to.tell_each(
+    to.write_each(
         "coupling", "negative_creep{}_rad", +[](const Plant& p) {
           return second<ElastomerCoupling>(p).creep(ElastomerCoupling::Side::negative);
         });
   }
-  to.tell_each(
+  to.write_each(
       "coupling", "slip{}_Nm",
       +[](const Plant& p) { return second<ElastomerCoupling>(p).slip().forces(); });
   to.tell("coupling", "glue_1",
           [](const BenchTruth& t) { return second<ElastomerCoupling>(t.plant).glue(); });
 }
 
-void tell_rubber(Teller& to) {
-  to.tell_each(
+void write_rubber(TruthWriter& to) {
+  to.write_each(
       "rubber", "branch{}_Nm",
       +[](const Plant& p) { return second<RubberSpring>(p).branches().forces(); });
-  to.tell_each(
+  to.write_each(
       "rubber", "slip{}_Nm",
       +[](const Plant& p) { return second<RubberSpring>(p).slip().forces(); });
 }
@@ -148,19 +148,19 @@ void tell_rubber(Teller& to) {
 std::vector<TruthChannel> truth_channels(const DataSheet& sheet) {
   const PartNames names = part_names(sheet.family);
   const PlantParameters parts = plant_parameters(sheet);
-  Teller to;
+  TruthWriter to;
   to.tell("", "torque_Nm", [](const BenchTruth& t) { return t.load_cell_Nm; });
-  tell_stages(to, names);
-  tell_bodies(to, names);
-  tell_frictions(to, names, parts);
-  if (std::holds_alternative<SlipClutch::Parameters>(parts.first)) tell_clutch(to);
+  write_stages(to, names);
+  write_bodies(to, names);
+  write_frictions(to, names, parts);
+  if (std::holds_alternative<SlipClutch::Parameters>(parts.first)) write_clutch(to);
   if (const auto* coupling = std::get_if<ElastomerCoupling::Parameters>(&parts.second))
-    tell_coupling(to, coupling->bonded);
-  if (std::holds_alternative<RubberSpring::Parameters>(parts.second)) tell_rubber(to);
+    write_coupling(to, coupling->bonded);
+  if (std::holds_alternative<RubberSpring::Parameters>(parts.second)) write_rubber(to);
   // One bristle, or one Bouc-Wen element, is the friction channel itself; four slip elements are not.
   if (const auto* spring = std::get_if<Spring::Parameters>(&parts.second);
       spring != nullptr && std::holds_alternative<MaxwellSlip<4>::Parameters>(spring->friction)) {
-    to.tell_each(
+    to.write_each(
         "spring", "slip{}_Nm", +[](const Plant& p) {
           return std::get<MaxwellSlip<4>>(second<Spring>(p).friction()).forces();
         });

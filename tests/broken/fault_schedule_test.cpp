@@ -90,11 +90,12 @@ INSTANTIATE_TEST_SUITE_P(
                     part("sprong, fault: break, at: 1s"),
                     {"line 2 (faults[0].part): expected one of spring, friction, torque-constant",
                      "Did you mean 'spring'?"}},
-        BadSchedule{"MisspeltFault",
-                    gear("fault: freze, at: 1s"),
-                    {"line 2 (faults[0].fault): expected one of freeze, jump, drift, flip, coarse, "
-                     "silent, nan, found 'freze'",
-                     "Did you mean 'freeze'?"}},
+        BadSchedule{
+            "MisspeltFault",
+            gear("fault: freze, at: 1s"),
+            {"line 2 (faults[0].fault): expected one of freeze, jump, drift, sign_flip, quantised, "
+             "dropout, nan, found 'freze'",
+             "Did you mean 'freeze'?"}},
         BadSchedule{"ASensorCannotBreak", gear("fault: break, at: 1s"), {"expected one of freeze"}},
         BadSchedule{"APartCannotFreeze",
                     part("spring, fault: freeze, at: 1s"),
@@ -106,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadSchedule{"KeyOfAnotherFault",
                     gear("fault: freeze, at: 1s, by: 2deg"),
                     {"unknown key 'by'", "one of sensor, fault, at, for"}},
-        BadSchedule{"KeyTwice", gear("fault: flip, at: 1s, at: 2s"), {"'at' stands twice"}},
+        BadSchedule{"KeyTwice", gear("fault: sign_flip, at: 1s, at: 2s"), {"'at' stands twice"}},
         BadSchedule{
             "NoFaultKind", gear("at: 1s"), {"line 2 (faults[0]): the key 'fault' is missing"}},
         BadSchedule{"NoTime", gear("fault: freeze"), {"the key 'at' is missing"}},
@@ -127,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadSchedule{
             "JumpByNothing", gear("fault: jump, at: 1s, by: 0"), {"by: expected 1e-09 rad"}},
         BadSchedule{"NegativeResolution",
-                    gear("fault: coarse, at: 1s, to: -1deg"),
+                    gear("fault: quantised, at: 1s, to: -1deg"),
                     {"to: expected 1e-09 rad"}},
         BadSchedule{"TimeInMetres",
                     gear("fault: freeze, at: 1m"),

@@ -69,15 +69,15 @@ TEST(DeflectionController, LetsAFreeJointComeToRestAfterAPush) {
     const auto settings = settings_of(actuator);
     DeflectionController controller(settings, kRate_Hz);
     SpringJoint joint(settings.joint, JointOutput::free);
-    double most_J = 0.0;
+    double max_J = 0.0;
     for (int n = 0; n < 20'000; ++n) {
       const double push_Nm = n < 200 ? 0.02 * settings.joint.stiffness_Nm_rad : 0.0;
       joint.step(controller.step(0.0, joint.deflection_rad()).command, 1.0 / kRate_Hz, push_Nm);
-      most_J = std::max(most_J, joint.energy_J());
+      max_J = std::max(max_J, joint.energy_J());
     }
-    EXPECT_GT(most_J, 0.0);
+    EXPECT_GT(max_J, 0.0);
     // The drive's friction, which the integral makes up for, weighs like inertia: it coasts long.
-    EXPECT_LT(joint.energy_J(), 0.2 * most_J) << actuator;
+    EXPECT_LT(joint.energy_J(), 0.2 * max_J) << actuator;
   }
 }
 

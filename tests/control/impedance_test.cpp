@@ -55,13 +55,13 @@ TEST(JointImpedance, MakesAFreeJointSwingAsItsSpringAndDamperDo) {
         kStep_rad * std::exp(-kDamping * kFrequency_rad_s * t) *
             (std::cos(damped * t) + kDamping * kFrequency_rad_s / damped * std::sin(damped * t));
     ASSERT_NEAR(joint.joint_rad(), expected, 0.04 * kStep_rad) << t;
-    const auto wish =
+    const auto reference =
         impedance.step({.angle_rad = kStep_rad},
                        {.angle_rad = joint.joint_rad(), .speed_rad_s = joint.joint_speed_rad_s()});
     JointSample sample;
     sample.gear_angle_rad = joint.angle_rad();
     sample.joint_angle_rad = joint.joint_rad();
-    joint.step(controller.step(wish.torque_Nm, sample).current_A, 1.0 / kRate_Hz);
+    joint.step(controller.step(reference.torque_Nm, sample).current_A, 1.0 / kRate_Hz);
   }
 }
 
@@ -70,16 +70,16 @@ TEST(JointImpedance, FadesWithoutAMeasurementAndKeepsTheLastGoodWish) {
   EXPECT_EQ(impedance.step({.angle_rad = kNaN}, {.angle_rad = 0.1, .speed_rad_s = 0.0}).torque_Nm,
             0.0)
       << "no wish yet";
-  JointImpedance told({.gains = {.stiffness_Nm_rad = 50.0}}, kRate_Hz);
-  (void)told.step({.angle_rad = 0.3}, {.angle_rad = 0.1, .speed_rad_s = 0.0});
-  const auto refused =
-      told.step({.angle_rad = 0.5, .torque_Nm = kInfinity}, {.angle_rad = 0.1, .speed_rad_s = 0.0});
+  JointImpedance estimate({.gains = {.stiffness_Nm_rad = 50.0}}, kRate_Hz);
+  (void)estimate.step({.angle_rad = 0.3}, {.angle_rad = 0.1, .speed_rad_s = 0.0});
+  const auto refused = estimate.step({.angle_rad = 0.5, .torque_Nm = kInfinity},
+                                     {.angle_rad = 0.1, .speed_rad_s = 0.0});
   EXPECT_EQ(refused.fault, Fault::input_not_finite);
   EXPECT_DOUBLE_EQ(refused.torque_Nm, 10.0);
-  const auto lost = told.step({.angle_rad = 0.3}, {});
+  const auto lost = estimate.step({.angle_rad = 0.3}, {});
   EXPECT_EQ(lost.fault, Fault::input_not_finite);
   EXPECT_NEAR(lost.torque_Nm, 10.0 * std::exp(-0.05), 1e-12);
-  EXPECT_NEAR(told.step({.angle_rad = 0.3}, {.angle_rad = 0.1, .speed_rad_s = 0.0}).torque_Nm,
+  EXPECT_NEAR(estimate.step({.angle_rad = 0.3}, {.angle_rad = 0.1, .speed_rad_s = 0.0}).torque_Nm,
               lost.torque_Nm, 1e-9);
 }
 
@@ -102,35 +102,35 @@ RC_GTEST_PROP(JointImpedance, ChangesItsGainsWithoutABump, ()) {
   JointImpedance impedance({.torque_Nm = 5.0}, kRate_Hz);
   Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
   for (int n = 0; n < 10; ++n) {
-    const JointImpedance::Wish wish = {.angle_rad = 0.1 * random.normal(),
-                                       .speed_rad_s = random.normal()};
+    const JointImpedance::Reference reference = {.angle_rad = 0.1 * random.normal(),
+                                                 .speed_rad_s = random.normal()};
     const JointImpedance::State state = {.angle_rad = 0.1 * random.normal(), .speed_rad_s = 0.0};
     double last_Nm = 0.0;
     // Until the handover of the change before has gone.
-    for (int k = 0; k < 3000; ++k) last_Nm = impedance.step(wish, state).torque_Nm;
+    for (int k = 0; k < 3000; ++k) last_Nm = impedance.step(reference, state).torque_Nm;
     RC_ASSERT(impedance.set_gains(
         {.stiffness_Nm_rad = 100.0 * random.uniform(), .damping_Nms_rad = 5.0 * random.uniform()}));
-    RC_ASSERT(std::abs(impedance.step(wish, state).torque_Nm - last_Nm) < 1e-9);
+    RC_ASSERT(std::abs(impedance.step(reference, state).torque_Nm - last_Nm) < 1e-9);
   }
 }
 
 RC_GTEST_PROP(JointImpedance, KeepsToItsLimits, ()) {
-  const double most_Nm = 5.0;
+  const double max_Nm = 5.0;
   const double rate_Nm_s = 400.0;
-  JointImpedance impedance({.torque_Nm = most_Nm, .torque_rate_Nm_s = rate_Nm_s}, kRate_Hz);
+  JointImpedance impedance({.torque_Nm = max_Nm, .torque_rate_Nm_s = rate_Nm_s}, kRate_Hz);
   Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
   double last_Nm = 0.0;
   for (int n = 0; n < 10'000; ++n) {
     const bool is_lost = random.uniform() < 0.01;
-    const JointImpedance::Wish wish = {.angle_rad =
-                                           random.uniform() < 0.01 ? kNaN : random.normal()};
+    const JointImpedance::Reference reference = {
+        .angle_rad = random.uniform() < 0.01 ? kNaN : random.normal()};
     const JointImpedance::State state = {.angle_rad = is_lost ? kNaN : random.normal(),
                                          .speed_rad_s = random.normal()};
     if (random.uniform() < 0.05)
       RC_ASSERT(impedance.set_gains({.stiffness_Nm_rad = 100.0 * random.uniform(),
                                      .damping_Nms_rad = 5.0 * random.uniform()}));
-    const auto output = impedance.step(wish, state);
-    RC_ASSERT(std::abs(output.torque_Nm) <= most_Nm);
+    const auto output = impedance.step(reference, state);
+    RC_ASSERT(std::abs(output.torque_Nm) <= max_Nm);
     if (is_lost) {
       RC_ASSERT(output.fault == Fault::input_not_finite);
     } else {
@@ -243,7 +243,7 @@ TEST(TubeImpedance, GoesOnFromWhereItFadedTo) {
   const auto back = impedance.step(0.01, 0.0, angles);
   EXPECT_EQ(back.fault, Fault::none);
   EXPECT_NEAR(back.current_A, last_A, 1e-9);
-  EXPECT_NEAR(back.current_A, wanted_A + back.handover_A, 1e-9);
+  EXPECT_NEAR(back.current_A, wanted_A + back.transfer_A, 1e-9);
   for (int n = 0; n < 100; ++n) last_A = impedance.step(0.01, 0.0, angles).current_A;
   EXPECT_NEAR(last_A, wanted_A * (1.0 - std::exp(-1.0)), 0.01 * wanted_A);
 }

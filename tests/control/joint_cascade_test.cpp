@@ -29,18 +29,18 @@ JointCascade::Settings settings_of(const char* actuator) {
           .limits = {.lowest_rad = -1.0,
                      .highest_rad = 1.0,
                      .speed_rad_s = sheet.rating.speed_rad_s.value,
-                     .load_Nm = 0.05 * sheet.rating.torque_Nm.value,
-                     .carried_Nm = 0.3 * sheet.rating.torque_Nm.value},
+                     .max_unmeasured_load_Nm = 0.05 * sheet.rating.torque_Nm.value,
+                     .max_measured_load_Nm = 0.3 * sheet.rating.torque_Nm.value},
           .has_torque = true};
 }
 
 /// Runs the loop for so long; the last output.
 JointCascade::Output run(JointCascade& cascade, RigidJoint& joint, const JointReference& reference,
-                         int ticks, double load_Nm = 0.0) {
+                         int ticks, double max_unmeasured_load_Nm = 0.0) {
   JointCascade::Output output;
   for (int n = 0; n < ticks; ++n) {
-    output = cascade.step(reference, joint.state(load_Nm));
-    joint.step(output.current_A, load_Nm, 1.0 / kRate_Hz);
+    output = cascade.step(reference, joint.state(max_unmeasured_load_Nm));
+    joint.step(output.current_A, max_unmeasured_load_Nm, 1.0 / kRate_Hz);
   }
   return output;
 }
@@ -50,8 +50,9 @@ TEST(JointCascade, GoesToAPositionAndHoldsItUnderLoad) {
     const JointCascade::Settings settings = settings_of(actuator);
     JointCascade cascade(settings, kRate_Hz);
     RigidJoint joint(settings.drive);
-    const double load_Nm = 0.5 * settings.limits.carried_Nm;
-    run(cascade, joint, {.mode = JointMode::position, .position_rad = 0.5}, 5000, load_Nm);
+    const double max_unmeasured_load_Nm = 0.5 * settings.limits.max_measured_load_Nm;
+    run(cascade, joint, {.mode = JointMode::position, .position_rad = 0.5}, 5000,
+        max_unmeasured_load_Nm);
     EXPECT_NEAR(joint.angle_rad(), 0.5, 1e-4) << actuator;
     EXPECT_NEAR(joint.speed_rad_s(), 0.0, 1e-4) << actuator;
   }
@@ -61,11 +62,11 @@ TEST(JointCascade, GoesToAPositionAndHoldsItUnderLoad) {
 TEST(JointCascade, AnswersAStepAsTheSecondOrderSystemDoes) {
   JointCascade::Settings settings = settings_of("dfki-50");
   settings.drive.current_time_constant_s = 1e-6;
-  settings.limits.load_Nm = 0.0;
+  settings.limits.max_unmeasured_load_Nm = 0.0;
   JointCascade::Gains gains = JointCascade::gains_for(settings.drive, 50.0);
   gains.velocity.integral = 0.0;
   settings.gains = gains;
-  settings.handover_s = 1e-6;
+  settings.transfer_s = 1e-6;
   constexpr double kFast_Hz = 100'000.0;
   JointCascade cascade(settings, kFast_Hz);
   RigidJoint joint(settings.drive);
@@ -101,7 +102,7 @@ TEST(JointCascade, AddsUpTheTermsThatItNames) {
     EXPECT_EQ(output.limit, JointCascade::Limit::none);
     EXPECT_NEAR(output.current_A,
                 output.proportional_A + output.integral_A + output.derivative_A +
-                    output.feed_forward_A + output.handover_A,
+                    output.feed_forward_A + output.transfer_A,
                 1e-12);
   }
 }
@@ -129,7 +130,7 @@ TEST(JointCascade, CarriesTheLoadOnWhenAPositionBecomesASpeed) {
   const auto hold = [&](const JointReference& reference, int ticks) {
     for (int n = 0; n < ticks; ++n) {
       const auto output = cascade.step(reference, joint.state(0.0));
-      joint.step(output.current_A, settings.limits.load_Nm, 1.0 / kRate_Hz);
+      joint.step(output.current_A, settings.limits.max_unmeasured_load_Nm, 1.0 / kRate_Hz);
     }
   };
   hold({.mode = JointMode::position, .position_rad = 0.3}, 5000);
@@ -264,14 +265,15 @@ TEST(JointCascade, RefusesLimitsThatContradictEachOther) {
             std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.limits.lowest_rad = kNaN; }).find("no room between"),
             std::string::npos);
-  EXPECT_NE(refusal([](auto& s) { s.limits.load_Nm = 70.0; }).find("cannot brake"),
+  EXPECT_NE(refusal([](auto& s) { s.limits.max_unmeasured_load_Nm = 70.0; }).find("cannot brake"),
             std::string::npos);
   // 0.9 of what the rated current can, beside a load_Nm of 2.5 Nm.
   const Drive drive = drive_of(data_sheet("dfki-50"));
   const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
-  EXPECT_EQ(refusal([&](auto& s) { s.limits.carried_Nm = 0.9 * rated_Nm; }), "");
-  EXPECT_NE(refusal([&](auto& s) { s.limits.carried_Nm = rated_Nm; }).find("cannot brake"),
-            std::string::npos);
+  EXPECT_EQ(refusal([&](auto& s) { s.limits.max_measured_load_Nm = 0.9 * rated_Nm; }), "");
+  EXPECT_NE(
+      refusal([&](auto& s) { s.limits.max_measured_load_Nm = rated_Nm; }).find("cannot brake"),
+      std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.limits.speed_rad_s = 0.05; }).find("use up the speed limit"),
             std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.limits.current_rate_A_s = 100.0; }).find("current rate"),
@@ -305,7 +307,7 @@ JointCascade::Settings any_settings() {
   settings.limits.lowest_rad = number(-2.0, -0.5);
   settings.limits.highest_rad = number(0.5, 2.0);
   settings.limits.thermal_time_s = number(0.2, 5.0);
-  settings.limits.carried_Nm =
+  settings.limits.max_measured_load_Nm =
       number(0.0, 0.8) * settings.drive.rated_current_A * settings.drive.torque_per_current();
   settings.gains = JointCascade::gains_for(settings.drive, settings.bandwidth_rad_s);
   settings.gains->velocity.integral *= number(0.0, 3.0);
@@ -353,11 +355,11 @@ RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
   RigidJoint joint(settings.drive);
   JointReference reference;
   const bool is_steady = *rc::gen::arbitrary<bool>();
-  double carried_Nm = 0.0;
+  double max_measured_load_Nm = 0.0;
   double unknown_Nm = 0.0;
   double heat = 0.0;
   const double share = -std::expm1(-1.0 / (limits.thermal_time_s * kRate_Hz));
-  const double most_J = 0.5 * settings.drive.inertia() * limits.speed_rad_s * limits.speed_rad_s;
+  const double max_J = 0.5 * settings.drive.inertia() * limits.speed_rad_s * limits.speed_rad_s;
   for (int n = 0; n < 10'000; ++n) {
     if (random.uniform() < 0.01) reference = any_reference(random);
     if (random.uniform() < 0.003) {
@@ -367,17 +369,19 @@ RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
       RC_ASSERT(cascade.set_gains(gains));
     }
     if (random.uniform() < 0.02)
-      unknown_Nm = 0.8 * limits.load_Nm * (random.uniform() < 0.5 ? -1 : 1);
+      unknown_Nm = 0.8 * limits.max_unmeasured_load_Nm * (random.uniform() < 0.5 ? -1 : 1);
     // Half of the cases push to one side with all of it.
-    carried_Nm = is_steady ? limits.carried_Nm
-                           : std::clamp(carried_Nm + 0.004 * limits.carried_Nm * random.normal(),
-                                        -limits.carried_Nm, limits.carried_Nm);
-    const auto output = cascade.step(reference, joint.state(carried_Nm));
-    joint.step(output.current_A, carried_Nm + unknown_Nm, 1.0 / kRate_Hz);
+    max_measured_load_Nm =
+        is_steady ? limits.max_measured_load_Nm
+                  : std::clamp(max_measured_load_Nm +
+                                   0.004 * limits.max_measured_load_Nm * random.normal(),
+                               -limits.max_measured_load_Nm, limits.max_measured_load_Nm);
+    const auto output = cascade.step(reference, joint.state(max_measured_load_Nm));
+    joint.step(output.current_A, max_measured_load_Nm + unknown_Nm, 1.0 / kRate_Hz);
     RC_ASSERT(joint.angle_rad() >= limits.lowest_rad);
     RC_ASSERT(joint.angle_rad() <= limits.highest_rad);
     RC_ASSERT(std::abs(joint.speed_rad_s()) <= limits.speed_rad_s);
-    RC_ASSERT(joint.energy_J() <= most_J);
+    RC_ASSERT(joint.energy_J() <= max_J);
     RC_ASSERT(std::abs(output.current_A) <= settings.drive.peak_current_A);
     heat += share * (output.current_A * output.current_A - heat);
     RC_ASSERT(heat <= settings.drive.rated_current_A * settings.drive.rated_current_A);
@@ -392,7 +396,7 @@ TEST(JointCascade, StopsAtItsLimitWithAHotWindingUnderTheWholeLoadThatItWasToldO
       JointCascade::Settings settings = settings_of(actuator);
       const Drive& drive = settings.drive;
       const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
-      settings.limits.carried_Nm = share * rated_Nm;
+      settings.limits.max_measured_load_Nm = share * rated_Nm;
       JointCascade cascade(settings, kRate_Hz);
       RigidJoint joint(drive);
       double farthest_rad = 0.0;
@@ -402,10 +406,11 @@ TEST(JointCascade, StopsAtItsLimitWithAHotWindingUnderTheWholeLoadThatItWasToldO
         const bool is_heating = n < 40'000;
         const double wanted_A =
             is_heating && n / 10 % 2 == 0 ? -drive.peak_current_A : drive.peak_current_A;
-        const double load_Nm = is_heating ? 0.0 : -settings.limits.carried_Nm;
-        const auto output =
-            cascade.step({.mode = JointMode::current, .current_A = wanted_A}, joint.state(load_Nm));
-        joint.step(output.current_A, load_Nm, 1.0 / kRate_Hz);
+        const double max_unmeasured_load_Nm =
+            is_heating ? 0.0 : -settings.limits.max_measured_load_Nm;
+        const auto output = cascade.step({.mode = JointMode::current, .current_A = wanted_A},
+                                         joint.state(max_unmeasured_load_Nm));
+        joint.step(output.current_A, max_unmeasured_load_Nm, 1.0 / kRate_Hz);
         farthest_rad = std::max(farthest_rad, std::abs(joint.angle_rad()));
         hottest = std::max(hottest, output.thermal_load);
       }

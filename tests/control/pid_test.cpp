@@ -125,7 +125,7 @@ TEST(Pid, RefusesImpossibleSettings) {
   EXPECT_NE(refusal({.limits = {.lowest = kNaN}}), "");
   EXPECT_NE(refusal({.limits = {.rate_per_s = 0.0}}), "");
   EXPECT_NE(refusal({.tracking_s = 0.0}), "");
-  EXPECT_NE(refusal({.handover_s = -0.1}), "");
+  EXPECT_NE(refusal({.transfer_s = -0.1}), "");
   EXPECT_NE(refusal({}, 0.0), "");
   EXPECT_EQ(refusal({}), "");
 }

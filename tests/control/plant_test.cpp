@@ -119,15 +119,15 @@ TEST(JointCascade, HoldsAPlantWithinItsLimits) {
     Plant plant(plant_parameters(sheet));
     const Drive drive = drive_of(sheet);
     const double speed_rad_s = 0.8 * sheet.rating.speed_rad_s.value;
-    JointCascade cascade(
-        {.drive = drive,
-         .limits = {.lowest_rad = -0.8,
-                    .highest_rad = 0.8,
-                    .speed_rad_s = speed_rad_s,
-                    .load_Nm = 2.0 * drive.coulomb_Nm + drive.viscous_Nms_rad * speed_rad_s,
-                    .carried_Nm = 10.0},
-         .has_torque = true},
-        kRate_Hz);
+    JointCascade cascade({.drive = drive,
+                          .limits = {.lowest_rad = -0.8,
+                                     .highest_rad = 0.8,
+                                     .speed_rad_s = speed_rad_s,
+                                     .max_unmeasured_load_Nm = 2.0 * drive.coulomb_Nm +
+                                                               drive.viscous_Nms_rad * speed_rad_s,
+                                     .max_measured_load_Nm = 10.0},
+                          .has_torque = true},
+                         kRate_Hz);
     const Load load = lever(1.0, 0.5);
     const double stiffness_Nm_rad = series_elastic_joint(sheet).stiffness_Nm_rad;
     Differentiator speed(kRate_Hz, 120.0);

@@ -148,12 +148,12 @@ TEST(TorqueController, RemembersWhatItAskedTheJointForAndNotWhatItWasAskedFor) {
   auto settings = settings_of("dfki-50");
   settings.largest_torque_Nm = kInfinity;
   settings.deflection.largest_deflection_rad = 0.05;
-  const auto asked_rad = [&](double wish_Nm) {
+  const auto asked_rad = [&](double reference_Nm) {
     TorqueController controller(relaxing_inverse(), settings, kRate_Hz);
     TorqueLoopCore::Output output;
     for (int n = 0; n < 2000; ++n) output = controller.step(6.0, wound(0.01));
     EXPECT_NEAR(output.wanted_deflection_rad, 0.01, 1e-3);
-    for (int n = 0; n < 1000; ++n) output = controller.step(wish_Nm, wound(0.01));
+    for (int n = 0; n < 1000; ++n) output = controller.step(reference_Nm, wound(0.01));
     EXPECT_EQ(output.wanted_deflection_rad, 0.05);
     return controller.step(6.0, wound(0.01)).wanted_deflection_rad;
   };
@@ -265,7 +265,7 @@ TEST(TorqueController, ReachesTheWantedTorqueAgainstALockedOutput) {
     EXPECT_NEAR(output.current_A,
                 output.proportional_A + output.integral_A + output.derivative_A +
                     output.feed_forward_A + output.rate_feed_forward_A + output.friction_A +
-                    output.observer_A + output.handover_A,
+                    output.observer_A + output.transfer_A,
                 1e-12);
   }
 }
@@ -428,11 +428,11 @@ RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyWishAndLetsItGo, ()) {
   Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
   TorqueController controller(LinearInverse(parts.stiffness_Nm_rad), settings, kRate_Hz);
   SpringJoint joint(parts, JointOutput::free);
-  const double most_Nm = parts.drive.peak_current_A * parts.drive.torque_per_current();
-  const double most_rad_s = most_Nm / parts.drive.viscous_Nms_rad;
-  const double most_J =
-      0.5 * (parts.drive.inertia() + parts.joint_inertia_kg_m2) * most_rad_s * most_rad_s +
-      2.0 * most_Nm * most_Nm / parts.stiffness_Nm_rad;
+  const double max_Nm = parts.drive.peak_current_A * parts.drive.torque_per_current();
+  const double max_rad_s = max_Nm / parts.drive.viscous_Nms_rad;
+  const double max_J =
+      0.5 * (parts.drive.inertia() + parts.joint_inertia_kg_m2) * max_rad_s * max_rad_s +
+      2.0 * max_Nm * max_Nm / parts.stiffness_Nm_rad;
   double wanted_Nm = 0.0;
   double largest_J = 0.0;
   for (int n = 0; n < 10'000; ++n) {
@@ -444,7 +444,7 @@ RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyWishAndLetsItGo, ()) {
     RC_ASSERT(std::abs(output.current_A) <= parts.drive.peak_current_A);
     RC_ASSERT((output.fault != Fault::none) == std::isnan(asked_Nm));
     joint.step(output.current_A, 1.0 / kRate_Hz);
-    RC_ASSERT(joint.energy_J() <= most_J);
+    RC_ASSERT(joint.energy_J() <= max_J);
     if (n < 7000) largest_J = std::max(largest_J, joint.spring_J());
   }
   // What was wound lets go; the joint, of itself, may still turn.

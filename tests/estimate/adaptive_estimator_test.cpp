@@ -44,8 +44,8 @@ double run(AdaptiveEstimator& adaptive, Estimator frozen, double wrong_by, int s
   double sum = 0.0;
   for (int n = 0; n < samples; ++n) {
     const double reference = frozen.step(raw_at(n)).value + wrong_by;
-    const double told = adaptive.step(raw_at(n)).value;
-    if (n >= samples / 2) sum += std::abs(told - reference);
+    const double output = adaptive.step(raw_at(n)).value;
+    if (n >= samples / 2) sum += std::abs(output - reference);
     (void)adaptive.learn({.value = reference + 1e-6 * (n % 2)});
   }
   return 2.0 * sum / samples;
@@ -58,7 +58,7 @@ TYPED_TEST(Adapted, LearnsAnOffsetWhateverTheFamily) {
     const Estimator frozen(settings_without_zeros(), AnyModel(example<TypeParam>()));
     EXPECT_LT(run(adaptive, frozen, 3.0), 1.0);
     EXPECT_GT(adaptive.adapter().counts().updates(), 3000U);
-    EXPECT_GT(adaptive.adapter().counts().of(Learning::warming_up), 0U);
+    EXPECT_GT(adaptive.adapter().counts().of(UpdateOutcome::warming_up), 0U);
     EXPECT_EQ(adaptive.adapter().counts().roll_backs, 0U);
   }
 }
@@ -71,10 +71,10 @@ TYPED_TEST(Adapted, TheAdaptedNetworkTellsWhatTheAdaptiveOneDid) {
   adaptive.reset();
   Estimator kept(settings_without_zeros(), AnyModel(adaptive.adapted()));
   for (int n = 0; n < 1000; ++n) {
-    const Estimate told = adaptive.step(raw_at(n));
+    const Estimate output = adaptive.step(raw_at(n));
     const Estimate again = kept.step(raw_at(n));
-    EXPECT_NEAR(told.value, again.value, 1e-4);
-    EXPECT_EQ(told.fault, again.fault);
+    EXPECT_NEAR(output.value, again.value, 1e-4);
+    EXPECT_EQ(output.fault, again.fault);
   }
 }
 
@@ -94,22 +94,22 @@ TYPED_TEST(Adapted, ResetKeepsWhatWasLearnedAndForgetDoesNot) {
 TYPED_TEST(Adapted, TicksWithoutAnEstimateOfTheNetworkTeachNothing) {
   const AnyModel::Parameters network = example<TypeParam>().parameters();
   AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
-  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::warming_up);
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::warming_up);
   for (int n = 0; n < 1000; ++n) (void)adaptive.step(raw_at(n));
   (void)adaptive.step(std::array{kNaN, 0.0});
-  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::no_estimate);
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::no_estimate);
   EXPECT_EQ(adaptive.step(std::array{50.0, 0.0}).fault, Fault::outside_training_range);
-  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::no_estimate);
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::no_estimate);
   EXPECT_EQ(dump(adaptive.adapted()), dump(network));
 }
 
 TEST(AdaptiveEstimator, WaitsForItsZeros) {
   AdaptiveEstimator adaptive(test::example_settings(), example<Mlp>().parameters(), {});
   for (int n = 0; n < 1000; ++n) (void)adaptive.step(raw_at(n));
-  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::no_estimate);
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::no_estimate);
   adaptive.set_zero("joint_angle_rad", 0.0);
   (void)adaptive.step(raw_at(1000));
-  EXPECT_EQ(adaptive.learn({.value = 1.0}), Learning::updated);
+  EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::updated);
 }
 
 TEST(AdaptiveEstimator, RefusesFamiliesWithoutALastLayer) {

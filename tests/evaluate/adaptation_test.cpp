@@ -66,7 +66,7 @@ TEST(AdaptModel, ImprovesOnAnotherPieceByEitherMethod) {
         << method;
     EXPECT_LT(adapted.as_it_ran.back().adapted.rmse, adapted.as_it_ran.back().frozen.rmse);
     EXPECT_GT(adapted.counts.updates(), 10000U);
-    EXPECT_GT(adapted.counts.of(Learning::warming_up), 0U);
+    EXPECT_GT(adapted.counts.of(UpdateOutcome::warming_up), 0U);
     EXPECT_GT(adapted.relative_change, 0.0);
   }
 }
@@ -153,9 +153,9 @@ TEST(AdaptModel, HeldAndMissingReferencesTeachNothing) {
   slow.add(std::move(torque));
   dataset.records[0].recording = std::move(slow);
   const AdaptedModel adapted = adapt_model(bench_model(), dataset, settings_for("nlms"));
-  EXPECT_EQ(adapted.counts.of(Learning::reference_not_finite), 1600U);
-  EXPECT_NEAR(static_cast<double>(adapted.counts.of(Learning::reference_stale)), 18400 * 7 / 8.0,
-              300);
+  EXPECT_EQ(adapted.counts.of(UpdateOutcome::reference_not_finite), 1600U);
+  EXPECT_NEAR(static_cast<double>(adapted.counts.of(UpdateOutcome::reference_stale)),
+              18400 * 7 / 8.0, 300);
   EXPECT_NEAR(static_cast<double>(adapted.counts.updates()), 18400 / 8.0, 50);
   EXPECT_LT(adapted.held_out.back().adapted.rmse, adapted.held_out.back().frozen.rmse);
 }

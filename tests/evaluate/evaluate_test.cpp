@@ -37,12 +37,12 @@ TEST(Evaluate, FindsTheNoiseThatARightModelCannotExplain) {
 TEST(Evaluate, CountsHowOftenTheTruthIsWithinTheErrorBar) {
   const Dataset dataset = test::bench_dataset();
   ModelFile file = trained(dataset, "linear_coulomb").file;
-  const Score told = evaluate(make_estimator(file), dataset, Role::test).together;
-  EXPECT_GT(told.within_std_dev, 0.5);
-  EXPECT_GT(told.within_2_std_dev, told.within_std_dev);
+  const Score estimate = evaluate(make_estimator(file), dataset, Role::test).together;
+  EXPECT_GT(estimate.within_std_dev, 0.5);
+  EXPECT_GT(estimate.within_2_std_dev, estimate.within_std_dev);
   for (double& std_dev : file.settings.residuals.std_dev) std_dev *= 2.0;
   const Score wider = evaluate(make_estimator(file), dataset, Role::test).together;
-  EXPECT_EQ(wider.within_std_dev, told.within_2_std_dev);
+  EXPECT_EQ(wider.within_std_dev, estimate.within_2_std_dev);
   file.settings.residuals = {};
   EXPECT_TRUE(
       std::isnan(evaluate(make_estimator(file), dataset, Role::test).together.within_std_dev));

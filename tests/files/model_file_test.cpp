@@ -131,7 +131,7 @@ TEST(ModelFile, IsBoundToItsDevice) {
 TEST(ModelFile, IsNotWrittenIfItCouldNotBeRead) {
   const TemporaryFolder folder;
   save_model(folder.path("m"), example_model_file(example<Linear>()));
-  const auto before = read_whole_file(folder.path("m"), kMostModelFileBytes);
+  const auto before = read_whole_file(folder.path("m"), kMaxModelFileBytes);
   ModelFile bad = example_model_file(example<Linear>());
   bad.parameters.get<Linear::Parameters>().coefficients.values(0, 1) =
       std::numeric_limits<double>::quiet_NaN();
@@ -142,7 +142,7 @@ TEST(ModelFile, IsNotWrittenIfItCouldNotBeRead) {
   bad.settings.features.inputs.pop_back();
   EXPECT_THAT(error_message([&] { save_model(folder.path("m"), bad); }),
               HasSubstr("m: inputs: expected 2, as many as the model takes, found 1"));
-  EXPECT_EQ(read_whole_file(folder.path("m"), kMostModelFileBytes), before);
+  EXPECT_EQ(read_whole_file(folder.path("m"), kMaxModelFileBytes), before);
   EXPECT_EQ(folder.files(), 1U);
 }
 

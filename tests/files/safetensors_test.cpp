@@ -85,7 +85,7 @@ TEST(Safetensors, RefuseValuesThatDoNotFillTheirShape) {
 
 TEST(Safetensors, RefuseToWriteAHeaderThatTheyWouldNotRead) {
   Safetensors contents;
-  contents.metadata["long"] = std::string(kMostHeaderBytes, 'x');
+  contents.metadata["long"] = std::string(kMaxHeaderBytes, 'x');
   EXPECT_THROW((void)safetensors_bytes(contents), Error);
 }
 

@@ -62,10 +62,10 @@ TEST_P(ImportGolden, StreamsWhatPyTorchTells) {
   double size = 1.0;
   for (const double output : outputs) size = std::max(size, std::abs(output));
   for (std::size_t n = 0; n < outputs.size(); ++n) {
-    const Estimate told =
+    const Estimate estimate =
         model.step(std::span(inputs).subspan(n * model.input_count(), model.input_count()));
     // Weights, sums and activations are float32: a few units in the last place of the largest value.
-    EXPECT_NEAR(told.value, outputs[n], 2e-6 * size) << "sample " << n;
+    EXPECT_NEAR(estimate.value, outputs[n], 2e-6 * size) << "sample " << n;
   }
 }
 

@@ -33,7 +33,7 @@ inline TrainingData data_for(const FamilyInfo& family, std::size_t samples) {
   constexpr std::size_t kSamples = 600;
   if (family.model_family == DynamicBoucWen::kFamily)
     return recorded(hysteretic(), multisine(kSamples, 750.0, 5.0, 100.0, 60.0), 5e-6);
-  if (family.model_family == FrictionDrive::kFamily)
+  if (family.model_family == RigidDrive::kFamily)
     return recorded(carriage(), multisine(kSamples, 1000.0, 2.0, 20.0, 200.0), 1e-6);
   return two_springs(samples);
 }

@@ -35,8 +35,9 @@ const std::map<std::string_view, Settings> kQuick{
     {"dgmm", {{"components", "12"}, {"em_iterations", "2"}, {"initial_spread", "0.3"}}},
     {"dgmm_paper", {{"components", "50"}}},
     {"gaussian_process", {{"samples", "40"}, {"restarts", "0"}, {"iterations", "10"}}},
-    {"parametric_gp", {{"updates", "300"}, {"clusters", "6"}}},
-    {"parametric_gp_variational", {{"points", "6"}, {"samples", "80"}, {"iterations", "5"}}},
+    {"parametric_gp", {{"updates", "300"}, {"inducing_points", "6"}}},
+    {"parametric_gp_variational",
+     {{"inducing_points", "6"}, {"samples", "80"}, {"iterations", "5"}}},
     {"mlp", {{"layers", "4"}, {"epochs", "2"}, {"batch", "64"}}},
     {"gru", {{"layers", "2"}, {"epochs", "2"}, {"window", "40"}, {"stride", "20"}, {"batch", "8"}}},
     {"lstm",
@@ -98,7 +99,7 @@ const std::map<std::string_view, Trial> kTrials{
     {"published", {.value = "discrete", .is_refused = true}},
     {"exponent", {.value = "2"}},
     {"first_horizon", {.value = "50"}},
-    {"friction_drive.terms", {.value = "quadratic"}},
+    {"rigid_drive.terms", {.value = "quadratic"}},
     {"feedback_noise", {.value = "0.2", .given = {{"training", "noise"}}}},
 };
 

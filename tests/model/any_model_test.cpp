@@ -95,9 +95,9 @@ TEST(AnyModel, HoldsAModelOfTheUsersOwn) {
 
 TEST(AnyModel, SaysThatAFamilyCannotInvert) {
   AnyModel any = example<Mlp>();
-  const Estimate told = any.invert(1.0, std::vector{0.3, 0.1});
-  EXPECT_EQ(told.fault, Fault::model_not_finite);
-  EXPECT_EQ(told.value, 0.3);
+  const Estimate estimate = any.invert(1.0, std::vector{0.3, 0.1});
+  EXPECT_EQ(estimate.fault, Fault::model_not_finite);
+  EXPECT_EQ(estimate.value, 0.3);
 }
 
 TEST(AnyModel, ParametersNameTheirLeaves) {

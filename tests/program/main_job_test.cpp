@@ -293,7 +293,7 @@ TEST_F(MainJob, RecordsAnActuatorThatFailsAndWears) {
   folder_.file("faults.yaml",
                "faults:\n"
                "  - {sensor: gear_angle_rad, fault: nan, at: 500ms, for: 100ms}\n"
-               "  - {sensor: joint_angle_rad, fault: silent, at: 1s}\n"
+               "  - {sensor: joint_angle_rad, fault: dropout, at: 1s}\n"
                "  - {part: friction, fault: drift, at: 0s, to: 1.3, over: 2s}\n");
   const std::string call = "simulate dfki-50 sweep --duration 2s ";
   const Outcome outcome = torsio(

@@ -20,11 +20,11 @@ TEST_F(RealtimeExample, RecordsWhatUnpackTurnsIntoCsv) {
   record();
   const Outcome unpacked = torsio("unpack run.tsr -o run.csv --json -");
   ASSERT_EQ(unpacked.exit_code, 0) << unpacked.err;
-  const auto told = nlohmann::json::parse(unpacked.out);
-  EXPECT_GT(told.at("frames"), 10);
-  EXPECT_EQ(told.at("dropped"), 0);
-  EXPECT_EQ(told.at("was_closed"), true);
-  EXPECT_EQ(told.at("sample_rate_Hz"), 1000.0);
+  const auto estimate = nlohmann::json::parse(unpacked.out);
+  EXPECT_GT(estimate.at("frames"), 10);
+  EXPECT_EQ(estimate.at("dropped"), 0);
+  EXPECT_EQ(estimate.at("was_closed"), true);
+  EXPECT_EQ(estimate.at("sample_rate_Hz"), 1000.0);
   EXPECT_TRUE(contents("run.csv").starts_with("t_s,wanted_torque_Nm,torque_Nm\n"));
 }
 

@@ -74,7 +74,7 @@ TEST(BoucWenBenchmark, CannotBeSimulatedFromAHeldForce) {
 TEST(EmpsBenchmark, IsSimulatedByFourNumbers) {
   TORSIO_NEEDS_DATA("emps");
   const Dataset dataset = load_dataset({manifest_path("emps")}, {});
-  const auto choices = model_choices(dataset, "friction_drive", {});
+  const auto choices = model_choices(dataset, "rigid_drive", {});
   const TrainedModel trained = train_model(dataset, choices[0], 1);
   ASSERT_EQ(trained.table.size(), 4U);
   // Janot, Gautier and Brunot identified 95.1 kg, 203.5 Ns/m, 20.4 N, -3.16 N by inverse dynamics.
@@ -89,7 +89,7 @@ TEST(EmpsBenchmark, IsSimulatedByFourNumbers) {
 // What terms=auto chooses by blocks of the training record, in a minute.
 TEST(EmpsBenchmark, HasFrictionThatFallsAlongTheScrew) {
   TORSIO_NEEDS_DATA("emps");
-  const Results results = compared("emps", "friction_drive:terms=position");
+  const Results results = compared("emps", "rigid_drive:terms=position");
   EXPECT_LT(scored(results, "pulses").score.metrics.rmse, 6e-3);  // 5.0e-3
 }
 
@@ -121,7 +121,7 @@ TEST(PublicBenchmarks, StandBesidePublishedFigures) {
   };
   EXPECT_LT(rmse_of("boucwen test_sinesweep", "narx_mlp, 16 lags, 128 units"),
             rmse_of("boucwen test_sinesweep", "arx"));
-  EXPECT_LT(rmse_of("emps emps_val", "friction_drive, 4 numbers"), rmse_of("emps emps_val", "arx"));
+  EXPECT_LT(rmse_of("emps emps_val", "rigid_drive, 4 numbers"), rmse_of("emps emps_val", "arx"));
 }
 
 }  // namespace

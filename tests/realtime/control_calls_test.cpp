@@ -104,11 +104,13 @@ TEST(ControlCalls, OfPidAreNone) {
 // Every mode, the fault paths, gains that are taken and gains that are refused.
 TEST(ControlCalls, OfJointCascadeAreNone) {
   const Drive drive = drive_of(data_sheet("dfki-50"));
-  JointCascade cascade(
-      {.drive = drive,
-       .limits = {.lowest_rad = -1.0, .highest_rad = 1.0, .speed_rad_s = 2.0, .load_Nm = 2.0},
-       .has_torque = true},
-      kRate_Hz);
+  JointCascade cascade({.drive = drive,
+                        .limits = {.lowest_rad = -1.0,
+                                   .highest_rad = 1.0,
+                                   .speed_rad_s = 2.0,
+                                   .max_unmeasured_load_Nm = 2.0},
+                        .has_torque = true},
+                       kRate_Hz);
   const JointCascade::Gains gains = JointCascade::gains_for(drive, 40.0);
   Spoiled position(1.0, 4099);
   Spoiled torque(1.0, 4111);
@@ -325,7 +327,7 @@ TEST(ControlCalls, OfTubeImpedanceAreNone) {
 TEST(ControlCalls, OfReferencesAreNone) {
   Chirp chirp({}, kRate_Hz);
   LogSweep sweep({}, kRate_Hz);
-  RandomWalk walk({}, kRate_Hz);
+  BandLimitedNoise walk({}, kRate_Hz);
   Steps steps({.levels = {1.0, -1.0, 0.5}, .hold_s = 2.0}, kRate_Hz);
   Replay replay({.values = {0.0, 1.0, 0.5}, .recorded_Hz = 100.0}, kRate_Hz);
   JointMove move({.waypoints_rad = {0.0, 1.0, -0.5}}, kRate_Hz);

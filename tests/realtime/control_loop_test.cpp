@@ -125,11 +125,11 @@ class Robot {
   std::uint64_t gains_taken_ = 0;
 };
 
-double most_current(const Robot& robot, std::size_t begin, std::size_t end) {
-  double most_A = 0.0;
+double max_current(const Robot& robot, std::size_t begin, std::size_t end) {
+  double max_A = 0.0;
   for (std::size_t n = begin; n < end; ++n)
-    most_A = std::max(most_A, std::abs(robot.history[n].current_A));
-  return most_A;
+    max_A = std::max(max_A, std::abs(robot.history[n].current_A));
+  return max_A;
 }
 
 /// The first tick from `begin` on in which the joint is not driven.
@@ -157,8 +157,8 @@ TEST(ControlLoop, GivesNoCurrentBeforeItIsArmed) {
     if (n == 500) robot.watchdog.arm(robot.clock.now_ns() - 1);
     robot.send(8.0);
   });
-  EXPECT_EQ(most_current(robot, 0, 500), 0.0);
-  EXPECT_GT(most_current(robot, 500, 600), 0.5);
+  EXPECT_EQ(max_current(robot, 0, 500), 0.0);
+  EXPECT_GT(max_current(robot, 500, 600), 0.5);
 }
 
 // docs/faults.md 17, 20, 21: at any moment of any motion. The stored energy falls from the stop
@@ -178,7 +178,7 @@ TEST(ControlLoop, StopsWithin20MsWithoutCommandsAndTakesUpNoEnergy) {
     EXPECT_LE(stop, static_cast<std::size_t>(silence) + 20);
     EXPECT_GT(stop, static_cast<std::size_t>(silence));
     EXPECT_EQ(robot.watchdog.reason(), CommandWatchdog::Reason::command_lost);
-    EXPECT_EQ(most_current(robot, stop, 2000), 0.0) << "the commands came back, nobody armed it";
+    EXPECT_EQ(max_current(robot, stop, 2000), 0.0) << "the commands came back, nobody armed it";
     // The current loop takes half a millisecond to let go of what it held.
     for (std::size_t n = stop + 5; n < 2000; ++n)
       ASSERT_LE(robot.history[n].energy_J, robot.history[n - 1].energy_J + 1e-6) << round;
@@ -194,8 +194,8 @@ TEST(ControlLoop, GoesOnOnlyWhenItIsArmedAgainAndAskedAgain) {
   });
   const std::size_t stop = stop_after(robot, 1);
   EXPECT_LE(stop, 420U);
-  EXPECT_EQ(most_current(robot, stop, 1000), 0.0);
-  EXPECT_GT(most_current(robot, 1001, 1500), 0.3);
+  EXPECT_EQ(max_current(robot, stop, 1000), 0.0);
+  EXPECT_GT(max_current(robot, 1001, 1500), 0.3);
 }
 
 // docs/faults.md 13, 18: the last good set-point stands, but does not feed the watchdog; nor do gains.

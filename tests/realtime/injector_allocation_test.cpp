@@ -18,8 +18,8 @@ TEST(FaultInjector, NeverTouchesTheHeapWhateverFails) {
   FaultSchedule schedule;
   double start_s = 0.0;
   for (const FaultKind kind :
-       {FaultKind::freeze, FaultKind::jump, FaultKind::drift, FaultKind::flip, FaultKind::coarse,
-        FaultKind::silent, FaultKind::nan}) {
+       {FaultKind::freeze, FaultKind::jump, FaultKind::drift, FaultKind::sign_flip,
+        FaultKind::quantised, FaultKind::dropout, FaultKind::nan}) {
     for (const std::string& sensor : fault_sensors(sheet))
       schedule.faults.push_back(
           {.what = sensor, .kind = kind, .start_s = start_s, .duration_s = 0.2, .amount = 0.1});

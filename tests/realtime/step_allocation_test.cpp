@@ -107,12 +107,12 @@ TEST(NetworkBank, StepAndStatesNeverTouchTheHeap) {
 }
 
 /// A reference that runs into every guard: it swings about the frozen value, small or large.
-ReferenceSample troublesome(int n, double told, double frozen) {
+ReferenceSample troublesome(int n, double output, double frozen) {
   const double swing = (n % 2 == 0 ? 1.0 : -1.0) * (n / 500 % 2 == 0 ? 0.5 : 20.0);
   const double value = n % 7 == 0    ? kNaN
                        : n % 11 == 0 ? 200.0
-                       : n % 13 == 0 ? told
-                       : n % 17 == 0 ? told + 60.0
+                       : n % 13 == 0 ? output
+                       : n % 17 == 0 ? output + 60.0
                                      : frozen + swing;
   return {.value = value, .age_s = n % 19 == 0 ? 1.0 : 0.0};
 }
@@ -134,8 +134,8 @@ TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
     EXPECT_EQ(heap_calls_during([&] {
                 for (int n = 0; n < 4000; ++n) {
                   const std::array raw{0.1 * std::sin(0.01 * n), 0.0};
-                  const double told = estimator.step(raw).value;
-                  (void)estimator.learn(troublesome(n, told, frozen.step(raw).value));
+                  const double output = estimator.step(raw).value;
+                  (void)estimator.learn(troublesome(n, output, frozen.step(raw).value));
                   if (n == 2000) estimator.pause();
                   if (n == 2100) estimator.resume();
                 }
@@ -145,8 +145,8 @@ TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
               }),
               0U);
     const AdaptationCounts counts = estimator.adapter().counts();
-    for (std::size_t outcome = 0; outcome < kLearningOutcomes; ++outcome)
-      EXPECT_GT(counts.outcomes[outcome], 0U) << name(static_cast<Learning>(outcome));
+    for (std::size_t outcome = 0; outcome < kUpdateOutcomes; ++outcome)
+      EXPECT_GT(counts.outcomes[outcome], 0U) << name(static_cast<UpdateOutcome>(outcome));
     EXPECT_GT(counts.roll_backs, 0U);
     EXPECT_EQ(heap_calls_during([&] { estimator.forget(); }), 0U);
   }

@@ -39,7 +39,7 @@ TEST(Excitation, RepeatsAfterResetAndInCopies) {
   expect_repeatable(Triangle({}, kRate_Hz));
   expect_repeatable(TrapezoidSweep({}, kRate_Hz));
   expect_repeatable(Multisine({{1.0, 3.0}, {0.5, 0.25}, 4}, kRate_Hz));
-  expect_repeatable(RandomWalk({}, kRate_Hz));
+  expect_repeatable(BandLimitedNoise({}, kRate_Hz));
   expect_repeatable(QuasiPeriodic({}, kRate_Hz));
   expect_repeatable(Steps({{1.0, -2.0, 3.0}, 0.7}, kRate_Hz));
 }
@@ -127,7 +127,7 @@ TEST(Multisine, HoldsEachAmplitudeAtItsFrequency) {
 }
 
 TEST(RandomWalk, HasTheRmsThatWasAskedForBelowItsCutOff) {
-  RandomWalk walk({.rms = 2.5, .cutoff_Hz = 1.0, .seed = 5}, 100.0);
+  BandLimitedNoise walk({.rms = 2.5, .cutoff_Hz = 1.0, .seed = 5}, 100.0);
   EXPECT_EQ(walk.step(), 0.0);
   const std::vector<double> values = samples(walk, 200'000);  // about 4000 independent values
   double square = 0.0;
@@ -207,8 +207,8 @@ TEST(Excitation, RefusesParametersOutOfRange) {
   EXPECT_THROW(Multisine({}, kRate_Hz), UsageError);
   EXPECT_THROW(Multisine({{1.0, 2.0}, {1.0}, 1}, kRate_Hz), UsageError);
   EXPECT_THROW(Multisine({{600.0}, {1.0}, 1}, kRate_Hz), UsageError);
-  EXPECT_THROW(RandomWalk({.rms = -1.0}, kRate_Hz), UsageError);
-  EXPECT_THROW(RandomWalk({.cutoff_Hz = 500.0}, kRate_Hz), UsageError);
+  EXPECT_THROW(BandLimitedNoise({.rms = -1.0}, kRate_Hz), UsageError);
+  EXPECT_THROW(BandLimitedNoise({.cutoff_Hz = 500.0}, kRate_Hz), UsageError);
   EXPECT_THROW(QuasiPeriodic({.amplitude = kNan}, kRate_Hz), UsageError);
   EXPECT_THROW(QuasiPeriodic({.period_spread = 0.31}, kRate_Hz), UsageError);
   EXPECT_THROW(QuasiPeriodic({.amplitude_spread = -0.1}, kRate_Hz), UsageError);

@@ -76,9 +76,9 @@ std::vector<double> model_a(const std::vector<double>& twist_deg) {
   for (const double now_deg : twist_deg) {
     for (int part = 0; part < kParts; ++part) {
       const double at_deg = before_deg + (now_deg - before_deg) * (part + 0.5) / kParts;
-      const double carried_Nm = kSeries * (at_deg - creep[0] - creep[1]);
+      const double max_measured_load_Nm = kSeries * (at_deg - creep[0] - creep[1]);
       for (std::size_t j = 0; j < creep.size(); ++j)
-        creep[j] += kPart_s * (carried_Nm - kStiffness[j] * creep[j]) / kDamping[j];
+        creep[j] += kPart_s * (max_measured_load_Nm - kStiffness[j] * creep[j]) / kDamping[j];
     }
     before_deg = now_deg;
     torque_Nm.push_back(kSeries * (now_deg - creep[0] - creep[1]));

@@ -120,14 +120,14 @@ TEST(Simulate, LoadCellIsFreshEveryEighthSample) {
 
 TEST(Simulate, TruthComesOnRequestAndChangesNothingElse) {
   const Recording plain = simulate({.duration_s = 1.0});
-  const Recording told = simulate({.duration_s = 1.0, .with_truth = true});
+  const Recording estimate = simulate({.duration_s = 1.0, .with_truth = true});
   for (const Channel& channel : plain.channels()) {
-    EXPECT_EQ(channel.values, told.channel(channel.name).values) << channel.name;
+    EXPECT_EQ(channel.values, estimate.channel(channel.name).values) << channel.name;
   }
   EXPECT_FALSE(plain.has("truth_torque_Nm"));
-  const auto& truth = told.channel("truth_torque_Nm").values;
-  const Channel& cell = told.channel("torque_Nm");
-  for (std::size_t i = 2; i < told.size(); ++i) {
+  const auto& truth = estimate.channel("truth_torque_Nm").values;
+  const Channel& cell = estimate.channel("torque_Nm");
+  for (std::size_t i = 2; i < estimate.size(); ++i) {
     if (cell.is_fresh(i)) {
       EXPECT_NEAR(cell.values[i], truth[i - 2], 6.0 * 0.0005 / 3.0 * 50.0);
     }

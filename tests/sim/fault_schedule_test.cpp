@@ -46,8 +46,8 @@ ScheduledFault gear(FaultKind kind, double amount = 0.0) {
 
 TEST(FaultInjector, LastsAsLongAsItIsToldAndLeavesNothingBehind) {
   for (const FaultKind kind :
-       {FaultKind::freeze, FaultKind::jump, FaultKind::drift, FaultKind::flip, FaultKind::coarse,
-        FaultKind::silent, FaultKind::nan}) {
+       {FaultKind::freeze, FaultKind::jump, FaultKind::drift, FaultKind::sign_flip,
+        FaultKind::quantised, FaultKind::dropout, FaultKind::nan}) {
     const std::vector<Measurement> faulty = seen({gear(kind, 0.05)});
     const std::vector<Measurement> sound = seen({});
     for (std::size_t tick = 0; tick < sound.size(); ++tick) {
@@ -66,27 +66,27 @@ TEST(FaultInjector, DoesToASensorWhatItsKindSays) {
     return seen({gear(kind, amount)})[40].middle_angle_rad;
   };
   EXPECT_EQ(at_tick_40(FaultKind::freeze), 0.029);
-  EXPECT_EQ(at_tick_40(FaultKind::silent), 0.029);
+  EXPECT_EQ(at_tick_40(FaultKind::dropout), 0.029);
   EXPECT_EQ(at_tick_40(FaultKind::jump, -2.0), 0.040 - 2.0);
   EXPECT_NEAR(at_tick_40(FaultKind::drift, 3.0), 0.040 + 0.01 * 3.0, 1e-12);
-  EXPECT_EQ(at_tick_40(FaultKind::flip), -0.040);
-  EXPECT_NEAR(at_tick_40(FaultKind::coarse, 0.03), 0.03, 1e-12);
+  EXPECT_EQ(at_tick_40(FaultKind::sign_flip), -0.040);
+  EXPECT_NEAR(at_tick_40(FaultKind::quantised, 0.03), 0.03, 1e-12);
   EXPECT_TRUE(std::isnan(at_tick_40(FaultKind::nan)));
 }
 
 TEST(FaultInjector, AFrozenSensorDeliversAndASilentOneDoesNot) {
   EXPECT_TRUE(seen({gear(FaultKind::freeze)})[40].is_middle_angle_fresh);
-  EXPECT_FALSE(seen({gear(FaultKind::silent)})[40].is_middle_angle_fresh);
+  EXPECT_FALSE(seen({gear(FaultKind::dropout)})[40].is_middle_angle_fresh);
 }
 
 TEST(FaultInjector, FromTheFirstTickOnHoldsTheFirstValue) {
-  for (const FaultKind kind : {FaultKind::freeze, FaultKind::silent})
+  for (const FaultKind kind : {FaultKind::freeze, FaultKind::dropout})
     EXPECT_EQ(seen({{.what = "gear_angle_rad", .kind = kind}})[99].middle_angle_rad, 0.0);
 }
 
 TEST(FaultInjector, AHeldValueNeverChangesBetweenDeliveries) {
   for (const FaultKind kind : {FaultKind::freeze, FaultKind::jump, FaultKind::drift,
-                               FaultKind::flip, FaultKind::silent, FaultKind::nan}) {
+                               FaultKind::sign_flip, FaultKind::dropout, FaultKind::nan}) {
     const std::vector<Measurement> all = seen({{.what = "torque_Nm",
                                                 .kind = kind,
                                                 .start_s = 0.0305,
@@ -105,9 +105,9 @@ TEST(FaultInjector, AHeldValueNeverChangesBetweenDeliveries) {
 
 TEST(FaultInjector, CombinesTheFaultsOfASensorInTheirOrder) {
   const double jumped =
-      seen({gear(FaultKind::flip), gear(FaultKind::jump, 1.0)})[40].middle_angle_rad;
+      seen({gear(FaultKind::sign_flip), gear(FaultKind::jump, 1.0)})[40].middle_angle_rad;
   const double flipped =
-      seen({gear(FaultKind::jump, 1.0), gear(FaultKind::flip)})[40].middle_angle_rad;
+      seen({gear(FaultKind::jump, 1.0), gear(FaultKind::sign_flip)})[40].middle_angle_rad;
   EXPECT_EQ(jumped, 1.0 - 0.040);
   EXPECT_EQ(flipped, -1.0 - 0.040);
 }
@@ -190,14 +190,14 @@ TEST(FaultInjector, RefusesWhatCannotBe) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   expect({.what = "gear_angel_rad"}, "Did you mean 'gear_angle_rad'?");
   expect({.what = "gear_angle_rad", .kind = FaultKind::broken},
-         "expected one of freeze, jump, drift, flip, coarse, silent, nan, found break");
+         "expected one of freeze, jump, drift, sign_flip, quantised, dropout, nan, found break");
   expect({.what = "spring", .kind = FaultKind::freeze}, "expected one of break, bottom");
   expect({.what = "gear_angle_rad", .start_s = kNaN}, "at: expected 0 s");
   expect({.what = "gear_angle_rad", .start_s = -1.0}, "at: expected 0 s");
   expect({.what = "gear_angle_rad", .start_s = 10.0}, "before 10 s, found 10 s");
   expect({.what = "gear_angle_rad", .duration_s = 0.0}, "for: expected");
   expect({.what = "gear_angle_rad", .kind = FaultKind::jump, .amount = kNaN}, "by: expected");
-  expect({.what = "gear_angle_rad", .kind = FaultKind::coarse, .amount = -0.1}, "to: expected");
+  expect({.what = "gear_angle_rad", .kind = FaultKind::quantised, .amount = -0.1}, "to: expected");
   expect({.what = "spring", .kind = FaultKind::broken, .amount = -0.1}, "to: expected 0 to 1");
   expect({.what = "friction", .kind = FaultKind::drift, .amount = 1.1, .over_s = kNaN},
          "over: expected");
@@ -218,9 +218,9 @@ TEST(FaultSchedule, ReadsEveryKindWithUnits) {
       "  - {sensor: gear_angle_rad, fault: freeze, at: 5s, for: 200ms}\n"
       "  - {sensor: joint_angle_rad, fault: jump, at: 3s, by: 2deg}\n"
       "  - {sensor: motor_angle_rad, fault: drift, at: 3s, per_second: -1deg}\n"
-      "  - {sensor: motor_current_A, fault: flip, at: 3}\n"
-      "  - {sensor: torque_Nm, fault: coarse, at: 3s, to: 50Ncm}\n"
-      "  - {sensor: torque_Nm, fault: silent, at: 3s}\n"
+      "  - {sensor: motor_current_A, fault: sign_flip, at: 3}\n"
+      "  - {sensor: torque_Nm, fault: quantised, at: 3s, to: 50Ncm}\n"
+      "  - {sensor: torque_Nm, fault: dropout, at: 3s}\n"
       "  - {sensor: torque_Nm, fault: nan, at: 3s}\n"
       "  - {part: friction, fault: drift, at: 0s, to: 130pct, over: 1min}\n"
       "  - {part: torque-constant, fault: drift, at: 0s, to: 0.9, over: 0s}\n"
@@ -252,10 +252,10 @@ TEST(FaultSchedule, ReadsEveryKindWithUnits) {
 TEST(FaultSchedule, KnowsTheSensorsAndPartsOfEveryActuator) {
   for (const DataSheet& sheet : data_sheets()) {
     for (const std::string& sensor : fault_sensors(sheet))
-      EXPECT_EQ(
-          parse_fault_schedule("faults: [{sensor: " + sensor + ", fault: flip, at: 0}]", "f", sheet)
-              .faults.size(),
-          1U);
+      EXPECT_EQ(parse_fault_schedule("faults: [{sensor: " + sensor + ", fault: sign_flip, at: 0}]",
+                                     "f", sheet)
+                    .faults.size(),
+                1U);
     EXPECT_EQ(fault_parts(sheet).front(), sheet.name == "harmonic-drive" ? "gear" : "spring");
     EXPECT_EQ(parse_fault_schedule("faults: [{part: " + fault_parts(sheet).front() +
                                        ", fault: bottom, at: 0, beyond: 1deg, times: 10}]",
@@ -314,7 +314,7 @@ TEST(SimulateWithFaults, NaNIsLoggedAndTheRunSurvivesIt) {
 
 TEST(SimulateWithFaults, ASilentSensorIsMarkedInTheLog) {
   const Recording recording = simulate(faulty_sweep(
-      {{.what = "gear_angle_rad", .kind = FaultKind::silent, .start_s = 1.0, .duration_s = 0.5}}));
+      {{.what = "gear_angle_rad", .kind = FaultKind::dropout, .start_s = 1.0, .duration_s = 0.5}}));
   const Channel& channel = recording.channel("gear_angle_rad");
   EXPECT_TRUE(channel.is_fresh(999));
   EXPECT_FALSE(channel.is_fresh(1000));

@@ -27,7 +27,7 @@ struct EncoderUnderTest {
   std::string_view name;
   SheetValue SensorSheet::*bits;
   SheetValue SensorSheet::*zero_rad;
-  double Measurement::*told_rad;
+  double Measurement::*estimated_rad;
   double (*truth_rad)(const Plant& plant);
 };
 const std::vector<EncoderUnderTest>& encoders() {
@@ -59,7 +59,8 @@ void expect_encoder_errors(const DataSheet& sheet) {
                            .joint_angle_rad = 2.0 * random.uniform() - 1.0});
     const Measurement measured = sensors.step(plant, 0.0);
     for (std::size_t k = 0; k < encoders().size(); ++k)
-      errors_rad[k].push_back(measured.*encoders()[k].told_rad - encoders()[k].truth_rad(plant));
+      errors_rad[k].push_back(measured.*encoders()[k].estimated_rad -
+                              encoders()[k].truth_rad(plant));
   }
   const double jitter_lsb = sheet.sensors.encoder_jitter_lsb.value;
   const double expected_lsb = std::sqrt(jitter_lsb * jitter_lsb + 1.0 / 12.0);

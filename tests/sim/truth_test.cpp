@@ -14,7 +14,7 @@
 namespace torsio {
 namespace {
 
-Recording told(const std::string& actuator, const std::string& experiment, double duration_s) {
+Recording estimate(const std::string& actuator, const std::string& experiment, double duration_s) {
   return simulate({.actuator = actuator,
                    .experiment = experiment,
                    .duration_s = duration_s,
@@ -51,7 +51,7 @@ double range(const std::vector<double>& of) {
 }
 
 TEST(Truth, TheSlipElementsOfASpringAddUpToItsFriction) {
-  const Recording recording = told("dfki-50", "static-cycle", 6.0);
+  const Recording recording = estimate("dfki-50", "static-cycle", 6.0);
   const Sum slip = sum_of(recording, "spring_slip");
   EXPECT_EQ(slip.parts, 4);
   EXPECT_GT(range(slip.of), 0.5);
@@ -59,7 +59,7 @@ TEST(Truth, TheSlipElementsOfASpringAddUpToItsFriction) {
 }
 
 TEST(Truth, SlipElementsAndBranchesOfRubberAddUpToItsFriction) {
-  const Recording recording = told("rubber-clutch", "slow-cycles", 20.0);
+  const Recording recording = estimate("rubber-clutch", "slow-cycles", 20.0);
   Sum sum = sum_of(recording, "rubber_slip");
   const Sum branches = sum_of(recording, "rubber_branch");
   EXPECT_EQ(sum.parts, 3);
@@ -81,11 +81,11 @@ double viscosity(const Recording& recording, const std::string& place, const std
 
 TEST(Truth, FrictionIsTheBristleAndWhatIsViscous) {
   // The friction is that of the speed before the step: equal to a percent or so.
-  const Recording sweep = told("dfki-120", "sweep", 4.0);
+  const Recording sweep = estimate("dfki-120", "sweep", 4.0);
   const double motor = plant_parameters(data_sheet("dfki-120")).rotor_friction.viscous_Nms_rad;
   EXPECT_GT(range(values(sweep, "motor_bristle_Nm")), 0.01);
   EXPECT_NEAR(viscosity(sweep, "motor", "motor"), motor, 0.02 * motor);
-  const Recording drive = told("harmonic-drive", "human-torque", 4.0);
+  const Recording drive = estimate("harmonic-drive", "human-torque", 4.0);
   const double generator =
       plant_parameters(data_sheet("harmonic-drive")).middle_friction.viscous_Nms_rad;
   EXPECT_GT(range(values(drive, "wave_generator_bristle_Nm")), 0.01);
@@ -94,7 +94,7 @@ TEST(Truth, FrictionIsTheBristleAndWhatIsViscous) {
 }
 
 TEST(Truth, EncodersTellTheTrueAnglesToAFewCodes) {
-  const Recording recording = told("dfki-50", "sweep", 4.0);
+  const Recording recording = estimate("dfki-50", "sweep", 4.0);
   const double code_rad = rad_from_deg(0.1);
   for (const char* body : {"gear", "joint"}) {
     const auto& measured = recording.channel(std::string(body) + "_angle_rad").values;
@@ -105,7 +105,7 @@ TEST(Truth, EncodersTellTheTrueAnglesToAFewCodes) {
 }
 
 TEST(Truth, TheClutchTellsHowFarItSlipped) {
-  const Recording recording = told("rubber-clutch", "slip", 40.0);
+  const Recording recording = estimate("rubber-clutch", "slip", 40.0);
   const auto& slip = values(recording, "clutch_slip_rad");
   const auto& is_slipping = values(recording, "clutch_is_slipping_1");
   EXPECT_GT(range(slip), 0.05);
@@ -119,10 +119,10 @@ TEST(Truth, TheClutchTellsHowFarItSlipped) {
 }
 
 TEST(Truth, AnUnbondedCouplingHasTwoChainsAndACreepingGlue) {
-  const Recording bonded = told("elastomer", "triangles", 3.0);
+  const Recording bonded = estimate("elastomer", "triangles", 3.0);
   EXPECT_TRUE(bonded.has("truth_coupling_creep3_rad"));
   EXPECT_FALSE(bonded.has("truth_coupling_positive_creep1_rad"));
-  const Recording unbonded = told("elastomer:unbonded", "triangles", 3.0);
+  const Recording unbonded = estimate("elastomer:unbonded", "triangles", 3.0);
   EXPECT_GE(*std::ranges::min_element(values(unbonded, "coupling_positive_creep1_rad")), -1e-15);
   EXPECT_LE(*std::ranges::max_element(values(unbonded, "coupling_negative_creep1_rad")), 1e-15);
   EXPECT_GT(range(values(unbonded, "coupling_positive_creep1_rad")), 0.0);

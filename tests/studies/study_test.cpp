@@ -72,7 +72,7 @@ TEST(Studies, OfTorqueLevelsErrMoreTheHarderTheHandPushes) {
 }
 
 TEST(Studies, OfTheElastomerCouplingHaveTheFitsOfThePrototype) {
-  const Study study = run_study(find_study("003-ladder"), kQuick);
+  const Study study = run_study(find_study("003-models"), kQuick);
   const ErrorRow& line = row_of(study, "bonded, triangles", "linear");
   const ErrorRow& printed = row_of(study, "bonded, triangles", "viscoelastic 003a as printed");
   const ErrorRow& a = row_of(study, "bonded, triangles", "viscoelastic 003a");
@@ -89,7 +89,7 @@ TEST(Studies, OfTheElastomerCouplingHaveTheFitsOfThePrototype) {
   const ErrorRow& curves = row_of(study, "bonded, triangles", "Hammerstein-Wiener");
   EXPECT_LT(curves.rmse, line.rmse);
   EXPECT_EQ(published(curves, RowQuantity::fit_percent), "77.73");
-  EXPECT_THAT(study_text(find_study("003-ladder"), study), HasSubstr("paper fit %"));
+  EXPECT_THAT(study_text(find_study("003-models"), study), HasSubstr("paper fit %"));
 }
 
 TEST(Studies, OfTheRubberSensorSayWhetherPgprBeatsALine) {

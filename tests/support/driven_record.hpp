@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "model/second_order/dynamic_bouc_wen.hpp"
-#include "model/second_order/friction_drive.hpp"
+#include "model/second_order/rigid_drive.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/fit/common/training_data.hpp"
@@ -61,15 +61,15 @@ inline DynamicBoucWen hysteretic(double exponent = 1.0) {
 }
 
 /// A heavy carriage on a screw, pushed to one side by its cables.
-inline FrictionDrive carriage(double quadratic = 0.0) {
-  return FrictionDrive({.inertia = 95.0,
-                        .viscous = 200.0,
-                        .coulomb = 20.0,
-                        .offset = -3.0,
-                        .viscous_quadratic = quadratic,
-                        .time = {.sample_period_s = 1e-3},
-                        .lowest = -10.0,
-                        .highest = 10.0});
+inline RigidDrive carriage(double quadratic = 0.0) {
+  return RigidDrive({.inertia = 95.0,
+                     .viscous = 200.0,
+                     .coulomb = 20.0,
+                     .offset = -3.0,
+                     .viscous_quadratic = quadratic,
+                     .time = {.sample_period_s = 1e-3},
+                     .lowest = -10.0,
+                     .highest = 10.0});
 }
 
 }  // namespace torsio::test

@@ -21,7 +21,7 @@
 #include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"
 #include "model/second_order/dynamic_bouc_wen.hpp"
-#include "model/second_order/friction_drive.hpp"
+#include "model/second_order/rigid_drive.hpp"
 #include "model/viscoelastic/viscoelastic.hpp"
 #include "support/hysteresis_examples.hpp"
 #include "support/random_network.hpp"
@@ -235,7 +235,7 @@ inline ParametricGp::Parameters example_parametric_gp(std::size_t inputs) {
   ParametricGp::Parameters parameters{.scaling = example_scaling(inputs),
                                       .kernel = parse_kernel("se*(linear+periodic*rq)", inputs),
                                       .noise_variance = 0.01,
-                                      .points = example_points(inputs),
+                                      .inducing_points = example_points(inputs),
                                       .weights = {0.4, -0.2, 0.3, 0.1, -0.5, 0.2, 0.6, -0.1, 0.05},
                                       .explained = Matrix(9, 9)};
   for (std::size_t i = 0; i < 9; ++i) parameters.explained(i, i) = 0.1;
@@ -361,22 +361,22 @@ inline DynamicBoucWen example<DynamicBoucWen>() {
 
 /// With every term.
 template <>
-inline FrictionDrive example<FrictionDrive>() {
-  return FrictionDrive({.inertia = 0.01,
-                        .viscous = 0.02,
-                        .coulomb = 0.05,
-                        .offset = 0.01,
-                        .static_ratio = 1.5,
-                        .stribeck_speed = 0.1,
-                        .bristle = 1e-3,
-                        .viscous_asymmetry = 0.01,
-                        .viscous_quadratic = 0.01,
-                        .spring = 0.02,
-                        .coulomb_slope = 0.1,
-                        .gains = {1.0, 0.2},
-                        .time = {.sample_period_s = 1e-3},
-                        .lowest = -5000.0,
-                        .highest = 5000.0});
+inline RigidDrive example<RigidDrive>() {
+  return RigidDrive({.inertia = 0.01,
+                     .viscous = 0.02,
+                     .coulomb = 0.05,
+                     .offset = 0.01,
+                     .static_ratio = 1.5,
+                     .stribeck_speed = 0.1,
+                     .bristle = 1e-3,
+                     .viscous_asymmetry = 0.01,
+                     .viscous_quadratic = 0.01,
+                     .spring = 0.02,
+                     .coulomb_slope = 0.1,
+                     .gains = {1.0, 0.2},
+                     .time = {.sample_period_s = 1e-3},
+                     .lowest = -5000.0,
+                     .highest = 5000.0});
 }
 
 template <>

@@ -29,8 +29,8 @@ inline std::vector<std::string> spring_families() {
 /// Settings with which the slow families are fitted in a second, for tests of what follows a fit.
 inline std::map<std::string, std::string> quick_options(std::string_view family) {
   std::map<std::string, std::string> options;
-  for (const auto& [name, value] :
-       std::map<std::string, std::string>{{"samples", "300"}, {"points", "20"}, {"rounds", "1"}}) {
+  for (const auto& [name, value] : std::map<std::string, std::string>{
+           {"samples", "300"}, {"inducing_points", "20"}, {"rounds", "1"}}) {
     const auto known = find_family(family).options;
     if (std::ranges::find(known, name, &OptionInfo::name) != known.end()) options[name] = value;
   }

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string_view>
 
+#include "torsio/control/bumpless_transfer.hpp"
 #include "torsio/control/drive.hpp"
-#include "torsio/control/handover.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/pid.hpp"
 #include "torsio/control/thermal_limit.hpp"
@@ -76,9 +76,10 @@ class JointCascade {
     double lowest_rad = -std::numeric_limits<double>::infinity();
     double highest_rad = std::numeric_limits<double>::infinity();
     double speed_rad_s = 0.0;
-    double load_Nm = 0.0;     ///< d: the largest load that is not measured (friction, torque
-                              ///< error, what changes faster than the current follows)
-    double carried_Nm = 0.0;  ///< the largest load that is: what carries it cannot brake
+    double max_unmeasured_load_Nm =
+        0.0;  ///< d: the largest load that is not measured (friction, torque
+              ///< error, what changes faster than the current follows)
+    double max_measured_load_Nm = 0.0;  ///< the largest load that is: what carries it cannot brake
     double torque_Nm = std::numeric_limits<double>::infinity();  ///< of the wanted torque
     double current_rate_A_s = std::numeric_limits<double>::infinity();
     double thermal_time_s = 10.0;  ///< of the winding
@@ -90,7 +91,7 @@ class JointCascade {
     bool has_torque = false;          ///< the state has a torque
     std::optional<Gains> gains = {};  ///< none: `gains_for`
     double torque_cutoff_Hz = 120.0;  ///< of the torque's derivative
-    double handover_s = 0.1;
+    double transfer_s = 0.1;
     double fault_decay_s = 0.02;  ///< of the current without a usable measurement
   };
 
@@ -112,7 +113,7 @@ class JointCascade {
     double integral_A = 0.0;
     double derivative_A = 0.0;
     double feed_forward_A = 0.0;
-    double handover_A = 0.0;
+    double transfer_A = 0.0;
     double thermal_load = 0.0;  ///< 0 cold, 1 as hot as the winding may be
     Limit limit = Limit::none;  ///< the last that cut the current
     bool is_reference_refused =
@@ -173,7 +174,7 @@ class JointCascade {
   Pid velocity_;
   Pid torque_;
   JointImpedance impedance_;
-  Handover handover_;
+  BumplessTransfer transfer_;
   ThermalLimit thermal_;
   JointReference reference_;
   double current_A_ = 0.0;

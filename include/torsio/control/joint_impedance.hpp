@@ -2,8 +2,8 @@
 
 #include <limits>
 
+#include "torsio/control/bumpless_transfer.hpp"
 #include "torsio/control/deflection_controller.hpp"
-#include "torsio/control/handover.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/realtime.hpp"
@@ -25,10 +25,10 @@ class JointImpedance {
     Gains gains = {};
     double torque_Nm = std::numeric_limits<double>::infinity();         ///< limit of τ*
     double torque_rate_Nm_s = std::numeric_limits<double>::infinity();  ///< limit of τ̇*
-    double handover_s = 0.1;
+    double transfer_s = 0.1;
     double fault_decay_s = 0.02;  ///< of the torque without a usable measurement
   };
-  struct Wish {
+  struct Reference {
     double angle_rad = 0.0;
     double speed_rad_s = 0.0;
     double torque_Nm = 0.0;  ///< τ_ff
@@ -42,7 +42,7 @@ class JointImpedance {
     double spring_Nm = 0.0;
     double damper_Nm = 0.0;
     double feed_forward_Nm = 0.0;
-    double handover_Nm = 0.0;
+    double transfer_Nm = 0.0;
     bool is_limited = false;
     Fault fault = Fault::none;
   };
@@ -54,7 +54,7 @@ class JointImpedance {
 
   /// A wish that is not finite is a fault, and the last good one stands (none yet: no torque); a
   /// measurement is one too, and the torque fades to 0 and goes on from there.
-  Output step(const Wish& wanted, const State& measured) noexcept TORSIO_REALTIME;
+  Output step(const Reference& wanted, const State& measured) noexcept TORSIO_REALTIME;
 
   /// Both at once, from the next step on, without a jump: what they would change at the last step's
   /// errors fades in by the handover, so that gains may also move in every tick.
@@ -66,14 +66,14 @@ class JointImpedance {
   Output fade() noexcept;
 
   Gains gains_;
-  double most_Nm_;
+  double max_Nm_;
   double step_Nm_;
   double fault_keep_;
-  Handover handover_;
-  Wish wanted_;
-  double behind_rad_ = 0.0;    ///< of the last step
-  double behind_rad_s_ = 0.0;  ///< of the last step
-  bool has_wish_ = false;
+  BumplessTransfer transfer_;
+  Reference wanted_;
+  double position_error_rad_ = 0.0;  ///< of the last step
+  double speed_error_rad_s_ = 0.0;   ///< of the last step
+  bool has_reference_ = false;
   bool is_returning_ = false;  ///< from a fault
   double torque_Nm_ = 0.0;
 };

@@ -32,12 +32,12 @@ namespace torsio {
 class ModelInverse {
  public:
   /// Of the residual standard deviation of the linear fallback.
-  static constexpr double kMostDeparture = 3.0;
+  static constexpr double kMaxDeparture = 3.0;
 
   /// @throws Error as `Estimator`, or if the model's first input is not `spring_deflection_rad`, its
   /// target no torque in Nm, its family has no inverse, its fallback no positive slope, or it needs a
   /// channel that a `JointSample` does not have.
-  ModelInverse(EstimatorSettings settings, AnyModel model, double most_departure = kMostDeparture);
+  ModelInverse(EstimatorSettings settings, AnyModel model, double max_departure = kMaxDeparture);
 
   /// As `Estimator::set_zero`.
   void set_zero(std::string_view channel, double value) { core_.set_zero(channel, value); }
@@ -57,7 +57,7 @@ class ModelInverse {
   EstimatorCore core_;
   AnyModel model_;
   JointInputs inputs_;
-  double most_departure_rad_;
+  double max_departure_rad_;
   bool is_stepped_;
   std::vector<double> asked_;  ///< features of this tick, the deflection being the answer
   bool is_asked_ = false;      ///< the memory has yet to go there

@@ -3,7 +3,7 @@
 #include <limits>
 #include <optional>
 
-#include "torsio/control/handover.hpp"
+#include "torsio/control/bumpless_transfer.hpp"
 #include "torsio/control/linear_system.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
@@ -46,7 +46,7 @@ class Pid {
     std::optional<double> derivative_cutoff_Hz = std::nullopt;
     /// T_t of the back calculation; none: K_p / K_i, the integral's own time
     std::optional<double> tracking_s = std::nullopt;
-    double handover_s = 0.1;
+    double transfer_s = 0.1;
   };
 
   struct Output {
@@ -103,7 +103,7 @@ class Pid {
   double step_limit_;            ///< of the command, a tick
   double tracking_share_ = 0.0;  ///< T / T_t
   Differentiator differentiator_;
-  Handover handover_;
+  BumplessTransfer transfer_;
   Output last_;
   double integral_ = 0.0;
   double rate_ = 0.0;       ///< D, of the last step

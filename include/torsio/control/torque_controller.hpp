@@ -6,9 +6,9 @@
 #include <optional>
 #include <utility>
 
+#include "torsio/control/bumpless_transfer.hpp"
 #include "torsio/control/deflection_controller.hpp"
 #include "torsio/control/disturbance_observer.hpp"
-#include "torsio/control/handover.hpp"
 #include "torsio/control/spring_inverse.hpp"
 
 namespace torsio {
@@ -50,7 +50,7 @@ class TorqueLoopCore {
     double rate_feed_forward_A = 0.0;
     double friction_A = 0.0;
     double observer_A = 0.0;
-    double handover_A = 0.0;  ///< after a change of gains or a fault
+    double transfer_A = 0.0;  ///< after a change of gains or a fault
     bool is_limited = false;
     Fault inverse = Fault::none;  ///< the inverse fell back on its line, which may be used
     Fault fault = Fault::none;    ///< a reference or a measurement could not be used
@@ -77,7 +77,7 @@ class TorqueLoopCore {
 
   Settings settings_;
   DeflectionController deflection_;
-  Handover handover_;  ///< of what is added to the deflection controller's current
+  BumplessTransfer transfer_;  ///< of what is added to the deflection controller's current
   std::optional<DisturbanceObserver> observer_;
   Differentiator wanted_rate_;  ///< D[τ*]
   double amperes_per_Nm_;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "torsio/control/handover.hpp"
+#include "torsio/control/bumpless_transfer.hpp"
 #include "torsio/control/pid.hpp"
 #include "torsio/control/series_elastic_joint.hpp"
 #include "torsio/core/fault.hpp"
@@ -48,7 +48,7 @@ class TubeImpedance {
     /// high impedance are such: at 1 kHz the joint without dry friction is unstable with them.
     bool relies_on_friction = false;
     double speed_cutoff_Hz = 40.0;  ///< of q̇
-    double handover_s = 0.1;        ///< of the current, when the measurement is back
+    double transfer_s = 0.1;        ///< of the current, when the measurement is back
     double fault_decay_s = 0.02;    ///< of the current without a usable measurement
   };
   struct Angles {
@@ -62,7 +62,7 @@ class TubeImpedance {
     double position_rad = 0.0;     ///< its share of θ_s*
     double damping_rad = 0.0;      ///< its share of θ_s*
     double motor_torque_Nm = 0.0;  ///< τ_m
-    double handover_A = 0.0;       ///< beside τ_m / k_t, after a fault
+    double transfer_A = 0.0;       ///< beside τ_m / k_t, after a fault
     bool is_limited = false;
     Fault fault = Fault::none;
   };
@@ -100,8 +100,8 @@ class TubeImpedance {
   double gear_ratio_;
   double fault_keep_;
   Differentiator speed_;
-  Handover handover_;
-  bool has_wish_ = false;
+  BumplessTransfer transfer_;
+  bool has_reference_ = false;
   bool is_returning_ = false;  ///< from a fault
   double wanted_rad_ = 0.0;
   double wanted_rad_s_ = 0.0;

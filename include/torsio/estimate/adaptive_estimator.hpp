@@ -44,7 +44,7 @@ class AdaptiveEstimator {
   Estimate step(std::span<const double> raw) noexcept TORSIO_REALTIME;
   /// @param reference of the tick that `step` was called for last, as it is measured: zeros and units
   /// of the model's target.
-  Learning learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
+  UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const LastLayerAdapter& adapter() const noexcept {
     return estimator_.model().adapter();

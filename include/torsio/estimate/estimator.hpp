@@ -82,9 +82,9 @@ class BasicEstimator {
     const EstimatorCore::Conditioned input = core_.condition(raw);
     if (input.fault != Fault::none) return core_.held(input.fault);
     if (input.restarted) model_.reset();
-    const Estimate told = model_.step(input.features);
-    if (!std::isfinite(told.value)) model_.reset();
-    return core_.judge(input.features, told);
+    const Estimate raw_estimate = model_.step(input.features);
+    if (!std::isfinite(raw_estimate.value)) model_.reset();
+    return core_.apply_guards(input.features, raw_estimate);
   }
 
   /// A measurement of the last step's target, for a model that feeds its output back: free run

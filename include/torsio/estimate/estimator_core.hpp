@@ -51,7 +51,7 @@ class EstimatorCore {
   /// beyond the border.
   [[nodiscard]] double excursion(Features features) const noexcept TORSIO_REALTIME;
   /// What may be told to the outside of `told`, the model's answer to `features`.
-  Estimate judge(Features features, const Estimate& told) noexcept TORSIO_REALTIME;
+  Estimate apply_guards(Features features, const Estimate& raw_estimate) noexcept TORSIO_REALTIME;
 
  private:
   struct Range {
@@ -60,9 +60,9 @@ class EstimatorCore {
     double border = 0.0;  ///< width, on either side, of where the model hands over to the fallback
   };
 
-  [[nodiscard]] Estimate model_part(const Estimate& told) const noexcept;
+  [[nodiscard]] Estimate model_part(const Estimate& raw_estimate) const noexcept;
   /// `told` handed over to the fallback by the share `weight` in 0..1.
-  [[nodiscard]] Estimate blended(Features features, const Estimate& told,
+  [[nodiscard]] Estimate blended(Features features, const Estimate& raw_estimate,
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
   [[nodiscard]] double residual_std_at(double value) const noexcept;

@@ -22,7 +22,7 @@ inline constexpr std::string_view kAttributionCaveat =
     "never makes.";
 
 /// Exact values take 2^inputs coalitions.
-inline constexpr std::size_t kMostAttributedInputs = 12;
+inline constexpr std::size_t kMaxAttributedInputs = 12;
 
 struct AttributionOptions {
   std::size_t windows = 200;       ///< explained, drawn from the data
@@ -92,7 +92,7 @@ struct Memory {
 ///
 /// Cost: windows x background x (2^inputs - 2) x window_samples steps of the model, and repeats x
 /// inputs passes over the data. `progress` is called from several threads, one at a time.
-/// @throws Error for more than `kMostAttributedInputs` inputs, data with another number of inputs
+/// @throws Error for more than `kMaxAttributedInputs` inputs, data with another number of inputs
 /// or shorter than a window; UsageError for options that are 0; Cancelled.
 [[nodiscard]] Attribution attribute(const AnyModel& model, const TrainingData& data,
                                     const AttributionOptions& options = {},

@@ -39,8 +39,8 @@ struct FitReport {
 };
 
 /// Residuals of the estimator's streamed run, at fresh samples of the split, over lags of up to a
-/// tenth of the longest record or `kMostLags`.
-inline constexpr std::size_t kMostLags = 500;
+/// tenth of the longest record or `kMaxLags`.
+inline constexpr std::size_t kMaxLags = 500;
 [[nodiscard]] FitReport fit_report(const TrainedModel& model, const Dataset& dataset);
 
 }  // namespace torsio

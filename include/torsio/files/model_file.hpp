@@ -20,7 +20,7 @@ namespace torsio {
 inline constexpr int kModelFormatVersion = 1;
 
 /// A larger file is refused before memory is taken for it.
-inline constexpr std::size_t kMostModelFileBytes = std::size_t{256} << 20;
+inline constexpr std::size_t kMaxModelFileBytes = std::size_t{256} << 20;
 
 /// What a model file says about its model besides what is needed to run it. Nothing here depends on
 /// the clock or the machine: the same fit gives the same bytes.

@@ -13,7 +13,7 @@
 namespace torsio {
 
 /// A larger file of another program is refused: what it unfolds to in memory is many times its size.
-inline constexpr std::size_t kMostForeignBytes = std::size_t{64} << 20;
+inline constexpr std::size_t kMaxForeignBytes = std::size_t{64} << 20;
 
 /// What a network of another program does one after the other, in double so that stages may be
 /// multiplied into each other without loss.

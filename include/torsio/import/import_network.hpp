@@ -31,7 +31,7 @@ struct ForeignFile {
   Source source;
 };
 
-/// @throws Error if the file cannot be read or is larger than `kMostForeignBytes`.
+/// @throws Error if the file cannot be read or is larger than `kMaxForeignBytes`.
 [[nodiscard]] ForeignFile read_foreign_file(const std::string& path);
 
 struct ImportedModel {

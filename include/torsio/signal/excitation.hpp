@@ -138,14 +138,14 @@ class Multisine {
 
 /// White Gaussian steps through a Butterworth low-pass, scaled to a standard deviation of `rms` in
 /// the long run; starts at rest. Specification 4.7.
-class RandomWalk {
+class BandLimitedNoise {
  public:
   struct Parameters {
     double rms = 1.0;        ///< >= 0
     double cutoff_Hz = 1.0;  ///< as `Lowpass` takes it
     std::uint64_t seed = 1;
   };
-  RandomWalk(const Parameters& parameters, double sample_rate_Hz);
+  BandLimitedNoise(const Parameters& parameters, double sample_rate_Hz);
   double step() noexcept TORSIO_REALTIME;
   void reset() noexcept;
 

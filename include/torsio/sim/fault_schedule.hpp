@@ -17,12 +17,12 @@ enum class FaultKind : std::uint8_t {
   jump,    ///< `amount` too much
   drift,  ///< of a sensor: `amount` too much for each second since the start; of a part: its factor
           ///< goes from 1 to `amount` in `over_s` and stays there
-  flip,   ///< the sign is wrong
-  coarse,  ///< nothing finer than `amount` is left
-  silent,  ///< delivers nothing: the last value is held, and not fresh
-  nan,     ///< no number
-  broken,  ///< the spring's torque falls to the share `amount`, 0 for a spring in two pieces
-  bottom,  ///< the spring's deflection meets a stop at `amount` radians, to either side
+  sign_flip,  ///< the sign is wrong
+  quantised,  ///< nothing finer than `amount` is left
+  dropout,    ///< delivers nothing: the last value is held, and not fresh
+  nan,        ///< no number
+  broken,     ///< the spring's torque falls to the share `amount`, 0 for a spring in two pieces
+  bottom,     ///< the spring's deflection meets a stop at `amount` radians, to either side
 };
 
 /// One thing that goes wrong, and when.

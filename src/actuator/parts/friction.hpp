@@ -45,8 +45,8 @@ class LuGreFriction {
     const double level_Nm = parameters_.coulomb_Nm + parameters_.load_factor * std::abs(load_Nm);
     force_Nm_ = relaxed_bristle(force_Nm_, speed_rad_s, level_Nm * stribeck_(speed_rad_s),
                                 stiffness_Nm_rad_, dt_s);
-    const double most_Nm = parameters_.static_ratio * level_Nm;
-    force_Nm_ = std::min(std::max(force_Nm_, -most_Nm), most_Nm);
+    const double max_Nm = parameters_.static_ratio * level_Nm;
+    force_Nm_ = std::min(std::max(force_Nm_, -max_Nm), max_Nm);
     return force_Nm_ + viscous_Nm;
   }
 

@@ -49,8 +49,8 @@ class LuGreSlip {
     const double target_Nm = std::copysign(limit_Nm_ * over_limit, increment_rad);
     force_Nm_ +=
         (force_Nm_ - target_Nm) * std::expm1(-std::abs(increment_rad) * per_bristle_ / over_limit);
-    const double most_Nm = parameters_.static_ratio * limit_Nm_;
-    force_Nm_ = std::min(std::max(force_Nm_, -most_Nm), most_Nm);
+    const double max_Nm = parameters_.static_ratio * limit_Nm_;
+    force_Nm_ = std::min(std::max(force_Nm_, -max_Nm), max_Nm);
     return force_Nm_;
   }
 

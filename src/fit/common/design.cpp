@@ -12,7 +12,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostKnots = 64;
+constexpr std::size_t kMaxKnots = 64;
 
 std::size_t input_named(const std::string& expression, const TrainingData& data) {
   const auto input = std::ranges::find(data.inputs, expression, &InputInfo::expression);
@@ -98,13 +98,13 @@ Groups groups_by(const std::string& schedule, const TrainingData& data, const Ma
   groups.frame.scheduled = true;
   groups.frame.feature = input_named(schedule, data);
   std::map<double, std::vector<std::size_t>> by_value;
-  for (std::size_t n = 0; n < features.rows && by_value.size() <= kMostKnots; ++n)
+  for (std::size_t n = 0; n < features.rows && by_value.size() <= kMaxKnots; ++n)
     by_value[features(n, groups.frame.feature)].push_back(n);
-  if (by_value.size() < 2 || by_value.size() > kMostKnots)
+  if (by_value.size() < 2 || by_value.size() > kMaxKnots)
     throw Error({.place = "option schedule: " + schedule,
-                 .expected = "2 to " + std::to_string(kMostKnots) +
+                 .expected = "2 to " + std::to_string(kMaxKnots) +
                              " distinct values in the training data, each of them a knot",
-                 .found = by_value.size() > kMostKnots ? "more" : "one value",
+                 .found = by_value.size() > kMaxKnots ? "more" : "one value",
                  .advice = "Schedule over a condition of the records, which is constant in each."});
   for (auto& [knot, samples] : by_value) {
     groups.frame.knots.push_back(knot);

@@ -23,10 +23,11 @@ struct Residual {
 std::vector<Residual> residuals(AnyModel& model, const TrainingData& data) {
   std::vector<Residual> all;
   for (const Sequence& sequence : data.sequences) {
-    const std::vector<Estimate> told = run(model, sequence);
-    for (std::size_t n = 0; n < told.size(); ++n)
-      if (sequence.use[n] != 0 && std::isfinite(told[n].value) && told[n].fault == Fault::none)
-        all.push_back({told[n].value, told[n].value - sequence.target[n]});
+    const std::vector<Estimate> estimates = run(model, sequence);
+    for (std::size_t n = 0; n < estimates.size(); ++n)
+      if (sequence.use[n] != 0 && std::isfinite(estimates[n].value) &&
+          estimates[n].fault == Fault::none)
+        all.push_back({estimates[n].value, estimates[n].value - sequence.target[n]});
   }
   return all;
 }
@@ -102,7 +103,7 @@ LinearFallback linear_fallback(const TrainingData& data) {
 
 ResidualTable residual_table(AnyModel model, const TrainingData& data) {
   std::vector<Residual> all = residuals(model, data);
-  const std::size_t regions = std::min(all.size() / kResidualsPerRegion, kMostResidualRegions);
+  const std::size_t regions = std::min(all.size() / kResidualsPerRegion, kMaxResidualRegions);
   if (regions == 0) return {};
   std::ranges::stable_sort(all, {}, &Residual::value);
   if (!(all.front().value < all.back().value)) return {};  // one output: no regions

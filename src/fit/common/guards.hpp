@@ -19,7 +19,7 @@ namespace torsio {
 [[nodiscard]] LinearFallback linear_fallback(const TrainingData& data);
 
 inline constexpr std::size_t kResidualsPerRegion = 50;
-inline constexpr std::size_t kMostResidualRegions = 16;
+inline constexpr std::size_t kMaxResidualRegions = 16;
 
 /// Root mean square of the model's residuals by region of its own output: up to 16 regions of equal
 /// sample count, at least 50 samples each. It is the spread about 0, not about the region's mean: a

@@ -3,23 +3,23 @@
 namespace torsio {
 
 std::vector<Estimate> run(AnyModel& model, const Sequence& sequence) {
-  std::vector<Estimate> told(sequence.features.rows);
+  std::vector<Estimate> estimates(sequence.features.rows);
   model.reset();
-  for (std::size_t n = 0; n < told.size(); ++n) {
+  for (std::size_t n = 0; n < estimates.size(); ++n) {
     if (sequence.has_features(n))
-      told[n] = model.step(sequence.features.row(n));
+      estimates[n] = model.step(sequence.features.row(n));
     else
-      told[n].fault = Fault::input_not_finite;
+      estimates[n].fault = Fault::input_not_finite;
   }
-  return told;
+  return estimates;
 }
 
 Metrics evaluate(AnyModel model, const TrainingData& data) {
   MetricsAccumulator accumulator;
   for (const Sequence& sequence : data.sequences) {
-    const std::vector<Estimate> told = run(model, sequence);
-    for (std::size_t n = 0; n < told.size(); ++n)
-      if (sequence.use[n] != 0) accumulator.add(told[n].value, sequence.target[n]);
+    const std::vector<Estimate> estimates = run(model, sequence);
+    for (std::size_t n = 0; n < estimates.size(); ++n)
+      if (sequence.use[n] != 0) accumulator.add(estimates[n].value, sequence.target[n]);
   }
   return accumulator.metrics();
 }

@@ -20,7 +20,7 @@ namespace {
 
 void check_count(std::size_t samples, bool with_std_dev) {
   const std::size_t most =
-      with_std_dev ? GaussianProcess::kMostPointsWithStdDev : GaussianProcess::kMostPoints;
+      with_std_dev ? GaussianProcess::kMaxPointsWithStdDev : GaussianProcess::kMaxPoints;
   if (samples <= most) return;
   throw UsageError(
       {.place = "option samples",

@@ -28,7 +28,7 @@ struct GaussianProcessOptions {
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.kernel, kKernelOption);
     visit(self.samples, {.name = "samples",
-                         .maximum = GaussianProcess::kMostPoints,
+                         .maximum = GaussianProcess::kMaxPoints,
                          .help = "at most so many training samples, drawn by chance; 0: all"});
     visit(self.restarts,
           {.name = "restarts",

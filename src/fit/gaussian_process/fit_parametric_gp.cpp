@@ -27,8 +27,8 @@ constexpr double kPaperStart = 0.3;
 constexpr double kPaperRate = 0.1;
 constexpr std::size_t kWidenEvery = 1000;
 constexpr double kWidenUntil = 0.8;
-constexpr std::size_t kMostClustered = 20000;  // more samples do not move the centres
-constexpr double kFirstNoise = 0.1;            // variance of the standardised target
+constexpr std::size_t kMaxClustered = 20000;  // more samples do not move the centres
+constexpr double kFirstNoise = 0.1;           // variance of the standardised target
 
 /// Adam (Kingma and Ba 2015) with its usual numbers.
 class Adam {
@@ -59,7 +59,7 @@ class Adam {
 struct Split {
   Table training;
   Table judging;
-  std::string judged_on;
+  std::string tested_on;
 };
 
 void append(Table& table, std::span<const double> features, double target) {
@@ -74,9 +74,9 @@ Split split_of(const TrainingData& data, const FitContext& context) {
   if (context.validation != nullptr)
     return {.training = std::move(all),
             .judging = usable_table(*context.validation),
-            .judged_on = "the validation records"};
+            .tested_on = "the validation records"};
   Split split{
-      .training = {}, .judging = {}, .judged_on = "a fifth of the training samples, held out"};
+      .training = {}, .judging = {}, .tested_on = "a fifth of the training samples, held out"};
   for (std::size_t n = 0; n < all.target.size(); ++n)
     append(interleaved_fold(n, all.target.size()) == kFolds - 1 ? split.judging : split.training,
            all.features.row(n), all.target[n]);
@@ -123,9 +123,9 @@ class Learner {
     const double share = 1.0 / static_cast<double>(batch.size());
     const bool by_data = options_.mode != ParametricGpMode::nlml && !options_.kernel_plain;
     for (const std::size_t n : batch) {
-      const auto told = trainer.predict(table.features.row(n));
+      const auto predicted = trainer.predict(table.features.row(n));
       // Taken in, it would spoil what was learned.
-      if (!std::isfinite(told.mean) || !(told.variance + trainer.noise_variance() > 0.0))
+      if (!std::isfinite(predicted.mean) || !(predicted.variance + trainer.noise_variance() > 0.0))
         return false;
       if (by_data) trainer.add_data_gradient(table.target[n], share);
       trainer.add_noise_gradient(table.target[n], share);
@@ -211,7 +211,7 @@ ParametricGp::Parameters parameters_of(const ParametricGpTrainer& trainer,
   ParametricGp::Parameters parameters{.scaling = scaling,
                                       .kernel = trainer.kernel().expression(),
                                       .noise_variance = trainer.noise_variance(),
-                                      .points = trainer.points(),
+                                      .inducing_points = trainer.points(),
                                       .weights = {weights.begin(), weights.end()},
                                       .explained = {}};
   const std::size_t size = trainer.points().rows;
@@ -237,9 +237,9 @@ double rmse_of(const ParametricGp::Parameters& parameters, const Table& table) {
   ParametricGp model(parameters);
   double sum = 0.0;
   for (std::size_t n = 0; n < table.target.size(); ++n) {
-    const Estimate told = model.step(table.features.row(n));
-    if (told.fault != Fault::none) return std::numeric_limits<double>::infinity();
-    sum += (told.value - table.target[n]) * (told.value - table.target[n]);
+    const Estimate predicted = model.step(table.features.row(n));
+    if (predicted.fault != Fault::none) return std::numeric_limits<double>::infinity();
+    sum += (predicted.value - table.target[n]) * (predicted.value - table.target[n]);
   }
   return std::sqrt(sum / static_cast<double>(table.target.size()));
 }
@@ -272,9 +272,9 @@ void check_domain(const Kernel& kernel, const Matrix& centres, const Matrix& sam
 std::vector<std::string> notes_of(const Descent& descent, const ParametricGpOptions& options,
                                   std::size_t points, const NetworkScaling& scaling) {
   std::vector<std::string> notes;
-  if (points < options.clusters)
+  if (points < options.inducing_points)
     notes.push_back(fmt::format("only {} samples differ: as many clusters instead of {}", points,
-                                options.clusters));
+                                options.inducing_points));
   if (!descent.end.empty()) notes.push_back(descent.end);
   notes.push_back(fmt::format(
       "kernel {}; noise {:.3g}{}", description_of(descent.trainer.kernel().expression()),
@@ -289,7 +289,7 @@ void check_memory(const VariationalGpOptions& options, const TrainingData& data)
   const std::size_t used = options.samples == 0 ? all : std::min(all, options.samples);
   require_memory({.what = "the search over all samples and points",
                   .bytes = kTables * sizeof(double) * static_cast<double>(used) *
-                           static_cast<double>(std::min(options.points, used)),
+                           static_cast<double>(std::min(options.inducing_points, used)),
                   .count = used,
                   .counted = "samples",
                   .advice = "Set samples={} or less, or fewer points."});
@@ -332,8 +332,8 @@ Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data, const Parametri
       options.kernel_plain ? no_scaling(data.input_count()) : scaling_of(split.training);
   const Table table = standardised(scaling, split.training);
 
-  Matrix centres =
-      cluster_centres(thinned(table, kMostClustered, random).features, options.clusters, random);
+  Matrix centres = cluster_centres(thinned(table, kMaxClustered, random).features,
+                                   options.inducing_points, random);
   if (!options.kernel_plain)
     expression = started(std::move(expression), options.mode, median_distance(centres, random));
   const Kernel kernel(expression, data.input_count());
@@ -359,7 +359,7 @@ Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data, const Parametri
   const bool is_better = refitted_rmse < learned_rmse;
   notes.push_back(fmt::format(
       "RMSE on {}: {:.4g} as learned, {:.4g} by the closed form over all samples, which is {}",
-      context.error_of ? "a free run" : split.judged_on, learned_rmse, refitted_rmse,
+      context.error_of ? "a free run" : split.tested_on, learned_rmse, refitted_rmse,
       is_better ? "kept" : "not kept"));
   return {is_better ? std::move(refitted) : std::move(parameters), std::move(notes)};
 }
@@ -377,7 +377,7 @@ Fitted<ParametricGp> fit_variational_gp(const TrainingData& data,
   const NetworkScaling scaling = scaling_of(table);
   table = standardised(scaling, std::move(table));
   const Table part = thinned(table, options.samples, random);
-  const Matrix points = cluster_centres(part.features, options.points, random);
+  const Matrix points = cluster_centres(part.features, options.inducing_points, random);
   set_start(expression, median_distance(points, random));
   Kernel kernel(expression, data.input_count());
 
@@ -400,7 +400,7 @@ Fitted<ParametricGp> fit_variational_gp(const TrainingData& data,
   return {{.scaling = scaling,
            .kernel = kernel.expression(),
            .noise_variance = noise_variance,
-           .points = points,
+           .inducing_points = points,
            .weights = std::move(posterior.weights),
            .explained = std::move(posterior.explained)},
           std::move(notes)};

@@ -38,7 +38,7 @@ using PlainKernel = std::array<double, 9>;
 struct ParametricGpOptions {
   ParametricGpMode mode = ParametricGpMode::recommended;
   std::string kernel = "se*(linear+periodic*rq)";  ///< see `parse_kernel`
-  std::size_t clusters = 14;                       ///< M
+  std::size_t inducing_points = 14;                ///< M
   std::size_t updates = 20000;                     ///< samples taken in, drawn by chance
   std::size_t batch = 1;        ///< samples between two steps of the kernel's numbers
   double learning_rate = 0.01;  ///< of Adam; `paper` has its own
@@ -50,10 +50,10 @@ struct ParametricGpOptions {
     visit(self.mode,
           {.name = "mode", .help = "what the kernel descends on", .choices = kParametricGpModes});
     visit(self.kernel, kKernelOption);
-    visit(self.clusters, {.name = "clusters",
-                          .minimum = 1,
-                          .maximum = ParametricGp::kMostPoints,
-                          .help = "hypothetical inputs"});
+    visit(self.inducing_points, {.name = "inducing_points",
+                                 .minimum = 1,
+                                 .maximum = ParametricGp::kMaxPoints,
+                                 .help = "number of inducing points"});
     visit(self.updates,
           {.name = "updates", .maximum = 1e9, .help = "samples taken in, drawn by chance"});
     visit(self.batch, {.name = "batch",
@@ -101,17 +101,17 @@ struct ParametricGpOptions {
 
 struct VariationalGpOptions {
   std::string kernel = "linear_ard+matern52_ard";  ///< see `parse_kernel`
-  std::size_t points = 100;                        ///< M
+  std::size_t inducing_points = 100;               ///< M
   std::size_t samples = 5000;    ///< that the kernel's numbers are found on, at most; 0: all
   std::size_t iterations = 100;  ///< at most
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.kernel, kKernelOption);
-    visit(self.points, {.name = "points",
-                        .minimum = 1,
-                        .maximum = ParametricGp::kMostPoints,
-                        .help = "hypothetical inputs"});
+    visit(self.inducing_points, {.name = "inducing_points",
+                                 .minimum = 1,
+                                 .maximum = ParametricGp::kMaxPoints,
+                                 .help = "number of inducing points"});
     visit(self.samples, {.name = "samples",
                          .maximum = 1e9,
                          .help = "that the kernel's numbers are found on, at most; 0: all"});

@@ -13,7 +13,7 @@ std::vector<FamilyInfo> gaussian_process_families() {
            .summary = "exact Gaussian process over some hundred samples"}),
       family_of<fit_parametric_gp>(
           {.name = ParametricGp::kFamily,
-           .summary = "Gaussian process at a few hypothetical inputs, learned sample by sample"}),
+           .summary = "Gaussian process at a few inducing points, learned sample by sample"}),
       family_of<fit_variational_gp>({.name = "parametric_gp_variational",
                                      .summary = "the same by a variational bound, in closed form",
                                      .model_family = ParametricGp::kFamily})};

@@ -125,9 +125,9 @@ Table thinned(const Table& table, std::size_t most, Random& random) {
 }
 
 double median_distance(const Matrix& points, Random& random) {
-  constexpr std::size_t kMostPairs = 1000;
+  constexpr std::size_t kMaxPairs = 1000;
   std::vector<double> squares;
-  for (std::size_t k = 0; k < kMostPairs && points.rows > 1; ++k) {
+  for (std::size_t k = 0; k < kMaxPairs && points.rows > 1; ++k) {
     const std::size_t a = random.below(points.rows);
     const std::size_t b = random.below(points.rows);
     if (a != b) squares.push_back(square_distance(points.row(a), points.row(b)));

@@ -15,9 +15,9 @@ constexpr double kWidest = 13.8;
 
 }  // namespace
 
-KernelSearch::KernelSearch(const Kernel& kernel, std::size_t most_iterations)
-    : iterations(most_iterations) {
-  settings.iterations = most_iterations;
+KernelSearch::KernelSearch(const Kernel& kernel, std::size_t max_iterations)
+    : iterations(max_iterations) {
+  settings.iterations = max_iterations;
   settings.tolerance = 1e-8;
   settings.lowest.assign(kernel.parameter_count() + 1, -kWidest);
   settings.highest.assign(kernel.parameter_count() + 1, kWidest);

@@ -17,7 +17,7 @@ struct KernelSearch {
   std::size_t iterations = 100;
   LbfgsSettings settings;
 
-  KernelSearch(const Kernel& kernel, std::size_t most_iterations);
+  KernelSearch(const Kernel& kernel, std::size_t max_iterations);
 };
 
 /// ln sigma^2 to start from, and its least: the floor of specification 3.3.

@@ -12,7 +12,7 @@
 
 namespace torsio {
 
-/// Values u ~ N(m, S) of a Gaussian process at hypothetical inputs Z, learned sample by sample, and
+/// Values u ~ N(m, S) of a Gaussian process at inducing points Z, learned sample by sample, and
 /// gradients by the kernel's numbers. See `fit_parametric_gp` for the equations.
 class ParametricGpTrainer {
  public:

@@ -10,7 +10,7 @@
 
 namespace torsio {
 
-/// The posterior of values u at hypothetical inputs Z, in closed form for a fixed kernel. With
+/// The posterior of values u at inducing points Z, in closed form for a fixed kernel. With
 ///
 ///     Lambda_n = k(x_n, x_n) - q_n . K^-1 q_n + sigma^2  (FITC), or sigma^2 (the optimum of Titsias'
 ///     bound), and A = K + sum_n q_n q_n^T / Lambda_n:

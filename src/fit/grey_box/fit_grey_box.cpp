@@ -56,8 +56,8 @@ double rms_of(const TrainingData& data, AnyModel* model) {
   for (const Sequence& sequence : data.sequences) {
     for (std::size_t n = 0; n < sequence.target.size(); ++n) {
       if (sequence.use[n] == 0) continue;
-      const double told = model == nullptr ? 0.0 : model->step(sequence.features.row(n)).value;
-      sum += (sequence.target[n] - told) * (sequence.target[n] - told);
+      const double estimate = model == nullptr ? 0.0 : model->step(sequence.features.row(n)).value;
+      sum += (sequence.target[n] - estimate) * (sequence.target[n] - estimate);
       ++count;
     }
   }
@@ -77,8 +77,8 @@ std::pair<TrainingData, TrainingData> parted(const TrainingData& data) {
   for (std::size_t s = 0; s < data.sequences.size(); ++s) {
     const std::size_t samples = data.sequences[s].use.size();
     for (std::size_t n = 0; n < samples; ++n) {
-      const bool is_judged = interleaved_fold(n, samples) == 0;
-      (is_judged ? parts.first : parts.second).sequences[s].use[n] = 0;
+      const bool is_scored = interleaved_fold(n, samples) == 0;
+      (is_scored ? parts.first : parts.second).sequences[s].use[n] = 0;
     }
   }
   return parts;
@@ -108,10 +108,10 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
   const double rms = rms_of(left, nullptr);
   if (options.residual == ResidualKind::automatic) {
     constexpr double kWorthwhile = 0.98;
-    const auto [learned, judged] = parted(left);
+    const auto [learned, scored] = parted(left);
     AnyModel trial = residual_model(learned, options.residual, context);
-    const double without = rms_of(judged, nullptr);
-    const double with = rms_of(judged, &trial);
+    const double without = rms_of(scored, nullptr);
+    const double with = rms_of(scored, &trial);
     const bool is_kept = with < kWorthwhile * without;
     fitted.notes.push_back(fmt::format(
         "a network on what is left over: {:.4g} instead of {:.4g} on a fifth of the data "

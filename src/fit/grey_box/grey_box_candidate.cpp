@@ -13,10 +13,10 @@ namespace {
 using Index = Eigen::Index;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr std::array<std::size_t, GreyBoxChoice::kMostSlips + 1> kSlips{0, 1, 2, 4, 8};
-constexpr std::array<std::size_t, GreyBoxChoice::kMostBranches + 1> kBranches{0, 3, 6};
+constexpr std::array<std::size_t, GreyBoxChoice::kMaxSlips + 1> kSlips{0, 1, 2, 4, 8};
+constexpr std::array<std::size_t, GreyBoxChoice::kMaxBranches + 1> kBranches{0, 3, 6};
 constexpr std::array kSmoothing{1e-6, 1e-4, 1e-2};
-constexpr std::size_t kMostColumns = 160;
+constexpr std::size_t kMaxColumns = 160;
 
 /// Indices that n of `count` geometric values keep: from the finest on, evenly spread.
 std::vector<std::size_t> kept(std::size_t n, std::size_t count) {
@@ -151,7 +151,7 @@ GreyBoxCandidate::GreyBoxCandidate(const GreyBoxSums& sums, const GreyBoxChoice&
 
 bool GreyBoxCandidate::is_possible() const noexcept {
   const std::size_t columns = structure_.columns();
-  return columns <= kMostColumns && kSamplesPerTerm * columns * sums_.levels <= sums_.samples;
+  return columns <= kMaxColumns && kSamplesPerTerm * columns * sums_.levels <= sums_.samples;
 }
 
 std::vector<NormalEquations> GreyBoxCandidate::projected(

@@ -20,8 +20,8 @@ struct GreyBoxChoice {
   bool has_viscous = false;   ///< slopes of rates
   bool has_coulomb = false;   ///< tanh of rates
 
-  static constexpr std::size_t kMostSlips = 4;     ///< the highest place
-  static constexpr std::size_t kMostBranches = 2;  ///< the highest place
+  static constexpr std::size_t kMaxSlips = 4;     ///< the highest place
+  static constexpr std::size_t kMaxBranches = 2;  ///< the highest place
 
   bool operator==(const GreyBoxChoice&) const = default;
 };

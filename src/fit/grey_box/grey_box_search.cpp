@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kWorthwhile = 0.99;
 
-/// One step up any ladder from `at`.
+/// One step up any sequence from `at`.
 std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
   std::vector<GreyBoxChoice> next;
   const auto with = [&](auto change) {
@@ -21,11 +21,11 @@ std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
   // Two at a time as well: three knots show nothing of a curve that stiffens both ways alike.
   for (std::size_t by = 1; by <= 2; ++by) {
     if (at.curve + by <= GreyBoxSums::kFinest) with([by](auto& c) { c.curve += by; });
-    if (at.slips + by <= GreyBoxChoice::kMostSlips) with([by](auto& c) { c.slips += by; });
+    if (at.slips + by <= GreyBoxChoice::kMaxSlips) with([by](auto& c) { c.slips += by; });
   }
   if (at.slips > 0 && at.forces < GreyBoxSums::kFinest) with([](auto& c) { ++c.forces; });
   if (at.slips > 1) with([](auto& c) { --c.slips; });
-  if (at.branches < GreyBoxChoice::kMostBranches) with([](auto& c) { ++c.branches; });
+  if (at.branches < GreyBoxChoice::kMaxBranches) with([](auto& c) { ++c.branches; });
   if (at.smoothing > 0) with([](auto& c) { --c.smoothing; });
   if (!at.is_passive && !at.is_signed && at.slips > 0) with([](auto& c) { c.is_signed = true; });
   // Friction of the wrong sign somewhere: no force >= 0 is a step towards it.

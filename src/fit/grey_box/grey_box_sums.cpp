@@ -13,7 +13,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostSummed = 100000;  // rows; of more every n-th is taken
+constexpr std::size_t kMaxSummed = 100000;  // rows; of more every n-th is taken
 constexpr std::size_t kRecordsToLeaveOut = 3;
 
 /// [lowest, highest] first input. @throws Error if that is no range, or of few samples.
@@ -143,7 +143,7 @@ std::vector<Range> ranges_of_others(const GreyBoxSums& sums, const TrainingData&
 void add_data(GreyBoxSums& sums, const TrainingData& data) {
   const std::vector<Range> others =
       sums.is_by_record ? ranges_of_others(sums, data) : std::vector<Range>{};
-  const std::size_t stride = (sums.samples + kMostSummed - 1) / kMostSummed;
+  const std::size_t stride = (sums.samples + kMaxSummed - 1) / kMaxSummed;
   RowSum row;
   std::size_t record = 0;
   std::size_t used = 0;

@@ -31,12 +31,12 @@ void check_options(const HammersteinWienerOptions& options) {
                         .expected = fmt::format("{} to {}", lowest, highest),
                         .found = fmt::format("{}", *value)});
   };
-  constexpr std::size_t kMostOrder = 2 * kMostSections;
-  require(options.zeros, "zeros", 0, kMostOrder);
-  require(options.poles, "poles", 0, kMostOrder);
-  require(options.input_degree, "input_degree", 1, StaticCurve::kMostValues - 1);
-  require(options.output_degree, "output_degree", 1, StaticCurve::kMostValues - 1);
-  require(options.knots, "knots", 3, StaticCurve::kMostValues);
+  constexpr std::size_t kMaxOrder = 2 * kMaxSections;
+  require(options.zeros, "zeros", 0, kMaxOrder);
+  require(options.poles, "poles", 0, kMaxOrder);
+  require(options.input_degree, "input_degree", 1, StaticCurve::kMaxValues - 1);
+  require(options.output_degree, "output_degree", 1, StaticCurve::kMaxValues - 1);
+  require(options.knots, "knots", 3, StaticCurve::kMaxValues);
   require(options.iterations, "iterations", 1, 100'000);
 }
 
@@ -49,7 +49,7 @@ void check_continuous(const HammersteinWienerOptions& options, const WienerShape
 }
 
 void check_data(const TrainingData& data, const WienerData& own) {
-  if (own.judged_samples() == 0)
+  if (own.scored_samples() == 0)
     throw Error({.place = "training records", .expected = "measured samples", .found = "none"});
   if (!(own.range.lowest < own.range.highest))
     throw Error({.place = data.inputs.front().expression,
@@ -62,11 +62,11 @@ void check_data(const TrainingData& data, const WienerData& own) {
 
 void check_length(const WienerData& own, const WienerShape& shape) {
   const std::size_t numbers = shape.zeros + shape.poles + shape.input_values + shape.output_values;
-  if (own.judged_samples() < kSamplesPerNumber * numbers)
+  if (own.scored_samples() < kSamplesPerNumber * numbers)
     throw Error({.place = "training records",
                  .expected = fmt::format("{} measured samples or more, ten for each of {} numbers",
                                          kSamplesPerNumber * numbers, numbers),
-                 .found = fmt::format("{}", own.judged_samples()),
+                 .found = fmt::format("{}", own.scored_samples()),
                  .advice = "Take lower orders and degrees, or give longer records."});
   const std::size_t lag = std::max(shape.zeros, shape.poles);
   const bool outlasts = std::ranges::any_of(
@@ -95,7 +95,7 @@ WienerFit fit_or_refuse(const WienerData& own, const WienerShape& shape, std::si
                  .expected = fmt::format("an end within {} iterations", iterations),
                  .found = fmt::format(
                      "RMSE {:.4g} and still falling",
-                     std::sqrt(fit->sum_of_squares / static_cast<double>(own.judged_samples()))),
+                     std::sqrt(fit->sum_of_squares / static_cast<double>(own.scored_samples()))),
                  .advice = "Raise iterations, or take lower orders and degrees."});
   return *std::move(fit);
 }
@@ -120,9 +120,9 @@ std::string roots_text(const std::vector<std::complex<double>>& roots, double pe
   return parts.empty() ? "none" : fmt::format("{}", fmt::join(parts, ", "));
 }
 
-class Telling {
+class Summary {
  public:
-  Telling(const TrainingData& data, const WienerData& own) : data_(data), own_(own) {}
+  Summary(const TrainingData& data, const WienerData& own) : data_(data), own_(own) {}
 
   void linear_part(const HammersteinWiener::Parameters& p, std::vector<std::string>& notes) const {
     notes.push_back(fmt::format("poles {}; zeros {}",
@@ -199,7 +199,7 @@ class Telling {
 };
 
 double rmse_of(const WienerData& own, double sum_of_squares) {
-  return std::sqrt(sum_of_squares / static_cast<double>(own.judged_samples()));
+  return std::sqrt(sum_of_squares / static_cast<double>(own.scored_samples()));
 }
 
 ContinuousFit refine_or_refuse(const WienerData& own, const WienerNumbers& numbers,
@@ -256,7 +256,7 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
     return !context.progress || context.progress(begin + (1.0 - begin) * share, doing);
   };
   WienerFit fit = fit_or_refuse(own, shape, options.iterations, last);
-  const Telling telling(data, own);
+  const Summary telling(data, own);
   telling.table(fit.numbers, fitted);
   const double discrete_rmse = rmse_of(own, fit.sum_of_squares);
   std::ranges::move(continuous_notes(parameters_of(own, fit.numbers, 1)),

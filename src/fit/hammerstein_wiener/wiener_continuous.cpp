@@ -135,7 +135,7 @@ ContinuousFit refined_in_continuous_time(const WienerData& data, const WienerNum
   const WienerChart chart = continuous_chart(sections, slowest);
   const SearchResult found =
       minimise_squares_from(wiener_problem(error, error.size(), chart), starts,
-                            {.most_iterations = iterations,
+                            {.max_iterations = iterations,
                              .lower = lowest_theta(sections, error.size(), slowest),
                              .tolerance = 1e-7,  // a slow pole's valley has no end that matters
                              .progress = progress});

@@ -68,10 +68,10 @@ double WienerData::slowest_pole() const {
   return std::exp(-1.0 / (kLongestMemory * static_cast<double>(longest)));
 }
 
-std::size_t WienerData::judged_samples() const {
+std::size_t WienerData::scored_samples() const {
   std::size_t count = 0;
   for (const WienerRecord& record : records)
-    count += static_cast<std::size_t>(std::ranges::count_if(record.judged, std::identity{}));
+    count += static_cast<std::size_t>(std::ranges::count_if(record.scored, std::identity{}));
   return count;
 }
 
@@ -89,7 +89,7 @@ WienerData wiener_data(const TrainingData& data) {
       if (!sequence.has_features(n)) continue;
       record.input.push_back(sequence.features(n, 0));
       record.target.push_back(sequence.target[n]);
-      record.judged.push_back(sequence.use[n]);
+      record.scored.push_back(sequence.use[n]);
       if (sequence.use[n] == 0) continue;
       made.range.lowest = std::min(made.range.lowest, record.input.back());
       made.range.highest = std::max(made.range.highest, record.input.back());
@@ -121,7 +121,7 @@ WienerData front_of(const WienerData& data, std::size_t samples) {
         all <= samples ? record.input.size() : record.input.size() * samples / all;
     record.input.resize(kept);
     record.target.resize(kept);
-    record.judged.resize(kept);
+    record.scored.resize(kept);
   }
   return front;
 }
@@ -319,7 +319,7 @@ bool WienerError::pass(const WienerNumbers& numbers, bool with_slopes, const Tak
       }
       const auto error = part(error_at);
       for (std::size_t n = 0; n < count; ++n) {
-        if (record.judged[begin + n] == 0) {
+        if (record.scored[begin + n] == 0) {
           block.row(static_cast<Index>(n)).setZero();
           continue;
         }
@@ -335,34 +335,35 @@ bool WienerError::pass(const WienerNumbers& numbers, bool with_slopes, const Tak
 
 double WienerError::sum_of_squares(const WienerNumbers& numbers) const {
   double sum = 0.0;
-  const bool is_told =
+  const bool is_determined =
       pass(numbers, false, [&](const Block& block, auto, std::size_t count, auto&) {
         sum += block.col(1).head(static_cast<Index>(count)).squaredNorm();
       });
-  return is_told ? sum : kNotMeasured;
+  return is_determined ? sum : kNotMeasured;
 }
 
 bool WienerError::products(const WienerNumbers& numbers, Matrix& gram) const {
   const auto columns = static_cast<Index>(size()) + 2;
   Block sum = Block::Zero(columns, columns);
-  const bool is_told = pass(numbers, true, [&](const Block& block, auto, std::size_t count, auto&) {
-    const auto part = block.topRows(static_cast<Index>(count));
-    sum.selfadjointView<Eigen::Upper>().rankUpdate(part.transpose());
-  });
+  const bool is_determined =
+      pass(numbers, true, [&](const Block& block, auto, std::size_t count, auto&) {
+        const auto part = block.topRows(static_cast<Index>(count));
+        sum.selfadjointView<Eigen::Upper>().rankUpdate(part.transpose());
+      });
   gram = Matrix(size() + 1, size() + 1);
   const auto source = [&](std::size_t k) { return static_cast<Index>(k < size() ? k : k + 1); };
   for (std::size_t i = 0; i < gram.rows; ++i)
     for (std::size_t j = i; j < gram.rows; ++j) gram(i, j) = gram(j, i) = sum(source(i), source(j));
-  return is_told && all_finite(gram.values);
+  return is_determined && all_finite(gram.values);
 }
 
 Matrix WienerError::rows(const WienerNumbers& numbers) const {
-  Matrix all(data_.judged_samples(), size() + 1);
+  Matrix all(data_.scored_samples(), size() + 1);
   std::size_t row = 0;
   (void)pass(numbers, true,
              [&](const Block& block, std::size_t begin, std::size_t count, const WienerRecord& of) {
                for (std::size_t n = 0; n < count; ++n) {
-                 if (of.judged[begin + n] == 0) continue;
+                 if (of.scored[begin + n] == 0) continue;
                  for (std::size_t k = 0; k <= size(); ++k)
                    all(row, k) =
                        block(static_cast<Index>(n), static_cast<Index>(k < size() ? k : k + 1));
@@ -377,7 +378,7 @@ std::vector<double> WienerError::inner(const WienerNumbers& numbers) const {
   (void)pass(numbers, false,
              [&](const Block& block, std::size_t begin, std::size_t count, const WienerRecord& of) {
                for (std::size_t n = 0; n < count; ++n)
-                 if (of.judged[begin + n] != 0) all.push_back(block(static_cast<Index>(n), 0));
+                 if (of.scored[begin + n] != 0) all.push_back(block(static_cast<Index>(n), 0));
              });
   return all;
 }

@@ -20,7 +20,7 @@ void fill_basis(const StaticCurve& curve, double x, std::span<double> basis);
 struct WienerRecord {
   std::vector<double> input;
   std::vector<double> target;  ///< finite where judged
-  std::vector<std::uint8_t> judged;
+  std::vector<std::uint8_t> scored;
 };
 
 struct WienerData {
@@ -30,7 +30,7 @@ struct WienerData {
   double rest_input = 0.0;  ///< the input of that range that is nearest 0
   double deviation = 0.0;   ///< standard deviation of the judged targets
 
-  [[nodiscard]] std::size_t judged_samples() const;
+  [[nodiscard]] std::size_t scored_samples() const;
   /// Radius within which a search keeps poles: what decays slower than over ten of the longest record cannot be
   /// told from what never does.
   [[nodiscard]] double slowest_pole() const;
@@ -98,7 +98,7 @@ class WienerError {
   [[nodiscard]] std::vector<double> pack(const WienerNumbers& numbers) const;
   [[nodiscard]] WienerNumbers unpack(std::span<const double> packed) const;
   [[nodiscard]] std::size_t sections() const { return frame_.sections.rows; }
-  [[nodiscard]] std::size_t judged_samples() const { return data_.judged_samples(); }
+  [[nodiscard]] std::size_t scored_samples() const { return data_.scored_samples(); }
   [[nodiscard]] double slowest_pole() const { return data_.slowest_pole(); }
   /// Where coefficients a1, a2 of the sections stand in the packed numbers; kNowhere: not free.
   [[nodiscard]] std::pair<std::size_t, std::size_t> poles_at(std::size_t section) const;

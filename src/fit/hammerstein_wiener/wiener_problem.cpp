@@ -59,8 +59,8 @@ WienerChart stable_chart(const WienerError& error) {
 }
 
 std::vector<double> stable_start(const WienerError& error, std::span<const double> packed) {
-  static constexpr double kMost = 1.0 - 1e-6;
-  const auto inside = [](double x) { return std::clamp(x, -kMost, kMost); };
+  static constexpr double kMax = 1.0 - 1e-6;
+  const auto inside = [](double x) { return std::clamp(x, -kMax, kMax); };
   const double edge = error.slowest_pole();
   std::vector<double> theta(packed.begin(), packed.end());
   for (std::size_t i = 0; i < error.sections(); ++i) {
@@ -124,7 +124,7 @@ ResidualProblem wiener_problem(const WienerError& error, std::size_t parameters,
   return {.residuals = parameters + 1,
           .evaluate = evaluate,
           .has_jacobian = true,
-          .samples = error.judged_samples()};
+          .samples = error.scored_samples()};
 }
 
 }  // namespace torsio

@@ -16,7 +16,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostStarts = 64;  // numbers for the states that records start from
+constexpr std::size_t kMaxStarts = 64;  // numbers for the states that records start from
 
 WienerShape shape_of(const HammersteinWienerOptions& options, std::size_t zeros, std::size_t poles,
                      std::size_t input_degree, std::size_t output_degree) {
@@ -47,8 +47,8 @@ std::string text_of(const WienerShape& shape) {
 /// The data with one fold left out, or with nothing else.
 WienerData fold_of(WienerData data, std::size_t fold, bool is_held_out) {
   for (WienerRecord& record : data.records)
-    for (std::size_t n = 0; n < record.judged.size(); ++n)
-      if ((interleaved_fold(n, record.judged.size()) == fold) != is_held_out) record.judged[n] = 0;
+    for (std::size_t n = 0; n < record.scored.size(); ++n)
+      if ((interleaved_fold(n, record.scored.size()) == fold) != is_held_out) record.scored[n] = 0;
   return data;
 }
 
@@ -64,10 +64,10 @@ double held_out_error(const WienerData& data, const WienerShape& shape, std::siz
     report_progress(progress, 0.5 + 0.5 * static_cast<double>(fold) / kFolds, "held-out blocks");
     const WienerData rest = fold_of(data, fold, false);
     const WienerData held_out = fold_of(data, fold, true);
-    if (rest.judged_samples() == 0 || held_out.judged_samples() == 0) continue;
+    if (rest.scored_samples() == 0 || held_out.scored_samples() == 0) continue;
     const WienerFit fit = refined(rest, whole->numbers, iterations);
     sum += held_sum_of_squares(held_out, fit.numbers);
-    samples += held_out.judged_samples();
+    samples += held_out.scored_samples();
   }
   return samples == 0 || !std::isfinite(sum) ? kNone
                                              : std::sqrt(sum / static_cast<double>(samples));
@@ -86,10 +86,10 @@ class ShapeSearch {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const double length = (end - begin) / static_cast<double>(shapes.size());
-      const Progress told = share_of(progress_, begin + static_cast<double>(i) * length,
-                                     begin + static_cast<double>(i + 1) * length);
+      const Progress report = share_of(progress_, begin + static_cast<double>(i) * length,
+                                       begin + static_cast<double>(i + 1) * length);
       const Progress part = [&](double share, std::string_view doing) {
-        return !told || told(share, fmt::format("{}: {}", text_of(shapes[i]), doing));
+        return !report || report(share, fmt::format("{}: {}", text_of(shapes[i]), doing));
       };
       errors.push_back(held_out_error(data_, shapes[i], iterations_, part));
       least = std::min(least, errors.back());
@@ -133,7 +133,7 @@ WienerFit refined(const WienerData& data, const WienerNumbers& start, std::size_
   const std::vector<double> theta = stable_start(error, error.pack(start));
   const WienerChart chart = stable_chart(error);
   const ResidualProblem problem = wiener_problem(error, theta.size(), chart);
-  SearchOptions options{.most_iterations = iterations, .progress = progress};
+  SearchOptions options{.max_iterations = iterations, .progress = progress};
   SearchResult found = minimise_squares(problem, theta, options);
   const std::vector<double> bound = stable_bound(error);
   const auto is_beyond = [](double theta_i, double most) { return std::abs(theta_i) > most; };
@@ -153,14 +153,14 @@ WienerFit refined(const WienerData& data, const WienerNumbers& start, std::size_
 std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& shape,
                                    std::size_t iterations, const Progress& progress) {
   const std::size_t sections = (std::max({shape.zeros, shape.poles, std::size_t{1}}) + 1) / 2;
-  const bool has_start = 2 * sections * data.records.size() <= kMostStarts;
+  const bool has_start = 2 * sections * data.records.size() <= kMaxStarts;
   std::optional<WienerFit> best;
   std::vector<WienerNumbers> starts = wiener_starts(data, shape, has_start);
   // Of long records a part tells which start leads farther.
   constexpr std::size_t kEnough = 10'000;
-  if (starts.size() > 1 && data.judged_samples() > 2 * kEnough) {
+  if (starts.size() > 1 && data.scored_samples() > 2 * kEnough) {
     const WienerData part = front_of(data, kEnough);
-    if (part.judged_samples() > 0) {
+    if (part.scored_samples() > 0) {
       std::vector<WienerFit> tried;
       tried.reserve(starts.size());
       for (const WienerNumbers& start : starts) tried.push_back(refined(part, start, iterations));
@@ -228,7 +228,7 @@ double held_sum_of_squares(const WienerData& data, const WienerNumbers& numbers)
     if (numbers.start.rows > 0) model.set_state(numbers.start.row(r));
     for (std::size_t n = 0; n < record.input.size(); ++n) {
       const double value = model.step({&record.input[n], 1}).value;
-      if (record.judged[n] != 0) sum += std::pow(value - record.target[n], 2);
+      if (record.scored[n] != 0) sum += std::pow(value - record.target[n], 2);
     }
   }
   return sum;

@@ -66,10 +66,10 @@ class ColumnProducts {
 
 /// Calls take(record, sample) for each judged sample that has `lags` before it in its record.
 template <class Take>
-void for_each_judged(const WienerData& data, std::size_t lags, const Take& take) {
+void for_each_scored(const WienerData& data, std::size_t lags, const Take& take) {
   for (std::size_t r = 0; r < data.records.size(); ++r)
     for (std::size_t n = lags; n < data.records[r].input.size(); ++n)
-      if (data.records[r].judged[n] != 0) take(r, n);
+      if (data.records[r].scored[n] != 0) take(r, n);
 }
 
 Signals filtered(Signals signals, const Sections& sections, bool is_all_pole) {
@@ -117,7 +117,7 @@ LinearStart with_numerator(const WienerData& data, const Signals& inputs, const 
   const Signals v = filtered(inputs, all_pole, true);
   ColumnProducts products(zeros + 2);
   std::vector<double> row(zeros + 3);
-  for_each_judged(data, zeros, [&](std::size_t r, std::size_t n) {
+  for_each_scored(data, zeros, [&](std::size_t r, std::size_t n) {
     for (std::size_t k = 0; k <= zeros; ++k) row[k] = v[r][n - k];
     for (std::size_t k = 1; k <= zeros; ++k)
       for (std::size_t i = zeros; i >= k; --i) row[i] = row[i - 1] - row[i];
@@ -159,7 +159,7 @@ LinearStart by_steiglitz_mcbride(const WienerData& data, const Signals& inputs, 
     const Signals y = filtered(outputs, all_pole, true);
     ColumnProducts products(poles + zeros + 2);
     std::vector<double> row(poles + zeros + 3);
-    for_each_judged(data, lags, [&](std::size_t r, std::size_t n) {
+    for_each_scored(data, lags, [&](std::size_t r, std::size_t n) {
       for (std::size_t k = 1; k <= poles; ++k) row[k - 1] = -y[r][n - k];
       for (std::size_t k = 0; k <= zeros; ++k) row[poles + k] = u[r][n - k];
       row[poles + zeros + 1] = 1.0;
@@ -262,9 +262,9 @@ void hold_numerators(Sections& sections) {
   }
 }
 
-std::vector<double> judged_inputs(const WienerData& data) {
+std::vector<double> scored_inputs(const WienerData& data) {
   std::vector<double> all;
-  for_each_judged(data, 0,
+  for_each_scored(data, 0,
                   [&](std::size_t r, std::size_t n) { all.push_back(data.records[r].input[n]); });
   return all;
 }
@@ -284,7 +284,7 @@ void fit_input(const WienerData& data, WienerNumbers& numbers) {
   }
   ColumnProducts products(count + 1);
   std::vector<double> row(count + 2);
-  for_each_judged(data, 0, [&](std::size_t r, std::size_t n) {
+  for_each_scored(data, 0, [&](std::size_t r, std::size_t n) {
     for (std::size_t k = 0; k < count; ++k) row[k] = columns[k][r][n];
     row[count] = 1.0;
     row[count + 1] = data.records[r].target[n];
@@ -307,7 +307,7 @@ void fit_output(const WienerData& data, const WienerShape& shape, WienerNumbers&
   ColumnProducts products(count);
   std::vector<double> row(count + 1);
   std::size_t at = 0;
-  for_each_judged(data, 0, [&](std::size_t r, std::size_t n) {
+  for_each_scored(data, 0, [&](std::size_t r, std::size_t n) {
     fill_basis(numbers.output, x[at], std::span(row).first(count));
     row[count] = data.records[r].target[n];
     products.add(row);
@@ -338,7 +338,7 @@ std::vector<WienerNumbers> wiener_starts(const WienerData& data, const WienerSha
   for (const LinearStart& each : linear) {
     if (!std::isfinite(each.sum_of_squares)) continue;
     WienerNumbers straight{
-        .input = line_over(judged_inputs(data), shape.input_values, shape.is_piecewise_linear),
+        .input = line_over(scored_inputs(data), shape.input_values, shape.is_piecewise_linear),
         .sections = each.sections,
         .output = {},
         .start = {}};

@@ -16,7 +16,7 @@ struct Shape {
 };
 Shape shape_of(std::span<const double> theta) { return {std::exp(theta[0]), theta[1], theta[2]}; }
 
-constexpr double kMostExponent = 10.0;
+constexpr double kMaxExponent = 10.0;
 constexpr double kLeastRatio = -0.95;  ///< at -1 the force has no bound
 
 /// Differences reach over the bounds of the search by a little.
@@ -128,7 +128,7 @@ std::vector<FittedParameter> table_of(BoucWenSearch& search, const OperatorData&
 Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const BoucWenOptions& options,
                                   const Progress& progress) {
   const OperatorData runs =
-      operator_data(data, options.rates, 0, kMostResiduals / 4, 6 + data.input_count());
+      operator_data(data, options.rates, 0, kMaxResiduals / 4, 6 + data.input_count());
   constexpr double kSmallTurn = 2e-3;
   const OperatorData smooth_runs = without_small_turns(runs, kSmallTurn * runs.half_range);
   BoucWenSearch smooth_search(smooth_runs);
@@ -148,9 +148,9 @@ Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const BoucWenOptions
   std::vector<std::vector<double>> starts;
   for (const double share : {0.03, 0.3})
     for (const double ratio : {0.8, -0.3}) starts.push_back({range + std::log(share), 1.5, ratio});
-  const SearchOptions limits{.most_iterations = options.most_iterations,
+  const SearchOptions limits{.max_iterations = options.max_iterations,
                              .lower = {range + std::log(1e-4), 1.0, kLeastRatio},
-                             .upper = {highest, kMostExponent, 1.0},
+                             .upper = {highest, kMaxExponent, 1.0},
                              .typical = {1.0, 1.0, 1.0},
                              .progress = progress};
   const SearchResult near =
@@ -162,8 +162,8 @@ Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const BoucWenOptions
   const LinearSolution linear = search.solve(shape, residuals);
   const std::vector<double>& c = linear.coefficients;
   // A line takes no small steps.
-  const Shape told = c[2] == 0.0 ? Shape{runs.half_range, 1.0, 0.0} : shape;
-  Fitted<BoucWenModel> fitted{parameters_of(told, c[0], c[1], c[2]), runs.notes};
+  const Shape scaled = c[2] == 0.0 ? Shape{runs.half_range, 1.0, 0.0} : shape;
+  Fitted<BoucWenModel> fitted{parameters_of(scaled, c[0], c[1], c[2]), runs.notes};
   fitted.parameters.slopes.assign(c.begin() + 3, c.end());
   fitted.parameters.centre = runs.centre;
   fitted.parameters.half_range = runs.half_range;
@@ -173,7 +173,7 @@ Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const BoucWenOptions
         "input and the target differ in sign");
     return fitted;
   }
-  if (shape.exponent > 0.999 * kMostExponent)
+  if (shape.exponent > 0.999 * kMaxExponent)
     fitted.notes.emplace_back("n is at its bound: the knee is sharper than the data tell");
   if (found.theta[0] > highest - 1e-3)
     fitted.notes.emplace_back("z_max is at its bound: the hysteresis never comes to its end");

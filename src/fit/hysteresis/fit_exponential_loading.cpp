@@ -64,7 +64,7 @@ Fitted<ExponentialLoading> fit_exponential_loading(const TrainingData& data,
                                                    const Progress& progress) {
   const std::size_t size = options.degree + 1;
   const OperatorData runs =
-      operator_data(data, options.rates, 0, kMostResiduals, 2 + 2 * size + data.input_count());
+      operator_data(data, options.rates, 0, kMaxResiduals, 2 + 2 * size + data.input_count());
   LoadingSearch search(runs, options.degree);
   const ResidualProblem problem{
       .residuals = runs.rows(),
@@ -78,7 +78,7 @@ Fitted<ExponentialLoading> fit_exponential_loading(const TrainingData& data,
     starts.push_back({std::log(decays), std::log(decays)});
   const std::vector<double> typical{1.0, 1.0};
   const SearchResult found = converged_search(problem, starts,
-                                              {.most_iterations = options.most_iterations,
+                                              {.max_iterations = options.max_iterations,
                                                .lower = {std::log(1e-2), std::log(1e-2)},
                                                .upper = {std::log(1e4), std::log(1e4)},
                                                .typical = typical,

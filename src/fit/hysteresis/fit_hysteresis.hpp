@@ -16,22 +16,22 @@
 
 // Fits of hysteresis operators. The operator runs through every sample of a record that has
 // features (between two turns where that changes nothing, only those that are judged); usable samples are learned from, the search of a non-linear family using at most
-// `kMostResiduals` of them, evenly spread. Other inputs get slopes as in `fit_polynomial`.
+// `kMaxResiduals` of them, evenly spread. Other inputs get slopes as in `fit_polynomial`.
 //
 // All @throw Error if the first input is constant in the training data or there are too few
 // samples; those that search, too, if no start converges: a search that gave up is no fit.
 
 namespace torsio {
 
-inline constexpr std::size_t kMostResiduals = 10000;
+inline constexpr std::size_t kMaxResiduals = 10000;
 
-inline constexpr std::size_t kMostThresholds = 64;
+inline constexpr std::size_t kMaxThresholds = 64;
 inline constexpr std::size_t kHighestCurveDegree = 9;
 
 /// Options that several operators share.
 inline constexpr OptionInfo kThresholdsOption{.name = "thresholds",
                                               .minimum = 1,
-                                              .maximum = kMostThresholds,
+                                              .maximum = kMaxThresholds,
                                               .help = "of the operators, by the input's range"};
 inline constexpr OptionInfo kWeightScheduleOption{
     .name = "schedule",
@@ -84,7 +84,7 @@ struct ImprovedPrandtlIshlinskiiOptions {
   std::size_t thresholds = 8;
   std::size_t bends = 4;
   bool rates = false;
-  std::size_t most_iterations = 200;
+  std::size_t max_iterations = 200;
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
@@ -93,7 +93,7 @@ struct ImprovedPrandtlIshlinskiiOptions {
         self.bends,
         {.name = "bends", .maximum = 32, .help = "of the curve behind, half on either side of 0"});
     visit(self.rates, kRatesOption);
-    visit(self.most_iterations, kSearchIterationsOption);
+    visit(self.max_iterations, kSearchIterationsOption);
   }
 };
 
@@ -104,17 +104,17 @@ struct ImprovedPrandtlIshlinskiiOptions {
 
 struct BoucWenOptions {
   bool rates = false;
-  std::size_t most_iterations = 200;
+  std::size_t max_iterations = 200;
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.rates, kRatesOption);
-    visit(self.most_iterations, kSearchIterationsOption);
+    visit(self.max_iterations, kSearchIterationsOption);
   }
 };
 
 /// z_max, n and gamma / beta are searched from four starts; the rest is linear and solved for each
-/// of their values, the hysteresis held at or above 0. Learns from a quarter of `kMostResiduals`: its
+/// of their values, the hysteresis held at or above 0. Learns from a quarter of `kMaxResiduals`: its
 /// powers cost.
 [[nodiscard]] Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data,
                                                 const BoucWenOptions& options,
@@ -123,14 +123,14 @@ struct BoucWenOptions {
 struct BacklashOptions {
   std::size_t degree = 5;
   bool rates = false;
-  std::size_t most_iterations = 200;
+  std::size_t max_iterations = 200;
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.degree,
           {.name = "degree", .maximum = kHighestCurveDegree, .help = "of the boundaries"});
     visit(self.rates, kRatesOption);
-    visit(self.most_iterations, kSearchIterationsOption);
+    visit(self.max_iterations, kSearchIterationsOption);
   }
 };
 
@@ -147,14 +147,14 @@ struct BacklashOptions {
 struct ExponentialLoadingOptions {
   std::size_t degree = 1;
   bool rates = false;
-  std::size_t most_iterations = 200;
+  std::size_t max_iterations = 200;
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.degree,
           {.name = "degree", .maximum = kHighestCurveDegree, .help = "of the curves it nears"});
     visit(self.rates, kRatesOption);
-    visit(self.most_iterations, kSearchIterationsOption);
+    visit(self.max_iterations, kSearchIterationsOption);
   }
 };
 

@@ -158,7 +158,7 @@ Fitted<ImprovedPrandtlIshlinskii> fit_improved_prandtl_ishlinskii(
   constexpr auto kFamily = ImprovedPrandtlIshlinskii::kFamily;
   const std::size_t rate = first_rate(data, kFamily);
   const OperatorData runs =
-      operator_data(data, options.rates, rate, kMostResiduals,
+      operator_data(data, options.rates, rate, kMaxResiduals,
                     2 + data.input_count() + options.thresholds + options.bends);
   const auto plain = fit_prandtl_ishlinskii(
       data,
@@ -185,7 +185,7 @@ Fitted<ImprovedPrandtlIshlinskii> fit_improved_prandtl_ishlinskii(
                       std::span<double> jacobian) { return run.evaluate(at, residuals, jacobian); },
       .has_jacobian = true};
   SearchOptions search = bounds_of(run, start);
-  search.most_iterations = options.most_iterations;
+  search.max_iterations = options.max_iterations;
   search.progress = progress;
   const SearchResult found = converged_search(problem, {theta}, search, kFamily);
   Fitted<ImprovedPrandtlIshlinskii> fitted{run.at(found.theta), runs.notes};

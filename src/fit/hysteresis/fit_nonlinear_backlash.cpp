@@ -200,7 +200,7 @@ Fitted<Backlash<kByRate>> fit(const TrainingData& data, const BacklashOptions& o
   const std::size_t rate = kByRate ? first_rate(data, kFamily) : 0;
   const Layout layout{options.degree + 1, data.input_count()};
   const OperatorData runs =
-      operator_data(data, options.rates, rate, kMostResiduals, layout.linear() + 3);
+      operator_data(data, options.rates, rate, kMaxResiduals, layout.linear() + 3);
   BacklashRun run(runs, layout, kByRate);
   const Starts starts = starts_of(
       runs, layout, boundaries_by_direction(runs, layout, default_dead_band(data)), kByRate);
@@ -211,7 +211,7 @@ Fitted<Backlash<kByRate>> fit(const TrainingData& data, const BacklashOptions& o
               std::span<double> jacobian) { return run.evaluate(theta, residuals, jacobian); },
       .has_jacobian = true};
   const SearchResult found = converged_search(problem, starts.theta,
-                                              {.most_iterations = options.most_iterations,
+                                              {.max_iterations = options.max_iterations,
                                                .lower = starts.lower,
                                                .upper = starts.upper,
                                                .typical = starts.typical,

@@ -73,7 +73,7 @@ void set_units(OperatorData& result, const TrainingData& data) {
 }  // namespace
 
 OperatorData operator_data(const TrainingData& data, bool rates, std::size_t rate_feature,
-                           std::size_t most_rows, std::size_t parameters) {
+                           std::size_t max_rows, std::size_t parameters) {
   OperatorData result;
   const std::size_t usable = data.usable_samples();
   if (usable < kSamplesPerTerm * parameters)
@@ -82,7 +82,7 @@ OperatorData operator_data(const TrainingData& data, bool rates, std::size_t rat
                                          kSamplesPerTerm * parameters, kSamplesPerTerm, parameters),
                  .found = std::to_string(usable)});
   const std::vector<bool> sloped = sloped_inputs(data, rates, result);
-  const std::size_t stride = (usable + most_rows - 1) / most_rows;
+  const std::size_t stride = (usable + max_rows - 1) / max_rows;
   std::size_t seen = 0;
   result.others.columns = data.input_count();
   for (const Sequence& sequence : data.sequences) {
@@ -151,11 +151,11 @@ SearchResult converged_search(const ResidualProblem& problem,
                               const std::vector<std::vector<double>>& starts, SearchOptions options,
                               std::string_view family) {
   constexpr std::size_t kFirstIterations = 6;
-  const std::size_t most = options.most_iterations;
-  options.most_iterations = std::min(most, kFirstIterations);
+  const std::size_t most = options.max_iterations;
+  options.max_iterations = std::min(most, kFirstIterations);
   std::vector<double> best =
       starts.size() == 1 ? starts.front() : minimise_squares_from(problem, starts, options).theta;
-  options.most_iterations = most;
+  options.max_iterations = most;
   SearchResult found = minimise_squares(problem, std::move(best), options);
   if (!found.has_converged)
     throw Error({.problem = fmt::format("the search for the parameters of {} did not converge in "

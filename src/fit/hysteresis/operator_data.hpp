@@ -40,11 +40,11 @@ struct OperatorData {
 };
 
 /// @param rate_feature which input is the rate; that of the first input: none
-/// @param most_rows usable samples beyond these are thinned out evenly
+/// @param max_rows usable samples beyond these are thinned out evenly
 /// @throws Error if the first input is constant, or fewer than five rows come on each of
 /// `parameters`.
 [[nodiscard]] OperatorData operator_data(const TrainingData& data, bool rates,
-                                         std::size_t rate_feature, std::size_t most_rows,
+                                         std::size_t rate_feature, std::size_t max_rows,
                                          std::size_t parameters);
 
 /// The same rows, and on the way between them only turns by more than `dead_band`: for the long part of a
@@ -61,7 +61,7 @@ struct LinearSolution {
                                           std::span<double> residuals);
 
 /// A few iterations from each of several starts, then the best of them to its end.
-/// @throws Error if that does not converge in `options.most_iterations`.
+/// @throws Error if that does not converge in `options.max_iterations`.
 [[nodiscard]] SearchResult converged_search(const ResidualProblem& problem,
                                             const std::vector<std::vector<double>>& starts,
                                             SearchOptions options, std::string_view family);

@@ -82,14 +82,14 @@ class Names {
     return all;
   }
 
-  void others(const Linear::Parameters& /*of*/, std::vector<FittedParameter>& /*told*/) const {}
-  void others(const LinearCoulomb::Parameters& of, std::vector<FittedParameter>& told) const {
-    told.push_back({"v", unit_of_input(inputs_[of.rate_feature]), of.rate_scale});
+  void others(const Linear::Parameters& /*of*/, std::vector<FittedParameter>& /*list*/) const {}
+  void others(const LinearCoulomb::Parameters& of, std::vector<FittedParameter>& list) const {
+    list.push_back({"v", unit_of_input(inputs_[of.rate_feature]), of.rate_scale});
   }
-  void others(const Polynomial::Parameters& of, std::vector<FittedParameter>& told) const {
+  void others(const Polynomial::Parameters& of, std::vector<FittedParameter>& list) const {
     const std::string unit = unit_of_input(inputs_[0]);
-    told.push_back({"centre m of z = (x - m) / h", unit, of.centre});
-    told.push_back({"half range h", unit, of.half_range});
+    list.push_back({"centre m of z = (x - m) / h", unit, of.centre});
+    list.push_back({"half range h", unit, of.half_range});
   }
 
   [[nodiscard]] std::string at_knot(const CoefficientSchedule& of, std::size_t row) const {

@@ -22,7 +22,7 @@ constexpr std::array kSpreads{0.1, kDefaultSpread, 0.25, 0.4, 0.6, 1.0};
 constexpr std::size_t kDefault = 1;  // of these
 
 // The search looks at every n-th sample, so that it is given no more than these.
-constexpr std::size_t kMostSearched = 16000;
+constexpr std::size_t kMaxSearched = 16000;
 
 // Mean square errors, one for each fold that could be judged.
 using FoldErrors = std::vector<double>;
@@ -85,7 +85,7 @@ Folds folds_of(const Matrix& samples, const TrainingData& data) {
   const std::vector<std::size_t> records = record_of_samples(data);
   const std::size_t count = records.back() + 1;
   Folds result{.folds = {}, .of_records = count > 1};
-  const std::size_t stride = (samples.rows + kMostSearched - 1) / kMostSearched;
+  const std::size_t stride = (samples.rows + kMaxSearched - 1) / kMaxSearched;
   for (std::size_t fold = 0; fold < (result.of_records ? count : kFolds); ++fold) {
     Fold split;
     Matrix left_out;

@@ -78,10 +78,10 @@ Standardisation standardisation_of(const Matrix& samples, const TrainingData& da
 
 // A value so far out would drag a component, the line and the background with it.
 void refuse_outliers(const TrainingData& data, const Standardisation& by) {
-  constexpr double kMostScales = 1e6;
+  constexpr double kMaxScales = 1e6;
   const auto check = [&](const Sequence& sequence, std::size_t n, std::size_t quantity) {
     const double value = quantity == 0 ? sequence.target[n] : sequence.features(n, quantity - 1);
-    if (std::abs(value - by.centre[quantity]) <= kMostScales * by.scale[quantity]) return;
+    if (std::abs(value - by.centre[quantity]) <= kMaxScales * by.scale[quantity]) return;
     throw Error({.place = fmt::format(
                      "dgmm: {}: {}, sample {}", sequence.recording,
                      quantity == 0 ? data.target : data.inputs[quantity - 1].expression, n),

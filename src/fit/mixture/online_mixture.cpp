@@ -35,7 +35,7 @@ void check_settings(const Standardisation& standardisation, const OnlineMixtureS
   check_range("merge_candidates", static_cast<double>(s.merge_candidates), 1.0, kLargest);
   check_range("prune_count", s.prune_count, 0.0, std::numeric_limits<double>::max());
   const std::size_t d = standardisation.centre.size();
-  check_range("number of quantities", static_cast<double>(d), 1.0, kMostMixtureQuantities);
+  check_range("number of quantities", static_cast<double>(d), 1.0, kMaxMixtureQuantities);
   check_range("number of scales", static_cast<double>(standardisation.scale.size()),
               static_cast<double>(d), static_cast<double>(d));
   for (const double scale : standardisation.scale)
@@ -117,7 +117,7 @@ void OnlineMixture::learn(std::span<const double> sample) {
 }
 
 OnlineMixture::Nearest OnlineMixture::nearest(std::span<const double> at) const {
-  std::array<float, kMostMixtureQuantities> point;
+  std::array<float, kMaxMixtureQuantities> point;
   for (std::size_t j = 0; j < dimension_; ++j) point[j] = static_cast<float>(at[j]);
   const std::size_t found = nearest_kernel::nearest(search_.data(), (size_ + kLanes - 1) / kLanes,
                                                     dimension_, point.data());

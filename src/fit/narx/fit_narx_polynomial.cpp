@@ -87,7 +87,7 @@ MultivariatePolynomial::Parameters polynomial_of(const NarxTerms& f) {
 struct Split {
   TrainingData training;
   TrainingData judging;
-  std::string judged_on;
+  std::string tested_on;
 };
 
 Sequence cut(const Sequence& from, std::size_t first, std::size_t end) {
@@ -112,15 +112,15 @@ void hold_out(Split& split, std::size_t sequence, std::size_t first, std::size_t
 /// Free run wants stretches in one piece, several times as long as their measured start.
 Split split_of(const TrainingData& data, const FitContext& context) {
   constexpr std::size_t kFold = 5;
-  constexpr std::size_t kMostBlocks = 10;
+  constexpr std::size_t kMaxBlocks = 10;
   constexpr std::size_t kLeastBlock = 5 * kCorrected;
   if (context.validation != nullptr) return {data, *context.validation, "the validation records"};
-  Split split{.training = data, .judging = data, .judged_on = "a fifth held out"};
+  Split split{.training = data, .judging = data, .tested_on = "a fifth held out"};
   split.judging.sequences.clear();
   const bool has_many = data.sequences.size() >= kFold;
   for (std::size_t s = 0; s < data.sequences.size(); ++s) {
     const std::size_t samples = data.sequences[s].target.size();
-    const std::size_t blocks = has_many ? 1 : std::min(kMostBlocks, samples / kLeastBlock);
+    const std::size_t blocks = has_many ? 1 : std::min(kMaxBlocks, samples / kLeastBlock);
     for (std::size_t block = 0; block < blocks; ++block)
       if ((has_many ? s : block) % kFold == kFold - 1)
         hold_out(split, s, samples * block / blocks, samples * (block + 1) / blocks);
@@ -151,10 +151,10 @@ struct Structure {
   std::string note;
 };
 
-std::size_t most_terms(const NarxPolynomialOptions& options, std::size_t samples) {
+std::size_t max_terms(const NarxPolynomialOptions& options, std::size_t samples) {
   const std::size_t fits = samples / kSamplesPerTerm;
   if (options.terms == 0)
-    return std::clamp<std::size_t>(fits, 1, NarxPolynomialOptions::kMostAutomatic);
+    return std::clamp<std::size_t>(fits, 1, NarxPolynomialOptions::kMaxAutomatic);
   if (options.terms <= fits) return options.terms;
   throw Error(
       {.problem = "too few training samples",
@@ -175,7 +175,7 @@ Structure chosen_structure(const Split& split, const Table& table,
                            const Narx<Linear>::Parameters& frame, const FitContext& context) {
   Frols found = frols(table.features, table.target,
                       {.degree = options.degree,
-                       .terms = most_terms(options, table.target.size()),
+                       .terms = max_terms(options, table.target.size()),
                        .exchange = options.exchange},
                       share_of(context.progress, 0.0, 0.5));
   if (found.sizes.empty())
@@ -195,7 +195,7 @@ Structure chosen_structure(const Split& split, const Table& table,
     const double enough = kAsGood * *std::ranges::min_element(rmse);
     best = static_cast<std::size_t>(
         std::ranges::find_if(rmse, [&](double each) { return each <= enough; }) - rmse.begin());
-    why = fmt::format(", the number by the free run on {}", split.judged_on);
+    why = fmt::format(", the number by the free run on {}", split.tested_on);
   } else if (found.sizes.size() < options.terms) {
     why = fmt::format(", {} asked for: no other explains anything more", options.terms);
   }

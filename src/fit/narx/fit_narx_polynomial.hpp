@@ -18,7 +18,7 @@ namespace torsio {
 struct NarxPolynomialOptions {
   NarxLags lags = {};
   std::size_t degree = 3;  ///< of the terms to choose from
-  /// To choose; 0: as many as free run wants, up to `kMostAutomatic`.
+  /// To choose; 0: as many as free run wants, up to `kMaxAutomatic`.
   std::size_t terms = 0;
   bool exchange = true;
   /// one_step, or noise: least squares. free_run: then refined by Ceres, as `fit_arx`.
@@ -26,7 +26,7 @@ struct NarxPolynomialOptions {
   double noise = 0.02;  ///< standard deviation, as a share of the target's
   double range = 1.2;   ///< of the largest |target|: where the output is clipped
 
-  static constexpr std::size_t kMostAutomatic = 20;
+  static constexpr std::size_t kMaxAutomatic = 20;
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
@@ -37,7 +37,7 @@ struct NarxPolynomialOptions {
                         .help = "of the terms to choose from"});
     visit(self.terms,
           {.name = "terms",
-           .maximum = kMostTerms,
+           .maximum = kMaxTerms,
            .help = "to choose; 0: as many as free run on held-out records wants, up to 20"});
     visit(self.exchange,
           {.name = "exchange", .help = "swap chosen terms for others wherever that explains more"});

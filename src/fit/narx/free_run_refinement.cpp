@@ -56,8 +56,8 @@ class FreeRun {
         at.regressors[first_output_ + i] = past[n - 1 - i] / f_.scales[first_output_ + i];
       past[n] = evaluate(theta, at, with_slopes);
       if (!(std::abs(past[n]) < kLargest)) return false;
-      const bool is_judged = sequence_.use[n] != 0;
-      if (is_judged) residuals[n] = past[n] - sequence_.target[n];
+      const bool is_scored = sequence_.use[n] != 0;
+      if (is_scored) residuals[n] = past[n] - sequence_.target[n];
       if (!with_slopes) continue;
       double* slope = slopes.data() + n * columns_;
       std::ranges::copy(at.terms, slope);
@@ -66,7 +66,7 @@ class FreeRun {
         const double* before = slopes.data() + (n - 1 - i) * columns_;
         for (std::size_t j = 0; j < columns_; ++j) slope[j] += at.by_output[i] * before[j];
       }
-      if (is_judged)
+      if (is_scored)
         std::copy_n(slope, columns_, jacobian.begin() + static_cast<std::ptrdiff_t>(n * columns_));
     }
     return true;

@@ -348,9 +348,9 @@ void check(const Matrix& regressors, const FrolsOptions& options) {
     throw UsageError({.place = "degree",
                       .expected = fmt::format("1 to {}", kHighest),
                       .found = std::to_string(options.degree)});
-  if (options.terms < 1 || options.terms > kMostTerms)
+  if (options.terms < 1 || options.terms > kMaxTerms)
     throw UsageError({.place = "terms",
-                      .expected = fmt::format("1 to {}", kMostTerms),
+                      .expected = fmt::format("1 to {}", kMaxTerms),
                       .found = std::to_string(options.terms)});
   check_candidates(regressors.columns, options.degree);
   if (regressors.rows < options.terms)
@@ -362,10 +362,10 @@ void check(const Matrix& regressors, const FrolsOptions& options) {
 }  // namespace
 
 std::size_t monomial_count(std::size_t inputs, std::size_t degree) noexcept {
-  constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
+  constexpr std::size_t kMax = std::numeric_limits<std::size_t>::max();
   std::size_t count = 1;  // (inputs + d over d), exact for each d
   for (std::size_t d = 1; d <= degree; ++d) {
-    if (count > kMost / (inputs + d)) return kMost;
+    if (count > kMax / (inputs + d)) return kMax;
     count = count * (inputs + d) / d;
   }
   return count;
@@ -373,9 +373,9 @@ std::size_t monomial_count(std::size_t inputs, std::size_t degree) noexcept {
 
 void check_candidates(std::size_t inputs, std::size_t degree) {
   const std::size_t count = monomial_count(inputs, degree);
-  if (count <= kMostCandidates) return;
+  if (count <= kMaxCandidates) return;
   std::size_t fits = degree;
-  while (fits > 0 && monomial_count(inputs, fits) > kMostCandidates) --fits;
+  while (fits > 0 && monomial_count(inputs, fits) > kMaxCandidates) --fits;
   const std::string found = count == std::numeric_limits<std::size_t>::max()
                                 ? "more than can be counted"
                                 : std::to_string(count);
@@ -385,7 +385,7 @@ void check_candidates(std::size_t inputs, std::size_t degree) {
            fmt::format("{} regressors (inputs, their lags, past outputs) make too many terms "
                        "of degree {} and less",
                        inputs, degree),
-       .expected = fmt::format("at most {} to choose from", kMostCandidates),
+       .expected = fmt::format("at most {} to choose from", kMaxCandidates),
        .found = found,
        .advice = fits > 0 ? fmt::format("Set degree={} ({} terms), or take fewer lags.", fits,
                                         monomial_count(inputs, fits))

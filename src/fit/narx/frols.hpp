@@ -36,10 +36,10 @@ struct Frols {
 /// largest std::size_t where that is more than one holds.
 [[nodiscard]] std::size_t monomial_count(std::size_t inputs, std::size_t degree) noexcept;
 
-inline constexpr std::size_t kMostCandidates = 100'000;
-inline constexpr std::size_t kMostTerms = 100;
+inline constexpr std::size_t kMaxCandidates = 100'000;
+inline constexpr std::size_t kMaxTerms = 100;
 
-/// @throws UsageError, with the degree that would do, if there are more than `kMostCandidates`.
+/// @throws UsageError, with the degree that would do, if there are more than `kMaxCandidates`.
 void check_candidates(std::size_t inputs, std::size_t degree);
 
 /// Chooses monomials of the scaled regressors by forward regression with orthogonal least squares: in
@@ -59,7 +59,7 @@ void check_candidates(std::size_t inputs, std::size_t degree);
 /// term; memory: (regressors + terms) x samples.
 /// @param regressors samples x inputs, finite; `target` one a sample.
 /// @throws Error if the target is 0 throughout or there are fewer samples than terms; UsageError for
-/// a degree or number of terms out of range, or more candidates than `kMostCandidates`; Cancelled.
+/// a degree or number of terms out of range, or more candidates than `kMaxCandidates`; Cancelled.
 [[nodiscard]] Frols frols(const Matrix& regressors, std::span<const double> target,
                           const FrolsOptions& options, const Progress& progress = {});
 

@@ -77,7 +77,7 @@ constexpr std::array kNarxFamilies{
     narx_family<Mlp>("neural network that hears its own past output"),
     narx_family<GaussianProcess>("exact Gaussian process that hears its own past output"),
     narx_family<ParametricGp>(
-        "Gaussian process at a few hypothetical inputs that hears its own past output"),
+        "Gaussian process at a few inducing points that hears its own past output"),
     NarxFamily{"narx_parametric_gp_variational", kVariational, Narx<ParametricGp>::kFamily,
                "the same by a variational bound, in closed form", narx_variational}};
 

@@ -11,10 +11,10 @@
 namespace torsio {
 
 void check_lags(const NarxLags& lags) {
-  constexpr std::size_t kMost = Narx<Linear>::kMostLags;
-  if (lags.outputs >= 1 && lags.outputs <= kMost && lags.inputs <= kMost) return;
+  constexpr std::size_t kMax = Narx<Linear>::kMaxLags;
+  if (lags.outputs >= 1 && lags.outputs <= kMax && lags.inputs <= kMax) return;
   throw UsageError({.place = "lags",
-                    .expected = fmt::format("0 to {0} of inputs, 1 to {0} of outputs", kMost),
+                    .expected = fmt::format("0 to {0} of inputs, 1 to {0} of outputs", kMax),
                     .found = fmt::format("{} and {}", lags.inputs, lags.outputs)});
 }
 
@@ -67,12 +67,12 @@ double free_run_rmse(const OutputLists& outputs, const TrainingData& data) {
   MetricsAccumulator accumulator;
   for (std::size_t s = 0; s < outputs.size(); ++s) {
     const Sequence& sequence = data.sequences[s];
-    std::size_t told = 0;
+    std::size_t given = 0;
     for (std::size_t n = 0; n < outputs[s].size(); ++n) {
-      if (told == kCorrected) {
+      if (given == kCorrected) {
         if (sequence.use[n] != 0) accumulator.add(outputs[s][n], sequence.target[n]);
       } else if (std::isfinite(sequence.target[n])) {
-        ++told;
+        ++given;
       }
     }
   }

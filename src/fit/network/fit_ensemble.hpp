@@ -43,9 +43,9 @@ struct EnsembleMember {
 template <class Member, class TrainOne>
 Fitted<Ensemble<Member>> fit_ensemble(std::size_t members, const FitContext& context,
                                       const TrainOne& train_one) {
-  if (members < 2 || members > Ensemble<Member>::kMostMembers)
+  if (members < 2 || members > Ensemble<Member>::kMaxMembers)
     throw UsageError({.place = "option members",
-                      .expected = fmt::format("2 to {}", Ensemble<Member>::kMostMembers),
+                      .expected = fmt::format("2 to {}", Ensemble<Member>::kMaxMembers),
                       .found = fmt::format("{}", members)});
   const std::size_t known = context.resume == nullptr ? 0 : context.resume->finished_loss.size();
   if (known >= members)

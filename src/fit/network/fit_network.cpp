@@ -32,12 +32,11 @@ void require(bool is_good, std::string_view option, std::string expected, std::s
 }
 
 void check_layers(const std::vector<std::size_t>& layers, std::size_t fewest) {
-  require(layers.size() >= fewest && layers.size() < kMostLayers, "layers",
-          fmt::format("{} to {} layers", fewest, kMostLayers - 1),
-          fmt::format("{}", layers.size()));
+  require(layers.size() >= fewest && layers.size() < kMaxLayers, "layers",
+          fmt::format("{} to {} layers", fewest, kMaxLayers - 1), fmt::format("{}", layers.size()));
   for (const std::size_t units : layers)
-    require(units >= 1 && units <= kMostUnits, "layers",
-            fmt::format("1 to {} units a layer", kMostUnits), fmt::format("{}", units));
+    require(units >= 1 && units <= kMaxUnits, "layers",
+            fmt::format("1 to {} units a layer", kMaxUnits), fmt::format("{}", units));
 }
 
 void check(const NetworkTraining& training) {
@@ -63,11 +62,11 @@ void check(const TrainingWindows& windows) {
 
 void check_fits_a_file(const TrainingNetwork& network, std::size_t members) {
   const std::size_t bytes = members * network.parameter_count() * sizeof(float);
-  if (bytes <= kMostModelFileBytes) return;
+  if (bytes <= kMaxModelFileBytes) return;
   throw UsageError(
       {.place = "layers",
        .expected = fmt::format("networks of at most {} MiB together, as model files are",
-                               kMostModelFileBytes >> 20),
+                               kMaxModelFileBytes >> 20),
        .found = fmt::format("{} parameters{}, {} MiB", network.parameter_count(),
                             members == 1 ? "" : fmt::format(" in each of {} members", members),
                             bytes >> 20),

@@ -159,7 +159,7 @@ struct RecurrentOptions {
 /// So many networks, each from initial weights, a split and an order of its own; the first is the
 /// one that the fit above gives. `residual_std` is the mean of the members' losses on what they did
 /// not learn from.
-/// @throws as above; UsageError unless there are 2 to `Ensemble::kMostMembers`.
+/// @throws as above; UsageError unless there are 2 to `Ensemble::kMaxMembers`.
 [[nodiscard]] Fitted<MlpEnsemble> fit_mlp_ensemble(const TrainingData& data,
                                                    const MlpOptions& options, std::size_t members,
                                                    const FitContext& context = {});

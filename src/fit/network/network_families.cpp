@@ -17,7 +17,7 @@ struct WithMembers {
     Network::visit_options(self.network, visit);
     visit(self.members, {.name = "members",
                          .minimum = 1,
-                         .maximum = MlpEnsemble::kMostMembers,
+                         .maximum = MlpEnsemble::kMaxMembers,
                          .help = "networks of an ensemble, whose mean is told and whose "
                                  "disagreement widens the error bar"});
   }

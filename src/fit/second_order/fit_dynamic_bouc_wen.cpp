@@ -36,27 +36,27 @@ Parameters of(const Oscillator& oscillator, Parameters with) {
 
 /// Fills in stiffness and miss: from rest, the compliance that explains most of the target.
 void judge(Oscillator& oscillator, const TrainingData& data, Parameters with) {
-  constexpr std::size_t kMostSamples = 8000;
+  constexpr std::size_t kMaxSamples = 8000;
   oscillator.stiffness = 1.0;
   with = of(oscillator, with);
   with.lowest = -1e300;
   with.highest = 1e300;
-  double told_told = 0.0;
-  double told_target = 0.0;
+  double output_output = 0.0;
+  double output_target = 0.0;
   double target_target = 0.0;
   for (const Sequence& sequence : data.sequences) {
-    std::vector<double> told(std::min(kMostSamples, sequence.target.size()));
-    if (!run_from(model_if_valid<DynamicBoucWen>(with), {}, sequence, told)) return;
-    for (std::size_t n = 0; n < told.size(); ++n) {
+    std::vector<double> output(std::min(kMaxSamples, sequence.target.size()));
+    if (!run_from(model_if_valid<DynamicBoucWen>(with), {}, sequence, output)) return;
+    for (std::size_t n = 0; n < output.size(); ++n) {
       if (sequence.use[n] == 0) continue;
-      told_told += told[n] * told[n];
-      told_target += told[n] * sequence.target[n];
+      output_output += output[n] * output[n];
+      output_target += output[n] * sequence.target[n];
       target_target += sequence.target[n] * sequence.target[n];
     }
   }
-  if (!(told_target > 0.0)) return;
-  oscillator.stiffness = told_told / told_target;
-  oscillator.miss = 1.0 - told_target * told_target / (told_told * target_target);
+  if (!(output_target > 0.0)) return;
+  oscillator.stiffness = output_output / output_target;
+  oscillator.miss = 1.0 - output_target * output_target / (output_output * target_target);
 }
 
 Oscillator best_oscillator(const TrainingData& data, const Parameters& with) {
@@ -137,9 +137,9 @@ SimulatedModel simulated(std::vector<SearchedParameter> parameters, const Parame
   return {.parameters = std::move(parameters),
           .run =
               [with](std::span<const double> values, std::span<const double> state,
-                     const Sequence& sequence, std::span<double> told) {
+                     const Sequence& sequence, std::span<double> output) {
                 return run_from(model_if_valid<DynamicBoucWen>(with_listed(with, values)), state,
-                                sequence, told);
+                                sequence, output);
               },
           .free_states = 3};
 }
@@ -187,7 +187,7 @@ Fitted<DynamicBoucWen> fit_dynamic_bouc_wen(const TrainingData& data,
   linear = of(best_oscillator(data, linear), linear);
   const double largest = largest_target(data);
   SimulationFitOptions search{.first_horizon = options.first_horizon,
-                              .most_iterations = options.iterations,
+                              .max_iterations = options.iterations,
                               .progress = progress};
   const SimulatedModel model =
       simulated(searched(linear, largest, data, searches_exponent), linear);

@@ -104,16 +104,16 @@ InverseDynamics inverse_dynamics(const TrainingData& data, double gain) {
     }
     design.rows = force.size();
     if (design.rows <= design.columns) continue;
-    const std::vector<double> told = least_squares(design, force).coefficients;
-    if (!(told[0] > 0.0)) continue;
+    const std::vector<double> solved = least_squares(design, force).coefficients;
+    if (!(solved[0] > 0.0)) continue;
     found.largest_speed = std::max(found.largest_speed, largest);
-    found.guesses.push_back({.inertia = told[0],
-                             .viscous = std::max(told[1], 0.0),
-                             .coulomb = std::max(told[2], 0.0),
-                             .offset = told[3]});
+    found.guesses.push_back({.inertia = solved[0],
+                             .viscous = std::max(solved[1], 0.0),
+                             .coulomb = std::max(solved[2], 0.0),
+                             .offset = solved[3]});
   }
   if (found.guesses.empty())
-    throw Error({.place = "friction_drive",
+    throw Error({.place = "rigid_drive",
                  .expected = "a force that accelerates the target in its own direction",
                  .found = "no inertia that explains " + data.target,
                  .advice = "Check signs, which channel drives, and that the record is longer than "

@@ -2,7 +2,7 @@
 
 #include "fit/common/fitted_model.hpp"
 #include "fit/second_order/fit_dynamic_bouc_wen.hpp"
-#include "fit/second_order/fit_friction_drive.hpp"
+#include "fit/second_order/fit_rigid_drive.hpp"
 
 namespace torsio {
 
@@ -12,10 +12,10 @@ std::vector<FamilyInfo> second_order_families() {
                .summary = "mass, damper and spring beside a Bouc-Wen element, driven by a force",
                .is_spring = traits_of<DynamicBoucWen>().is_spring,
                .only_if_named = true}),
-          family_of<fit_friction_drive>(
-              {.name = FrictionDrive::kFamily,
+          family_of<fit_rigid_drive>(
+              {.name = RigidDrive::kFamily,
                .summary = "inertia with viscous and dry friction, driven by a force",
-               .is_spring = traits_of<FrictionDrive>().is_spring,
+               .is_spring = traits_of<RigidDrive>().is_spring,
                .only_if_named = true})};
 }
 

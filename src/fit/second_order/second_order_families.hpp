@@ -6,7 +6,7 @@
 
 namespace torsio {
 
-/// Masses with friction and hysteresis, driven by a force: `dynamic_bouc_wen`, `friction_drive`.
+/// Masses with friction and hysteresis, driven by a force: `dynamic_bouc_wen`, `rigid_drive`.
 [[nodiscard]] std::vector<FamilyInfo> second_order_families();
 
 }  // namespace torsio

@@ -14,12 +14,12 @@
 namespace torsio {
 namespace {
 
-std::size_t judged_samples(const TrainingData& data, std::size_t horizon) {
-  std::size_t judged = 0;
+std::size_t scored_samples(const TrainingData& data, std::size_t horizon) {
+  std::size_t scored = 0;
   for (const Sequence& sequence : data.sequences)
     for (std::size_t n = 0; n < std::min(horizon, sequence.target.size()); ++n)
-      judged += sequence.use[n];
-  return judged;
+      scored += sequence.use[n];
+  return scored;
 }
 
 double target_spread(const TrainingData& data) {
@@ -45,7 +45,7 @@ class Unknowns {
       starts_.push_back(measured_start(sequence, data.sample_rate_Hz));
       starts_.back().resize(model.free_states, 0.0);
     }
-    if (start_samples == 0 && data.sequences.size() <= kMostSearchedStarts)
+    if (start_samples == 0 && data.sequences.size() <= kMaxSearchedStarts)
       searched_ = model.free_states;
     for (std::size_t i = 0; i < data.sequences.size(); ++i)
       for (std::size_t j = 0; j < searched_; ++j) {
@@ -55,9 +55,9 @@ class Unknowns {
       }
   }
 
-  [[nodiscard]] SearchOptions options(std::size_t most_iterations, double tolerance,
+  [[nodiscard]] SearchOptions options(std::size_t max_iterations, double tolerance,
                                       Progress progress) const {
-    return {.most_iterations = most_iterations,
+    return {.max_iterations = max_iterations,
             .lower = lower_,
             .upper = upper_,
             .typical = std::vector<double>(scale_.size(), 1.0),
@@ -91,7 +91,7 @@ class Unknowns {
 
   /// Of the first `horizon` samples of each sequence, over the target's spread.
   [[nodiscard]] ResidualProblem problem(std::size_t horizon, double difference) const {
-    return {.residuals = judged_samples(data_, horizon),
+    return {.residuals = scored_samples(data_, horizon),
             .evaluate =
                 [this, horizon](std::span<const double> unknowns, std::span<double> residuals,
                                 std::span<double> /*jacobian*/) {
@@ -104,15 +104,15 @@ class Unknowns {
   bool evaluate(std::span<const double> unknowns, std::size_t horizon,
                 std::span<double> residuals) const {
     const std::vector<double> values = parameters(unknowns);
-    std::vector<double> told;
+    std::vector<double> output;
     std::size_t next = 0;
     for (std::size_t i = 0; i < data_.sequences.size(); ++i) {
       const Sequence& sequence = data_.sequences[i];
-      told.assign(std::min(horizon, sequence.target.size()), 0.0);
+      output.assign(std::min(horizon, sequence.target.size()), 0.0);
       const auto state = start(unknowns, i);
-      if (!state || !model_.run(values, *state, sequence, told)) return false;
-      for (std::size_t n = 0; n < told.size(); ++n)
-        if (sequence.use[n] != 0) residuals[next++] = (told[n] - sequence.target[n]) / spread_;
+      if (!state || !model_.run(values, *state, sequence, output)) return false;
+      for (std::size_t n = 0; n < output.size(); ++n)
+        if (sequence.use[n] != 0) residuals[next++] = (output[n] - sequence.target[n]) / spread_;
     }
     return true;
   }
@@ -185,19 +185,19 @@ std::pair<double, double> range_of_input(const Table& table, std::size_t input) 
 void add_table(SimulationFit& fit, const SimulatedModel& model, const ResidualProblem& problem,
                std::span<const double> theta) {
   const std::vector<double> ones(theta.size(), 1.0);
-  const ParameterUncertainty told = uncertainty_of(problem, theta, ones);
+  const ParameterUncertainty output = uncertainty_of(problem, theta, ones);
   std::vector<std::string> names;
   for (std::size_t i = 0; i < model.parameters.size(); ++i) {
     const SearchedParameter& each = model.parameters[i];
     fit.table.push_back({.name = each.name,
                          .unit = each.unit,
                          .value = fit.parameters[i],
-                         .std_error = told.std_error[i] * each.typical});
+                         .std_error = output.std_error[i] * each.typical});
     names.push_back(each.name);
   }
   while (names.size() < theta.size()) names.emplace_back("a start");
   constexpr double kPart = 0.05;
-  for (const std::vector<double>& direction : told.null_directions) {
+  for (const std::vector<double>& direction : output.null_directions) {
     const auto of_parameters = std::span(direction).first(model.parameters.size());
     if (std::ranges::none_of(of_parameters, [](double part) { return std::abs(part) > kPart; }))
       continue;  // starts that leave no trace
@@ -250,12 +250,12 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
   from.reserve(starts.size());
   for (const std::vector<double>& start : starts) from.push_back(unknowns.from(start));
   const std::size_t least = 2 * from.front().size();
-  if (judged_samples(data, longest) < least)
+  if (scored_samples(data, longest) < least)
     throw Error({.problem = "the training records are too short to simulate",
                  .expected = fmt::format("at least {} samples for {} unknowns", least, least / 2),
-                 .found = std::to_string(judged_samples(data, longest))});
+                 .found = std::to_string(scored_samples(data, longest))});
   std::size_t horizon = std::min(options.first_horizon, longest);
-  while (judged_samples(data, horizon) < least) horizon = std::min(2 * horizon, longest);
+  while (scored_samples(data, horizon) < least) horizon = std::min(2 * horizon, longest);
   SearchResult best;
   for (std::size_t kept = options.kept;; kept = (kept + 1) / 2) {
     const bool is_last = horizon == longest;
@@ -268,8 +268,8 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
     for (const double difference : model.differences) {
       found = minimise_squares_each(
           unknowns.problem(horizon, difference), from,
-          unknowns.options(is_last ? options.most_iterations : kToTellStartsApart,
-                           options.tolerance, progress));
+          unknowns.options(is_last ? options.max_iterations : kToTellStartsApart, options.tolerance,
+                           progress));
       from.resize(found.size());
       std::ranges::transform(found, from.begin(), &SearchResult::theta);
     }
@@ -296,7 +296,7 @@ std::optional<std::vector<double>> start_by_first(const SimulatedModel& model,
                                                   const Sequence& sequence, double sample_rate_Hz,
                                                   double spread, std::size_t samples) {
   // Positions and speeds enter the first samples all but linearly: few steps, and many such searches.
-  constexpr int kMostSteps = 5;
+  constexpr int kMaxSteps = 5;
   constexpr double kLeftOpen = 1e-12;
   constexpr double kWorthIt = 0.999;
   std::vector<double> state = measured_start(sequence, sample_rate_Hz);
@@ -307,7 +307,7 @@ std::optional<std::vector<double>> start_by_first(const SimulatedModel& model,
   FirstSamples first(model, parameters, sequence, samples);
   std::optional<Eigen::VectorXd> miss = first.misses(state);
   if (!miss) return std::nullopt;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const std::optional<Eigen::MatrixXd> slope = first.slopes(state, scale);
     if (!slope) break;
     Eigen::MatrixXd normal = slope->transpose() * *slope;
@@ -330,20 +330,20 @@ double held_out_rmse(const SimulatedModel& model, std::span<const double> parame
                      const TrainingData& data, std::size_t initialise) {
   const double spread = target_spread(data);
   double sum = 0.0;
-  std::size_t judged = 0;
+  std::size_t scored = 0;
   for (const Sequence& sequence : data.sequences) {
     const auto start =
         start_by_first(model, parameters, sequence, data.sample_rate_Hz, spread, initialise);
-    std::vector<double> told(sequence.target.size(), 0.0);
-    if (!start || !model.run(parameters, *start, sequence, told))
+    std::vector<double> output(sequence.target.size(), 0.0);
+    if (!start || !model.run(parameters, *start, sequence, output))
       return std::numeric_limits<double>::infinity();
-    for (std::size_t n = initialise; n < told.size(); ++n) {
+    for (std::size_t n = initialise; n < output.size(); ++n) {
       if (sequence.use[n] == 0) continue;
-      sum += (told[n] - sequence.target[n]) * (told[n] - sequence.target[n]);
-      ++judged;
+      sum += (output[n] - sequence.target[n]) * (output[n] - sequence.target[n]);
+      ++scored;
     }
   }
-  return judged > 0 ? std::sqrt(sum / static_cast<double>(judged))
+  return scored > 0 ? std::sqrt(sum / static_cast<double>(scored))
                     : std::numeric_limits<double>::infinity();
 }
 

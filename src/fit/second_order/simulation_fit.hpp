@@ -58,9 +58,9 @@ bool run_from(std::optional<M> model, std::span<const double> state, const Seque
   model->set_state(state);
   for (std::size_t n = 0; n < values.size(); ++n) {
     if (!sequence.has_features(n)) continue;
-    const Estimate told = model->step(sequence.features.row(n));
-    if (told.fault != Fault::none) return false;
-    values[n] = told.value;
+    const Estimate estimate = model->step(sequence.features.row(n));
+    if (estimate.fault != Fault::none) return false;
+    values[n] = estimate.value;
   }
   return true;
 }
@@ -69,7 +69,7 @@ struct SimulationFitOptions {
   std::size_t first_horizon = 500;  ///< samples of each sequence that the first search sees
   std::size_t growth = 4;           ///< of the horizon from one search to the next
   std::size_t kept = 3;             ///< starts that go on to the second horizon
-  std::size_t most_iterations = 200;
+  std::size_t max_iterations = 200;
   double tolerance = 1e-9;  ///< relative fall of the squares below which a search has converged
   /// First samples of each record that put its start, as in a score; 0: the start is searched for
   /// beside the parameters. A start that all of the record draws on hides what a free run drifts by.
@@ -88,11 +88,11 @@ struct SimulationFit {
 /// argmin over the parameters of the sum of (y_k - target_k)^2, y a free run through the record from a
 /// start that is searched for, too, or put by the record's first samples. From all starts of the
 /// search over a short horizon, then from the best over longer ones: a long run has many minima in
-/// frequency and phase, a short one few. Where the records are more than `kMostSearchedStarts`,
+/// frequency and phase, a short one few. Where the records are more than `kMaxSearchedStarts`,
 /// the starts to be searched for stay where the first samples point.
 /// @throws Error if a record is shorter than the unknowns need, every start runs away, or the last
 /// search did not converge; Cancelled.
-inline constexpr std::size_t kMostSearchedStarts = 30;
+inline constexpr std::size_t kMaxSearchedStarts = 30;
 [[nodiscard]] SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData& data,
                                               const std::vector<std::vector<double>>& starts,
                                               const SimulationFitOptions& options);

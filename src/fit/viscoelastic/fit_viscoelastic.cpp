@@ -17,7 +17,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostJudged = 30'000;
+constexpr std::size_t kMaxScored = 30'000;
 
 /// "Nm/rad" of torque_Nm and spring_deflection_rad; empty where the names do not tell.
 std::string stiffness_unit(const TrainingData& data) {
@@ -49,7 +49,7 @@ std::vector<FittedParameter> table_of(const SpringDashpotNetwork& network, doubl
 }
 
 /// Elements that a branch's rate hangs on: |d ln p / d ln value| of a fifth or more.
-std::vector<std::string> elements_behind(const SpringDashpotNetwork& network, std::size_t branch) {
+std::vector<std::string> elements_after(const SpringDashpotNetwork& network, std::size_t branch) {
   constexpr double kMoved = 1.01;
   constexpr double kShare = 0.2;
   const RelaxationSpectrum spectrum = relaxation_spectrum(network);
@@ -85,8 +85,7 @@ void note_relaxation(std::vector<std::string>& notes, const SpringDashpotNetwork
     notes.push_back(fmt::format(
         "relaxation {} ({:.2g} Hz) lies {}: {} may be far off; add a {} record, or a prior",
         times[i], branches[i].rate_1_s / (2.0 * std::numbers::pi), place,
-        fmt::join(elements_behind(network, i), ", "),
-        place.starts_with("below") ? "slow" : "fast"));
+        fmt::join(elements_after(network, i), ", "), place.starts_with("below") ? "slow" : "fast"));
   }
 }
 
@@ -155,7 +154,7 @@ Fitted<Viscoelastic> fit_viscoelastic(const TrainingData& data, const Viscoelast
   check(options);
   report_progress(context.progress, 0.0, "fitting viscoelastic");
   const SpringDashpotNetwork network = parse_network(options.network);
-  const ViscoelasticError error(data, kMostJudged, options.is_at_rest);
+  const ViscoelasticError error(data, kMaxScored, options.is_at_rest);
   require_varying(error, data);
   ViscoelasticFit fit;
   if (options.is_refined) {

@@ -84,11 +84,11 @@ class StartState {
 
 }  // namespace
 
-ViscoelasticError::ViscoelasticError(const TrainingData& data, std::size_t most_judged,
+ViscoelasticError::ViscoelasticError(const TrainingData& data, std::size_t max_scored,
                                      bool is_at_rest)
     : is_at_rest_(is_at_rest), period_s_(1.0 / data.sample_rate_Hz) {
   const std::size_t stride = std::max<std::size_t>(
-      1, (data.usable_samples() + most_judged - 1) / std::max<std::size_t>(most_judged, 1));
+      1, (data.usable_samples() + max_scored - 1) / std::max<std::size_t>(max_scored, 1));
   std::size_t usable = 0;
   for (const Sequence& sequence : data.sequences) {
     Run run;
@@ -96,11 +96,11 @@ ViscoelasticError::ViscoelasticError(const TrainingData& data, std::size_t most_
       if (!sequence.has_features(n)) continue;
       run.input.push_back(sequence.features(n, 0));
       run.target.push_back(sequence.target[n]);
-      run.is_judged.push_back(sequence.use[n] != 0 && usable++ % stride == 0 ? 1 : 0);
-      run.judged += run.is_judged.back();
+      run.is_scored.push_back(sequence.use[n] != 0 && usable++ % stride == 0 ? 1 : 0);
+      run.scored += run.is_scored.back();
     }
     longest_s_ = std::max(longest_s_, period_s_ * static_cast<double>(run.input.size()));
-    residuals_ += run.judged;
+    residuals_ += run.scored;
     runs_.push_back(std::move(run));
   }
   measure_deviations();
@@ -113,7 +113,7 @@ void ViscoelasticError::measure_deviations() {
     double squares = 0.0;
     for (const Run& run : runs_) {
       for (std::size_t n = 0; n < run.input.size(); ++n) {
-        if (run.is_judged[n] == 0) continue;
+        if (run.is_scored[n] == 0) continue;
         const double distance = (run.*channel)[n] - mean;
         mean += distance / ++count;
         squares += distance * ((run.*channel)[n] - mean);
@@ -138,7 +138,7 @@ void ViscoelasticError::evaluate(const RelaxationSpectrum& spectrum, double offs
     default: break;
   }
   if (spectrum.branches.size() <= 16) return evaluate_with<16>(spectrum, offset, residuals);
-  evaluate_with<kMostNetworkNodes / 2>(spectrum, offset, residuals);
+  evaluate_with<kMaxNetworkNodes / 2>(spectrum, offset, residuals);
 }
 
 template <std::size_t Count>
@@ -155,7 +155,7 @@ void ViscoelasticError::evaluate_with(const RelaxationSpectrum& spectrum, double
       const double value =
           relaxed<Count>(steps.offset + steps.stiffness * run.input[n] + steps.slope * moved, moved,
                          steps.decay, steps.gain, torque);
-      if (run.is_judged[n] != 0) {
+      if (run.is_scored[n] != 0) {
         residuals[next] = value - run.target[n];
         if (!is_at_rest_) start.add(residuals[next]);
         ++next;
@@ -166,7 +166,7 @@ void ViscoelasticError::evaluate_with(const RelaxationSpectrum& spectrum, double
     start.solve();
     std::size_t at = first;
     for (std::size_t n = 0; n < run.input.size() && !start.is_over(); ++n, start.advance())
-      if (run.is_judged[n] != 0) residuals[at++] += start.output();
+      if (run.is_scored[n] != 0) residuals[at++] += start.output();
   }
 }
 

@@ -13,9 +13,9 @@ namespace torsio {
 /// By how much a network misses the target over training records.
 class ViscoelasticError {
  public:
-  /// @param most_judged usable samples; of more every m-th is judged
+  /// @param max_scored usable samples; of more every m-th is judged
   /// @param is_at_rest each record starts relaxed; else in the state from which it misses least
-  ViscoelasticError(const TrainingData& data, std::size_t most_judged, bool is_at_rest);
+  ViscoelasticError(const TrainingData& data, std::size_t max_scored, bool is_at_rest);
 
   [[nodiscard]] std::size_t residuals() const noexcept { return residuals_; }
   [[nodiscard]] double longest_s() const noexcept { return longest_s_; }
@@ -32,8 +32,8 @@ class ViscoelasticError {
   struct Run {
     std::vector<double> input = {};
     std::vector<double> target = {};
-    std::vector<std::uint8_t> is_judged = {};
-    std::size_t judged = 0;
+    std::vector<std::uint8_t> is_scored = {};
+    std::size_t scored = 0;
   };
   template <std::size_t Count>
   void evaluate_with(const RelaxationSpectrum& spectrum, double offset,

@@ -18,7 +18,7 @@ namespace {
 constexpr double kFloor = 1e-4;  // of the scale
 constexpr double kCeiling = 1e6;
 constexpr std::size_t kFirstIterations = 12;
-constexpr std::size_t kMostIterations = 300;
+constexpr std::size_t kMaxIterations = 300;
 constexpr std::size_t kFinalists = 3;
 
 /// theta = (q_1 ... q_n, b) of a network on training data.
@@ -89,8 +89,8 @@ class Search {
             }};
   }
 
-  [[nodiscard]] SearchOptions options(std::size_t most_iterations, Progress progress) const {
-    SearchOptions options{.most_iterations = most_iterations,
+  [[nodiscard]] SearchOptions options(std::size_t max_iterations, Progress progress) const {
+    SearchOptions options{.max_iterations = max_iterations,
                           .typical = std::vector<double>(elements(), 1.0),
                           .progress = std::move(progress)};
     options.typical.push_back(error_.target_deviation());
@@ -146,7 +146,7 @@ std::vector<SearchResult> finalists(const Search& search, const ResidualProblem&
   for (std::size_t i = 0; i < last; ++i)
     found[i] = minimise_squares(
         problem, found[i].theta,
-        search.options(kMostIterations,
+        search.options(kMaxIterations,
                        part_of(context.progress, starts.size() + i, starts.size() + last)));
   std::ranges::stable_sort(found, {}, &SearchResult::sum_of_squares);
   return found;
@@ -155,7 +155,7 @@ std::vector<SearchResult> finalists(const Search& search, const ResidualProblem&
 void require_converged(const SearchResult& found) {
   if (found.has_converged) return;
   throw Error(
-      {.problem = fmt::format("the search did not converge within {} iterations", kMostIterations),
+      {.problem = fmt::format("the search did not converge within {} iterations", kMaxIterations),
        .advice = "Give start values (k1=300), a prior, or a network of fewer elements."});
 }
 
@@ -189,7 +189,7 @@ ViscoelasticFit search_network(const ViscoelasticError& error, const SpringDashp
     std::vector<std::vector<double>> from = search.starts(1, context.seed);
     for (const SearchResult& each : found) from.push_back(each.theta);
     best = minimise_squares_from(search.problem(rmse_of(best, problem) / options.prior), from,
-                                 search.options(kMostIterations, context.progress));
+                                 search.options(kMaxIterations, context.progress));
   }
   require_converged(best);
   return {.network = search.network_at(search.values_of(best.theta)),

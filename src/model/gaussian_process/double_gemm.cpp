@@ -25,7 +25,7 @@ constexpr std::size_t kRows = 8;
 constexpr std::size_t kRows = 4;
 #endif
 constexpr std::size_t kVectors = 3;
-constexpr std::size_t kMostPanel = kVectors * 8;
+constexpr std::size_t kMaxPanel = kVectors * 8;
 
 // A block of the right factor's panel stays in the nearest cache, the left one in the second.
 constexpr std::size_t kDepth = 192;
@@ -88,12 +88,12 @@ HWY_INLINE void tile(const double* HWY_RESTRICT left, const double* HWY_RESTRICT
 // A tile that reaches beyond the result.
 void edge_tile(const double* left, const double* right, std::size_t depth, Mode mode,
                const Result& c) {
-  HWY_ALIGN double whole[kRows * kMostPanel];  // NOLINT(modernize-avoid-c-arrays)
-  tile(left, right, depth, Mode::set, whole, kMostPanel);
+  HWY_ALIGN double whole[kRows * kMaxPanel];  // NOLINT(modernize-avoid-c-arrays)
+  tile(left, right, depth, Mode::set, whole, kMaxPanel);
   for (std::size_t i = 0; i < c.rows; ++i)
     for (std::size_t j = 0; j < c.columns; ++j) {
       double& at = c.values[i * c.stride + j];
-      const double value = whole[i * kMostPanel + j];
+      const double value = whole[i * kMaxPanel + j];
       at = mode == Mode::set ? value : mode == Mode::add ? at + value : at - value;
     }
 }

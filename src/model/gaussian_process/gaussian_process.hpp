@@ -27,8 +27,8 @@ namespace torsio {
 class GaussianProcess {
  public:
   static constexpr std::string_view kFamily = "gaussian_process";
-  static constexpr std::size_t kMostPoints = 65536;
-  static constexpr std::size_t kMostPointsWithStdDev = 4096;
+  static constexpr std::size_t kMaxPoints = 65536;
+  static constexpr std::size_t kMaxPointsWithStdDev = 4096;
 
   struct Parameters {
     using Family = GaussianProcess;

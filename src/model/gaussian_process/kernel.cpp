@@ -83,9 +83,9 @@ double KernelGradient::operator[](std::size_t parameter) const noexcept {
 
 Kernel::Kernel(KernelExpression expression, std::size_t inputs)
     : expression_(std::move(expression)), inputs_(inputs) {
-  if (inputs == 0 || inputs > kMostInputs)
+  if (inputs == 0 || inputs > kMaxInputs)
     throw Error({.place = "kernel",
-                 .expected = fmt::format("1 to {} inputs", kMostInputs),
+                 .expected = fmt::format("1 to {} inputs", kMaxInputs),
                  .found = std::to_string(inputs)});
   prepare();
   refresh();
@@ -93,9 +93,9 @@ Kernel::Kernel(KernelExpression expression, std::size_t inputs)
 
 void Kernel::prepare() {
   const std::vector<KernelNode>& nodes = expression_.nodes;
-  if (nodes.empty() || nodes.size() > kMostNodes)
+  if (nodes.empty() || nodes.size() > kMaxNodes)
     throw Error({.place = "kernel.nodes",
-                 .expected = fmt::format("1 to {} nodes", kMostNodes),
+                 .expected = fmt::format("1 to {} nodes", kMaxNodes),
                  .found = std::to_string(nodes.size())});
   std::vector<std::size_t> operands;
   for (std::size_t n = 0; n < nodes.size(); ++n) {
@@ -189,7 +189,7 @@ void Kernel::add_gradient(const double* x, const PackedPoints& points, std::size
 }
 
 double Kernel::self(const double* x) const noexcept {
-  std::array<double, kMostNodes> values{};
+  std::array<double, kMaxNodes> values{};
   for (std::size_t n = 0; n < terms_.size(); ++n) {
     const KernelTerm& term = terms_[n];
     switch (term.kind) {

@@ -128,8 +128,8 @@ class KernelGradient {
 /// for a periodic one).
 class Kernel {
  public:
-  static constexpr std::size_t kMostNodes = 64;
-  static constexpr std::size_t kMostInputs = 4096;
+  static constexpr std::size_t kMaxNodes = 64;
+  static constexpr std::size_t kMaxInputs = 4096;
 
   /// @throws Error that names the node: an unknown kind, a sum or product of less than two, a
   /// number of length scales that is neither 1 nor `inputs`, a number that is not finite, or not

@@ -224,7 +224,7 @@ bool needs_distance(const Program& program) {
 void row_any(const Program& program, const double* x, const Points& points, double* values) {
   const D d;
   const bool with_distance = needs_distance(program);
-  Value terms[Kernel::kMostNodes];  // NOLINT(modernize-avoid-c-arrays)
+  Value terms[Kernel::kMaxNodes];  // NOLINT(modernize-avoid-c-arrays)
   for (std::size_t j = 0; j < in_groups(points.count); j += hn::Lanes(d)) {
     evaluate<false>({program, x, points.values + j, points.stride}, with_distance, terms);
     hn::Store(terms[program.count - 1].k, d, values + j);
@@ -272,8 +272,8 @@ void add_gradient_any(const Program& program, const double* x, const Points& poi
                       const double* weights, double* gradient) {
   const D d;
   const bool with_distance = needs_distance(program);
-  Value terms[Kernel::kMostNodes];  // NOLINT(modernize-avoid-c-arrays)
-  V outer[Kernel::kMostNodes];      // NOLINT(modernize-avoid-c-arrays)
+  Value terms[Kernel::kMaxNodes];  // NOLINT(modernize-avoid-c-arrays)
+  V outer[Kernel::kMaxNodes];      // NOLINT(modernize-avoid-c-arrays)
   for (std::size_t j = 0; j < in_groups(points.count); j += hn::Lanes(d)) {
     const At at{program, x, points.values + j, points.stride};
     evaluate<true>(at, with_distance, terms);

@@ -96,8 +96,8 @@ class Parser {
   void join(KernelKind kind) { add({.kind = number_of(kind), .length_scales = {}}); }
 
   void add(KernelNode node) {
-    if (kernel_.nodes.size() == Kernel::kMostNodes)
-      refuse(fmt::format("at most {} kernels, sums and products", Kernel::kMostNodes));
+    if (kernel_.nodes.size() == Kernel::kMaxNodes)
+      refuse(fmt::format("at most {} kernels, sums and products", Kernel::kMaxNodes));
     kernel_.nodes.push_back(std::move(node));
   }
 

@@ -15,8 +15,9 @@ namespace {
 using kernel_kernels::in_groups;
 
 ParametricGp::Parameters checked(ParametricGp::Parameters parameters) {
-  check_kernel_model(parameters, "parametric_gp", ParametricGp::kMostPoints);
-  const std::size_t size = parameters.points.rows;
+  check_kernel_model(parameters, parameters.inducing_points, "inducing_points", "parametric_gp",
+                     ParametricGp::kMaxPoints);
+  const std::size_t size = parameters.inducing_points.rows;
   check_shape(parameters.explained, size, size, "parametric_gp: explained");
   return parameters;
 }
@@ -34,14 +35,14 @@ AlignedVector<double> padded_rows(const Matrix& matrix) {
 
 ParametricGp::ParametricGp(Parameters parameters)
     : parameters_(checked(std::move(parameters))),
-      kernel_(parameters_.kernel, parameters_.points.columns),
-      points_(parameters_.points),
+      kernel_(parameters_.kernel, parameters_.inducing_points.columns),
+      points_(parameters_.inducing_points),
       weights_(padded(parameters_.weights)),
       explained_(padded_rows(parameters_.explained)),
       input_(input_count()),
       values_(points_.padded_size()) {
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    kernel_.row(parameters_.points.row(i).data(), points_, points_.size(), values_.data());
+    kernel_.row(parameters_.inducing_points.row(i).data(), points_, points_.size(), values_.data());
     if (!std::ranges::all_of(values_, [](double value) { return std::isfinite(value); }))
       throw Error({.place = "parametric_gp: kernel",
                    .expected = "a finite value between any two of the points",

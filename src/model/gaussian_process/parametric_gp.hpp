@@ -12,7 +12,7 @@
 
 namespace torsio {
 
-/// A Gaussian process that knows its data through the values u ~ N(m, S) at M hypothetical inputs Z,
+/// A Gaussian process that knows its data through the values u ~ N(m, S) at M inducing points Z,
 /// in standardised coordinates:
 ///
 ///     K = k(Z, Z),   q = k(Z, x)
@@ -28,14 +28,14 @@ namespace torsio {
 class ParametricGp {
  public:
   static constexpr std::string_view kFamily = "parametric_gp";
-  static constexpr std::size_t kMostPoints = 4096;
+  static constexpr std::size_t kMaxPoints = 4096;
 
   struct Parameters {
     using Family = ParametricGp;
     NetworkScaling scaling;
     KernelExpression kernel;
     double noise_variance = 0.0;  ///< sigma^2, of the standardised target
-    Matrix points;                ///< Z: M x inputs, standardised
+    Matrix inducing_points;       ///< Z: M x inputs, standardised
     std::vector<double> weights;  ///< alpha
     Matrix explained;             ///< C: M x M, symmetric
 
@@ -44,7 +44,7 @@ class ParametricGp {
       visit("scaling", self.scaling);
       visit("kernel", self.kernel);
       visit("noise_variance", self.noise_variance);
-      visit("points", self.points);
+      visit("inducing_points", self.inducing_points);
       visit("weights", self.weights);
       visit("explained", self.explained);
     }

@@ -30,17 +30,16 @@ bool is_positive(std::span<const double> values) {
 GreyBoxTerms::Structure checked(GreyBoxTerms::Structure structure) {
   using Terms = GreyBoxTerms;
   const auto count = [](const auto& list) { return std::to_string(list.size()) + " of them"; };
-  require(structure.curve_knots.size() >= 2 && structure.curve_knots.size() <= Terms::kMostKnots &&
+  require(structure.curve_knots.size() >= 2 && structure.curve_knots.size() <= Terms::kMaxKnots &&
               is_ascending(structure.curve_knots),
           "curve_knots", "2 to 1000 finite, ascending numbers", count(structure.curve_knots));
   require(!structure.friction_knots.empty() &&
-              structure.friction_knots.size() <= Terms::kMostKnots &&
+              structure.friction_knots.size() <= Terms::kMaxKnots &&
               is_ascending(structure.friction_knots),
           "friction_knots", "1 to 1000 finite, ascending numbers", count(structure.friction_knots));
-  require(
-      structure.thresholds.size() <= Terms::kMostThresholds && is_positive(structure.thresholds),
-      "thresholds", "at most 32 positive numbers", count(structure.thresholds));
-  require(structure.time_constants_s.size() <= Terms::kMostTimeConstants &&
+  require(structure.thresholds.size() <= Terms::kMaxThresholds && is_positive(structure.thresholds),
+          "thresholds", "at most 32 positive numbers", count(structure.thresholds));
+  require(structure.time_constants_s.size() <= Terms::kMaxTimeConstants &&
               is_positive(structure.time_constants_s),
           "time_constants_s", "at most 32 positive numbers", count(structure.time_constants_s));
   const auto is_scale = [](double scale) { return std::isfinite(scale) && scale >= 0.0; };

@@ -36,9 +36,9 @@ namespace torsio {
 /// The v_j are exact where x runs straight between samples.
 class GreyBoxTerms {
  public:
-  static constexpr std::size_t kMostThresholds = 32;
-  static constexpr std::size_t kMostKnots = 1000;
-  static constexpr std::size_t kMostTimeConstants = 32;
+  static constexpr std::size_t kMaxThresholds = 32;
+  static constexpr std::size_t kMaxKnots = 1000;
+  static constexpr std::size_t kMaxTimeConstants = 32;
 
   struct Structure {
     std::vector<double> curve_knots;       ///< x's unit, ascending, at least 2
@@ -103,7 +103,7 @@ class GreyBoxTerms {
   /// The terms of x alone, if x had jumped here at once: nothing relaxes on the way.
   template <class Term>
   void visit_jump(double x, Term&& term) const noexcept {
-    std::array<double, kMostThresholds + kMostTimeConstants> moved;
+    std::array<double, kMaxThresholds + kMaxTimeConstants> moved;
     const double dx = is_started_ ? x - last_ : 0.0;  // a start has no way behind it
     const std::size_t slips = slips_.size();
     for (std::size_t i = 0; i < slips; ++i)

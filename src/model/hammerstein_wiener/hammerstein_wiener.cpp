@@ -21,7 +21,7 @@ void require(bool holds, const char* field, const char* expected, const std::str
 
 void check_sections(const Sections& sections) {
   require(sections.columns == kSectionColumns && sections.rows >= 1 &&
-              sections.rows <= kMostSections &&
+              sections.rows <= kMaxSections &&
               sections.values.size() == sections.rows * sections.columns,
           "sections", "1 to 50 rows of b0 b1 b2 a1 a2",
           std::to_string(sections.rows) + " x " + std::to_string(sections.columns));

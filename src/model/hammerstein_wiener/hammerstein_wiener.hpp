@@ -62,7 +62,7 @@ class HammersteinWiener {
 
   /// @throws Error if there is no input, the period is not positive, a curve or a number is none,
   /// lowest is not below highest, C is not monotone between them, or G has no section, more than
-  /// `kMostSections`, or a pole that is not inside the unit circle.
+  /// `kMaxSections`, or a pole that is not inside the unit circle.
   explicit HammersteinWiener(Parameters parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }

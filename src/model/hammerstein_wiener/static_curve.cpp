@@ -34,7 +34,7 @@ void StaticCurve::check(std::string_view place) const {
   const auto require = [&](bool holds, const char* expected, const std::string& found) {
     if (!holds) throw Error({.place = std::string(place), .expected = expected, .found = found});
   };
-  require(!values.empty() && values.size() <= kMostValues, "1 to 200 values",
+  require(!values.empty() && values.size() <= kMaxValues, "1 to 200 values",
           std::to_string(values.size()));
   require(all_finite(values) && all_finite(knots) && std::isfinite(centre), "finite numbers",
           "one that is not finite");

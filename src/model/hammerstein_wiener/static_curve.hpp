@@ -20,7 +20,7 @@ struct StaticCurve {
   double centre = 0.0;                      ///< of a polynomial; x's unit
   double half_range = 1.0;                  ///< x's unit, > 0
 
-  static constexpr std::size_t kMostValues = 200;
+  static constexpr std::size_t kMaxValues = 200;
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {

@@ -100,7 +100,7 @@ void check(const DiscreteTransfer& transfer) {
   require(std::ranges::any_of(transfer.numerator, [](double b) { return b != 0.0; }), "a numerator",
           "none");
   const std::size_t most = std::max(transfer.numerator.size(), transfer.denominator.size());
-  require(most <= 2 * kMostSections, "at most 100 coefficients", std::to_string(most));
+  require(most <= 2 * kMaxSections, "at most 100 coefficients", std::to_string(most));
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ namespace torsio {
 /// make them as fine as d^n.
 using Sections = Matrix;
 inline constexpr std::size_t kSectionColumns = 5;
-inline constexpr std::size_t kMostSections = 50;
+inline constexpr std::size_t kMaxSections = 50;
 
 /// The same in the form of the papers.
 struct DiscreteTransfer {
@@ -42,7 +42,7 @@ struct ContinuousTransfer {
 
 /// Factors a transfer function into sections, nearest zeros with the poles.
 /// @throws Error if the denominator does not begin with 1, the numerator is zero or of another degree
-/// in z than the pairing holds (kMostSections), or a number is not finite.
+/// in z than the pairing holds (kMaxSections), or a number is not finite.
 [[nodiscard]] Sections sections_of(const DiscreteTransfer& transfer);
 [[nodiscard]] DiscreteTransfer transfer_of(const Sections& sections);
 

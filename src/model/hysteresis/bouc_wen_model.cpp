@@ -10,7 +10,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kMostExponent = 20.0;
+constexpr double kMaxExponent = 20.0;
 constexpr double kLongestStep = 0.125;  ///< in z_max
 
 /// dz/du = 1 + rho |z|^n from z < 0 towards 0. @returns z, and the travel that is left at z = 0.
@@ -65,7 +65,7 @@ BoucWenModel::BoucWenModel(const Parameters& parameters)
                     "a positive number", given.beta);
   require_parameter(given.gamma > -given.beta && given.gamma <= given.beta, kFamily, "gamma",
                     "a number above -beta and at most beta", given.gamma);
-  require_parameter(given.exponent >= 1.0 && given.exponent <= kMostExponent, kFamily, "exponent",
+  require_parameter(given.exponent >= 1.0 && given.exponent <= kMaxExponent, kFamily, "exponent",
                     "1 to 20", given.exponent);
   require_parameter(std::isfinite(largest_) && largest_ > 0.0, kFamily, "beta + gamma",
                     "numbers whose z_max is positive and finite", largest_);

@@ -26,9 +26,9 @@ void check_shapes(const GaussianMixture& mixture, const std::string& place) {
   };
   if (m == 0) throw Error({.place = place, .expected = "at least one component", .found = "none"});
   if (d == 0) throw Error({.place = place, .expected = "at least one quantity", .found = "none"});
-  if (d > kMostMixtureQuantities)
+  if (d > kMaxMixtureQuantities)
     throw Error({.place = place,
-                 .expected = fmt::format("at most {} quantities", kMostMixtureQuantities),
+                 .expected = fmt::format("at most {} quantities", kMaxMixtureQuantities),
                  .found = std::to_string(d)});
   if (mixture.scale.size() != d)
     throw Error({.place = place + ": scale",

@@ -9,7 +9,7 @@
 namespace torsio {
 
 /// Largest D: what is prepared for a query grows with its square.
-inline constexpr std::size_t kMostMixtureQuantities = 64;
+inline constexpr std::size_t kMaxMixtureQuantities = 64;
 
 /// A mixture of Gaussians over D quantities, in standardised coordinates x~ = (x - centre) / scale:
 ///
@@ -38,7 +38,7 @@ struct GaussianMixture {
 };
 
 /// @throws Error that names the component and what is wrong with it: no component, more than
-/// `kMostMixtureQuantities` quantities, a shape that disagrees, a value that is not finite, a weight that is not positive (or weights whose sum is
+/// `kMaxMixtureQuantities` quantities, a shape that disagrees, a value that is not finite, a weight that is not positive (or weights whose sum is
 /// not 1), a covariance that is not symmetric or not positive definite.
 void check(const GaussianMixture& mixture, const std::string& place = "mixture");
 

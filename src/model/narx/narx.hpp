@@ -30,7 +30,7 @@ class Narx {
   using Inner = M;
   static constexpr std::string_view kPrefix = "narx_";
   static constexpr std::string_view kFamily = JoinedName<kPrefix, M::kFamily>::kName;
-  static constexpr std::size_t kMostLags = 1000;
+  static constexpr std::size_t kMaxLags = 1000;
 
   struct Parameters {
     using Family = Narx;
@@ -89,15 +89,15 @@ class Narx {
 
   Estimate step(Features features) noexcept TORSIO_REALTIME {
     remember(features);
-    Estimate told = model_.step(regressors_);
-    const double wanted = told.value;
-    told.value = std::isfinite(wanted)
-                     ? std::min(std::max(wanted, parameters_.lowest), parameters_.highest)
-                     : output_;
-    if (told.value != wanted) told.fault = Fault::diverged;  // NaN too
-    told.std_dev = kNotMeasured;                             // f's own is that of one step
-    output_ = told.value;
-    return told;
+    Estimate estimate = model_.step(regressors_);
+    const double wanted = estimate.value;
+    estimate.value = std::isfinite(wanted)
+                         ? std::min(std::max(wanted, parameters_.lowest), parameters_.highest)
+                         : output_;
+    if (estimate.value != wanted) estimate.fault = Fault::diverged;  // NaN too
+    estimate.std_dev = kNotMeasured;                                 // f's own is that of one step
+    output_ = estimate.value;
+    return estimate;
   }
 
   /// Takes a measurement for the output of the last step. One that is not finite is passed over.
@@ -133,7 +133,7 @@ class Narx {
     const Parameters& p = parameters_;
     require(p.inputs >= 1 && p.inputs <= model_.input_count(), "an input that the inner model has",
             std::to_string(p.inputs));
-    require(p.input_lags <= kMostLags && p.output_lags >= 1 && p.output_lags <= kMostLags,
+    require(p.input_lags <= kMaxLags && p.output_lags >= 1 && p.output_lags <= kMaxLags,
             "0 to 1000 input lags and 1 to 1000 output lags",
             std::to_string(p.input_lags) + " and " + std::to_string(p.output_lags));
     require(model_.input_count() == p.regressors(), "an inner model of as many inputs as lags make",

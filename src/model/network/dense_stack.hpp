@@ -17,8 +17,8 @@ class DenseStack {
  public:
   /// @param inputs of the first layer.
   /// @param place of the layers, for messages: "mlp: layers".
-  /// @throws Error if there is no layer or more than `kMostLayers`, shapes do not fit together, a
-  /// layer is wider than `kMostUnits`, the last has not one output or is not linear, an activation is
+  /// @throws Error if there is no layer or more than `kMaxLayers`, shapes do not fit together, a
+  /// layer is wider than `kMaxUnits`, the last has not one output or is not linear, an activation is
   /// unknown, or a number is not finite.
   DenseStack(const std::vector<DenseLayer>& layers, std::size_t inputs, const std::string& place);
 

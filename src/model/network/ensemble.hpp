@@ -30,7 +30,7 @@ template <Model M>
 class Ensemble {
  public:
   using Member = M;
-  static constexpr std::size_t kMostMembers = 64;
+  static constexpr std::size_t kMaxMembers = 64;
 
   static constexpr std::string_view kSuffix = "_ensemble";
   static constexpr std::string_view kFamily = JoinedName<M::kFamily, kSuffix>::kName;
@@ -48,7 +48,7 @@ class Ensemble {
     bool operator==(const Parameters&) const = default;
   };
 
-  /// @throws Error as its members do, if there are not 2 to `kMostMembers` of them, if they have not
+  /// @throws Error as its members do, if there are not 2 to `kMaxMembers` of them, if they have not
   /// as many inputs or not one sample period, or r is not positive.
   explicit Ensemble(Parameters parameters) : parameters_(std::move(parameters)) {
     const auto require = [](bool holds, const char* expected, std::string found) {
@@ -57,7 +57,7 @@ class Ensemble {
             {.place = std::string(kFamily), .expected = expected, .found = std::move(found)});
     };
     const std::size_t count = parameters_.members.size();
-    require(count >= 2 && count <= kMostMembers, "2 to 64 members", std::to_string(count));
+    require(count >= 2 && count <= kMaxMembers, "2 to 64 members", std::to_string(count));
     require(std::isfinite(parameters_.residual_std) && parameters_.residual_std > 0.0,
             "a positive residual_std", std::to_string(parameters_.residual_std));
     for (const auto& member : parameters_.members) {
@@ -94,11 +94,11 @@ class Ensemble {
     double squares = 0.0;
     double count = 0.0;
     for (M& member : members_) {
-      const Estimate told = member.step(features);
-      const double distance = told.value - estimate.value;
+      const Estimate output = member.step(features);
+      const double distance = output.value - estimate.value;
       estimate.value += distance / ++count;
-      squares += distance * (told.value - estimate.value);
-      if (estimate.fault == Fault::none) estimate.fault = told.fault;
+      squares += distance * (output.value - estimate.value);
+      if (estimate.fault == Fault::none) estimate.fault = output.fault;
     }
     const double spread = std::sqrt(squares / (count - 1.0));
     estimate.std_dev = std::hypot(parameters_.residual_std, spread);

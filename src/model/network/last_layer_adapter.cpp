@@ -15,9 +15,9 @@
 namespace torsio {
 namespace {
 
-constexpr double kMostTicks = 1e9;
+constexpr double kMaxTicks = 1e9;
 
-constexpr std::array<std::string_view, kLearningOutcomes> kNames{
+constexpr std::array<std::string_view, kUpdateOutcomes> kNames{
     "updated",         "limited",
     "paused",          "warming_up",
     "no_estimate",     "reference_not_finite",
@@ -73,7 +73,7 @@ double length_of(const DenseLayer& layer) {
 /// @param zero what a time of 0 means.
 std::size_t ticks_in(double time_s, double period_s, std::size_t zero) {
   if (time_s == 0.0) return zero;
-  return static_cast<std::size_t>(std::clamp(std::ceil(time_s / period_s), 1.0, kMostTicks));
+  return static_cast<std::size_t>(std::clamp(std::ceil(time_s / period_s), 1.0, kMaxTicks));
 }
 
 std::size_t padded(std::size_t count) {
@@ -83,7 +83,7 @@ std::size_t padded(std::size_t count) {
 
 }  // namespace
 
-std::string_view name(Learning outcome) noexcept {
+std::string_view name(UpdateOutcome outcome) noexcept {
   return kNames[static_cast<std::size_t>(outcome)];
 }
 
@@ -105,9 +105,9 @@ LastLayerAdapter::LastLayerAdapter(const AdaptationSettings& settings, const Den
   check_positive(target_scale, "adaptation: target_scale");
   if (std::isnan(settings_.largest_error)) settings_.largest_error = target_scale;
   if (settings_.rule != AdaptationRule::rls) return;
-  if (features_ > kMostRlsFeatures)
+  if (features_ > kMaxRlsFeatures)
     throw Error({.place = "adaptation: rls",
-                 .expected = fmt::format("at most {} features of the last layer", kMostRlsFeatures),
+                 .expected = fmt::format("at most {} features of the last layer", kMaxRlsFeatures),
                  .found = fmt::format("{}", features_),
                  .advice = "Use nlms: its cost grows with the features, not their square."});
   pending_ = product_ = deviation_;
@@ -137,54 +137,54 @@ double LastLayerAdapter::step(std::span<const float> features, double frozen_val
   return adapted;
 }
 
-Learning LastLayerAdapter::learn(const ReferenceSample& reference) noexcept {
-  if (paused_) return counted(Learning::paused);
-  const Learning verdict = judge(reference);
+UpdateOutcome LastLayerAdapter::learn(const ReferenceSample& reference) noexcept {
+  if (paused_) return counted(UpdateOutcome::paused);
+  const UpdateOutcome verdict = outcome_of(reference);
   has_step_ = false;
-  if (verdict != Learning::updated) return counted(verdict);
+  if (verdict != UpdateOutcome::updated) return counted(verdict);
   const double error = (reference.value - adapted_value_) / target_scale_;
   square_ = settings_.rule == AdaptationRule::nlms ? nlms(error) : rls(error);
-  if (square_ <= bound_ * bound_) return counted(Learning::updated);
+  if (square_ <= bound_ * bound_) return counted(UpdateOutcome::updated);
   // A hair inside, so that rounding does not leave it outside.
   const double shrink = (1.0 - 1e-12) * bound_ / std::sqrt(square_);
   square_ = adaptation_kernels::blend(deviation_.data(), shrink, 0.0, extended_.data(),
                                       deviation_.size());
-  return counted(Learning::limited);
+  return counted(UpdateOutcome::limited);
 }
 
-Learning LastLayerAdapter::pass_over(Learning reason) noexcept {
+UpdateOutcome LastLayerAdapter::pass_over(UpdateOutcome reason) noexcept {
   has_step_ = false;
-  if (paused_) return counted(Learning::paused);
+  if (paused_) return counted(UpdateOutcome::paused);
   compare(0.0, 0.0);
   return counted(reason);
 }
 
-Learning LastLayerAdapter::judge(const ReferenceSample& reference) noexcept {
+UpdateOutcome LastLayerAdapter::outcome_of(const ReferenceSample& reference) noexcept {
   const double value = reference.value;
   // A slower sensor tells nothing between its samples: that it tells the same again counts.
   const bool is_new = std::isfinite(value) && value != last_reference_;
   unchanged_ticks_ = is_new ? 0 : unchanged_ticks_ + 1;
   if (is_new) last_reference_ = value;
-  const Learning doubt = doubt_about(reference);
-  if (doubt != Learning::updated) {
+  const UpdateOutcome doubt = doubt_about(reference);
+  if (doubt != UpdateOutcome::updated) {
     compare(0.0, 0.0);
     return doubt;
   }
   compare(std::abs(value - adapted_value_), std::abs(value - frozen_value_));
   // Only now: the comparison may have rolled the weights back.
   const double error = std::abs(value - adapted_value_);
-  if (error > settings_.largest_error) return Learning::error_too_large;
-  if (error < settings_.dead_zone * settings_.sensor_std) return Learning::dead_zone;
-  return Learning::updated;
+  if (error > settings_.largest_error) return UpdateOutcome::error_too_large;
+  if (error < settings_.dead_zone * settings_.sensor_std) return UpdateOutcome::dead_zone;
+  return UpdateOutcome::updated;
 }
 
-Learning LastLayerAdapter::doubt_about(const ReferenceSample& reference) const noexcept {
-  if (!has_step_) return Learning::no_estimate;
-  if (!std::isfinite(reference.value)) return Learning::reference_not_finite;
+UpdateOutcome LastLayerAdapter::doubt_about(const ReferenceSample& reference) const noexcept {
+  if (!has_step_) return UpdateOutcome::no_estimate;
+  if (!std::isfinite(reference.value)) return UpdateOutcome::reference_not_finite;
   if (!(reference.age_s <= settings_.oldest_reference_s) || unchanged_ticks_ >= frozen_after_ticks_)
-    return Learning::reference_stale;
-  if (std::abs(reference.value) >= settings_.saturation) return Learning::reference_saturated;
-  return Learning::updated;
+    return UpdateOutcome::reference_stale;
+  if (std::abs(reference.value) >= settings_.saturation) return UpdateOutcome::reference_saturated;
+  return UpdateOutcome::updated;
 }
 
 void LastLayerAdapter::compare(double adapted_error, double frozen_error) noexcept {
@@ -241,7 +241,7 @@ void LastLayerAdapter::reset_covariance() noexcept {
   pending_scale_ = 1.0;
 }
 
-Learning LastLayerAdapter::counted(Learning outcome) noexcept {
+UpdateOutcome LastLayerAdapter::counted(UpdateOutcome outcome) noexcept {
   ++counts_.outcomes[static_cast<std::size_t>(outcome)];
   return outcome;
 }

@@ -47,10 +47,10 @@ void check_list(const std::vector<Number>& values, std::size_t length, const std
 
 /// Before anything is multiplied.
 std::size_t checked_units(std::size_t rows, std::size_t gates, const std::string& place) {
-  if (rows == 0 || rows % gates != 0 || rows / gates > kMostUnits)
+  if (rows == 0 || rows % gates != 0 || rows / gates > kMaxUnits)
     refuse(place,
-           gates == 1 ? fmt::format("1 to {} rows", kMostUnits)
-                      : fmt::format("{} rows for each of 1 to {} units", gates, kMostUnits),
+           gates == 1 ? fmt::format("1 to {} rows", kMaxUnits)
+                      : fmt::format("{} rows for each of 1 to {} units", gates, kMaxUnits),
            fmt::format("{} rows", rows));
   return rows / gates;
 }
@@ -70,8 +70,8 @@ std::size_t checked_rows(const Layer& layer, std::size_t gates, std::size_t inpu
 
 std::size_t checked_input_count(const NetworkScaling& scaling, const std::string& place) {
   const auto& [centre, scale] = scaling.inputs;
-  if (centre.empty() || centre.size() > kMostUnits)
-    refuse(place + ".inputs.centre", fmt::format("1 to {} inputs", kMostUnits),
+  if (centre.empty() || centre.size() > kMaxUnits)
+    refuse(place + ".inputs.centre", fmt::format("1 to {} inputs", kMaxUnits),
            fmt::format("{}", centre.size()));
   if (scale.size() != centre.size())
     refuse(place + ".inputs.scale", fmt::format("{} numbers", centre.size()),
@@ -85,8 +85,8 @@ std::size_t checked_input_count(const NetworkScaling& scaling, const std::string
 }
 
 void check_layer_count(std::size_t count, const std::string& place) {
-  if (count == 0 || count > kMostLayers)
-    refuse(place, fmt::format("1 to {} layers", kMostLayers), fmt::format("{}", count));
+  if (count == 0 || count > kMaxLayers)
+    refuse(place, fmt::format("1 to {} layers", kMaxLayers), fmt::format("{}", count));
 }
 
 void check_layer(const DenseLayer& layer, std::size_t inputs, const std::string& place) {

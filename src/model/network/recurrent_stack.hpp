@@ -21,8 +21,8 @@ class RecurrentStack {
  public:
   /// @param inputs of the first layer.
   /// @param place of the layers, for messages: "lstm: layers".
-  /// @throws Error if there is no layer or more than `kMostLayers`, shapes do not fit together, a
-  /// layer is wider than `kMostUnits`, or a number is not finite.
+  /// @throws Error if there is no layer or more than `kMaxLayers`, shapes do not fit together, a
+  /// layer is wider than `kMaxUnits`, or a number is not finite.
   RecurrentStack(const std::vector<Layer>& layers, std::size_t inputs, std::size_t joints,
                  const std::string& place);
 

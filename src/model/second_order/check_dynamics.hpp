@@ -27,10 +27,10 @@ inline double driving_force(std::span<const double> gains,
 }
 
 inline void check_sampled_time(const SampledTime& time, std::string_view family) {
-  constexpr std::size_t kMostSubsteps = 1000;
+  constexpr std::size_t kMaxSubsteps = 1000;
   require_parameter(std::isfinite(time.sample_period_s) && time.sample_period_s > 0.0, family,
                     "sample_period_s", "a positive number", time.sample_period_s);
-  require_parameter(time.substeps >= 1 && time.substeps <= kMostSubsteps, family, "substeps",
+  require_parameter(time.substeps >= 1 && time.substeps <= kMaxSubsteps, family, "substeps",
                     "1 to 1000", static_cast<double>(time.substeps));
 }
 

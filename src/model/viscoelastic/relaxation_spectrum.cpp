@@ -156,9 +156,9 @@ void check_leaf(const SpringDashpotNetwork& network, std::size_t index) {
 }  // namespace
 
 RelaxationSpectrum relaxation_spectrum(const SpringDashpotNetwork& network) {
-  if (network.nodes.empty() || network.nodes.size() > kMostNetworkNodes)
+  if (network.nodes.empty() || network.nodes.size() > kMaxNetworkNodes)
     throw Error({.place = "network",
-                 .expected = fmt::format("1 to {} nodes", kMostNetworkNodes),
+                 .expected = fmt::format("1 to {} nodes", kMaxNetworkNodes),
                  .found = fmt::format("{}", network.nodes.size())});
   std::vector<RelaxationSpectrum> open;
   for (std::size_t i = 0; i < network.nodes.size(); ++i) {

@@ -54,7 +54,7 @@ struct SpringDashpotNetwork {
   void set_values(const std::vector<double>& values);
 };
 
-inline constexpr std::size_t kMostNetworkNodes = 100;
+inline constexpr std::size_t kMaxNetworkNodes = 100;
 /// Of a k [Nm/rad] or d [Nm s/rad].
 inline constexpr double kSmallestElement = 1e-12;
 inline constexpr double kLargestElement = 1e12;
@@ -105,7 +105,7 @@ struct RelaxationSpectrum {
 /// between its poles and are found there by bisection, relative to the nearer pole. Every number
 /// comes out to a few roundings however far apart the rates are.
 /// @throws Error for nodes that are no network, a value outside
-/// `kSmallestElement` to `kLargestElement`, more nodes than `kMostNetworkNodes`, or two elements of one name.
+/// `kSmallestElement` to `kLargestElement`, more nodes than `kMaxNetworkNodes`, or two elements of one name.
 [[nodiscard]] RelaxationSpectrum relaxation_spectrum(const SpringDashpotNetwork& network);
 
 }  // namespace torsio

@@ -52,7 +52,7 @@ constexpr std::array kPresets{
            kPerDegree},
 };
 constexpr std::string_view kGeneralised = "generalised_maxwell";
-constexpr std::size_t kMostBranches = 16;
+constexpr std::size_t kMaxBranches = 16;
 
 std::string preset_names() {
   std::string names;
@@ -98,8 +98,8 @@ class Parser {
     std::size_t count = 0;
     const auto [end, code] = std::from_chars(number.data(), number.data() + number.size(), count);
     if (code != std::errc{} || end != number.data() + number.size() || count < 1 ||
-        count > kMostBranches)
-      refuse(start, fmt::format("the number of branches, 1 to {}", kMostBranches), number);
+        count > kMaxBranches)
+      refuse(start, fmt::format("the number of branches, 1 to {}", kMaxBranches), number);
     want(')', "')'");
     if (!at_end()) refuse_here("the end");
     return count;
@@ -151,8 +151,8 @@ class Parser {
   }
 
   void add(NetworkNode node, std::size_t start) {
-    if (network_.nodes.size() == kMostNetworkNodes)
-      refuse(start, fmt::format("at most {} elements and joins", kMostNetworkNodes), "more");
+    if (network_.nodes.size() == kMaxNetworkNodes)
+      refuse(start, fmt::format("at most {} elements and joins", kMaxNetworkNodes), "more");
     network_.nodes.push_back(node);
   }
 

@@ -23,7 +23,7 @@ namespace {
 
 constexpr auto kPlace = "track";
 constexpr double kTurnedRound_rad = rad_from_deg(200.0);
-constexpr double kMostTorque = 10.0;  // over the rating
+constexpr double kMaxTorque = 10.0;  // over the rating
 constexpr double kSweep_s = 20.0;
 
 Load load_of(const TrackingSpec& spec) {
@@ -54,7 +54,7 @@ class LoopLog {
   void add(double wanted_Nm, const TorqueLoopCore::Output& out) {
     const double terms_A = out.proportional_A + out.integral_A + out.derivative_A +
                            out.feed_forward_A + out.rate_feed_forward_A + out.friction_A +
-                           out.observer_A + out.handover_A;
+                           out.observer_A + out.transfer_A;
     const std::array<double, kNames.size()> row{wanted_Nm,
                                                 out.wanted_torque_Nm,
                                                 out.wanted_deflection_rad,
@@ -65,7 +65,7 @@ class LoopLog {
                                                 out.rate_feed_forward_A,
                                                 out.friction_A,
                                                 out.observer_A,
-                                                out.handover_A,
+                                                out.transfer_A,
                                                 out.current_A - terms_A,
                                                 out.current_A,
                                                 out.is_limited ? 1.0 : 0.0,
@@ -84,7 +84,7 @@ class LoopLog {
                                      "integral_current_A",     "derivative_current_A",
                                      "feed_forward_current_A", "rate_feed_forward_current_A",
                                      "friction_current_A",     "observer_current_A",
-                                     "handover_current_A",     "rest_current_A",
+                                     "transfer_current_A",     "rest_current_A",
                                      "command_current_A",      "is_limited_1",
                                      "inverse_fault_1",        "fault_1"};
   std::array<std::vector<double>, kNames.size()> columns_;
@@ -108,7 +108,7 @@ class Loop {
         bench_log_(sheet, reference_Nm_.size(), true),
         loop_log_(reference_Nm_.size()),
         controller_(inverse, loop_settings(sheet, spec, load_), kBenchRate_Hz),
-        most_Nm_(kMostTorque * sheet.rating.torque_Nm.value) {
+        max_Nm_(kMaxTorque * sheet.rating.torque_Nm.value) {
     if (load_.is_locked) return;
     check_swing(
         {.place = kPlace,
@@ -136,7 +136,7 @@ class Loop {
                                                  .motor_current_A = measured.motor_current_A});
       loop_log_.add(reference_Nm_[tick], out);
       if (!(std::abs(truth.plant.state().joint_angle_rad) < kTurnedRound_rad &&
-            std::abs(truth.load_cell_Nm) < most_Nm_))
+            std::abs(truth.load_cell_Nm) < max_Nm_))
         return false;
       bench_.act({.command = {.current_A = out.current_A}, .load = load_});
     }
@@ -156,7 +156,7 @@ class Loop {
   BenchLog bench_log_;
   LoopLog loop_log_;
   TorqueController<AnyInverse> controller_;
-  double most_Nm_;
+  double max_Nm_;
 };
 
 /// The reference's amplitude, through the frequencies of the loop.

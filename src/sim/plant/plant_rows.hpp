@@ -96,7 +96,7 @@ struct ElastomerRows : StageRows {
   Row creep_per_cycle, dead_band_rad;
   SlipRows<3> slip;
   std::array<Lobes, kBonded ? 1 : 2> lobes;
-  Row carried_Nm, glue, glue_after_cycle, last_side, turns;
+  Row max_measured_load_Nm, glue, glue_after_cycle, last_side, turns;
 };
 
 struct BodyRows {

@@ -345,7 +345,7 @@ HWY_INLINE V step_lobes(const ElastomerRows<kBonded>& rows, std::size_t at,
 // The glue after this step.
 template <bool kBonded>
 HWY_INLINE V step_glue(ElastomerRows<kBonded>& rows, std::size_t at, V angle, V before_Nm,
-                       V carried_Nm) {
+                       V max_measured_load_Nm) {
   const V creep = get(rows.creep_per_cycle, at);
   V glue = get(rows.glue, at);
   if (hn::AllTrue(D(), hn::Eq(creep, zero()))) return glue;
@@ -361,7 +361,7 @@ HWY_INLINE V step_glue(ElastomerRows<kBonded>& rows, std::size_t at, V angle, V 
   put(hn::IfThenZeroElse(is_cycle, turns), rows.turns, at);
   put(after, rows.glue_after_cycle, at);
   put(hn::IfThenElse(is_beyond, side, last_side), rows.last_side, at);
-  glue = hn::IfThenElse(hn::Le(hn::Mul(carried_Nm, before_Nm), zero()), after, glue);
+  glue = hn::IfThenElse(hn::Le(hn::Mul(max_measured_load_Nm, before_Nm), zero()), after, glue);
   put(glue, rows.glue, at);
   return glue;
 }
@@ -375,8 +375,8 @@ HWY_INLINE void step_stage(ElastomerRows<kBonded>& rows, std::size_t at, const E
   linear = clamp(linear, get(rows.lowest_Nm, at), get(rows.highest_Nm, at));
   const V bend = hn::MulAdd(linear, get(rows.cubic, at), get(rows.quadratic, at));
   const V carried = hn::Mul(linear, hn::MulAdd(linear, bend, of(1.0)));
-  const V before = get(rows.carried_Nm, at);
-  put(carried, rows.carried_Nm, at);
+  const V before = get(rows.max_measured_load_Nm, at);
+  put(carried, rows.max_measured_load_Nm, at);
   const V increment = hn::Sub(twist, get(rows.twist_rad, at));
   V slip = step_inner(rows.slip, at, increment, zero(), zero());
   if constexpr (!kBonded) {

@@ -252,7 +252,7 @@ void start(ElastomerRows<kBonded>& rows, Lane lane, const ElastomerCoupling& cou
     lane(rows.lobes[i].torque_Nm) = chain.relaxed_stiffness() * pressed_rad;
   }
   lane(rows.twist_rad) = twist_rad;
-  lane(rows.carried_Nm) = coupling.friction_torque();
+  lane(rows.max_measured_load_Nm) = coupling.friction_torque();
   lane(rows.glue) = 1.0;
   lane(rows.glue_after_cycle) = 1.0;
   lane(rows.last_side) = 0.0;

@@ -91,7 +91,7 @@ Taken on_a_closed_path(const LuGreFriction::Parameters& parts, double largest_lo
   const double dt_s = std::pow(10.0, -7.0 + 4.0 * random.uniform());
   double last_Nm = 0.0;
   double work_J = 0.0;
-  double most_lost_J = 0.0;
+  double max_lost_J = 0.0;
   Taken taken;
   for (int i = 1; i <= kSamples; ++i) {
     const double share = static_cast<double>(i) / kSamples;
@@ -104,9 +104,9 @@ Taken on_a_closed_path(const LuGreFriction::Parameters& parts, double largest_lo
     work_J += step_J;
     taken.throughput_J += std::abs(step_J);
     taken.least_J = std::min(taken.least_J, work_J);
-    most_lost_J = std::max(most_lost_J, work_J - friction.energy());
+    max_lost_J = std::max(max_lost_J, work_J - friction.energy());
     taken.deepest_fall_J =
-        std::max(taken.deepest_fall_J, most_lost_J - (work_J - friction.energy()));
+        std::max(taken.deepest_fall_J, max_lost_J - (work_J - friction.energy()));
   }
   return taken;
 }

@@ -81,7 +81,7 @@ TYPED_TEST(SpringFrictionLaws, LoopIsAsWideAsTwiceTheLimit) {
 struct Fall {
   double deepest_J = 0.0;  ///< of work less F² / 2k, below what it had reached
   double lost_J = 0.0;     ///< at the end
-  double most_stored_J = 0.0;
+  double max_stored_J = 0.0;
 };
 
 /// On a random walk inside a spring whose torque presses the surfaces.
@@ -89,7 +89,7 @@ template <class Friction>
 Fall fall_of_loss(Friction friction, double spring_Nm_rad, std::uint64_t seed) {
   double last_Nm = 0.0;
   double work_J = 0.0;
-  double most_lost_J = 0.0;
+  double max_lost_J = 0.0;
   double x_rad = 0.0;
   Fall fall;
   for (const Motion& now : random_motion(seed, 0.01 * kKnee_rad)) {
@@ -98,9 +98,9 @@ Fall fall_of_loss(Friction friction, double spring_Nm_rad, std::uint64_t seed) {
     work_J += 0.5 * (last_Nm + force_Nm) * now.increment_rad;
     last_Nm = force_Nm;
     fall.lost_J = work_J - friction.energy();
-    most_lost_J = std::max(most_lost_J, fall.lost_J);
-    fall.deepest_J = std::max(fall.deepest_J, most_lost_J - fall.lost_J);
-    fall.most_stored_J = std::max(fall.most_stored_J, friction.energy());
+    max_lost_J = std::max(max_lost_J, fall.lost_J);
+    fall.deepest_J = std::max(fall.deepest_J, max_lost_J - fall.lost_J);
+    fall.max_stored_J = std::max(fall.max_stored_J, friction.energy());
   }
   return fall;
 }
@@ -120,7 +120,7 @@ TYPED_TEST(SpringFrictionLaws, LossNeverFallsUnderAConstantLimit) {
 TYPED_TEST(SpringFrictionLaws, LossFallsByAShareOfWhatIsStoredWhereTheLimitFollowsTheLoad) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const Fall fall = fall_of_loss(friction_of<TypeParam>(1.5, 0.05), 500.0, seed);
-    EXPECT_LT(fall.deepest_J, 0.01 * fall.most_stored_J) << "seed " << seed;
+    EXPECT_LT(fall.deepest_J, 0.01 * fall.max_stored_J) << "seed " << seed;
     EXPECT_GT(fall.lost_J, 1.5 * kKnee_rad) << "seed " << seed;
   }
 }
@@ -174,7 +174,7 @@ TYPED_TEST(SpringFrictionLaws, StartsWithTheEnergyOfASpring) {
 
 TYPED_TEST(SpringFrictionLaws, StiffnessIsTheLargestSlopeThatOccurs) {
   auto friction = friction_of<TypeParam>(1.0, 0.1);
-  const double most_Nm_rad = friction.stiffness(5.0);
+  const double max_Nm_rad = friction.stiffness(5.0);
   double steepest_Nm_rad = 0.0;
   double last_Nm = 0.0;
   for (const Motion& now : random_motion(5, 0.01 * kKnee_rad)) {
@@ -182,8 +182,8 @@ TYPED_TEST(SpringFrictionLaws, StiffnessIsTheLargestSlopeThatOccurs) {
     steepest_Nm_rad = std::max(steepest_Nm_rad, (force_Nm - last_Nm) / now.increment_rad);
     last_Nm = force_Nm;
   }
-  EXPECT_LE(steepest_Nm_rad, most_Nm_rad * (1.0 + 1e-6));  // rounding of short increments
-  EXPECT_GE(steepest_Nm_rad, most_Nm_rad * 0.9);
+  EXPECT_LE(steepest_Nm_rad, max_Nm_rad * (1.0 + 1e-6));  // rounding of short increments
+  EXPECT_GE(steepest_Nm_rad, max_Nm_rad * 0.9);
 }
 
 TYPED_TEST(SpringFrictionLaws, ResetMakesARunRepeatable) {

@@ -70,7 +70,7 @@ TEST(Guards, TheResidualTableTellsTheSpreadByRegionOfTheOutput) {
     return 100.0 * x[0] + (x[0] > 0.0 ? 2.0 : 0.5) * random.normal();
   });
   const ResidualTable table = residual_table(spring(100.0), data);
-  ASSERT_EQ(table.std_dev.size(), kMostResidualRegions);
+  ASSERT_EQ(table.std_dev.size(), kMaxResidualRegions);
   ASSERT_EQ(table.edges.size(), table.std_dev.size() + 1);
   EXPECT_TRUE(std::ranges::is_sorted(table.edges));
   for (std::size_t i = 0; i < table.std_dev.size(); ++i) {

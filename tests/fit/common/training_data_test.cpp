@@ -117,9 +117,9 @@ TEST(TrainingData, LeavesOutSamplesWhoseFeatureIsNotFinite) {
   EXPECT_EQ(data.sequences[0].use, (std::vector<std::uint8_t>{1, 1, 1, 1, 0, 1, 1, 1, 1, 1}));
   EXPECT_FALSE(data.sequences[0].has_features(4));
   AnyModel model = Linear({.coefficients = {.values = Matrix(1, 2, 1.0)}});
-  const std::vector<Estimate> told = run(model, data.sequences[0]);
-  EXPECT_EQ(told[4].fault, Fault::input_not_finite);
-  EXPECT_EQ(told[5].fault, Fault::none);
+  const std::vector<Estimate> estimate = run(model, data.sequences[0]);
+  EXPECT_EQ(estimate[4].fault, Fault::input_not_finite);
+  EXPECT_EQ(estimate[5].fault, Fault::none);
 }
 
 TEST(TrainingData, NamesTheExpressionThatIsNeverFinite) {

@@ -72,8 +72,8 @@ TEST(FitGaussianProcess, TakesDuplicatesAndAConstantInput) {
   const auto fitted = fit_gaussian_process(data, {.kernel = "se_ard"});
   EXPECT_THAT(fitted.notes, Contains(HasSubstr("support_m is constant")));
   EXPECT_NO_THROW(GaussianProcess{fitted.parameters});
-  const auto sparse = fit_variational_gp(data, {.points = 100});
-  EXPECT_LE(sparse.parameters.points.rows, 50U) << "only so many points differ";
+  const auto sparse = fit_variational_gp(data, {.inducing_points = 100});
+  EXPECT_LE(sparse.parameters.inducing_points.rows, 50U) << "only so many points differ";
 }
 
 TEST(FitGaussianProcess, RefusesMoreSamplesThanItCanTake) {
@@ -114,7 +114,8 @@ TEST(FitParametricGp, PassesItsOptionsOnAndRefusesWrongOnes) {
   const auto fit = [&](const std::map<std::string, std::string>& options) {
     return family.fit(curve(300), Options(family.options, options), {.seed = 1});
   };
-  const auto fitted = fit({{"kernel", "se"}, {"clusters", "9"}, {"updates", "50"}, {"batch", "7"}});
+  const auto fitted =
+      fit({{"kernel", "se"}, {"inducing_points", "9"}, {"updates", "50"}, {"batch", "7"}});
   EXPECT_EQ(fitted.model.get_if<ParametricGp>()->parameters().weights.size(), 9U);
   EXPECT_THAT(error_message([&] { (void)fit({{"mode", "best"}}); }), HasSubstr("recommended"));
   EXPECT_THAT(error_message([&] { (void)fit({{"kernel", "se*"}}); }), HasSubstr("column 4"));
@@ -124,7 +125,8 @@ TEST(FitParametricGp, PassesItsOptionsOnAndRefusesWrongOnes) {
               HasSubstr("nine numbers"));
   const FamilyInfo& variational = find_family("parametric_gp_variational");
   const auto sparse = variational.fit(
-      curve(300), Options(variational.options, {{"points", "12"}, {"kernel", "rq"}}), {.seed = 1});
+      curve(300), Options(variational.options, {{"inducing_points", "12"}, {"kernel", "rq"}}),
+      {.seed = 1});
   EXPECT_EQ(sparse.model.get_if<ParametricGp>()->parameters().weights.size(), 12U);
 }
 
@@ -140,7 +142,8 @@ TEST(FitParametricGp, EveryModeMakesAModelAndAllButThePapersFindTheCurve) {
       EXPECT_LT(error, 0.15) << static_cast<int>(mode);
     }
   }
-  EXPECT_LT(rmse<ParametricGp>(fit_variational_gp(data, {.kernel = "se", .points = 14}).parameters),
+  EXPECT_LT(rmse<ParametricGp>(
+                fit_variational_gp(data, {.kernel = "se", .inducing_points = 14}).parameters),
             0.03);
 }
 
@@ -155,9 +158,9 @@ TEST(FitParametricGp, LearnsNothingFromASampleAtWhichItsNumbersAreNone) {
 TEST(FitParametricGp, TheUseDecidesWhetherTheClosedFormIsKept) {
   // As if the closed form were worse there, and better.
   for (const double sign : {1.0, -1.0}) {
-    double told = 0.0;
+    double estimate = 0.0;
     FitContext context{.seed = 1};
-    context.error_of = [&](const AnyModel&) { return told += sign; };
+    context.error_of = [&](const AnyModel&) { return estimate += sign; };
     const auto fitted = fit_parametric_gp(curve(300), {.updates = 300}, context);
     EXPECT_THAT(fitted.notes, Contains(AllOf(HasSubstr("RMSE on a free run"),
                                              HasSubstr(sign > 0.0 ? "is not kept" : "is kept"))));
@@ -279,8 +282,8 @@ double covered(const typename Model::Parameters& parameters, const Matrix& featu
   Model model(parameters);
   std::size_t inside = 0;
   for (std::size_t n = 0; n < target.size(); ++n) {
-    const Estimate told = model.step(features.row(n));
-    if (std::abs(told.value - target[n]) <= 1.96 * told.std_dev) ++inside;
+    const Estimate estimate = model.step(features.row(n));
+    if (std::abs(estimate.value - target[n]) <= 1.96 * estimate.std_dev) ++inside;
   }
   return static_cast<double>(inside) / static_cast<double>(target.size());
 }
@@ -288,8 +291,8 @@ double covered(const typename Model::Parameters& parameters, const Matrix& featu
 /// Functions drawn from a Gaussian process; the first half to learn from, the second to judge.
 TEST(FitGaussianProcess, ItsIntervalsCoverDataFromThePrior) {
   constexpr std::size_t kLearned = 300;
-  constexpr std::size_t kJudged = 300;
-  constexpr std::size_t kAll = kLearned + kJudged;
+  constexpr std::size_t kScored = 300;
+  constexpr std::size_t kAll = kLearned + kScored;
   constexpr int kDraws = 12;
   double exact = 0.0;
   double sparse = 0.0;
@@ -311,11 +314,11 @@ TEST(FitGaussianProcess, ItsIntervalsCoverDataFromThePrior) {
         Eigen::VectorXd::NullaryExpr(kAll, [&] { return random.normal(); });
     const Eigen::VectorXd f = k.llt().matrixL() * white;
     Matrix learned(kLearned, 2);
-    Matrix judged(kJudged, 2);
+    Matrix scored(kScored, 2);
     std::vector<double> target;
     for (std::size_t n = 0; n < kAll; ++n) {
       std::ranges::copy(points.row(n),
-                        n < kLearned ? learned.row(n).begin() : judged.row(n - kLearned).begin());
+                        n < kLearned ? learned.row(n).begin() : scored.row(n - kLearned).begin());
       target.push_back(f(static_cast<Eigen::Index>(n)) + 0.2 * random.normal());
     }
     std::size_t next = 0;
@@ -324,9 +327,9 @@ TEST(FitGaussianProcess, ItsIntervalsCoverDataFromThePrior) {
                                [&](Features) { return target[next++]; });
     const std::vector<double> rest(target.begin() + kLearned, target.end());
     exact += covered<GaussianProcess>(
-        fit_gaussian_process(data, {.kernel = "se", .restarts = 0}).parameters, judged, rest);
+        fit_gaussian_process(data, {.kernel = "se", .restarts = 0}).parameters, scored, rest);
     sparse += covered<ParametricGp>(
-        fit_variational_gp(data, {.kernel = "se", .points = 60}).parameters, judged, rest);
+        fit_variational_gp(data, {.kernel = "se", .inducing_points = 60}).parameters, scored, rest);
   }
   EXPECT_NEAR(exact / kDraws, 0.95, 0.02);
   EXPECT_NEAR(sparse / kDraws, 0.95, 0.02);

@@ -148,8 +148,8 @@ TEST(FitHammersteinWiener, SaysWhereSlowMotionLeavesWhatItLearnedFrom) {
   HammersteinWienerOptions shape = kTrueShape;
   shape.zeros = 0;
   shape.poles = 1;
-  const auto told = fit_hammerstein_wiener(recorded(slow, 6000, 0.01, 1), shape);
-  HammersteinWiener model(told.parameters);
+  const auto estimate = fit_hammerstein_wiener(recorded(slow, 6000, 0.01, 1), shape);
+  HammersteinWiener model(estimate.parameters);
   const auto data = recorded(slow, 6000, 0.0, 1);
   const auto [lowest, highest] = std::ranges::minmax(data.sequences[0].target);
   const double u = std::ranges::max(data.sequences[0].features.values);
@@ -254,11 +254,11 @@ TEST(FitHammersteinWiener, GoesOnFromTheMiddleOfAMovement) {
   const TrainingData data = recorded(known_hammerstein_wiener(), 600, 0.0, 10);
   const Sequence& whole = data.sequences.front();
   constexpr std::size_t kBegin = 300;
-  constexpr std::size_t kTold = 50;
-  Matrix told(kTold, 1);
-  for (std::size_t n = 0; n < kTold; ++n) told(n, 0) = whole.features(kBegin + n, 0);
+  constexpr std::size_t kGiven = 50;
+  Matrix estimate(kGiven, 1);
+  for (std::size_t n = 0; n < kGiven; ++n) estimate(n, 0) = whole.features(kBegin + n, 0);
   AnyModel model{HammersteinWiener(known_hammerstein_wiener())};
-  start_where_measured(model, told, std::span(whole.target).subspan(kBegin, kTold), 1e-6);
+  start_where_measured(model, estimate, std::span(whole.target).subspan(kBegin, kGiven), 1e-6);
   for (std::size_t n = kBegin; n < whole.target.size(); ++n) {
     const double value = model.step(whole.features.row(n)).value;
     EXPECT_NEAR(value, whole.target[n], 1e-3) << n;

@@ -34,7 +34,7 @@ TEST_P(WienerErrorTest, SensitivitiesAreFiniteDifferences) {
   const WienerError error(data_, numbers_);
   const std::vector<double> packed = error.pack(numbers_);
   const Matrix rows = error.rows(numbers_);
-  ASSERT_EQ(rows.rows, data_.judged_samples());
+  ASSERT_EQ(rows.rows, data_.scored_samples());
   ASSERT_EQ(rows.columns, packed.size() + 1);
   constexpr double kStep = 1e-6;
   for (std::size_t k = 0; k < packed.size(); ++k) {
@@ -98,7 +98,7 @@ TEST_P(WienerErrorTest, IsTheModelsOwn) {
     model.set_state(straight.start.row(r));
     for (std::size_t n = 0; n < data_.records[r].input.size(); ++n) {
       const double y = model.step({&data_.records[r].input[n], 1}).value;
-      if (data_.records[r].judged[n] != 0) sum += std::pow(y - data_.records[r].target[n], 2);
+      if (data_.records[r].scored[n] != 0) sum += std::pow(y - data_.records[r].target[n], 2);
     }
   }
   EXPECT_NEAR(WienerError(data_, straight).sum_of_squares(straight), sum, 1e-9 * sum);

@@ -203,7 +203,7 @@ TEST(FitOperators, SayWhatIsMissing) {
       HasSubstr("nonlinear_backlash_improved has no input that tells a rate"));
   TrainingData data = recording_of(test::example_bouc_wen(), 0.1, 3000);
   EXPECT_THAT(
-      test::error_message([&] { static_cast<void>(fit_bouc_wen(data, {.most_iterations = 1})); }),
+      test::error_message([&] { static_cast<void>(fit_bouc_wen(data, {.max_iterations = 1})); }),
       HasSubstr("did not converge"));
 }
 

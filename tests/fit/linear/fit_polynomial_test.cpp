@@ -60,9 +60,9 @@ TEST(FitPolynomial, RecoversBothBranchesOfALoop) {
   const auto fitted = fit_polynomial(data, {.dead_band = 0.001});
   EXPECT_EQ(Polynomial(fitted.parameters).parameter_count(), 12U);
   AnyModel model = Polynomial(fitted.parameters);
-  const auto told = run(model, data.sequences[0]);
-  for (std::size_t n = 10; n < told.size(); ++n)
-    ASSERT_NEAR(told[n].value, data.sequences[0].target[n], 1e-9) << "sample " << n;
+  const auto estimate = run(model, data.sequences[0]);
+  for (std::size_t n = 10; n < estimate.size(); ++n)
+    ASSERT_NEAR(estimate[n].value, data.sequences[0].target[n], 1e-9) << "sample " << n;
   EXPECT_TRUE(fitted.notes.empty());
 }
 
@@ -149,10 +149,10 @@ TEST(FitPolynomial, KnowsWhereEachCurveHasData) {
   Polynomial model(fit_polynomial(data, {}).parameters);
   const auto measured = std::ranges::minmax(data.sequences[0].target);
   for (double x = -0.1; x <= 0.1; x += 0.001) {
-    const Estimate told = model.step(std::array{x});
-    EXPECT_GT(told.value, measured.min - 5.0) << x;
-    EXPECT_LT(told.value, measured.max + 5.0) << x;
-    EXPECT_EQ(told.fault, x < -0.058 ? Fault::none : Fault::outside_training_range) << x;
+    const Estimate estimate = model.step(std::array{x});
+    EXPECT_GT(estimate.value, measured.min - 5.0) << x;
+    EXPECT_LT(estimate.value, measured.max + 5.0) << x;
+    EXPECT_EQ(estimate.fault, x < -0.058 ? Fault::none : Fault::outside_training_range) << x;
   }
 }
 

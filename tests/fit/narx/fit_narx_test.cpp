@@ -124,9 +124,11 @@ TEST(FitNarx, NoiseIsOfTheSeed) {
 
 TEST(FitNarx, FindsTheDifferenceEquationAsAVariationalGaussianProcess) {
   const TrainingData data = second_order(1000, 0.02, 6);
-  const FittedModel fitted = fit_named(
-      "narx_parametric_gp_variational", data,
-      {{"kernel", "linear_ard"}, {"points", "10"}, {"input_lags", "1"}, {"training", "one_step"}});
+  const FittedModel fitted = fit_named("narx_parametric_gp_variational", data,
+                                       {{"kernel", "linear_ard"},
+                                        {"inducing_points", "10"},
+                                        {"input_lags", "1"},
+                                        {"training", "one_step"}});
   EXPECT_EQ(fitted.model.family(), "narx_parametric_gp");
   EXPECT_GT(evaluate(fitted.model, second_order(1000, 0.0, 7)).fit_percent, 95.0);
 }

@@ -61,10 +61,10 @@ TEST(Frols, EndsWithoutNoiseAtTheLastTermThatIsThere) {
   EXPECT_THAT(last.terms,
               UnorderedElementsAre(Monomial{}, Monomial{1}, Monomial{0, 2}, Monomial{1, 1, 3}));
   for (std::size_t n = 0; n < x.rows; ++n) {
-    double told = 0.0;
+    double estimate = 0.0;
     for (std::size_t t = 0; t < last.terms.size(); ++t)
-      told += last.coefficients[t] * product(x.row(n), last.terms[t], found.scales);
-    ASSERT_NEAR(told, known(x, 0.0)[n], 1e-10) << n;
+      estimate += last.coefficients[t] * product(x.row(n), last.terms[t], found.scales);
+    ASSERT_NEAR(estimate, known(x, 0.0)[n], 1e-10) << n;
   }
 }
 

@@ -8,7 +8,7 @@
 
 #include "evaluate/initial_state.hpp"
 #include "fit/second_order/fit_dynamic_bouc_wen.hpp"
-#include "fit/second_order/fit_friction_drive.hpp"
+#include "fit/second_order/fit_rigid_drive.hpp"
 #include "support/driven_record.hpp"
 #include "support/error_message.hpp"
 #include "torsio/evaluate/comparison.hpp"
@@ -89,8 +89,8 @@ TEST(FitDynamicBoucWen, SaysWhyItCannotFit) {
   EXPECT_THAT(refused([](TrainingData&) {}, {.iterations = 1}), HasSubstr("no convergence"));
 }
 
-TEST(FitFrictionDrive, FindsWhatMadeTheRecord) {
-  const auto fitted = fit_friction_drive(carriage_record(), {});
+TEST(FitRigidDrive, FindsWhatMadeTheRecord) {
+  const auto fitted = fit_rigid_drive(carriage_record(), {});
   EXPECT_NEAR(fitted.parameters.inertia, 95.0, 0.3);
   EXPECT_NEAR(fitted.parameters.viscous, 200.0, 4.0);
   EXPECT_NEAR(fitted.parameters.coulomb, 20.0, 0.2);
@@ -99,33 +99,33 @@ TEST(FitFrictionDrive, FindsWhatMadeTheRecord) {
   EXPECT_EQ(fitted.table[1].unit, "N s/m");
 }
 
-TEST(FitFrictionDrive, ScalesEverythingByTheGain) {
-  const auto plain = fit_friction_drive(carriage_record(), {}).parameters;
-  const auto scaled = fit_friction_drive(carriage_record(), {.gain = 2.0}).parameters;
+TEST(FitRigidDrive, ScalesEverythingByTheGain) {
+  const auto plain = fit_rigid_drive(carriage_record(), {}).parameters;
+  const auto scaled = fit_rigid_drive(carriage_record(), {.gain = 2.0}).parameters;
   EXPECT_NEAR(scaled.inertia, 2.0 * plain.inertia, 0.01 * plain.inertia);
   EXPECT_NEAR(scaled.coulomb, 2.0 * plain.coulomb, 0.02 * plain.coulomb);
 }
 
-TEST(FitFrictionDrive, ChoosesATermThatIsThere) {
-  const auto with = fit_friction_drive(carriage_record(300.0, 2400), {.terms = "auto"});
+TEST(FitRigidDrive, ChoosesATermThatIsThere) {
+  const auto with = fit_rigid_drive(carriage_record(300.0, 2400), {.terms = "auto"});
   EXPECT_GT(with.parameters.viscous_quadratic, 200.0);
   EXPECT_THAT(with.notes, Contains(HasSubstr("chosen terms: quadratic")));
 }
 
-TEST(FitFrictionDrive, SaysWhyItCannotFit) {
+TEST(FitRigidDrive, SaysWhyItCannotFit) {
   EXPECT_THAT(test::error_message(
-                  [] { (void)fit_friction_drive(carriage_record(), {.terms = "lugre+stribek"}); }),
+                  [] { (void)fit_rigid_drive(carriage_record(), {.terms = "lugre+stribek"}); }),
               testing::AllOf(HasSubstr("stribek"), HasSubstr("Did you mean")));
   TrainingData backward = carriage_record();
   for (double& y : backward.sequences[0].target) y = -y;
-  EXPECT_THAT(test::error_message([&] { (void)fit_friction_drive(backward, {}); }),
+  EXPECT_THAT(test::error_message([&] { (void)fit_rigid_drive(backward, {}); }),
               HasSubstr("accelerates the target in its own direction"));
 }
 
 /// Pushed by a hand that the record knows nothing of, from a speed of 0.3 m/s on.
 Recording drifting_record() {
   std::vector<double> force = multisine(4000, 1000.0, 0.5, 4.0, 80.0);
-  FrictionDrive drive = carriage();
+  RigidDrive drive = carriage();
   drive.set_state(std::vector<double>{0.1, 0.3, 0.0});
   std::vector<double> position;
   for (std::size_t n = 0; n < force.size(); ++n) {
@@ -138,19 +138,19 @@ Recording drifting_record() {
   return recording;
 }
 
-TEST(FitFrictionDrive, PutsAStartByTheFirstSamplesHoweverFarTheRunDrifts) {
+TEST(FitRigidDrive, PutsAStartByTheFirstSamplesHoweverFarTheRunDrifts) {
   Dataset dataset;
   dataset.target = "position_m";
   Recording recording = drifting_record();
   dataset.records.push_back({recording, whole_record(recording.size(), Role::train)});
-  const auto choices = model_choices(dataset, "friction_drive", {"force_N"});
+  const auto choices = model_choices(dataset, "rigid_drive", {"force_N"});
   const TrainedModel trained = train_model(dataset, choices[0], 1);
   const Channel& target = recording.channel("position_m");
-  const Prediction told = predict(make_estimator(trained.file), recording, {&target, 50});
+  const Prediction estimate = predict(make_estimator(trained.file), recording, {&target, 50});
   const auto miss = [&](std::size_t n) {
-    return std::abs(told.estimates[n].value - target.values[n]);
+    return std::abs(estimate.estimates[n].value - target.values[n]);
   };
-  EXPECT_EQ(told.initialised, 50U);
+  EXPECT_EQ(estimate.initialised, 50U);
   EXPECT_LT(miss(49), 2e-5);
   double largest = 0.0;
   for (std::size_t n = 50; n < recording.size(); ++n) largest = std::max(largest, miss(n));
@@ -171,7 +171,7 @@ TEST(InitialState, OfAMassOnAHystereticSpringIsFoundFromItsFirstSamples) {
 }
 
 TEST(InitialState, OfADriveIsItsPositionAndSpeed) {
-  FrictionDrive model = carriage();
+  RigidDrive model = carriage();
   model.set_state(std::vector<double>{0.2, -0.05, 0.0});
   const TrainingData data = recorded(model, std::vector<double>(50, 10.0), 0.0);
   AnyModel found(carriage());

@@ -58,11 +58,11 @@ TEST(GaussianProcess, SaysMeanAndSpreadOfItsDefinition) {
           q.dot(Eigen::Map<const Eigen::VectorXd>(weights.data(), Eigen::Index(weights.size())));
       const double prior = covariance(expression, x, x)(0, 0);
       const double left = prior - q.dot(k.llt().solve(q));
-      const Estimate told = model.step(features.row(n));
-      EXPECT_NEAR(told.value, scaling.target_centre + scaling.target_scale * mean, 1e-11);
-      EXPECT_NEAR(told.std_dev, scaling.target_scale * std::sqrt(left + noise), 1e-9);
-      EXPECT_NEAR(told.novelty, left / prior, 1e-10);
-      EXPECT_EQ(told.fault, Fault::none);
+      const Estimate estimate = model.step(features.row(n));
+      EXPECT_NEAR(estimate.value, scaling.target_centre + scaling.target_scale * mean, 1e-11);
+      EXPECT_NEAR(estimate.std_dev, scaling.target_scale * std::sqrt(left + noise), 1e-9);
+      EXPECT_NEAR(estimate.novelty, left / prior, 1e-10);
+      EXPECT_EQ(estimate.fault, Fault::none);
     }
   });
 }
@@ -84,15 +84,16 @@ TEST(ParametricGp, SaysMeanAndSpreadOfItsDefinition) {
   const Matrix features = test::example_features(50, 2);
   for (std::size_t n = 0; n < features.rows; ++n) {
     const Matrix x = standardised(p.scaling, features.row(n));
-    const Eigen::VectorXd q = covariance(p.kernel, p.points, x);
+    const Eigen::VectorXd q = covariance(p.kernel, p.inducing_points, x);
     const double mean =
         q.dot(Eigen::Map<const Eigen::VectorXd>(p.weights.data(), Eigen::Index(p.weights.size())));
     const double prior = covariance(p.kernel, x, x)(0, 0);
     const double left = prior - 0.1 * q.squaredNorm();
-    const Estimate told = model.step(features.row(n));
-    EXPECT_NEAR(told.value, p.scaling.target_centre + p.scaling.target_scale * mean, 1e-11);
-    EXPECT_NEAR(told.std_dev, p.scaling.target_scale * std::sqrt(left + p.noise_variance), 1e-10);
-    EXPECT_NEAR(told.novelty, left / prior, 1e-12);
+    const Estimate estimate = model.step(features.row(n));
+    EXPECT_NEAR(estimate.value, p.scaling.target_centre + p.scaling.target_scale * mean, 1e-11);
+    EXPECT_NEAR(estimate.std_dev, p.scaling.target_scale * std::sqrt(left + p.noise_variance),
+                1e-10);
+    EXPECT_NEAR(estimate.novelty, left / prior, 1e-12);
   }
 }
 
@@ -101,10 +102,10 @@ void expect_faults_without_harm(Model model) {
   const std::vector<double> good{0.05, 0.1};
   const double expected = model.step(good).value;
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), HUGE_VAL, -HUGE_VAL}) {
-    const Estimate told = model.step(std::vector{0.05, bad});
-    EXPECT_EQ(told.fault, Fault::model_not_finite) << bad;
-    EXPECT_EQ(told.value, model.parameters().scaling.target_centre);
-    EXPECT_TRUE(std::isnan(told.std_dev));
+    const Estimate estimate = model.step(std::vector{0.05, bad});
+    EXPECT_EQ(estimate.fault, Fault::model_not_finite) << bad;
+    EXPECT_EQ(estimate.value, model.parameters().scaling.target_centre);
+    EXPECT_TRUE(std::isnan(estimate.std_dev));
     EXPECT_EQ(model.step(good).value, expected);
   }
 }
@@ -145,7 +146,7 @@ TEST(ParametricGp, RefusesPointsOutsideItsKernelsDomain) {
   parameters.kernel = parse_kernel("rq", 2);
   parameters.kernel.nodes[0].shape = -5.3729;
   EXPECT_NO_THROW(ParametricGp{parameters});
-  parameters.points(8, 0) = 9.0;
+  parameters.inducing_points(8, 0) = 9.0;
   EXPECT_THAT(error_message([&] { const ParametricGp model(parameters); }),
               testing::AllOf(HasSubstr("alpha below 0"), HasSubstr("point 0")));
 }

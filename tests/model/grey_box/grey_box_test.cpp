@@ -30,37 +30,37 @@ GreyBox::Parameters plain(std::vector<double> thresholds = {}, std::vector<doubl
   return parameters;
 }
 
-double told(GreyBox& box, double x) { return box.step(std::array{x}).value; }
+double estimate(GreyBox& box, double x) { return box.step(std::array{x}).value; }
 
 TEST(GreyBox, ItsCurveIsStraightBetweenKnotsAndBeyondThem) {
   GreyBox::Parameters parameters = plain();
   parameters.coefficients.values.values = {-10.0, 0.0, 20.0, 0.0, 0.0};
   GreyBox box(parameters);
-  EXPECT_DOUBLE_EQ(told(box, -0.5), -5.0);
-  EXPECT_DOUBLE_EQ(told(box, 0.25), 5.0);
-  EXPECT_DOUBLE_EQ(told(box, 2.0), 40.0);
-  EXPECT_DOUBLE_EQ(told(box, -3.0), -30.0);
+  EXPECT_DOUBLE_EQ(estimate(box, -0.5), -5.0);
+  EXPECT_DOUBLE_EQ(estimate(box, 0.25), 5.0);
+  EXPECT_DOUBLE_EQ(estimate(box, 2.0), 40.0);
+  EXPECT_DOUBLE_EQ(estimate(box, -3.0), -30.0);
 }
 
 TEST(GreyBox, ASlipElementHoldsUntilItsThresholdAndThenSlides) {
   GreyBox::Parameters parameters = plain({0.1});
   parameters.coefficients.values.values = {0.0, 0.0, 0.0, 4.0, 0.0, 0.0};
   GreyBox box(parameters);
-  EXPECT_DOUBLE_EQ(told(box, 0.0), 0.0);
-  EXPECT_DOUBLE_EQ(told(box, 0.05), 2.0);
-  EXPECT_DOUBLE_EQ(told(box, 0.5), 4.0);
-  EXPECT_NEAR(told(box, 0.45), 2.0, 1e-12);
-  EXPECT_DOUBLE_EQ(told(box, 0.0), -4.0);
+  EXPECT_DOUBLE_EQ(estimate(box, 0.0), 0.0);
+  EXPECT_DOUBLE_EQ(estimate(box, 0.05), 2.0);
+  EXPECT_DOUBLE_EQ(estimate(box, 0.5), 4.0);
+  EXPECT_NEAR(estimate(box, 0.45), 2.0, 1e-12);
+  EXPECT_DOUBLE_EQ(estimate(box, 0.0), -4.0);
 }
 
 TEST(GreyBox, ItsFrictionGrowsWithTheDeflectionAndIsHeldBeyondTheKnots) {
   GreyBox::Parameters parameters = plain({0.1}, {0.0, 1.0});
   parameters.coefficients.values.values = {0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0};
   GreyBox box(parameters);
-  told(box, 0.0);
-  EXPECT_DOUBLE_EQ(told(box, 0.5), 2.0);
-  EXPECT_DOUBLE_EQ(told(box, 5.0), 3.0);
-  EXPECT_DOUBLE_EQ(told(box, -5.0), -1.0);
+  estimate(box, 0.0);
+  EXPECT_DOUBLE_EQ(estimate(box, 0.5), 2.0);
+  EXPECT_DOUBLE_EQ(estimate(box, 5.0), 3.0);
+  EXPECT_DOUBLE_EQ(estimate(box, -5.0), -1.0);
 }
 
 TEST(GreyBox, ABranchRelaxesExactlyOnARamp) {
@@ -71,7 +71,7 @@ TEST(GreyBox, ABranchRelaxesExactlyOnARamp) {
   GreyBox box(parameters);
   for (int n = 0; n <= 40; ++n) {
     const double t = 0.01 * n;
-    EXPECT_NEAR(told(box, kRate * t),
+    EXPECT_NEAR(estimate(box, kRate * t),
                 2.0 * kRate * kTimeConstant_s * (1.0 - std::exp(-t / kTimeConstant_s)), 1e-13);
   }
 }
@@ -90,12 +90,12 @@ TEST(GreyBox, WithForcesThatAreNotNegativeItGivesNoWorkAway) {
     };
     constexpr int kSamples = 2000;
     double x = at(0.0);
-    double torque = told(box, x);
+    double torque = estimate(box, x);
     double work = 0.0;
     double elastic_return = 0.0;
     for (int n = 1; n <= 3 * kSamples; ++n) {
       const double next = at(static_cast<double>(n) / kSamples);
-      const double next_torque = told(box, next);
+      const double next_torque = estimate(box, next);
       work += 0.5 * (torque + next_torque) * (next - x);
       elastic_return = std::abs(next_torque) * std::abs(next - x);
       x = next;
@@ -109,14 +109,14 @@ TEST(GreyBox, GoesOnFromAStateThatItIsGiven) {
   GreyBox::Parameters parameters = plain({0.02, 0.2}, {0.0}, {0.3});
   parameters.coefficients.values.values = {-9.0, 1.0, 8.0, 0.7, 1.5, 2.0, 0.0, 0.0};
   GreyBox first(parameters);
-  for (int n = 0; n < 50; ++n) told(first, 0.3 * std::sin(0.3 * n));
+  for (int n = 0; n < 50; ++n) estimate(first, 0.3 * std::sin(0.3 * n));
   const std::vector<double> state(first.state().begin(), first.state().end());
   const double x = 0.3 * std::sin(0.3 * 49);
   GreyBox second(parameters);
   second.set_state(state);
   // A start has no step behind it: the branch decays for a period more.
   first.step(std::array{x});
-  EXPECT_DOUBLE_EQ(told(first, x), (told(second, x), told(second, x)));
+  EXPECT_DOUBLE_EQ(estimate(first, x), (estimate(second, x), estimate(second, x)));
 }
 
 TEST(GreyBox, BringsAStateOutOfBoundsToItsBoundAndPassesOverWhatIsNoNumber) {
@@ -149,9 +149,9 @@ TEST(GreyBox, ItsResidualIsBoundedAndFadesOutBeyondItsTrainingData) {
                          .lowest = {-1.0, -1.0},
                          .highest = {1.0, 1.0}};
   GreyBox box(parameters);
-  EXPECT_DOUBLE_EQ(told(box, 0.5), 2.0) << "bounded";
-  EXPECT_NEAR(told(box, 1.1), 1.0, 1e-12) << "half of the border";
-  EXPECT_DOUBLE_EQ(told(box, 1.3), 0.0) << "beyond it";
+  EXPECT_DOUBLE_EQ(estimate(box, 0.5), 2.0) << "bounded";
+  EXPECT_NEAR(estimate(box, 1.1), 1.0, 1e-12) << "half of the border";
+  EXPECT_DOUBLE_EQ(estimate(box, 1.3), 0.0) << "beyond it";
 }
 
 TEST(GreyBox, InvertsFromWhereItIsWithinItsCurve) {
@@ -165,7 +165,7 @@ TEST(GreyBox, InvertsFromWhereItIsWithinItsCurve) {
     const Estimate found = box.invert(target, std::array{x});
     ASSERT_EQ(found.fault, Fault::none);
     x = found.value;
-    EXPECT_NEAR(told(box, x), target, 1e-9);
+    EXPECT_NEAR(estimate(box, x), target, 1e-9);
   }
 }
 

@@ -152,9 +152,9 @@ TEST(HammersteinWiener, SurvivesAnInputThatOverflows) {
   const double before = step(model, 0.2);
   step(other, 0.2);
   const double u = 1e200;
-  const Estimate told = model.step({&u, 1});
-  EXPECT_EQ(told.fault, Fault::model_not_finite);
-  EXPECT_EQ(told.value, before);
+  const Estimate estimate = model.step({&u, 1});
+  EXPECT_EQ(estimate.fault, Fault::model_not_finite);
+  EXPECT_EQ(estimate.value, before);
   EXPECT_EQ(step(model, 0.3), step(other, 0.3));
 }
 
@@ -162,13 +162,13 @@ TEST(HammersteinWiener, StaysAtTheEndOfItsRangeAndSaysSo) {
   const Parameters p = example_parameters();
   const double gain = dc_gain(p.sections);
   HammersteinWiener model(p);
-  Estimate told;
+  Estimate estimate;
   for (const double u : {0.0, 3.0, -3.0}) {  // within, above, below what x may be
-    for (int n = 0; n < 200; ++n) told = model.step({&u, 1});
+    for (int n = 0; n < 200; ++n) estimate = model.step({&u, 1});
     const double x = gain * p.input(u);
-    EXPECT_EQ(told.fault,
+    EXPECT_EQ(estimate.fault,
               x >= p.lowest && x <= p.highest ? Fault::none : Fault::outside_training_range);
-    EXPECT_NEAR(told.value, p.output(std::clamp(x, p.lowest, p.highest)), 1e-9) << u;
+    EXPECT_NEAR(estimate.value, p.output(std::clamp(x, p.lowest, p.highest)), 1e-9) << u;
   }
   model.reset();
   const double u = 0.1;

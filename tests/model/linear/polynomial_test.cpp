@@ -81,9 +81,9 @@ TEST(Polynomial, StaysAtTheEndOfTheRangeOfItsDirectionAndSaysSo) {
   const auto rising = [](double z) { return 1.2 + 50.0 * z - z * z + 12.0 * z * z * z; };
   says(model, -0.1);
   EXPECT_EQ(model.step(std::array{0.004, 0.0}).fault, Fault::none) << "a twentieth beyond";
-  const Estimate told = model.step(std::array{0.08, 0.0});
-  EXPECT_EQ(told.fault, Fault::outside_training_range);
-  EXPECT_NEAR(told.value, rising(0.05), 1e-12);
+  const Estimate estimate = model.step(std::array{0.08, 0.0});
+  EXPECT_EQ(estimate.fault, Fault::outside_training_range);
+  EXPECT_NEAR(estimate.value, rising(0.05), 1e-12);
   const Estimate back = model.step(std::array{0.07, 0.0});
   EXPECT_EQ(back.fault, Fault::none) << "falling, P- knows that";
   // Backwards: what P+ says at the end of its range is the most that it says.

@@ -25,10 +25,10 @@ TEST(Narx, IsItsDifferenceEquation) {
     const auto before = features.row(n == 0 ? 0 : n - 1);
     const double expected = 0.5 + 200.0 * now[0] + 0.25 * now[1] + 100.0 * before[0] +
                             0.1 * before[1] + 0.6 * y.back() - 0.1 * y[y.size() - 2];
-    const Estimate told = model.step(now);
-    ASSERT_NEAR(told.value, expected, 1e-12 * (1.0 + std::abs(expected))) << n;
-    ASSERT_TRUE(std::isnan(told.std_dev));
-    y.push_back(told.value);
+    const Estimate estimate = model.step(now);
+    ASSERT_NEAR(estimate.value, expected, 1e-12 * (1.0 + std::abs(expected))) << n;
+    ASSERT_TRUE(std::isnan(estimate.std_dev));
+    y.push_back(estimate.value);
   }
 }
 
@@ -54,15 +54,15 @@ TEST(Narx, StaysAtTheEndOfItsRangeAndSaysSo) {
   parameters.model.coefficients.values.values.back() = 0.6;  // 0.6 + 0.6 > 1: it runs away
   Narx<Linear> model(parameters);
   const std::vector<double> push{0.1, 0.0};
-  Estimate told;
-  for (int n = 0; n < 100; ++n) told = model.step(push);
-  EXPECT_EQ(told.value, 200.0);
-  EXPECT_EQ(told.fault, Fault::diverged);
+  Estimate estimate;
+  for (int n = 0; n < 100; ++n) estimate = model.step(push);
+  EXPECT_EQ(estimate.value, 200.0);
+  EXPECT_EQ(estimate.fault, Fault::diverged);
   const std::vector<double> beyond{1e308, 1e308};
-  told = model.step(beyond);
-  told = model.step(beyond);
-  EXPECT_TRUE(std::isfinite(told.value));
-  EXPECT_EQ(told.fault, Fault::diverged);
+  estimate = model.step(beyond);
+  estimate = model.step(beyond);
+  EXPECT_TRUE(std::isfinite(estimate.value));
+  EXPECT_EQ(estimate.fault, Fault::diverged);
   model.reset();
   EXPECT_EQ(model.step(std::vector<double>{0.0, 0.0}).fault, Fault::none);
 }

@@ -21,7 +21,7 @@ TEST(Ensemble, TellsTheMeanOfItsMembersAndWhatTheyDisagreeBy) {
   for (const auto& parameters : ensemble.parameters().members) members.emplace_back(parameters);
   const Matrix features = test::example_features(50, 2);
   for (std::size_t n = 0; n < features.rows; ++n) {
-    const Estimate told = ensemble.step(features.row(n));
+    const Estimate estimate = ensemble.step(features.row(n));
     std::vector<double> values;
     for (Gru& member : members) values.push_back(member.step(features.row(n)).value);
     const double mean = (values[0] + values[1] + values[2]) / 3.0;
@@ -29,10 +29,10 @@ TEST(Ensemble, TellsTheMeanOfItsMembersAndWhatTheyDisagreeBy) {
     for (const double value : values) squares += (value - mean) * (value - mean);
     const double spread = std::sqrt(squares / 2.0);
     const double residual = ensemble.parameters().residual_std;
-    ASSERT_NEAR(told.value, mean, 1e-12 * std::abs(mean));
-    ASSERT_NEAR(told.std_dev, std::hypot(residual, spread), 1e-10);
-    ASSERT_NEAR(told.novelty, spread / residual, 1e-10);
-    ASSERT_EQ(told.fault, n < 3 ? Fault::warming_up : Fault::none) << n;
+    ASSERT_NEAR(estimate.value, mean, 1e-12 * std::abs(mean));
+    ASSERT_NEAR(estimate.std_dev, std::hypot(residual, spread), 1e-10);
+    ASSERT_NEAR(estimate.novelty, spread / residual, 1e-10);
+    ASSERT_EQ(estimate.fault, n < 3 ? Fault::warming_up : Fault::none) << n;
   }
 }
 

@@ -82,7 +82,7 @@ class Pupil {
     features = normals(frozen.weights.columns, random_);
     return value_of(teacher, features) - adapter.step(features, value_of(frozen, features));
   }
-  Learning learn(double wrong_by = 0.0) {
+  UpdateOutcome learn(double wrong_by = 0.0) {
     return adapter.learn({.value = value_of(teacher, features) + wrong_by});
   }
   /// The error after `count` lessons.
@@ -131,7 +131,7 @@ TEST(LastLayerAdapter, NlmsTakesTheStepOfItsEquation) {
       extended.push_back(1.0);
       double square = 0.0;
       for (const double x : extended) square += x * x;
-      EXPECT_EQ(pupil.learn(), Learning::updated);
+      EXPECT_EQ(pupil.learn(), UpdateOutcome::updated);
       for (std::size_t j = 0; j < 22; ++j)
         deviation[j] = 0.9 * deviation[j] + 0.7 * error * extended[j] / (0.5 + square);
     }
@@ -211,7 +211,7 @@ TEST(LastLayerAdapter, RlsEqualsRidgeLeastSquares) {
         for (int n = 0; n < kSamples; ++n) {
           (void)pupil.step();
           const double wrong_by = noise.normal();
-          EXPECT_EQ(pupil.learn(wrong_by), Learning::updated);
+          EXPECT_EQ(pupil.learn(wrong_by), UpdateOutcome::updated);
           for (Eigen::Index j = 0; j + 1 < size; ++j)
             extended(n, j) = static_cast<double>(pupil.features[static_cast<std::size_t>(j)]);
           extended(n, size - 1) = 1.0;
@@ -246,7 +246,7 @@ TEST(LastLayerAdapter, RlsStaysSoundForLongWithoutExcitation) {
   Random random(3);
   for (int n = 0; n < 20000; ++n) {
     (void)adapter.step(features, 0.0);
-    EXPECT_EQ(adapter.learn({.value = 1.0 + 0.1 * random.normal()}), Learning::updated);
+    EXPECT_EQ(adapter.learn({.value = 1.0 + 0.1 * random.normal()}), UpdateOutcome::updated);
   }
   EXPECT_NEAR(adapter.step(features, 0.0), 1.0, 0.2);
   const std::vector<float> other = normals(30, random);
@@ -266,10 +266,10 @@ TEST(LastLayerAdapter, ErrorsWithinTheNoiseTeachNothing) {
   Pupil pupil(settings, 5);
   pupil.teacher = pupil.frozen;
   (void)pupil.step();
-  EXPECT_EQ(pupil.learn(5.9), Learning::dead_zone);
+  EXPECT_EQ(pupil.learn(5.9), UpdateOutcome::dead_zone);
   EXPECT_EQ(pupil.adapter.relative_change(), 0.0);
   (void)pupil.step();
-  EXPECT_EQ(pupil.learn(6.1), Learning::updated);
+  EXPECT_EQ(pupil.learn(6.1), UpdateOutcome::updated);
 }
 
 TEST(LastLayerAdapter, ErrorsBeyondTheLargestTeachNothing) {
@@ -280,11 +280,11 @@ TEST(LastLayerAdapter, ErrorsBeyondTheLargestTeachNothing) {
   pupil.teacher = pupil.frozen;
   for (const double wrong_by : {kScale + 0.1, -kScale - 0.1, 1e300, -1e300}) {
     (void)pupil.step();
-    EXPECT_EQ(pupil.learn(wrong_by), Learning::error_too_large);
+    EXPECT_EQ(pupil.learn(wrong_by), UpdateOutcome::error_too_large);
   }
   EXPECT_EQ(pupil.adapter.relative_change(), 0.0);
   (void)pupil.step();
-  EXPECT_EQ(pupil.learn(kScale - 0.1), Learning::updated);
+  EXPECT_EQ(pupil.learn(kScale - 0.1), UpdateOutcome::updated);
 }
 
 TEST(LastLayerAdapter, AReferenceThatIsNoNumberChangesNothing) {
@@ -296,14 +296,14 @@ TEST(LastLayerAdapter, AReferenceThatIsNoNumberChangesNothing) {
       (void)twin.step();
       if (i % 3 == 0) {
         EXPECT_EQ(pupil.adapter.learn({.value = i % 2 == 0 ? kNaN : -kInfinity}),
-                  Learning::reference_not_finite);
+                  UpdateOutcome::reference_not_finite);
       } else {
-        EXPECT_EQ(pupil.learn(), Learning::updated);
+        EXPECT_EQ(pupil.learn(), UpdateOutcome::updated);
         (void)twin.learn();
       }
     }
     EXPECT_EQ(pupil.adapter.adapted(), twin.adapter.adapted());
-    EXPECT_EQ(pupil.adapter.counts().of(Learning::reference_not_finite), 17U);
+    EXPECT_EQ(pupil.adapter.counts().of(UpdateOutcome::reference_not_finite), 17U);
   }
 }
 
@@ -317,14 +317,14 @@ TEST(LastLayerAdapter, FeaturesThatAreNoNumbersAreTold_AndTeachNothing) {
       std::vector<float> features(6, 0.1F);
       features[3] = bad;
       EXPECT_EQ(pupil.adapter.step(features, 7.0), 7.0);
-      EXPECT_EQ(pupil.adapter.learn({.value = 1.0}), Learning::no_estimate);
+      EXPECT_EQ(pupil.adapter.learn({.value = 1.0}), UpdateOutcome::no_estimate);
     }
     EXPECT_TRUE(std::isnan(pupil.adapter.step(std::vector<float>(6, 0.1F), kNaN)));
-    EXPECT_EQ(pupil.adapter.learn({.value = 1.0}), Learning::no_estimate);
+    EXPECT_EQ(pupil.adapter.learn({.value = 1.0}), UpdateOutcome::no_estimate);
     EXPECT_EQ(pupil.adapter.step(std::vector<float>(5, 0.1F), 3.0), 3.0);  // another network's
     EXPECT_EQ(pupil.adapter.adapted(), before);
     (void)pupil.step();
-    EXPECT_EQ(pupil.learn(), Learning::updated);
+    EXPECT_EQ(pupil.learn(), UpdateOutcome::updated);
   }
 }
 
@@ -349,9 +349,9 @@ TEST(LastLayerAdapter, StaleReferencesTeachNothing) {
   settings.oldest_reference_s = 0.004;
   Pupil pupil(settings, 5);
   for (const auto& [age_s, outcome] :
-       {std::pair{0.004, Learning::updated}, std::pair{0.0041, Learning::reference_stale},
-        std::pair{kInfinity, Learning::reference_stale},
-        std::pair{kNaN, Learning::reference_stale}}) {
+       {std::pair{0.004, UpdateOutcome::updated}, std::pair{0.0041, UpdateOutcome::reference_stale},
+        std::pair{kInfinity, UpdateOutcome::reference_stale},
+        std::pair{kNaN, UpdateOutcome::reference_stale}}) {
     (void)pupil.step();
     EXPECT_EQ(pupil.adapter.learn({.value = 1.0, .age_s = age_s}), outcome) << age_s;
   }
@@ -363,10 +363,10 @@ TEST(LastLayerAdapter, AFrozenReferenceIsStaleWithNothingBetweenItsSamplesToo) {
   Pupil pupil(settings, 5);
   for (int n = 0; n < 800; ++n) {
     (void)pupil.step();
-    const bool is_told = n % 8 == 0;
-    const Learning told = pupil.adapter.learn({.value = is_told ? 1.0 : kNaN});
-    if (!is_told) continue;
-    EXPECT_EQ(told, n < 100 ? Learning::updated : Learning::reference_stale) << n;
+    const bool is_determined = n % 8 == 0;
+    const UpdateOutcome estimate = pupil.adapter.learn({.value = is_determined ? 1.0 : kNaN});
+    if (!is_determined) continue;
+    EXPECT_EQ(estimate, n < 100 ? UpdateOutcome::updated : UpdateOutcome::reference_stale) << n;
   }
 }
 
@@ -377,19 +377,19 @@ TEST(LastLayerAdapter, AFrozenReferenceIsStaleUntilItMoves) {
   for (int n = 0; n < 300; ++n) {
     (void)pupil.step();
     EXPECT_EQ(pupil.adapter.learn({.value = 1.0}),
-              n < 100 ? Learning::updated : Learning::reference_stale);
+              n < 100 ? UpdateOutcome::updated : UpdateOutcome::reference_stale);
   }
   (void)pupil.step();
-  EXPECT_EQ(pupil.adapter.learn({.value = 1.1}), Learning::updated);
+  EXPECT_EQ(pupil.adapter.learn({.value = 1.1}), UpdateOutcome::updated);
 }
 
 TEST(LastLayerAdapter, ASaturatedReferenceTeachesNothing) {
   AdaptationSettings settings = unguarded();
   settings.saturation = 50.0;
   Pupil pupil(settings, 5);
-  for (const auto& [value, outcome] :
-       {std::pair{49.9, Learning::updated}, std::pair{50.0, Learning::reference_saturated},
-        std::pair{-51.0, Learning::reference_saturated}}) {
+  for (const auto& [value, outcome] : {std::pair{49.9, UpdateOutcome::updated},
+                                       std::pair{50.0, UpdateOutcome::reference_saturated},
+                                       std::pair{-51.0, UpdateOutcome::reference_saturated}}) {
     (void)pupil.step();
     EXPECT_EQ(pupil.adapter.learn({.value = value}), outcome) << value;
   }
@@ -397,14 +397,14 @@ TEST(LastLayerAdapter, ASaturatedReferenceTeachesNothing) {
 
 TEST(LastLayerAdapter, LearnsAtMostOnceFromAStep) {
   Pupil pupil(unguarded(), 5);
-  EXPECT_EQ(pupil.adapter.learn({.value = 1.0}), Learning::no_estimate);
+  EXPECT_EQ(pupil.adapter.learn({.value = 1.0}), UpdateOutcome::no_estimate);
   (void)pupil.step();
-  EXPECT_EQ(pupil.learn(), Learning::updated);
+  EXPECT_EQ(pupil.learn(), UpdateOutcome::updated);
   const DenseLayer once = pupil.adapter.adapted();
-  EXPECT_EQ(pupil.learn(), Learning::no_estimate);
+  EXPECT_EQ(pupil.learn(), UpdateOutcome::no_estimate);
   (void)pupil.step();
-  EXPECT_EQ(pupil.adapter.pass_over(Learning::warming_up), Learning::warming_up);
-  EXPECT_EQ(pupil.learn(), Learning::no_estimate);
+  EXPECT_EQ(pupil.adapter.pass_over(UpdateOutcome::warming_up), UpdateOutcome::warming_up);
+  EXPECT_EQ(pupil.learn(), UpdateOutcome::no_estimate);
   EXPECT_EQ(pupil.adapter.adapted(), once);
 }
 
@@ -414,14 +414,14 @@ TEST(LastLayerAdapter, PausedKeepsWhatItLearned) {
   const DenseLayer learned = pupil.adapter.adapted();
   pupil.adapter.pause();
   (void)pupil.step();
-  EXPECT_EQ(pupil.learn(30.0), Learning::paused);
-  EXPECT_EQ(pupil.adapter.pass_over(Learning::no_estimate), Learning::paused);
+  EXPECT_EQ(pupil.learn(30.0), UpdateOutcome::paused);
+  EXPECT_EQ(pupil.adapter.pass_over(UpdateOutcome::no_estimate), UpdateOutcome::paused);
   EXPECT_EQ(pupil.adapter.adapted(), learned);
   pupil.adapter.resume();
   (void)pupil.step();
-  EXPECT_EQ(pupil.learn(30.0), Learning::updated);
+  EXPECT_EQ(pupil.learn(30.0), UpdateOutcome::updated);
   EXPECT_NE(pupil.adapter.adapted(), learned);
-  EXPECT_EQ(pupil.adapter.counts().of(Learning::paused), 2U);
+  EXPECT_EQ(pupil.adapter.counts().of(UpdateOutcome::paused), 2U);
 }
 
 TEST(LastLayerAdapter, ResetMakesARunRepeatable) {
@@ -447,7 +447,7 @@ TEST(LastLayerAdapter, IsDrawnBackToTheLargestChange) {
   settings.largest_change = 0.05;  // the teacher is twice as far away
   Pupil pupil(settings, 20);
   (void)pupil.taught(3000);
-  EXPECT_GT(pupil.adapter.counts().of(Learning::limited), 100U);
+  EXPECT_GT(pupil.adapter.counts().of(UpdateOutcome::limited), 100U);
   EXPECT_NEAR(pupil.adapter.relative_change(), 0.05, 0.002);
 }
 
@@ -468,8 +468,8 @@ RC_GTEST_PROP(LastLayerAdapter, NeverLeavesTheLargestChangeWhateverComesIn, ()) 
   for (const auto& [feature_power, error_power] : steps) {
     std::vector<float> h = normals(features, random);
     for (float& x : h) x *= static_cast<float>(std::pow(10.0, feature_power));
-    const double told = pupil.adapter.step(h, 0.0);
-    (void)pupil.adapter.learn({.value = told + random.normal() * std::pow(10.0, error_power)});
+    const double estimate = pupil.adapter.step(h, 0.0);
+    (void)pupil.adapter.learn({.value = estimate + random.normal() * std::pow(10.0, error_power)});
     RC_ASSERT(pupil.adapter.relative_change() <= settings.largest_change);
     double square = 0.0;
     double frozen_square = 0.0;
@@ -501,12 +501,12 @@ TEST(LastLayerAdapter, RollsBackAfterTenSecondsOfBeingWorseThanFrozen) {
     const std::vector<float> features{0.3F, -0.2F, 0.5F, 0.1F};
     for (int n = 0; n < 9999; ++n) {
       (void)adapter.step(features, 1.0);
-      EXPECT_EQ(adapter.learn({.value = 1.0 + swinging(n)}), Learning::updated);
+      EXPECT_EQ(adapter.learn({.value = 1.0 + swinging(n)}), UpdateOutcome::updated);
     }
     EXPECT_EQ(adapter.counts().roll_backs, 0U);
     EXPECT_NE(adapter.adapted(), frozen);
     (void)adapter.step(features, 1.0);
-    adapter.pass_over(Learning::no_estimate);  // ends the ten seconds and teaches nothing
+    adapter.pass_over(UpdateOutcome::no_estimate);  // ends the ten seconds and teaches nothing
     EXPECT_EQ(adapter.counts().roll_backs, 1U);
     EXPECT_EQ(adapter.adapted(), frozen);
     EXPECT_EQ(adapter.step(features, 1.0), 1.0);
@@ -530,7 +530,7 @@ TEST(LastLayerAdapter, UnbelievableReferencesAreNoEvidenceAgainstIt) {
   // 1e6 below: the frozen model, which is wrong by less here, would win by that alone.
   for (int n = 0; n < 400; ++n) {
     (void)pupil.step();
-    EXPECT_EQ(pupil.learn(n % 2 == 0 ? -1e6 : 1e6), Learning::error_too_large);
+    EXPECT_EQ(pupil.learn(n % 2 == 0 ? -1e6 : 1e6), UpdateOutcome::error_too_large);
   }
   EXPECT_EQ(pupil.adapter.counts().roll_backs, 0U);
 }

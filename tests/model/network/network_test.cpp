@@ -163,9 +163,9 @@ TYPED_TEST(Recurrent, GoesOnFromAStateThatItGave) {
   (void)other.step(features.row(5));
   other.reset(state);
   for (std::size_t n = kSteps / 2; n < kSteps; ++n) {
-    const Estimate told = other.step(features.row(n));
-    EXPECT_EQ(told.value, network.step(features.row(n)).value);
-    EXPECT_EQ(told.fault, Fault::none) << "a given state counts as warmed up";
+    const Estimate estimate = other.step(features.row(n));
+    EXPECT_EQ(estimate.value, network.step(features.row(n)).value);
+    EXPECT_EQ(estimate.fault, Fault::none) << "a given state counts as warmed up";
   }
 }
 
@@ -196,7 +196,7 @@ TYPED_TEST(Recurrent, ABankEqualsOneNetworkAJoint) {
     NetworkBank<TypeParam> bank(parameters, joints);
     std::vector<TypeParam> alone(joints, TypeParam(parameters));
     std::vector<double> features(joints * 2);
-    std::vector<Estimate> told(joints);
+    std::vector<Estimate> estimate(joints);
     const Matrix wave = example_features(kSteps + joints, 2);
     for (std::size_t n = 0; n < kSteps; ++n) {
       for (std::size_t joint = 0; joint < joints; ++joint)
@@ -206,11 +206,11 @@ TYPED_TEST(Recurrent, ABankEqualsOneNetworkAJoint) {
         bank.reset(joints / 2);
         alone[joints / 2].reset();
       }
-      bank.step(features, told);
+      bank.step(features, estimate);
       for (std::size_t joint = 0; joint < joints; ++joint) {
         const Estimate expected = alone[joint].step({features.data() + 2 * joint, 2});
-        ASSERT_EQ(told[joint].value, expected.value) << "joint " << joint << ", step " << n;
-        ASSERT_EQ(told[joint].fault, expected.fault);
+        ASSERT_EQ(estimate[joint].value, expected.value) << "joint " << joint << ", step " << n;
+        ASSERT_EQ(estimate[joint].fault, expected.fault);
       }
     }
   }

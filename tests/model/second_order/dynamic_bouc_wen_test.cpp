@@ -135,15 +135,15 @@ TEST(DynamicBoucWen, StopsAtTheEndOfItsRangeAndSaysSo) {
   parameters.highest = 1e-3;
   DynamicBoucWen model(parameters);
   double force = 500.0;
-  Estimate told;
-  for (int n = 0; n < 10 && told.fault == Fault::none; ++n) told = model.step({&force, 1});
-  EXPECT_EQ(told.fault, Fault::diverged);
-  EXPECT_EQ(told.value, 1e-3);
+  Estimate estimate;
+  for (int n = 0; n < 10 && estimate.fault == Fault::none; ++n) estimate = model.step({&force, 1});
+  EXPECT_EQ(estimate.fault, Fault::diverged);
+  EXPECT_EQ(estimate.value, 1e-3);
   EXPECT_EQ(model.state()[1], 0.0);
   force = 1e200;
-  told = model.step({&force, 1});
-  EXPECT_EQ(told.fault, Fault::diverged);
-  EXPECT_TRUE(std::isfinite(told.value));
+  estimate = model.step({&force, 1});
+  EXPECT_EQ(estimate.fault, Fault::diverged);
+  EXPECT_TRUE(std::isfinite(estimate.value));
 }
 
 TEST(DynamicBoucWen, GoesOnAfterAForceThatIsNoNumber) {
@@ -155,9 +155,9 @@ TEST(DynamicBoucWen, GoesOnAfterAForceThatIsNoNumber) {
   EXPECT_TRUE(std::isfinite(bad.value));
   force = 10.0;
   for (int n = 0; n < 20; ++n) {
-    const Estimate told = model.step({&force, 1});
-    EXPECT_EQ(told.fault, Fault::none);
-    EXPECT_TRUE(std::isfinite(told.value));
+    const Estimate estimate = model.step({&force, 1});
+    EXPECT_EQ(estimate.fault, Fault::none);
+    EXPECT_TRUE(std::isfinite(estimate.value));
   }
 }
 

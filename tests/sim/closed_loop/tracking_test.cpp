@@ -86,28 +86,28 @@ TEST(Track, RecordsTermsThatAddUpToTheCommand) {
   const auto at = [&](const char* channel, std::size_t i) {
     return record.channel(channel).values[i];
   };
-  double most_rest = 0.0;
-  double most_friction = 0.0;
-  double most_observer = 0.0;
-  double most_forward = 0.0;
+  double max_rest = 0.0;
+  double max_friction = 0.0;
+  double max_observer = 0.0;
+  double max_forward = 0.0;
   for (std::size_t i = 0; i < record.size(); ++i) {
     double sum = 0.0;
     for (const char* term :
          {"proportional_current_A", "integral_current_A", "derivative_current_A",
           "feed_forward_current_A", "rate_feed_forward_current_A", "friction_current_A",
-          "observer_current_A", "handover_current_A", "rest_current_A"})
+          "observer_current_A", "transfer_current_A", "rest_current_A"})
       sum += at(term, i);
     ASSERT_NEAR(sum, at("command_current_A", i), 1e-12);
     if (at("is_limited_1", i) == 0.0)
-      most_rest = std::max(most_rest, std::abs(at("rest_current_A", i)));
-    most_friction = std::max(most_friction, std::abs(at("friction_current_A", i)));
-    most_observer = std::max(most_observer, std::abs(at("observer_current_A", i)));
-    most_forward = std::max(most_forward, std::abs(at("rate_feed_forward_current_A", i)));
+      max_rest = std::max(max_rest, std::abs(at("rest_current_A", i)));
+    max_friction = std::max(max_friction, std::abs(at("friction_current_A", i)));
+    max_observer = std::max(max_observer, std::abs(at("observer_current_A", i)));
+    max_forward = std::max(max_forward, std::abs(at("rate_feed_forward_current_A", i)));
   }
-  EXPECT_LT(most_rest, 1e-12);
-  EXPECT_GT(most_friction, 0.01);
-  EXPECT_GT(most_observer, 0.01);
-  EXPECT_GT(most_forward, 0.01);
+  EXPECT_LT(max_rest, 1e-12);
+  EXPECT_GT(max_friction, 0.01);
+  EXPECT_GT(max_observer, 0.01);
+  EXPECT_GT(max_forward, 0.01);
 }
 
 TEST(Track, FollowsNoiseFasterThanTheLoopWhereItsRateIsFedForward) {

@@ -22,17 +22,17 @@ class Falls {
   void observe(double loss_J, double stored_J) {
     largest_J_ = std::max(largest_J_, last_loss_J_ - loss_J);
     last_loss_J_ = loss_J;
-    most_stored_J_ = std::max(most_stored_J_, stored_J);
+    max_stored_J_ = std::max(max_stored_J_, stored_J);
   }
   [[nodiscard]] double share() const {
-    return most_stored_J_ > 0.0 ? largest_J_ / most_stored_J_ : 0.0;
+    return max_stored_J_ > 0.0 ? largest_J_ / max_stored_J_ : 0.0;
   }
   [[nodiscard]] double largest_J() const { return largest_J_; }
 
  private:
   double largest_J_ = 0.0;
   double last_loss_J_ = 0.0;
-  double most_stored_J_ = 0.0;
+  double max_stored_J_ = 0.0;
 };
 
 /// A bristle whose stiffness follows the load: an active element.
@@ -83,10 +83,10 @@ Books driven_at_random(const std::string& actuator, double longest_step_s = 0.0)
   Plant plant(parts, longest_step_s);
   const int steps = static_cast<int>(std::ceil(1e-3 / plant.longest_step()));
   const double step_s = 1e-3 / steps;
-  RandomWalk current({.rms = kShare * sheet.rating.current_A.value, .cutoff_Hz = 2.0, .seed = 3},
-                     1000.0);
-  RandomWalk torque({.rms = kShare * sheet.rating.torque_Nm.value, .cutoff_Hz = 1.0, .seed = 4},
-                    1000.0);
+  BandLimitedNoise current(
+      {.rms = kShare * sheet.rating.current_A.value, .cutoff_Hz = 2.0, .seed = 3}, 1000.0);
+  BandLimitedNoise torque(
+      {.rms = kShare * sheet.rating.torque_Nm.value, .cutoff_Hz = 1.0, .seed = 4}, 1000.0);
   Load load = test::tenth_of_the_rating(sheet);
   plant.reset(0.0, load);
   EnergyAudit audit(plant, load);

@@ -47,7 +47,7 @@ struct ReferenceSample {
 };
 
 /// What became of one reference.
-enum class Learning : std::uint8_t {
+enum class UpdateOutcome : std::uint8_t {
   updated,               ///< the weights have moved
   limited,               ///< they have, and were drawn back to `largest_change`
   paused,                ///< by the caller
@@ -59,22 +59,23 @@ enum class Learning : std::uint8_t {
   error_too_large,       ///< beyond `largest_error`: rather the sensor's fault than the weights'
   dead_zone,             ///< no more than noise
 };
-inline constexpr std::size_t kLearningOutcomes = static_cast<std::size_t>(Learning::dead_zone) + 1;
+inline constexpr std::size_t kUpdateOutcomes =
+    static_cast<std::size_t>(UpdateOutcome::dead_zone) + 1;
 
 /// The enumerator's own spelling, for logs and JSON.
-[[nodiscard]] std::string_view name(Learning outcome) noexcept;
+[[nodiscard]] std::string_view name(UpdateOutcome outcome) noexcept;
 
 /// How often each came.
 struct AdaptationCounts {
-  std::array<std::size_t, kLearningOutcomes> outcomes{};
+  std::array<std::size_t, kUpdateOutcomes> outcomes{};
   std::size_t roll_backs = 0;         ///< to the frozen weights, which had been better
   std::size_t covariance_resets = 0;  ///< RLS: rounding had spoilt P
 
-  [[nodiscard]] std::size_t of(Learning outcome) const noexcept {
+  [[nodiscard]] std::size_t of(UpdateOutcome outcome) const noexcept {
     return outcomes[static_cast<std::size_t>(outcome)];
   }
   [[nodiscard]] std::size_t updates() const noexcept {
-    return of(Learning::updated) + of(Learning::limited);
+    return of(UpdateOutcome::updated) + of(UpdateOutcome::limited);
   }
   bool operator==(const AdaptationCounts&) const = default;
 };
@@ -100,7 +101,7 @@ class LastLayerAdapter {
  public:
   /// @param last the network's last layer. @param target_scale of its `NetworkScaling`.
   /// @throws Error if a setting is out of range, all weights are 0, or there are more features than
-  /// `kMostRlsFeatures` for RLS.
+  /// `kMaxRlsFeatures` for RLS.
   LastLayerAdapter(const AdaptationSettings& settings, const DenseLayer& last, double target_scale,
                    double sample_period_s);
 
@@ -120,9 +121,9 @@ class LastLayerAdapter {
   double step(std::span<const float> features, double frozen_value) noexcept TORSIO_REALTIME;
 
   /// Learns from the reference of the last step. Call it once a tick, with NaN where there is none.
-  Learning learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
+  UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
   /// Counts a tick whose estimate was not the model's: `warming_up` or `no_estimate`.
-  Learning pass_over(Learning reason) noexcept TORSIO_REALTIME;
+  UpdateOutcome pass_over(UpdateOutcome reason) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const AdaptationCounts& counts() const noexcept { return counts_; }
   /// |W - W0| / |W0|
@@ -131,15 +132,15 @@ class LastLayerAdapter {
   [[nodiscard]] DenseLayer adapted() const;
 
  private:
-  [[nodiscard]] Learning judge(const ReferenceSample& reference) noexcept;
+  [[nodiscard]] UpdateOutcome outcome_of(const ReferenceSample& reference) noexcept;
   /// Why a reference is not to be believed; `updated` if it is.
-  [[nodiscard]] Learning doubt_about(const ReferenceSample& reference) const noexcept;
+  [[nodiscard]] UpdateOutcome doubt_about(const ReferenceSample& reference) const noexcept;
   void compare(double adapted_error, double frozen_error) noexcept;
   void roll_back() noexcept;
   [[nodiscard]] double nlms(double error) noexcept;
   [[nodiscard]] double rls(double error) noexcept;
   void reset_covariance() noexcept;
-  Learning counted(Learning outcome) noexcept;
+  UpdateOutcome counted(UpdateOutcome outcome) noexcept;
 
   AdaptationSettings settings_;
   DenseLayer frozen_;
@@ -170,6 +171,6 @@ class LastLayerAdapter {
 };
 
 /// More would need over 64 MiB for P.
-inline constexpr std::size_t kMostRlsFeatures = 4000;
+inline constexpr std::size_t kMaxRlsFeatures = 4000;
 
 }  // namespace torsio

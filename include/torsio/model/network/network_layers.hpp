@@ -112,7 +112,7 @@ template <class Layer>
 }
 
 /// No layer wider, no network deeper: a file that says so is refused before memory is taken.
-inline constexpr std::size_t kMostUnits = 65536;
-inline constexpr std::size_t kMostLayers = 64;
+inline constexpr std::size_t kMaxUnits = 65536;
+inline constexpr std::size_t kMaxLayers = 64;
 
 }  // namespace torsio

@@ -11,10 +11,10 @@ namespace torsio {
 ///     h[n] = h₀ exp(−n T / T_h)
 ///
 /// added to a command, it makes the change start where the command was.
-class Handover {
+class BumplessTransfer {
  public:
   /// Both positive.
-  Handover(double time_s, double sample_rate_Hz) noexcept
+  BumplessTransfer(double time_s, double sample_rate_Hz) noexcept
       : keep_(std::exp(-1.0 / (time_s * sample_rate_Hz))) {}
 
   void reset() noexcept { bump_ = 0.0; }

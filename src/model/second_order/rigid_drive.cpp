@@ -1,4 +1,4 @@
-#include "model/second_order/friction_drive.hpp"
+#include "model/second_order/rigid_drive.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,14 +19,13 @@ std::vector<double> middles(std::size_t substeps) {
   return places;
 }
 
-double bristle_stiffness(const FrictionDrive::Parameters& p) {
+double bristle_stiffness(const RigidDrive::Parameters& p) {
   return p.bristle > 0.0 ? p.static_ratio * p.coulomb / p.bristle : 0.0;
 }
 
-void check_signs(const FrictionDrive::Parameters& p) {
+void check_signs(const RigidDrive::Parameters& p) {
   const auto require = [&](bool holds, const char* field, const char* expected, double found) {
-    require_parameter(holds && std::isfinite(found), FrictionDrive::kFamily, field, expected,
-                      found);
+    require_parameter(holds && std::isfinite(found), RigidDrive::kFamily, field, expected, found);
   };
   require(p.inertia > 0.0, "inertia", "a positive number", p.inertia);
   require(p.viscous >= 0.0, "viscous", "a number not below 0", p.viscous);
@@ -43,29 +42,29 @@ void check_signs(const FrictionDrive::Parameters& p) {
   require(true, "coulomb_slope", "a number", p.coulomb_slope);
 }
 
-const FrictionDrive::Parameters& checked(const FrictionDrive::Parameters& p) {
+const RigidDrive::Parameters& checked(const RigidDrive::Parameters& p) {
   check_signs(p);
-  check_gains(p.gains, FrictionDrive::kFamily);
-  check_sampled_time(p.time, FrictionDrive::kFamily);
-  check_end_stops(p.lowest, p.highest, FrictionDrive::kFamily);
+  check_gains(p.gains, RigidDrive::kFamily);
+  check_sampled_time(p.time, RigidDrive::kFamily);
+  check_end_stops(p.lowest, p.highest, RigidDrive::kFamily);
   constexpr double kStable = 2.0;  // of the leapfrog
   const double turn = std::sqrt((std::max(p.spring, 0.0) + bristle_stiffness(p)) / p.inertia) *
                       p.time.sample_period_s / static_cast<double>(p.time.substeps);
-  require_parameter(turn < kStable, FrictionDrive::kFamily, "substeps",
+  require_parameter(turn < kStable, RigidDrive::kFamily, "substeps",
                     "sub-steps of less than 2 over the fastest rate", turn);
   return p;
 }
 
 }  // namespace
 
-FrictionDrive::FrictionDrive(const Parameters& parameters)
+RigidDrive::RigidDrive(const Parameters& parameters)
     : parameters_(checked(parameters)),
       substep_s_(parameters.time.sample_period_s / static_cast<double>(parameters.time.substeps)),
       input_(parameters.time.input_order, middles(parameters.time.substeps)),
       stribeck_(parameters.static_ratio, parameters.stribeck_speed),
       bristle_stiffness_(bristle_stiffness(parameters)) {}
 
-std::size_t FrictionDrive::parameter_count() const noexcept {
+std::size_t RigidDrive::parameter_count() const noexcept {
   const Parameters& p = parameters_;
   std::size_t count = 3 + input_count();
   if (p.static_ratio > 1.0) count += 2;
@@ -75,12 +74,12 @@ std::size_t FrictionDrive::parameter_count() const noexcept {
   return count;
 }
 
-void FrictionDrive::reset() noexcept {
+void RigidDrive::reset() noexcept {
   input_.reset();
   state_ = {};
 }
 
-void FrictionDrive::set_state(std::span<const double> state) noexcept {
+void RigidDrive::set_state(std::span<const double> state) noexcept {
   for (std::size_t i = 0; i < state_.size() && i < state.size(); ++i)
     if (std::isfinite(state[i])) state_[i] = state[i];
   state_[0] = std::clamp(state_[0], parameters_.lowest, parameters_.highest);
@@ -89,12 +88,12 @@ void FrictionDrive::set_state(std::span<const double> state) noexcept {
   state_[2] = std::clamp(state_[2], -most, most);
 }
 
-double FrictionDrive::dry_level() const noexcept {
+double RigidDrive::dry_level() const noexcept {
   return parameters_.coulomb * std::max(0.0, 1.0 + parameters_.coulomb_slope * state_[0]) *
          stribeck_(state_[1]);
 }
 
-void FrictionDrive::coast(double dt_s) noexcept {
+void RigidDrive::coast(double dt_s) noexcept {
   state_[0] += dt_s * state_[1];
   if (bristle_stiffness_ == 0.0) return;
   const double level = dry_level();
@@ -102,7 +101,7 @@ void FrictionDrive::coast(double dt_s) noexcept {
       level > 0.0 ? relaxed_bristle(state_[2], state_[1], level, bristle_stiffness_, dt_s) : 0.0;
 }
 
-void FrictionDrive::advance(double force) noexcept {
+void RigidDrive::advance(double force) noexcept {
   const Parameters& p = parameters_;
   coast(0.5 * substep_s_);
   const double speed = state_[1];
@@ -118,7 +117,7 @@ void FrictionDrive::advance(double force) noexcept {
   coast(0.5 * substep_s_);
 }
 
-Estimate FrictionDrive::step(Features features) noexcept {
+Estimate RigidDrive::step(Features features) noexcept {
   const bool is_first = !input_.is_started();
   const auto forces = input_.step(driving_force(parameters_.gains, features));
   if (is_first) return {.value = state_[0]};

@@ -1,4 +1,4 @@
-#include "fit/second_order/fit_friction_drive.hpp"
+#include "fit/second_order/fit_rigid_drive.hpp"
 
 #include <fmt/format.h>
 
@@ -20,7 +20,7 @@
 namespace torsio {
 namespace {
 
-using Parameters = FrictionDrive::Parameters;
+using Parameters = RigidDrive::Parameters;
 
 /// Of a free run, that put its start: in the fit as in a score (`--initialise`).
 constexpr std::size_t kStartSamples = 50;
@@ -154,7 +154,7 @@ std::optional<TermSet> terms_named(const std::string& text) {
       std::vector<std::string> names{"none", "auto"};
       for (const Term& each : kTerms) names.emplace_back(each.name);
       throw UsageError({.place = "terms",
-                        .problem = "no term of friction_drive is called \"" + name + '"',
+                        .problem = "no term of rigid_drive is called \"" + name + '"',
                         .expected = "some of " + joined(names) + ", joined by +",
                         .advice = did_you_mean(name, names)});
     }
@@ -199,11 +199,11 @@ Candidate candidate(const Parameters& with, const Scale& scale, const TermSet& s
   made.model.parameters.insert(made.model.parameters.end(), scale.further_gains.begin(),
                                scale.further_gains.end());
   made.model.differences = {0.03, 3e-3};  // stops and starts make the residuals rough
-  made.model.run = [with, fields = made.fields](std::span<const double> values,
-                                                std::span<const double> state,
-                                                const Sequence& sequence, std::span<double> told) {
-    return run_from(model_if_valid<FrictionDrive>(with_fields(with, fields, values)), state,
-                    sequence, told);
+  made.model.run = [with, fields = made.fields](
+                       std::span<const double> values, std::span<const double> state,
+                       const Sequence& sequence, std::span<double> output) {
+    return run_from(model_if_valid<RigidDrive>(with_fields(with, fields, values)), state, sequence,
+                    output);
   };
   return made;
 }
@@ -295,12 +295,11 @@ Choice chosen_terms(const Parameters& with, const Scale& scale, const TrainingDa
 
 }  // namespace
 
-Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
-                                         const FrictionDriveOptions& options,
-                                         const Progress& progress) {
+Fitted<RigidDrive> fit_rigid_drive(const TrainingData& data, const RigidDriveOptions& options,
+                                   const Progress& progress) {
   const std::optional<TermSet> named = terms_named(options.terms);
   require_excitation(data);
-  report_progress(progress, 0.0, "fitting friction_drive");
+  report_progress(progress, 0.0, "fitting rigid_drive");
   const EndStops stops = end_stops(data);
   const InverseDynamics inverse = inverse_dynamics(data, options.gain);
   std::vector<double> gains(data.input_count(), 0.0);
@@ -323,7 +322,7 @@ Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
                     .target_unit = unit_label(data.target),
                     .further_gains = further_gains(data)};
   const SimulationFitOptions search{.first_horizon = options.first_horizon,
-                                    .most_iterations = options.iterations,
+                                    .max_iterations = options.iterations,
                                     .tolerance = 1e-6,
                                     .start_samples = kStartSamples,
                                     .progress = progress};
@@ -339,9 +338,9 @@ Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
     made = candidate(basic, scale, choice.terms);
     fit = fit_by_simulation(made.model, data, {start_of(made, basic)}, search);
   }
-  Fitted<FrictionDrive> fitted{.parameters = made.parameters(fit.parameters),
-                               .notes = std::move(choice.notes),
-                               .table = std::move(fit.table)};
+  Fitted<RigidDrive> fitted{.parameters = made.parameters(fit.parameters),
+                            .notes = std::move(choice.notes),
+                            .table = std::move(fit.table)};
   std::ranges::move(fit.notes, std::back_inserter(fitted.notes));
   fitted.notes.push_back(fmt::format("free runs through the training records miss {:.3g} {} RMSE",
                                      fit.rmse, scale.target_unit));

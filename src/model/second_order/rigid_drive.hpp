@@ -28,14 +28,14 @@ namespace torsio {
 /// at 0 after a reset; the first sample is told from the state as it is. Where q leaves
 /// lowest..highest it stops there, with `Fault::diverged`. Source: Gautier, Janot and Vandanjon 2013
 /// (J, Fv, Fc, offset); Canudas de Wit et al. 1995 (Stribeck, LuGre); the other terms are ours.
-class FrictionDrive {
+class RigidDrive {
  public:
-  static constexpr std::string_view kFamily = "friction_drive";
+  static constexpr std::string_view kFamily = "rigid_drive";
   static constexpr FamilyTraits kTraits{
       .is_spring = false, .extrapolates = true, .integrates = true};
 
   struct Parameters {
-    using Family = FrictionDrive;
+    using Family = RigidDrive;
     double inertia = 0.0;               ///< J > 0, force / (q/s²)
     double viscous = 0.0;               ///< Fv >= 0, force / (q/s)
     double coulomb = 0.0;               ///< Fc >= 0, force
@@ -75,7 +75,7 @@ class FrictionDrive {
 
   /// @throws Error if a number is outside the range above, or the sub-steps are too long for the
   /// spring or the bristle to stay stable.
-  explicit FrictionDrive(const Parameters& parameters);
+  explicit RigidDrive(const Parameters& parameters);
 
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.gains.size(); }

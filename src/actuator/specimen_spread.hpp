@@ -12,6 +12,6 @@ namespace torsio {
 /// +-50 %, asymmetry +-0.03 (added), Coulomb friction of gear and bearing +-20 %, and the zero of
 /// each encoder +-0.02 deg. Gears and the clutch, whose preload is set on the bench, stay nominal.
 /// Source: specification 4.6.
-void spread_piece(DataSheet& sheet);
+void spread_specimen(DataSheet& sheet);
 
 }  // namespace torsio

@@ -1,4 +1,4 @@
-#include "piece_spread.hpp"
+#include "specimen_spread.hpp"
 
 #include <cstdint>
 
@@ -10,8 +10,8 @@ namespace torsio {
 namespace {
 
 /// What one piece has of each spread. The order of the draws is part of what a serial number means.
-struct PieceDraws {
-  explicit PieceDraws(std::uint64_t seed) : random(seed) {}
+struct SpecimenDraws {
+  explicit SpecimenDraws(std::uint64_t seed) : random(seed) {}
   /// Uniform within +-bound.
   double draw(double bound) noexcept { return bound * (2.0 * random.uniform() - 1.0); }
 
@@ -37,7 +37,7 @@ void scale_each(Values& values, double factor) noexcept {
   for (SheetValue& value : values) scale(value, factor);
 }
 
-void spread(SpringSheet& spring, const PieceDraws& piece) noexcept {
+void spread(SpringSheet& spring, const SpecimenDraws& piece) noexcept {
   scale(spring.stiffness_Nm_rad, piece.stiffness);
   scale(spring.stage_stiffness_Nm_rad, piece.stiffness);
   scale(spring.friction_Nm, piece.inner_friction);
@@ -45,31 +45,31 @@ void spread(SpringSheet& spring, const PieceDraws& piece) noexcept {
   shift(spring.asymmetry, piece.asymmetry);
 }
 
-void spread(ElastomerSheet& coupling, const PieceDraws& piece) noexcept {
+void spread(ElastomerSheet& coupling, const SpecimenDraws& piece) noexcept {
   scale(coupling.stiffness_Nm_rad, piece.stiffness);
   scale_each(coupling.branch_stiffness_Nm_rad, piece.stiffness);
   scale_each(coupling.slip_Nm, piece.inner_friction);
 }
 
-void spread(RubberSheet& rubber, const PieceDraws& piece) noexcept {
+void spread(RubberSheet& rubber, const SpecimenDraws& piece) noexcept {
   shift(rubber.asymmetry_Nm_rad, piece.asymmetry * rubber.stiffness_Nm_rad.value);
   scale(rubber.asymmetry_Nm_rad, piece.stiffness);
   scale(rubber.stiffness_Nm_rad, piece.stiffness);
   scale(rubber.slip_Nm, piece.inner_friction);
 }
 
-void spread(TubeSheet& tube, const PieceDraws& piece) noexcept {
+void spread(TubeSheet& tube, const SpecimenDraws& piece) noexcept {
   scale(tube.stiffness_Nm_rad, piece.stiffness);
 }
 
-void spread(const GearSheet& /*gear*/, const PieceDraws& /*piece*/) noexcept {}
-void spread(const ClutchSheet& /*clutch*/, const PieceDraws& /*piece*/) noexcept {}
+void spread(const GearSheet& /*gear*/, const SpecimenDraws& /*piece*/) noexcept {}
+void spread(const ClutchSheet& /*clutch*/, const SpecimenDraws& /*piece*/) noexcept {}
 
 }  // namespace
 
-void spread_piece(DataSheet& sheet) {
+void spread_specimen(DataSheet& sheet) {
   if (!sheet.serial) return;
-  const PieceDraws piece(text_hash(sheet.name) + *sheet.serial);
+  const SpecimenDraws piece(text_hash(sheet.name) + *sheet.serial);
   const auto spread_part = [&](auto& part) { spread(part, piece); };
   std::visit(spread_part, sheet.first);
   std::visit(spread_part, sheet.second);

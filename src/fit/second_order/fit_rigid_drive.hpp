@@ -4,7 +4,7 @@
 #include <string>
 
 #include "fit/second_order/fit_dynamic_bouc_wen.hpp"
-#include "model/second_order/friction_drive.hpp"
+#include "model/second_order/rigid_drive.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/options.hpp"
@@ -12,7 +12,7 @@
 
 namespace torsio {
 
-struct FrictionDriveOptions {
+struct RigidDriveOptions {
   double gain = 1.0;  ///< g, known beforehand: it only scales the other parameters
   /// Besides J, Fv, Fc and offset: some of "stribeck", "lugre", "asymmetry", "quadratic", "spring",
   /// "position", joined by +; "none"; "auto": added as long as they help on held-out blocks.
@@ -44,8 +44,8 @@ struct FrictionDriveOptions {
 /// turn and simulated from its own first 50 samples; a term stays if it lowers that error by a tenth.
 /// @throws UsageError for an unknown term, Error unless the first input and the target move
 /// in both directions, and the search converges; Cancelled.
-[[nodiscard]] Fitted<FrictionDrive> fit_friction_drive(const TrainingData& data,
-                                                       const FrictionDriveOptions& options,
-                                                       const Progress& progress = {});
+[[nodiscard]] Fitted<RigidDrive> fit_rigid_drive(const TrainingData& data,
+                                                 const RigidDriveOptions& options,
+                                                 const Progress& progress = {});
 
 }  // namespace torsio

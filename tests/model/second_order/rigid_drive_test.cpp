@@ -1,4 +1,4 @@
-#include "model/second_order/friction_drive.hpp"
+#include "model/second_order/rigid_drive.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 
 using testing::HasSubstr;
 
-FrictionDrive::Parameters sliding(std::size_t substeps = 1) {
+RigidDrive::Parameters sliding(std::size_t substeps = 1) {
   return {.inertia = 95.0,
           .viscous = 200.0,
           .coulomb = 20.0,
@@ -24,13 +24,13 @@ FrictionDrive::Parameters sliding(std::size_t substeps = 1) {
           .highest = 10.0};
 }
 
-double step(FrictionDrive& model, double force) { return model.step({&force, 1}).value; }
+double step(RigidDrive& model, double force) { return model.step({&force, 1}).value; }
 
-TEST(FrictionDrive, BrakesAsCoulombSaysAndStays) {
+TEST(RigidDrive, BrakesAsCoulombSaysAndStays) {
   auto parameters = sliding();
   parameters.viscous = 0.0;
   parameters.time.input_order = 1;  // a cubic would overshoot where the force jumps
-  FrictionDrive model(parameters);
+  RigidDrive model(parameters);
   model.set_state(std::vector<double>{0.0, 0.1, 0.0});
   // Stops after v J / Fc = 0.475 s, v^2 J / (2 Fc) = 23.75 mm away.
   double q = 0.0;
@@ -52,7 +52,7 @@ double drag_error(std::size_t substeps) {
   auto parameters = sliding(substeps);
   parameters.viscous = 2000.0;
   parameters.time.sample_period_s = 0.01;
-  FrictionDrive model(parameters);
+  RigidDrive model(parameters);
   double q = 0.0;
   for (int n = 0; n <= 50; ++n) q = step(model, 120.0);
   const double rate = 2000.0 / 95.0;
@@ -60,11 +60,11 @@ double drag_error(std::size_t substeps) {
   return std::abs(q - speed * (0.5 - (1.0 - std::exp(-rate * 0.5)) / rate));
 }
 
-TEST(FrictionDrive, ConvergesWithTheSecondPowerOfTheSubstep) {
+TEST(RigidDrive, ConvergesWithTheSecondPowerOfTheSubstep) {
   EXPECT_NEAR(std::log2(drag_error(2) / drag_error(4)), 2.0, 0.1);
 }
 
-TEST(FrictionDrive, SlidesSteadilyWhereItsForcesBalance) {
+TEST(RigidDrive, SlidesSteadilyWhereItsForcesBalance) {
   auto parameters = sliding();
   parameters.offset = -3.0;
   parameters.static_ratio = 1.4;
@@ -72,7 +72,7 @@ TEST(FrictionDrive, SlidesSteadilyWhereItsForcesBalance) {
   parameters.viscous_asymmetry = -30.0;
   parameters.viscous_quadratic = 100.0;
   for (const double force : {80.0, -80.0}) {
-    FrictionDrive model(parameters);
+    RigidDrive model(parameters);
     for (int n = 0; n < 10000; ++n) (void)step(model, force);
     const double v = model.state()[1];
     const double resisted =
@@ -81,21 +81,21 @@ TEST(FrictionDrive, SlidesSteadilyWhereItsForcesBalance) {
   }
 }
 
-TEST(FrictionDrive, NeedsTheBreakawayForceToStart) {
+TEST(RigidDrive, NeedsTheBreakawayForceToStart) {
   auto parameters = sliding();
   parameters.static_ratio = 1.5;
   parameters.stribeck_speed = 0.01;
-  FrictionDrive model(parameters);
+  RigidDrive model(parameters);
   for (int n = 0; n < 100; ++n) (void)step(model, 29.9);
   EXPECT_EQ(model.state()[0], 0.0);
   for (int n = 0; n < 1000; ++n) (void)step(model, 30.5);
   EXPECT_GT(model.state()[1], 0.01);  // and then slides against less
 }
 
-TEST(FrictionDrive, FeelsMoreFrictionWhereItsSlopeSays) {
+TEST(RigidDrive, FeelsMoreFrictionWhereItsSlopeSays) {
   auto parameters = sliding();
   parameters.coulomb_slope = 0.5;
-  FrictionDrive model(parameters);
+  RigidDrive model(parameters);
   for (const double q : {-1.0, 0.0, 1.0}) {
     const double level = 20.0 * (1.0 + 0.5 * q);
     model.reset();
@@ -106,24 +106,24 @@ TEST(FrictionDrive, FeelsMoreFrictionWhereItsSlopeSays) {
   }
 }
 
-TEST(FrictionDrive, WithABristleIsASpringBeforeItSlides) {
+TEST(RigidDrive, WithABristleIsASpringBeforeItSlides) {
   auto parameters = sliding();
   parameters.bristle = 1e-3;  // 20 kN/m
-  FrictionDrive model(parameters);
+  RigidDrive model(parameters);
   for (int n = 0; n < 5000; ++n) (void)step(model, std::min(0.001 * n, 1.0));
   const double z = model.state()[2];
   EXPECT_NEAR(z, 1.0, 1e-3);
   EXPECT_NEAR(model.state()[0], -1e-3 * std::log1p(-1.0 / 20.0), 2e-6);  // F' = s (1 - F / Fc) v
 }
 
-TEST(FrictionDrive, TakesMoreEnergyThanItHolds) {
+TEST(RigidDrive, TakesMoreEnergyThanItHolds) {
   for (const double bristle : {0.0, 1e-3}) {
     auto parameters = sliding(2);
     parameters.bristle = bristle;
     parameters.static_ratio = 1.5;
     parameters.stribeck_speed = 0.02;
     parameters.spring = 300.0;
-    FrictionDrive model(parameters);
+    RigidDrive model(parameters);
     double work = 0.0;
     double before = 0.0;
     for (int n = 1; n < 20000; ++n) {
@@ -140,39 +140,39 @@ TEST(FrictionDrive, TakesMoreEnergyThanItHolds) {
   }
 }
 
-TEST(FrictionDrive, StopsAtTheEndOfItsRangeAndGoesOnAfterNaN) {
-  FrictionDrive model(sliding());
+TEST(RigidDrive, StopsAtTheEndOfItsRangeAndGoesOnAfterNaN) {
+  RigidDrive model(sliding());
   double force = 1e7;
-  Estimate told;
-  for (int n = 0; n < 1000; ++n) told = model.step({&force, 1});
-  EXPECT_EQ(told.fault, Fault::diverged);
-  EXPECT_EQ(told.value, 10.0);
+  Estimate estimate;
+  for (int n = 0; n < 1000; ++n) estimate = model.step({&force, 1});
+  EXPECT_EQ(estimate.fault, Fault::diverged);
+  EXPECT_EQ(estimate.value, 10.0);
   force = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(model.step({&force, 1}).fault, Fault::none);
   force = -1.0;
-  for (int n = 0; n < 10; ++n) told = model.step({&force, 1});
-  EXPECT_EQ(told.fault, Fault::none);
-  EXPECT_EQ(told.value, 10.0);
+  for (int n = 0; n < 10; ++n) estimate = model.step({&force, 1});
+  EXPECT_EQ(estimate.fault, Fault::none);
+  EXPECT_EQ(estimate.value, 10.0);
 }
 
-TEST(FrictionDrive, KeepsABristleBelowWhatItCanHold) {
+TEST(RigidDrive, KeepsABristleBelowWhatItCanHold) {
   auto parameters = sliding();
   parameters.bristle = 1e-3;
-  FrictionDrive with(parameters);
+  RigidDrive with(parameters);
   with.set_state(std::vector<double>{0.0, NAN, 1e9});
   EXPECT_THAT(with.state(), testing::ElementsAre(0.0, 0.0, 20.0));
-  FrictionDrive without(sliding());
+  RigidDrive without(sliding());
   without.set_state(std::vector<double>{20.0, 1.0, 5.0});
   EXPECT_THAT(without.state(), testing::ElementsAre(10.0, 1.0, 0.0));
 }
 
-TEST(FrictionDrive, RefusesWhatIsNoDrive) {
+TEST(RigidDrive, RefusesWhatIsNoDrive) {
   const auto refused = [](auto change) {
     auto parameters = sliding();
     change(parameters);
-    return test::error_message([&] { FrictionDrive model(parameters); });
+    return test::error_message([&] { RigidDrive model(parameters); });
   };
-  EXPECT_THAT(refused([](auto& p) { p.inertia = 0.0; }), HasSubstr("friction_drive: inertia"));
+  EXPECT_THAT(refused([](auto& p) { p.inertia = 0.0; }), HasSubstr("rigid_drive: inertia"));
   EXPECT_THAT(refused([](auto& p) { p.static_ratio = 0.9; }), HasSubstr("static_ratio"));
   EXPECT_THAT(refused([](auto& p) { p.viscous_asymmetry = 300.0; }),
               HasSubstr("viscous_asymmetry"));
