@@ -132,7 +132,7 @@ Row pgpr_step() {
   parameters.scaling = no_scaling(kRegressors);
   parameters.kernel = parse_kernel("se*(linear+periodic*rq)", kRegressors);
   parameters.noise_variance = 0.01;
-  parameters.points = points.features;
+  parameters.inducing_points = points.features;
   parameters.weights = points.target;
   parameters.explained = Matrix(kClusters, kClusters, 0.001);
   ParametricGp model(parameters);

@@ -1,6 +1,7 @@
 #include "torsio/core/did_you_mean.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <numeric>
 #include <vector>
@@ -27,11 +28,27 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+struct Renamed {
+  std::string_view before;
+  std::string_view now;
+};
+
+// Names of families, options, faults and studies that older files and notes contain.
+constexpr std::array kRenamed{
+    Renamed{"friction_drive", "rigid_drive"}, Renamed{"clusters", "inducing_points"},
+    Renamed{"points", "inducing_points"},     Renamed{"flip", "sign_flip"},
+    Renamed{"coarse", "quantised"},           Renamed{"silent", "dropout"},
+    Renamed{"003-ladder", "003-models"},
+};
+
 }  // namespace
 
 std::string did_you_mean(std::string_view wrong, std::span<const std::string_view> names) {
   constexpr std::size_t kLongest = 200;
   if (wrong.size() > kLongest) return {};
+  for (const auto& [before, now] : kRenamed)
+    if (wrong == before && std::ranges::find(names, now) != names.end())
+      return "It is now called '" + std::string(now) + "'.";
   const std::string_view* nearest = nullptr;
   std::size_t distance = kLongest;
   for (const std::string_view& name : names) {

@@ -105,10 +105,10 @@ ParameterDescription description_of(const ModelFile& model) {
   return {};
 }
 
-std::string coefficient_table(const std::vector<FittedParameter>& estimate) {
+std::string coefficient_table(const std::vector<FittedParameter>& description) {
   TextTable table;
   table.header({"parameter", "value", "unit"});
-  for (const FittedParameter& each : estimate)
+  for (const FittedParameter& each : description)
     table.row({each.name, fmt::format("{:.6g}", each.value), each.unit});
   return table.text();
 }
@@ -172,15 +172,15 @@ std::string model_description(const ModelFile& model) {
   text += fmt::format("\n{}", range_table(settings));
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
-  const ParameterDescription estimate = description_of(model);
-  if (!estimate.coefficients.empty() && estimate.coefficients.size() <= kReadable)
-    return text + "\n" + coefficient_table(estimate.coefficients);
+  const ParameterDescription description = description_of(model);
+  if (!description.coefficients.empty() && description.coefficients.size() <= kReadable)
+    return text + "\n" + coefficient_table(description.coefficients);
   std::vector<Leaf> leaves = leaves_of(model);
   std::erase_if(leaves, [&](const Leaf& leaf) {
-    return !estimate.covered.empty() && leaf.name.starts_with(estimate.covered);
+    return !description.covered.empty() && leaf.name.starts_with(description.covered);
   });
   text += "\n";
-  for (const std::string& line : estimate.lines) text += line + "\n";
+  for (const std::string& line : description.lines) text += line + "\n";
   return text + parameter_lines(leaves);
 }
 

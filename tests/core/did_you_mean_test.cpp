@@ -20,5 +20,11 @@ TEST(DidYouMean, KeepsQuietWhereNothingIsNear) {
   EXPECT_EQ(did_you_mean("", kVerbs), "");
 }
 
+TEST(DidYouMean, GivesTheNewNameOfARenamedOption) {
+  constexpr std::array<std::string_view, 2> kOptions{"inducing_points", "iterations"};
+  EXPECT_EQ(did_you_mean("clusters", kOptions), "It is now called 'inducing_points'.");
+  EXPECT_EQ(did_you_mean("clusters", kVerbs), "") << "the new name belongs to another list";
+}
+
 }  // namespace
 }  // namespace torsio

@@ -13,6 +13,7 @@
 #include "data/measured_recordings.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/data/csv.hpp"
 
 namespace torsio {
 namespace {

@@ -235,7 +235,7 @@ inline ParametricGp::Parameters example_parametric_gp(std::size_t inputs) {
   ParametricGp::Parameters parameters{.scaling = example_scaling(inputs),
                                       .kernel = parse_kernel("se*(linear+periodic*rq)", inputs),
                                       .noise_variance = 0.01,
-                                      .points = example_points(inputs),
+                                      .inducing_points = example_points(inputs),
                                       .weights = {0.4, -0.2, 0.3, 0.1, -0.5, 0.2, 0.6, -0.1, 0.05},
                                       .explained = Matrix(9, 9)};
   for (std::size_t i = 0; i < 9; ++i) parameters.explained(i, i) = 0.1;

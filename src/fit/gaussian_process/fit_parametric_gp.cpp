@@ -214,7 +214,7 @@ ParametricGp::Parameters parameters_of(const ParametricGpTrainer& trainer,
   ParametricGp::Parameters parameters{.scaling = scaling,
                                       .kernel = trainer.kernel().expression(),
                                       .noise_variance = trainer.noise_variance(),
-                                      .points = trainer.points(),
+                                      .inducing_points = trainer.points(),
                                       .weights = {weights.begin(), weights.end()},
                                       .explained = {}};
   const std::size_t size = trainer.points().rows;
@@ -403,7 +403,7 @@ Fitted<ParametricGp> fit_variational_gp(const TrainingData& data,
   return {{.scaling = scaling,
            .kernel = kernel.expression(),
            .noise_variance = noise_variance,
-           .points = points,
+           .inducing_points = points,
            .weights = std::move(posterior.weights),
            .explained = std::move(posterior.explained)},
           std::move(notes)};

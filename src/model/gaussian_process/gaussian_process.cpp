@@ -17,7 +17,7 @@ namespace {
 using kernel_kernels::in_groups;
 
 GaussianProcess::Parameters checked(GaussianProcess::Parameters parameters) {
-  check_kernel_model(parameters, "gaussian_process",
+  check_kernel_model(parameters, parameters.points, "points", "gaussian_process",
                      parameters.with_std_dev ? GaussianProcess::kMaxPointsWithStdDev
                                              : GaussianProcess::kMaxPoints);
   return parameters;

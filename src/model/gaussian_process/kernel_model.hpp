@@ -20,17 +20,20 @@ namespace torsio {
 
 /// What families whose value is a weighted sum of kernels share.
 
-/// Scaling, noise, points and weights. @throws Error at `place` with the field.
+/// Checks scaling, noise, the inputs of the kernels and their weights. @param points the field `points_name`: a row per
+/// kernel. @throws Error at `place` with the field.
 template <class Parameters>
-void check_kernel_model(const Parameters& parameters, const std::string& place, std::size_t most) {
+void check_kernel_model(const Parameters& parameters, const Matrix& points,
+                        const std::string& points_name, const std::string& place,
+                        std::size_t max_points) {
   const std::size_t inputs = checked_input_count(parameters.scaling, place + ": scaling");
-  const std::size_t rows = parameters.points.rows;
-  if (rows == 0 || rows > most)
-    throw Error({.place = place + ": points",
-                 .expected = fmt::format("1 to {} points", most),
-                 .found = fmt::format("{}", rows)});
-  check_shape(parameters.points, rows, inputs, place + ": points");
-  check_length(parameters.weights, rows, place + ": weights");
+  const std::string points_place = place + ": " + points_name;
+  if (points.rows == 0 || points.rows > max_points)
+    throw Error({.place = points_place,
+                 .expected = fmt::format("1 to {} points", max_points),
+                 .found = fmt::format("{}", points.rows)});
+  check_shape(points, points.rows, inputs, points_place);
+  check_length(parameters.weights, points.rows, place + ": weights");
   check_positive(parameters.noise_variance, place + ": noise_variance");
 }
 

@@ -15,7 +15,8 @@ namespace {
 using kernel_kernels::in_groups;
 
 ParametricGp::Parameters checked(ParametricGp::Parameters parameters) {
-  check_kernel_model(parameters, "parametric_gp", ParametricGp::kMaxPoints);
+  check_kernel_model(parameters, parameters.inducing_points, "inducing_points", "parametric_gp",
+                     ParametricGp::kMaxPoints);
   const std::size_t size = parameters.inducing_points.rows;
   check_shape(parameters.explained, size, size, "parametric_gp: explained");
   return parameters;

@@ -84,7 +84,7 @@ TEST(ParametricGp, SaysMeanAndSpreadOfItsDefinition) {
   const Matrix features = test::example_features(50, 2);
   for (std::size_t n = 0; n < features.rows; ++n) {
     const Matrix x = standardised(p.scaling, features.row(n));
-    const Eigen::VectorXd q = covariance(p.kernel, p.points, x);
+    const Eigen::VectorXd q = covariance(p.kernel, p.inducing_points, x);
     const double mean =
         q.dot(Eigen::Map<const Eigen::VectorXd>(p.weights.data(), Eigen::Index(p.weights.size())));
     const double prior = covariance(p.kernel, x, x)(0, 0);
@@ -146,7 +146,7 @@ TEST(ParametricGp, RefusesPointsOutsideItsKernelsDomain) {
   parameters.kernel = parse_kernel("rq", 2);
   parameters.kernel.nodes[0].shape = -5.3729;
   EXPECT_NO_THROW(ParametricGp{parameters});
-  parameters.points(8, 0) = 9.0;
+  parameters.inducing_points(8, 0) = 9.0;
   EXPECT_THAT(error_message([&] { const ParametricGp model(parameters); }),
               testing::AllOf(HasSubstr("alpha below 0"), HasSubstr("point 0")));
 }
