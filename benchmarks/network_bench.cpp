@@ -8,6 +8,9 @@
 #include <vector>
 
 #include "model/common/parameters.hpp"
+#include "model/network/gru.hpp"
+#include "model/network/lstm.hpp"
+#include "model/network/mlp.hpp"
 #include "model/network/network_bank.hpp"
 #include "rows.hpp"
 #include "support/random_network.hpp"

@@ -110,7 +110,7 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
 std::vector<torsio::NamedInverse> inverses_of(const TrackFlags& flags) {
   std::vector<torsio::NamedInverse> models;
   for (const std::string& path : flags.models) {
-    if (path == "linear") continue;
+    if (path == torsio::kSweepLineName) continue;  // always run beside the models
     const torsio::ModelFile file = torsio::load_model(path);
     try {
       models.push_back({path, torsio::inverse_of(file)});

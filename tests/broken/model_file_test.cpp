@@ -12,6 +12,8 @@
 #include "files/whole_file.hpp"
 #include "support/error_message.hpp"
 #include "support/example_model_file.hpp"
+#include "support/examples/linear.hpp"
+#include "support/examples/network.hpp"
 #include "support/grey_box_examples.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"

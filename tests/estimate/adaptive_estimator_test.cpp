@@ -6,19 +6,20 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "model/network/ensemble.hpp"
-#include "support/dump_any.hpp"
+#include "support/dump.hpp"
 #include "support/error_message.hpp"
-#include "support/example_models.hpp"
 #include "support/example_settings.hpp"
+#include "support/examples/linear.hpp"
+#include "support/examples/network.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 
 namespace torsio {
 namespace {
 
-using test::dump;
 using test::error_message;
 using test::example;
 using testing::HasSubstr;
@@ -35,6 +36,11 @@ template <class Network>
 class Adapted : public testing::Test {};
 using Networks = testing::Types<Mlp, Lstm, Gru>;
 TYPED_TEST_SUITE(Adapted, Networks);
+
+template <class Network>
+std::string weights(const AnyModel::Parameters& network) {
+  return test::dump(network.get<typename Network::Parameters>());
+}
 
 std::array<double, 2> raw_at(int n) { return {0.1 * std::sin(0.01 * n), 0.0}; }
 
@@ -82,13 +88,13 @@ TYPED_TEST(Adapted, ResetKeepsWhatWasLearnedAndForgetDoesNot) {
   const AnyModel::Parameters network = example<TypeParam>().parameters();
   AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
   (void)run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<TypeParam>())), 3.0);
-  const std::string learned = dump(adaptive.adapted());
+  const std::string learned = weights<TypeParam>(adaptive.adapted());
   adaptive.reset();
   EXPECT_EQ(adaptive.step(raw_at(0)).fault, Fault::warming_up);
-  EXPECT_EQ(dump(adaptive.adapted()), learned);
-  EXPECT_NE(learned, dump(network));
+  EXPECT_EQ(weights<TypeParam>(adaptive.adapted()), learned);
+  EXPECT_NE(learned, weights<TypeParam>(network));
   adaptive.forget();
-  EXPECT_EQ(dump(adaptive.adapted()), dump(network));
+  EXPECT_EQ(weights<TypeParam>(adaptive.adapted()), weights<TypeParam>(network));
 }
 
 TYPED_TEST(Adapted, TicksWithoutAnEstimateOfTheNetworkTeachNothing) {
@@ -100,7 +106,7 @@ TYPED_TEST(Adapted, TicksWithoutAnEstimateOfTheNetworkTeachNothing) {
   EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::no_estimate);
   EXPECT_EQ(adaptive.step(std::array{50.0, 0.0}).fault, Fault::outside_training_range);
   EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::no_estimate);
-  EXPECT_EQ(dump(adaptive.adapted()), dump(network));
+  EXPECT_EQ(weights<TypeParam>(adaptive.adapted()), weights<TypeParam>(network));
 }
 
 TEST(AdaptiveEstimator, WaitsForItsZeros) {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "support/error_message.hpp"
-#include "support/example_models.hpp"
+#include "support/examples/linear.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 

@@ -6,7 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "support/example_models.hpp"
+#include "model/viscoelastic/viscoelastic.hpp"
+#include "support/examples/linear.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/random.hpp"
 
@@ -79,7 +80,7 @@ TEST(InitialState, StaysAtRestWhereNothingIsTold) {
 }
 
 TEST(InitialState, OfAFamilyWithoutIsAReset) {
-  AnyModel model = test::example<AnyModel>();
+  AnyModel model = test::example<Linear>();
   EXPECT_TRUE(model.state().empty());
   const Measured run = run_from(kState, 20, 0.0);
   Matrix features(20, model.input_count());

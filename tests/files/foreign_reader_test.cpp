@@ -5,7 +5,10 @@
 #include <filesystem>
 #include <string>
 
+#include "model/network/lstm.hpp"
 #include "support/example_model_file.hpp"
+#include "support/examples/linear.hpp"
+#include "support/random_network.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace torsio {
@@ -38,7 +41,7 @@ TEST(ForeignReader, OpensAModelFile) {
   EXPECT_EQ(read("model.rate_feature"), "[] [1] linear_coulomb\n");
   EXPECT_EQ(read("model.coefficients.scheduled"), "[] [1] linear_coulomb\n");
 
-  auto network = test::example<Lstm>().parameters();
+  auto network = test::random_network<Lstm>({.units = {5, 3}}, 5);
   network.layers[1].bias.assign(12, 0.25F);
   save_model(folder.path("m.safetensors"), test::example_model_file(Lstm(network)));
   EXPECT_EQ(read("model.layers.1.bias"),

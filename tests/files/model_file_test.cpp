@@ -13,6 +13,7 @@
 #include "support/error_message.hpp"
 #include "support/every_family.hpp"
 #include "support/example_model_file.hpp"
+#include "support/example_models.hpp"
 #include "support/grey_box_examples.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"

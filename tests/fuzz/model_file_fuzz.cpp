@@ -13,6 +13,7 @@
 #include "files/known_families.hpp"
 #include "files/safetensors.hpp"
 #include "support/example_model_file.hpp"
+#include "support/example_models.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"
 

@@ -1,5 +1,5 @@
 // What a new family needs besides its model: a row in the table of families and a page. (An example
-// in tests/support/example_models.hpp is asked for by the compiler, the laws come by themselves.)
+// in tests/support/examples is asked for by the compiler, the laws come by themselves.)
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -12,7 +12,7 @@
 #include "torsio/model/any_model.hpp"
 
 /// What it means to be a model family. A new one of `AllFamilies` specialises `example`
-/// (support/example_models.hpp); the laws then hold for it without another line.
+/// (support/examples); the laws then hold for it without another line.
 ///
 /// Laws of fitters stand in fit_laws_test.cpp. That NaN in gives a fault and a finite value out, and
 /// that offline equals streaming, are laws of the estimator; that saving and loading changes no bit

@@ -13,8 +13,12 @@
 #include <vector>
 
 #include "model/mixture/random_mixture.hpp"
-#include "support/example_models.hpp"
 #include "support/example_settings.hpp"
+#include "support/examples/grey_box.hpp"
+#include "support/examples/hysteresis.hpp"
+#include "support/examples/linear.hpp"
+#include "support/examples/network.hpp"
+#include "support/examples/viscoelastic.hpp"
 #include "support/system_calls.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_impedance.hpp"

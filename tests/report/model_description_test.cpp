@@ -5,7 +5,10 @@
 
 #include "model/network/ensemble.hpp"
 #include "support/example_model_file.hpp"
-#include "support/example_models.hpp"
+#include "support/examples/gaussian_process.hpp"
+#include "support/examples/linear.hpp"
+#include "support/examples/network.hpp"
+#include "support/examples/viscoelastic.hpp"
 #include "torsio/import/import_network.hpp"
 
 namespace torsio {

@@ -1,15 +1,18 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 
-#include "files/known_families.hpp"
 #include "support/dump.hpp"
+#include "torsio/files/model_file.hpp"
 
 namespace torsio::test {
 
+/// As a model file holds them, so that this header needs no family's.
 inline std::string dump(const AnyParameters& parameters) {
-  std::string text;
-  with_own_type(parameters, [&](const auto& own) { text = dump(own); });
+  std::string text(parameters.family());
+  for (const std::byte byte : model_bytes({.card = {}, .settings = {}, .parameters = parameters}))
+    text += static_cast<char>(byte);
   return text;
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/model/any_model.hpp"
 
 namespace torsio::test {
 

@@ -26,7 +26,7 @@ inline std::vector<std::string> spring_families() {
   return names;
 }
 
-/// Settings with which the slow families are fitted in a second, for tests of what follows a fit.
+/// Small values of the options that set how long a fit takes, for tests that need no better model.
 inline std::map<std::string, std::string> quick_options(std::string_view family) {
   std::map<std::string, std::string> options;
   for (const auto& [name, value] : std::map<std::string, std::string>{

@@ -3,7 +3,8 @@
 #include <cstddef>
 #include <utility>
 
-#include "support/example_models.hpp"
+#include "support/examples/grey_box.hpp"
+#include "support/random_network.hpp"
 
 namespace torsio::test {
 

@@ -6,10 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "model/network/gru.hpp"
-#include "model/network/lstm.hpp"
-#include "model/network/mlp.hpp"
+#include "torsio/core/matrix.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/model/network/network_layers.hpp"
 
 namespace torsio::test {
 
@@ -31,7 +30,7 @@ class NetworkMaker {
   typename Network::Parameters network() {
     typename Network::Parameters parameters;
     parameters.scaling = scaling();
-    if constexpr (std::same_as<Network, Mlp>) {
+    if constexpr (!requires { typename Network::Layer; }) {
       parameters.layers = dense_layers(shape_.inputs);
     } else {
       std::size_t inputs = shape_.inputs;

@@ -17,10 +17,20 @@
 #include "model/mixture/dgmm.hpp"
 #include "model/network/mlp.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/fit/families.hpp"
 
 namespace torsio {
 namespace {
+
+/// The families that f may be of, as `narx_families` is given them: a row's fitter is a plain function,
+/// so it cannot hold the fitter of f itself.
+std::vector<FamilyInfo>& inner_families() {
+  static std::vector<FamilyInfo> families;
+  return families;
+}
+
+const FamilyInfo& inner_family(std::string_view name) {
+  return *std::ranges::find(inner_families(), name, &FamilyInfo::name);
+}
 
 /// f of the family M as a NARX model.
 template <class M>
@@ -32,7 +42,7 @@ AnyModel wrapped(const AnyModel& f, const Narx<Linear>::Parameters& rest) {
 template <class M>
 FittedModel narx_by(std::string_view family, const TrainingData& data, const Options& options,
                     const FitContext& context) {
-  const FamilyInfo& inner = find_family(family);
+  const FamilyInfo& inner = inner_family(family);
   return fit_narx(data, filled<NarxOptions>(options),
                   {.fit =
                        [&](const TrainingData& table, const FitContext& own) {
@@ -99,6 +109,7 @@ std::vector<OptionInfo> options_with(std::span<const OptionInfo> inner) {
 
 std::vector<FamilyInfo> narx_families(std::span<const FamilyInfo> known) {
   static std::array<std::vector<OptionInfo>, kNarxFamilies.size()> options;
+  inner_families().assign(known.begin(), known.end());
   std::vector<FamilyInfo> families{
       family_of<fit_arx>(
           {.name = "arx",
@@ -116,7 +127,7 @@ std::vector<FamilyInfo> narx_families(std::span<const FamilyInfo> known) {
            .describe = describe_equation})};
   for (std::size_t i = 0; i < kNarxFamilies.size(); ++i) {
     const NarxFamily& of = kNarxFamilies[i];
-    options[i] = options_with(std::ranges::find(known, of.inner, &FamilyInfo::name)->options);
+    options[i] = options_with(inner_family(of.inner).options);
     families.push_back({.name = of.name,
                         .summary = of.summary,
                         .model_family = of.model_family,

@@ -249,6 +249,7 @@ AnyInverse inverse_of(const ModelFile& model) {
 
 LinearInverse sweep_line(const DataSheet& sheet, std::uint64_t seed, const Progress& progress) {
   const Dataset sweeps = sweep_dataset(full_name(sheet), seed, progress);
+  // Whatever the family, its fallback is the line; this family is the quickest to fit.
   const TrainedModel trained = train_model(
       sweeps, {.family = "linear", .features = resolve_inputs(sweeps, {"spring_deflection_rad"})},
       seed);
@@ -262,14 +263,15 @@ std::vector<TrackingRow> track_models(const DataSheet& sheet, const TrackingSpec
                                       std::span<const std::uint64_t> seeds,
                                       const Progress& progress) {
   for (const std::uint64_t seed : seeds) check_tracking(sheet, spec, seed);
+  const std::string line_name(kSweepLineName);
   std::vector<TrackingRow> rows;
   const std::size_t runs = seeds.size() * (models.size() + 1);
   const auto part = [&](const std::string& doing) {
     return part_of(progress, rows.size(), runs, doing);
   };
   for (const std::uint64_t seed : seeds) {
-    TrackingRow line = row_of(sheet, spec, "linear", seed);
-    run_into(line, sheet, spec, linear, part("linear"));
+    TrackingRow line = row_of(sheet, spec, line_name, seed);
+    run_into(line, sheet, spec, linear, part(line_name));
     rows.push_back(line);
     for (const NamedInverse& model : models) {
       TrackingRow row = row_of(sheet, spec, model.name, seed);

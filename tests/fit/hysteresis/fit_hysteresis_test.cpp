@@ -12,7 +12,7 @@
 #include "fit/hysteresis/operator_data.hpp"
 #include "support/error_message.hpp"
 #include "support/example_data.hpp"
-#include "support/hysteresis_examples.hpp"
+#include "support/examples/hysteresis.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
@@ -60,7 +60,7 @@ double rmse_elsewhere(M truth, M fitted) {
 }
 
 TEST(FitMaxwellSlip, FindsTheElementsWhoseThresholdsItHas) {
-  auto truth = test::example_maxwell_slip().parameters();
+  auto truth = test::example<MaxwellSlipModel>().parameters();
   const double half_range = [] {
     double largest = 0.0;
     double least = 0.0;
@@ -83,7 +83,7 @@ TEST(FitMaxwellSlip, FindsTheElementsWhoseThresholdsItHas) {
 }
 
 TEST(FitMaxwellSlip, ComesNearWithGenericThresholds) {
-  const auto truth = test::example_maxwell_slip();
+  const auto truth = test::example<MaxwellSlipModel>();
   const auto data = recording_of(truth, 0.05);
   const auto fitted = fit_maxwell_slip(data, {.rates = true});
   EXPECT_LT(rmse_elsewhere(truth, MaxwellSlipModel(fitted.parameters)), 0.2);
@@ -95,7 +95,7 @@ TEST(FitMaxwellSlip, ComesNearWithGenericThresholds) {
 }
 
 TEST(FitPrandtlIshlinskii, SaysInPlaysWhatStopsSay) {
-  const auto truth = test::example_prandtl_ishlinskii();
+  const auto truth = test::example<PrandtlIshlinskii>();
   const auto data = recording_of(truth, 0.05);
   const auto passive = fit_prandtl_ishlinskii(data, {.rates = true});
   EXPECT_LT(rmse_elsewhere(truth, PrandtlIshlinskii(passive.parameters)), 0.6);
@@ -106,7 +106,7 @@ TEST(FitPrandtlIshlinskii, SaysInPlaysWhatStopsSay) {
 }
 
 TEST(FitOperators, AgainstTheSignOfFrictionNothingIsFitted) {
-  TrainingData data = recording_of(test::example_maxwell_slip());
+  TrainingData data = recording_of(test::example<MaxwellSlipModel>());
   for (double& each : data.sequences[0].target) each = -each;
   const auto fitted = fit_maxwell_slip(data, {});
   EXPECT_THAT(fitted.notes, Contains(HasSubstr("differ in sign")));
@@ -115,7 +115,7 @@ TEST(FitOperators, AgainstTheSignOfFrictionNothingIsFitted) {
 }
 
 TEST(FitBoucWen, FindsItsParameters) {
-  const auto truth = test::example_bouc_wen();
+  const auto truth = test::example<BoucWenModel>();
   const auto fitted = fit_bouc_wen(recording_of(truth, 0.02), {.rates = true});
   const auto& p = truth.parameters();
   const auto& q = fitted.parameters;
@@ -133,14 +133,14 @@ TEST(FitBoucWen, FindsItsParameters) {
 }
 
 TEST(FitNonlinearBacklash, FindsTheBoundariesAndTheSpringBetween) {
-  const auto truth = test::example_nonlinear_backlash();
+  const auto truth = test::example<NonlinearBacklash>();
   const auto fitted = fit_nonlinear_backlash(recording_of(truth, 0.02), {.rates = true});
   EXPECT_NEAR(fitted.parameters.stiffness, 3000.0, 60.0);
   EXPECT_LT(rmse_elsewhere(truth, NonlinearBacklash(fitted.parameters)), 0.1);
 }
 
 TEST(FitNonlinearBacklash, TheImprovedOneFindsTheGrowthByRate) {
-  const auto truth = test::example_improved_nonlinear_backlash();
+  const auto truth = test::example<ImprovedNonlinearBacklash>();
   const auto fitted = fit_improved_nonlinear_backlash(recording_of(truth, 0.02), {});
   EXPECT_LT(rmse_elsewhere(truth, ImprovedNonlinearBacklash(fitted.parameters)), 0.3);
   EXPECT_NEAR(fitted.parameters.rate.gain, 0.1, 0.03);
@@ -148,7 +148,7 @@ TEST(FitNonlinearBacklash, TheImprovedOneFindsTheGrowthByRate) {
 }
 
 TEST(FitExponentialLoading, FindsBothDecays) {
-  const auto truth = test::example_exponential_loading();
+  const auto truth = test::example<ExponentialLoading>();
   const auto fitted =
       fit_exponential_loading(recording_of(truth, 0.02), {.degree = 3, .rates = true});
   EXPECT_NEAR(fitted.parameters.rising_decay, 60.0, 3.0);
@@ -157,7 +157,7 @@ TEST(FitExponentialLoading, FindsBothDecays) {
 }
 
 TEST(FitImprovedPrandtlIshlinskii, FindsAsymmetryAndGrowthByRate) {
-  const auto truth = test::example_improved_prandtl_ishlinskii();
+  const auto truth = test::example<ImprovedPrandtlIshlinskii>();
   const auto data = recording_of(truth, 0.02);
   const auto fitted = fit_improved_prandtl_ishlinskii(data, {.rates = true});
   const double improved = rmse_elsewhere(truth, ImprovedPrandtlIshlinskii(fitted.parameters));
@@ -174,7 +174,7 @@ TEST(FitImprovedPrandtlIshlinskii, FindsAsymmetryAndGrowthByRate) {
 }
 
 TEST(FitOperators, UnusableSamplesMoveTheOperatorButAreNotLearnedFrom) {
-  const auto truth = test::example_bouc_wen();
+  const auto truth = test::example<BoucWenModel>();
   TrainingData data = recording_of(truth);
   Sequence& sequence = data.sequences[0];
   for (std::size_t n = 0; n < sequence.target.size(); ++n)
@@ -189,19 +189,19 @@ TEST(FitOperators, UnusableSamplesMoveTheOperatorButAreNotLearnedFrom) {
 }
 
 TEST(FitOperators, SayWhatIsMissing) {
-  TrainingData still = recording_of(test::example_maxwell_slip(), 0.0, 400);
+  TrainingData still = recording_of(test::example<MaxwellSlipModel>(), 0.0, 400);
   for (std::size_t n = 0; n < 400; ++n) still.sequences[0].features(n, 0) = 0.1;
   EXPECT_THAT(test::error_message([&] { static_cast<void>(fit_maxwell_slip(still, {})); }),
               HasSubstr("constant in the training data"));
-  TrainingData few = recording_of(test::example_maxwell_slip(), 0.0, 20);
+  TrainingData few = recording_of(test::example<MaxwellSlipModel>(), 0.0, 20);
   EXPECT_THAT(test::error_message([&] { static_cast<void>(fit_nonlinear_backlash(few, {})); }),
               HasSubstr("too few training samples"));
-  TrainingData no_rate = recording_of(test::example_maxwell_slip(), 0.0, 2000);
+  TrainingData no_rate = recording_of(test::example<MaxwellSlipModel>(), 0.0, 2000);
   no_rate.inputs[1].is_rate = false;
   EXPECT_THAT(
       test::error_message([&] { static_cast<void>(fit_improved_nonlinear_backlash(no_rate, {})); }),
       HasSubstr("nonlinear_backlash_improved has no input that tells a rate"));
-  TrainingData data = recording_of(test::example_bouc_wen(), 0.1, 3000);
+  TrainingData data = recording_of(test::example<BoucWenModel>(), 0.1, 3000);
   EXPECT_THAT(
       test::error_message([&] { static_cast<void>(fit_bouc_wen(data, {.max_iterations = 1})); }),
       HasSubstr("did not converge"));

@@ -12,7 +12,7 @@
 #include "model/gaussian_process/parametric_gp.hpp"
 #include "support/each_instruction_set.hpp"
 #include "support/error_message.hpp"
-#include "support/example_models.hpp"
+#include "support/examples/gaussian_process.hpp"
 
 namespace torsio {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "support/error_message.hpp"
-#include "support/hysteresis_examples.hpp"
+#include "support/examples/hysteresis.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
@@ -44,25 +44,9 @@ double work(const std::vector<double>& path, const std::vector<double>& torque) 
 }
 
 template <class M>
-struct Example;
-#define TORSIO_EXAMPLE(Model, function)              \
-  template <>                                        \
-  struct Example<Model> {                            \
-    static Model make() { return test::function(); } \
-  }
-TORSIO_EXAMPLE(MaxwellSlipModel, example_maxwell_slip);
-TORSIO_EXAMPLE(PrandtlIshlinskii, example_prandtl_ishlinskii);
-TORSIO_EXAMPLE(ImprovedPrandtlIshlinskii, example_improved_prandtl_ishlinskii);
-TORSIO_EXAMPLE(BoucWenModel, example_bouc_wen);
-TORSIO_EXAMPLE(NonlinearBacklash, example_nonlinear_backlash);
-TORSIO_EXAMPLE(ImprovedNonlinearBacklash, example_improved_nonlinear_backlash);
-TORSIO_EXAMPLE(ExponentialLoading, example_exponential_loading);
-#undef TORSIO_EXAMPLE
-
-template <class M>
 class HysteresisLaws : public testing::Test {
  protected:
-  M model_ = Example<M>::make();
+  M model_ = test::example<M>();
 };
 using Models =
     testing::Types<MaxwellSlipModel, PrandtlIshlinskii, ImprovedPrandtlIshlinskii, BoucWenModel,
@@ -84,7 +68,7 @@ TYPED_TEST(HysteresisLaws, ARunGoesOnFromAStateThatItIsGiven) {
   const auto onward = path_through({-0.02, 0.03, 0.01}, 1e-3);
   EXPECT_EQ(torques(same, onward), torques(model, onward)) << "its own state changes nothing";
 
-  auto fresh = Example<TypeParam>::make();
+  auto fresh = test::example<TypeParam>();
   fresh.set_state(state);
   const auto from_fresh = torques(fresh, onward);
   model.reset();
@@ -117,7 +101,7 @@ TYPED_TEST_SUITE(EnergyLaws, Dissipative);
 
 TYPED_TEST(EnergyLaws, LosesEnergyOnEveryRepeatedLoop) {
   EXPECT_TRUE(rc::check([] {
-    auto model = Example<TypeParam>::make();
+    auto model = test::example<TypeParam>();
     // A few turning points, run through again and again until the loop stands.
     const auto corners = *rc::gen::container<std::vector<int>>(4, rc::gen::inRange(-100, 101));
     std::vector<double> turns;
@@ -198,15 +182,15 @@ TYPED_TEST(RateIndependence, ItsHysteresisHearsNoRate) {
 TEST(ImprovedModels, LoopsGrowWithTheRate) {
   const auto path = path_through({0.0, 0.08, -0.08, 0.08, -0.08, 0.08}, 1e-3);
   const auto lost = [&](auto model, double rate) { return work(path, torques(model, path, rate)); };
-  EXPECT_GT(lost(test::example_improved_prandtl_ishlinskii(), 2.0),
-            1.2 * lost(test::example_improved_prandtl_ishlinskii(), 0.0));
-  EXPECT_GT(lost(test::example_improved_nonlinear_backlash(), 2.0),
-            1.1 * lost(test::example_improved_nonlinear_backlash(), 0.0));
+  EXPECT_GT(lost(test::example<ImprovedPrandtlIshlinskii>(), 2.0),
+            1.2 * lost(test::example<ImprovedPrandtlIshlinskii>(), 0.0));
+  EXPECT_GT(lost(test::example<ImprovedNonlinearBacklash>(), 2.0),
+            1.1 * lost(test::example<ImprovedNonlinearBacklash>(), 0.0));
 }
 
 TEST(OperatorSums, StopsAndPlaysSayTheSame) {
-  auto stops = test::example_maxwell_slip();
-  auto plays = test::example_prandtl_ishlinskii();
+  auto stops = test::example<MaxwellSlipModel>();
+  auto plays = test::example<PrandtlIshlinskii>();
   Random random(9);
   double x = 0.0;
   for (int n = 0; n < 3000; ++n) {
@@ -217,7 +201,7 @@ TEST(OperatorSums, StopsAndPlaysSayTheSame) {
 }
 
 TEST(PrandtlIshlinskii, AnInnerLoopLeavesNoTraceOnTheOuterOne) {
-  auto with = test::example_prandtl_ishlinskii();
+  auto with = test::example<PrandtlIshlinskii>();
   auto without = with;
   const auto there = path_through({0.0, 0.09, -0.05}, 1e-3);
   torques(with, there);
@@ -233,7 +217,7 @@ TEST(PrandtlIshlinskii, AnInnerLoopLeavesNoTraceOnTheOuterOne) {
 TEST(PrandtlIshlinskii, LoopsBetweenTheSameTurnsAreCongruent) {
   const auto loop = path_through({-0.01, 0.02, -0.01}, 5e-4);
   const auto after = [&](const std::vector<double>& history) {
-    auto model = test::example_prandtl_ishlinskii();
+    auto model = test::example<PrandtlIshlinskii>();
     torques(model, path_through(history, 1e-3));
     torques(model, loop);
     return torques(model, loop);
@@ -258,7 +242,7 @@ TEST(PrandtlIshlinskii, PlaysOfPositiveWeightWouldGiveWork) {
 }
 
 TEST(ImprovedPrandtlIshlinskii, ItsBentCurveAndTheStraightenedOneAreInverse) {
-  const auto model = test::example_improved_prandtl_ishlinskii();
+  const auto model = test::example<ImprovedPrandtlIshlinskii>();
   for (double v = -90.0; v < 90.0; v += 0.37) {
     EXPECT_NEAR(model.straightened(model.bent(v)), v, 1e-11);
     EXPECT_GT(model.bent(v + 0.01), model.bent(v));
@@ -266,9 +250,9 @@ TEST(ImprovedPrandtlIshlinskii, ItsBentCurveAndTheStraightenedOneAreInverse) {
 }
 
 TEST(BoucWenModel, ReachesItsLargestHysteresisAndNotMore) {
-  const auto parameters = test::example_bouc_wen().parameters();
+  const auto parameters = test::example<BoucWenModel>().parameters();
   const double largest = std::pow(parameters.beta + parameters.gamma, -1.0 / parameters.exponent);
-  auto model = test::example_bouc_wen();
+  auto model = test::example<BoucWenModel>();
   double share = 0.0;
   for (double x = 0.0; x < 20.0 * largest; x += 0.01 * largest) {
     model.step(std::vector{x, 0.0});
@@ -282,7 +266,7 @@ TEST(BoucWenModel, ReachesItsLargestHysteresisAndNotMore) {
 }
 
 TEST(BoucWenModel, SolvesItsEquation) {
-  auto model = test::example_bouc_wen();
+  auto model = test::example<BoucWenModel>();
   const auto& p = model.parameters();
   const double largest = std::pow(p.beta + p.gamma, -1.0 / p.exponent);
   double z = 0.0;
@@ -310,7 +294,7 @@ TEST(BoucWenModel, SolvesItsEquation) {
 }
 
 TEST(NonlinearBacklash, KeepsBetweenItsBoundaries) {
-  auto model = test::example_nonlinear_backlash();
+  auto model = test::example<NonlinearBacklash>();
   const Envelope boundaries = model.parameters().boundaries;
   Random random(6);
   for (int n = 0; n < 2000; ++n) {
@@ -322,7 +306,7 @@ TEST(NonlinearBacklash, KeepsBetweenItsBoundaries) {
 }
 
 TEST(ExponentialLoading, FollowsItsEquationFromTheLastReversal) {
-  auto model = test::example_exponential_loading();
+  auto model = test::example<ExponentialLoading>();
   const auto& p = model.parameters();
   torques(model, path_through({0.0, 0.05, -0.03}, 1e-3));
   const double reversal_x = -0.03;
@@ -351,26 +335,27 @@ TEST(HysteresisModels, RefuseWhatBreaksTheirPromises) {
     change(parameters);
     return test::error_message([&] { decltype(example){parameters}; });
   };
-  EXPECT_THAT(refusal(test::example_maxwell_slip(), [](auto& p) { p.thresholds[1] = 1e-9; }),
+  EXPECT_THAT(refusal(test::example<MaxwellSlipModel>(), [](auto& p) { p.thresholds[1] = 1e-9; }),
               HasSubstr("maxwell_slip: thresholds"));
-  EXPECT_THAT(refusal(test::example_maxwell_slip(), [](auto& p) { p.thresholds.assign(7, 0.1); }),
-              HasSubstr("maxwell_slip"));
   EXPECT_THAT(
-      refusal(test::example_improved_prandtl_ishlinskii(), [](auto& p) { p.bends[2] = -1.0; }),
+      refusal(test::example<MaxwellSlipModel>(), [](auto& p) { p.thresholds.assign(7, 0.1); }),
+      HasSubstr("maxwell_slip"));
+  EXPECT_THAT(
+      refusal(test::example<ImprovedPrandtlIshlinskii>(), [](auto& p) { p.bends[2] = -1.0; }),
       HasSubstr("rises everywhere"));
-  EXPECT_THAT(refusal(test::example_bouc_wen(), [](auto& p) { p.gamma = 3001.0; }),
+  EXPECT_THAT(refusal(test::example<BoucWenModel>(), [](auto& p) { p.gamma = 3001.0; }),
               HasSubstr("bouc_wen: gamma"));
-  EXPECT_THAT(refusal(test::example_bouc_wen(), [](auto& p) { p.exponent = 0.9; }),
+  EXPECT_THAT(refusal(test::example<BoucWenModel>(), [](auto& p) { p.exponent = 0.9; }),
               HasSubstr("bouc_wen: exponent"));
-  EXPECT_THAT(refusal(test::example_bouc_wen(), [](auto& p) { p.elastic_share = 1.2; }),
+  EXPECT_THAT(refusal(test::example<BoucWenModel>(), [](auto& p) { p.elastic_share = 1.2; }),
               HasSubstr("bouc_wen: elastic_share"));
-  EXPECT_THAT(refusal(test::example_nonlinear_backlash(), [](auto& p) { p.stiffness = 0.0; }),
+  EXPECT_THAT(refusal(test::example<NonlinearBacklash>(), [](auto& p) { p.stiffness = 0.0; }),
               HasSubstr("nonlinear_backlash: stiffness"));
-  EXPECT_THAT(refusal(test::example_nonlinear_backlash(), [](auto& p) { p.rate.gain = 0.1; }),
+  EXPECT_THAT(refusal(test::example<NonlinearBacklash>(), [](auto& p) { p.rate.gain = 0.1; }),
               HasSubstr("rate.gain"));
-  EXPECT_THAT(refusal(test::example_exponential_loading(), [](auto& p) { p.slopes[0] = 1.0; }),
+  EXPECT_THAT(refusal(test::example<ExponentialLoading>(), [](auto& p) { p.slopes[0] = 1.0; }),
               HasSubstr("slope of the first input"));
-  EXPECT_THAT(refusal(test::example_exponential_loading(), [](auto& p) { p.falling_decay = -1.0; }),
+  EXPECT_THAT(refusal(test::example<ExponentialLoading>(), [](auto& p) { p.falling_decay = -1.0; }),
               HasSubstr("exponential_loading: decay"));
 }
 

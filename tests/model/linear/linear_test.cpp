@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "model/linear/linear_coulomb.hpp"
-#include "support/example_models.hpp"
+#include "support/examples/linear.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "support/example_models.hpp"
+#include "support/examples/linear.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

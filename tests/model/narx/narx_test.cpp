@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "support/error_message.hpp"
-#include "support/example_models.hpp"
+#include "support/examples/narx.hpp"
 
 namespace torsio {
 namespace {

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "support/example_models.hpp"
+#include "support/examples/network.hpp"
+#include "support/random_network.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

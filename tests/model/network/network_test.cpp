@@ -10,10 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "model/network/gru.hpp"
+#include "model/network/lstm.hpp"
+#include "model/network/mlp.hpp"
 #include "model/network/network_bank.hpp"
 #include "support/each_instruction_set.hpp"
 #include "support/error_message.hpp"
-#include "support/example_models.hpp"
+#include "support/examples/example.hpp"
 #include "support/network_reference.hpp"
 #include "support/random_network.hpp"
 

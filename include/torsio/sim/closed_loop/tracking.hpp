@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/actuator/data_sheet.hpp"
@@ -65,6 +66,10 @@ struct TrackingRun {
 /// @throws Error as `AnyInverse::of`, or if the model cannot run at that rate, or wants the zero of
 /// a channel that no one sets here.
 [[nodiscard]] AnyInverse inverse_of(const ModelFile& model);
+
+/// What `track` calls the line of `sweep_line` where others are model files: a documented keyword
+/// (docs/tracking.md), the name of its rows too.
+inline constexpr std::string_view kSweepLineName = "linear";
 
 /// The line that the sweeps of `sweep_dataset` give: what a loop has without a learned model.
 [[nodiscard]] LinearInverse sweep_line(const DataSheet& sheet, std::uint64_t seed,

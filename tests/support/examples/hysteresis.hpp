@@ -7,11 +7,15 @@
 #include "model/hysteresis/improved_prandtl_ishlinskii.hpp"
 #include "model/hysteresis/nonlinear_backlash.hpp"
 #include "model/hysteresis/operator_sum.hpp"
+#include "support/examples/example.hpp"
+#include "torsio/core/matrix.hpp"
 
 namespace torsio::test {
 
-/// Models of two inputs, a deflection of +-0.1 rad and its rate, about 600 Nm/rad and +-6 Nm wide.
-inline MaxwellSlipModel example_maxwell_slip() {
+// All about 600 Nm/rad and +-6 Nm wide.
+
+template <>
+inline MaxwellSlipModel example<MaxwellSlipModel>() {
   MaxwellSlipModel::Parameters parameters;
   parameters.thresholds = {0.001, 0.004, 0.01, 0.04, 0.09};
   parameters.coefficients.values = Matrix(1, 8);
@@ -20,7 +24,8 @@ inline MaxwellSlipModel example_maxwell_slip() {
 }
 
 /// The same said in plays: k_0 takes what the stops had, the weights turn.
-inline PrandtlIshlinskii example_prandtl_ishlinskii() {
+template <>
+inline PrandtlIshlinskii example<PrandtlIshlinskii>() {
   PrandtlIshlinskii::Parameters parameters;
   parameters.thresholds = {0.001, 0.004, 0.01, 0.04, 0.09};
   parameters.coefficients.values = Matrix(1, 8);
@@ -28,7 +33,8 @@ inline PrandtlIshlinskii example_prandtl_ishlinskii() {
   return PrandtlIshlinskii(parameters);
 }
 
-inline ImprovedPrandtlIshlinskii example_improved_prandtl_ishlinskii() {
+template <>
+inline ImprovedPrandtlIshlinskii example<ImprovedPrandtlIshlinskii>() {
   return ImprovedPrandtlIshlinskii({.bias = 0.5,
                                     .slopes = {1500.0, 0.25},
                                     .weights = {-600.0, -300.0, -30.0},
@@ -39,7 +45,8 @@ inline ImprovedPrandtlIshlinskii example_improved_prandtl_ishlinskii() {
                                     .rate_feature = 1});
 }
 
-inline BoucWenModel example_bouc_wen() {
+template <>
+inline BoucWenModel example<BoucWenModel>() {
   return BoucWenModel({.stiffness = 1200.0,
                        .elastic_share = 0.5,
                        .beta = 3000.0,
@@ -54,19 +61,22 @@ inline Envelope example_envelope() {
   return {.middle = {0.5, 55.0, 1.0, 6.0}, .half_width = {4.0, 0.5, 1.0}, .half_range = 0.11};
 }
 
-inline NonlinearBacklash example_nonlinear_backlash() {
+template <>
+inline NonlinearBacklash example<NonlinearBacklash>() {
   return NonlinearBacklash(
       {.stiffness = 3000.0, .boundaries = example_envelope(), .slopes = {0.0, 0.25}});
 }
 
-inline ImprovedNonlinearBacklash example_improved_nonlinear_backlash() {
+template <>
+inline ImprovedNonlinearBacklash example<ImprovedNonlinearBacklash>() {
   return ImprovedNonlinearBacklash({.stiffness = 3000.0,
                                     .boundaries = example_envelope(),
                                     .slopes = {0.0, 0.25},
                                     .rate = {.gain = 0.1, .exponent = 0.6, .feature = 1}});
 }
 
-inline ExponentialLoading example_exponential_loading() {
+template <>
+inline ExponentialLoading example<ExponentialLoading>() {
   return ExponentialLoading({.curves = example_envelope(),
                              .rising_decay = 60.0,
                              .falling_decay = 90.0,
