@@ -6,6 +6,9 @@
 
 namespace torsio::test {
 
+/// As many as the library is compiled for on any machine of this kind: on ARM64, NEON is the only one.
+inline constexpr int kFewestInstructionSets = HWY_ARCH_X86 ? 2 : 1;
+
 /// Calls `act(name)` once for each instruction set that this machine has and the library was
 /// compiled for, with run-time dispatch held to it.
 template <class Act>

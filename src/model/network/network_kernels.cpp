@@ -27,15 +27,17 @@ std::size_t lane_count() { return kLanes; }
 
 HWY_INLINE Vector set(float value) { return hn::Set(kTag, value); }
 
-// NaN stays: Max and Min of vectors give back their second argument where one is NaN, or else NaN;
-// those of a single number do not.
+// NaN stays. Max and Min of x86 vectors return their second argument where one is NaN; those of NEON
+// and of single numbers return the number.
+constexpr bool kKeepsSecond =
+    HWY_ARCH_X86 != 0 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128;
 HWY_INLINE Vector at_least(Vector x, float limit) {
-  if constexpr (kLanes == 1) return hn::IfThenElse(hn::Lt(x, set(limit)), set(limit), x);
-  return hn::Max(set(limit), x);
+  if constexpr (kKeepsSecond) return hn::Max(set(limit), x);
+  return hn::IfThenElse(hn::Lt(x, set(limit)), set(limit), x);
 }
 HWY_INLINE Vector at_most(Vector x, float limit) {
-  if constexpr (kLanes == 1) return hn::IfThenElse(hn::Gt(x, set(limit)), set(limit), x);
-  return hn::Min(set(limit), x);
+  if constexpr (kKeepsSecond) return hn::Min(set(limit), x);
+  return hn::IfThenElse(hn::Gt(x, set(limit)), set(limit), x);
 }
 
 // x P(x^2) / Q(x^2) on |x| <= 9, where tanh is 1 to float32: a minimax fit of the relative error,
