@@ -124,7 +124,8 @@ TEST(PublishedFigures, InTheTablesOfTorqueTrackingAreThoseOfTheFile) {
                                                            {RowQuantity::rmse, 6},
                                                            {RowQuantity::mad_to_linear, 7}};
     for (const auto& [quantity, group] : columns)
-      if (match[static_cast<std::size_t>(group)].length() > 0)
+      if (const std::string text = match[static_cast<std::size_t>(group)];
+          !text.empty() && text != "-")
         cells[{condition, match[2].str(), std::string(published_title(quantity))}] = text;
   }
   EXPECT_EQ(rows, 0U) << "rows of papers that could not be read";
