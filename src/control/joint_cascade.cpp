@@ -275,9 +275,9 @@ double JointCascade::wanted_current(const JointState& measured, const Bounds& sp
     transfer_.add(current_A_ - terms_A);
   }
   is_switching_ = false;
-  // The loop's own handover, after a change of its gains, is part of ours.
+  // The loop's own transfer, after a change of its gains, is part of ours.
   const double fading_A = transfer_.step();
-  output.transfer_A = fading_A + loop.handover;
+  output.transfer_A = fading_A + loop.transfer;
   return terms_A + fading_A;
 }
 

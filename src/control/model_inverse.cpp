@@ -87,7 +87,7 @@ void ModelInverse::reset() noexcept {
   last_rad_ = 0.0;
 }
 
-void ModelInverse::remember(Features features) noexcept {
+void ModelInverse::store(Features features) noexcept {
   if (!std::isfinite(model_.step(features).value)) model_.reset();
 }
 
@@ -126,7 +126,7 @@ Estimate ModelInverse::guarded(double torque_Nm, Features features) noexcept {
 }
 
 Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcept {
-  if (is_asked_) remember(asked_);
+  if (is_asked_) store(asked_);
   is_asked_ = false;
   follows_answer_ = false;
   const detail::EstimatorCore::Conditioned input = core_.condition(inputs_.from(sample));
@@ -135,7 +135,7 @@ Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcep
             .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};
   if (input.restarted) model_.reset();
   const bool has_state = !model_.state().empty();
-  if (is_stepped_ && !has_state) remember(input.features);
+  if (is_stepped_ && !has_state) store(input.features);
   Estimate answer = guarded(torque_Nm, input.features);
   zero_rad_ = sample.spring_deflection_rad() - input.features.front();
   if (has_state) {

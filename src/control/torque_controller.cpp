@@ -85,7 +85,7 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
                    .integral_A = loop.integral,
                    .derivative_A = loop.derivative,
                    .feed_forward_A = loop.feed_forward,
-                   .transfer_A = loop.handover,
+                   .transfer_A = loop.transfer,
                    .is_limited = loop.is_limited,
                    .inverse = wanted_rad.fault,
                    .fault = is_refused_ ? Fault::input_not_finite : loop.fault};

@@ -22,7 +22,7 @@ class LinearSystem {
   /// @throws Error if the shapes do not fit, a number is not finite, or the rate is not positive.
   LinearSystem(Matrices matrices, double sample_rate_Hz);
 
-  /// ẋ = A x + B u, y = C x + D u behind a zero-order hold, seen at the samples: exactly.
+  /// ẋ = A x + B u, y = C x + D u after a zero-order hold, sampled: exact.
   [[nodiscard]] static LinearSystem held(const Matrices& continuous, double sample_rate_Hz);
   [[nodiscard]] static LinearSystem gain(double gain, double sample_rate_Hz);
   /// y[n] = u[n−1]
@@ -71,7 +71,7 @@ struct Margins {
   double least_gain = 0.0;  ///< the largest factor below 1 that makes it unstable; 0 if none
 };
 
-/// Of a loop with one input and one output that is closed with the sign turned.
+/// Margins of a loop with one input and one output that is closed with negative feedback.
 /// @throws Error if it has more.
 [[nodiscard]] Margins margins(const LinearSystem& loop);
 

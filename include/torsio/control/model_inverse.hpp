@@ -16,22 +16,22 @@
 
 namespace torsio {
 
-/// A model of the torque run backwards: δ = E[δ | τ*, δ̇, …] with everything but δ as measured
+/// A model of the torque, inverted: δ = E[δ | τ*, δ̇, …] with everything but δ as measured
 /// (`AnyModel::invert`; specification 3.1 for mixtures).
 ///
-/// Guarded as an `Estimator` is: where another input, or the answer, has left its range in training,
-/// the model hands over to its linear fallback run backwards; until the filters have settled, and
-/// where the model has no answer, that alone tells. A slow sweep teaches nothing about the fast
-/// motions of a torque loop (specification 6), so the answer may leave that line only by so many of
-/// its residual standard deviations.
+/// Guarded as an `Estimator` is: where another input, or the result, has left its range in
+/// training, the inverse changes over to that of the linear fallback; until the filters have
+/// settled, and where the model has no inverse, the linear fallback alone is used. A slow sweep
+/// contains no information about the fast motions of a torque loop (specification 6), so the result
+/// may depart from the linear fallback only by so many of its residual standard deviations.
 ///
-/// The memory of a model with state follows the deflection that is asked for, not the measured one:
-/// along that it would take a joint that sticks for a spring that is stiff, and ask for less the
-/// longer it sticks. `follow` tells it what was really asked for behind the limits of the loop. A
-/// model that answers with what is not finite is reset.
+/// The memory of a model with state follows the deflection that is requested, not the measured one:
+/// with the measured one it would interpret a joint that sticks as a spring that is stiff, and
+/// request less the longer the joint sticks. `follow` reports the deflection that was really
+/// requested after the limits of the loop. A model whose output is not finite is reset.
 class ModelInverse {
  public:
-  /// Of the residual standard deviation of the linear fallback.
+  /// In residual standard deviations of the linear fallback.
   static constexpr double kMaxDeparture = 3.0;
 
   /// @throws Error as `Estimator`, or if the model's first input is not `spring_deflection_rad`, its
@@ -50,7 +50,7 @@ class ModelInverse {
   }
 
  private:
-  void remember(Features features) noexcept;
+  void store(Features features) noexcept;
   [[nodiscard]] double on_the_line(double torque_Nm, Features features) const noexcept;
   Estimate guarded(double torque_Nm, Features features) noexcept;
 
@@ -71,8 +71,9 @@ class ModelInverse {
 class TrainedInverse {
  public:
   /// @throws Error if its target is not `spring_deflection_rad`, `torque_Nm` is not among its raw
-  /// inputs, another is not in a `JointSample`, or a channel behind its target was zeroed in training:
-  /// its deflection would be off the measured one by zeros that it is not told.
+  ///          inputs, another is not in a `JointSample`, or a channel from which its target is
+  ///          computed was zeroed in training: its deflection would differ from the measured one by
+  ///          zeros that it does not know.
   explicit TrainedInverse(Estimator estimator);
 
   void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
@@ -86,7 +87,7 @@ class TrainedInverse {
   std::vector<double> raw_;
 };
 
-/// Any of the above, where a file says which.
+/// Any of the above, as a file specifies.
 class AnyInverse {
  public:
   AnyInverse(LinearInverse inverse) : inverse_(inverse) {}
@@ -97,7 +98,7 @@ class AnyInverse {
   [[nodiscard]] static AnyInverse of(const EstimatorSettings& settings,
                                      const AnyModel::Parameters& parameters);
 
-  /// As `Estimator::set_zero`; nothing to a line.
+  /// As `Estimator::set_zero`; without effect on a linear spring.
   void set_zero(std::string_view channel, double value);
   void reset() noexcept {
     detail::dispatch(inverse_, [](auto& inverse) { inverse.reset(); });

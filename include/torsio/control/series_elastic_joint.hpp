@@ -5,7 +5,8 @@
 
 namespace torsio {
 
-/// A joint behind a spring as controllers are designed on it, all as felt at the joint:
+/// A joint with a series spring, the model for controller design; all quantities referred to the
+/// joint:
 ///
 ///     J N² θ̈ + b θ̇ = N k_t i − K δ,   δ = θ − q,   M q̈ + d q̇ = K δ + τ_ext,   T_i i̇ = i* − i
 ///
@@ -13,15 +14,15 @@ namespace torsio {
 struct SeriesElasticJoint {
   Drive drive = {};
   double stiffness_Nm_rad = 0.0;       ///< K
-  double joint_inertia_kg_m2 = 0.0;    ///< M, with what hangs on it
+  double joint_inertia_kg_m2 = 0.0;    ///< M, with the load
   double joint_viscous_Nms_rad = 0.0;  ///< d
 
   /// @throws Error as `Drive::check`, if stiffness or inertia is not positive, or d negative.
   void check() const;
 };
 
-/// That of a data sheet: the relaxed stiffness of an elastomer, the middle one of rubber; a torsion
-/// tube before the last gear is taken to the joint, and the gear as rigid.
+/// The joint of a data sheet: the relaxed stiffness of an elastomer, the middle one of rubber; a
+/// torsion tube before the last gear is referred to the joint, and the gear is rigid.
 [[nodiscard]] SeriesElasticJoint series_elastic_joint(const DataSheet& sheet);
 
 /// What the far side of the spring does.

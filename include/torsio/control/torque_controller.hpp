@@ -13,12 +13,12 @@
 
 namespace torsio {
 
-/// Makes up for a share of the drive's friction where the spring is to be wound:
+/// Compensates a share of the drive's friction while the spring is wound:
 ///
 ///     i_f = s (F_c tanh(v* / v₀) + F_v v*) / (N k_t),   v* = D[τ*] / K, low-passed
 ///
-/// Of the wanted torque, not of what an inverse makes of it: that hears the measured motion, and its
-/// rate would close a second loop through the model.
+/// It uses the wanted torque, not the output of an inverse: that depends on the measured motion,
+/// and its rate would close a second loop through the model.
 struct FrictionCompensation {
   double share = 0.7;         ///< s, 0 to 1; more than there is makes the loop hunt
   double speed_rad_s = 0.02;  ///< v₀, at the joint
@@ -29,7 +29,7 @@ class TorqueLoopCore {
  public:
   struct Settings {
     DeflectionController::Settings deflection = {};
-    double largest_torque_Nm = std::numeric_limits<double>::infinity();  ///< the wish is cut there
+    double largest_torque_Nm = std::numeric_limits<double>::infinity();  ///< reference limit
     std::optional<FrictionCompensation> friction = std::nullopt;
     std::optional<double> observer_cutoff_Hz = std::nullopt;  ///< needs the rotor's angle
     /// Adds i_r = K_d v*, v* as in `FrictionCompensation`: the deflection is damped against its wanted
@@ -42,7 +42,7 @@ class TorqueLoopCore {
   struct Output {
     double current_A = 0.0;
     double wanted_torque_Nm = 0.0;       ///< after its limit
-    double wanted_deflection_rad = 0.0;  ///< of the inverse, after its limit
+    double wanted_deflection_rad = 0.0;  ///< output of the inverse, after its limit
     double proportional_A = 0.0;
     double integral_A = 0.0;
     double derivative_A = 0.0;
@@ -77,7 +77,7 @@ class TorqueLoopCore {
 
   Settings settings_;
   DeflectionController deflection_;
-  detail::BumplessTransfer transfer_;  ///< of what is added to the deflection controller's current
+  detail::BumplessTransfer transfer_;  ///< terms added to the deflection controller's current
   std::optional<DisturbanceObserver> observer_;
   Differentiator wanted_rate_;  ///< D[τ*]
   double amperes_per_Nm_;
@@ -92,9 +92,10 @@ class TorqueLoopCore {
 ///
 ///     δ* = inverse(τ*),   i = deflection controller(δ*, δ) + i_r + i_f + d,   |i| <= i_peak
 ///
-/// A wish that is not finite is a fault, and the last good one stands; without a usable measurement
-/// the current fades to 0. Where the inverse falls back on its line the loop goes on and
-/// `Output::inverse` says so. Source: paper 000 section 4, 001 section 6; specification 3.11.
+/// A reference that is not finite is a fault, and the last finite one is used; without a usable
+/// measurement the current fades to 0. Where the inverse uses its linear fallback the loop
+/// continues and `Output::inverse` reports it. Source: paper 000 section 4, 001 section 6;
+/// specification 3.11.
 template <SpringInverse I>
 class TorqueController {
  public:

@@ -47,9 +47,9 @@ class TubeImpedance {
     /// Gains that only the dry friction of the gear keeps stable are taken too. Those of the paper's
     /// high impedance are such: at 1 kHz the joint without dry friction is unstable with them.
     bool relies_on_friction = false;
-    double speed_cutoff_Hz = 40.0;  ///< of q̇
-    double transfer_s = 0.1;        ///< of the current, when the measurement is back
-    double fault_decay_s = 0.02;    ///< of the current without a usable measurement
+    double speed_cutoff_Hz = 40.0;  ///< low-pass of q̇
+    double transfer_s = 0.1;        ///< transition of the current when measurements return
+    double fault_decay_s = 0.02;    ///< decay of the current without a usable measurement
   };
   struct Angles {
     double rotor_rad = kNotMeasured;
@@ -67,7 +67,7 @@ class TubeImpedance {
     Fault fault = Fault::none;
   };
 
-  /// Of a data sheet with a tube before a gear. @throws Error if it has none.
+  /// Settings from a data sheet with a tube before a gear. @throws Error if it has none.
   [[nodiscard]] static Settings settings_of(const DataSheet& sheet, const Gains& gains);
   /// The gains that render a stiffness and a damping at the joint. @param torque_Nm_rad K_tp
   /// @throws Error if a value is negative, or K_tp not positive.
@@ -81,15 +81,16 @@ class TubeImpedance {
 
   void reset() noexcept;
 
-  /// A wish that is not finite is a fault, and the last good one stands (none yet: no current); a
-  /// measurement too, and the current fades to 0 and goes on from there.
+  /// A reference that is not finite is a fault, and the last finite one is used (none yet: no
+  /// current). A measurement that is not finite is a fault too: the current fades to 0 and
+  /// continues from there.
   Output step(double wanted_rad, double wanted_rad_s,
               const Angles& measured) noexcept TORSIO_REALTIME;
 
   /// K [Nm/rad], at rest.
   [[nodiscard]] double stiffness() const noexcept;
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
-  /// As a joint with the tube behind both gears, and what it feeds back. Allocates.
+  /// The equivalent joint with the tube after both gears, and the feedback. Allocates.
   [[nodiscard]] static SeriesElasticJoint joint_of(const Settings& settings);
   [[nodiscard]] static JointFeedback feedback_of(const Settings& settings, double sample_rate_Hz);
 

@@ -27,7 +27,7 @@ class EstimatorCore {
 
   /// One tick's raw channels after the pipeline.
   struct Conditioned {
-    Features features;          ///< empty where `fault` says that there are none
+    Features features;          ///< empty where `fault` is not none
     Fault fault = Fault::none;  ///< none, input_count_wrong or input_not_finite
     bool restarted = false;     ///< the pipeline was reset: the model's memory is void too
   };
@@ -50,18 +50,18 @@ class EstimatorCore {
   /// How far the worst feature has left its range, in widths of its border: 0 inside, above 1
   /// beyond the border.
   [[nodiscard]] double excursion(Features features) const noexcept TORSIO_REALTIME;
-  /// What may be told to the outside of `told`, the model's answer to `features`.
+  /// Applies the guards to `raw_estimate`, the model's output for `features`.
   Estimate apply_guards(Features features, const Estimate& raw_estimate) noexcept TORSIO_REALTIME;
 
  private:
   struct Range {
     double lowest = 0.0;
     double highest = 0.0;
-    double border = 0.0;  ///< width, on either side, of where the model hands over to the fallback
+    double border = 0.0;  ///< width, on either side, of the transition to the fallback
   };
 
   [[nodiscard]] Estimate model_part(const Estimate& raw_estimate) const noexcept;
-  /// `told` handed over to the fallback by the share `weight` in 0..1.
+  /// Blends `raw_estimate` with the fallback, whose share is `weight` in 0..1.
   [[nodiscard]] Estimate blended(Features features, const Estimate& raw_estimate,
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
@@ -70,7 +70,7 @@ class EstimatorCore {
 
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
-  std::vector<Range> ranges_;  ///< of each feature, tolerance included
+  std::vector<Range> ranges_;  ///< per feature, tolerance included
   std::vector<std::string> unset_zeros_;
   std::size_t longest_gap_;  ///< ticks
   std::size_t missed_ = 0;   ///< ticks in a row without usable input

@@ -26,8 +26,8 @@ struct JointSample {
 
 namespace detail {
 
-/// Writes the raw channels that an estimator wants, taken by name from a `JointSample`: its fields
-/// and `spring_deflection_rad`.
+/// Writes the raw channels that an estimator requires, taken by name from a `JointSample`: its
+/// fields and `spring_deflection_rad`.
 class JointInputs {
  public:
   /// @throws Error naming the raw input that a `JointSample` does not have, or if the target is no

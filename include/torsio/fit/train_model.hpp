@@ -31,7 +31,7 @@ struct ModelChoice {
 /// A fitted model with all that it needs to run (`make_estimator(file)`) and to be saved.
 struct TrainedModel {
   ModelFile file;
-  std::vector<std::string> notes;  ///< what the user should be told about the fit
+  std::vector<std::string> notes;  ///< messages about the fit for the user
   std::vector<FittedParameter> table = {};
   double fit_seconds = 0.0;
 };

@@ -28,7 +28,7 @@ class AdaptiveModel {
   /// has no last layer.
   explicit AdaptiveModel(const Parameters& parameters);
 
-  /// Those of the frozen network.
+  /// The parameters of the frozen network.
   [[nodiscard]] Parameters parameters() const;
   [[nodiscard]] std::size_t input_count() const noexcept { return network_.input_count(); }
   [[nodiscard]] std::size_t parameter_count() const noexcept { return network_.parameter_count(); }

@@ -31,13 +31,13 @@ struct RecorderReport {
   std::string trouble = {};   ///< what the disk refused last; empty: nothing
 };
 
-/// Writes what a loop saw into a file, without ever keeping the loop waiting.
+/// Writes a loop's frames into a file without ever blocking the loop.
 ///
 /// `push` copies a frame into a lock-free ring; a thread of ordinary priority takes the frames out
-/// and writes them as sealed blocks (docs/realtime.md has the format). A disk that is slow or full
-/// costs frames, which are counted and known in the file, never time of the loop. A file whose
-/// process was killed holds every block that was sealed; `read_recording_blocks` tells them from a
-/// torn end.
+/// and writes them as sealed blocks (docs/realtime.md describes the format). A disk that is slow or
+/// full costs frames, which are counted and marked in the file, never time of the loop. A file
+/// whose process was killed contains every block that was sealed; `read_recording_blocks`
+/// distinguishes them from an incomplete end.
 class Recorder {
  public:
   /// @throws UsageError if the options are out of range or a channel has no SI unit; Error if the

@@ -34,8 +34,8 @@ class Differentiator {
     return lowpass_ ? lowpass_->step(rate_) : rate_;
   }
 
-  /// For samples that were lost: the next input is not one sample behind the last, and takes over
-  /// the last difference instead of making one.
+  /// For samples that were lost: the next input is not one sample after the last, and keeps the
+  /// last difference instead of making a new one.
   void skip() noexcept TORSIO_REALTIME { is_skipped_ = true; }
 
   /// Samples after `reset()` until the output is the derivative (to 1 % of a step of it): 2 without

@@ -7,10 +7,10 @@
 #include "torsio/core/realtime.hpp"
 #include "torsio/signal/lowpass.hpp"
 
-// References that excite an actuator, one sample a `step()`. `reset()` begins again with the same
-// numbers. Amplitudes are in whatever unit the reference has (rad, Nm); the first sample is the
-// value at time 0. Every constructor throws `UsageError` for a parameter that is not finite or out
-// of its stated range, and for a frequency at or above half the sample rate.
+// References that excite an actuator, one sample per `step()`. `reset()` restarts with the same
+// numbers. Amplitudes are in the unit of the reference (rad, Nm); the first sample is the value at
+// time 0. Every constructor throws `UsageError` for a parameter that is not finite or outside its
+// stated range, and for a frequency at or above half the sample rate.
 
 namespace torsio {
 
@@ -187,12 +187,12 @@ class QuasiPeriodic {
   Parameters parameters_;
   double sample_rate_Hz_;
   Random random_;
-  double amplitude_ = 0.0;  ///< of this period
+  double amplitude_ = 0.0;  ///< in this period
   double turns_a_sample_ = 0.0;
-  double turns_ = 0.0;  ///< of this period that have passed
+  double turns_ = 0.0;  ///< turns of this period that have passed
 };
 
-/// What was recorded once more, at the loop's own rate: straight lines between the samples. Behind
+/// Repeats a recording at the loop's own rate, with linear interpolation between the samples. After
 /// the last one it stays there, or begins again.
 class Replay {
  public:

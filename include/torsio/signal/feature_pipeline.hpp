@@ -54,12 +54,12 @@ class FeaturePipeline {
   [[nodiscard]] double sample_rate_Hz() const noexcept;
   [[nodiscard]] std::size_t feature_count() const noexcept;
 
-  /// The channels that `step` wants, in this order: those of the expressions after all definitions
-  /// are put in.
+  /// The channels that `step` requires, in this order: those of the expressions after all
+  /// definitions are substituted.
   [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept;
 
-  /// Whether a feature says how fast something moves: it uses channels only inside `rate(...)` or
-  /// channels (raw or defined) that are rates by their unit (`_rad_s`, `_m_s`).
+  /// Whether a feature is a rate of motion: it uses channels only inside `rate(...)` or channels
+  /// (raw or defined) that are rates by their unit (`_rad_s`, `_m_s`).
   [[nodiscard]] bool is_rate(std::size_t feature) const noexcept;
 
   /// Subtracts `value` (SI) from a raw channel from now on; call while configuring.

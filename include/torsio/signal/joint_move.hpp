@@ -45,7 +45,7 @@ class JointMove {
   struct Part {
     double start_s = 0.0;
     double duration_s = 0.0;
-    std::array<double, 6> coefficients{};  ///< of s^0 to s^5
+    std::array<double, 6> coefficients{};  ///< s^0 to s^5
   };
   [[nodiscard]] static Part part(double from_rad, double to_rad, double from_rad_s, double to_rad_s,
                                  double duration_s);

@@ -32,9 +32,9 @@ namespace torsio {
                                                 const FeatureSpec& spec);
 
 /// A raw input that the target was computed from, declared by the dataset or found in the data (the
-/// target is a straight line of the input to 3e-5 of its spread), or all inputs if only together
-/// they give the target so; empty if there is none. Such an
-/// input is a leak: a score with it means nothing.
+/// target is a linear function of the input to 3e-5 of its spread), or all inputs if they give the
+/// target only together; empty if there is none. Such an input is a leak: a score with it means
+/// nothing.
 [[nodiscard]] std::string find_leak(const Dataset& dataset, const FeatureSpec& spec);
 
 /// `find_leak`, and unless the user allows it, @throws UsageError if there is one.

@@ -19,7 +19,7 @@ struct OptionInfo {
   double minimum = 0.0;                 ///< numbers and integers only
   double maximum = 0.0;
   std::string_view help = {};
-  std::span<const std::string_view> choices = {};  ///< of `Kind::choice`
+  std::span<const std::string_view> choices = {};  ///< for `Kind::choice`
   bool takes_auto = false;  ///< `auto` may be given though it is not the default
 };
 

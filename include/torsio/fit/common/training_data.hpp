@@ -11,7 +11,7 @@
 
 namespace torsio {
 
-/// One input of a model as a fitter sees it.
+/// Name and rate property of one input of a model.
 struct InputInfo {
   std::string expression;
   bool is_rate = false;  ///< FeaturePipeline::is_rate

@@ -14,7 +14,7 @@ namespace torsio {
 /// The inputs of one tick, in the order that the model's own `inputs` list names.
 using Features = std::span<const double>;
 
-/// What a model or an estimator says at one tick. `value` is finite in every case.
+/// The output of a model or an estimator at one tick. `value` is finite in every case.
 struct Estimate {
   double value = 0.0;  ///< in the target's unit
   double std_dev =
@@ -23,10 +23,10 @@ struct Estimate {
   Fault fault = Fault::none;
 };
 
-/// What every model family offers; tests/laws says what it must mean.
+/// The interface of every model family; tests/laws checks its meaning.
 ///
 /// `M::Parameters` is plain data with everything that `step` needs; constructing from it checks it
-/// and may throw `Error`. `step` may assume `input_count()` finite features (the estimator sees to
+/// and may throw `Error`. `step` may assume `input_count()` finite features (the estimator ensures
 /// both) and never allocates, locks or throws.
 template <class M>
 concept Model = std::copyable<M> && requires(M model, const M fixed, Features features) {
@@ -70,7 +70,7 @@ concept HasLastLayer = requires(const M& model) {
 
 namespace detail {
 
-/// Where a model has no inverse: the given first input, or 0 where that is no number.
+/// Where a model has no inverse: the given first input, or 0 where that is not a number.
 [[nodiscard]] inline Estimate no_inverse(Features features) noexcept {
   return {.value = std::isfinite(features[0]) ? features[0] : 0.0,
           .fault = Fault::model_not_finite};

@@ -32,8 +32,8 @@ struct AdaptationSettings {
   double largest_error = kNotMeasured;  ///< NaN: the network's target_scale
   double oldest_reference_s = 0.0;      ///< an older value is stale; not negative
   double frozen_after_s = 0.2;
-  double saturation = kNotMeasured;  ///< of |reference|; NaN: nowhere
-  double largest_change = 0.2;       ///< rho, of |W - W0| over |W0|
+  double saturation = kNotMeasured;  ///< limit of |reference|; NaN: no limit
+  double largest_change = 0.2;       ///< rho, limit of |W - W0| / |W0|
   double comparison_s = 10.0;
 
   /// The settings that a user gives by name, with range and help. `rule` has a flag of its own, and
@@ -102,7 +102,7 @@ struct AdaptationSettings {
   }
 };
 
-/// What the sensor to learn from says at one tick.
+/// One measurement of the reference sensor, from which the layer is trained.
 struct ReferenceSample {
   double value = kNotMeasured;  ///< in the target's unit; NaN where nothing was measured
   double age_s = 0.0;           ///< since it was measured; not 0 for a value that is held
@@ -110,11 +110,11 @@ struct ReferenceSample {
 
 /// What became of one reference.
 enum class UpdateOutcome : std::uint8_t {
-  updated,               ///< the weights have moved
-  limited,               ///< they have, and were drawn back to `largest_change`
-  paused,                ///< by the caller
-  warming_up,            ///< filters or hidden state have not settled
-  no_estimate,           ///< no step since the last reference, or a guard answered for the model
+  updated,      ///< the weights have moved
+  limited,      ///< they have, and were drawn back to `largest_change`
+  paused,       ///< by the caller
+  warming_up,   ///< filters or hidden state have not settled
+  no_estimate,  ///< no step since the last reference, or a guard replaced the model's value
   reference_not_finite,  ///< NaN or infinite: not measured
   reference_stale,       ///< older than `oldest_reference_s`, or frozen
   reference_saturated,   ///< at the end of the sensor's range
@@ -182,7 +182,8 @@ class LastLayerAdapter {
   /// something is not finite.
   double step(std::span<const float> features, double frozen_value) noexcept TORSIO_REALTIME;
 
-  /// Learns from the reference of the last step. Call it once a tick, with NaN where there is none.
+  /// Trains on the reference of the last step. Call it in every tick, with NaN where there is no
+  /// reference.
   UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
   /// Counts a tick whose estimate was not the model's: `warming_up` or `no_estimate`.
   UpdateOutcome pass_over(UpdateOutcome reason) noexcept TORSIO_REALTIME;
@@ -209,18 +210,18 @@ class LastLayerAdapter {
   double target_scale_;
   double bound_;  ///< on |W - W0|
   std::size_t frozen_after_ticks_;
-  std::size_t features_;  ///< of the last layer, without the 1
+  std::size_t features_;  ///< inputs of the last layer, without the 1
 
-  detail::AlignedVector<double> deviation_;  ///< W - W0, the bias behind the weights, padded
+  detail::AlignedVector<double> deviation_;  ///< W - W0, the bias after the weights, padded
   double square_ = 0.0;                      ///< its square
   detail::AlignedVector<double> extended_;   ///< h~ of the last step, padded
   double extended_square_ = 0.0;
-  double frozen_value_ = 0.0;   ///< of the last step
-  double adapted_value_ = 0.0;  ///< of the last step
+  double frozen_value_ = 0.0;   ///< at the last step
+  double adapted_value_ = 0.0;  ///< at the last step
   bool has_step_ = false;
 
   // RLS. The last rank-one update waits until the next pass over P, which then costs no more.
-  detail::AlignedVector<double> covariance_;  ///< as src/model/network/adaptation_kernels.hpp says
+  detail::AlignedVector<double> covariance_;  ///< layout: src/model/network/adaptation_kernels.hpp
   detail::AlignedVector<double>
       pending_;  ///< P is pending_scale_ (covariance_ - pending_ pending_')
   detail::AlignedVector<double> product_;  ///< P h~
