@@ -302,7 +302,7 @@ TEST(FitHammersteinWiener, TellsWhatTheDataLeaveOpen) {
     sequence.target[n] = model.step(sequence.features.row(n)).value;
   }
   const auto fitted = fit_hammerstein_wiener(data, kTrueShape);
-  EXPECT_THAT(fitted.notes, Contains(HasSubstr("the data do not tell ")));
+  EXPECT_THAT(fitted.notes, Contains(HasSubstr("the data do not determine ")));
 }
 
 }  // namespace

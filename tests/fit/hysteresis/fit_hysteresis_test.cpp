@@ -200,7 +200,7 @@ TEST(FitOperators, SayWhatIsMissing) {
   no_rate.inputs[1].is_rate = false;
   EXPECT_THAT(
       test::error_message([&] { static_cast<void>(fit_improved_nonlinear_backlash(no_rate, {})); }),
-      HasSubstr("nonlinear_backlash_improved has no input that tells a rate"));
+      HasSubstr("nonlinear_backlash_improved has no input that is a rate"));
   TrainingData data = recording_of(test::example<BoucWenModel>(), 0.1, 3000);
   EXPECT_THAT(
       test::error_message([&] { static_cast<void>(fit_bouc_wen(data, {.max_iterations = 1})); }),

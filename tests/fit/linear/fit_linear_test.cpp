@@ -198,9 +198,8 @@ TEST(FitLinearCoulomb, SaysWhenTheFrictionIsViscous) {
 TEST(FitLinearCoulomb, NeedsARateThatMoves) {
   const auto target = [](Row) { return 1.0; };
   const auto none = training_data_of({{.expression = "x"}}, Matrix(100, 1, 1.0), target);
-  EXPECT_NE(
-      refusal([&] { return fit_linear_coulomb(none, {}); }).find("no input that tells a rate"),
-      std::string::npos);
+  EXPECT_NE(refusal([&] { return fit_linear_coulomb(none, {}); }).find("no input that is a rate"),
+            std::string::npos);
   const auto still = training_data_of(deflection_and_rate(), Matrix(100, 2), target);
   EXPECT_NE(refusal([&] { return fit_linear_coulomb(still, {}); }).find("0 throughout"),
             std::string::npos);

@@ -144,7 +144,7 @@ TEST(FitNarx, RefusesWhatItCannotDo) {
   const TrainingData brief = second_order(40, 0.1, 5);
   for (const char* family : {"arx", "narx_dgmm", "narx_polynomial"})
     EXPECT_THAT(test::error_message([&] { (void)fit_named(family, brief, {}); }),
-                HasSubstr("too short to judge a free run"))
+                HasSubstr("too short to evaluate a free run"))
         << family;
 }
 

@@ -60,7 +60,7 @@ TEST(FitDynamicBoucWen, SaysWhichParametersTheRecordCannotTell) {
   const TrainingData data =
       recorded(DynamicBoucWen(parameters), multisine(2000, 750.0, 5.0, 100.0, 60.0), 0.0);
   const auto fitted = fit_dynamic_bouc_wen(data, {});
-  EXPECT_THAT(fitted.notes, Contains(HasSubstr("the data cannot tell")));
+  EXPECT_THAT(fitted.notes, Contains(HasSubstr("the data do not determine")));
   EXPECT_TRUE(std::isnan(fitted.table[2].std_error));
 }
 
