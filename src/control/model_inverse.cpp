@@ -45,16 +45,17 @@ double departure_rad(const EstimatorSettings& settings, double max_departure) {
                                     : std::numeric_limits<double>::infinity();
 }
 
-/// Where the torque stands among the raw inputs of an inverse model.
+/// Index of the torque among the raw inputs of an inverse model.
 std::size_t torque_place(const Estimator& estimator) {
   if (estimator.settings().target != kDeflection)
     refuse(fmt::format("a model whose target is {}", kDeflection),
            fmt::format("the target '{}'", estimator.settings().target));
   for (const std::string& channel : estimator.settings().zeroed_channels)
     if (channel == "gear_angle_rad" || channel == "joint_angle_rad" || channel == kDeflection)
-      refuse(
-          "a deflection as it is measured", fmt::format("one behind the zero of {}", channel),
-          "Train it without zero rules for the angles, or train the torque, which runs backwards.");
+      refuse("a deflection as it is measured",
+             fmt::format("one relative to the zero of {}", channel),
+             "Train it without zero rules for the angles, or train a model of the torque, which "
+             "can be inverted.");
   const auto place = std::ranges::find(estimator.raw_inputs(), kTorque);
   if (place == estimator.raw_inputs().end())
     refuse(fmt::format("a model with {} among its inputs", kTorque),

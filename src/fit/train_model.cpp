@@ -83,10 +83,11 @@ void refuse_zeros_after_an_inverse(const TrainingData& data, const FeaturePipeli
   for (const ZeroRule& zero : zeros)
     if (zero.channel == "gear_angle_rad" || zero.channel == "joint_angle_rad" ||
         zero.channel == data.target)
-      throw Error({.place = data.target,
-                   .expected = "a target as it is measured, of an inverse that takes torque_Nm",
-                   .found = fmt::format("a zero: rule for {}", zero.channel),
-                   .advice = "Take the rule away, or train the torque, which runs backwards."});
+      throw Error(
+          {.place = data.target,
+           .expected = "a target as it is measured, of an inverse that takes torque_Nm",
+           .found = fmt::format("a zero: rule for {}", zero.channel),
+           .advice = "Remove the rule, or train a model of the torque, which can be inverted."});
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ TEST(ExpressionError, ListsTheFunctionsForOneThatIsUnknown) {
 
 TEST(ExpressionError, ListsTheUnitsForOneThatIsUnknown) {
   const std::string text = message("tanh(x / 3furlong)");
-  EXPECT_NE(text.find("column 11: expected a unit or an operator behind the number, found "
+  EXPECT_NE(text.find("column 11: expected a unit or an operator after the number, found "
                       "'furlong'\n  a product needs its '*'; the units are "),
             std::string::npos)
       << text;

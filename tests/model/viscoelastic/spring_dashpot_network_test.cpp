@@ -92,7 +92,7 @@ TEST(SpringDashpotText, PointsAtTheMistakeAndSaysWhatWasExpected) {
       {"series(k1, k2", "column 14: expected ',' or ')', found the end"},
       {"series(k1 k2)", "column 11: expected ',' and a second network to be in series, found 'k2'"},
       {"series(k1)", "column 10: expected ',' and a second network to be in series, found ')'"},
-      {"series k1", "column 8: expected '(' behind series, found 'k1'"},
+      {"series k1", "column 8: expected '(' after series, found 'k1'"},
       {"seires(k1, k2)", "column 1: expected series, parallel, kv, maxwell, a spring k1 or a"},
       {"series(k1, x2)", "column 12: expected series, parallel, kv, maxwell, a spring k1 or a"},
       {"series(k1,, k2)", "column 11: expected series, parallel, kv, maxwell, a spring k1"},
@@ -102,8 +102,8 @@ TEST(SpringDashpotText, PointsAtTheMistakeAndSaysWhatWasExpected) {
       {"kv(k1, d1, k2)", "column 10: expected ')': kv takes a spring and a dashpot, found ','"},
       {"maxwell(kv(k1, d1), d2)", "column 9: expected the spring of maxwell, like k1, found 'kv'"},
       {"series(kv(k1, d1), k1)",
-       "column 20: expected a name that stands nowhere else: each element is a parameter of its "
-       "own, found 'k1'"},
+       "column 20: expected a name that is used only once: each element is a separate "
+       "parameter, found 'k1'"},
       {"kv(k1, d1) k2", "column 12: expected the end, found 'k2'"},
       {"kv(k1=, d1)", "column 7: expected a start value, like 0.68, found ','"},
       {"kv(k1=-3, d1)", "column 7: expected a start value from 1e-12 to 1e+12"},
@@ -151,7 +151,7 @@ TEST(RelaxationSpectrum, RefusesNodesThatAreNoNetwork) {
               HasSubstr("node 1: expected 2 to 1 networks to join, found 2"));
   EXPECT_THAT(
       message({{.kind = 0, .value = 1.0}, {.kind = 0, .value = 1.0}, {.kind = 2, .children = 2}}),
-      HasSubstr("node 1: expected a name that stands nowhere else, found k"));
+      HasSubstr("node 1: expected a name that is used only once, found k"));
 }
 
 // Specification 7.
