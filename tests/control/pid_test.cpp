@@ -207,7 +207,7 @@ RC_GTEST_PROP(Pid, ChangesItsGainsWithoutABump, ()) {
   Pid unchanged = pid;
   const Pid::Gains gains = any_gains();
   RC_ASSERT(pid.set_gains(gains));
-  // The measurement goes on as it went: equal conditions, and the two differ by nothing.
+  // The measurement continues at its rate: equal conditions, and the two have equal outputs.
   const Pid::Output before = unchanged.step(reference, measurement + last_rate);
   const Pid::Output after = pid.step(reference, measurement + last_rate);
   const double drift = (settings.gains.proportional - gains.proportional) * last_rate;

@@ -2,7 +2,7 @@
 
 namespace torsio::test {
 
-/// What a family that is `Invertible` owes besides.
+/// The additional laws of a family that is `Invertible`.
 template <class M>
 class InverseLaws : public ModelLaws<M> {};
 

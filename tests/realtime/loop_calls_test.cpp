@@ -30,7 +30,7 @@ thread_local int looks_at_other_clocks = 0;
 
 }  // namespace
 
-// Stands in front of glibc's, to see which clock is looked at.
+// Replaces glibc's function to record which clock is read.
 extern "C" int clock_gettime(clockid_t id, timespec* time) noexcept {
   if (id == CLOCK_MONOTONIC)
     ++looks_at_monotonic_clock;

@@ -30,7 +30,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(AllocationCounter, SeesEveryWayIntoTheHeap) {
-  // volatile: the compiler may drop a pair of new and delete that nobody looks at.
+  // volatile: the compiler may remove a pair of new and delete whose result is not used.
   EXPECT_EQ(heap_calls_during([] {
               int* volatile number = new int(1);
               delete number;
@@ -182,7 +182,8 @@ TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {
               step(0.0, 0.0);
             }),
             0U);
-  // The curves of these two end at 0.1, far inside the estimator's range, and they say so themselves.
+  // The curves of these two end at 0.1, far inside the estimator's range, and report a fault
+  // themselves.
   constexpr bool kEndsEarlier =
       std::same_as<TypeParam, Polynomial> || std::same_as<TypeParam, HammersteinWiener>;
   EXPECT_EQ(in_border, kEndsEarlier ? Fault::outside_training_range : Fault::none);

@@ -22,7 +22,7 @@ TEST(Differentiator, SaysZeroAndUnsettledBeforeItKnowsTwoSamples) {
   EXPECT_EQ(rate.step(-7.0), 0.0);
 }
 
-TEST(Differentiator, TellsTheSlopeOfARampAtEveryRate) {
+TEST(Differentiator, EstimatesTheSlopeOfARampAtEveryRate) {
   for (const double sample_rate_Hz : {50.0, 1000.0, 10'000.0}) {
     Differentiator rate(sample_rate_Hz, 10.0);
     double output = 0.0;

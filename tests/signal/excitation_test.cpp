@@ -138,7 +138,7 @@ TEST(RandomWalk, HasTheRmsThatWasAskedForBelowItsCutOff) {
   }
   const auto count = static_cast<double>(values.size());
   EXPECT_NEAR(std::sqrt(square / count), 2.5, 0.1);
-  // Of |H|^2 = 1 / (1 + (f / fc)^4) the mean square frequency is fc^2.
+  // For |H|^2 = 1 / (1 + (f / fc)^4) the mean square frequency is fc^2.
   EXPECT_NEAR(std::sqrt(speed_square / square), kTurn, 0.05 * kTurn);
 }
 

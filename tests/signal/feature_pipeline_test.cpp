@@ -135,7 +135,7 @@ TEST(FeaturePipeline, SettlesWhenItsSlowestChainHas) {
   EXPECT_EQ(pipeline({"lag(3, 5) + lowpass(2, 1Hz) + rate(7) + x"}).settling_samples(), 0U);
 }
 
-TEST(FeaturePipeline, TellsTheRateOfARampOnceSettled) {
+TEST(FeaturePipeline, EstimatesTheRateOfARampOnceSettled) {
   FeaturePipeline features = pipeline({"lowpass(rate(x), 10Hz)"});
   double slope = 0.0;
   for (int n = 0; !features.is_settled(); ++n) slope = features.step(std::vector{0.002 * n})[0];

@@ -187,7 +187,7 @@ TEST(FitParametricGp, KeepsTheClosedFormOnlyWhereItIsBetter) {
   const TrainingData data = curve(2000);
   const auto fitted = fit_parametric_gp(data, {.kernel = "se", .updates = 3000}, {.seed = 2});
   EXPECT_THAT(fitted.notes, Contains(AllOf(HasSubstr("held out"), HasSubstr("which is kept"))));
-  // A validation record of the learned model's own answers cannot be met better.
+  // No refit improves on a validation record of the learned model's own outputs.
   const auto learned = fit_parametric_gp(data, {.kernel = "se", .updates = 3000, .refit = false},
                                          {.seed = 2, .validation = &data});
   TrainingData own = curve(100);
@@ -288,7 +288,7 @@ double covered(const typename Model::Parameters& parameters, const Matrix& featu
   return static_cast<double>(inside) / static_cast<double>(target.size());
 }
 
-/// Functions drawn from a Gaussian process; the first half to learn from, the second to judge.
+/// Functions drawn from a Gaussian process; the first half for training, the second for evaluation.
 TEST(FitGaussianProcess, ItsIntervalsCoverDataFromThePrior) {
   constexpr std::size_t kLearned = 300;
   constexpr std::size_t kScored = 300;

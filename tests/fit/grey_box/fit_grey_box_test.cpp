@@ -65,7 +65,7 @@ TrainingData spring_data(std::uint64_t seed, double start = 0.0) {
 TEST(FitGreyBox, FindsAStiffeningSpringWithFrictionToItsNoise) {
   const Fitted<GreyBox> fitted = fit_grey_box(spring_data(1), kBoxAlone);
   EXPECT_LT(evaluate(GreyBox(fitted.parameters), spring_data(2, 100.0)).rmse, 0.2)
-      << "the noise, and a start that it is not told";
+      << "the noise, and an unknown start";
   EXPECT_FALSE(fitted.parameters.terms.thresholds.empty());
   ASSERT_FALSE(fitted.notes.empty());
   EXPECT_THAT(fitted.notes[0], HasSubstr("slip elements"));
@@ -198,7 +198,7 @@ TEST(FitGreyBox, KnowsHowWrongItIsBetweenTheKnotsOfItsSchedule) {
       features(n, 0) = motion(n, 0);
       features(n, 1) = support;
     }
-    // No curve through four supports tells what is between them.
+    // No curve through four supports determines what is between them.
     return test::training_data_of(
         {{.expression = "spring_deflection_rad"}, {.expression = "support_m"}}, std::move(features),
         [](Row x) { return 400.0 * x[0] * (1.0 + std::sin(400.0 * x[1])); });
@@ -215,7 +215,7 @@ TEST(FitGreyBox, KnowsHowWrongItIsBetweenTheKnotsOfItsSchedule) {
   EXPECT_LT(fitted.held_out_rmse, 3.0 * between);
 }
 
-TEST(FitGreyBox, IsNotJudgedWhereAHeldOutRecordLeavesTheOthersRange) {
+TEST(FitGreyBox, IsNotEvaluatedWhereAHeldOutRecordLeavesTheOthersRange) {
   // Beyond +-0.06 the spring is another one, and one record of four goes there.
   const auto record = [](double amplitude, std::uint64_t seed) {
     Random random(seed);

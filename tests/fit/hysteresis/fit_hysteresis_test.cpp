@@ -36,7 +36,7 @@ Matrix wander(std::size_t samples) {
   return features;
 }
 
-/// What a model says to that, with noise.
+/// The output of a model for that input, with noise.
 template <class M>
 TrainingData recording_of(M model, double noise = 0.0, std::size_t samples = 12000) {
   Random random(12);

@@ -50,7 +50,7 @@ TEST(FitLinear, RecoversASpringAndLeavesRatesOut) {
   EXPECT_TRUE(fitted.notes.empty());
 }
 
-TEST(FitLinear, TellsTheStiffnessWithUnitAndError) {
+TEST(FitLinear, ReportsTheStiffnessWithUnitAndError) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(500), [](Row x) {
     return 0.7 + 350.0 * x[0] + 0.01 * std::sin(1e4 * x[0]);
   });

@@ -103,7 +103,7 @@ TEST(FitDgmm, ItsLineLeavesRatesOut) {
   EXPECT_TRUE(std::isfinite(clamp.intercept));
 }
 
-// A spread of an expression says nothing about what a sensor resolves.
+// The spread of an expression is not related to the resolution of a sensor.
 TEST(FitDgmm, OnlyAChannelHasTheResolutionOfItsSensor) {
   TrainingData data = sweeps(1000, 1, 1e-5);
   constexpr double kResolution_rad = rad_from_deg(0.01);
@@ -223,7 +223,7 @@ TEST(FitDgmmSpread, OfOneRecordIsFoundByItsBlocks) {
   EXPECT_NE(fit_dgmm(data).notes.at(0).find("a fifth of the record at a time"), std::string::npos);
 }
 
-TEST(FitDgmmSpread, StaysAtTheDefaultWhereNoRecordCanBeJudgedByTheOthers) {
+TEST(FitDgmmSpread, StaysAtTheDefaultWhereNoRecordCanBeEvaluatedByTheOthers) {
   TrainingData data = supports(0.8, 1.2);
   data.sequences.resize(2);
   const Fitted<Dgmm> fitted = fit_dgmm(data);

@@ -53,7 +53,7 @@ TEST(FitDynamicBoucWen, FindsTheExponentIfAsked) {
   EXPECT_NEAR(fitted.parameters.exponent, 1.5, 0.05);
 }
 
-TEST(FitDynamicBoucWen, SaysWhichParametersTheRecordCannotTell) {
+TEST(FitDynamicBoucWen, StatesWhichParametersTheRecordDoesNotDetermine) {
   // Without hysteresis in the record: a spring is a spring, whichever of the two carries it.
   auto parameters = hysteretic().parameters();
   parameters.loss = parameters.skew = 0.0;
@@ -122,7 +122,7 @@ TEST(FitRigidDrive, SaysWhyItCannotFit) {
               HasSubstr("accelerates the target in its own direction"));
 }
 
-/// Pushed by a hand that the record knows nothing of, from a speed of 0.3 m/s on.
+/// Pushed by an external force that is not recorded, from a speed of 0.3 m/s on.
 Recording drifting_record() {
   std::vector<double> force = multisine(4000, 1000.0, 0.5, 4.0, 80.0);
   RigidDrive drive = carriage();

@@ -67,7 +67,7 @@ TEST(GaussianProcess, SaysMeanAndSpreadOfItsDefinition) {
   });
 }
 
-TEST(GaussianProcess, LeavesTheSpreadOutIfToldSo) {
+TEST(GaussianProcess, LeavesTheSpreadOutIfConfiguredSo) {
   auto parameters = example<GaussianProcess>().parameters();
   parameters.with_std_dev = false;
   GaussianProcess plain(parameters);
@@ -132,7 +132,7 @@ TEST(GaussianProcess, RefusesParametersThatMakeNone) {
 
 TEST(GaussianProcess, RefusesAKernelThatIsNotPositiveDefinite) {
   auto parameters = example<GaussianProcess>().parameters();
-  // (1 - R / 20)^10 rises again behind R = 20: far points would be closer than near ones.
+  // (1 - R / 20)^10 rises again for R > 20: far points would be closer than near ones.
   parameters.kernel = parse_kernel("rq", 2);
   parameters.kernel.nodes[0].shape = -10.0;
   parameters.kernel.nodes[0].length_scales = {0.1};

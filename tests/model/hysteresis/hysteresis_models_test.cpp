@@ -102,7 +102,7 @@ TYPED_TEST_SUITE(EnergyLaws, Dissipative);
 TYPED_TEST(EnergyLaws, LosesEnergyOnEveryRepeatedLoop) {
   EXPECT_TRUE(rc::check([] {
     auto model = test::example<TypeParam>();
-    // A few turning points, run through again and again until the loop stands.
+    // A few turning points, repeated until the loop is periodic.
     const auto corners = *rc::gen::container<std::vector<int>>(4, rc::gen::inRange(-100, 101));
     std::vector<double> turns;
     for (const int each : corners) turns.push_back(1e-3 * each);
@@ -206,7 +206,7 @@ TEST(PrandtlIshlinskii, AnInnerLoopLeavesNoTraceOnTheOuterOne) {
   const auto there = path_through({0.0, 0.09, -0.05}, 1e-3);
   torques(with, there);
   torques(without, there);
-  // Wiping out: the inner loop closes and is forgotten.
+  // Wiping out: the inner loop closes and no longer has an effect.
   torques(with, path_through({-0.05, 0.01, -0.02, 0.01, -0.05}, 1e-3));
   const auto onward = path_through({-0.05, -0.08, 0.09}, 1e-3);
   const auto remembered = torques(with, onward);

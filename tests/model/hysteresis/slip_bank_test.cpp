@@ -87,14 +87,14 @@ TEST(SlipBank, DependsOnThePathAndNotOnItsSteps) {
   }
 }
 
-TEST(SlipBank, TellsWhatAStepWouldGiveWithoutTakingIt) {
+TEST(SlipBank, ReturnsTheForceOfAStepWithoutTakingIt) {
   SlipBank bank(kThresholds, "test");
   const std::vector<double> weights{1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0};
   bank.move(0.3);
   const std::vector<double> before(bank.forces().begin(), bank.forces().end());
-  const double foretold = bank.sum_after(-0.17, weights);
+  const double predicted = bank.sum_after(-0.17, weights);
   EXPECT_TRUE(std::ranges::equal(bank.forces(), before));
-  EXPECT_EQ(bank.step(-0.17, weights), foretold);
+  EXPECT_EQ(bank.step(-0.17, weights), predicted);
 }
 
 TEST(SlipBank, NoNumberMovesNothingAndAnEndlessStepSlipsAll) {

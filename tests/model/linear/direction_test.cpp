@@ -24,7 +24,7 @@ TEST(DirectionTracker, IsUnknownUntilTheSignalLeftTheDeadBand) {
             (std::vector{kUnknown, kUnknown, kFalling}));
 }
 
-TEST(DirectionTracker, TurnsBehindTheExtremeNotBehindTheLastSample) {
+TEST(DirectionTracker, ChangesRelativeToTheExtremeNotToTheLastSample) {
   // From the extreme 3.0 back in small steps: each is inside the dead band, their sum is not.
   EXPECT_EQ(
       directions(DirectionTracker(1.0), {0.0, 2.0, 3.0, 2.6, 2.2, 1.8, 1.9, 2.9}),

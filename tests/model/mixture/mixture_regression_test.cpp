@@ -189,7 +189,8 @@ TEST(MixtureRegression, DoesNotDependOnTheOrderOfComponents) {
 }
 
 TEST(MixtureRegression, FindsANarrowComponentThatFloatCannotPlace) {
-  // Two components a hundred times closer to each other than float32 can tell at their position.
+  // Two components a hundred times closer to each other than the resolution of float32 at their
+  // position.
   GaussianMixture mixture{.centre = {0.0, 0.0},
                           .scale = {1.0, 1.0},
                           .weights = {0.5, 0.5},

@@ -51,7 +51,7 @@ TEST(Narx, StaysAtTheEndOfItsRangeAndSaysSo) {
   auto parameters = test::example<Narx<Linear>>().parameters();
   parameters.lowest = -200.0;
   parameters.highest = 200.0;
-  parameters.model.coefficients.values.values.back() = 0.6;  // 0.6 + 0.6 > 1: it runs away
+  parameters.model.coefficients.values.values.back() = 0.6;  // 0.6 + 0.6 > 1: it diverges
   Narx<Linear> model(parameters);
   const std::vector<double> push{0.1, 0.0};
   Estimate estimate;

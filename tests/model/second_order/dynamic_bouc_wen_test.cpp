@@ -118,7 +118,7 @@ TEST(DynamicBoucWen, GivesBackNoMoreEnergyThanItWasGiven) {
   }
 }
 
-TEST(DynamicBoucWen, TellsTheFirstSampleFromTheStateItWasGiven) {
+TEST(DynamicBoucWen, ComputesTheFirstSampleFromTheGivenState) {
   DynamicBoucWen model(benchmark());
   model.reset();
   const std::vector<double> start{1e-3, -0.2, 20.0};

@@ -201,7 +201,7 @@ TEST(RelaxationSpectrum, OfTheStartValuesIsThePapersTransferFunction) {
   const RelaxationSpectrum spectrum = relaxation_spectrum(
       parse_network("series(kv(k1=0.684218, d1=14.2903), kv(k2=4.52983, d2=4.43722), k3=1.61244)"));
   const ContinuousTransfer g = continuous_of(Paper003::refined);
-  constexpr double kGains = 1137.56 * 0.00187;  // of the curves about 0
+  constexpr double kGains = 1137.56 * 0.00187;  // slopes of the curves at 0
   for (const double frequency : {0.001, 0.01, 0.1, 0.4, 1.0, 4.0, 20.0}) {
     const Complex s = at_Hz(frequency);
     const Complex expected = kGains * ((g.numerator[0] * s + g.numerator[1]) * s + g.numerator[2]) /
