@@ -31,7 +31,7 @@ DeflectionController::Settings settings_of(const char* actuator) {
 }
 
 // With P, D and feed-forward alone: J δ'' + (b + D) δ' + (K + P) δ = (K + P) δ*.
-TEST(DeflectionController, AnswersAStepAsTheSecondOrderSystemDoes) {
+TEST(DeflectionController, FollowsAStepAsTheSecondOrderSystemDoes) {
   constexpr double kFast_Hz = 100'000.0;
   constexpr double kStep_rad = 1e-3;
   DeflectionController::Settings settings = settings_of("dfki-50");
@@ -126,7 +126,7 @@ TEST(DeflectionController, KeepsTheLastFiniteReferenceAndFadesWithoutAMeasuremen
   EXPECT_NEAR(disturbed.step(0.01, 0.001).command, last_A, 1e-9) << "continues from there";
 }
 
-TEST(DeflectionController, RefusesGainsThatAreUnstableAndSaysTheMargin) {
+TEST(DeflectionController, RefusesGainsThatAreUnstableAndStatesTheMargin) {
   const auto refusal = [](auto change) {
     DeflectionController::Settings settings = settings_of("dfki-50");
     change(settings);

@@ -59,7 +59,7 @@ TEST(JointCascade, GoesToAPositionAndHoldsItUnderLoad) {
 }
 
 // P on position over P on speed: q'' + w q' + w k_q q = w k_q q*, a second-order system.
-TEST(JointCascade, AnswersAStepAsTheSecondOrderSystemDoes) {
+TEST(JointCascade, FollowsAStepAsTheSecondOrderSystemDoes) {
   JointCascade::Settings settings = settings_of("dfki-50");
   settings.drive.current_time_constant_s = 1e-6;
   settings.limits.max_unmeasured_load_Nm = 0.0;

@@ -38,7 +38,7 @@ TEST(Pid, NamesTheTermsThatMakeUpItsCommand) {
   EXPECT_FALSE(output.is_limited);
 }
 
-TEST(Pid, DoesNotKickAtAStepOfTheReferenceUnlessAskedTo) {
+TEST(Pid, DoesNotKickAtAStepOfTheReferenceUnlessConfiguredTo) {
   Pid::Settings settings = {.gains = {.proportional = 1.0, .derivative = 1.0}};
   Pid of_measurement(settings, kRate_Hz);
   settings.derivative_of = Pid::DerivativeOf::error;
@@ -61,7 +61,7 @@ TEST(Pid, FiltersItsDerivative) {
 }
 
 // u = K_p e + K_i int e on the integrator y' = u: y'' + K_p y' + K_i y = K_p r' + K_i r.
-TEST(Pid, OnAnIntegratorAnswersAStepAsTheSecondOrderSystemDoes) {
+TEST(Pid, OnAnIntegratorFollowsAStepAsTheSecondOrderSystemDoes) {
   constexpr double kFrequency = 8.0;
   constexpr double kDamping = 0.6;
   Pid pid(

@@ -78,7 +78,7 @@ Estimate settled(I& inverse, double torque_Nm, const JointSample& sample) {
   return inverse.step(torque_Nm, sample);
 }
 
-TEST(ModelInverse, OfALineIsTheLineTurnedRound) {
+TEST(ModelInverse, OfALinearModelIsItsLinearInverse) {
   ModelInverse inverse(deflection_and_rate(), test::example<Linear>());
   const Estimate found = settled(inverse, 12.5, wound(0.01));
   EXPECT_EQ(found.fault, Fault::none);
@@ -86,7 +86,7 @@ TEST(ModelInverse, OfALineIsTheLineTurnedRound) {
   EXPECT_NEAR(LinearInverse(600.0, 0.5).step(12.5, {}).value, found.value, 1e-12);
 }
 
-TEST(ModelInverse, AnswersWithTheLineUntilItsFiltersHaveSettled) {
+TEST(ModelInverse, ReturnsTheLinearFallbackUntilItsFiltersHaveSettled) {
   ModelInverse inverse(deflection_and_rate(), test::example<Dgmm>());
   const Estimate first = inverse.step(12.5, wound(0.01));
   EXPECT_EQ(first.fault, Fault::warming_up);
@@ -175,7 +175,7 @@ TEST(ModelInverse, GoesOnWithoutItsMemoryWhereThatIsNoLongerFinite) {
   EXPECT_NEAR(found.value, sound_rad, 2e-3);
 }
 
-TEST(ModelInverse, HoldsItsAnswerWhereAnInputIsMissing) {
+TEST(ModelInverse, HoldsItsOutputWhereAnInputIsMissing) {
   ModelInverse inverse(deflection_and_rate(), test::example<Linear>());
   const double last_rad = settled(inverse, 12.5, wound(0.01)).value;
   for (const double bad : {kNaN, kInfinity}) {
@@ -332,7 +332,7 @@ TEST(TorqueController, FollowsARampWithoutLagWhereItsRateIsFedForward) {
   EXPECT_NEAR(lag_s(), 0.0, 2e-3);
 }
 
-TEST(TorqueController, SaysTheFaultAndLetsTheCurrentFade) {
+TEST(TorqueController, ReportsTheFaultAndTheCurrentFades) {
   auto settings = settings_of("dfki-50");
   settings.observer_cutoff_Hz = 5.0;
   const SeriesElasticJoint& parts = settings.deflection.joint;

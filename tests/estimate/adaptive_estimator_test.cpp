@@ -84,7 +84,7 @@ TYPED_TEST(Adapted, TheAdaptedNetworkHasTheOutputsOfTheAdaptiveOne) {
   }
 }
 
-TYPED_TEST(Adapted, ResetKeepsWhatWasLearnedAndForgetDoesNot) {
+TYPED_TEST(Adapted, ResetKeepsTheWeightsAndForgetDoesNot) {
   const AnyModel::Parameters network = example<TypeParam>().parameters();
   AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
   (void)run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<TypeParam>())), 3.0);

@@ -73,7 +73,7 @@ std::string refusal(const EstimatorSettings& bad, std::size_t inputs = 1) {
   return error_message([&] { ScriptedEstimator(bad, Scripted({.inputs = inputs})); });
 }
 
-TEST(Estimator, SaysWhatItsModelSays) {
+TEST(Estimator, ReturnsTheOutputOfItsModel) {
   ScriptedEstimator estimator(settings(), Scripted({}));
   EXPECT_THAT(estimator.raw_inputs(), testing::ElementsAre("gear_angle_rad"));
   const Estimate estimate = step(estimator, 0.25);
@@ -282,7 +282,7 @@ TEST(Estimator, ReturnsTheFallbackWhenTheModelFails) {
   }
 }
 
-TEST(Estimator, PassesOnWhatTheModelSaysOfItself) {
+TEST(Estimator, PassesOnTheFaultOfTheModel) {
   ScriptedEstimator estimator =
       with_output({.value = 1.0, .novelty = 9.0, .fault = Fault::outside_training_range});
   const Estimate estimate = step(estimator, 0.5);
@@ -387,7 +387,7 @@ TEST(Estimator, IsNotToBeUsedBeforeItsZeroIsSet) {
   EXPECT_EQ(estimate.std_dev, 1.0);
 }
 
-TEST(Estimator, WantsEveryZeroThatTrainingTook) {
+TEST(Estimator, RequiresEveryZeroThatTrainingTook) {
   EstimatorSettings two = zeroed_settings("gear_angle_rad - joint_angle_rad");
   two.zeroed_channels = {"gear_angle_rad", "joint_angle_rad"};
   ScriptedEstimator estimator(two, Scripted({}));

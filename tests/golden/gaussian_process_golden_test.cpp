@@ -42,7 +42,7 @@ KernelExpression kernel_of(const Json& each, std::size_t inputs) {
   return kernel;
 }
 
-TEST(GaussianProcessGolden, SaysWhatScikitLearnSaysForAFixedKernel) {
+TEST(GaussianProcessGolden, AgreesWithScikitLearnForAFixedKernel) {
   const Json document = golden();
   for (const Json& each : document["fixed"]) {
     SCOPED_TRACE(each["kernel"].get<std::string>());

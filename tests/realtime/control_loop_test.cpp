@@ -187,7 +187,7 @@ TEST(ControlLoop, StopsWithin20MsWithoutCommandsAndTakesUpNoEnergy) {
 }
 
 // docs/faults.md 21: the word of an operator, and a command since.
-TEST(ControlLoop, GoesOnOnlyWhenItIsArmedAgainAndAskedAgain) {
+TEST(ControlLoop, ContinuesOnlyWhenItIsArmedAgainAndCommandedAgain) {
   Robot robot;
   robot.run(1500, [&](int n) {
     if (n == 0 || n == 800) robot.watchdog.arm(robot.clock.now_ns());

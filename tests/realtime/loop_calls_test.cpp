@@ -122,7 +122,7 @@ RecorderOptions two_channels(std::size_t ring_frames) {
   return {.channels = {"torque_Nm", "current_A"}, .ring_frames = ring_frames};
 }
 
-TEST(LockCounter, SeesLocksAndWakeUps) {
+TEST(LockCounter, DetectsLocksAndWakeUps) {
   pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
   EXPECT_EQ(lock_calls_during([&] {
               pthread_mutex_lock(&lock);
@@ -189,7 +189,7 @@ TEST(SystemCalls, AreSeenByTheKernelsFilter) {
               testing::ExitedWithCode(0), "");
 }
 
-TEST(RealtimeLoop, AsksTheKernelForNothingButTheTime) {
+TEST(RealtimeLoop, CallsTheKernelOnlyForTheTime) {
   if (!filters_work()) GTEST_SKIP() << "this kernel takes no seccomp filter";
   const TemporaryFolder folder;
   // All of the child's threads are its own: the recorder's may write, the loop's may not.

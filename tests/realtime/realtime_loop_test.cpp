@@ -203,7 +203,7 @@ TEST(RealtimeLoop, EndsWithItsObject) {
   EXPECT_FALSE(ran) << "a step after the object was gone";
 }
 
-TEST(RealtimeLoop, SaysWhatItWasGrantedAndGivesTheThreadBack) {
+TEST(RealtimeLoop, ReportsWhatItWasGrantedAndRestoresTheThread) {
   LoopOptions options = modest();
   options.priority = 1;
   const int before = sched_getscheduler(0);

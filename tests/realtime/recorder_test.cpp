@@ -108,7 +108,7 @@ TEST(Recorder, PeriodsThatTheLoopSkippedAreNotANumber) {
   EXPECT_EQ(blocks.dropped, 0U);
 }
 
-TEST(Recorder, AFullRingDropsAndCountsAndTheFileKnows) {
+TEST(Recorder, AFullRingDropsAndCountsAndTheFileRecordsIt) {
   const TemporaryFolder folder;
   Recorder recorder(folder.path("run.tsr"), options_of(64));
   std::uint64_t refused = 0;

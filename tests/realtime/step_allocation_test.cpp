@@ -29,7 +29,7 @@ using test::heap_calls_during;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-TEST(AllocationCounter, SeesEveryWayIntoTheHeap) {
+TEST(AllocationCounter, DetectsEveryKindOfHeapCall) {
   // volatile: the compiler may remove a pair of new and delete whose result is not used.
   EXPECT_EQ(heap_calls_during([] {
               int* volatile number = new int(1);
@@ -50,7 +50,7 @@ TEST(AllocationCounter, SeesEveryWayIntoTheHeap) {
   EXPECT_EQ(heap_calls_during([] { const std::vector<double> values(1000, 1.0); }), 2U);
 }
 
-TEST(AllocationCounter, SeesNoneWhereThereIsNone) {
+TEST(AllocationCounter, DetectsNoneWhereThereIsNone) {
   double sum = 0.0;
   EXPECT_EQ(heap_calls_during([&] { sum = std::sin(1.0); }), 0U);
   EXPECT_GT(sum, 0.0);

@@ -23,7 +23,7 @@ std::string message(std::string input, std::vector<ChannelDefinition> definition
 constexpr const char* kFunctionList =
     "\n  the functions are rate, lowpass, lag, sign, tanh, abs, sqrt, exp, min, max";
 
-TEST(ExpressionError, SaysWhereWhatWasExpectedAndFound) {
+TEST(ExpressionError, StatesPlaceExpectedAndFound) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "input '': column 1: expected a channel, a number, a function or '(', found the end"},
       {"a +",

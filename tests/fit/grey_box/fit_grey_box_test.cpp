@@ -190,7 +190,7 @@ TEST(FitGreyBox, InterpolatesOverAConditionThatItIsScheduledBy) {
   EXPECT_LT(evaluate(GreyBox(fitted.parameters), at(0.02, 9)).rmse, 0.15);
 }
 
-TEST(FitGreyBox, KnowsHowWrongItIsBetweenTheKnotsOfItsSchedule) {
+TEST(FitGreyBox, EstimatesItsErrorBetweenTheKnotsOfItsSchedule) {
   const auto at = [](double support) {
     Matrix features(4000, 2);
     const Matrix motion = wander(4000, support);
@@ -237,7 +237,7 @@ TEST(FitGreyBox, IsNotEvaluatedWhereAHeldOutRecordLeavesTheOthersRange) {
       << "what lies there is fitted all the same";
 }
 
-TEST(FitGreyBox, FindsDryFrictionThatTurnsAtAFractionOfTheUsualRate) {
+TEST(FitGreyBox, FindsDryFrictionThatChangesSignWithinAFractionOfTheUsualRate) {
   const auto scale_of = [](double turns_within) {
     Matrix features(8000, 2);
     const Matrix motion = wander(8000);
@@ -280,7 +280,7 @@ TEST(FitGreyBox, ANetworkIsKeptOnlyWhereItHelps) {
             0.5 * evaluate(GreyBox(fit_grey_box(bent, kBoxAlone).parameters), bent).rmse);
 }
 
-TEST(FitGreyBox, SaysWhyItCannotBeFitted) {
+TEST(FitGreyBox, StatesWhyItCannotBeFitted) {
   TrainingData still = spring_data(1);
   for (std::size_t n = 0; n < still.sequences[0].features.rows; ++n)
     still.sequences[0].features(n, 0) = 0.1;

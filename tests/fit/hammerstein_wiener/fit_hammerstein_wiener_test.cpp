@@ -141,7 +141,7 @@ TEST(FitHammersteinWiener, KeepsPolesInsideTheUnitCircle) {
   }
 }
 
-TEST(FitHammersteinWiener, SaysWhereSlowMotionLeavesWhatItLearnedFrom) {
+TEST(FitHammersteinWiener, ReportsWhereSlowMotionLeavesItsTrainingRange) {
   // Fast motion never fills the slow pole; slow motion of the same amplitude does.
   HammersteinWiener::Parameters slow = known_hammerstein_wiener();
   slow.sections = sections_of({{0.05}, {1.0, -0.99}});
@@ -198,7 +198,7 @@ TEST(FitHammersteinWiener, GoesToContinuousTimeAndWarnsOfArtefacts) {
   EXPECT_LT(evaluate(AnyModel(HammersteinWiener(refined.parameters)), of_slow).rmse, 0.003);
 }
 
-TEST(FitHammersteinWiener, SaysThatOnlyTheFirstInputIsUsed) {
+TEST(FitHammersteinWiener, ReportsThatOnlyTheFirstInputIsUsed) {
   TrainingData data = recorded(known_hammerstein_wiener(), 2000, 0.05, 9);
   data.inputs.push_back({"v_1"});
   Matrix both(2000, 2);
@@ -240,7 +240,7 @@ TEST(FitHammersteinWiener, RefusesDataWithoutInformation) {
   EXPECT_THAT(message(unseen, {}), HasSubstr("measured samples"));
 }
 
-TEST(FitHammersteinWiener, SaysThatItDidNotConverge) {
+TEST(FitHammersteinWiener, ReportsThatItDidNotConverge) {
   auto hurried = kTrueShape;
   hurried.iterations = 1;
   EXPECT_THAT(test::error_message([&] {

@@ -94,7 +94,7 @@ TEST(FitMaxwellSlip, ComesNearWithGenericThresholds) {
   }
 }
 
-TEST(FitPrandtlIshlinskii, SaysInPlaysWhatStopsSay) {
+TEST(FitPrandtlIshlinskii, IsEquivalentToTheFitOfStops) {
   const auto truth = test::example<PrandtlIshlinskii>();
   const auto data = recording_of(truth, 0.05);
   const auto passive = fit_prandtl_ishlinskii(data, {.rates = true});
@@ -188,7 +188,7 @@ TEST(FitOperators, UnusableSamplesMoveTheOperatorButAreNotLearnedFrom) {
   EXPECT_LT(std::abs(slip.parameters.coefficients.values.values[0]), 2.0);
 }
 
-TEST(FitOperators, SayWhatIsMissing) {
+TEST(FitOperators, StateWhatIsMissing) {
   TrainingData still = recording_of(test::example<MaxwellSlipModel>(), 0.0, 400);
   for (std::size_t n = 0; n < 400; ++n) still.sequences[0].features(n, 0) = 0.1;
   EXPECT_THAT(test::error_message([&] { static_cast<void>(fit_maxwell_slip(still, {})); }),

@@ -67,7 +67,7 @@ TEST(FitLinear, ReportsTheStiffnessWithUnitAndError) {
   EXPECT_EQ(coulomb[4].unit, "rad/s");
 }
 
-TEST(FitLinear, GivesRatesASlopeWhenAsked) {
+TEST(FitLinear, GivesRatesASlopeIfRequested) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(500),
                                      [](Row x) { return 0.7 + 350.0 * x[0] - 2.0 * x[1]; });
   expect_coefficients(fit_linear(data, {.rates = true}).parameters.coefficients,
@@ -84,7 +84,7 @@ TEST(FitLinear, LearnsOnlyFromUsableSamples) {
   expect_coefficients(fit_linear(data, {}).parameters.coefficients, {0.7, 350.0, 0.0});
 }
 
-TEST(FitLinear, LeavesAConstantInputOutAndSaysSo) {
+TEST(FitLinear, LeavesAConstantInputOutAndReportsIt) {
   const auto data = with_condition({0.033}, [](Row x) { return 1.0 + 10.0 * x[0]; });
   const auto fitted = fit_linear(data, {});
   expect_coefficients(fitted.parameters.coefficients, {1.0, 10.0, 0.0, 0.0});
@@ -92,7 +92,7 @@ TEST(FitLinear, LeavesAConstantInputOutAndSaysSo) {
             std::vector<std::string>{"input support_m is constant in the training data: no term"});
 }
 
-TEST(FitLinear, LeavesADependentInputOutAndSaysSo) {
+TEST(FitLinear, LeavesADependentInputOutAndReportsIt) {
   auto data = with_condition({0.0, 1.0}, [](Row x) { return 1.0 + 10.0 * x[0]; });
   for (std::size_t n = 0; n < data.sequences[0].features.rows; ++n)
     data.sequences[0].features(n, 2) = 3.0 - 2.0 * data.sequences[0].features(n, 0);
@@ -187,7 +187,7 @@ TEST(FitLinearCoulomb, SharesOneScaleBetweenAllKnots) {
                       {0.0, 10.0, 0.0, 0.0, 1.0, 0.0, 10.0, 0.0, 0.0, 2.0}, 1e-5);
 }
 
-TEST(FitLinearCoulomb, SaysWhenTheFrictionIsViscous) {
+TEST(FitLinearCoulomb, ReportsWhenTheFrictionIsViscous) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(2000),
                                      [](Row x) { return 600.0 * x[0] + 2.0 * x[1]; });
   const auto fitted = fit_linear_coulomb(data, {});

@@ -74,7 +74,7 @@ TEST(FitPolynomial, BeatsOneCurveOnANoisyLoop) {
   EXPECT_LT(two, 0.5 * one);
 }
 
-TEST(FitPolynomial, DerivesItsDeadBandFromResolutionAndRangeAndSaysSo) {
+TEST(FitPolynomial, DerivesItsDeadBandFromResolutionAndRangeAndReportsIt) {
   const auto coarse = training_data_of(
       {{.expression = "x"}},
       [] {
@@ -136,7 +136,7 @@ TEST(FitPolynomial, SchedulesItsCurvesOverACondition) {
   EXPECT_NEAR(model.step(std::array{0.04, 0.2}).value, 110.0 * 0.04 - 2.0, 1e-9);
 }
 
-TEST(FitPolynomial, KnowsWhereEachCurveHasData) {
+TEST(FitPolynomial, StoresTheRangeOfEachCurvesData) {
   // It falls all the way, but rises over the lower fifth only: above, degree 5 extrapolates without
   // bound.
   Matrix features(2000, 1);
@@ -157,7 +157,7 @@ TEST(FitPolynomial, KnowsWhereEachCurveHasData) {
   }
 }
 
-TEST(FitPolynomial, KnowsWhereEachKnotHasData) {
+TEST(FitPolynomial, StoresTheRangeOfEachKnotsData) {
   Matrix features(8000, 2);
   const Matrix loop = triangle(8000);
   for (std::size_t n = 0; n < features.rows; ++n) {

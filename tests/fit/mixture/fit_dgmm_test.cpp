@@ -143,7 +143,7 @@ TEST(FitDgmm, IsDeterministicForAnyNumberOfThreads) {
             fit_dgmm(sweeps(3000, 1), two).parameters.mixture);
 }
 
-TEST(FitDgmm, AcceptsInputsThatSayTheSame) {
+TEST(FitDgmm, AcceptsLinearlyDependentInputs) {
   TrainingData data = sweeps(2000, 1);
   data.inputs[1] = data.inputs[0];
   for (Sequence& sequence : data.sequences)
@@ -234,7 +234,7 @@ TEST(FitDgmmSpread, StaysAtTheDefaultWhereNoRecordCanBeEvaluatedByTheOthers) {
   EXPECT_EQ(fitted.parameters.mixture, fit_dgmm(data, given).parameters.mixture);
 }
 
-TEST(FitDgmm, SaysWhatIsWrong) {
+TEST(FitDgmm, StatesWhatIsWrong) {
   TrainingData empty = sweeps(10, 1);
   for (Sequence& sequence : empty.sequences) sequence.use.assign(10, 0);
   EXPECT_THROW(static_cast<void>(fit_dgmm(empty)), Error);

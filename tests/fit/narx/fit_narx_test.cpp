@@ -74,7 +74,7 @@ TEST(FitArx, RefinesAcrossAGapInTheTarget) {
   EXPECT_NEAR(fit_arx(data, kTrueOrder).parameters.model.coefficients.values.values[3], 1.6, 0.03);
 }
 
-TEST(NarxData, PutsInputsTheirLagsAndPastOutputsSideBySide) {
+TEST(NarxData, CombinesInputsTheirLagsAndPastOutputs) {
   TrainingData data = second_order(10, 0.0, 1);
   data.sequences[0].target[5] = std::numeric_limits<double>::quiet_NaN();
   data.sequences[0].use[5] = 0;

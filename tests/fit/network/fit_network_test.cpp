@@ -81,7 +81,7 @@ double spread(const TrainingData& data) {
   return std::sqrt(square / count - sum * sum / (count * count));
 }
 
-TEST(FitNetwork, AnLstmRemembersWhatAStaticNetworkCannot) {
+TEST(FitNetwork, AnLstmFitsAMemoryThatAStaticNetworkCannot) {
   const TrainingData data = delayed_sines(5, 1500, 8);
   TrainingData test = delayed_sines(6, 600, 8);
   test.sequences.erase(test.sequences.begin(), test.sequences.begin() + 5);  // a phase of its own
@@ -267,7 +267,7 @@ TEST(FitNetwork, WindowsNeitherLeaveARecordNorCrossAGapInItsInputs) {
   EXPECT_EQ(set.starts, expected);
 }
 
-TEST(FitNetwork, LeavesWindowsOutThatHaveNothingToLearn) {
+TEST(FitNetwork, LeavesOutWindowsWithoutTargets) {
   TrainingData data = delayed_sines(1, 100, 3);
   for (std::size_t n = 0; n < 60; ++n) data.sequences[0].use[n] = 0;
   const auto parts = whole_sequences(data);
@@ -341,7 +341,7 @@ TEST(FitNetwork, RefusesOptionsOutOfRange) {
   refused([](RecurrentOptions& o) { o.training.clip = std::nan(""); });
 }
 
-TEST(FitNetwork, AnExplodingLossKeepsTheBestOrSaysSo) {
+TEST(FitNetwork, AnExplodingLossKeepsTheBestOrIsReported) {
   const TrainingData data = test::noisy_spring();
   MlpOptions options{.activation = Activation::linear};
   options.training = {.epochs = 30, .learning_rate = 1e30, .clip = 0.0, .patience = 0};

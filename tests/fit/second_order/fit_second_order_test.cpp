@@ -46,7 +46,7 @@ TEST(FitDynamicBoucWen, FindsWhatMadeTheRecordWithinItsErrorBars) {
   EXPECT_EQ(fitted.parameters.mass, fitted.table[0].value);
 }
 
-TEST(FitDynamicBoucWen, FindsTheExponentIfAsked) {
+TEST(FitDynamicBoucWen, FindsTheExponentIfRequested) {
   const TrainingData data =
       recorded(hysteretic(1.5), multisine(1500, 750.0, 5.0, 100.0, 60.0), 1e-7);
   const auto fitted = fit_dynamic_bouc_wen(data, {.exponent = NAN});
@@ -64,7 +64,7 @@ TEST(FitDynamicBoucWen, StatesWhichParametersTheRecordDoesNotDetermine) {
   EXPECT_TRUE(std::isnan(fitted.table[2].std_error));
 }
 
-TEST(FitDynamicBoucWen, SaysWhyItCannotFit) {
+TEST(FitDynamicBoucWen, StatesWhyItCannotFit) {
   const std::vector<double> force = multisine(600, 750.0, 5.0, 100.0, 60.0);
   const TrainingData good = recorded(hysteretic(), force, 5e-6);
   const auto refused = [&](auto change, DynamicBoucWenOptions options = {}) {
@@ -112,7 +112,7 @@ TEST(FitRigidDrive, ChoosesATermThatIsThere) {
   EXPECT_THAT(with.notes, Contains(HasSubstr("chosen terms: quadratic")));
 }
 
-TEST(FitRigidDrive, SaysWhyItCannotFit) {
+TEST(FitRigidDrive, StatesWhyItCannotFit) {
   EXPECT_THAT(test::error_message(
                   [] { (void)fit_rigid_drive(carriage_record(), {.terms = "lugre+stribek"}); }),
               testing::AllOf(HasSubstr("stribek"), HasSubstr("Did you mean")));
@@ -138,7 +138,7 @@ Recording drifting_record() {
   return recording;
 }
 
-TEST(FitRigidDrive, PutsAStartByTheFirstSamplesHoweverFarTheRunDrifts) {
+TEST(FitRigidDrive, EstimatesAStartFromTheFirstSamplesHoweverFarTheRunDrifts) {
   Dataset dataset;
   dataset.target = "position_m";
   Recording recording = drifting_record();

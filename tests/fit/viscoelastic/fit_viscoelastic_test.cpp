@@ -127,7 +127,7 @@ TEST(FitViscoelastic, EstimatesOnlyTheSumOfTwoParallelSprings) {
   EXPECT_TRUE(std::isnan(fitted.table[0].std_error));
 }
 
-TEST(FitViscoelastic, SaysThatNothingExcitedASlowRelaxation) {
+TEST(FitViscoelastic, ReportsThatNothingExcitedASlowRelaxation) {
   const auto fitted = fit_viscoelastic(data_of("003a", 0.001, 0.4), {.network = "003a"});
   EXPECT_THAT(fitted.notes, Contains(AllOf(HasSubstr("s (0.02 Hz) lies below the 0."),
                                            HasSubstr("k2, d2"), HasSubstr("add a slow record"))));

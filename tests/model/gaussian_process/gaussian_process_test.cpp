@@ -42,7 +42,7 @@ Matrix standardised(const NetworkScaling& scaling, Features features) {
   return row;
 }
 
-TEST(GaussianProcess, SaysMeanAndSpreadOfItsDefinition) {
+TEST(GaussianProcess, ReturnsMeanAndSpreadOfItsDefinition) {
   auto model = example<GaussianProcess>();
   const auto& [scaling, expression, noise, points, weights, with_std_dev] = model.parameters();
   Eigen::MatrixXd k = covariance(expression, points, points);
@@ -78,7 +78,7 @@ TEST(GaussianProcess, LeavesTheSpreadOutIfConfiguredSo) {
   EXPECT_TRUE(std::isnan(plain.step(x).novelty));
 }
 
-TEST(ParametricGp, SaysMeanAndSpreadOfItsDefinition) {
+TEST(ParametricGp, ReturnsMeanAndSpreadOfItsDefinition) {
   auto model = example<ParametricGp>();
   const ParametricGp::Parameters& p = model.parameters();
   const Matrix features = test::example_features(50, 2);

@@ -169,7 +169,7 @@ TEST(GreyBox, InvertsFromWhereItIsWithinItsCurve) {
   }
 }
 
-TEST(GreyBox, SaysWhereATargetIsBeyondItsCurve) {
+TEST(GreyBox, ReportsATargetBeyondItsCurve) {
   GreyBox::Parameters parameters = plain();
   parameters.coefficients.values.values = {-10.0, 0.0, 20.0, 0.0, 0.0};
   GreyBox box(parameters);

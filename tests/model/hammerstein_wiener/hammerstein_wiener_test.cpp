@@ -158,7 +158,7 @@ TEST(HammersteinWiener, SurvivesAnInputThatOverflows) {
   EXPECT_EQ(step(model, 0.3), step(other, 0.3));
 }
 
-TEST(HammersteinWiener, StaysAtTheEndOfItsRangeAndSaysSo) {
+TEST(HammersteinWiener, StaysAtTheEndOfItsRangeAndReportsIt) {
   const Parameters p = example_parameters();
   const double gain = dc_gain(p.sections);
   HammersteinWiener model(p);
@@ -222,7 +222,7 @@ TEST(StaticCurve, IsTheSumOfItsValuesTimesTheirBasis) {
   }
 }
 
-TEST(StaticCurve, IsMonotoneBetweenItsTurns) {
+TEST(StaticCurve, IsMonotoneBetweenItsExtremes) {
   const StaticCurve cubic{.values = {0.0, -3.0, 0.0, 1.0}};  // turns at -1 and 1
   const Interval inner = monotone_part(cubic, {-1.5, 1.5});
   EXPECT_NEAR(inner.lowest, -1.0, 1e-12);

@@ -91,7 +91,7 @@ TEST(TransferFunction, WarnsOfPolesThatNoContinuousSystemHas) {
   EXPECT_EQ(continuous_warning(sections_of({{1.0}, {1.0, -1.8, 0.9}}), kPeriod_s), "");
 }
 
-TEST(TransferFunction, KnowsThePolesAndZerosOfTheRefinedForm) {
+TEST(TransferFunction, HasThePolesAndZerosOfTheRefinedForm) {
   const ContinuousTransfer refined = continuous_of(Paper003::refined);
   const auto found = real_parts(polynomial_roots(refined.denominator));
   EXPECT_NEAR(found[0], -1.416, 1e-3);   // specification 2

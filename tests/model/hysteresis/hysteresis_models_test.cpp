@@ -188,7 +188,7 @@ TEST(ImprovedModels, LoopsGrowWithTheRate) {
             1.1 * lost(test::example<ImprovedNonlinearBacklash>(), 0.0));
 }
 
-TEST(OperatorSums, StopsAndPlaysSayTheSame) {
+TEST(OperatorSums, StopsAndPlaysAreEquivalent) {
   auto stops = test::example<MaxwellSlipModel>();
   auto plays = test::example<PrandtlIshlinskii>();
   Random random(9);
@@ -214,7 +214,7 @@ TEST(PrandtlIshlinskii, AnInnerLoopLeavesNoTraceOnTheOuterOne) {
   for (std::size_t n = 0; n < onward.size(); ++n) ASSERT_NEAR(remembered[n], expected[n], 1e-9);
 }
 
-TEST(PrandtlIshlinskii, LoopsBetweenTheSameTurnsAreCongruent) {
+TEST(PrandtlIshlinskii, LoopsBetweenTheSameTurningPointsAreCongruent) {
   const auto loop = path_through({-0.01, 0.02, -0.01}, 5e-4);
   const auto after = [&](const std::vector<double>& history) {
     auto model = test::example<PrandtlIshlinskii>();

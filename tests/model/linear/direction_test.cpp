@@ -31,7 +31,7 @@ TEST(DirectionTracker, ChangesRelativeToTheExtremeNotToTheLastSample) {
       (std::vector{kUnknown, kRising, kRising, kRising, kRising, kFalling, kFalling, kRising}));
 }
 
-TEST(DirectionTracker, NoiseInsideTheDeadBandNeverTurnsIt) {
+TEST(DirectionTracker, NoiseInsideTheDeadBandNeverChangesIt) {
   DirectionTracker tracker(0.5);
   tracker.step(0.0);
   for (int i = 1; i < 1000; ++i) {
@@ -43,7 +43,7 @@ TEST(DirectionTracker, NoiseInsideTheDeadBandNeverTurnsIt) {
   }
 }
 
-TEST(DirectionTracker, ForgetsAtReset) {
+TEST(DirectionTracker, IsUnknownAfterReset) {
   DirectionTracker tracker(1.0);
   tracker.step(0.0);
   ASSERT_EQ(tracker.step(2.0), kRising);

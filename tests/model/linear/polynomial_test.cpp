@@ -73,7 +73,7 @@ TEST(Polynomial, InvertsWithAnInputBeyondItsRange) {
   EXPECT_DOUBLE_EQ(model.invert(-1e6, std::array{0.0, 0.0}).value, -0.1);
 }
 
-TEST(Polynomial, StaysAtTheEndOfTheRangeOfItsDirectionAndSaysSo) {
+TEST(Polynomial, StaysAtTheEndOfTheRangeOfItsDirectionAndReportsIt) {
   Polynomial::Parameters parameters = example<Polynomial>().parameters();
   parameters.ranges = Matrix(1, 4);
   parameters.ranges.values = {-0.1, 0.0, -0.1, 0.1};  // P+ was fitted to the lower half only

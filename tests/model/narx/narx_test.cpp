@@ -47,7 +47,7 @@ TEST(Narx, TakesAMeasurementForItsLastOutput) {
   EXPECT_NEAR(corrected.step(features).value, 0.5 + 300.0 * 0.01 + 0.5 * 7.0, 1e-12);
 }
 
-TEST(Narx, StaysAtTheEndOfItsRangeAndSaysSo) {
+TEST(Narx, StaysAtTheEndOfItsRangeAndReportsIt) {
   auto parameters = test::example<Narx<Linear>>().parameters();
   parameters.lowest = -200.0;
   parameters.highest = 200.0;

@@ -287,7 +287,7 @@ TEST(LastLayerAdapter, ErrorsBeyondTheLargestChangeNoWeights) {
   EXPECT_EQ(pupil.learn(kScale - 0.1), UpdateOutcome::updated);
 }
 
-TEST(LastLayerAdapter, AReferenceThatIsNoNumberChangesNothing) {
+TEST(LastLayerAdapter, AReferenceThatIsNotANumberChangesNothing) {
   for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
     Pupil pupil(unguarded(rule), 6);
     Pupil twin(unguarded(rule), 6);
@@ -307,7 +307,7 @@ TEST(LastLayerAdapter, AReferenceThatIsNoNumberChangesNothing) {
   }
 }
 
-TEST(LastLayerAdapter, FeaturesThatAreNoNumbersAreTold_AndTeachNothing) {
+TEST(LastLayerAdapter, FeaturesThatAreNotNumbersAreReportedAndChangeNoWeights) {
   for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
     Pupil pupil(unguarded(rule), 6);
     (void)pupil.trained_error(10);

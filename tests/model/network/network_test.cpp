@@ -145,7 +145,7 @@ class Recurrent : public testing::Test {};
 using RecurrentNetworks = testing::Types<Lstm, Gru>;
 TYPED_TEST_SUITE(Recurrent, RecurrentNetworks);
 
-TYPED_TEST(Recurrent, WarmsUpForAsManySamplesAsItSays) {
+TYPED_TEST(Recurrent, WarmsUpForItsStatedNumberOfSamples) {
   TypeParam network(random_network<TypeParam>({.warm_up_samples = 3}, 2));
   const std::vector<double> features{0.1, 0.2};
   for (int run = 0; run < 2; ++run) {

@@ -86,7 +86,7 @@ TEST(SpringDashpotText, NamesItsElementsInOrder) {
   EXPECT_NEAR(parse_network("003a").values()[0], deg_from_rad(3.803), 1e-12);
 }
 
-TEST(SpringDashpotText, PointsAtTheMistakeAndSaysWhatWasExpected) {
+TEST(SpringDashpotText, PointsAtTheMistakeAndStatesWhatWasExpected) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "expected a network like series(kv(k1, d1), k2), or one of hooke, maxwell,"},
       {"series(k1, k2", "column 14: expected ',' or ')', found the end"},
@@ -226,7 +226,7 @@ TEST(RelaxationSpectrum, Of003bAnd003cIsNearlyThatOf003a) {
   }
 }
 
-TEST(RelaxationSpectrum, OfSimpleNetworksIsWhatTheTextbookSays) {
+TEST(RelaxationSpectrum, OfSimpleNetworksIsTheTextbooks) {
   const auto of = [](const char* text) { return relaxation_spectrum(parse_network(text)); };
   EXPECT_EQ(of("kv(k1=3, d1=2)").stiffness, 3.0);
   EXPECT_EQ(of("kv(k1=3, d1=2)").damping, 2.0);
