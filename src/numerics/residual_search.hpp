@@ -15,7 +15,7 @@ struct ResidualProblem {
   std::size_t residuals = 0;
   /// Fills the residuals and, unless it is empty, the Jacobian (residuals x parameters, row by row).
   /// @returns false where r cannot be computed (a run that diverges): the search takes a shorter
-  ///          step.
+  /// step.
   std::function<bool(std::span<const double> theta, std::span<double> residuals,
                      std::span<double> jacobian)>
       evaluate;
@@ -47,7 +47,7 @@ struct SearchResult {
 
 /// argmin_θ Σ r², by Levenberg-Marquardt (Ceres), one thread, deterministic.
 /// @throws Error if r cannot be computed at the start, UsageError for contradicting bounds,
-///          Cancelled.
+/// Cancelled.
 [[nodiscard]] SearchResult minimise_squares(const ResidualProblem& problem,
                                             std::vector<double> start,
                                             const SearchOptions& options = {});

@@ -78,10 +78,10 @@ class DeflectionController {
   [[nodiscard]] const Pid::Gains& gains() const noexcept { return pid_.gains(); }
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
 
-  /// What the loop feeds back with these gains. Allocates.
+  /// The feedback of the loop with these gains. Allocates.
   [[nodiscard]] JointFeedback feedback(const Pid::Gains& gains) const;
   [[nodiscard]] JointFeedback feedback() const { return feedback(gains()); }
-  /// From the wanted deflection to the current, within the limits. Allocates.
+  /// The system from the wanted deflection to the current, within the limits. Allocates.
   [[nodiscard]] LinearSystem reference_path() const;
   /// Margins of the loop with these gains, opened at the current. Allocates.
   [[nodiscard]] Margins margins_of(const Pid::Gains& gains, JointOutput output) const;

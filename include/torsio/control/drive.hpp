@@ -6,8 +6,8 @@ namespace torsio {
 
 /// The parameters of the motor and gear that drive a joint, as a controller uses them.
 struct Drive {
-  double ratio = 1.0;                    ///< N, turns of the rotor a turn of the joint
-  double torque_constant_Nm_A = 0.0;     ///< k_t, of the rotor
+  double ratio = 1.0;                    ///< N, turns of the rotor per turn of the joint
+  double torque_constant_Nm_A = 0.0;     ///< k_t, at the rotor
   double rotor_inertia_kg_m2 = 0.0;      ///< J
   double viscous_Nms_rad = 0.0;          ///< motor and gear, referred to the joint
   double coulomb_Nm = 0.0;               ///< motor and gear, referred to the joint

@@ -18,8 +18,8 @@ namespace torsio {
 
 enum class JointMode : std::uint8_t { current, velocity, position, torque, impedance };
 
-/// What is wanted of a joint in one tick. What a mode does not name it does not read, but every
-/// number must be finite: a reference is taken whole or not at all.
+/// The reference of a joint in one tick. A mode ignores the fields that are not listed for it, but
+/// every number must be finite: a reference is accepted as a whole or rejected.
 struct JointReference {
   JointMode mode = JointMode::current;
   double position_rad = 0.0;         ///< position, impedance
@@ -82,7 +82,7 @@ class JointCascade {
     double max_unmeasured_load_Nm =
         0.0;  ///< d: the largest load that is not measured (friction, torque
               ///< error, what changes faster than the current follows)
-    double max_measured_load_Nm = 0.0;  ///< the largest load that is: what carries it cannot brake
+    double max_measured_load_Nm = 0.0;  ///< largest measured load: reduces the torque for braking
     double torque_Nm = std::numeric_limits<double>::infinity();  ///< limit of the wanted torque
     double current_rate_A_s = std::numeric_limits<double>::infinity();
     double thermal_time_s = 10.0;  ///< time constant of the winding
@@ -124,15 +124,17 @@ class JointCascade {
     Fault fault = Fault::none;
   };
 
-  /// k_q = ω / 5; velocity J N² ω / (N k_t), its integral ω / 5 times that; no torque gains.
+  /// Default gains: k_q = ω / 5; velocity J N² ω / (N k_t), its integral ω / 5 times that; no
+  /// torque gains.
   [[nodiscard]] static Gains gains_for(const Drive& drive, double bandwidth_rad_s);
 
   /// @throws Error if the drive is impossible, a gain negative, or if the limits contradict each
-  /// other: no room between them and their margins, no current left to brake with, a rate that is
-  /// slower than the override.
+  /// other: no space between them and their margins, no current left to brake with, a rate
+  /// limit that is slower than the override.
   JointCascade(const Settings& settings, double sample_rate_Hz);
 
-  /// No memory, no current, mode `current` with 0 A; a winding as warm as it was.
+  /// Clears the memory: no current, mode `current` with 0 A; the temperature of the winding is
+  /// kept.
   void reset() noexcept;
 
   /// After a rejected reference the last good one remains in use (0 A if there was none), with
@@ -142,7 +144,7 @@ class JointCascade {
   Output step(const JointReference& reference, const JointState& measured) noexcept TORSIO_REALTIME;
 
   /// All at once, from the next step on, without a jump.
-  /// @returns false, and all stay, if one is negative or not finite
+  /// @returns false, and all are kept, if one is negative or not finite
   [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
 
   /// @returns m [rad], v_max′ [rad/s]
@@ -168,7 +170,7 @@ class JointCascade {
   Settings settings_;
   double period_s_;
   double amperes_per_Nm_;
-  double speed_gain_A_s_rad_;  ///< k_v, of the override
+  double speed_gain_A_s_rad_;  ///< k_v of the override
   double approach_1_s_;        ///< ω_p
   double braking_rad_s2_;      ///< a
   double margin_rad_;

@@ -10,11 +10,11 @@
 
 namespace torsio {
 
-/// A spring and a damper at the joint, as a torque to be wanted of a `TorqueController`:
+/// A spring and a damper at the joint, as the reference of a `TorqueController`:
 ///
 ///     τ* = K (q* − q) + D (q̇* − q̇) + τ_ff,   then limited in size and rate
 ///
-/// Source: Hogan, Impedance control (1985). How stiff it may be: `passive_stiffness`.
+/// Source: Hogan, Impedance control (1985). The largest stiffness: `passive_stiffness`.
 class JointImpedance {
  public:
   struct Gains {
@@ -79,9 +79,9 @@ class JointImpedance {
   double torque_Nm_ = 0.0;
 };
 
-/// The largest stiffness [Nm/rad] that an impedance on deflection control, with this damping, renders
-/// so that the joint is passive up to the frequency and stable with its output free; 0 if it is not
-/// even without. Swept from below in steps of 5 %, up to ten times the spring.
+/// The largest stiffness [Nm/rad] of an impedance on deflection control, with this damping, for
+/// which the joint is passive up to the frequency and stable with its output free; 0 if it is not
+/// even without stiffness. Searched from below in steps of 5 %, up to ten times the spring.
 [[nodiscard]] double passive_stiffness(const DeflectionController& controller,
                                        double damping_Nms_rad, double passive_to_rad_s,
                                        double speed_cutoff_Hz);

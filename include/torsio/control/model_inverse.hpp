@@ -34,9 +34,9 @@ class ModelInverse {
   /// In residual standard deviations of the linear fallback.
   static constexpr double kMaxDeparture = 3.0;
 
-  /// @throws Error as `Estimator`, or if the model's first input is not `spring_deflection_rad`, its
-  /// target no torque in Nm, its family has no inverse, its fallback no positive slope, or it needs a
-  /// channel that a `JointSample` does not have.
+  /// @throws Error as `Estimator`, or if the model's first input is not `spring_deflection_rad`,
+  /// its target is not a torque in Nm, its family has no inverse, its fallback has no
+  /// positive slope, or it needs a channel that a `JointSample` does not have.
   ModelInverse(EstimatorSettings settings, AnyModel model, double max_departure = kMaxDeparture);
 
   /// As `Estimator::set_zero`.
@@ -44,7 +44,8 @@ class ModelInverse {
 
   void reset() noexcept;
   Estimate step(double torque_Nm, const JointSample& sample) noexcept TORSIO_REALTIME;
-  /// @param asked_rad what the loop asks for instead of the last answer; without a call, that
+  /// @param asked_rad the deflection that the loop requests instead of the last result; without a
+  /// call, that
   void follow(double asked_rad) noexcept TORSIO_REALTIME {
     if (follows_answer_) asked_.front() = asked_rad - zero_rad_;
   }
@@ -59,21 +60,21 @@ class ModelInverse {
   detail::JointInputs inputs_;
   double max_departure_rad_;
   bool is_stepped_;
-  std::vector<double> asked_;  ///< features of this tick, the deflection being the answer
-  bool is_asked_ = false;      ///< the memory has yet to go there
+  std::vector<double> asked_;  ///< features of this tick, with the resulting deflection
+  bool is_asked_ = false;      ///< the memory has not been updated with it yet
   bool follows_answer_ = false;
   double zero_rad_ = 0.0;  ///< the measured deflection less the model's, of this tick
   double last_rad_ = 0.0;
 };
 
-/// A model that was trained the other way round, with the target `spring_deflection_rad` and
-/// `torque_Nm` among its inputs; guarded by its own estimator.
+/// An inverse model from training: its target is `spring_deflection_rad`, and `torque_Nm` is among
+/// its inputs; guarded by its own estimator.
 class TrainedInverse {
  public:
   /// @throws Error if its target is not `spring_deflection_rad`, `torque_Nm` is not among its raw
-  ///          inputs, another is not in a `JointSample`, or a channel from which its target is
-  ///          computed was zeroed in training: its deflection would differ from the measured one by
-  ///          zeros that it does not know.
+  /// inputs, another is not in a `JointSample`, or a channel from which its target is
+  /// computed was zeroed in training: its deflection would differ from the measured one by
+  /// zeros that it does not know.
   explicit TrainedInverse(Estimator estimator);
 
   void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }

@@ -19,7 +19,7 @@ concept SpringInverse =
       { inverse.step(torque_Nm, sample) } noexcept -> std::same_as<Estimate>;
     };
 
-/// δ = (τ − b) / K: the line that every learned inverse must beat.
+/// δ = (τ − b) / K: the linear inverse, the baseline for every learned one.
 class LinearInverse {
  public:
   /// @throws Error if the stiffness is not positive, or a value not finite.

@@ -29,7 +29,7 @@ class ThermalLimit {
   }
   /// Whether the limit has begun to fall, at three quarters of the heat.
   [[nodiscard]] bool is_warm() const noexcept TORSIO_REALTIME { return load_ > kCold; }
-  /// @param current_A that flows in this tick, finite
+  /// @param current_A the current that flows in this tick, finite
   void step(double current_A) noexcept TORSIO_REALTIME {
     const double ratio = current_A / rated_A_;
     load_ += share_ * (ratio * ratio - load_);

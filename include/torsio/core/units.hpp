@@ -48,7 +48,7 @@ struct ChannelName {
 /// Reads "10Hz", "0.1s", "50 ms" or "3deg" as an SI number. A bare number is taken to be in
 /// `expected_si` already.
 /// @throws UsageError naming `place` if the text is not a number, or its unit is not one of
-///          `expected_si`'s quantity.
+/// `expected_si`'s quantity.
 [[nodiscard]] double si_quantity(std::string_view text, std::string_view expected_si,
                                  std::string_view place);
 

@@ -31,19 +31,19 @@ class AdaptiveEstimator {
     return estimator_.raw_inputs();
   }
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return estimator_.settings(); }
-  /// As the estimator's.
+  /// As for the estimator.
   void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
 
-  /// Filters and hidden state; what was learned stays.
+  /// Resets filters and hidden state; the adapted weights are kept.
   void reset() noexcept;
-  /// Back to the frozen network.
+  /// Returns to the frozen network.
   void forget() noexcept { estimator_.model().adapter().reset(); }
   void pause() noexcept { estimator_.model().adapter().pause(); }
   void resume() noexcept { estimator_.model().adapter().resume(); }
 
   Estimate step(std::span<const double> raw) noexcept TORSIO_REALTIME;
   /// @param reference measured at the tick of the last `step`, with the zeros and unit of the
-  ///               model's target.
+  /// model's target.
   UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const LastLayerAdapter& adapter() const noexcept {

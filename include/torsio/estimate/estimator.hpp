@@ -73,7 +73,7 @@ class BasicEstimator {
     model_.reset();
   }
 
-  /// Whether filters and differentiators have settled, so that the model is listened to.
+  /// Whether filters and differentiators have settled, so that the model's value is used.
   [[nodiscard]] bool is_settled() const noexcept { return core_.is_settled(); }
 
   /// @param raw one value for each of `raw_inputs()`; NaN for one that was not measured.
@@ -87,7 +87,7 @@ class BasicEstimator {
   }
 
   /// A measurement of the last step's target, for a model that feeds its output back: free run
-  /// starts where the joint is, or goes one step ahead if called after each step.
+  /// starts from the measured value, or is one step ahead if called after each step.
   void correct(double measured) noexcept TORSIO_REALTIME
     requires FeedsBack<M>
   {

@@ -13,12 +13,12 @@
 
 namespace torsio::detail {
 
-/// A gap in the inputs longer than this starts the filters and the model afresh; a shorter one they
-/// run across, as if its ticks had not been.
+/// After a gap in the inputs that is longer than this, filters and model are reset; over a shorter
+/// one they continue as if its ticks did not exist.
 inline constexpr double kLongestGapSeconds = 0.01;
 
-/// Everything of an estimator that does not depend on the family of its model: raw channels in,
-/// features out, and the guards that decide whether what the model made of them may be used.
+/// The part of an estimator that does not depend on the family of its model: from raw channels to
+/// features, and the guards that decide whether the model's output may be used.
 class EstimatorCore {
  public:
   /// @throws Error if the settings contradict each other or the model, or a number in them is not
@@ -29,7 +29,7 @@ class EstimatorCore {
   struct Conditioned {
     Features features;          ///< empty where `fault` is not none
     Fault fault = Fault::none;  ///< none, input_count_wrong or input_not_finite
-    bool restarted = false;     ///< the pipeline was reset: the model's memory is void too
+    bool restarted = false;     ///< the pipeline was reset: the model's memory is invalid too
   };
 
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return settings_; }
@@ -45,7 +45,7 @@ class EstimatorCore {
   void reset() noexcept;
 
   Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;
-  /// The last value that came of good inputs, with the reason why it is held.
+  /// The last value from good inputs, with the reason why it is held.
   [[nodiscard]] Estimate held(Fault fault) const noexcept TORSIO_REALTIME;
   /// How far the worst feature has left its range, in widths of its border: 0 inside, above 1
   /// beyond the border.
@@ -74,7 +74,7 @@ class EstimatorCore {
   std::vector<std::string> unset_zeros_;
   std::size_t longest_gap_;  ///< ticks
   std::size_t missed_ = 0;   ///< ticks in a row without usable input
-  bool poisoned_ = false;    ///< a feature was not finite: differences and lags still hold it
+  bool poisoned_ = false;    ///< a feature was not finite: differences and lags still contain it
   double last_value_ = 0.0;
 };
 

@@ -23,8 +23,8 @@ struct FeatureRanges {
   }
 };
 
-/// value = intercept + sum_j slope_j * feature_j, used where the model must not be trusted. Fitted
-/// ones have slope 0 on rates.
+/// value = intercept + sum_j slope_j * feature_j, used where the model's value must not be used.
+/// Fitted ones have slope 0 on rates.
 struct LinearFallback {
   double intercept = 0.0;
   std::vector<double> slope;

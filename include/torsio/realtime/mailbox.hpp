@@ -45,8 +45,8 @@ class Mailbox {
   Mailbox(const Mailbox&) = delete;
   Mailbox& operator=(const Mailbox&) = delete;
 
-  /// By the writing thread. `now_ns`: when the value came to be, on the clock that its age will be
-  /// asked for (`MonotonicClock`): the source's time stamp, if it has one.
+  /// Called by the writing thread. `now_ns`: the time of the value on the clock with which its age
+  /// is computed (`MonotonicClock`): the source's time stamp, if it has one.
   void write(const T& value, std::int64_t now_ns) noexcept TORSIO_REALTIME {
     slots_[back_].letter = {.value = value, .sequence = ++written_, .written_ns = now_ns};
     back_ =
@@ -54,7 +54,7 @@ class Mailbox {
         kSlot;
   }
 
-  /// By the reading thread: the latest value; stays as it is until this thread reads again.
+  /// Called by the reading thread: the latest value; unchanged until this thread reads again.
   [[nodiscard]] const Letter& read() noexcept TORSIO_REALTIME {
     if ((between_.load(std::memory_order_relaxed) & kFresh) != 0)
       front_ = between_.exchange(front_, std::memory_order_acq_rel) & kSlot;
@@ -64,7 +64,7 @@ class Mailbox {
  private:
   static constexpr std::size_t kCacheLine = 64;
   static constexpr std::uint8_t kSlot = 3;
-  static constexpr std::uint8_t kFresh = 4;  ///< the reader has not taken the slot between
+  static constexpr std::uint8_t kFresh = 4;  ///< the reader has not taken the middle slot
   static_assert(std::atomic<std::uint8_t>::is_always_lock_free);
 
   struct alignas(kCacheLine) Slot {

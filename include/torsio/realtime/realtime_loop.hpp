@@ -25,7 +25,7 @@ struct LoopOptions {
   int cpu = -1;             ///< the core to stay on; -1: any
   /// Ends the loop after this many overruns in a row; 0: never.
   std::uint64_t stop_after_overruns = 0;
-  /// What was asked for above and is not permitted is an Error instead of a remark in the report.
+  /// A request above that is not permitted is an Error instead of a remark in the report.
   bool must_be_granted = false;
 };
 
@@ -37,12 +37,13 @@ struct Tick {
   std::uint64_t overruns = 0;    ///< so far
 };
 
-/// What the operating system let the loop have.
+/// What the operating system granted to the loop.
 struct LoopGrants {
   bool fifo = false;
   bool memory_locked = false;
   bool cpu = false;
-  std::string refused = {};  ///< what was asked for and not given, with the reason; empty: nothing
+  std::string refused =
+      {};  ///< what was requested and not granted, with the reason; empty: nothing
 };
 
 enum class LoopEnd : std::uint8_t {

@@ -9,15 +9,15 @@
 
 namespace torsio {
 
-/// Whether a loop may drive its joint on the commands that reach it.
+/// Decides whether a loop may drive its joint with the commands that it receives.
 ///
 ///     disarmed  --arm-->  waiting  --a command written since-->  running
 ///     running   --no command, a fault, the clock, stop-->  stopped  --arm-->  waiting
 ///
-/// Only a valid motion command feeds it, by the time at which its source wrote it: none that was
-/// refused, and no other traffic. A stop is latched: no command ends it, only `arm` and then a command
-/// that was written after that. In every state but `running` the motor gets no current, which takes
-/// no energy into the joint: reset the controllers and command 0.
+/// Only a valid motion command feeds it, with the time at which its source wrote it: no rejected
+/// command, and no other traffic. A stop is latched: no command ends it, only `arm` followed by a
+/// command that was written after that. In every state but `running` the motor gets no current,
+/// which takes no energy into the joint: reset the controllers and command 0.
 ///
 /// All times are of one monotonic clock (`MonotonicClock`, `Tick::due_ns`); one that runs backwards
 /// stops the loop. Form: ours.
@@ -29,10 +29,10 @@ class CommandWatchdog {
     /// How long the loop may continue with a fault, such as an inverse on its linear fallback.
     double longest_fault_s = std::numeric_limits<double>::infinity();
   };
-  /// The latest one, as `Mailbox::Letter` has it.
+  /// The latest command, as in `Mailbox::Letter`.
   struct Command {
     std::int64_t written_ns = 0;
-    bool is_valid = false;  ///< there is one, and it was taken whole
+    bool is_valid = false;  ///< there is one, and it was accepted
   };
   enum class State : std::uint8_t { disarmed, waiting, running, stopped };
   /// The reason of the last stop.
@@ -46,7 +46,7 @@ class CommandWatchdog {
   void stop() noexcept TORSIO_REALTIME;
 
   /// Call in every tick, before the controllers.
-  /// @param fault of the loop's last output
+  /// @param fault in the loop's last output
   State step(std::int64_t now_ns, const Command& command,
              Fault fault = Fault::none) noexcept TORSIO_REALTIME;
 

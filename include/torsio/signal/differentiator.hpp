@@ -13,7 +13,8 @@ namespace torsio {
 ///     y[n] = (x[n] - x[n-1]) * sample_rate
 ///
 /// (it lags by half a sample), low-passed if a cut-off is given. The first output is 0, because
-/// nothing is known yet. An input that is not finite spoils two differences and is then forgotten.
+/// there is no difference yet. An input that is not finite affects two differences and has no later
+/// effect.
 class Differentiator {
  public:
   /// @throws UsageError if the sample rate is not positive and finite, or as `Lowpass` does.

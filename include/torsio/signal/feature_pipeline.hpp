@@ -19,8 +19,8 @@ struct ChannelDefinition {
   bool operator==(const ChannelDefinition&) const = default;
 };
 
-/// Which inputs a model takes and how they come from raw channels. Plain data: it is stored in the
-/// model file as it is.
+/// The inputs of a model and how they are computed from raw channels. Plain data: it is stored
+/// unchanged in the model file.
 struct FeatureSpec {
   std::vector<std::string> inputs;  ///< one expression each, causal (see docs/expressions.md)
   std::vector<ChannelDefinition>
@@ -35,11 +35,11 @@ struct FeatureSpec {
 /// Equal sub-expressions are evaluated once. `rate(x)` is the backward difference over one sample,
 /// `lowpass(x, f)` a second-order Butterworth filter re-discretised for the sample rate that starts
 /// in the steady state of its first input, `lag(x, n)` the value n samples ago (before there is
-/// one, the oldest). docs/expressions.md has the whole language.
+/// one, the oldest). docs/expressions.md describes the whole language.
 ///
-/// Finite raw values can still give a feature that is not finite (`x / y`). It stays in its tick: a
-/// low-pass passes it through without taking it into its state, a rate has forgotten it one sample
-/// later, a lag n samples later.
+/// Finite raw values can still give a feature that is not finite (`x / y`). Its effect is limited:
+/// a low-pass returns it without changing its state, a rate is finite again one sample later, a lag
+/// n samples later.
 class FeaturePipeline {
  public:
   /// @throws Error naming the expression and the column in it if one cannot be parsed, names

@@ -47,8 +47,8 @@ class Lowpass {
     return low;
   }
 
-  /// Samples from a step of the input on (that one counted) until the output stays within 1 % of
-  /// it: an upper bound from the envelope of the step response.
+  /// Samples from a step of the input on (included) until the output stays within 1 % of it: an
+  /// upper bound from the envelope of the step response.
   [[nodiscard]] std::size_t settling_samples() const noexcept;
 
   /// Standard deviation of the output over that of a white input, in the long run.

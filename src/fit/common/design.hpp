@@ -43,7 +43,7 @@ struct DesignFit {
 /// Least squares in every group. Terms that the data of a group cannot distinguish are dropped
 /// there, with a note.
 /// @param is_free one per column, or empty: coefficients of columns with a 0 are constrained to be
-///               >= 0
+/// >= 0
 /// @throws Error if a group has fewer than `kSamplesPerTerm` samples for each term.
 [[nodiscard]] DesignFit fit_design(const Design& design, const Groups& groups,
                                    std::span<const std::uint8_t> is_free = {});

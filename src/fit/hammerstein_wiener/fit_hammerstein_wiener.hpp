@@ -91,9 +91,9 @@ struct HammersteinWienerOptions {
 /// Source: specification 3.5. The table contains the coefficients with standard errors; notes state
 /// poles, zeros, the form in continuous time and what the data cannot distinguish.
 /// @throws Error if the first input is constant, there are fewer than ten samples per parameter or
-///          no record outlasts the lags, no start of the search is stable, or it does not converge;
-///          UsageError for an order or a degree out of range, or more zeros than poles in
-///          continuous time.
+/// no record outlasts the lags, no start of the search is stable, or it does not converge;
+/// UsageError for an order or a degree out of range, or more zeros than poles in
+/// continuous time.
 [[nodiscard]] Fitted<HammersteinWiener> fit_hammerstein_wiener(
     const TrainingData& data, const HammersteinWienerOptions& options,
     const FitContext& context = {});

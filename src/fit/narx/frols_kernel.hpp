@@ -23,7 +23,7 @@ struct Candidates {
 
 /// Over one block of samples: dots_j += phi_j . v, and squares_j += phi_j . phi_j unless null.
 /// @param columns of the regressors, the block's first sample, `stride` apart; the first is 1 where
-///               a sample is, 0 after the last.
+/// a sample is, 0 after the last.
 /// @param scratch `parents` x kBlock, on a cache line.
 void add_products(const Candidates& candidates, const double* columns, std::size_t stride,
                   const double* v, double* scratch, double* dots, double* squares) noexcept;

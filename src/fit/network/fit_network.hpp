@@ -146,9 +146,9 @@ struct RecurrentOptions {
 /// number of threads. A loss that explodes (a million times that of a constant, or not finite)
 /// ends the training; the best weights so far are kept and a note reports it.
 /// @throws Error if no stretch of the records is as long as a window, the target is constant or not
-///          finite in a training sample, the network is larger than a model file or the memory, or
-///          the loss explodes in the first epoch; UsageError if an option is out of range or
-///          `context.resume` has another recipe; Cancelled, after `context.keep`.
+/// finite in a training sample, the network is larger than a model file or the memory, or
+/// the loss explodes in the first epoch; UsageError if an option is out of range or
+/// `context.resume` has another recipe; Cancelled, after `context.keep`.
 [[nodiscard]] Fitted<Mlp> fit_mlp(const TrainingData& data, const MlpOptions& options,
                                   const FitContext& context = {});
 [[nodiscard]] Fitted<Lstm> fit_lstm(const TrainingData& data, const RecurrentOptions& options,

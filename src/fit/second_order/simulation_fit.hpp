@@ -91,7 +91,7 @@ struct SimulationFit {
 /// run has many minima in frequency and phase, a short one few. Where the records are more than
 /// `kMaxSearchedStarts`, the starts are not searched but estimated from the first samples.
 /// @throws Error if a record is shorter than the unknowns need, every start diverges, or the last
-///          search did not converge; Cancelled.
+/// search did not converge; Cancelled.
 inline constexpr std::size_t kMaxSearchedStarts = 30;
 [[nodiscard]] SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData& data,
                                               const std::vector<std::vector<double>>& starts,

@@ -55,7 +55,7 @@ class OperatorSum {
   };
 
   /// @throws Error if the coefficients are not a valid schedule or too few, or the thresholds are
-  ///          not positive, finite and ascending.
+  /// not positive, finite and ascending.
   explicit OperatorSum(const Parameters& parameters);
 
   [[nodiscard]] Parameters parameters() const;

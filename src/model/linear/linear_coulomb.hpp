@@ -36,7 +36,7 @@ class LinearCoulomb {
   };
 
   /// @throws Error if there is no input, the coefficients are not a valid schedule, `rate_feature`
-  ///          is not an input, or v is not positive and finite.
+  /// is not an input, or v is not positive and finite.
   explicit LinearCoulomb(const Parameters& parameters);
 
   [[nodiscard]] Parameters parameters() const {

@@ -60,7 +60,7 @@ class Polynomial {
   };
 
   /// @throws Error if the coefficients do not fit the degree or are not a valid schedule, k_0 is
-  ///          not 0, or centre, half_range, ranges or dead band are out of range.
+  /// not 0, or centre, half_range, ranges or dead band are out of range.
   explicit Polynomial(const Parameters& parameters);
 
   [[nodiscard]] Parameters parameters() const;

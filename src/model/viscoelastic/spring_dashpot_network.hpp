@@ -105,7 +105,7 @@ struct RelaxationSpectrum {
 /// which lie between its poles and are computed there by bisection, relative to the nearer pole.
 /// Every number is accurate to a few roundings however far apart the rates are.
 /// @throws Error for nodes that are not a network, a value outside `kSmallestElement` to
-///          `kLargestElement`, more nodes than `kMaxNetworkNodes`, or two elements with one name.
+/// `kLargestElement`, more nodes than `kMaxNetworkNodes`, or two elements with one name.
 [[nodiscard]] RelaxationSpectrum relaxation_spectrum(const SpringDashpotNetwork& network);
 
 }  // namespace torsio

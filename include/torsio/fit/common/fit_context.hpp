@@ -11,12 +11,13 @@ namespace torsio {
 
 class AnyModel;
 
-/// What surrounds a fit besides its data and options. Fits that end within seconds need only the
+/// The inputs of a fit in addition to data and options. Fits that end within seconds need only the
 /// first two.
 struct FitContext {
   std::uint64_t seed = 0;
   Progress progress = {};
-  /// Decides when to stop; null: a fitter that needs such records holds out some of its own.
+  /// Determines when to stop; null: a fitter that needs such records holds out some of the training
+  /// data.
   const TrainingData* validation = nullptr;
   /// The error of a model in its intended use (for example free run for a NARX model); null: a
   /// fitter that chooses between models evaluates them by its own means.

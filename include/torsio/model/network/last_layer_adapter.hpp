@@ -17,8 +17,9 @@ namespace torsio {
 /// Normalised least mean squares, or recursive least squares with forgetting.
 enum class AdaptationRule : std::uint8_t { nlms, rls };
 
-/// How a last layer is adapted, and what keeps that safe. Errors, noise and limits of the reference
-/// are in the target's unit. `LastLayerAdapter` accepts the ranges that `visit_options` states.
+/// How a last layer is adapted, and the guards of the adaptation. Errors, noise and limits of the
+/// reference are in the target's unit. `LastLayerAdapter` accepts the ranges that `visit_options`
+/// states.
 struct AdaptationSettings {
   AdaptationRule rule = AdaptationRule::nlms;
   double step_size = 0.003;             ///< NLMS: mu; docs/decisions/0015
@@ -37,7 +38,7 @@ struct AdaptationSettings {
   double comparison_s = 10.0;
 
   /// The settings that a user gives by name, with range and help. `rule` has a flag of its own, and
-  /// a recording's references are never old.
+  /// a recording's references are never stale.
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.step_size,
@@ -108,17 +109,17 @@ struct ReferenceSample {
   double age_s = 0.0;           ///< since it was measured; not 0 for a value that is held
 };
 
-/// What became of one reference.
+/// The result of one reference.
 enum class UpdateOutcome : std::uint8_t {
-  updated,      ///< the weights have moved
-  limited,      ///< they have, and were drawn back to `largest_change`
+  updated,      ///< the weights have changed
+  limited,      ///< they have changed, limited by `largest_change`
   paused,       ///< by the caller
   warming_up,   ///< filters or hidden state have not settled
   no_estimate,  ///< no step since the last reference, or a guard replaced the model's value
   reference_not_finite,  ///< NaN or infinite: not measured
   reference_stale,       ///< older than `oldest_reference_s`, or frozen
   reference_saturated,   ///< at the end of the sensor's range
-  error_too_large,       ///< beyond `largest_error`: rather the sensor's fault than the weights'
+  error_too_large,       ///< beyond `largest_error`: probably a fault of the sensor
   dead_zone,             ///< no more than noise
 };
 inline constexpr std::size_t kUpdateOutcomes =
@@ -127,11 +128,11 @@ inline constexpr std::size_t kUpdateOutcomes =
 /// The enumerator's own spelling, for logs and JSON.
 [[nodiscard]] std::string_view name(UpdateOutcome outcome) noexcept;
 
-/// How often each came.
+/// Number of references with each result.
 struct AdaptationCounts {
   std::array<std::size_t, kUpdateOutcomes> outcomes{};
-  std::size_t roll_backs = 0;         ///< to the frozen weights, which had been better
-  std::size_t covariance_resets = 0;  ///< RLS: rounding had spoilt P
+  std::size_t roll_backs = 0;         ///< to the frozen weights, which had the smaller error
+  std::size_t covariance_resets = 0;  ///< RLS: P was not valid because of rounding
 
   [[nodiscard]] std::size_t of(UpdateOutcome outcome) const noexcept {
     return outcomes[static_cast<std::size_t>(outcome)];
@@ -142,7 +143,8 @@ struct AdaptationCounts {
   bool operator==(const AdaptationCounts&) const = default;
 };
 
-/// Adapts the last layer of a network to a reference, sample by sample, while the rest of it stays.
+/// Adapts the last layer of a network to a reference, sample by sample, while the other layers stay
+/// constant.
 ///
 /// With features h~ = [h; 1] of the last layer, its frozen weights W0 = [w; b], and the error
 /// e = reference - W h~ in standardised units:
@@ -156,9 +158,9 @@ struct AdaptationCounts {
 /// RMSE over the last `comparison_s` exceeds that of the frozen weights on the same samples. Samples
 /// whose reference is beyond the largest error of both do not count there.
 ///
-/// All in double. What is kept is W - W0: without updates the value is the network's, to the bit.
-/// Source: paper 004, specification 3.4. Cost for n features: NLMS 5 n multiply-adds; RLS one pass
-/// over n^2 / 2 doubles. Nothing is allocated after construction.
+/// All in double. The stored state is W - W0: without updates the value is the network's, to the
+/// bit. Source: paper 004, specification 3.4. Cost for n features: NLMS 5 n multiply-adds; RLS one
+/// pass over n^2 / 2 doubles. Nothing is allocated after construction.
 class LastLayerAdapter {
  public:
   /// @param last the network's last layer. @param target_scale of its `NetworkScaling`.
@@ -169,17 +171,17 @@ class LastLayerAdapter {
 
   [[nodiscard]] const AdaptationSettings& settings() const noexcept { return settings_; }
 
-  /// Back to the frozen weights; forgets what was learned and counted.
+  /// Returns to the frozen weights and resets the counters.
   void reset() noexcept TORSIO_REALTIME;
 
-  /// While paused, references are passed over; what was learned stays in use.
+  /// While paused, references are ignored; the adapted weights stay in use.
   void pause() noexcept { paused_ = true; }
   void resume() noexcept { paused_ = false; }
   [[nodiscard]] bool is_paused() const noexcept { return paused_; }
 
-  /// @param features what the last layer saw. @param frozen_value what the network made of them, in
-  /// the target's unit. @returns what the adapted weights make of them, or the frozen value if
-  /// something is not finite.
+  /// @param features input of the last layer. @param frozen_value the network's output for them, in
+  /// the target's unit. @returns the output with the adapted weights, or the frozen
+  /// value if something is not finite.
   double step(std::span<const float> features, double frozen_value) noexcept TORSIO_REALTIME;
 
   /// Trains on the reference of the last step. Call it in every tick, with NaN where there is no
@@ -196,7 +198,7 @@ class LastLayerAdapter {
 
  private:
   [[nodiscard]] UpdateOutcome outcome_of(const ReferenceSample& reference) noexcept;
-  /// Why a reference is not to be believed; `updated` if it is.
+  /// Why a reference must not be used; `updated` if it may be.
   [[nodiscard]] UpdateOutcome doubt_about(const ReferenceSample& reference) const noexcept;
   void compare(double adapted_error, double frozen_error) noexcept;
   void roll_back() noexcept;
