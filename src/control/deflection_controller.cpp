@@ -109,7 +109,7 @@ DeflectionController::Output DeflectionController::step(double wanted_rad,
   output.integral = loop.integral;
   output.derivative = loop.derivative;
   output.feed_forward = loop.feed_forward;
-  output.handover = loop.handover;
+  output.transfer = loop.transfer;
   output.is_limited = output.is_limited || loop.is_limited;
   return output;
 }

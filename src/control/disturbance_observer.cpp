@@ -19,7 +19,7 @@ DisturbanceObserver::DisturbanceObserver(const SeriesElasticJoint& joint, double
 void DisturbanceObserver::reset() noexcept {
   speed_.reset();
   acceleration_.reset();
-  // Nothing is known of a disturbance yet: the first raw difference is mostly noise.
+  // The disturbance is not known yet: the first raw difference is dominated by noise.
   lowpass_.reset();
   static_cast<void>(lowpass_.step(0.0));
 }

@@ -15,7 +15,7 @@ constexpr auto kPlace = "joint cascade";
 /// Below a quarter the approach to a limit is overdamped; a fifth leaves room for the delays.
 constexpr double kApproachShare = 0.2;
 constexpr double kBrakingShare = 0.5;
-constexpr double kMaxBandwidthShare = 0.2;  // of the sample rate, in rad a sample
+constexpr double kMaxBandwidthShare = 0.2;  // share of the sample rate, in rad per sample
 
 JointCascade::Settings checked(const JointCascade::Settings& settings, double sample_rate_Hz) {
   settings.drive.check();
@@ -169,7 +169,7 @@ JointCascade::Bounds JointCascade::speed_bounds(double angle_rad) const noexcept
           std::clamp(approach(above_rad), -soft_speed_rad_s_, soft_speed_rad_s_)};
 }
 
-// What a loop has learned of the load it keeps where the next mode goes on with it.
+// A loop keeps its integral, which contains the load, if the next mode uses the same loop.
 void JointCascade::enter(JointMode mode) noexcept {
   if (mode == reference_.mode) return;
   if (loop_of(mode) != loop_of(reference_.mode)) {
@@ -275,9 +275,9 @@ double JointCascade::wanted_current(const JointState& measured, const Bounds& sp
     transfer_.add(current_A_ - terms_A);
   }
   is_switching_ = false;
-  // The loop's own handover, after a change of its gains, is part of ours.
+  // The loop's own transfer, after a change of its gains, is part of ours.
   const double fading_A = transfer_.step();
-  output.transfer_A = fading_A + loop.handover;
+  output.transfer_A = fading_A + loop.transfer;
   return terms_A + fading_A;
 }
 

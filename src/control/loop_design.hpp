@@ -12,8 +12,8 @@ namespace torsio {
 /// Each on inputs of its own, their outputs added. @throws Error if they do not fit.
 [[nodiscard]] LinearSystem side_by_side(const LinearSystem& one, const LinearSystem& other);
 
-/// Whether the loop, closed with the sign turned, comes to rest; what stands still may stay where it
-/// is. @throws Error as `LinearSystem::closed`.
+/// Whether the loop, closed with negative feedback, is stable; a mode that is constant in time may
+/// remain. @throws Error as `LinearSystem::closed`.
 [[nodiscard]] bool is_stable_closed(const LinearSystem& loop);
 
 /// From the measurement to minus the command, as `Pid` does it between its limits; terms without a
@@ -28,8 +28,8 @@ namespace torsio {
 /// @throws Error naming the output and the phase margin if the loop is unstable when it is closed.
 void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output);
 
-/// What deflection control feeds back when a `JointImpedance` gives its wish through the line
-/// δ* = τ* / K, q̇ being the low-passed difference of q. Allocates.
+/// The feedback of deflection control when a `JointImpedance` gives its reference through the
+/// linear spring δ* = τ* / K, q̇ being the low-passed difference of q. Allocates.
 [[nodiscard]] JointFeedback impedance_feedback(const DeflectionController& controller,
                                                const JointImpedance::Gains& gains,
                                                double speed_cutoff_Hz);

@@ -11,8 +11,8 @@ namespace torsio {
 namespace {
 
 constexpr int kGrid = 2000;
-constexpr double kLowestShare = 1e-5;  // of the Nyquist frequency
-/// Above 1, for modes that nothing moves: a joint that stays where it stands.
+constexpr double kLowestShare = 1e-5;  // share of the Nyquist frequency
+/// Tolerance above 1 for modes that nothing excites: a joint that remains at its position.
 constexpr double kStandingStill = 1e-7;
 
 /// Where `value` changes its sign between two frequencies, by bisection.

@@ -45,16 +45,17 @@ double departure_rad(const EstimatorSettings& settings, double max_departure) {
                                     : std::numeric_limits<double>::infinity();
 }
 
-/// Where the torque stands among the raw inputs of an inverse model.
+/// Index of the torque among the raw inputs of an inverse model.
 std::size_t torque_place(const Estimator& estimator) {
   if (estimator.settings().target != kDeflection)
     refuse(fmt::format("a model whose target is {}", kDeflection),
            fmt::format("the target '{}'", estimator.settings().target));
   for (const std::string& channel : estimator.settings().zeroed_channels)
     if (channel == "gear_angle_rad" || channel == "joint_angle_rad" || channel == kDeflection)
-      refuse(
-          "a deflection as it is measured", fmt::format("one behind the zero of {}", channel),
-          "Train it without zero rules for the angles, or train the torque, which runs backwards.");
+      refuse("a deflection as it is measured",
+             fmt::format("one relative to the zero of {}", channel),
+             "Train it without zero rules for the angles, or train a model of the torque, which "
+             "can be inverted.");
   const auto place = std::ranges::find(estimator.raw_inputs(), kTorque);
   if (place == estimator.raw_inputs().end())
     refuse(fmt::format("a model with {} among its inputs", kTorque),
@@ -87,7 +88,7 @@ void ModelInverse::reset() noexcept {
   last_rad_ = 0.0;
 }
 
-void ModelInverse::remember(Features features) noexcept {
+void ModelInverse::store(Features features) noexcept {
   if (!std::isfinite(model_.step(features).value)) model_.reset();
 }
 
@@ -126,7 +127,7 @@ Estimate ModelInverse::guarded(double torque_Nm, Features features) noexcept {
 }
 
 Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcept {
-  if (is_asked_) remember(asked_);
+  if (is_asked_) store(asked_);
   is_asked_ = false;
   follows_answer_ = false;
   const detail::EstimatorCore::Conditioned input = core_.condition(inputs_.from(sample));
@@ -135,7 +136,7 @@ Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcep
             .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};
   if (input.restarted) model_.reset();
   const bool has_state = !model_.state().empty();
-  if (is_stepped_ && !has_state) remember(input.features);
+  if (is_stepped_ && !has_state) store(input.features);
   Estimate answer = guarded(torque_Nm, input.features);
   zero_rad_ = sample.spring_deflection_rad() - input.features.front();
   if (has_state) {

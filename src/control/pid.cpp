@@ -95,8 +95,8 @@ Pid::Output Pid::step(double reference, double measurement, double feed_forward)
   const double terms =
       output.proportional + output.integral + output.derivative + output.feed_forward;
   if (is_starting_) transfer_.add(last_.command - terms);
-  output.handover = transfer_.step();
-  const double wanted = terms + output.handover;
+  output.transfer = transfer_.step();
+  const double wanted = terms + output.transfer;
   if (!std::isfinite(wanted)) {
     start(last_.command);
     return hold();

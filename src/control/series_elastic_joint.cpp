@@ -118,7 +118,7 @@ void require_stable(std::string_view place, const LinearSystem& loop, JointOutpu
 Passivity passivity(const SeriesElasticJoint& joint, const JointFeedback& feedback) {
   joint.check();
   constexpr int kGrid = 1000;
-  constexpr double kLowestShare = 1e-5;  // of the Nyquist frequency
+  constexpr double kLowestShare = 1e-5;  // share of the Nyquist frequency
   const Impedance impedance{joint, feedback};
   const double highest_rad_s = std::numbers::pi * feedback.deflection.sample_rate_Hz();
   Passivity found = {.passive_to_rad_s = highest_rad_s};

@@ -85,7 +85,7 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
                    .integral_A = loop.integral,
                    .derivative_A = loop.derivative,
                    .feed_forward_A = loop.feed_forward,
-                   .transfer_A = loop.handover,
+                   .transfer_A = loop.transfer,
                    .is_limited = loop.is_limited,
                    .inverse = wanted_rad.fault,
                    .fault = is_refused_ ? Fault::input_not_finite : loop.fault};
@@ -101,7 +101,7 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
   if (observer_)
     output.observer_A = observer_->step(applied_A_, sample.motor_angle_rad, deflection_rad);
   const double terms_A = output.rate_feed_forward_A + output.friction_A + output.observer_A;
-  // The loop itself goes on from the current that was applied; the rest comes in slowly.
+  // The loop itself continues from the current that was applied; the other terms fade in.
   if (is_returning_) transfer_.add(-terms_A);
   is_returning_ = false;
   const double fading_A = transfer_.step();

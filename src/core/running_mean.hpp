@@ -23,7 +23,7 @@ class RunningMean {
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
   /// NaN of no value.
   [[nodiscard]] double mean() const noexcept { return count_ == 0 ? kNotMeasured : mean_; }
-  /// Of one value; NaN of fewer than two.
+  /// Standard deviation of one value; NaN for fewer than two.
   [[nodiscard]] double std_dev() const noexcept {
     return count_ < 2 ? kNotMeasured : std::sqrt(squares_ / static_cast<double>(count_ - 1));
   }

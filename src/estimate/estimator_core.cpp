@@ -17,7 +17,7 @@
 namespace torsio::detail {
 namespace {
 
-/// An error bar that says something; NaN for one that does not.
+/// An error bar that is positive and finite; NaN for any other.
 double evidence(double std_dev) noexcept {
   return std::isfinite(std_dev) && std_dev > 0.0 ? std_dev : kNotMeasured;
 }
@@ -189,7 +189,7 @@ Estimate EstimatorCore::apply_guards(Features features, const Estimate& raw_esti
   }
   out.novelty = raw_estimate.novelty;
   if (!unset_zeros_.empty()) {
-    // Off by an unknown amount, it says nothing that a channel seems to be outside its range.
+    // With an unknown zero, the range of a channel cannot be checked.
     if (out.fault != Fault::warming_up) out.fault = Fault::zero_not_set;
     out.std_dev = kNotMeasured;
   }

@@ -45,7 +45,7 @@ detail::JointInputs::JointInputs(const std::vector<std::string>& raw_inputs,
     throw Error({.place = "torque estimator",
                  .expected = "a model whose target is a torque in Nm",
                  .found = fmt::format("the target '{}'", target),
-                 .advice = "Use an Estimator: it tells any target."});
+                 .advice = "Use an Estimator, which estimates any target."});
   for (const std::string& name : raw_inputs) {
     const auto* const channel = std::ranges::find(kJointChannels, name, &JointChannel::name);
     if (channel == kJointChannels.end())

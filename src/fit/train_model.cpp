@@ -70,10 +70,11 @@ void refuse_constant_target(const TrainingData& data) {
   throw Error({.place = data.target,
                .expected = "a target that changes",
                .found = fmt::format("{} in every training sample", lowest),
-               .advice = "Is the sensor connected? torsio check says more."});
+               .advice = "Is the sensor connected? torsio check reports details."});
 }
 
-/// An inverse's target is compared with the measured deflection, and nobody tells it these zeros.
+/// An inverse's target is compared with the measured deflection, and its estimator does not receive
+/// these zeros.
 void refuse_zeros_after_an_inverse(const TrainingData& data, const FeaturePipeline& pipeline,
                                    const std::vector<ZeroRule>& zeros) {
   if (data.target != "spring_deflection_rad" ||
@@ -82,10 +83,11 @@ void refuse_zeros_after_an_inverse(const TrainingData& data, const FeaturePipeli
   for (const ZeroRule& zero : zeros)
     if (zero.channel == "gear_angle_rad" || zero.channel == "joint_angle_rad" ||
         zero.channel == data.target)
-      throw Error({.place = data.target,
-                   .expected = "a target as it is measured, of an inverse that takes torque_Nm",
-                   .found = fmt::format("a zero: rule for {}", zero.channel),
-                   .advice = "Take the rule away, or train the torque, which runs backwards."});
+      throw Error(
+          {.place = data.target,
+           .expected = "a target as it is measured, of an inverse that takes torque_Nm",
+           .found = fmt::format("a zero: rule for {}", zero.channel),
+           .advice = "Remove the rule, or train a model of the torque, which can be inverted."});
 }
 
 }  // namespace
@@ -149,7 +151,8 @@ TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std:
 
 TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                          const FitContext& context) {
-  // A wrong setting or records that disagree are told before the data are run through the filters.
+  // A wrong setting or records that disagree are reported before the data are run through the
+  // filters.
   const FamilyInfo& family = find_family(choice.family);
   (void)Options(family.options, choice.options);
   (void)training_zeros(dataset);

@@ -23,7 +23,7 @@ constexpr std::size_t kRows = 8;
 constexpr std::size_t kRows = 4;
 #endif
 
-/// Where the left factor's element (row, k) stands: values[row * row_stride + k * step].
+/// Position of the left factor's element (row, k): values[row * row_stride + k * step].
 struct Left {
   const float* values;
   std::size_t row_stride;
@@ -147,7 +147,7 @@ void pack_columns(const float* values, std::size_t stride, std::size_t rows, std
     const float* from = values + j;
     if (width == kWidth) {
       for (std::size_t k = 0; k < rows; ++k, to += kWidth, from += stride)
-        std::memcpy(to, from, kWidth * sizeof(float));  // of known size: no call
+        std::memcpy(to, from, kWidth * sizeof(float));  // size known at compile time: no call
       continue;
     }
     for (std::size_t k = 0; k < rows; ++k, to += kWidth, from += stride)

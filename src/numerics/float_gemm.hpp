@@ -6,7 +6,7 @@
 
 namespace torsio::float_gemm {
 
-/// Columns stand in panels of this many; results are written in whole panels.
+/// Columns are stored in panels of this many; results are written in whole panels.
 inline constexpr std::size_t kPanel = 16;
 
 constexpr std::size_t in_panels(std::size_t columns) {

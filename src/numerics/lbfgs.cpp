@@ -22,7 +22,7 @@ double dot(const Vector& a, const Vector& b) {
 
 struct Pair {
   Vector step;
-  Vector change;  ///< of the gradient
+  Vector change;  ///< change of the gradient
 };
 
 class Minimiser {

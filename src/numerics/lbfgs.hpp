@@ -11,7 +11,7 @@ struct LbfgsSettings {
   std::size_t iterations = 100;      ///< at most
   double tolerance = 1e-9;           ///< ends when an iteration gains less of |f|
   double gradient_tolerance = 1e-5;  ///< ends when no free component is larger
-  double longest_step = 2.0;         ///< of any variable
+  double longest_step = 2.0;         ///< limit for each variable
   double first_step = 1.0;           ///< length of the first trial, at most
   std::vector<double> lowest = {};   ///< bounds, one a variable, or empty
   std::vector<double> highest = {};

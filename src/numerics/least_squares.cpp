@@ -15,7 +15,7 @@ constexpr double kDependent = 1e-10;
 struct Factorised {
   Eigen::HouseholderQR<Eigen::MatrixXd> qr;
   std::vector<std::size_t> kept;
-  std::vector<double> lengths;  ///< of the kept columns before scaling
+  std::vector<double> lengths;  ///< lengths of the kept columns before scaling
   std::vector<std::size_t> dropped;
 };
 
@@ -42,7 +42,8 @@ Factorised factorise(const Matrix& matrix) {
       result.dropped.push_back(j);
     }
   }
-  // Behind a dependent column the factors mean nothing, so each one found starts the work again.
+  // After a dependent column the factors are meaningless, so the factorisation restarts for each
+  // one found.
   while (true) {
     if (matrix.rows < result.kept.size())
       throw Error({.problem = "too few samples to fit",

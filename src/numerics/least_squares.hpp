@@ -9,7 +9,7 @@
 namespace torsio {
 
 struct LeastSquares {
-  std::vector<double> coefficients;  ///< one a column, 0 for a dropped one
+  std::vector<double> coefficients;  ///< one per column, 0 for a dropped one
   std::vector<std::size_t> dropped;  ///< columns that depend linearly on those before them
 };
 

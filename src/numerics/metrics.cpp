@@ -25,7 +25,7 @@ void MetricsAccumulator::add(double value, double target) noexcept {
   ++samples_;
   const auto count = static_cast<double>(samples_);
   square_sum_ += error * error;
-  // A model that told NaN must show as NaN, which std::max would swallow.
+  // A model whose output was NaN must have the metric NaN, which std::max would suppress.
   max_abs_ = std::isnan(error) ? error : std::max(max_abs_, std::abs(error));
   update(std::abs(error), count, mean_abs_, abs_spread_);
   update(target, count, mean_target_, target_spread_);

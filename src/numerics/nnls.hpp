@@ -30,7 +30,7 @@ struct NormalEquations {
                                                std::span<const double> target);
 
 struct NonNegativeFit {
-  std::vector<double> coefficients;  ///< one a column
+  std::vector<double> coefficients;  ///< one per column
   std::vector<std::size_t> dropped;  ///< free columns that depend linearly on free ones before them
   bool has_converged = false;        ///< false: the active sets went in circles; the best one found
 };
@@ -40,7 +40,7 @@ struct NonNegativeFit {
 /// passive set. Columns are scaled to length 1; one that the passive columns explain to 1e-10 of its
 /// squared length stays out, so a solution always exists. Deterministic. Working on AᵀA costs half
 /// the digits: coefficients are good to about 1e-16 times the squared condition number.
-/// @param is_free one a column
+/// @param is_free one per column
 [[nodiscard]] NonNegativeFit non_negative_least_squares(const NormalEquations& equations,
                                                         std::span<const std::uint8_t> is_free);
 

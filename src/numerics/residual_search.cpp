@@ -29,7 +29,7 @@ double typical_of(std::span<const double> typical, std::span<const double> theta
   return theta[i] != 0.0 ? std::abs(theta[i]) : 1.0;
 }
 
-/// J by central differences, one-sided where the other side cannot be told.
+/// J by central differences, one-sided where the other side cannot be computed.
 bool differentiate(const ResidualProblem& problem, std::span<const double> theta,
                    std::span<const double> at_theta, std::span<const double> typical,
                    std::span<double> jacobian) {
@@ -90,7 +90,7 @@ class Residuals : public ceres::CostFunction {
   std::size_t parameters_;
 };
 
-/// Tells the listener of each iteration; what it throws comes out after Ceres has returned.
+/// Reports each iteration to `Progress`; its exceptions are thrown again after Ceres has returned.
 class Reporter : public ceres::IterationCallback {
  public:
   explicit Reporter(const SearchOptions& options) : options_(options) {}
@@ -149,8 +149,8 @@ std::vector<int> on_bounds(const std::vector<double>& theta, const SearchOptions
   return held;
 }
 
-/// What a search meets is in its summary; Ceres would also tell the terminal. glog has one level for the program,
-/// which is put back behind the last of the searches that run.
+/// The messages of a search are in its summary; Ceres would also print them to the terminal. glog
+/// has one level for the program, which is restored after the last of the searches that run.
 class SilentCeres {
  public:
   SilentCeres() {
@@ -170,7 +170,7 @@ class SilentCeres {
   static inline int before = 0;
 };
 
-/// Nothing if r cannot be told at the start.
+/// Nothing if r cannot be computed at the start.
 std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<double> theta,
                                    const SearchOptions& options) {
   ceres::Problem ceres_problem;
@@ -193,7 +193,8 @@ std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<d
   const SilentCeres silent;
   ceres::Solve(settings, &ceres_problem, &summary);
   reporter.rethrow();
-  // Steps that a bound cuts short stop early: what lies on one is held, and the rest goes on.
+  // Steps that a bound shortens end the search early: parameters on a bound are held, and the
+  // search continues with the others.
   if (const std::vector<int> held = on_bounds(theta, options);
       !held.empty() && held.size() < theta.size()) {
     ceres_problem.SetManifold(theta.data(),
@@ -208,7 +209,7 @@ std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<d
 }
 
 [[noreturn]] void refuse_start() {
-  throw Error({.problem = "the model runs away at the start of the search",
+  throw Error({.problem = "the model diverges at the start of the search",
                .expected = "a start at which it stays finite",
                .advice = "Check units and scale of the inputs."});
 }

@@ -11,7 +11,8 @@
 
 namespace torsio {
 
-/// Tells `progress`, which must outlive it, of a part of the work as of all of it, from `first` to `last`.
+/// Reports progress of a part of the work to `progress`, which must outlive it, as progress of the
+/// whole from `first` to `last`.
 [[nodiscard]] inline Progress share_of(const Progress& progress, double first, double last) {
   if (!progress) return {};
   return [&progress, first, last](double share, std::string_view doing) {
@@ -19,10 +20,10 @@ namespace torsio {
   };
 }
 
-/// Progress of work on several threads, told by one of them at a time.
+/// Progress of work on several threads, reported by one of them at a time.
 class SharedProgress {
  public:
-  /// The work's units are told as fractions of [begin, end).
+  /// The work's units are reported as fractions of [begin, end).
   SharedProgress(const Progress& progress, double begin, double end, std::size_t units,
                  std::string doing)
       : progress_(progress),

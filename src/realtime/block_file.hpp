@@ -17,7 +17,7 @@ class BlockFile {
   BlockFile(const BlockFile&) = delete;
   BlockFile& operator=(const BlockFile&) = delete;
 
-  /// False if the disk did not take all of it; `trouble` then says why.
+  /// False if the disk did not take all of it; `trouble` then contains the reason.
   bool append(std::span<const std::byte> block);
   bool sync();
   void close();
@@ -27,7 +27,7 @@ class BlockFile {
   void note(int code);
 
   int descriptor_ = -1;
-  std::int64_t size_ = 0;  ///< of the blocks that are whole
+  std::int64_t size_ = 0;  ///< size of the complete blocks
   std::string trouble_;
 };
 

@@ -13,7 +13,8 @@
 namespace torsio {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the blocks are written as they stand");
+static_assert(std::endian::native == std::endian::little,
+              "the blocks are written in the machine's byte order");
 
 constexpr std::string_view kMagic = "TORSIOB1";
 constexpr std::uint32_t kVersion = 1;
@@ -28,7 +29,7 @@ std::uint32_t crc_of(std::span<const std::byte> kind_and_size, std::span<const s
   return static_cast<std::uint32_t>(add(add(0, kind_and_size), payload));
 }
 
-/// Builds a block behind the room for its seal.
+/// Builds a block after the space for its seal.
 class BlockBuilder {
  public:
   explicit BlockBuilder(std::vector<std::byte>& bytes) : bytes_(bytes) {

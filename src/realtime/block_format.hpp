@@ -11,11 +11,11 @@
 
 namespace torsio {
 
-// The format of docs/realtime.md, little-endian: a file is a row of sealed blocks, the first one a
-// header, the last one an end unless the process was killed.
+// The format of docs/realtime.md, little-endian: a file is a sequence of sealed blocks, the first
+// one a header, the last one an end unless the process was killed.
 //
 //     seal     8 bytes magic, u32 kind, u32 bytes of payload, u32 CRC-32 of kind, size and payload
-//     header   u32 version, u32 channels, f64 period in s, the names, each behind its u32 length
+//     header   u32 version, u32 channels, f64 period in s, the names, each after its u32 length
 //     frames   u64 dropped, u32 frames, u32 channels, i64 tick each, f64 values row by row
 //     end      u64 dropped, u64 frames in the file
 
@@ -50,7 +50,7 @@ struct Seal {
 [[nodiscard]] std::optional<Seal> read_seal(std::span<const std::byte> bytes) noexcept;
 [[nodiscard]] bool is_whole(const Seal& seal, std::span<const std::byte> payload) noexcept;
 
-/// Nothing if the payload, although whole, does not say what its kind should.
+/// Nothing if the payload is complete but does not match its kind.
 [[nodiscard]] std::optional<RecordingHeader> read_header(std::span<const std::byte> payload);
 [[nodiscard]] std::optional<RecordingEnd> read_end(std::span<const std::byte> payload);
 /// Appends to the block.

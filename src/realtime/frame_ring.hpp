@@ -13,7 +13,7 @@ namespace torsio {
 /// Frames that belong together, as a recording keeps them: one row of values to each tick.
 struct FrameBlock {
   std::vector<std::int64_t> ticks;
-  std::vector<double> values;  ///< row-major: ticks.size() rows of one value a channel
+  std::vector<double> values;  ///< row-major: ticks.size() rows of one value per channel
   std::uint64_t dropped = 0;   ///< frames lost since the start, up to the last one in here
 
   void clear() noexcept {
@@ -54,7 +54,7 @@ class FrameRing {
   std::size_t mask_;
   std::vector<Stamp> stamps_;
   std::vector<double> values_;
-  alignas(kCacheLine) std::atomic<std::uint64_t> head_{0};  ///< frames that were ever put in
+  alignas(kCacheLine) std::atomic<std::uint64_t> head_{0};  ///< frames ever inserted
   std::uint64_t tail_seen_ = 0;                             ///< by the filling thread
   std::int64_t last_tick_;
   std::atomic<std::uint64_t> dropped_{0};

@@ -21,7 +21,7 @@ LoopPrivileges::LoopPrivileges(const LoopOptions& options) {
   throw Error({.place = "real-time loop",
                .problem = "the operating system refuses " + grants_.refused,
                .advice = "Run it as root, or raise rtprio and memlock in "
-                         "/etc/security/limits.conf; docs/realtime.md tells more."});
+                         "/etc/security/limits.conf; see docs/realtime.md."});
 }
 
 LoopPrivileges::~LoopPrivileges() { give_back(); }
@@ -60,7 +60,7 @@ void LoopPrivileges::note_refusal(const char* what, int code) {
 [[gnu::noinline]] void touch_stack() noexcept {
   constexpr std::size_t kBytes = std::size_t{256} << 10;
   constexpr std::size_t kPage = 4096;
-  std::array<volatile char, kBytes> stack;  // NOLINT: what stands there does not matter
+  std::array<volatile char, kBytes> stack;  // NOLINT: its content is not used
   for (std::size_t at = 0; at < kBytes; at += kPage) stack[at] = 0;
 }
 

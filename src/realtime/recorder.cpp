@@ -24,7 +24,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t kMaxRingFrames = std::size_t{1} << 24;
 constexpr double kLongest_s = 3600.0;
 constexpr std::size_t kMaxBlockHeadBytes = 64;
-/// How often the writing thread looks into the ring: nobody wakes it, for that could block.
+/// How often the writing thread polls the ring: no thread wakes it, because that could block.
 constexpr auto kPoll = std::chrono::milliseconds(5);
 
 void check_channels(const std::vector<std::string>& channels) {

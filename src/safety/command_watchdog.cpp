@@ -54,7 +54,8 @@ CommandWatchdog::State CommandWatchdog::step(std::int64_t now_ns, const Command&
                                              Fault fault) noexcept {
   if (now_ns < last_ns_) stop_because(Reason::clock);
   last_ns_ = now_ns;
-  // The future feeds as little as the past: a command from there would stand for too long.
+  // A command from the future is as invalid as one from the past: it would remain valid for too
+  // long.
   const bool is_fresh =
       command.is_valid && detail::distance_ns(now_ns, command.written_ns) < timeout_ns_;
   if (state_ == State::waiting && is_fresh && command.written_ns > armed_ns_) {
@@ -62,7 +63,7 @@ CommandWatchdog::State CommandWatchdog::step(std::int64_t now_ns, const Command&
     reason_ = Reason::none;
     fed_ns_ = command.written_ns;
     well_ns_ = now_ns;
-    fault = Fault::none;  // of what was before
+    fault = Fault::none;  // faults before the start do not count
   } else if (state_ == State::running && is_fresh) {
     fed_ns_ = std::max(fed_ns_, command.written_ns);
   }

@@ -9,14 +9,14 @@
 
 namespace torsio {
 
-/// A signal between its last two samples, told by what has come so far.
+/// A signal between its last two samples, interpolated from the samples up to now.
 ///
 ///     u(t_k - (1 - s) h) = sum_j w_j(s) u_{k-j},   0 <= s <= 1
 ///
-/// w: the polynomial through the last `order` + 1 samples (Lagrange), or through as many as have
-/// come. Order 0 holds the sample before the last one, order 1 is a straight line, order 3 errs by
-/// at most 1/24 of the fourth power of the angle that a sine turns in one sample, times its
-/// amplitude. A sample is used as soon as it has come, none is waited for.
+/// w: the polynomial through the last `order` + 1 samples (Lagrange), or through as many as there
+/// are. Order 0 holds the sample before the last one, order 1 interpolates linearly, order 3 has an
+/// error of at most 1/24 of the fourth power of the angle that a sine turns in one sample, times
+/// its amplitude. A sample is used as soon as it is available, without delay.
 class CausalPolynomial {
  public:
   static constexpr std::size_t kHighestOrder = 5;
@@ -31,7 +31,7 @@ class CausalPolynomial {
   [[nodiscard]] bool is_started() const noexcept { return known_ > 0; }
 
  private:
-  /// Of a polynomial through `samples` samples: places x samples, the newest first.
+  /// Weights of a polynomial through `samples` samples: places x samples, the newest first.
   [[nodiscard]] std::vector<double> weights_through(std::size_t samples) const;
 
   std::size_t order_;

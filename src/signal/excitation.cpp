@@ -89,7 +89,7 @@ Triangle::Triangle(const Parameters& parameters, double sample_rate_Hz)
 
 double Triangle::step() noexcept {
   const double turns = clock_.next_s() * parameters_.frequency_Hz;
-  // The signal starts a quarter of a turn behind its lowest point.
+  // The signal starts a quarter of a period after its lowest point.
   const double from_lowest = turns + 0.25 - std::floor(turns + 0.25);
   return parameters_.amplitude * (1.0 - std::abs(4.0 * from_lowest - 2.0));
 }
@@ -181,7 +181,7 @@ QuasiPeriodic::QuasiPeriodic(const Parameters& parameters, double sample_rate_Hz
   };
   require_spread("amplitude spread", parameters.amplitude_spread);
   require_spread("period spread", parameters.period_spread);
-  // Of the shortest period: at most three spreads, which leave a tenth of it.
+  // The frequency of the shortest period: at most three spreads, which leave a tenth of it.
   require_frequency("quasi-periodic",
                     parameters.frequency_Hz / (1.0 - 3.0 * parameters.period_spread),
                     sample_rate_Hz);

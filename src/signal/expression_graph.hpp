@@ -42,7 +42,7 @@ struct Node {
   double parameter = 0.0;   ///< value of a constant, cut-off in Hz, lag in samples
 };
 
-/// What an expression says about motion: nothing (constants), a rate, or something else.
+/// The kind of motion that an expression depends on: none (constants), a rate, or something else.
 enum class Motion : std::uint8_t { none, rate, other };
 
 /// All expressions of a pipeline as one graph: equal sub-expressions are one node, operations on

@@ -88,7 +88,7 @@ class ExpressionParser::Reader {
   struct Operand {
     std::uint32_t node = 0;
     std::size_t start = 0;
-    std::string_view si_unit = {};  // of a number that was written with one
+    std::string_view si_unit = {};  // unit of a number that was written with one
   };
 
   [[noreturn]] void fail(std::size_t at, std::string expected, std::string found,
@@ -226,8 +226,7 @@ class ExpressionParser::Reader {
     const std::string_view suffix = take_word();
     const Unit* const unit = find_unit(suffix);
     if (unit == nullptr)
-      fail(unit_start, "a unit or an operator behind the number",
-           fmt::format("'{}'", shown(suffix)),
+      fail(unit_start, "a unit or an operator after the number", fmt::format("'{}'", shown(suffix)),
            "a product needs its '*'; the units are " + known_unit_list());
     return finite({graph_.constant(unit->si(value)), start, unit->si_suffix});
   }
@@ -294,7 +293,7 @@ class ExpressionParser::Reader {
     return value + 0.0;  // no negative zero
   }
 
-  // The argument's text; the reader stands behind the call's closing parenthesis.
+  // The argument's text; the reader is after the call's closing parenthesis.
   std::string as_written(const Operand& argument) const {
     std::string_view written = text_.substr(argument.start, position_ - 1 - argument.start);
     while (is_space(written.back())) written.remove_suffix(1);

@@ -26,7 +26,7 @@ class ExpressionParser {
   ExpressionParser(ExpressionGraph& graph, std::span<const ChannelDefinition> definitions,
                    std::optional<double> sample_rate_Hz);
 
-  /// The node of an expression; `title` says in messages what it is: "input". @throws Error
+  /// The node of an expression; `title` is its name in messages: "input". @throws Error
   std::uint32_t parse(std::string_view text, std::string_view title);
 
   /// Parses the definitions that no expression has used so far, for their mistakes. @throws Error

@@ -92,8 +92,8 @@ JointMove::JointMove(const Parameters& parameters, double sample_rate_Hz) : cloc
   if (parameters.through == Through::pass) {
     for (std::size_t i = 1; i + 1 < waypoints.size(); ++i) {
       const double before = (waypoints[i] - waypoints[i - 1]) / times[i - 1];
-      const double behind = (waypoints[i + 1] - waypoints[i]) / times[i];
-      if (before * behind > 0.0) speeds[i] = 0.5 * (before + behind);
+      const double after = (waypoints[i + 1] - waypoints[i]) / times[i];
+      if (before * after > 0.0) speeds[i] = 0.5 * (before + after);
     }
   }
   double stretch = 1.0;

@@ -12,7 +12,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kRounding = 1e-12;  // share of the mean that is no variation
+constexpr double kRounding = 1e-12;  // share of the mean below which a spread counts as 0
 
 }  // namespace
 

@@ -31,7 +31,7 @@ DeflectionController::Settings settings_of(const char* actuator) {
 }
 
 // With P, D and feed-forward alone: J δ'' + (b + D) δ' + (K + P) δ = (K + P) δ*.
-TEST(DeflectionController, AnswersAStepAsTheSecondOrderSystemDoes) {
+TEST(DeflectionController, FollowsAStepAsTheSecondOrderSystemDoes) {
   constexpr double kFast_Hz = 100'000.0;
   constexpr double kStep_rad = 1e-3;
   DeflectionController::Settings settings = settings_of("dfki-50");
@@ -76,7 +76,7 @@ TEST(DeflectionController, LetsAFreeJointComeToRestAfterAPush) {
       max_J = std::max(max_J, joint.energy_J());
     }
     EXPECT_GT(max_J, 0.0);
-    // The drive's friction, which the integral makes up for, weighs like inertia: it coasts long.
+    // The drive's friction, which the integral compensates, acts like inertia: it coasts long.
     EXPECT_LT(joint.energy_J(), 0.2 * max_J) << actuator;
   }
 }
@@ -107,7 +107,7 @@ TEST(DeflectionController, CutsTheDeflectionAndTheCurrent) {
   EXPECT_TRUE(output.is_limited);
 }
 
-TEST(DeflectionController, KeepsTheLastGoodWishAndFadesWithoutAMeasurement) {
+TEST(DeflectionController, KeepsTheLastFiniteReferenceAndFadesWithoutAMeasurement) {
   const auto settings = settings_of("dfki-50");
   DeflectionController disturbed(settings, kRate_Hz);
   DeflectionController sound(settings, kRate_Hz);
@@ -123,10 +123,10 @@ TEST(DeflectionController, KeepsTheLastGoodWishAndFadesWithoutAMeasurement) {
     EXPECT_NEAR(faded.command, last_A * std::exp(-0.05), 1e-12);
     last_A = faded.command;
   }
-  EXPECT_NEAR(disturbed.step(0.01, 0.001).command, last_A, 1e-9) << "goes on from there";
+  EXPECT_NEAR(disturbed.step(0.01, 0.001).command, last_A, 1e-9) << "continues from there";
 }
 
-TEST(DeflectionController, RefusesGainsThatAreUnstableAndSaysTheMargin) {
+TEST(DeflectionController, RefusesGainsThatAreUnstableAndStatesTheMargin) {
   const auto refusal = [](auto change) {
     DeflectionController::Settings settings = settings_of("dfki-50");
     change(settings);
@@ -146,7 +146,7 @@ TEST(DeflectionController, RefusesGainsThatAreUnstableAndSaysTheMargin) {
   EXPECT_NE(refusal([](auto& s) { s.rate_cutoff_Hz = 500.0; }), "");
 }
 
-// 100 cases of 10^4 ticks: any wish, any measurement, gains changed on the way.
+// 100 cases of 10^4 ticks: any reference, any measurement, gains changed during the run.
 RC_GTEST_PROP(DeflectionController, KeepsToItsLimitsAndChangesItsGainsWithoutABump, ()) {
   auto settings = settings_of(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"));
   settings.anti_windup =

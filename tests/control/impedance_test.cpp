@@ -66,11 +66,11 @@ TEST(JointImpedance, MakesAFreeJointSwingAsItsSpringAndDamperDo) {
   }
 }
 
-TEST(JointImpedance, FadesWithoutAMeasurementAndKeepsTheLastGoodWish) {
+TEST(JointImpedance, FadesWithoutAMeasurementAndKeepsTheLastFiniteReference) {
   JointImpedance impedance({.gains = {.stiffness_Nm_rad = 50.0}}, kRate_Hz);
   EXPECT_EQ(impedance.step({.angle_rad = kNaN}, {.angle_rad = 0.1, .speed_rad_s = 0.0}).torque_Nm,
             0.0)
-      << "no wish yet";
+      << "no reference yet";
   JointImpedance estimate({.gains = {.stiffness_Nm_rad = 50.0}}, kRate_Hz);
   (void)estimate.step({.angle_rad = 0.3}, {.angle_rad = 0.1, .speed_rad_s = 0.0});
   const auto refused = estimate.step({.angle_rad = 0.5, .torque_Nm = kInfinity},
@@ -94,11 +94,11 @@ TEST(JointImpedance, FollowsTheJointWhileItsGainsMove) {
         impedance.step({.angle_rad = 0.2}, {.angle_rad = 1e-4 * n, .speed_rad_s = 0.0});
     torque_Nm = output.torque_Nm;
   }
-  // By the handover 0.1 s behind: its share of the stiffness at the angles then.
+  // The transfer delays the gains by 0.1 s: that share of the stiffness at the present angles.
   EXPECT_NEAR(torque_Nm, 120.0 * 0.1 - 0.1 * 100.0 * 0.11, 0.15);
 }
 
-// At equal conditions; what the joint and the wish do by themselves is no bump.
+// Under equal conditions; changes due to the joint and the reference are not a bump.
 RC_GTEST_PROP(JointImpedance, ChangesItsGainsWithoutABump, ()) {
   JointImpedance impedance({.torque_Nm = 5.0}, kRate_Hz);
   Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
@@ -107,7 +107,7 @@ RC_GTEST_PROP(JointImpedance, ChangesItsGainsWithoutABump, ()) {
                                                  .speed_rad_s = random.normal()};
     const JointImpedance::State state = {.angle_rad = 0.1 * random.normal(), .speed_rad_s = 0.0};
     double last_Nm = 0.0;
-    // Until the handover of the change before has gone.
+    // Until the transfer of the previous change has decayed.
     for (int k = 0; k < 3000; ++k) last_Nm = impedance.step(reference, state).torque_Nm;
     RC_ASSERT(impedance.set_gains(
         {.stiffness_Nm_rad = 100.0 * random.uniform(), .damping_Nms_rad = 5.0 * random.uniform()}));
@@ -186,9 +186,9 @@ TEST(TubeImpedance, HasTheCurrentOfPaper004) {
   const double twist_rad = 0.02 / 2.0 - 0.004;
   EXPECT_DOUBLE_EQ(output.twist_rad, twist_rad);
   EXPECT_NEAR(output.current_A, 5.0 * (15.0 * 0.002 - twist_rad) / 0.08, 1e-12);
-  auto behind = tube_settings(TubeImpedance::kHigh);
-  behind.twist = TubeImpedance::Twist::tube_and_gear;
-  EXPECT_DOUBLE_EQ(TubeImpedance(behind, kRate_Hz).step(0.0, 0.0, angles).twist_rad,
+  auto with_gear = tube_settings(TubeImpedance::kHigh);
+  with_gear.twist = TubeImpedance::Twist::tube_and_gear;
+  EXPECT_DOUBLE_EQ(TubeImpedance(with_gear, kRate_Hz).step(0.0, 0.0, angles).twist_rad,
                    0.01 - 51.0 * 0.01);
 }
 
@@ -250,7 +250,7 @@ TEST(TubeImpedance, GoesOnFromWhereItFadedTo) {
 }
 
 // docs/faults.md 13: without a command there is no reference; the angle 0 would be far away.
-TEST(TubeImpedance, GivesNoCurrentBeforeItsFirstGoodWish) {
+TEST(TubeImpedance, GivesNoCurrentBeforeItsFirstFiniteReference) {
   TubeImpedance impedance(tube_settings(TubeImpedance::kHigh), kRate_Hz);
   const TubeImpedance::Angles angles = {
       .rotor_rad = 0.5 * 102.0, .middle_rad = 0.5 * 51.0, .joint_rad = 0.5};
@@ -259,7 +259,8 @@ TEST(TubeImpedance, GivesNoCurrentBeforeItsFirstGoodWish) {
     EXPECT_EQ(output.current_A, 0.0);
     EXPECT_EQ(output.fault, Fault::input_not_finite);
   }
-  EXPECT_NEAR(impedance.step(0.51, 0.0, angles).current_A, 0.0, 1e-9) << "handed over from none";
+  EXPECT_NEAR(impedance.step(0.51, 0.0, angles).current_A, 0.0, 1e-9)
+      << "transferred from no current";
   impedance.reset();
   EXPECT_EQ(impedance.step(kNaN, 0.0, angles).current_A, 0.0);
 }

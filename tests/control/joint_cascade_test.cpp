@@ -59,7 +59,7 @@ TEST(JointCascade, GoesToAPositionAndHoldsItUnderLoad) {
 }
 
 // P on position over P on speed: q'' + w q' + w k_q q = w k_q q*, a second-order system.
-TEST(JointCascade, AnswersAStepAsTheSecondOrderSystemDoes) {
+TEST(JointCascade, FollowsAStepAsTheSecondOrderSystemDoes) {
   JointCascade::Settings settings = settings_of("dfki-50");
   settings.drive.current_time_constant_s = 1e-6;
   settings.limits.max_unmeasured_load_Nm = 0.0;
@@ -126,7 +126,7 @@ TEST(JointCascade, CarriesTheLoadOnWhenAPositionBecomesASpeed) {
   const JointCascade::Settings settings = settings_of("dfki-50");
   JointCascade cascade(settings, kRate_Hz);
   RigidJoint joint(settings.drive);
-  // The cascade is not told of it: only its integral knows.
+  // The cascade does not measure it: only its integral compensates it.
   const auto hold = [&](const JointReference& reference, int ticks) {
     for (int n = 0; n < ticks; ++n) {
       const auto output = cascade.step(reference, joint.state(0.0));
@@ -344,9 +344,9 @@ JointReference finite_reference(Random& random) {
   return reference;
 }
 
-// 100 cases of 10^4 ticks, each ten steps of the plant: any modes, any commands, gains changed on
-// the way, loads up to what the limits were told of. A fifth of the unknown load is left for the
-// known one, which the current follows late.
+// 100 cases of 10^4 ticks, each ten steps of the plant: any modes, any commands, gains changed
+// during the run, loads up to those of the limits' settings. A fifth of the unknown load is
+// reserved for the known one, which the current follows late.
 RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
   const JointCascade::Settings settings = any_settings();
   const JointCascade::Limits& limits = settings.limits;
@@ -388,9 +388,9 @@ RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
   }
 }
 
-// The worst that the limits were told of: a load that pushes into the limit for ever, and a current
-// that heats the winding until no more than the rated one is left to brake with.
-TEST(JointCascade, StopsAtItsLimitWithAHotWindingUnderTheWholeLoadThatItWasToldOf) {
+// The worst case of the limits' settings: a load that pushes into the limit for ever, and a current
+// that heats the winding until only the rated one is left to brake with.
+TEST(JointCascade, StopsAtItsLimitWithAHotWindingUnderTheWholeLoadOfItsSettings) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
     for (const double share : {0.3, 0.6, 0.9}) {
       JointCascade::Settings settings = settings_of(actuator);

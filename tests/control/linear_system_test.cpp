@@ -27,7 +27,7 @@ Matrix matrix(std::size_t rows, std::size_t columns, std::vector<double> values)
   return result;
 }
 
-/// K w^2 / (s^2 + 2 z w s + w^2) behind a hold.
+/// K w^2 / (s^2 + 2 z w s + w^2) after a hold.
 LinearSystem oscillator(double gain, double rad_s, double damping) {
   return LinearSystem::held(
       {matrix(2, 2, {0.0, 1.0, -rad_s * rad_s, -2.0 * damping * rad_s}),

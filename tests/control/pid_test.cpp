@@ -38,7 +38,7 @@ TEST(Pid, NamesTheTermsThatMakeUpItsCommand) {
   EXPECT_FALSE(output.is_limited);
 }
 
-TEST(Pid, DoesNotKickAtAStepOfTheReferenceUnlessAskedTo) {
+TEST(Pid, DoesNotKickAtAStepOfTheReferenceUnlessConfiguredTo) {
   Pid::Settings settings = {.gains = {.proportional = 1.0, .derivative = 1.0}};
   Pid of_measurement(settings, kRate_Hz);
   settings.derivative_of = Pid::DerivativeOf::error;
@@ -61,7 +61,7 @@ TEST(Pid, FiltersItsDerivative) {
 }
 
 // u = K_p e + K_i int e on the integrator y' = u: y'' + K_p y' + K_i y = K_p r' + K_i r.
-TEST(Pid, OnAnIntegratorAnswersAStepAsTheSecondOrderSystemDoes) {
+TEST(Pid, OnAnIntegratorFollowsAStepAsTheSecondOrderSystemDoes) {
   constexpr double kFrequency = 8.0;
   constexpr double kDamping = 0.6;
   Pid pid(
@@ -207,7 +207,7 @@ RC_GTEST_PROP(Pid, ChangesItsGainsWithoutABump, ()) {
   Pid unchanged = pid;
   const Pid::Gains gains = any_gains();
   RC_ASSERT(pid.set_gains(gains));
-  // The measurement goes on as it went: equal conditions, and the two differ by nothing.
+  // The measurement continues at its rate: equal conditions, and the two have equal outputs.
   const Pid::Output before = unchanged.step(reference, measurement + last_rate);
   const Pid::Output after = pid.step(reference, measurement + last_rate);
   const double drift = (settings.gains.proportional - gains.proportional) * last_rate;

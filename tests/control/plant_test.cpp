@@ -32,7 +32,7 @@ struct MeanErrors {
   double deflection_rad = 0.0;
 };
 
-/// Of a slow sine against a locked output.
+/// The mean errors for a slow sine with a locked output.
 MeanErrors mean_errors(const char* actuator, const TorqueLoopCore::Settings& settings) {
   const DataSheet sheet = data_sheet(actuator);
   Plant plant(plant_parameters(sheet));
@@ -54,8 +54,8 @@ MeanErrors mean_errors(const char* actuator, const TorqueLoopCore::Settings& set
   return mean;
 }
 
-// The observer makes up for the drive's friction, and the deflection follows; the torque does less,
-// because a line for an inverse does not know of the spring's own.
+// The observer compensates the drive's friction, and the deflection follows; the torque follows
+// less well, because a linear inverse does not contain the spring's own friction.
 TEST(TorqueController, FollowsATorqueOnEverySeriesElasticPlant) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
     TorqueLoopCore::Settings settings = {
@@ -72,7 +72,7 @@ TEST(TorqueController, FollowsATorqueOnEverySeriesElasticPlant) {
   }
 }
 
-// The bench's own loop integrates before it answers, which is a tick's share of the integral.
+// The bench's own loop integrates before its output, which is a tick's share of the integral.
 TEST(DeflectionController, IsTheLoopOfTheBenchWithinATicksIntegral) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
     const DataSheet sheet = data_sheet(actuator);
@@ -111,8 +111,8 @@ TEST(TubeImpedance, IsTheLoopOfTheBench) {
   }
 }
 
-// With a free joint behind the spring, and friction and gravity as loads that nobody measures but
-// for the spring's torque: the motor's side stays within its limits.
+// With a free joint after the spring, and friction and gravity as loads that only the spring's
+// torque measures: the motor's side stays within its limits.
 TEST(JointCascade, HoldsAPlantWithinItsLimits) {
   for (const char* actuator : {"dfki-50", "dfki-120"}) {
     const DataSheet sheet = data_sheet(actuator);

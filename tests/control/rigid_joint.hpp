@@ -7,7 +7,7 @@
 
 namespace torsio::test {
 
-/// A rotor behind its current loop, and what loads it: J N² q̈ = N k_t i − τ, i̇ = (i* − i) / T_i.
+/// A rotor after its current loop, and its load: J N² q̈ = N k_t i − τ, i̇ = (i* − i) / T_i.
 class RigidJoint {
  public:
   explicit RigidJoint(const Drive& drive) : drive_(drive) {}

@@ -43,7 +43,7 @@ class SpringJoint {
   [[nodiscard]] double joint_rad() const noexcept { return joint_rad_; }
   [[nodiscard]] double joint_speed_rad_s() const noexcept { return joint_speed_rad_s_; }
   [[nodiscard]] double spring_J() const noexcept { return 0.5 * torque_Nm() * deflection_rad(); }
-  /// Of rotor, spring and joint.
+  /// Energy of rotor, spring and joint.
   [[nodiscard]] double energy_J() const noexcept {
     return 0.5 * (parts_.drive.inertia() * speed_rad_s_ * speed_rad_s_ +
                   parts_.joint_inertia_kg_m2 * joint_speed_rad_s_ * joint_speed_rad_s_ +

@@ -78,7 +78,7 @@ Estimate settled(I& inverse, double torque_Nm, const JointSample& sample) {
   return inverse.step(torque_Nm, sample);
 }
 
-TEST(ModelInverse, OfALineIsTheLineTurnedRound) {
+TEST(ModelInverse, OfALinearModelIsItsLinearInverse) {
   ModelInverse inverse(deflection_and_rate(), test::example<Linear>());
   const Estimate found = settled(inverse, 12.5, wound(0.01));
   EXPECT_EQ(found.fault, Fault::none);
@@ -86,7 +86,7 @@ TEST(ModelInverse, OfALineIsTheLineTurnedRound) {
   EXPECT_NEAR(LinearInverse(600.0, 0.5).step(12.5, {}).value, found.value, 1e-12);
 }
 
-TEST(ModelInverse, AnswersWithTheLineUntilItsFiltersHaveSettled) {
+TEST(ModelInverse, ReturnsTheLinearFallbackUntilItsFiltersHaveSettled) {
   ModelInverse inverse(deflection_and_rate(), test::example<Dgmm>());
   const Estimate first = inverse.step(12.5, wound(0.01));
   EXPECT_EQ(first.fault, Fault::warming_up);
@@ -119,7 +119,7 @@ TEST(ModelInverse, CountsInTheZerosOfItsChannels) {
   inverse.set_zero("joint_angle_rad", -0.03);
   const Estimate found = settled(inverse, 12.5, wound(-0.02));
   EXPECT_EQ(found.fault, Fault::none);
-  // Against its zero the joint stands at +0.23: a spring wound by 20 mrad shows as -10 mrad.
+  // Relative to its zero the joint is at +0.23: a spring wound by 20 mrad reads -10 mrad.
   EXPECT_NEAR(found.value, 0.02 + 0.03, 1e-9);
 }
 
@@ -144,9 +144,9 @@ ModelInverse relaxing_inverse() {
   return ModelInverse(settings, GreyBox(parameters));
 }
 
-// A wish that no limit of the torque cuts, but that of the deflection: the spring never was where
-// the inverse wanted it.
-TEST(TorqueController, RemembersWhatItAskedTheJointForAndNotWhatItWasAskedFor) {
+// A reference that only the limit of the deflection cuts, not one of the torque: the spring was
+// never at the deflection that the inverse requested.
+TEST(TorqueController, UpdatesTheInverseWithTheRequestedDeflectionAndNotWithTheWantedOne) {
   auto settings = settings_of("dfki-50");
   settings.largest_torque_Nm = kInfinity;
   settings.deflection.largest_deflection_rad = 0.05;
@@ -175,7 +175,7 @@ TEST(ModelInverse, GoesOnWithoutItsMemoryWhereThatIsNoLongerFinite) {
   EXPECT_NEAR(found.value, sound_rad, 2e-3);
 }
 
-TEST(ModelInverse, HoldsItsAnswerWhereAnInputIsMissing) {
+TEST(ModelInverse, HoldsItsOutputWhereAnInputIsMissing) {
   ModelInverse inverse(deflection_and_rate(), test::example<Linear>());
   const double last_rad = settled(inverse, 12.5, wound(0.01)).value;
   for (const double bad : {kNaN, kInfinity}) {
@@ -272,7 +272,7 @@ TEST(TorqueController, ReachesTheWantedTorqueAgainstALockedOutput) {
   }
 }
 
-TEST(TorqueController, CutsTheWishToTheRating) {
+TEST(TorqueController, CutsTheReferenceToTheRating) {
   const auto settings = settings_of("dfki-50");
   TorqueController controller(LinearInverse(573.0), settings, kRate_Hz);
   EXPECT_EQ(controller.step(1e9, wound(0.0)).wanted_torque_Nm, settings.largest_torque_Nm);
@@ -308,7 +308,7 @@ TEST(TorqueController, CompensatesFrictionWhereTheSpringIsToBeWound) {
       1e-6);
 }
 
-// Of a torque that rises steadily the plain loop is 2 ζ / ω behind, whatever the slope.
+// For a torque that rises steadily the plain loop has a lag of 2 ζ / ω, whatever the slope.
 TEST(TorqueController, FollowsARampWithoutLagWhereItsRateIsFedForward) {
   auto settings = settings_of("dfki-50");
   settings.deflection.integral_1_s = 0.0;
@@ -332,7 +332,7 @@ TEST(TorqueController, FollowsARampWithoutLagWhereItsRateIsFedForward) {
   EXPECT_NEAR(lag_s(), 0.0, 2e-3);
 }
 
-TEST(TorqueController, SaysTheFaultAndLetsTheCurrentFade) {
+TEST(TorqueController, ReportsTheFaultAndTheCurrentFades) {
   auto settings = settings_of("dfki-50");
   settings.observer_cutoff_Hz = 5.0;
   const SeriesElasticJoint& parts = settings.deflection.joint;
@@ -383,8 +383,8 @@ double change_after_a_loss_A(const TorqueLoopCore::Settings& settings, int lost_
   return largest_A;
 }
 
-// Of the whole current: what is added to that of the deflection controller neither vanishes with
-// the measurement nor comes back with it at once, nor after the ticks that the observer waits for.
+// The whole current is tested: the terms added to the deflection controller's neither vanish with
+// the measurement nor return with it at once, nor after the ticks that the observer waits for.
 TEST(TorqueController, LosesAndFindsItsMeasurementWithoutAJumpOfTheCurrent) {
   for (const int lost_ticks : {1, 5, 300}) {
     auto settings = settings_of("dfki-50");
@@ -417,9 +417,9 @@ TEST(TorqueController, RefusesWhatItCannotDo) {
   EXPECT_NE(test::error_message([] { return LinearInverse(0.0); }), "");
 }
 
-// 100 cases of 10^4 ticks on a free joint: any wishes, NaN among them, then none; what was put in
-// stays within what the peak current can do in that time, and leaves again.
-RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyWishAndLetsItGo, ()) {
+// 100 cases of 10^4 ticks on a free joint: any references, NaN among them, then none; the energy
+// stays within what the peak current can supply in that time, and decreases again.
+RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyReferenceAndReleasesIt, ()) {
   auto settings = settings_of(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"));
   if (*rc::gen::arbitrary<bool>()) settings.observer_cutoff_Hz = 3.0;
   if (*rc::gen::arbitrary<bool>()) settings.friction = FrictionCompensation{};
@@ -449,7 +449,7 @@ RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyWishAndLetsItGo, ()) {
     RC_ASSERT(joint.energy_J() <= max_J);
     if (n < 7000) largest_J = std::max(largest_J, joint.spring_J());
   }
-  // What was wound lets go; the joint, of itself, may still turn.
+  // The spring is released; the joint itself may still turn.
   RC_ASSERT(joint.spring_J() <= 0.01 * largest_J);
 }
 

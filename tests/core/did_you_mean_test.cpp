@@ -15,7 +15,7 @@ TEST(DidYouMean, NamesTheNearestName) {
   EXPECT_EQ(did_you_mean("comapre", kVerbs), "Did you mean 'compare'?");
 }
 
-TEST(DidYouMean, KeepsQuietWhereNothingIsNear) {
+TEST(DidYouMean, SuggestsNothingWhereNothingIsNear) {
   EXPECT_EQ(did_you_mean("simulate", kVerbs), "");
   EXPECT_EQ(did_you_mean("", kVerbs), "");
 }

@@ -5,7 +5,7 @@
 namespace torsio {
 namespace {
 
-TEST(Error, SaysPlaceExpectedFoundAndWhatToDo) {
+TEST(Error, StatesPlaceExpectedFoundAndAdvice) {
   const Error error({.place = "a.csv: line 3",
                      .expected = "4 cells",
                      .found = "3",

@@ -69,7 +69,7 @@ TYPED_TEST(Adapted, LearnsAnOffsetWhateverTheFamily) {
   }
 }
 
-TYPED_TEST(Adapted, TheAdaptedNetworkTellsWhatTheAdaptiveOneDid) {
+TYPED_TEST(Adapted, TheAdaptedNetworkHasTheOutputsOfTheAdaptiveOne) {
   const auto network = example<TypeParam>().parameters();
   AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
   (void)run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<TypeParam>())), 3.0);
@@ -84,7 +84,7 @@ TYPED_TEST(Adapted, TheAdaptedNetworkTellsWhatTheAdaptiveOneDid) {
   }
 }
 
-TYPED_TEST(Adapted, ResetKeepsWhatWasLearnedAndForgetDoesNot) {
+TYPED_TEST(Adapted, ResetKeepsTheWeightsAndForgetDoesNot) {
   const AnyModel::Parameters network = example<TypeParam>().parameters();
   AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
   (void)run(adaptive, Estimator(settings_without_zeros(), AnyModel(example<TypeParam>())), 3.0);
@@ -97,7 +97,7 @@ TYPED_TEST(Adapted, ResetKeepsWhatWasLearnedAndForgetDoesNot) {
   EXPECT_EQ(weights<TypeParam>(adaptive.adapted()), weights<TypeParam>(network));
 }
 
-TYPED_TEST(Adapted, TicksWithoutAnEstimateOfTheNetworkTeachNothing) {
+TYPED_TEST(Adapted, TicksWithoutAnEstimateOfTheNetworkChangeNoWeights) {
   const AnyModel::Parameters network = example<TypeParam>().parameters();
   AdaptiveEstimator adaptive(settings_without_zeros(), network, {});
   EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::warming_up);

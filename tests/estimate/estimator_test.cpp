@@ -24,13 +24,13 @@ using testing::HasSubstr;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Says `gain` times its input plus how many ticks it has seen, or whatever it is told to say.
+/// Outputs `gain` times its input plus the number of ticks so far, or a fixed estimate.
 class Scripted {
  public:
   struct Parameters {
     double gain = 10.0;
-    Estimate says = {.value = 0.0};
-    bool obeys = false;  ///< says `says`
+    Estimate output = {.value = 0.0};
+    bool is_fixed = false;  ///< outputs `output`
     std::size_t inputs = 1;
   };
   explicit Scripted(const Parameters& parameters) : parameters_(parameters) {}
@@ -41,7 +41,7 @@ class Scripted {
   void reset() noexcept { ticks_ = 0; }
   Estimate step(Features features) noexcept {
     ++ticks_;
-    if (parameters_.obeys) return parameters_.says;
+    if (parameters_.is_fixed) return parameters_.output;
     return {.value = parameters_.gain * features[0]};
   }
 
@@ -65,15 +65,15 @@ EstimatorSettings settings(const std::string& input = "gear_angle_rad") {
 
 Estimate step(ScriptedEstimator& estimator, double value) { return estimator.step({{value}}); }
 
-ScriptedEstimator saying(const Estimate& estimate) {
-  return {settings(), Scripted({.says = estimate, .obeys = true})};
+ScriptedEstimator with_output(const Estimate& estimate) {
+  return {settings(), Scripted({.output = estimate, .is_fixed = true})};
 }
 
 std::string refusal(const EstimatorSettings& bad, std::size_t inputs = 1) {
   return error_message([&] { ScriptedEstimator(bad, Scripted({.inputs = inputs})); });
 }
 
-TEST(Estimator, SaysWhatItsModelSays) {
+TEST(Estimator, ReturnsTheOutputOfItsModel) {
   ScriptedEstimator estimator(settings(), Scripted({}));
   EXPECT_THAT(estimator.raw_inputs(), testing::ElementsAre("gear_angle_rad"));
   const Estimate estimate = step(estimator, 0.25);
@@ -132,7 +132,7 @@ TEST(Estimator, RecoversFromInputsThatPoisonItsFilters) {
   EXPECT_NEAR(step(estimator, 0.5).value, before, 1e-9);
 }
 
-TEST(Estimator, TellsTheFallbackWhileItWarmsUp) {
+TEST(Estimator, ReturnsTheFallbackWhileItWarmsUp) {
   ScriptedEstimator estimator(settings("lag(gear_angle_rad, 3)"), Scripted({}));
   const Estimate first = step(estimator, 0.5);
   EXPECT_EQ(first.fault, Fault::warming_up);
@@ -141,18 +141,18 @@ TEST(Estimator, TellsTheFallbackWhileItWarmsUp) {
   EXPECT_FALSE(estimator.is_settled());
 }
 
-TEST(Estimator, TellsTheFallbackOutsideTheTrainingRange) {
+TEST(Estimator, ReturnsTheFallbackOutsideTheTrainingRange) {
   ScriptedEstimator estimator(settings(), Scripted({}));
   const Estimate outside = step(estimator, 1.11);
   EXPECT_EQ(outside.fault, Fault::outside_training_range);
   EXPECT_DOUBLE_EQ(outside.value, 0.5 + 7.0 * 1.11);
-  EXPECT_TRUE(std::isnan(outside.std_dev)) << "nobody measured the fallback out there";
+  EXPECT_TRUE(std::isnan(outside.std_dev)) << "the fallback was not measured there";
   EXPECT_EQ(step(estimator, -1.11).fault, Fault::outside_training_range);
 }
 
 TEST(Estimator, HandsOverToTheFallbackAcrossTheBorder) {
   const double model = 10.0;
-  ScriptedEstimator estimator = saying({.value = model, .std_dev = 2.0});
+  ScriptedEstimator estimator = with_output({.value = model, .std_dev = 2.0});
   EXPECT_EQ(step(estimator, 1.0).value, model) << "the model alone, up to the range's end";
   EXPECT_EQ(step(estimator, 1.0).std_dev, 2.0);
   for (const double weight : {0.1, 0.5, 0.9}) {
@@ -171,21 +171,21 @@ TEST(Estimator, HandsOverToTheFallbackAcrossTheBorder) {
   }
 }
 
-TEST(Estimator, TellsNoErrorBarForABlendWithoutEvidence) {
-  ScriptedEstimator estimator = saying({.value = 10.0});
+TEST(Estimator, ReturnsNoErrorBarForABlendWithoutEvidence) {
+  ScriptedEstimator estimator = with_output({.value = 10.0});
   EXPECT_TRUE(std::isnan(step(estimator, 1.05).std_dev));
   EstimatorSettings no_evidence = settings();
   no_evidence.fallback.residual_std = kNaN;
   ScriptedEstimator other(no_evidence,
-                          Scripted({.says = {.value = 1.0, .std_dev = 2.0}, .obeys = true}));
+                          Scripted({.output = {.value = 1.0, .std_dev = 2.0}, .is_fixed = true}));
   EXPECT_TRUE(std::isnan(step(other, 1.05).std_dev));
 }
 
-TEST(Estimator, StaysFiniteWhenModelAndFallbackAreFurtherApartThanANumberCanTell) {
+TEST(Estimator, StaysFiniteWhenModelAndFallbackAreFurtherApartThanTheLargestNumber) {
   EstimatorSettings far = settings();
   far.fallback = {.intercept = -1e308, .slope = {0.0}, .residual_std = 1.0};
-  ScriptedEstimator estimator(far,
-                              Scripted({.says = {.value = 1e308, .std_dev = 1.0}, .obeys = true}));
+  ScriptedEstimator estimator(
+      far, Scripted({.output = {.value = 1e308, .std_dev = 1.0}, .is_fixed = true}));
   const Estimate middle = step(estimator, 1.05);
   EXPECT_LT(std::abs(middle.value), 1e304);
   EXPECT_FALSE(std::isinf(middle.std_dev));
@@ -257,7 +257,7 @@ TEST(Estimator, JumpsNotEvenWhereAFeatureWasConstantInTraining) {
     EstimatorSettings constant = settings();
     constant.ranges.lowest = constant.ranges.highest = {trained_at};
     constant.fallback = {.intercept = 50.0, .slope = {0.0}};
-    ScriptedEstimator estimator(constant, Scripted({.says = {.value = 10.0}, .obeys = true}));
+    ScriptedEstimator estimator(constant, Scripted({.output = {.value = 10.0}, .is_fixed = true}));
     const double reach = 4e-7 * (trained_at == 0.0 ? 1.0 : std::abs(trained_at));
     double before = step(estimator, trained_at - reach).value;
     EXPECT_EQ(before, 50.0);
@@ -271,9 +271,9 @@ TEST(Estimator, JumpsNotEvenWhereAFeatureWasConstantInTraining) {
   }
 }
 
-TEST(Estimator, TellsTheFallbackWhenTheModelFails) {
+TEST(Estimator, ReturnsTheFallbackWhenTheModelFails) {
   for (const double bad : {kNaN, kInfinity, -kInfinity}) {
-    ScriptedEstimator estimator = saying({.value = bad, .std_dev = 0.1});
+    ScriptedEstimator estimator = with_output({.value = bad, .std_dev = 0.1});
     const Estimate estimate = step(estimator, 0.5);
     EXPECT_EQ(estimate.fault, Fault::model_not_finite);
     EXPECT_EQ(estimate.value, 4.0);
@@ -282,9 +282,9 @@ TEST(Estimator, TellsTheFallbackWhenTheModelFails) {
   }
 }
 
-TEST(Estimator, PassesOnWhatTheModelSaysOfItself) {
+TEST(Estimator, PassesOnTheFaultOfTheModel) {
   ScriptedEstimator estimator =
-      saying({.value = 1.0, .novelty = 9.0, .fault = Fault::outside_training_range});
+      with_output({.value = 1.0, .novelty = 9.0, .fault = Fault::outside_training_range});
   const Estimate estimate = step(estimator, 0.5);
   EXPECT_EQ(estimate.fault, Fault::outside_training_range);
   EXPECT_EQ(estimate.value, 4.0);
@@ -301,15 +301,16 @@ TEST(Estimator, TakesTheErrorBarFromTheResidualsOfTheNearestRegion) {
   EXPECT_EQ(step(estimator, 1.0).std_dev, 2.0);
 }
 
-TEST(Estimator, NeverTellsAnErrorBarOfZero) {
+TEST(Estimator, NeverReturnsAnErrorBarOfZero) {
   EstimatorSettings zeros = settings();
   zeros.residuals = {.edges = {0.0, 1.0}, .std_dev = {0.0}};
   zeros.fallback.residual_std = 0.0;
-  ScriptedEstimator sure(zeros, Scripted({.says = {.value = 1.0, .std_dev = 0.0}, .obeys = true}));
+  ScriptedEstimator sure(zeros,
+                         Scripted({.output = {.value = 1.0, .std_dev = 0.0}, .is_fixed = true}));
   EXPECT_TRUE(std::isnan(step(sure, 0.5).std_dev));
-  ScriptedEstimator failing(zeros, Scripted({.says = {.value = kNaN}, .obeys = true}));
+  ScriptedEstimator failing(zeros, Scripted({.output = {.value = kNaN}, .is_fixed = true}));
   EXPECT_TRUE(std::isnan(step(failing, 0.5).std_dev));
-  ScriptedEstimator own = saying({.value = 1.0, .std_dev = 0.25});
+  ScriptedEstimator own = with_output({.value = 1.0, .std_dev = 0.25});
   EXPECT_EQ(step(own, 0.5).std_dev, 0.25) << "the model's own comes first";
 }
 
@@ -386,7 +387,7 @@ TEST(Estimator, IsNotToBeUsedBeforeItsZeroIsSet) {
   EXPECT_EQ(estimate.std_dev, 1.0);
 }
 
-TEST(Estimator, WantsEveryZeroThatTrainingTook) {
+TEST(Estimator, RequiresEveryZeroThatTrainingTook) {
   EstimatorSettings two = zeroed_settings("gear_angle_rad - joint_angle_rad");
   two.zeroed_channels = {"gear_angle_rad", "joint_angle_rad"};
   ScriptedEstimator estimator(two, Scripted({}));
@@ -408,14 +409,15 @@ TEST(Estimator, KeepsItsZeroOverAReset) {
   EXPECT_DOUBLE_EQ(step(estimator, 0.5).value, 3.0);
 }
 
-TEST(Estimator, TellsAMissingZeroBehindInputsAndWarmUpAndBeforeTheRange) {
+TEST(Estimator, ReportsAMissingZeroAfterInputsAndWarmUpAndBeforeTheRange) {
   ScriptedEstimator estimator(zeroed_settings("lag(gear_angle_rad, 1)"), Scripted({}));
   EXPECT_EQ(step(estimator, kNaN).fault, Fault::input_not_finite);
   EXPECT_EQ(step(estimator, 5.0).fault, Fault::warming_up);
   const Estimate outside = step(estimator, 5.0);
   EXPECT_EQ(outside.fault, Fault::zero_not_set);
   EXPECT_EQ(outside.value, 35.5) << "the fallback's, as it would be with a zero";
-  ScriptedEstimator failing(zeroed_settings(), Scripted({.says = {.value = kNaN}, .obeys = true}));
+  ScriptedEstimator failing(zeroed_settings(),
+                            Scripted({.output = {.value = kNaN}, .is_fixed = true}));
   EXPECT_EQ(step(failing, 0.5).fault, Fault::zero_not_set);
   EXPECT_EQ(step(failing, 0.5).value, 4.0);
 }

@@ -41,7 +41,7 @@ TEST(TorqueEstimator, TakesItsInputsFromAJointSampleByName) {
   EXPECT_EQ(estimate.value, by_channel.step({{0.3, 0.2, 0.5}}).value);
 }
 
-TEST(TorqueEstimator, KnowsTheDeflectionOfAModelThatWasTrainedOnIt) {
+TEST(TorqueEstimator, ComputesTheDeflectionOfAModelThatWasTrainedOnIt) {
   TorqueEstimator torque(
       estimator({.inputs = {"spring_deflection_rad", "motor_angle_rad"}, .definitions = {}}));
   Estimator by_channel =
@@ -60,7 +60,7 @@ TEST(TorqueEstimator, AMissingSensorIsAFaultNotATorque) {
   EXPECT_TRUE(std::isfinite(estimate.value));
 }
 
-TEST(TorqueEstimator, RefusesAModelThatWantsOtherChannels) {
+TEST(TorqueEstimator, RefusesAModelThatRequiresOtherChannels) {
   EXPECT_THAT(
       test::error_message([] {
         TorqueEstimator(estimator({.inputs = {"gear_angle_rad", "oil_K"}, .definitions = {}}));

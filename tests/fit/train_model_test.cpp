@@ -31,7 +31,7 @@ TEST(TrainModel, TakesTheZerosOfTheTrainingRecords) {
   EXPECT_THROW((void)train_model(dataset, choice, 1), Error);
 }
 
-TEST(TrainModel, RefusesAnInverseWhoseTargetIsOffByZerosThatNobodyKnows) {
+TEST(TrainModel, RefusesAnInverseWhoseTargetIsOffByUnknownZeros) {
   Dataset dataset = test::bench_dataset();
   dataset.target = "spring_deflection_rad";
   for (DatasetRecord& record : dataset.records) {

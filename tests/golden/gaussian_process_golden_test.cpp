@@ -42,7 +42,7 @@ KernelExpression kernel_of(const Json& each, std::size_t inputs) {
   return kernel;
 }
 
-TEST(GaussianProcessGolden, SaysWhatScikitLearnSaysForAFixedKernel) {
+TEST(GaussianProcessGolden, AgreesWithScikitLearnForAFixedKernel) {
   const Json document = golden();
   for (const Json& each : document["fixed"]) {
     SCOPED_TRACE(each["kernel"].get<std::string>());
@@ -65,9 +65,9 @@ TEST(GaussianProcessGolden, SaysWhatScikitLearnSaysForAFixedKernel) {
     GaussianProcess model(parameters);
     const Matrix at = matrix(each["at"]);
     for (std::size_t n = 0; n < at.rows; ++n) {
-      const Estimate told = model.step(at.row(n));
-      EXPECT_NEAR(told.value, each["mean"][n].get<double>(), 1e-8);
-      EXPECT_NEAR(told.std_dev, each["std_dev"][n].get<double>(), 1e-8);
+      const Estimate estimate = model.step(at.row(n));
+      EXPECT_NEAR(estimate.value, each["mean"][n].get<double>(), 1e-8);
+      EXPECT_NEAR(estimate.std_dev, each["std_dev"][n].get<double>(), 1e-8);
     }
   }
 }

@@ -67,7 +67,7 @@ TEST(Golden, ALowpassHasTheFrequencyResponseOfScipyAtEveryRate) {
   }
 }
 
-TEST(Golden, ALowpassAnswersAStepAsScipyDoes) {
+TEST(Golden, ALowpassFollowsAStepAsScipyDoes) {
   for (const Json& each : golden("lowpass.json")) {
     SCOPED_TRACE(each["sample_rate_Hz"].dump());
     const auto expected = numbers(each["step"]);

@@ -1,7 +1,8 @@
 % Golden values of Octave's control package for control_golden_test.cpp. `./run oracles` runs this in its own folder.
 %
-% A deflection loop on a spring, cut at the current: PID with a low-passed derivative, one sample of delay, a hold, and
-% rotor, current loop, spring and joint. Inputs stand in the file; results are rounded, so that every machine writes the same bytes.
+% A deflection loop on a spring, opened at the current: PID with a low-passed derivative, one sample of delay, a hold,
+% and rotor, current loop, spring and joint. The file contains the inputs; results are rounded, so that every machine
+% writes the same bytes.
 pkg load control
 
 function value = rounded(value)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Networks as other programs write them, and what PyTorch says they tell, for import_golden_test.cpp: the folder `import`
+"""Networks as other programs write them, with the outputs that PyTorch computes, for import_golden_test.cpp: the folder `import`
 with weights as JSON, ONNX graphs of PyTorch's exporter, and graphs built by hand as Keras' exporter (tf2onnx) builds them.
 `./run oracles` runs this in its own folder.
 
@@ -214,7 +214,7 @@ save("keras_gru", [
 inputs = signal(3, 62)
 add_case("keras_gru.onnx", "gru", inputs, stream(network, inputs), window=12)
 
-# The batch in front (layout 1, since opset 14), biases left out, no time axis behind a Gather.
+# The batch in front (layout 1, since opset 14), biases left out, no time axis after a Gather.
 network = settle(Memory(torch.nn.LSTM, 2, 3), 53)
 with torch.no_grad():
     network.memory.bias_ih_l0.zero_()

@@ -77,7 +77,7 @@ std::vector<float> flat(const TrainingNetwork& network, const Json& parameters, 
   return all;
 }
 
-/// The golden batch, [steps x rows], as windows one behind the other.
+/// The golden batch, [steps x rows], as consecutive windows.
 WindowSet windows_of(const Json& each, std::size_t inputs) {
   const auto steps = each["steps"].get<std::size_t>();
   const auto rows = each["rows"].get<std::size_t>();

@@ -2,7 +2,7 @@
 
 namespace torsio::test {
 
-/// What a family that is `Invertible` owes besides.
+/// The additional laws of a family that is `Invertible`.
 template <class M>
 class InverseLaws : public ModelLaws<M> {};
 
@@ -34,7 +34,7 @@ TYPED_TEST(InverseLaws, InvertDoesNotDependOnTheFirstInput) {
   }
 }
 
-TYPED_TEST(InverseLaws, InvertSaysAFiniteValueWhateverItIsGiven) {
+TYPED_TEST(InverseLaws, InvertReturnsAFiniteValueForAnyInput) {
   for (const double target : {0.0, 1e300, HUGE_VAL, kNotMeasured})
     for (const double given : {0.0, 1e300, HUGE_VAL, kNotMeasured})
       for (const double other : {0.0, 1e300, HUGE_VAL, kNotMeasured}) {

@@ -11,10 +11,10 @@
 #include "torsio/core/random.hpp"
 #include "torsio/model/any_model.hpp"
 
-/// What it means to be a model family. A new one of `AllFamilies` specialises `example`
-/// (support/examples); the laws then hold for it without another line.
+/// The definition of a model family. A new one of `AllFamilies` specialises `example`
+/// (support/examples); the laws are then tested for it without another line.
 ///
-/// Laws of fitters stand in fit_laws_test.cpp. That NaN in gives a fault and a finite value out, and
+/// Laws of fitters are in fit_laws_test.cpp. That NaN in gives a fault and a finite value out, and
 /// that offline equals streaming, are laws of the estimator; that saving and loading changes no bit
 /// is one of the model files.
 namespace torsio::test {

@@ -53,7 +53,7 @@ TYPED_TEST(ModelLaws, ParametersAreAllThatItNeeds) {
   EXPECT_EQ(dump(this->model_.parameters()), dump(parameters));
 }
 
-TYPED_TEST(ModelLaws, SaysAFiniteValueForInputsFarOutsideItsRange) {
+TYPED_TEST(ModelLaws, ReturnsAFiniteValueForInputsFarOutsideItsRange) {
   Random random(3);
   std::vector<double> features(this->model_.input_count());
   for (int n = 0; n < 2000; ++n) {

@@ -1,6 +1,6 @@
 // Every option of every family has an effect: set to two values, it gives two models, or two notes on
-// them. One test a family, so that none is forgotten; options without a line below get a second value
-// by their kind.
+// them. One test per family, so that none is missing; options that are not listed below get a
+// second value by their kind.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -183,7 +183,7 @@ class OptionLaws : public testing::TestWithParam<const FamilyInfo*> {
 
   const FamilyInfo& family_ = *GetParam();
   TrainingData data_ = data_for(family_, 600);
-  std::map<Settings, std::string> outcomes_;  ///< of fits that were made
+  std::map<Settings, std::string> outcomes_;  ///< fits that were made
 };
 
 TEST_P(OptionLaws, EachOptionHasAnEffect) {

@@ -93,7 +93,7 @@ TEST(AnyModel, HoldsAModelOfTheUsersOwn) {
   EXPECT_FALSE(model.can_invert());
 }
 
-TEST(AnyModel, SaysThatAFamilyCannotInvert) {
+TEST(AnyModel, ReportsThatAFamilyCannotInvert) {
   AnyModel any = example<Mlp>();
   const Estimate estimate = any.invert(1.0, std::vector{0.3, 0.1});
   EXPECT_EQ(estimate.fault, Fault::model_not_finite);

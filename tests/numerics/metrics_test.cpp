@@ -55,7 +55,7 @@ TEST(Metrics, AConstantTargetHasNoFitPercent) {
   EXPECT_TRUE(std::isnan(metrics_of({1.0, 2.0}, {3.0, 3.0}).fit_percent));
 }
 
-TEST(Metrics, AModelThatToldNaNShowsAsNaN) {
+TEST(Metrics, AModelWhoseOutputIsNaNHasTheMetricNaN) {
   const Metrics metrics = metrics_of({kNotMeasured, 1.0}, {0.0, 0.0});
   EXPECT_TRUE(std::isnan(metrics.rmse));
   EXPECT_TRUE(std::isnan(metrics.max_abs));

@@ -138,7 +138,7 @@ TEST(NonNegativeLeastSquares, LeavesOutWhatOtherColumnsExplain) {
   EXPECT_THAT(fit.dropped, ElementsAre(2, 3));
 }
 
-TEST(NormalEquations, TellTheErrorOfAnyCoefficients) {
+TEST(NormalEquations, ComputeTheErrorOfAnyCoefficients) {
   Random random(8);
   const Matrix design = random_design(random, 40, 4);
   std::vector<double> target(design.rows);

@@ -31,7 +31,7 @@ ResidualProblem rosenbrock(bool has_jacobian) {
           .has_jacobian = has_jacobian};
 }
 
-/// y = (a + b) t + c t^2 on 0..1, a and b never told apart.
+/// y = (a + b) t + c t^2 on 0..1, only the sum of a and b is identifiable.
 ResidualProblem line_and_square(double noise) {
   constexpr std::size_t kSamples = 200;
   return {.residuals = kSamples,
@@ -109,7 +109,7 @@ TEST(ParameterUncertaintyOf, StandardErrorsAreThoseOfLinearRegression) {
   EXPECT_NEAR(found.std_error[0], 0.5 / std::sqrt(99.0), 1e-8);
 }
 
-TEST(ParameterUncertaintyOf, WhatTheDataCannotTellIsNamed) {
+TEST(ParameterUncertaintyOf, NamesWhatTheDataDoNotDetermine) {
   const std::vector<double> optimum{1.0, 2.0, 2.0};
   const std::vector<double> typical{1.0, 1.0, 1.0};
   const ParameterUncertainty found = uncertainty_of(line_and_square(0.1), optimum, typical);

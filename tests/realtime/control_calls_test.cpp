@@ -63,7 +63,7 @@ class Spoiled {
   std::size_t place_ = 0;
 };
 
-TEST(BesidesComputing, TellsWhatItSees) {
+TEST(BesidesComputing, ReportsTheKindOfCall) {
   EXPECT_EQ(besides_computing([] { return true; }), "");
   EXPECT_EQ(besides_computing([] { return false; }), "wrong results");
   EXPECT_EQ(besides_computing([] {

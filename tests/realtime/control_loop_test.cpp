@@ -31,13 +31,13 @@ struct Moment {
   State state = State::disarmed;
   double current_A = 0.0;
   double wanted_torque_Nm = 0.0;  ///< as the controller took it
-  double torque_Nm = 0.0;         ///< of the joint
+  double torque_Nm = 0.0;         ///< at the joint
   double energy_J = 0.0;
   double proportional_gain = 0.0;
   Fault fault = Fault::none;
 };
 
-/// A spring's line that knows no answer for a while, as a model does that left its range.
+/// A linear spring without a solution for a while, like a model that has left its range.
 class Doubting {
  public:
   explicit Doubting(const bool& is_lost) : is_lost_(&is_lost) {}
@@ -147,7 +147,7 @@ TEST(ControlLoop, FollowsTheTorqueThatIsSent) {
   EXPECT_EQ(robot.loop_end.steps, 1500U);
   double mean_Nm = 0.0;
   for (std::size_t n = 1000; n < 1500; ++n) mean_Nm += robot.history[n].torque_Nm / 500.0;
-  EXPECT_NEAR(mean_Nm, 8.0, 2.5) << "a line knows nothing of the friction of the spring";
+  EXPECT_NEAR(mean_Nm, 8.0, 2.5) << "a linear model does not contain the friction of the spring";
 }
 
 // docs/faults.md 19.
@@ -178,15 +178,16 @@ TEST(ControlLoop, StopsWithin20MsWithoutCommandsAndTakesUpNoEnergy) {
     EXPECT_LE(stop, static_cast<std::size_t>(silence) + 20);
     EXPECT_GT(stop, static_cast<std::size_t>(silence));
     EXPECT_EQ(robot.watchdog.reason(), CommandWatchdog::Reason::command_lost);
-    EXPECT_EQ(max_current(robot, stop, 2000), 0.0) << "the commands came back, nobody armed it";
-    // The current loop takes half a millisecond to let go of what it held.
+    EXPECT_EQ(max_current(robot, stop, 2000), 0.0)
+        << "the commands came back, but it was not armed";
+    // The current loop takes half a millisecond to release its current.
     for (std::size_t n = stop + 5; n < 2000; ++n)
       ASSERT_LE(robot.history[n].energy_J, robot.history[n - 1].energy_J + 1e-6) << round;
   }
 }
 
 // docs/faults.md 21: the word of an operator, and a command since.
-TEST(ControlLoop, GoesOnOnlyWhenItIsArmedAgainAndAskedAgain) {
+TEST(ControlLoop, ContinuesOnlyWhenItIsArmedAgainAndCommandedAgain) {
   Robot robot;
   robot.run(1500, [&](int n) {
     if (n == 0 || n == 800) robot.watchdog.arm(robot.clock.now_ns());
@@ -198,7 +199,8 @@ TEST(ControlLoop, GoesOnOnlyWhenItIsArmedAgainAndAskedAgain) {
   EXPECT_GT(max_current(robot, 1001, 1500), 0.3);
 }
 
-// docs/faults.md 13, 18: the last good set-point stands, but does not feed the watchdog; nor do gains.
+// docs/faults.md 13, 18: the last good set-point remains in use, but does not feed the watchdog;
+// nor do gains.
 TEST(ControlLoop, TakesNoPartOfACommandThatIsNotANumber) {
   Robot robot;
   const double usual =
@@ -247,7 +249,7 @@ TEST(ControlLoop, LetsTheCurrentFadeWithoutASensorAndThenStops) {
   EXPECT_LE(stop_after(robot, 0), 553U);
 }
 
-// docs/faults.md 28: no burst, no command that is older than it says, and an end.
+// docs/faults.md 28: no burst, no command that is older than its time stamp, and an end.
 TEST(ControlLoop, StopsAfterOverrunsWithoutCatchingUp) {
   Robot robot;
   robot.run(
@@ -265,8 +267,8 @@ TEST(ControlLoop, StopsAfterOverrunsWithoutCatchingUp) {
   EXPECT_EQ(robot.loop_end.skipped_periods, 6U + 5U);
 }
 
-// docs/faults.md 27: the loop's own clock does not run backwards; a watchdog that is told of one
-// that does stops.
+// docs/faults.md 27: the loop's own clock does not run backwards; a watchdog whose clock does
+// stops.
 TEST(ControlLoop, StopsWhereTheClockOfItsCommandsIsAhead) {
   Robot robot;
   robot.run(600, [&](int n) {
@@ -291,7 +293,7 @@ TEST(ControlLoop, TakesNewGainsWithoutABump) {
   });
   EXPECT_DOUBLE_EQ(robot.history[899].proportional_gain, usual);
   EXPECT_DOUBLE_EQ(robot.history[900].proportional_gain, 0.7 * usual);
-  EXPECT_DOUBLE_EQ(robot.history[1499].proportional_gain, 0.7 * usual) << "-1 is no gain";
+  EXPECT_DOUBLE_EQ(robot.history[1499].proportional_gain, 0.7 * usual) << "-1 is not a gain";
   const auto jump_A = [&](std::size_t n) {
     return std::abs(robot.history[n].current_A - robot.history[n - 1].current_A);
   };

@@ -11,7 +11,7 @@
 namespace torsio {
 namespace {
 
-TEST(DurationHistogram, WithoutDurationsSaysZero) {
+TEST(DurationHistogram, WithoutDurationsReturnsZero) {
   const DurationHistogram histogram;
   EXPECT_EQ(histogram.count(), 0U);
   EXPECT_EQ(histogram.quantile_ns(0.99), 0);

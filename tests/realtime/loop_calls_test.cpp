@@ -30,7 +30,7 @@ thread_local int looks_at_other_clocks = 0;
 
 }  // namespace
 
-// Stands in front of glibc's, to see which clock is looked at.
+// Replaces glibc's function to record which clock is read.
 extern "C" int clock_gettime(clockid_t id, timespec* time) noexcept {
   if (id == CLOCK_MONOTONIC)
     ++looks_at_monotonic_clock;
@@ -122,7 +122,7 @@ RecorderOptions two_channels(std::size_t ring_frames) {
   return {.channels = {"torque_Nm", "current_A"}, .ring_frames = ring_frames};
 }
 
-TEST(LockCounter, SeesLocksAndWakeUps) {
+TEST(LockCounter, DetectsLocksAndWakeUps) {
   pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
   EXPECT_EQ(lock_calls_during([&] {
               pthread_mutex_lock(&lock);
@@ -189,7 +189,7 @@ TEST(SystemCalls, AreSeenByTheKernelsFilter) {
               testing::ExitedWithCode(0), "");
 }
 
-TEST(RealtimeLoop, AsksTheKernelForNothingButTheTime) {
+TEST(RealtimeLoop, CallsTheKernelOnlyForTheTime) {
   if (!filters_work()) GTEST_SKIP() << "this kernel takes no seccomp filter";
   const TemporaryFolder folder;
   // All of the child's threads are its own: the recorder's may write, the loop's may not.

@@ -58,7 +58,7 @@ TEST(Mailbox, AReaderHasTheLatestValueWhateverTheOrderOfWritesAndReads) {
 /// Larger than any machine writes at once, so that a torn one shows.
 using Wide = std::array<std::uint64_t, 24>;
 
-TEST(Mailbox, AReaderSeesWholeValuesOnlyAndNeverAnOlderOneAfterANewerOne) {
+TEST(Mailbox, AReaderGetsWholeValuesOnlyAndNeverAnOlderOneAfterANewerOne) {
   constexpr std::uint64_t kDifferent = 3000;
   Mailbox<Wide> mailbox;
   std::atomic<bool> stops{false};

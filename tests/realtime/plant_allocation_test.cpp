@@ -13,7 +13,7 @@ namespace {
 
 using test::heap_calls_during;
 
-TEST(PlantBatch, NeverTouchesTheHeapOnceItStands) {
+TEST(PlantBatch, NeverUsesTheHeapAfterItsConstruction) {
   for (const std::string& actuator : test::every_chain()) {
     test::BatchInputs inputs = test::batch_inputs(actuator, 0, 11, 3);
     inputs.commands[2][4].current_A = std::numeric_limits<double>::quiet_NaN();
@@ -35,7 +35,7 @@ TEST(PlantBatch, NeverTouchesTheHeapOnceItStands) {
   }
 }
 
-TEST(Plant, NeverTouchesTheHeapOnceItStands) {
+TEST(Plant, NeverUsesTheHeapAfterItsConstruction) {
   for (const std::string& actuator : test::every_chain()) {
     const test::BatchInputs inputs = test::batch_inputs(actuator, 0, 1, 1);
     Plant plant(inputs.parameters[0]);

@@ -25,7 +25,7 @@ LoopOptions modest() { return {.period_s = 1e-3, .priority = 0, .lock_memory = f
 /// The periods in which a step began, if the steps take `durations_ns` one after the other.
 struct Steps {
   std::vector<std::int64_t> indices;
-  std::vector<std::int64_t> began_ns;  ///< behind the first period's beginning
+  std::vector<std::int64_t> began_ns;  ///< since the first period's beginning
   LoopReport report;
 };
 
@@ -179,7 +179,7 @@ TEST(RealtimeLoop, RunsOnItsOwnThreadByTheMonotonicClock) {
   loop.request_stop();
   const LoopReport report = loop.wait();
   EXPECT_EQ(report.end, LoopEnd::stop_requested);
-  // Behind the last step periods may have been skipped, too.
+  // After the last step periods may have been skipped, too.
   EXPECT_GE(static_cast<std::int64_t>(report.steps + report.skipped_periods), index + 1);
   loop.start([](const Tick&) noexcept { return false; });
   EXPECT_EQ(loop.wait().steps, 1U);
@@ -203,7 +203,7 @@ TEST(RealtimeLoop, EndsWithItsObject) {
   EXPECT_FALSE(ran) << "a step after the object was gone";
 }
 
-TEST(RealtimeLoop, SaysWhatItWasGrantedAndGivesTheThreadBack) {
+TEST(RealtimeLoop, ReportsWhatItWasGrantedAndRestoresTheThread) {
   LoopOptions options = modest();
   options.priority = 1;
   const int before = sched_getscheduler(0);
@@ -261,12 +261,12 @@ TEST(RealtimeLoop, RefusesOptionsOutOfRange) {
   refused([](LoopOptions& options) { options.cpu = CPU_SETSIZE; });
 }
 
-// What could throw is no step.
+// A function that may throw is not a step.
 constexpr auto kMayThrow = [](const Tick&) { return true; };
-constexpr auto kTellsNothing = [](const Tick&) noexcept {};
+constexpr auto kReturnsNothing = [](const Tick&) noexcept {};
 constexpr auto kIsStep = [](const Tick&) noexcept { return true; };
 static_assert(!LoopStep<decltype(kMayThrow)>);
-static_assert(!LoopStep<decltype(kTellsNothing)>);
+static_assert(!LoopStep<decltype(kReturnsNothing)>);
 static_assert(LoopStep<decltype(kIsStep)>);
 
 }  // namespace

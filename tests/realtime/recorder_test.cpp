@@ -41,7 +41,7 @@ RecorderOptions options_of(std::size_t ring_frames = 4096, std::size_t block_fra
           .sync_after_s = 0.0};
 }
 
-/// What a frame of that tick holds, so that a reader can tell.
+/// The values of the frame of that tick, which a reader can check.
 std::array<double, 2> frame_of(std::int64_t tick) {
   const auto number = static_cast<double>(tick);
   return {std::sin(number), -3.0 * number};
@@ -64,7 +64,7 @@ void expect_only_counted_gaps(const RecordingBlocks& blocks) {
   EXPECT_EQ(frames, blocks.frames);
   const std::uint64_t missing =
       static_cast<std::uint64_t>(first) + blocks.recording.size() - blocks.frames;
-  // Frames may have been dropped behind the last one that is in a file that was closed.
+  // Frames may have been dropped after the last one in a file that was closed.
   if (blocks.was_closed) {
     EXPECT_GE(blocks.dropped, missing);
   } else {
@@ -108,7 +108,7 @@ TEST(Recorder, PeriodsThatTheLoopSkippedAreNotANumber) {
   EXPECT_EQ(blocks.dropped, 0U);
 }
 
-TEST(Recorder, AFullRingDropsAndCountsAndTheFileKnows) {
+TEST(Recorder, AFullRingDropsAndCountsAndTheFileRecordsIt) {
   const TemporaryFolder folder;
   Recorder recorder(folder.path("run.tsr"), options_of(64));
   std::uint64_t refused = 0;
@@ -225,7 +225,7 @@ struct Written {
 
 Written example_file(const TemporaryFolder& folder) {
   RecorderOptions options = options_of(4096, 4);
-  options.seal_after_s = 3600.0;  // by their size alone, so that it can be told from outside
+  options.seal_after_s = 3600.0;  // sealed by size alone, so that the result is deterministic
   Recorder recorder(folder.path("example.tsr"), options);
   for (std::int64_t tick = 0; tick < 16; ++tick) (void)recorder.push(tick, frame_of(tick));
   recorder.close();

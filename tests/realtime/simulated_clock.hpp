@@ -7,7 +7,7 @@
 
 namespace torsio::test {
 
-/// Time that passes only when somebody sleeps, or when the test says so.
+/// A clock that advances only when a thread sleeps, or when the test advances it.
 class SimulatedClock final : public LoopClock {
  public:
   [[nodiscard]] std::int64_t now_ns() noexcept override { return now_ns_; }

@@ -29,8 +29,8 @@ using test::heap_calls_during;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-TEST(AllocationCounter, SeesEveryWayIntoTheHeap) {
-  // volatile: the compiler may drop a pair of new and delete that nobody looks at.
+TEST(AllocationCounter, DetectsEveryKindOfHeapCall) {
+  // volatile: the compiler may remove a pair of new and delete whose result is not used.
   EXPECT_EQ(heap_calls_during([] {
               int* volatile number = new int(1);
               delete number;
@@ -50,7 +50,7 @@ TEST(AllocationCounter, SeesEveryWayIntoTheHeap) {
   EXPECT_EQ(heap_calls_during([] { const std::vector<double> values(1000, 1.0); }), 2U);
 }
 
-TEST(AllocationCounter, SeesNoneWhereThereIsNone) {
+TEST(AllocationCounter, DetectsNoneWhereThereIsNone) {
   double sum = 0.0;
   EXPECT_EQ(heap_calls_during([&] { sum = std::sin(1.0); }), 0U);
   EXPECT_GT(sum, 0.0);
@@ -182,7 +182,8 @@ TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {
               step(0.0, 0.0);
             }),
             0U);
-  // The curves of these two end at 0.1, far inside the estimator's range, and they say so themselves.
+  // The curves of these two end at 0.1, far inside the estimator's range, and report a fault
+  // themselves.
   constexpr bool kEndsEarlier =
       std::same_as<TypeParam, Polynomial> || std::same_as<TypeParam, HammersteinWiener>;
   EXPECT_EQ(in_border, kEndsEarlier ? Fault::outside_training_range : Fault::none);

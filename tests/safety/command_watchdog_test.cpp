@@ -39,7 +39,7 @@ struct Loop {
   }
 };
 
-TEST(CommandWatchdog, LetsNothingMoveBeforeItIsArmed) {
+TEST(CommandWatchdog, PreventsMotionBeforeItIsArmed) {
   Loop loop;
   for (int n = 0; n < 100; ++n) EXPECT_EQ(loop.with_fresh_command(), State::disarmed);
   const std::int64_t old_ns = loop.now_ns;

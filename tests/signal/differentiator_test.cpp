@@ -10,7 +10,7 @@
 namespace torsio {
 namespace {
 
-TEST(Differentiator, SaysZeroAndUnsettledBeforeItKnowsTwoSamples) {
+TEST(Differentiator, ReturnsZeroAndUnsettledBeforeTwoSamples) {
   Differentiator rate(100.0);
   EXPECT_FALSE(rate.is_settled());
   EXPECT_EQ(rate.step(5.0), 0.0);
@@ -22,7 +22,7 @@ TEST(Differentiator, SaysZeroAndUnsettledBeforeItKnowsTwoSamples) {
   EXPECT_EQ(rate.step(-7.0), 0.0);
 }
 
-TEST(Differentiator, TellsTheSlopeOfARampAtEveryRate) {
+TEST(Differentiator, EstimatesTheSlopeOfARampAtEveryRate) {
   for (const double sample_rate_Hz : {50.0, 1000.0, 10'000.0}) {
     Differentiator rate(sample_rate_Hz, 10.0);
     double output = 0.0;
@@ -35,7 +35,7 @@ TEST(Differentiator, TellsTheSlopeOfARampAtEveryRate) {
   }
 }
 
-TEST(Differentiator, ForgetsASampleThatIsNotFinite) {
+TEST(Differentiator, SkipsASampleThatIsNotFinite) {
   Differentiator rate(10.0);
   (void)rate.step(1.0);
   EXPECT_FALSE(std::isfinite(rate.step(std::numeric_limits<double>::infinity())));

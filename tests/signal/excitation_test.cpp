@@ -126,7 +126,7 @@ TEST(Multisine, HoldsEachAmplitudeAtItsFrequency) {
   EXPECT_NE(samples(other, 10), std::vector<double>(values.begin(), values.begin() + 10));
 }
 
-TEST(RandomWalk, HasTheRmsThatWasAskedForBelowItsCutOff) {
+TEST(RandomWalk, HasTheRequestedRmsBelowItsCutOff) {
   BandLimitedNoise walk({.rms = 2.5, .cutoff_Hz = 1.0, .seed = 5}, 100.0);
   EXPECT_EQ(walk.step(), 0.0);
   const std::vector<double> values = samples(walk, 200'000);  // about 4000 independent values
@@ -138,7 +138,7 @@ TEST(RandomWalk, HasTheRmsThatWasAskedForBelowItsCutOff) {
   }
   const auto count = static_cast<double>(values.size());
   EXPECT_NEAR(std::sqrt(square / count), 2.5, 0.1);
-  // Of |H|^2 = 1 / (1 + (f / fc)^4) the mean square frequency is fc^2.
+  // For |H|^2 = 1 / (1 + (f / fc)^4) the mean square frequency is fc^2.
   EXPECT_NEAR(std::sqrt(speed_square / square), kTurn, 0.05 * kTurn);
 }
 

@@ -23,7 +23,7 @@ std::string message(std::string input, std::vector<ChannelDefinition> definition
 constexpr const char* kFunctionList =
     "\n  the functions are rate, lowpass, lag, sign, tanh, abs, sqrt, exp, min, max";
 
-TEST(ExpressionError, SaysWhereWhatWasExpectedAndFound) {
+TEST(ExpressionError, StatesPlaceExpectedAndFound) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "input '': column 1: expected a channel, a number, a function or '(', found the end"},
       {"a +",
@@ -82,7 +82,7 @@ TEST(ExpressionError, ListsTheFunctionsForOneThatIsUnknown) {
 
 TEST(ExpressionError, ListsTheUnitsForOneThatIsUnknown) {
   const std::string text = message("tanh(x / 3furlong)");
-  EXPECT_NE(text.find("column 11: expected a unit or an operator behind the number, found "
+  EXPECT_NE(text.find("column 11: expected a unit or an operator after the number, found "
                       "'furlong'\n  a product needs its '*'; the units are "),
             std::string::npos)
       << text;

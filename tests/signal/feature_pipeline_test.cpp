@@ -58,7 +58,7 @@ TEST(Expression, ReadsNumbersInEveryKnownUnit) {
   EXPECT_DOUBLE_EQ(value("20degC"), 293.15);
 }
 
-TEST(Expression, KnowsItsFunctions) {
+TEST(Expression, HasItsFunctions) {
   EXPECT_EQ(value("sign(x)", {-0.2}), -1.0);
   EXPECT_EQ(value("sign(x)", {0.0}), 0.0);
   EXPECT_EQ(value("sign(x)", {7.0}), 1.0);
@@ -79,7 +79,7 @@ TEST(Expression, KeepsANanThatItMade) {
   EXPECT_TRUE(std::isnan(value("max(1, x / y)", {0.0, 0.0})));
 }
 
-TEST(FeaturePipeline, AsksForTheChannelsUnderTheDefinitionsInOrderOfAppearance) {
+TEST(FeaturePipeline, RequiresTheChannelsOfTheDefinitionsInOrderOfAppearance) {
   const FeaturePipeline features =
       pipeline({"joint_angle_rad", "twist_rad", "lowpass(rate(twist_rad), 10Hz)"},
                {{"twist_rad", "gear_angle_rad - joint_angle_rad"},
@@ -90,7 +90,7 @@ TEST(FeaturePipeline, AsksForTheChannelsUnderTheDefinitionsInOrderOfAppearance) 
   EXPECT_EQ(features.feature_count(), 3U);
 }
 
-TEST(FeaturePipeline, PutsDefinitionsInAsIfTheyStoodInParentheses) {
+TEST(FeaturePipeline, SubstitutesDefinitionsAsIfInParentheses) {
   FeaturePipeline features = pipeline({"2 * sum_rad"}, {{"sum_rad", "x_rad + y_rad"}});
   EXPECT_EQ(features.step(std::vector{1.0, 3.0})[0], 8.0);
 }
@@ -135,7 +135,7 @@ TEST(FeaturePipeline, SettlesWhenItsSlowestChainHas) {
   EXPECT_EQ(pipeline({"lag(3, 5) + lowpass(2, 1Hz) + rate(7) + x"}).settling_samples(), 0U);
 }
 
-TEST(FeaturePipeline, TellsTheRateOfARampOnceSettled) {
+TEST(FeaturePipeline, EstimatesTheRateOfARampOnceSettled) {
   FeaturePipeline features = pipeline({"lowpass(rate(x), 10Hz)"});
   double slope = 0.0;
   for (int n = 0; !features.is_settled(); ++n) slope = features.step(std::vector{0.002 * n})[0];
@@ -160,7 +160,7 @@ TEST(FeaturePipeline, FiltersAlikeAtEverySampleRate) {
   }
 }
 
-TEST(FeaturePipeline, KnowsWhichFeaturesAreRates) {
+TEST(FeaturePipeline, DistinguishesFeaturesThatAreRates) {
   const std::vector<std::pair<std::string, bool>> cases{
       {"x_rad", false},
       {"rate(x_rad)", true},

@@ -29,7 +29,7 @@ TEST(Butterworth, StartsInTheSteadyStateOfItsFirstInput) {
   EXPECT_EQ(filter.step(0.1), 0.1);
 }
 
-TEST(Butterworth, SettlesToOnePercentOfAStepInTheSamplesItSays) {
+TEST(Butterworth, SettlesToOnePercentOfAStepInItsStatedSamples) {
   for (const double cutoff_Hz : {0.02, 1.0, 10.0, 120.0, 250.0, 400.0, 499.0}) {
     SCOPED_TRACE(cutoff_Hz);
     Lowpass filter(cutoff_Hz, 1000.0);
@@ -45,7 +45,7 @@ TEST(Butterworth, SettlesToOnePercentOfAStepInTheSamplesItSays) {
   }
 }
 
-TEST(Butterworth, KnowsItsGainForWhiteNoise) {
+TEST(Butterworth, ComputesItsGainForWhiteNoise) {
   for (const double cutoff_Hz : {0.5, 10.0, 120.0, 400.0}) {
     SCOPED_TRACE(cutoff_Hz);
     const Lowpass filter(cutoff_Hz, 1000.0);

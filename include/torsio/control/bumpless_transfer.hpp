@@ -6,21 +6,22 @@
 
 namespace torsio::detail {
 
-/// The bump that a change of gains or of mode would make, taken up whole and let go slowly:
+/// The step of the command that a change of gains or of mode would cause, which decays
+/// exponentially:
 ///
 ///     h[n] = h₀ exp(−n T / T_h)
 ///
-/// added to a command, it makes the change start where the command was.
+/// Added to a command, it makes the command continue from its value before the change.
 class BumplessTransfer {
  public:
-  /// Both positive.
+  /// Both are positive.
   BumplessTransfer(double time_s, double sample_rate_Hz) noexcept
       : keep_(std::exp(-1.0 / (time_s * sample_rate_Hz))) {}
 
   void reset() noexcept { bump_ = 0.0; }
-  /// What is yet to be let go of grows by `bump`.
+  /// Adds `bump` to the part that has not decayed yet.
   void add(double bump) noexcept { bump_ += bump; }
-  /// @returns the share of this tick
+  /// @returns the part that is added in this tick
   double step() noexcept TORSIO_REALTIME {
     const double now = bump_;
     // Far below the last bit of any command: no denormal numbers at the end of the decay.

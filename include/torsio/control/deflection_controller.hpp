@@ -34,11 +34,11 @@ class DeflectionController {
     double damping = 0.9;                            ///< ζ
     double integral_1_s = 6.0;                       ///< k_i; current only
     std::optional<Pid::Gains> gains = std::nullopt;  ///< none: as above
-    Pid::Gains speed_loop = {};  ///< of the drive [A s/rad], for the margins; velocity only
+    Pid::Gains speed_loop = {};  ///< the drive's loop [A s/rad], for the margins; velocity only
     double rate_cutoff_Hz = 120.0;
     double largest_deflection_rad = rad_from_deg(9.0);  ///< δ* is cut there
     Pid::AntiWindup anti_windup = Pid::AntiWindup::conditional;
-    double fault_decay_s = 0.02;  ///< of the command without a usable measurement
+    double fault_decay_s = 0.02;  ///< decay of the command without a usable measurement
   };
 
   struct Output {
@@ -48,7 +48,7 @@ class DeflectionController {
     double integral = 0.0;
     double derivative = 0.0;
     double feed_forward = 0.0;
-    double handover = 0.0;    ///< after a change of gains or a fault
+    double transfer = 0.0;    ///< after a change of gains or a fault
     bool is_limited = false;  ///< the deflection or the command was cut
     bool is_fading = false;   ///< no usable measurement
     Fault fault = Fault::none;
@@ -60,29 +60,30 @@ class DeflectionController {
 
   void reset() noexcept;
 
-  /// A wanted deflection that is not finite is a fault, and the last good one stands; so is a
-  /// measurement, and the command fades to 0. Afterwards it goes on from where it is.
+  /// A wanted deflection that is not finite is a fault, and the last finite one is used. A
+  /// measurement that is not finite is a fault too: the command fades to 0, and continues from
+  /// there when measurements return.
   Output step(double wanted_rad, double deflection_rad) noexcept TORSIO_REALTIME;
   /// As `Pid::track`: what was applied in the place of the last command.
   void track(double applied) noexcept TORSIO_REALTIME { pid_.track(applied); }
-  /// What was applied in the place of the last command fades by a tick, and the loop goes on from
-  /// there: for what adds to the command, where its own measurement is lost.
+  /// The command applied in place of the last one fades by one tick, and the loop continues from
+  /// there: for a controller that adds to the command and whose own measurement is lost.
   /// @returns the command
   double fade(double applied) noexcept TORSIO_REALTIME;
 
-  /// As `Pid::set_gains`. Whether the new ones are stable is not looked at: `margins_of` tells.
+  /// As `Pid::set_gains`. Does not check whether the new gains are stable: use `margins_of`.
   [[nodiscard]] bool set_gains(const Pid::Gains& gains) noexcept TORSIO_REALTIME {
     return pid_.set_gains(gains);
   }
   [[nodiscard]] const Pid::Gains& gains() const noexcept { return pid_.gains(); }
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
 
-  /// What the loop feeds back with these gains. Allocates.
+  /// The feedback of the loop with these gains. Allocates.
   [[nodiscard]] JointFeedback feedback(const Pid::Gains& gains) const;
   [[nodiscard]] JointFeedback feedback() const { return feedback(gains()); }
-  /// From the wanted deflection to the current, within the limits. Allocates.
+  /// The system from the wanted deflection to the current, within the limits. Allocates.
   [[nodiscard]] LinearSystem reference_path() const;
-  /// Of the loop with these gains, cut at the current. Allocates.
+  /// Margins of the loop with these gains, opened at the current. Allocates.
   [[nodiscard]] Margins margins_of(const Pid::Gains& gains, JointOutput output) const;
 
   [[nodiscard]] static Pid::Gains gains_for(const Settings& settings);

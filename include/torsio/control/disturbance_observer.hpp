@@ -7,7 +7,8 @@
 
 namespace torsio {
 
-/// The current that friction and whatever else the joint's equation does not know of use up:
+/// The current that is used up by friction and by other effects that are not in the joint's
+/// equation:
 ///
 ///     d = Q (i − (J N² θ̈ + K δ) / (N k_t))
 ///

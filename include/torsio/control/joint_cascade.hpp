@@ -18,8 +18,8 @@ namespace torsio {
 
 enum class JointMode : std::uint8_t { current, velocity, position, torque, impedance };
 
-/// What is wanted of a joint in one tick. What a mode does not name it does not read, but every
-/// number must be finite: a reference is taken whole or not at all.
+/// The reference of a joint in one tick. A mode ignores the fields that are not listed for it, but
+/// every number must be finite: a reference is accepted as a whole or rejected.
 struct JointReference {
   JointMode mode = JointMode::current;
   double position_rad = 0.0;         ///< position, impedance
@@ -31,12 +31,12 @@ struct JointReference {
   double damping_Nms_rad = 0.0;      ///< impedance, >= 0
 };
 
-/// What a joint tells: angle and speed of the side that the motor moves (rotor over ratio), and the
-/// torque that loads the motor (the spring's).
+/// What a joint measures: angle and speed of the side that the motor moves (rotor over ratio), and
+/// the torque that loads the motor (the spring's).
 struct JointState {
   double angle_rad = kNotMeasured;
   double speed_rad_s = kNotMeasured;
-  double torque_Nm = kNotMeasured;  ///< only where the cascade was told that there is one
+  double torque_Nm = kNotMeasured;  ///< only if the cascade was configured with a torque sensor
 };
 
 /// Position P -> velocity PI -> current, torque PID -> current, impedance -> torque; all with
@@ -47,22 +47,25 @@ struct JointState {
 ///     torque      i = PID(τ* − τ) + τ* / (N k_t) + i*
 ///     impedance   τ* = K (q* − q) + D (q̇* − q̇) + τ_ff, then torque
 ///
-/// A change of mode or of gains, those in an impedance's reference too, goes on from the last current;
-/// the difference fades by the handover. The impedance is a `JointImpedance`.
+/// After a change of mode or of gains, also of those in an impedance's reference, the current
+/// continues from its last value; the difference decays (`BumplessTransfer`). The impedance is a
+/// `JointImpedance`.
 ///
-/// **Limit override.** Whatever the mode wants, the current stays between those of two speed loops
-/// that sleep behind it and wake where the joint comes near a limit:
+/// **Limit override.** In every mode the current stays between those of two speed loops, which
+/// become active only where the joint comes near a limit:
 ///
 ///     k_v (v_lo − v) + τ / (N k_t)  <=  i  <=  k_v (v_hi − v) + τ / (N k_t),   k_v = J N² ω / (N k_t)
 ///     v_hi = min(v_max′, ω_p e, √(2 a (e − a / 2ω_p²))),   e = q_max − m − q,   and v_lo alike
 ///
-/// with ω_p = ω / 5, a = (N k_t i_rated − d − τ_c) / (2 J N²), half of what the rated current can brake
-/// beside the loads, and the margins m = d / (J N² ω ω_p), v_max′ = v_max − d / (J N² ω) that a load d
-/// the cascade does not know of may use up: in a joint that starts within its limits, q <= q_max and
-/// v <= v_max for any command, any such load and any measured one up to τ_c, hot winding or cold. Both bounds are continuous in the state and have no memory, so the least of them
-/// wins, there is nothing to wind up, and it lets go where it took over. What follows (current, I²t,
-/// voltage) cuts further. A rate limit acts on what the mode wants; one that is slower than the
-/// override is refused. Without a torque sensor τ is 0 and d is the whole load.
+/// with ω_p = ω / 5, a = (N k_t i_rated − d − τ_c) / (2 J N²), half of what the rated current can
+/// brake in addition to the loads, and the margins m = d / (J N² ω ω_p), v_max′ = v_max − d / (J N²
+/// ω) for a load d that the cascade does not measure: in a joint that starts within its limits, q
+/// <= q_max and v <= v_max for any command, any such load and any measured one up to τ_c, hot
+/// winding or cold. Both bounds are continuous in the state and have no memory. The smaller one
+/// applies, nothing can wind up, and the override releases the current at the value at which it
+/// took over. The limits after it (current, I²t, voltage) reduce the current further. A rate limit
+/// acts on the command of the mode; one that is slower than the override is rejected. Without a
+/// torque sensor τ is 0 and d is the whole load.
 ///
 /// Source: paper 000 section 4 (specification 3.11); the bounds and their proof are ours.
 class JointCascade {
@@ -79,10 +82,10 @@ class JointCascade {
     double max_unmeasured_load_Nm =
         0.0;  ///< d: the largest load that is not measured (friction, torque
               ///< error, what changes faster than the current follows)
-    double max_measured_load_Nm = 0.0;  ///< the largest load that is: what carries it cannot brake
-    double torque_Nm = std::numeric_limits<double>::infinity();  ///< of the wanted torque
+    double max_measured_load_Nm = 0.0;  ///< largest measured load: reduces the torque for braking
+    double torque_Nm = std::numeric_limits<double>::infinity();  ///< limit of the wanted torque
     double current_rate_A_s = std::numeric_limits<double>::infinity();
-    double thermal_time_s = 10.0;  ///< of the winding
+    double thermal_time_s = 10.0;  ///< time constant of the winding
   };
   struct Settings {
     Drive drive = {};
@@ -90,9 +93,9 @@ class JointCascade {
     Limits limits = {};
     bool has_torque = false;          ///< the state has a torque
     std::optional<Gains> gains = {};  ///< none: `gains_for`
-    double torque_cutoff_Hz = 120.0;  ///< of the torque's derivative
+    double torque_cutoff_Hz = 120.0;  ///< low-pass of the torque's derivative
     double transfer_s = 0.1;
-    double fault_decay_s = 0.02;  ///< of the current without a usable measurement
+    double fault_decay_s = 0.02;  ///< decay of the current without a usable measurement
   };
 
   enum class Limit : std::uint8_t {
@@ -121,24 +124,27 @@ class JointCascade {
     Fault fault = Fault::none;
   };
 
-  /// k_q = ω / 5; velocity J N² ω / (N k_t), its integral ω / 5 times that; no torque gains.
+  /// Default gains: k_q = ω / 5; velocity J N² ω / (N k_t), its integral ω / 5 times that; no
+  /// torque gains.
   [[nodiscard]] static Gains gains_for(const Drive& drive, double bandwidth_rad_s);
 
   /// @throws Error if the drive is impossible, a gain negative, or if the limits contradict each
-  /// other: no room between them and their margins, no current left to brake with, a rate that is
-  /// slower than the override.
+  /// other: no space between them and their margins, no current left to brake with, a rate
+  /// limit that is slower than the override.
   JointCascade(const Settings& settings, double sample_rate_Hz);
 
-  /// No memory, no current, mode `current` with 0 A; a winding as warm as it was.
+  /// Clears the memory: no current, mode `current` with 0 A; the temperature of the winding is
+  /// kept.
   void reset() noexcept;
 
-  /// A reference that is refused leaves the last good one standing (0 A if there was none), with
-  /// `Fault::input_not_finite` if it is not finite. A measurement that is not finite is that fault
-  /// too: the current fades to 0 with `fault_decay_s`, and goes on from there when there is one again.
+  /// After a rejected reference the last good one remains in use (0 A if there was none), with
+  /// `Fault::input_not_finite` if the rejected one is not finite. A measurement that is not finite
+  /// is that fault too: the current fades to 0 with `fault_decay_s`, and continues from there when
+  /// measurements return.
   Output step(const JointReference& reference, const JointState& measured) noexcept TORSIO_REALTIME;
 
   /// All at once, from the next step on, without a jump.
-  /// @returns false, and all stay, if one is negative or not finite
+  /// @returns false, and all are kept, if one is negative or not finite
   [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
 
   /// @returns m [rad], v_max′ [rad/s]
@@ -164,7 +170,7 @@ class JointCascade {
   Settings settings_;
   double period_s_;
   double amperes_per_Nm_;
-  double speed_gain_A_s_rad_;  ///< k_v, of the override
+  double speed_gain_A_s_rad_;  ///< k_v of the override
   double approach_1_s_;        ///< ω_p
   double braking_rad_s2_;      ///< a
   double margin_rad_;

@@ -10,11 +10,11 @@
 
 namespace torsio {
 
-/// A spring and a damper at the joint, as a torque to be wanted of a `TorqueController`:
+/// A spring and a damper at the joint, as the reference of a `TorqueController`:
 ///
 ///     τ* = K (q* − q) + D (q̇* − q̇) + τ_ff,   then limited in size and rate
 ///
-/// Source: Hogan, Impedance control (1985). How stiff it may be: `passive_stiffness`.
+/// Source: Hogan, Impedance control (1985). The largest stiffness: `passive_stiffness`.
 class JointImpedance {
  public:
   struct Gains {
@@ -26,7 +26,7 @@ class JointImpedance {
     double torque_Nm = std::numeric_limits<double>::infinity();         ///< limit of τ*
     double torque_rate_Nm_s = std::numeric_limits<double>::infinity();  ///< limit of τ̇*
     double transfer_s = 0.1;
-    double fault_decay_s = 0.02;  ///< of the torque without a usable measurement
+    double fault_decay_s = 0.02;  ///< decay of the torque without a usable measurement
   };
   struct Reference {
     double angle_rad = 0.0;
@@ -52,12 +52,13 @@ class JointImpedance {
 
   void reset() noexcept;
 
-  /// A wish that is not finite is a fault, and the last good one stands (none yet: no torque); a
-  /// measurement is one too, and the torque fades to 0 and goes on from there.
+  /// A reference that is not finite is a fault, and the last finite one is used (none yet: no
+  /// torque). A measurement that is not finite is a fault too: the torque fades to 0 and continues
+  /// from there.
   Output step(const Reference& wanted, const State& measured) noexcept TORSIO_REALTIME;
 
-  /// Both at once, from the next step on, without a jump: what they would change at the last step's
-  /// errors fades in by the handover, so that gains may also move in every tick.
+  /// Both at once, from the next step on, without a jump: the change that they would cause at the
+  /// last step's errors fades in (`BumplessTransfer`), so that gains may also change in every tick.
   /// @returns false, and both stay, if one is negative or not finite
   [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
   [[nodiscard]] const Gains& gains() const noexcept { return gains_; }
@@ -71,16 +72,16 @@ class JointImpedance {
   double fault_keep_;
   detail::BumplessTransfer transfer_;
   Reference wanted_;
-  double position_error_rad_ = 0.0;  ///< of the last step
-  double speed_error_rad_s_ = 0.0;   ///< of the last step
+  double position_error_rad_ = 0.0;  ///< at the last step
+  double speed_error_rad_s_ = 0.0;   ///< at the last step
   bool has_reference_ = false;
   bool is_returning_ = false;  ///< from a fault
   double torque_Nm_ = 0.0;
 };
 
-/// The largest stiffness [Nm/rad] that an impedance on deflection control, with this damping, renders
-/// so that the joint is passive up to the frequency and stable with its output free; 0 if it is not
-/// even without. Swept from below in steps of 5 %, up to ten times the spring.
+/// The largest stiffness [Nm/rad] of an impedance on deflection control, with this damping, for
+/// which the joint is passive up to the frequency and stable with its output free; 0 if it is not
+/// even without stiffness. Searched from below in steps of 5 %, up to ten times the spring.
 [[nodiscard]] double passive_stiffness(const DeflectionController& controller,
                                        double damping_Nms_rad, double passive_to_rad_s,
                                        double speed_cutoff_Hz);

@@ -11,8 +11,8 @@ namespace torsio {
 ///
 ///     x[n+1] = A x[n] + B u[n],   y[n] = C x[n] + D u[n]
 ///
-/// Configuration only: everything here allocates. Systems that are put together must have one sample
-/// rate, or that is an Error.
+/// Configuration only: everything here allocates. Systems that are combined must have the same
+/// sample rate; otherwise an Error is thrown.
 class LinearSystem {
  public:
   struct Matrices {
@@ -22,7 +22,7 @@ class LinearSystem {
   /// @throws Error if the shapes do not fit, a number is not finite, or the rate is not positive.
   LinearSystem(Matrices matrices, double sample_rate_Hz);
 
-  /// ẋ = A x + B u, y = C x + D u behind a zero-order hold, seen at the samples: exactly.
+  /// ẋ = A x + B u, y = C x + D u after a zero-order hold, sampled: exact.
   [[nodiscard]] static LinearSystem held(const Matrices& continuous, double sample_rate_Hz);
   [[nodiscard]] static LinearSystem gain(double gain, double sample_rate_Hz);
   /// y[n] = u[n−1]
@@ -44,11 +44,11 @@ class LinearSystem {
   [[nodiscard]] std::complex<double> response(double frequency_rad_s, std::size_t output = 0,
                                               std::size_t input = 0) const;
 
-  /// The largest absolute eigenvalue of A; below 1 all motions die away.
+  /// The largest absolute eigenvalue of A; below 1 the system is asymptotically stable.
   [[nodiscard]] double spectral_radius() const;
 
-  /// This system's outputs fed back to its inputs with the sign turned.
-  /// @throws Error if there are not as many of one as of the other, or the feedback has no solution.
+  /// Negative feedback: this system's outputs are subtracted from its inputs.
+  /// @throws Error if the numbers of inputs and outputs differ, or the feedback has no solution.
   [[nodiscard]] LinearSystem closed() const;
 
  private:
@@ -56,12 +56,13 @@ class LinearSystem {
   double sample_rate_Hz_;
 };
 
-/// First `before`, then `after`. @throws Error if what goes between, or the rates, do not fit.
+/// First `before`, then `after`. @throws Error if the number of signals between them, or the rates,
+/// differ.
 [[nodiscard]] LinearSystem operator*(const LinearSystem& after, const LinearSystem& before);
 /// Both on the same inputs, their outputs added. @throws Error if they do not fit.
 [[nodiscard]] LinearSystem operator+(const LinearSystem& one, const LinearSystem& other);
 
-/// How far a loop is from instability.
+/// Distance of a loop from instability.
 struct Margins {
   bool is_stable = false;  ///< `is_stable_closed`
   double phase_rad = 0.0;  ///< the least, over all frequencies of gain 1; infinite if there is none
@@ -71,7 +72,7 @@ struct Margins {
   double least_gain = 0.0;  ///< the largest factor below 1 that makes it unstable; 0 if none
 };
 
-/// Of a loop with one input and one output that is closed with the sign turned.
+/// Margins of a loop with one input and one output that is closed with negative feedback.
 /// @throws Error if it has more.
 [[nodiscard]] Margins margins(const LinearSystem& loop);
 

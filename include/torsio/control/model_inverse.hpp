@@ -16,27 +16,27 @@
 
 namespace torsio {
 
-/// A model of the torque run backwards: δ = E[δ | τ*, δ̇, …] with everything but δ as measured
+/// A model of the torque, inverted: δ = E[δ | τ*, δ̇, …] with everything but δ as measured
 /// (`AnyModel::invert`; specification 3.1 for mixtures).
 ///
-/// Guarded as an `Estimator` is: where another input, or the answer, has left its range in training,
-/// the model hands over to its linear fallback run backwards; until the filters have settled, and
-/// where the model has no answer, that alone tells. A slow sweep teaches nothing about the fast
-/// motions of a torque loop (specification 6), so the answer may leave that line only by so many of
-/// its residual standard deviations.
+/// Guarded as an `Estimator` is: where another input, or the result, has left its range in
+/// training, the inverse changes over to that of the linear fallback; until the filters have
+/// settled, and where the model has no inverse, the linear fallback alone is used. A slow sweep
+/// contains no information about the fast motions of a torque loop (specification 6), so the result
+/// may depart from the linear fallback only by so many of its residual standard deviations.
 ///
-/// The memory of a model with state follows the deflection that is asked for, not the measured one:
-/// along that it would take a joint that sticks for a spring that is stiff, and ask for less the
-/// longer it sticks. `follow` tells it what was really asked for behind the limits of the loop. A
-/// model that answers with what is not finite is reset.
+/// The memory of a model with state follows the deflection that is requested, not the measured one:
+/// with the measured one it would interpret a joint that sticks as a spring that is stiff, and
+/// request less the longer the joint sticks. `follow` reports the deflection that was really
+/// requested after the limits of the loop. A model whose output is not finite is reset.
 class ModelInverse {
  public:
-  /// Of the residual standard deviation of the linear fallback.
+  /// In residual standard deviations of the linear fallback.
   static constexpr double kMaxDeparture = 3.0;
 
-  /// @throws Error as `Estimator`, or if the model's first input is not `spring_deflection_rad`, its
-  /// target no torque in Nm, its family has no inverse, its fallback no positive slope, or it needs a
-  /// channel that a `JointSample` does not have.
+  /// @throws Error as `Estimator`, or if the model's first input is not `spring_deflection_rad`,
+  /// its target is not a torque in Nm, its family has no inverse, its fallback has no
+  /// positive slope, or it needs a channel that a `JointSample` does not have.
   ModelInverse(EstimatorSettings settings, AnyModel model, double max_departure = kMaxDeparture);
 
   /// As `Estimator::set_zero`.
@@ -44,13 +44,14 @@ class ModelInverse {
 
   void reset() noexcept;
   Estimate step(double torque_Nm, const JointSample& sample) noexcept TORSIO_REALTIME;
-  /// @param asked_rad what the loop asks for instead of the last answer; without a call, that
+  /// @param asked_rad the deflection that the loop requests instead of the last result; without a
+  /// call, that
   void follow(double asked_rad) noexcept TORSIO_REALTIME {
     if (follows_answer_) asked_.front() = asked_rad - zero_rad_;
   }
 
  private:
-  void remember(Features features) noexcept;
+  void store(Features features) noexcept;
   [[nodiscard]] double on_the_line(double torque_Nm, Features features) const noexcept;
   Estimate guarded(double torque_Nm, Features features) noexcept;
 
@@ -59,20 +60,21 @@ class ModelInverse {
   detail::JointInputs inputs_;
   double max_departure_rad_;
   bool is_stepped_;
-  std::vector<double> asked_;  ///< features of this tick, the deflection being the answer
-  bool is_asked_ = false;      ///< the memory has yet to go there
+  std::vector<double> asked_;  ///< features of this tick, with the resulting deflection
+  bool is_asked_ = false;      ///< the memory has not been updated with it yet
   bool follows_answer_ = false;
   double zero_rad_ = 0.0;  ///< the measured deflection less the model's, of this tick
   double last_rad_ = 0.0;
 };
 
-/// A model that was trained the other way round, with the target `spring_deflection_rad` and
-/// `torque_Nm` among its inputs; guarded by its own estimator.
+/// An inverse model from training: its target is `spring_deflection_rad`, and `torque_Nm` is among
+/// its inputs; guarded by its own estimator.
 class TrainedInverse {
  public:
   /// @throws Error if its target is not `spring_deflection_rad`, `torque_Nm` is not among its raw
-  /// inputs, another is not in a `JointSample`, or a channel behind its target was zeroed in training:
-  /// its deflection would be off the measured one by zeros that it is not told.
+  /// inputs, another is not in a `JointSample`, or a channel from which its target is
+  /// computed was zeroed in training: its deflection would differ from the measured one by
+  /// zeros that it does not know.
   explicit TrainedInverse(Estimator estimator);
 
   void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
@@ -86,7 +88,7 @@ class TrainedInverse {
   std::vector<double> raw_;
 };
 
-/// Any of the above, where a file says which.
+/// Any of the above, as a file specifies.
 class AnyInverse {
  public:
   AnyInverse(LinearInverse inverse) : inverse_(inverse) {}
@@ -97,7 +99,7 @@ class AnyInverse {
   [[nodiscard]] static AnyInverse of(const EstimatorSettings& settings,
                                      const AnyModel::Parameters& parameters);
 
-  /// As `Estimator::set_zero`; nothing to a line.
+  /// As `Estimator::set_zero`; without effect on a linear spring.
   void set_zero(std::string_view channel, double value);
   void reset() noexcept {
     detail::dispatch(inverse_, [](auto& inverse) { inverse.reset(); });

@@ -17,10 +17,11 @@ namespace torsio {
 ///     I[n+1] = I[n] + T K_i e               back calculation: + T / T_t (v − u)
 ///                                           conditional: only if v = u, or e leads back to the limits
 ///
-/// D is the backward difference, low-passed (of e instead of −y, if asked for), f the feed-forward,
-/// h the handover: what a change of gains or a start from a given command would add as a bump, let
-/// go of with a time constant of its own. The integral is in the unit of the command, so that a new
-/// K_i does not move it. Source: Åström & Hägglund, Advanced PID Control (2006), chapter 3.
+/// D is the backward difference, low-passed (of e instead of −y if requested), f the feed-forward,
+/// h the bumpless transfer: the step that a change of gains or a start from a given command would
+/// cause, which decays with a time constant of its own. The integral is in the unit of the command,
+/// so that a new K_i does not change it. Source: Åström & Hägglund, Advanced PID Control (2006),
+/// chapter 3.
 class Pid {
  public:
   enum class AntiWindup { back_calculation, conditional };
@@ -29,13 +30,13 @@ class Pid {
   /// In units of the command over units of the measurement.
   struct Gains {
     double proportional = 0.0;
-    double integral = 0.0;    ///< a second
-    double derivative = 0.0;  ///< times a second
+    double integral = 0.0;    ///< K_i, per second
+    double derivative = 0.0;  ///< K_d, in seconds
   };
   struct Limits {
     double lowest = -std::numeric_limits<double>::infinity();
     double highest = std::numeric_limits<double>::infinity();
-    double rate_per_s = std::numeric_limits<double>::infinity();  ///< of the command
+    double rate_per_s = std::numeric_limits<double>::infinity();  ///< rate limit of the command
   };
   struct Settings {
     Gains gains = {};
@@ -54,7 +55,7 @@ class Pid {
     double integral = 0.0;
     double derivative = 0.0;
     double feed_forward = 0.0;
-    double handover = 0.0;
+    double transfer = 0.0;
     bool is_limited = false;  ///< v is not the sum of the terms
     Fault fault = Fault::none;
   };
@@ -65,25 +66,26 @@ class Pid {
 
   /// No memory; the rate limit starts from the command 0, or the limit next to it.
   void reset() noexcept;
-  /// No memory, but that the next command is this one (cut to the limits), whatever the terms say.
+  /// Clears the memory. The next command is this one (cut to the limits), whatever the terms are.
   void start(double command) noexcept;
 
-  /// A value that is not finite is `Fault::input_not_finite`: the last command is held, and nothing
-  /// remembered: the derivative goes on with its last rate, not with a jump over the gap. So are
-  /// finite ones beyond what the terms hold.
+  /// A value that is not finite is `Fault::input_not_finite`: the last command is held, and no
+  /// state changes: the derivative continues with its last rate, without a jump over the gap. The
+  /// same applies to finite values that are too large for the terms.
   Output step(double reference, double measurement,
               double feed_forward = 0.0) noexcept TORSIO_REALTIME;
 
-  /// What was really applied in the place of the last command, where something behind cut it or
-  /// another loop took over. Call it after every `step` while that is so: the integral does not wind
-  /// up, and the rate limit goes on from there. A number that is not finite changes nothing.
+  /// The command that was applied in place of the last one, where a limit after the controller cut
+  /// it or another loop took over. Call it after every `step` while that is the case: the integral
+  /// does not wind up, and the rate limit continues from there. A number that is not finite changes
+  /// nothing.
   void track(double applied) noexcept TORSIO_REALTIME;
 
-  /// All gains at once, from the next step on; the command goes on without a jump.
+  /// All gains at once, from the next step on; the command continues without a jump.
   /// @returns false, and all stay as they are, if one is negative or not finite
   [[nodiscard]] bool set_gains(const Gains& gains) noexcept TORSIO_REALTIME;
   [[nodiscard]] const Gains& gains() const noexcept { return gains_; }
-  /// @returns the last command, or what `track` said was applied in its place
+  /// @returns the last command, or the one applied in its place according to `track`
   [[nodiscard]] double command() const noexcept { return last_.command; }
   [[nodiscard]] static bool is_valid(const Gains& gains) noexcept;
 
@@ -99,15 +101,15 @@ class Pid {
   DerivativeOf derivative_of_;
   std::optional<double> tracking_s_;
   double period_s_;
-  double step_limit_;            ///< of the command, a tick
+  double step_limit_;            ///< largest change of the command per tick
   double tracking_share_ = 0.0;  ///< T / T_t
   Differentiator differentiator_;
   detail::BumplessTransfer transfer_;
   Output last_;
   double integral_ = 0.0;
-  double rate_ = 0.0;       ///< D, of the last step
-  double error_ = 0.0;      ///< of the last step
-  double increment_ = 0.0;  ///< of the integral by the last step's error
+  double rate_ = 0.0;       ///< D at the last step
+  double error_ = 0.0;      ///< at the last step
+  double increment_ = 0.0;  ///< integral's change at the last step
   bool is_starting_ = false;
 };
 

@@ -5,40 +5,42 @@
 
 namespace torsio {
 
-/// A joint behind a spring as controllers are designed on it, all as felt at the joint:
+/// A joint with a series spring, the model for controller design; all quantities referred to the
+/// joint:
 ///
 ///     J N² θ̈ + b θ̇ = N k_t i − K δ,   δ = θ − q,   M q̈ + d q̇ = K δ + τ_ext,   T_i i̇ = i* − i
 ///
-/// θ is the rotor over the ratio. Dry friction, play and what is not linear in the spring are left out.
+/// θ is the rotor over the ratio. Dry friction, play and the nonlinearity of the spring are not
+/// modelled.
 struct SeriesElasticJoint {
   Drive drive = {};
   double stiffness_Nm_rad = 0.0;       ///< K
-  double joint_inertia_kg_m2 = 0.0;    ///< M, with what hangs on it
+  double joint_inertia_kg_m2 = 0.0;    ///< M, with the load
   double joint_viscous_Nms_rad = 0.0;  ///< d
 
   /// @throws Error as `Drive::check`, if stiffness or inertia is not positive, or d negative.
   void check() const;
 };
 
-/// That of a data sheet: the relaxed stiffness of an elastomer, the middle one of rubber; a torsion
-/// tube before the last gear is taken to the joint, and the gear as rigid.
+/// The joint of a data sheet: the relaxed stiffness of an elastomer, the middle one of rubber; a
+/// torsion tube before the last gear is referred to the joint, and the gear is rigid.
 [[nodiscard]] SeriesElasticJoint series_elastic_joint(const DataSheet& sheet);
 
-/// What the far side of the spring does.
+/// The boundary condition at the output side of the spring.
 enum class JointOutput { locked, free };
 
-/// What a controller feeds back in its linear range, as systems from one measurement to the current:
-/// i* = −(C_δ δ + C_θ̇ θ̇ + C_q q), of everything wanted being zero.
+/// The feedback of a controller in its linear range, as systems from one measurement to the
+/// current: i* = −(C_δ δ + C_θ̇ θ̇ + C_q q), with all references zero.
 struct JointFeedback {
   LinearSystem deflection;  ///< C_δ
   LinearSystem speed;       ///< C_θ̇
   LinearSystem joint;       ///< C_q
 };
 
-/// Whether the joint, as its surroundings feel it through the spring, takes up energy.
+/// Whether the joint, seen from its environment through the spring, is passive.
 struct Passivity {
-  /// Re Z >= 0 from 0 up to here [rad/s]: contact with any passive surroundings cannot build up a
-  /// motion slower than this. The Nyquist frequency if there is no end.
+  /// Re Z >= 0 from 0 up to this frequency [rad/s]: contact with a passive environment cannot
+  /// excite a motion slower than this. The Nyquist frequency if there is no upper limit.
   double passive_to_rad_s = 0.0;
   double least_Nms_rad = 0.0;  ///< the most negative Re Z up to the Nyquist frequency, or 0
   double least_rad_s = 0.0;    ///< where that is

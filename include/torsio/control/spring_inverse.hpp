@@ -8,10 +8,10 @@
 
 namespace torsio {
 
-/// What tells the deflection [rad] that gives a wanted torque, from what the joint reports in this
-/// tick. The value is finite in every case, `fault` says where it is a fallback's. Whoever writes one
-/// of their own satisfies this. One that also has `follow(rad) noexcept` is told after each step what
-/// the loop made of its answer: a limit may have cut it.
+/// Computes the deflection [rad] that gives a wanted torque from the joint's measurements in this
+/// tick. The value is finite in every case; `fault` reports where it is a fallback's. A
+/// user-defined inverse satisfies this concept. One that also has `follow(rad) noexcept` receives
+/// after each step the deflection that the loop really requested, which a limit may have cut.
 template <class I>
 concept SpringInverse =
     std::copyable<I> && requires(I inverse, double torque_Nm, const JointSample& sample) {
@@ -19,7 +19,7 @@ concept SpringInverse =
       { inverse.step(torque_Nm, sample) } noexcept -> std::same_as<Estimate>;
     };
 
-/// δ = (τ − b) / K: the line that every learned inverse must beat.
+/// δ = (τ − b) / K: the linear inverse, the baseline for every learned one.
 class LinearInverse {
  public:
   /// @throws Error if the stiffness is not positive, or a value not finite.

@@ -7,8 +7,8 @@
 
 namespace torsio {
 
-/// How much current a winding stands: the square of the current, through a first-order lag, stays
-/// below the square of the rated current (I²t).
+/// The current that a winding withstands: the square of the current, through a first-order lag,
+/// stays below the square of the rated current (I²t).
 ///
 ///     ẇ = (i² − w) / τ,   i² <= min(i_peak², i_rated² + κ (i_rated² − w)),   κ = 4 (i_peak² / i_rated² − 1)
 ///
@@ -29,7 +29,7 @@ class ThermalLimit {
   }
   /// Whether the limit has begun to fall, at three quarters of the heat.
   [[nodiscard]] bool is_warm() const noexcept TORSIO_REALTIME { return load_ > kCold; }
-  /// @param current_A that flows in this tick, finite
+  /// @param current_A the current that flows in this tick, finite
   void step(double current_A) noexcept TORSIO_REALTIME {
     const double ratio = current_A / rated_A_;
     load_ += share_ * (ratio * ratio - load_);
@@ -43,7 +43,7 @@ class ThermalLimit {
   double rated_A_;
   double peak_A_;
   double fade_;   ///< κ
-  double share_;  ///< of the lag in a tick
+  double share_;  ///< first-order lag per tick
   double load_ = 0.0;
 };
 

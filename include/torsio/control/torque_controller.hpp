@@ -13,36 +13,36 @@
 
 namespace torsio {
 
-/// Makes up for a share of the drive's friction where the spring is to be wound:
+/// Compensates a share of the drive's friction while the spring is wound:
 ///
 ///     i_f = s (F_c tanh(v* / v₀) + F_v v*) / (N k_t),   v* = D[τ*] / K, low-passed
 ///
-/// Of the wanted torque, not of what an inverse makes of it: that hears the measured motion, and its
-/// rate would close a second loop through the model.
+/// It uses the wanted torque, not the output of an inverse: that depends on the measured motion,
+/// and its rate would close a second loop through the model.
 struct FrictionCompensation {
-  double share = 0.7;         ///< s, 0 to 1; more than there is makes the loop hunt
+  double share = 0.7;         ///< s, 0 to 1; overcompensation causes limit cycles
   double speed_rad_s = 0.02;  ///< v₀, at the joint
 };
 
-/// What does not depend on the inverse of a `TorqueController`.
+/// The settings that do not depend on the inverse of a `TorqueController`.
 class TorqueLoopCore {
  public:
   struct Settings {
     DeflectionController::Settings deflection = {};
-    double largest_torque_Nm = std::numeric_limits<double>::infinity();  ///< the wish is cut there
+    double largest_torque_Nm = std::numeric_limits<double>::infinity();  ///< reference limit
     std::optional<FrictionCompensation> friction = std::nullopt;
     std::optional<double> observer_cutoff_Hz = std::nullopt;  ///< needs the rotor's angle
-    /// Adds i_r = K_d v*, v* as in `FrictionCompensation`: the deflection is damped against its wanted
-    /// rate instead of against standing still, and no longer lags by 2 ζ / ω. Margins stay as they
-    /// are; a torque that steps makes a current that jumps. For a torque that is known, not for one
-    /// that follows from a measurement, as that of an impedance.
+    /// Adds i_r = K_d v*, v* as in `FrictionCompensation`: the deflection is damped relative to its
+    /// wanted rate instead of relative to standstill, and no longer lags by 2 ζ / ω. The margins do
+    /// not change; a step of the torque makes a jump of the current. Use it for a torque that is
+    /// planned, not for one that follows from a measurement, like that of an impedance.
     bool feeds_rate_forward = false;
   };
 
   struct Output {
     double current_A = 0.0;
     double wanted_torque_Nm = 0.0;       ///< after its limit
-    double wanted_deflection_rad = 0.0;  ///< of the inverse, after its limit
+    double wanted_deflection_rad = 0.0;  ///< output of the inverse, after its limit
     double proportional_A = 0.0;
     double integral_A = 0.0;
     double derivative_A = 0.0;
@@ -52,7 +52,7 @@ class TorqueLoopCore {
     double observer_A = 0.0;
     double transfer_A = 0.0;  ///< after a change of gains or a fault
     bool is_limited = false;
-    Fault inverse = Fault::none;  ///< the inverse fell back on its line, which may be used
+    Fault inverse = Fault::none;  ///< the inverse used its linear fallback; the output is usable
     Fault fault = Fault::none;    ///< a reference or a measurement could not be used
   };
 
@@ -61,13 +61,13 @@ class TorqueLoopCore {
   TorqueLoopCore(const Settings& settings, double sample_rate_Hz);
 
   void reset() noexcept;
-  /// The torque to ask the inverse for: finite, and within the limit.
+  /// The torque for the inverse: finite, and within the limit.
   double accept(double wanted_Nm) noexcept TORSIO_REALTIME;
   Output step(const Estimate& wanted_rad, const JointSample& sample) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const DeflectionController& deflection() const noexcept { return deflection_; }
   [[nodiscard]] DeflectionController& deflection() noexcept { return deflection_; }
-  /// What the loop feeds back, the observer included. Allocates.
+  /// The feedback of the loop, the observer included. Allocates.
   [[nodiscard]] JointFeedback feedback() const;
   [[nodiscard]] Margins margins_of(JointOutput output) const;
 
@@ -77,7 +77,7 @@ class TorqueLoopCore {
 
   Settings settings_;
   DeflectionController deflection_;
-  detail::BumplessTransfer transfer_;  ///< of what is added to the deflection controller's current
+  detail::BumplessTransfer transfer_;  ///< terms added to the deflection controller's current
   std::optional<DisturbanceObserver> observer_;
   Differentiator wanted_rate_;  ///< D[τ*]
   double amperes_per_Nm_;
@@ -92,9 +92,10 @@ class TorqueLoopCore {
 ///
 ///     δ* = inverse(τ*),   i = deflection controller(δ*, δ) + i_r + i_f + d,   |i| <= i_peak
 ///
-/// A wish that is not finite is a fault, and the last good one stands; without a usable measurement
-/// the current fades to 0. Where the inverse falls back on its line the loop goes on and
-/// `Output::inverse` says so. Source: paper 000 section 4, 001 section 6; specification 3.11.
+/// A reference that is not finite is a fault, and the last finite one is used; without a usable
+/// measurement the current fades to 0. Where the inverse uses its linear fallback the loop
+/// continues and `Output::inverse` reports it. Source: paper 000 section 4, 001 section 6;
+/// specification 3.11.
 template <SpringInverse I>
 class TorqueController {
  public:

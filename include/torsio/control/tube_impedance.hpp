@@ -21,9 +21,9 @@ namespace torsio {
 ///
 ///     K = N_h k K_pp K_tp / (K_tp + k / N_g)
 ///
-/// and a damper alike. Paper 004 uses K_pp = 15, K_tp = 5 (high) and 0, 0.5 (zero), and prints no
-/// units: Nm/rad for K_tp is assumed.
-/// Source: paper 004 section 2.3, specification 3.11; damping and the way from K to K_pp are ours.
+/// and a damper likewise. Paper 004 uses K_pp = 15, K_tp = 5 (high) and 0, 0.5 (zero), and prints
+/// no units: Nm/rad for K_tp is assumed. Source: paper 004 section 2.3, specification 3.11; damping
+/// and the conversion from K to K_pp are ours.
 class TubeImpedance {
  public:
   struct Gains {
@@ -44,12 +44,13 @@ class TubeImpedance {
     Twist twist = Twist::tube;
     double joint_inertia_kg_m2 = 0.0;
     double joint_viscous_Nms_rad = 0.0;
-    /// Gains that only the dry friction of the gear keeps stable are taken too. Those of the paper's
-    /// high impedance are such: at 1 kHz the joint without dry friction is unstable with them.
+    /// Accept gains that are stable only with the dry friction of the gear. Those of the paper's
+    /// high impedance are of this kind: at 1 kHz the joint without dry friction is unstable with
+    /// them.
     bool relies_on_friction = false;
-    double speed_cutoff_Hz = 40.0;  ///< of q̇
-    double transfer_s = 0.1;        ///< of the current, when the measurement is back
-    double fault_decay_s = 0.02;    ///< of the current without a usable measurement
+    double speed_cutoff_Hz = 40.0;  ///< low-pass of q̇
+    double transfer_s = 0.1;        ///< transition of the current when measurements return
+    double fault_decay_s = 0.02;    ///< decay of the current without a usable measurement
   };
   struct Angles {
     double rotor_rad = kNotMeasured;
@@ -62,12 +63,12 @@ class TubeImpedance {
     double position_rad = 0.0;     ///< its share of θ_s*
     double damping_rad = 0.0;      ///< its share of θ_s*
     double motor_torque_Nm = 0.0;  ///< τ_m
-    double transfer_A = 0.0;       ///< beside τ_m / k_t, after a fault
+    double transfer_A = 0.0;       ///< in addition to τ_m / k_t, after a fault
     bool is_limited = false;
     Fault fault = Fault::none;
   };
 
-  /// Of a data sheet with a tube before a gear. @throws Error if it has none.
+  /// Settings from a data sheet with a tube before a gear. @throws Error if it has none.
   [[nodiscard]] static Settings settings_of(const DataSheet& sheet, const Gains& gains);
   /// The gains that render a stiffness and a damping at the joint. @param torque_Nm_rad K_tp
   /// @throws Error if a value is negative, or K_tp not positive.
@@ -81,15 +82,16 @@ class TubeImpedance {
 
   void reset() noexcept;
 
-  /// A wish that is not finite is a fault, and the last good one stands (none yet: no current); a
-  /// measurement too, and the current fades to 0 and goes on from there.
+  /// A reference that is not finite is a fault, and the last finite one is used (none yet: no
+  /// current). A measurement that is not finite is a fault too: the current fades to 0 and
+  /// continues from there.
   Output step(double wanted_rad, double wanted_rad_s,
               const Angles& measured) noexcept TORSIO_REALTIME;
 
   /// K [Nm/rad], at rest.
   [[nodiscard]] double stiffness() const noexcept;
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
-  /// As a joint with the tube behind both gears, and what it feeds back. Allocates.
+  /// The equivalent joint with the tube after both gears, and the feedback. Allocates.
   [[nodiscard]] static SeriesElasticJoint joint_of(const Settings& settings);
   [[nodiscard]] static JointFeedback feedback_of(const Settings& settings, double sample_rate_Hz);
 
@@ -108,8 +110,8 @@ class TubeImpedance {
   double current_A_ = 0.0;
 };
 
-/// As `passive_stiffness` of an impedance on deflection control: the largest K that this actuator
-/// renders so, with K_tp of `settings` and this damping.
+/// Like `passive_stiffness` for an impedance on deflection control: the largest passive K of this
+/// actuator, with K_tp of `settings` and this damping.
 [[nodiscard]] double passive_stiffness(const TubeImpedance::Settings& settings,
                                        double damping_Nms_rad, double passive_to_rad_s,
                                        double sample_rate_Hz);

@@ -6,9 +6,9 @@
 
 namespace torsio::detail {
 
-/// Calls `visit(alternative)` and returns what it returns: std::visit without the exception that it
-/// throws for a variant that holds nothing. No variant of torsio is left so: a failed assignment is
-/// the only way there, and theirs cannot fail.
+/// Calls `visit(alternative)` and returns its result: std::visit without the exception for a
+/// variant without a value. No variant of torsio gets into this state: only a failed assignment
+/// leads to it, and these assignments cannot fail.
 template <std::size_t Index = 0, class Variant, class Visit>
 decltype(auto) dispatch(Variant& variant, const Visit& visit) noexcept {
   if constexpr (Index + 1 < std::variant_size_v<std::remove_const_t<Variant>>) {

@@ -5,10 +5,10 @@
 
 namespace torsio {
 
-/// What a person needs to mend a mistake. Empty parts are left out of the message.
+/// What a person needs to correct a mistake. Empty parts are left out of the message.
 struct ErrorReport {
   std::string place = {};     ///< file and where in it: "sweep.csv: line 12, column 3 (torque_Nm)"
-  std::string problem = {};   ///< one clause, when expected/found do not say it all
+  std::string problem = {};   ///< one clause, where expected/found are not sufficient
   std::string expected = {};  ///< what would have been right
   std::string found = {};     ///< what was there instead
   std::string advice = {};    ///< what to do about it

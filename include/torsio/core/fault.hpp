@@ -5,8 +5,7 @@
 
 namespace torsio {
 
-/// What a real-time step has to say about its own output. The value beside it is finite in every
-/// case.
+/// What a real-time step reports about its own output. The value with it is finite in every case.
 enum class Fault : std::uint8_t {
   none,               ///< the value may be used
   input_not_finite,   ///< an input was NaN or infinite; the last good value is held

@@ -8,7 +8,7 @@ namespace torsio {
 
 namespace detail {
 
-/// A dense row-major table: plain data at public borders, where no Eigen type may stand.
+/// A dense row-major table: plain data in public interfaces, which contain no Eigen types.
 template <class Number>
 struct Table2d {
   std::size_t rows = 0;

@@ -7,7 +7,7 @@ namespace torsio {
 /// Where a recording came from, for the card of whatever is trained on it.
 struct Source {
   std::string file;    ///< as the user named it
-  std::string sha256;  ///< of the file's bytes; empty for a recording that was made in memory
+  std::string sha256;  ///< hash of the file's bytes; empty for a recording that was made in memory
   bool operator==(const Source&) const = default;
 };
 
@@ -15,7 +15,7 @@ struct Source {
 struct ZeroRule {
   std::string channel;
   double first_s = 0.0;    ///< mean over this much of the start; 0 with `mid_range`
-  bool mid_range = false;  ///< (min + max) / 2 of the record: looks ahead, and rows say so
+  bool mid_range = false;  ///< (min + max) / 2 of the record: not causal, and result rows state it
   bool operator==(const ZeroRule&) const = default;
 };
 

@@ -6,8 +6,7 @@
 
 namespace torsio::detail {
 
-/// How far two stamps of one clock are apart, whichever is earlier; stamps as far apart as may be, too.
-/// Never negative.
+/// Absolute difference of two stamps of one clock, without overflow. Never negative.
 [[nodiscard]] constexpr std::int64_t distance_ns(std::int64_t a_ns, std::int64_t b_ns) noexcept {
   const auto later = static_cast<std::uint64_t>(std::max(a_ns, b_ns));
   const auto earlier = static_cast<std::uint64_t>(std::min(a_ns, b_ns));

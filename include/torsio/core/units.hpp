@@ -10,7 +10,7 @@ namespace torsio {
 /// A unit that a channel name may end in, and the way to its SI unit:
 /// si = scale * value + offset.
 struct Unit {
-  std::string_view suffix;     ///< as written behind the last underscore(s): "deg_s"
+  std::string_view suffix;     ///< as written after the last underscore(s): "deg_s"
   std::string_view si_suffix;  ///< the unit that torsio computes in: "rad_s"
   double scale = 1.0;
   double offset = 0.0;
@@ -37,7 +37,7 @@ struct ChannelName {
   [[nodiscard]] std::string si() const;
 };
 
-/// Splits off the longest suffix that is a known unit; empty when there is none or nothing stands
+/// Splits off the longest suffix that is a known unit; empty when there is none or nothing is
 /// before it.
 [[nodiscard]] std::optional<ChannelName> split_channel_name(std::string_view name) noexcept;
 
@@ -47,7 +47,7 @@ struct ChannelName {
 
 /// Reads "10Hz", "0.1s", "50 ms" or "3deg" as an SI number. A bare number is taken to be in
 /// `expected_si` already.
-/// @throws UsageError naming `place` if the text is no number, or its unit is not one of
+/// @throws UsageError naming `place` if the text is not a number, or its unit is not one of
 /// `expected_si`'s quantity.
 [[nodiscard]] double si_quantity(std::string_view text, std::string_view expected_si,
                                  std::string_view place);

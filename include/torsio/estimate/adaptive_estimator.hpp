@@ -12,14 +12,14 @@
 
 namespace torsio {
 
-/// An `Estimator` around a network that goes on learning, in its last layer, from a reference sensor
-/// as long as there is one. Each tick:
+/// An `Estimator` around a network whose last layer is trained further during operation, from a
+/// reference sensor as long as there is one. Each tick:
 ///
-///     const Estimate torque = estimator.step(raw);         // of the weights before this tick's reference
+///     const Estimate torque = estimator.step(raw);         // weights before this tick's reference
 ///     estimator.learn({.value = load_cell_Nm, .age_s = age_s});
 ///
-/// Where the estimate was a guard's and not the network's (`fault` is not `none`), nothing is
-/// learned. Nothing is allocated after construction.
+/// Where the estimate comes from a guard and not from the network (`fault` is not `none`), nothing
+/// is learned. Nothing is allocated after construction.
 class AdaptiveEstimator {
  public:
   /// @param network of a model file (`ModelFile::parameters`). @throws Error as `Estimator` and
@@ -31,19 +31,19 @@ class AdaptiveEstimator {
     return estimator_.raw_inputs();
   }
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return estimator_.settings(); }
-  /// As the estimator's.
+  /// As for the estimator.
   void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
 
-  /// Filters and hidden state; what was learned stays.
+  /// Resets filters and hidden state; the adapted weights are kept.
   void reset() noexcept;
-  /// Back to the frozen network.
+  /// Returns to the frozen network.
   void forget() noexcept { estimator_.model().adapter().reset(); }
   void pause() noexcept { estimator_.model().adapter().pause(); }
   void resume() noexcept { estimator_.model().adapter().resume(); }
 
   Estimate step(std::span<const double> raw) noexcept TORSIO_REALTIME;
-  /// @param reference of the tick that `step` was called for last, as it is measured: zeros and units
-  /// of the model's target.
+  /// @param reference measured at the tick of the last `step`, with the zeros and unit of the
+  /// model's target.
   UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const LastLayerAdapter& adapter() const noexcept {

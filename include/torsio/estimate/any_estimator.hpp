@@ -6,10 +6,10 @@
 
 namespace torsio {
 
-/// An estimator around a model whose family is known only at run time, as model files hold them.
+/// An estimator around a model whose family is known only at run time, as in model files.
 using Estimator = BasicEstimator<AnyModel>;
 
-/// The same, fed with a joint's sample.
+/// The same, for a joint's sample as input.
 using TorqueEstimator = BasicTorqueEstimator<AnyModel>;
 
 }  // namespace torsio

@@ -14,32 +14,32 @@
 
 namespace torsio {
 
-/// What runs in the loop: raw channels -> features -> model -> guards -> value with error bar.
+/// The estimator for a control loop: raw channels -> features -> model -> guards -> value with
+/// error bar.
 ///
-/// `value` is finite in every case. Within the training range of every feature the model alone
-/// answers. Just outside, over a border as wide as `margin` says, model and fallback are blended:
-/// the fallback's weight w grows linearly with the worst feature's excursion, from 0 at the range
-/// to 1 at the border's end, so that no value jumps; std_dev^2 = (1-w) model's + w fallback's + w
-/// (1-w) (model - fallback)^2, and the fault is still `none`. Where `fault` is not `none`, the
-/// value must not be used as the model's. The first of these that holds is told:
+/// `value` is finite in every case. Within the training range of every feature it is the model's
+/// alone. Just outside, over a border of the width `margin`, model and fallback are blended: the
+/// fallback's weight w grows linearly with the worst feature's excursion, from 0 at the range to 1
+/// at the border's end, so that no value jumps; std_dev^2 = (1-w) model's + w fallback's + w (1-w)
+/// (model - fallback)^2, and the fault is still `none`. Where `fault` is not `none`, the value must
+/// not be used as the model's. The first of these that holds is reported:
 ///
 /// - `input_count_wrong`, `input_not_finite`: the tick cannot be used and nothing is stepped; the
 ///   last value from usable inputs (0 if none), without error bar.
 /// - `warming_up`: filters have not settled since `reset()` or a long gap; linear fallback.
 /// - `zero_not_set`: a channel in `settings().zeroed_channels` had its zero taken from each record
 ///   in training, and `set_zero` was not called for it. The value is what it would be otherwise,
-///   off by the slope times that zero, without error bar. It stands before the range, because
-///   nobody knows where a channel without a zero is.
+///   off by the slope times that zero, without error bar. It has priority over the range,
+///   because the position of a channel without a zero is unknown.
 /// - `outside_training_range`: a feature is beyond the border; linear fallback, without error bar:
 ///   there is no evidence.
-/// - whatever the model said of itself, or `model_not_finite` (the model is then reset); linear
+/// - a fault that the model reported, or `model_not_finite` (the model is then reset); linear
 ///   fallback.
 ///
-/// Should the fallback overflow, the last value is held. After a gap of at most
-/// `kLongestGapSeconds` (never less than one tick) filters and model run on as if the missing ticks
-/// had not been, so a plain `rate(x)` shows the whole step over the gap in one tick; after a longer
-/// one they start afresh and warm up. A model without an error bar of its own gets that of the
-/// residual table.
+/// If the fallback overflows, the last value is held. After a gap of at most `kLongestGapSeconds`
+/// (never less than one tick) filters and model continue as if the missing ticks did not exist, so
+/// a plain `rate(x)` shows the whole step over the gap in one tick; after a longer gap they restart
+/// and warm up. A model without an error bar of its own gets that of the residual table.
 template <Model M>
 class BasicEstimator {
  public:
@@ -50,7 +50,7 @@ class BasicEstimator {
     reset();
   }
 
-  /// The channels that `step` wants, in this order.
+  /// The channels that `step` requires, in this order.
   [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept {
     return core_.raw_inputs();
   }
@@ -62,8 +62,8 @@ class BasicEstimator {
   /// configuring.
   /// @throws UsageError for an unknown channel or a value that is not finite.
   void set_zero(std::string_view channel, double value) { core_.set_zero(channel, value); }
-  /// The channels in `settings().zeroed_channels` that still wait for `set_zero`; while there are
-  /// any, each step says `Fault::zero_not_set`.
+  /// The channels in `settings().zeroed_channels` for which `set_zero` was not called yet; while
+  /// there are any, each step reports `Fault::zero_not_set`.
   [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept {
     return core_.unset_zeros();
   }
@@ -73,7 +73,7 @@ class BasicEstimator {
     model_.reset();
   }
 
-  /// Whether filters and differentiators have settled, so that the model is listened to.
+  /// Whether filters and differentiators have settled, so that the model's value is used.
   [[nodiscard]] bool is_settled() const noexcept { return core_.is_settled(); }
 
   /// @param raw one value for each of `raw_inputs()`; NaN for one that was not measured.
@@ -87,7 +87,7 @@ class BasicEstimator {
   }
 
   /// A measurement of the last step's target, for a model that feeds its output back: free run
-  /// starts where the joint is, or goes one step ahead if called after each step.
+  /// starts from the measured value, or is one step ahead if called after each step.
   void correct(double measured) noexcept TORSIO_REALTIME
     requires FeedsBack<M>
   {

@@ -13,12 +13,12 @@
 
 namespace torsio::detail {
 
-/// A gap in the inputs longer than this starts the filters and the model afresh; a shorter one they
-/// run across, as if its ticks had not been.
+/// After a gap in the inputs that is longer than this, filters and model are reset; over a shorter
+/// one they continue as if its ticks did not exist.
 inline constexpr double kLongestGapSeconds = 0.01;
 
-/// Everything of an estimator that does not depend on the family of its model: raw channels in,
-/// features out, and the guards that decide whether what the model made of them may be used.
+/// The part of an estimator that does not depend on the family of its model: from raw channels to
+/// features, and the guards that decide whether the model's output may be used.
 class EstimatorCore {
  public:
   /// @throws Error if the settings contradict each other or the model, or a number in them is not
@@ -27,9 +27,9 @@ class EstimatorCore {
 
   /// One tick's raw channels after the pipeline.
   struct Conditioned {
-    Features features;          ///< empty where `fault` says that there are none
+    Features features;          ///< empty where `fault` is not none
     Fault fault = Fault::none;  ///< none, input_count_wrong or input_not_finite
-    bool restarted = false;     ///< the pipeline was reset: the model's memory is void too
+    bool restarted = false;     ///< the pipeline was reset: the model's memory is invalid too
   };
 
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return settings_; }
@@ -45,23 +45,23 @@ class EstimatorCore {
   void reset() noexcept;
 
   Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;
-  /// The last value that came of good inputs, with the reason why it is held.
+  /// The last value from good inputs, with the reason why it is held.
   [[nodiscard]] Estimate held(Fault fault) const noexcept TORSIO_REALTIME;
   /// How far the worst feature has left its range, in widths of its border: 0 inside, above 1
   /// beyond the border.
   [[nodiscard]] double excursion(Features features) const noexcept TORSIO_REALTIME;
-  /// What may be told to the outside of `told`, the model's answer to `features`.
+  /// Applies the guards to `raw_estimate`, the model's output for `features`.
   Estimate apply_guards(Features features, const Estimate& raw_estimate) noexcept TORSIO_REALTIME;
 
  private:
   struct Range {
     double lowest = 0.0;
     double highest = 0.0;
-    double border = 0.0;  ///< width, on either side, of where the model hands over to the fallback
+    double border = 0.0;  ///< width, on either side, of the transition to the fallback
   };
 
   [[nodiscard]] Estimate model_part(const Estimate& raw_estimate) const noexcept;
-  /// `told` handed over to the fallback by the share `weight` in 0..1.
+  /// Blends `raw_estimate` with the fallback, whose share is `weight` in 0..1.
   [[nodiscard]] Estimate blended(Features features, const Estimate& raw_estimate,
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
@@ -70,11 +70,11 @@ class EstimatorCore {
 
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
-  std::vector<Range> ranges_;  ///< of each feature, tolerance included
+  std::vector<Range> ranges_;  ///< per feature, tolerance included
   std::vector<std::string> unset_zeros_;
   std::size_t longest_gap_;  ///< ticks
   std::size_t missed_ = 0;   ///< ticks in a row without usable input
-  bool poisoned_ = false;    ///< a feature was not finite: differences and lags still hold it
+  bool poisoned_ = false;    ///< a feature was not finite: differences and lags still contain it
   double last_value_ = 0.0;
 };
 

@@ -13,8 +13,7 @@ namespace torsio {
 struct FeatureRanges {
   std::vector<double> lowest;
   std::vector<double> highest;
-  double margin =
-      0.05;  ///< share of the range over which, outside it, the model hands over to the fallback
+  double margin = 0.05;  ///< transition from model to fallback outside the range, as a share of it
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
@@ -24,13 +23,13 @@ struct FeatureRanges {
   }
 };
 
-/// value = intercept + sum_j slope_j * feature_j, used where the model must not be trusted. Fitted
-/// ones have slope 0 on rates.
+/// value = intercept + sum_j slope_j * feature_j, used where the model's value must not be used.
+/// Fitted ones have slope 0 on rates.
 struct LinearFallback {
   double intercept = 0.0;
   std::vector<double> slope;
   double residual_std =
-      std::numeric_limits<double>::quiet_NaN();  ///< of its own training residuals, target's unit
+      std::numeric_limits<double>::quiet_NaN();  ///< training residuals, target's unit
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
@@ -40,9 +39,9 @@ struct LinearFallback {
   }
 };
 
-/// Spread of the model's residuals by region of its own output, for families that know no error bar
-/// of their own. `std_dev[i]` holds for values in [edges[i], edges[i+1]); outside, the nearest
-/// region's. Empty: no evidence.
+/// Spread of the model's residuals by region of its own output, for families without an error
+/// bar of their own. `std_dev[i]` holds for values in [edges[i], edges[i+1]); outside, the
+/// nearest region's. Empty: no evidence.
 struct ResidualTable {
   std::vector<double> edges;    ///< ascending, one more than regions
   std::vector<double> std_dev;  ///< target's unit

@@ -9,8 +9,8 @@
 
 namespace torsio {
 
-/// What a series-elastic joint reports at one control tick. A field left out stays NaN: a fault if
-/// the model needs it, never a guess.
+/// The measurements of a series-elastic joint at one control tick. A field that is not set stays
+/// NaN: a fault if the model needs it, never a guess.
 struct JointSample {
   double t_s = kNotMeasured;
   double motor_angle_rad = kNotMeasured;  ///< rotor side, before the gear
@@ -26,12 +26,12 @@ struct JointSample {
 
 namespace detail {
 
-/// Writes the raw channels that an estimator wants, taken by name from a `JointSample`: its fields
-/// and `spring_deflection_rad`.
+/// Writes the raw channels that an estimator requires, taken by name from a `JointSample`: its
+/// fields and `spring_deflection_rad`.
 class JointInputs {
  public:
-  /// @throws Error naming the raw input that a `JointSample` does not have, or if the target is no
-  /// torque in Nm.
+  /// @throws Error naming the raw input that a `JointSample` does not have, or if the target is not
+  /// a torque in Nm.
   JointInputs(const std::vector<std::string>& raw_inputs, const std::string& target);
 
   std::span<const double> from(const JointSample& sample) noexcept TORSIO_REALTIME;

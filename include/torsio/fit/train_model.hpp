@@ -31,20 +31,21 @@ struct ModelChoice {
 /// A fitted model with all that it needs to run (`make_estimator(file)`) and to be saved.
 struct TrainedModel {
   ModelFile file;
-  std::vector<std::string> notes;  ///< what the user should be told about the fit
+  std::vector<std::string> notes;  ///< messages about the fit for the user
   std::vector<FittedParameter> table = {};
   double fit_seconds = 0.0;
 };
 
-/// Recording -> features -> fitted model -> guards: what `torsio fit` does. Learns from the records
-/// with the role train only; guards take their error bars from the validation records, if there are
-/// any. Deterministic for a seed.
-/// @throws Error if the data cannot be learned from or the training records disagree about which
-/// channels are zeroed, UsageError for a wrong setting, Cancelled if `progress` asks to stop.
+/// Recording -> features -> fitted model -> guards: the function of `torsio fit`. Only records with
+/// the role train are used for training; guards take their error bars from the validation records,
+/// if there are any. Deterministic for a seed.
+/// @throws Error if the data are not sufficient or the training records disagree about which
+/// channels are zeroed, UsageError for a wrong setting, Cancelled if `progress` asks to
+/// stop.
 [[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                                        std::uint64_t seed, const Progress& progress = {});
 
-/// What the models of one input set learn from: the dataset after the feature pipeline.
+/// The training data of the models with one input set: the dataset after the feature pipeline.
 struct LearningData {
   TrainingData training;
   std::optional<TrainingData> validation;  ///< if any record has that role
@@ -58,8 +59,8 @@ struct LearningData {
                                        const ModelChoice& choice, std::uint64_t seed,
                                        const Progress& progress = {});
 
-/// `train_model` of a fit that can be stopped and resumed. The validation records of the dataset are
-/// the context's, unless it has some.
+/// `train_model` for a fit that can be stopped and resumed. The validation records of the dataset
+/// are used for the context, unless it has its own.
 /// @throws UsageError also if there is something to resume and the family keeps no checkpoints.
 [[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                                        const FitContext& context);

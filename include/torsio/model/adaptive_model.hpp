@@ -9,13 +9,13 @@
 
 namespace torsio {
 
-/// The last layer of a network's parameters, or null: its family is none of `mlp`, `lstm`, `gru`.
+/// The last layer of a network's parameters, or null if the family is none of `mlp`, `lstm`, `gru`.
 [[nodiscard]] const DenseLayer* last_layer(const AnyModel::Parameters& parameters) noexcept;
 /// The same. @throws UsageError where there is none.
 const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters);
 
-/// A network whose last layer can be adapted while it runs: a `Model`, so that an estimator's guards
-/// go around it (`AdaptiveEstimator`).
+/// A network whose last layer can be adapted while it runs: a `Model`, so that it can be used
+/// within an estimator's guards (`AdaptiveEstimator`).
 class AdaptiveModel {
  public:
   struct Parameters {
@@ -28,12 +28,12 @@ class AdaptiveModel {
   /// has no last layer.
   explicit AdaptiveModel(const Parameters& parameters);
 
-  /// Those of the frozen network.
+  /// The parameters of the frozen network.
   [[nodiscard]] Parameters parameters() const;
   [[nodiscard]] std::size_t input_count() const noexcept { return network_.input_count(); }
   [[nodiscard]] std::size_t parameter_count() const noexcept { return network_.parameter_count(); }
 
-  /// The hidden state; what was learned stays (`adapter().reset()`).
+  /// Resets the hidden state; the adapted weights are kept (`adapter().reset()` resets them).
   void reset() noexcept { network_.reset(); }
   /// The value of the adapted weights.
   Estimate step(Features features) noexcept TORSIO_REALTIME;
@@ -41,7 +41,7 @@ class AdaptiveModel {
   [[nodiscard]] LastLayerAdapter& adapter() noexcept { return adapter_; }
   [[nodiscard]] const LastLayerAdapter& adapter() const noexcept { return adapter_; }
 
-  /// The network with the weights as they are now: a model like any other, to be saved.
+  /// The network with the present weights: an ordinary model, to be saved.
   [[nodiscard]] AnyModel::Parameters adapted() const;
 
  private:

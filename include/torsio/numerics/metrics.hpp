@@ -6,8 +6,8 @@
 
 namespace torsio {
 
-/// How far a model is off, e = value - target; all but `fit_percent` in the target's unit. NaN
-/// where there is nothing to say it from. There is no "MAE": the papers use it for two different
+/// The error of a model, e = value - target; all but `fit_percent` in the target's unit. NaN where
+/// there are no samples to compute it from. There is no "MAE": the papers use it for two different
 /// things. Source: specification 3.10.
 struct Metrics {
   std::size_t samples = 0;            ///< that were scored

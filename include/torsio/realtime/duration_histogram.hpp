@@ -8,9 +8,9 @@
 
 namespace torsio {
 
-/// How often which duration was met, in memory that is fixed from the start: 16 buckets to each
-/// power of two, so that a quantile is at most 1/16 too large and never too small, from 0 ns to 18
-/// minutes; longer ones are counted in the last bucket and kept in `max_ns`.
+/// A histogram of durations in memory of fixed size: 16 buckets for each power of two, so that a
+/// quantile is at most 1/16 too large and never too small, from 0 ns to 18 minutes; longer ones are
+/// counted in the last bucket, their maximum is in `max_ns`.
 class DurationHistogram {
  public:
   /// A negative duration counts as 0.
@@ -18,8 +18,8 @@ class DurationHistogram {
 
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] std::int64_t max_ns() const noexcept { return max_ns_; }  ///< exact
-  /// The smallest bucket end that at least this part of all durations does not exceed; 0 if there
-  /// are none. @param part in [0, 1], e.g. 0.999
+  /// The smallest bucket end that is not exceeded by at least this part of all durations; 0 if
+  /// there are none. @param part in [0, 1], e.g. 0.999
   [[nodiscard]] std::int64_t quantile_ns(double part) const noexcept;
 
  private:

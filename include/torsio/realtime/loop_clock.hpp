@@ -6,7 +6,7 @@
 
 namespace torsio {
 
-/// The time that a loop lives by. A test puts a simulated one in its place.
+/// The clock of a loop. A test replaces it by a simulated one.
 class LoopClock {
  public:
   LoopClock() = default;
@@ -14,7 +14,7 @@ class LoopClock {
   LoopClock(const LoopClock&) = delete;
   LoopClock& operator=(const LoopClock&) = delete;
 
-  /// Never runs backwards, whatever is done to the time of day.
+  /// Never runs backwards, even if the time of day is changed.
   [[nodiscard]] virtual std::int64_t now_ns() noexcept TORSIO_REALTIME = 0;
   /// Waits until that point of `now_ns()`; returns at once if it has passed.
   virtual void sleep_until(std::int64_t point_ns) noexcept = 0;
@@ -22,7 +22,7 @@ class LoopClock {
   [[nodiscard]] virtual std::int64_t cpu_ns() noexcept TORSIO_REALTIME = 0;
 };
 
-/// CLOCK_MONOTONIC, slept on by absolute time: a late wake-up does not move the next one.
+/// CLOCK_MONOTONIC with sleep to absolute times: a late wake-up does not delay the next one.
 class MonotonicClock final : public LoopClock {
  public:
   [[nodiscard]] std::int64_t now_ns() noexcept override;

@@ -18,31 +18,32 @@ namespace torsio {
 
 struct LoopOptions {
   double period_s = 1e-3;  ///< from 10 us to 10 s
-  /// Of SCHED_FIFO, 1 to 99; 0: the thread is scheduled like any other. Above 50 it comes before
-  /// the threads of interrupts on a PREEMPT_RT kernel.
+  /// SCHED_FIFO priority, 1 to 99; 0: the thread is scheduled like any other. Above 50 it has
+  /// priority over the interrupt threads of a PREEMPT_RT kernel.
   int priority = 80;
-  bool lock_memory = true;  ///< mlockall: of the whole process, and it stays locked behind the loop
+  bool lock_memory = true;  ///< mlockall: the whole process, also after the loop has ended
   int cpu = -1;             ///< the core to stay on; -1: any
   /// Ends the loop after this many overruns in a row; 0: never.
   std::uint64_t stop_after_overruns = 0;
-  /// What was asked for above and is not permitted is an Error instead of a remark in the report.
+  /// A request above that is not permitted is an Error instead of a remark in the report.
   bool must_be_granted = false;
 };
 
-/// What a step is told.
+/// The argument of a step.
 struct Tick {
-  std::int64_t index = 0;        ///< of the period, from 0; jumps where periods were skipped
+  std::int64_t index = 0;        ///< period from 0; jumps where periods were skipped
   std::int64_t due_ns = 0;       ///< when the period began: start + index * period
   std::int64_t lateness_ns = 0;  ///< how long after that the step was called
   std::uint64_t overruns = 0;    ///< so far
 };
 
-/// What the operating system let the loop have.
+/// What the operating system granted to the loop.
 struct LoopGrants {
   bool fifo = false;
   bool memory_locked = false;
   bool cpu = false;
-  std::string refused = {};  ///< what was asked for and not given, with the reason; empty: nothing
+  std::string refused =
+      {};  ///< what was requested and not granted, with the reason; empty: nothing
 };
 
 enum class LoopEnd : std::uint8_t {
@@ -51,18 +52,18 @@ enum class LoopEnd : std::uint8_t {
   overruns,        ///< `stop_after_overruns` in a row
 };
 
-/// What a loop has to say when it ends.
+/// The report of a loop at its end.
 struct LoopReport {
   LoopEnd end = LoopEnd::step_is_done;
   std::uint64_t steps = 0;
   std::uint64_t overruns = 0;         ///< steps that ended after the next period had begun
   std::uint64_t skipped_periods = 0;  ///< periods in which no step began, because of them
   DurationHistogram lateness;         ///< from the beginning of the period to the step
-  DurationHistogram cpu_time;         ///< of each step
+  DurationHistogram cpu_time;         ///< each step
   LoopGrants grants;
 };
 
-/// A step that cannot throw: `step(tick)` is noexcept and tells whether the loop goes on.
+/// A step that cannot throw: `step(tick)` is noexcept and returns whether the loop continues.
 template <class Step>
 concept LoopStep = requires(Step& step, const Tick& tick) {
   { step(tick) } noexcept -> std::same_as<bool>;
@@ -71,9 +72,9 @@ concept LoopStep = requires(Step& step, const Tick& tick) {
 /// Calls a step at a fixed rate, on its own thread or on the caller's.
 ///
 /// Period n begins at start + n * period on a monotonic clock. A step that ends after the next
-/// period has begun is an overrun: it is counted, and the loop goes on with the first period that
+/// period has begun is an overrun: it is counted, and the loop continues with the first period that
 /// has not begun yet, so that there is no burst of steps that catch up. Denormal numbers are off
-/// while it runs, 256 KiB of stack are touched before.
+/// while it runs; 256 KiB of stack are touched before.
 ///
 /// The loop neither allocates nor locks nor writes between the first step and the last. It is over
 /// after `stop_requested`, `overruns` or the step's own end, and never starts again by itself:
@@ -107,9 +108,9 @@ class RealtimeLoop {
     running_ = std::async(std::launch::async,
                           [this, own = std::move(step)]() mutable { return run(own); });
   }
-  /// Ends what `run` or `start` runs before its next step: within a period. From any thread, or a
-  /// signal handler. A request stands until `run` or `wait` returns: one that comes before `run` or
-  /// `start` ends that before its first step.
+  /// Ends the loop of `run` or `start` before its next step: within a period. May be called from
+  /// any thread or a signal handler. A request remains active until `run` or `wait` returns: one
+  /// that comes before `run` or `start` ends that before its first step.
   void request_stop() noexcept { is_stop_requested_.store(true, std::memory_order_release); }
   /// Waits for the end of what was started. @throws Error as `run`, or if nothing was started.
   LoopReport wait();

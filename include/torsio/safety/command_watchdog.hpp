@@ -9,44 +9,44 @@
 
 namespace torsio {
 
-/// Whether a loop may drive its joint on the commands that reach it.
+/// Decides whether a loop may drive its joint with the commands that it receives.
 ///
 ///     disarmed  --arm-->  waiting  --a command written since-->  running
 ///     running   --no command, a fault, the clock, stop-->  stopped  --arm-->  waiting
 ///
-/// Only a valid motion command feeds it, by the time at which its source wrote it: none that was
-/// refused, and no other traffic. A stop is latched: no command ends it, only `arm` and then a command
-/// that was written after that. In every state but `running` the motor gets no current, which takes
-/// no energy into the joint: reset the controllers and command 0.
+/// Only a valid motion command feeds it, with the time at which its source wrote it: no rejected
+/// command, and no other traffic. A stop is latched: no command ends it, only `arm` followed by a
+/// command that was written after that. In every state but `running` the motor gets no current,
+/// which takes no energy into the joint: reset the controllers and command 0.
 ///
 /// All times are of one monotonic clock (`MonotonicClock`, `Tick::due_ns`); one that runs backwards
 /// stops the loop. Form: ours.
 class CommandWatchdog {
  public:
   struct Settings {
-    /// For how long a command stands. At 1 kHz, a late tick included, it is over within 20 ms.
+    /// How long a command is valid. At 1 kHz, a late tick included, it expires within 20 ms.
     double timeout_s = 0.018;
-    /// For how long the loop may go on with a fault, such as an inverse that fell back on its line.
+    /// How long the loop may continue with a fault, such as an inverse on its linear fallback.
     double longest_fault_s = std::numeric_limits<double>::infinity();
   };
-  /// The latest one, as `Mailbox::Letter` has it.
+  /// The latest command, as in `Mailbox::Letter`.
   struct Command {
     std::int64_t written_ns = 0;
-    bool is_valid = false;  ///< there is one, and it was taken whole
+    bool is_valid = false;  ///< there is one, and it was accepted
   };
   enum class State : std::uint8_t { disarmed, waiting, running, stopped };
-  /// Of the last stop.
+  /// The reason of the last stop.
   enum class Reason : std::uint8_t { none, command_lost, fault, clock, requested };
 
   /// @throws Error if a time is not positive.
   explicit CommandWatchdog(const Settings& settings);
 
-  /// The operator's word that the joint may move. Not while it is running: that goes on.
+  /// The operator confirms that the joint may move. Without effect while it is running.
   void arm(std::int64_t now_ns) noexcept TORSIO_REALTIME;
   void stop() noexcept TORSIO_REALTIME;
 
-  /// Once a tick, before the controllers.
-  /// @param fault of the loop's last output
+  /// Call in every tick, before the controllers.
+  /// @param fault in the loop's last output
   State step(std::int64_t now_ns, const Command& command,
              Fault fault = Fault::none) noexcept TORSIO_REALTIME;
 
@@ -63,7 +63,7 @@ class CommandWatchdog {
   Reason reason_ = Reason::none;
   std::int64_t armed_ns_ = 0;
   std::int64_t fed_ns_ = 0;   ///< when the last valid command was written
-  std::int64_t well_ns_ = 0;  ///< of the last tick without a fault
+  std::int64_t well_ns_ = 0;  ///< time of the last tick without a fault
   std::int64_t last_ns_ = std::numeric_limits<std::int64_t>::min();
 };
 

@@ -13,7 +13,8 @@ namespace torsio {
 ///     y[n] = (x[n] - x[n-1]) * sample_rate
 ///
 /// (it lags by half a sample), low-passed if a cut-off is given. The first output is 0, because
-/// nothing is known yet. An input that is not finite spoils two differences and is then forgotten.
+/// there is no difference yet. An input that is not finite affects two differences and has no later
+/// effect.
 class Differentiator {
  public:
   /// @throws UsageError if the sample rate is not positive and finite, or as `Lowpass` does.
@@ -34,8 +35,8 @@ class Differentiator {
     return lowpass_ ? lowpass_->step(rate_) : rate_;
   }
 
-  /// For samples that were lost: the next input is not one sample behind the last, and takes over
-  /// the last difference instead of making one.
+  /// For samples that were lost: the next input is not one sample after the last, and keeps the
+  /// last difference instead of making a new one.
   void skip() noexcept TORSIO_REALTIME { is_skipped_ = true; }
 
   /// Samples after `reset()` until the output is the derivative (to 1 % of a step of it): 2 without

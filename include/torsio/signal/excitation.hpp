@@ -7,10 +7,10 @@
 #include "torsio/core/realtime.hpp"
 #include "torsio/signal/lowpass.hpp"
 
-// References that excite an actuator, one sample a `step()`. `reset()` begins again with the same
-// numbers. Amplitudes are in whatever unit the reference has (rad, Nm); the first sample is the
-// value at time 0. Every constructor throws `UsageError` for a parameter that is not finite or out
-// of its stated range, and for a frequency at or above half the sample rate.
+// References that excite an actuator, one sample per `step()`. `reset()` restarts with the same
+// numbers. Amplitudes are in the unit of the reference (rad, Nm); the first sample is the value at
+// time 0. Every constructor throws `UsageError` for a parameter that is not finite or outside its
+// stated range, and for a frequency at or above half the sample rate.
 
 namespace torsio {
 
@@ -51,8 +51,8 @@ class Chirp {
   detail::SampleClock clock_;
 };
 
-/// A sine whose frequency grows (or falls) by the same factor in equal times, from f0 to f1 over the
-/// duration T, and then stays: every octave gets as long as any other.
+/// A sine whose frequency grows (or falls) by the same factor in equal times, from f0 to f1 over
+/// the duration T, and then stays: every octave has the same length.
 ///
 ///     y(t) = A sin(2 pi f0 T (r^(t/T) - 1) / ln r),   r = f1 / f0
 class LogSweep {
@@ -73,7 +73,7 @@ class LogSweep {
   detail::SampleClock clock_;
 };
 
-/// Straight lines between +A and -A, from 0 upwards.
+/// A triangle wave between +A and -A, from 0 upwards.
 class Triangle {
  public:
   struct Parameters {
@@ -89,9 +89,9 @@ class Triangle {
   detail::SampleClock clock_;
 };
 
-/// A position that goes to and fro between +A and -A with a trapezoidal speed: from rest at 0 to
-/// +A, then between the ends, never faster than `speed` nor accelerated more than `acceleration`
-/// (a range too short for full speed is crossed without reaching it). Specification 4.7, `sweep`.
+/// A position that moves between +A and -A with a trapezoidal speed: from rest at 0 to +A, then
+/// between the ends, never faster than `speed` nor accelerated more than `acceleration` (in a range
+/// too short for full speed it is not reached). Specification 4.7, `sweep`.
 class TrapezoidSweep {
  public:
   struct Parameters {
@@ -160,8 +160,8 @@ class BandLimitedNoise {
   double output_ = 0.0;
 };
 
-/// A sine of which every period has an amplitude and a length of its own, as of a hand that pushes
-/// to and fro:
+/// A sine of which every period has its own amplitude and length, like the motion of a person who
+/// pushes back and forth:
 ///
 ///     y = A_n sin(2 pi (t - t_n) / T_n),   t_n <= t < t_n + T_n = t_(n+1)
 ///     A_n = A (1 + s_A g),   T_n = (1 + s_T g') / f
@@ -187,12 +187,12 @@ class QuasiPeriodic {
   Parameters parameters_;
   double sample_rate_Hz_;
   Random random_;
-  double amplitude_ = 0.0;  ///< of this period
+  double amplitude_ = 0.0;  ///< in this period
   double turns_a_sample_ = 0.0;
-  double turns_ = 0.0;  ///< of this period that have passed
+  double turns_ = 0.0;  ///< turns of this period that have passed
 };
 
-/// What was recorded once more, at the loop's own rate: straight lines between the samples. Behind
+/// Repeats a recording at the loop's own rate, with linear interpolation between the samples. After
 /// the last one it stays there, or begins again.
 class Replay {
  public:

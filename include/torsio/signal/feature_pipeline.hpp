@@ -19,8 +19,8 @@ struct ChannelDefinition {
   bool operator==(const ChannelDefinition&) const = default;
 };
 
-/// Which inputs a model takes and how they come from raw channels. Plain data: it is stored in the
-/// model file as it is.
+/// The inputs of a model and how they are computed from raw channels. Plain data: it is stored
+/// unchanged in the model file.
 struct FeatureSpec {
   std::vector<std::string> inputs;  ///< one expression each, causal (see docs/expressions.md)
   std::vector<ChannelDefinition>
@@ -35,11 +35,11 @@ struct FeatureSpec {
 /// Equal sub-expressions are evaluated once. `rate(x)` is the backward difference over one sample,
 /// `lowpass(x, f)` a second-order Butterworth filter re-discretised for the sample rate that starts
 /// in the steady state of its first input, `lag(x, n)` the value n samples ago (before there is
-/// one, the oldest). docs/expressions.md has the whole language.
+/// one, the oldest). docs/expressions.md describes the whole language.
 ///
-/// Finite raw values can still give a feature that is not finite (`x / y`). It stays in its tick: a
-/// low-pass passes it through without taking it into its state, a rate has forgotten it one sample
-/// later, a lag n samples later.
+/// Finite raw values can still give a feature that is not finite (`x / y`). Its effect is limited:
+/// a low-pass returns it without changing its state, a rate is finite again one sample later, a lag
+/// n samples later.
 class FeaturePipeline {
  public:
   /// @throws Error naming the expression and the column in it if one cannot be parsed, names
@@ -54,12 +54,12 @@ class FeaturePipeline {
   [[nodiscard]] double sample_rate_Hz() const noexcept;
   [[nodiscard]] std::size_t feature_count() const noexcept;
 
-  /// The channels that `step` wants, in this order: those of the expressions after all definitions
-  /// are put in.
+  /// The channels that `step` requires, in this order: those of the expressions after all
+  /// definitions are substituted.
   [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept;
 
-  /// Whether a feature says how fast something moves: it uses channels only inside `rate(...)` or
-  /// channels (raw or defined) that are rates by their unit (`_rad_s`, `_m_s`).
+  /// Whether a feature is a rate of motion: it uses channels only inside `rate(...)` or channels
+  /// (raw or defined) that are rates by their unit (`_rad_s`, `_m_s`).
   [[nodiscard]] bool is_rate(std::size_t feature) const noexcept;
 
   /// Subtracts `value` (SI) from a raw channel from now on; call while configuring.

@@ -9,15 +9,16 @@
 
 namespace torsio {
 
-/// A move of a joint from waypoint to waypoint along fifth-order polynomials in time, never faster
-/// nor accelerated more than its limits; it ends at rest at the last one and stays there.
+/// A move of a joint from waypoint to waypoint along fifth-order polynomials in time, within its
+/// limits of speed and acceleration; it ends at rest at the last one and stays there.
 ///
 ///     q(s) = q₀ + Σ c_k s^k,   s = (t − t₀) / T,   q̈ = 0 at every waypoint
 ///
-/// A move that stops at each waypoint is the one of least jerk between them, q₀ + d (10 s³ − 15 s⁴ +
-/// 6 s⁵), as fast as the limits allow: T = max(15 d / 8 v, √(10 d / (√3 a))). One that passes through has
-/// the mean of the two neighbouring speeds there, none where it turns back, and the times of all its
-/// parts are stretched together until the limits hold. Flash & Hogan (1985).
+/// A move that stops at each waypoint is the one of least jerk between them, q₀ + d (10 s³ − 15 s⁴
+/// + 6 s⁵), as fast as the limits allow: T = max(15 d / 8 v, √(10 d / (√3 a))). In a move without
+/// stops the speed at a waypoint is the mean of the two neighbouring speeds, or zero where the
+/// direction changes, and the times of all its parts are scaled together until the limits hold.
+/// Flash & Hogan (1985).
 class JointMove {
  public:
   enum class Through { stop, pass };
@@ -45,7 +46,7 @@ class JointMove {
   struct Part {
     double start_s = 0.0;
     double duration_s = 0.0;
-    std::array<double, 6> coefficients{};  ///< of s^0 to s^5
+    std::array<double, 6> coefficients{};  ///< s^0 to s^5
   };
   [[nodiscard]] static Part part(double from_rad, double to_rad, double from_rad_s, double to_rad_s,
                                  double duration_s);

@@ -16,8 +16,8 @@ namespace torsio {
 /// input gives that constant from the first sample on). Computed as a state-variable filter, whose
 /// coefficients do not cancel when the cut-off is far below the sample rate.
 ///
-/// An input that is not finite comes out as it is and leaves the state alone: the filter goes on
-/// at the next finite input as if there had been no sample.
+/// An input that is not finite is returned unchanged and does not change the state: the filter
+/// continues at the next finite input as if there had been no sample.
 ///
 /// Cost: 6 multiplications. Source: specification 3.1, guard 3.
 class Lowpass {
@@ -47,8 +47,8 @@ class Lowpass {
     return low;
   }
 
-  /// Samples from a step of the input on (that one counted) until the output stays within 1 % of
-  /// it: an upper bound from the envelope of the step response.
+  /// Samples from a step of the input on (included) until the output stays within 1 % of it: an
+  /// upper bound from the envelope of the step response.
   [[nodiscard]] std::size_t settling_samples() const noexcept;
 
   /// Standard deviation of the output over that of a white input, in the long run.

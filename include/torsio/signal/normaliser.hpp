@@ -8,7 +8,7 @@
 
 namespace torsio {
 
-/// Brings channels to comparable size: y_j = (x_j - centre_j) / scale_j.
+/// Scales channels to comparable size: y_j = (x_j - centre_j) / scale_j.
 class Normaliser {
  public:
   /// Plain data, stored with a model.

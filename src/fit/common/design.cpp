@@ -22,7 +22,7 @@ std::size_t input_named(const std::string& expression, const TrainingData& data)
   throw UsageError({.place = "option schedule",
                     .expected = "one of the model's inputs (" + list + ")",
                     .found = '"' + expression + '"',
-                    .advice = "Add it to --inputs: the model must be told it at run time."});
+                    .advice = "Add it to --inputs: the model requires it at run time."});
 }
 
 struct Dropped {
@@ -143,7 +143,7 @@ bool has_slope(const TrainingData& data, std::size_t input, const Groups& groups
 std::size_t first_rate(const TrainingData& data, std::string_view family) {
   const auto input = std::ranges::find(data.inputs, true, &InputInfo::is_rate);
   if (input == data.inputs.end())
-    throw Error({.problem = std::string(family) + " has no input that tells a rate",
+    throw Error({.problem = std::string(family) + " has no input that is a rate",
                  .expected = "one such as lowpass(rate(spring_deflection_rad), 10Hz)",
                  .advice = "Add it to --inputs; the friction follows it."});
   return static_cast<std::size_t>(input - data.inputs.begin());

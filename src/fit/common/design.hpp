@@ -16,7 +16,7 @@ namespace torsio {
 /// A model that is linear in its coefficients, before they are fitted.
 struct Design {
   Matrix columns;                  ///< samples x coefficients; zero where a term is left out
-  std::vector<double> target;      ///< one a sample
+  std::vector<double> target;      ///< one per sample
   std::vector<std::string> terms;  ///< what a column is, for messages; empty: left out on purpose
 };
 
@@ -40,10 +40,10 @@ struct DesignFit {
   std::vector<std::string> notes;
 };
 
-/// Least squares in every group. Terms that a group cannot tell apart are dropped there, with a
-/// note.
-/// @param is_free one a column, or empty: coefficients of columns with a 0 are kept from falling
-/// below 0
+/// Least squares in every group. Terms that the data of a group cannot distinguish are dropped
+/// there, with a note.
+/// @param is_free one per column, or empty: coefficients of columns with a 0 are constrained to be
+/// >= 0
 /// @throws Error if a group has fewer than `kSamplesPerTerm` samples for each term.
 [[nodiscard]] DesignFit fit_design(const Design& design, const Groups& groups,
                                    std::span<const std::uint8_t> is_free = {});
@@ -59,7 +59,7 @@ inline constexpr std::size_t kSamplesPerTerm = 5;
 [[nodiscard]] bool has_slope(const TrainingData& data, std::size_t input, const Groups& groups,
                              bool rates);
 
-/// The first input that tells a rate. @throws Error that names the family if there is none.
+/// The first input that is a rate. @throws Error that names the family if there is none.
 [[nodiscard]] std::size_t first_rate(const TrainingData& data, std::string_view family);
 
 /// Fills the columns `first`... with the inputs that `has_slope`, and names them.

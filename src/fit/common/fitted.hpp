@@ -8,14 +8,15 @@
 
 namespace torsio {
 
-/// What a fitter returns: the parameters, and what the user should be told about them ("input
-/// support_m is constant in the training data: no term").
+/// What a fitter returns: the parameters, and messages for the user ("input support_m is constant
+/// in the training data: no term").
 template <class Family>
 struct Fitted {
   typename Family::Parameters parameters;
   std::vector<std::string> notes;
-  std::vector<FittedParameter> table = {};  ///< of families whose numbers have a meaning
-  /// On training data that the fit held out to choose by; NaN of families that do not.
+  std::vector<FittedParameter> table = {};  ///< for families with interpretable parameters
+  /// RMSE on training data that the fit held out for its choices; NaN for families that hold out
+  /// none.
   double held_out_rmse = kNotMeasured;
 };
 

@@ -17,7 +17,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Residual {
-  double value = 0.0;  ///< what the model said
+  double value = 0.0;  ///< the model's output
   double error = 0.0;
 };
 
@@ -41,8 +41,8 @@ double edge_at(const std::vector<Residual>& sorted, std::size_t end) {
   return std::midpoint(sorted[end - 1].value, sorted[end].value);
 }
 
-/// An equation of motion holds beyond the forces that it was fitted to, and a straight line from force to
-/// displacement nowhere: the guard leaves such a model as much room again on either side.
+/// An equation of motion holds beyond the forces that it was fitted to; a linear map from force to
+/// displacement does not. The guard adds as much room again on either side for such a model.
 void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
   if (!model.traits().extrapolates) return;
   for (std::size_t j = 0; j < ranges.lowest.size(); ++j) {

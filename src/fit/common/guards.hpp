@@ -12,7 +12,7 @@ namespace torsio {
 /// The range of each input over the usable samples.
 [[nodiscard]] FeatureRanges feature_ranges(const TrainingData& data);
 
-/// Least squares of the target on all inputs that are no rates: tasks reach rates that no training
+/// Least squares of the target on all inputs that are not rates: tasks reach rates that no training
 /// record has, and a slope there extrapolates without bound (docs/decisions/0004). Rates, and
 /// inputs that are constant or depend linearly on those before them, have slope 0. `residual_std`
 /// is sqrt(sum e^2 / (samples - terms)).
@@ -27,10 +27,10 @@ inline constexpr std::size_t kMaxResidualRegions = 16;
 /// reset, as in the loop. Empty where there are fewer than 50 samples.
 [[nodiscard]] ResidualTable residual_table(AnyModel model, const TrainingData& data);
 
-/// What goes around a fitted model into its file. The residual table is from `validation` where
-/// given (training residuals are too small for a model with many parameters). Else it is from training,
-/// widened as a whole to `held_out_rmse` where the fit knows that and it is larger. `zeroed_channels`
-/// are left to the caller, who knows the recordings.
+/// The estimator settings around a fitted model in its file. The residual table is from
+/// `validation` where given (training residuals are too small for a model with many parameters).
+/// Otherwise it is from training, scaled up to `held_out_rmse` where the fit has computed that and
+/// it is larger. `zeroed_channels` are set by the caller, who has the recordings.
 [[nodiscard]] EstimatorSettings guarded_settings(const FeatureSpec& features,
                                                  const TrainingData& training,
                                                  const AnyModel& model,

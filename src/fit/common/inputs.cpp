@@ -58,7 +58,7 @@ void refuse_conflicts(const Dataset& dataset) {
     }
 }
 
-/// The mapping's definitions whose sources are still there, then the canonical channels that nobody
+/// The mapping's definitions whose sources still exist, then the canonical channels that were not
 /// recorded.
 std::vector<ChannelDefinition> known_definitions(const Dataset& dataset) {
   refuse_conflicts(dataset);
@@ -164,9 +164,9 @@ bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
   double total = 0.0;
   double missed = 0.0;
   for (std::size_t i = 0; i < measured.size(); ++i) {
-    double said = 0.0;
-    for (std::size_t j = 0; j < plane.size(); ++j) said += plane[j] * design(i, j);
-    missed += (measured[i] - said) * (measured[i] - said);
+    double computed = 0.0;
+    for (std::size_t j = 0; j < plane.size(); ++j) computed += plane[j] * design(i, j);
+    missed += (measured[i] - computed) * (measured[i] - computed);
     total += (measured[i] - mean) * (measured[i] - mean);
   }
   return missed < kUnexplained * total;
@@ -253,7 +253,7 @@ std::string refuse_leak(const Dataset& dataset, const FeatureSpec& spec, bool al
   if (!leak.empty() && !allow_leak)
     throw UsageError({.place = leak,
                       .problem = leak.starts_with(kTruthPrefix)
-                                     ? "no sensor sees this channel of a simulation"
+                                     ? "no sensor measures this channel of a simulation"
                                      : dataset.target + " was computed from this input: a model "
                                                         "would learn the formula",
                       .advice = "Leave it out of --inputs, or accept rows that are marked as leaks "

@@ -13,8 +13,8 @@
 
 #include "torsio/fit/common/options.hpp"
 
-// The options of a fitter stand in one place: its options struct states name, range and help beside
-// its fields. Kind and default come from the fields themselves.
+// The options of a fitter are declared in one place: its options struct states name, range and help
+// next to its fields. Kind and default come from the fields themselves.
 //
 //     struct MineOptions {
 //       double scale = kNotMeasured;  // "auto"

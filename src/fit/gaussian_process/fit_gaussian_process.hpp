@@ -20,10 +20,10 @@ inline constexpr OptionInfo kKernelOption{
 
 struct GaussianProcessOptions {
   std::string kernel = "linear_ard+matern52_ard";  ///< see `parse_kernel`
-  std::size_t samples = 500;  ///< at most so many training samples, drawn by chance; 0: all
-  std::size_t restarts = 3;   ///< of the search for the kernel's numbers, besides the first start
-  std::size_t iterations = 100;  ///< of one search, at most; 0: the numbers of the start
-  bool std_dev = true;           ///< know the error bar in every step, at N^2 / 2 operations
+  std::size_t samples = 500;     ///< at most so many training samples, drawn by chance; 0: all
+  std::size_t restarts = 3;      ///< searches of the hyperparameters after the first
+  std::size_t iterations = 100;  ///< limit of one search; 0: start values
+  bool std_dev = true;           ///< compute the error bar in every step, at N^2 / 2 operations
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {

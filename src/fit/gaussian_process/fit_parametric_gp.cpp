@@ -58,10 +58,10 @@ class Adam {
   std::vector<double> second_;
 };
 
-/// The samples learned from, and those that judge the refit.
+/// The training samples, and those on which the refit is evaluated.
 struct Split {
   Table training;
-  Table judging;
+  Table evaluation;
   std::string tested_on;
 };
 
@@ -76,12 +76,12 @@ Split split_of(const TrainingData& data, const FitContext& context) {
   Table all = usable_table(data);
   if (context.validation != nullptr)
     return {.training = std::move(all),
-            .judging = usable_table(*context.validation),
+            .evaluation = usable_table(*context.validation),
             .tested_on = "the validation records"};
   Split split{
-      .training = {}, .judging = {}, .tested_on = "a fifth of the training samples, held out"};
+      .training = {}, .evaluation = {}, .tested_on = "a fifth of the training samples, held out"};
   for (std::size_t n = 0; n < all.target.size(); ++n)
-    append(interleaved_fold(n, all.target.size()) == kFolds - 1 ? split.judging : split.training,
+    append(interleaved_fold(n, all.target.size()) == kFolds - 1 ? split.evaluation : split.training,
            all.features.row(n), all.target[n]);
   return split;
 }
@@ -235,7 +235,7 @@ ParametricGp::Parameters with_posterior(ParametricGp::Parameters parameters,
   return parameters;
 }
 
-/// RMSE in the target's unit; infinite where the model says no number.
+/// RMSE in the target's unit; infinite where the model's output is not a number.
 double rmse_of(const ParametricGp::Parameters& parameters, const Table& table) {
   ParametricGp model(parameters);
   double sum = 0.0;
@@ -355,7 +355,7 @@ Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data, const Parametri
                                                   descent.trainer.noise_variance(), table.features,
                                                   table.target, SparseNoise::fitc));
   const auto error_of = [&](const ParametricGp::Parameters& of) {
-    return context.error_of ? context.error_of(ParametricGp(of)) : rmse_of(of, split.judging);
+    return context.error_of ? context.error_of(ParametricGp(of)) : rmse_of(of, split.evaluation);
   };
   const double learned_rmse = error_of(parameters);
   const double refitted_rmse = error_of(refitted);

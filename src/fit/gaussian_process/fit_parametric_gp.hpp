@@ -42,7 +42,7 @@ struct ParametricGpOptions {
   std::size_t inducing_points = 14;                ///< M
   std::size_t updates = 20000;                     ///< samples taken in, drawn by chance
   std::size_t batch = 1;        ///< samples between two steps of the kernel's numbers
-  double learning_rate = 0.01;  ///< of Adam; `paper` has its own
+  double learning_rate = 0.01;  ///< for Adam; `paper` has its own
   bool refit = true;            ///< try the closed form over all samples at the end
   std::optional<PlainKernel> kernel_plain = {};  ///< in place of `kernel`, in physical units, fixed
 
@@ -95,8 +95,8 @@ struct ParametricGpOptions {
                                                      const ParametricGpOptions& options,
                                                      const FitContext& context = {});
 
-/// The combined kernel with these numbers. theta_1 is folded into theta_3 and theta_5, with which it
-/// only ever stands as a product; signs of theta_2, 3, 5, 6, 7, 9 mean nothing.
+/// The combined kernel with these numbers. theta_1 is folded into theta_3 and theta_5, with which
+/// it occurs only as a product; signs of theta_2, 3, 5, 6, 7, 9 have no effect.
 /// @throws Error if one that must not be 0 is, or is not finite.
 [[nodiscard]] KernelExpression kernel_plain(const PlainKernel& theta);
 

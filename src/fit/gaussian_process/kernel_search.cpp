@@ -12,7 +12,7 @@
 namespace torsio {
 namespace {
 
-// Factors of a million either way are no knowledge about standardised data.
+// For standardised data a prior that allows factors of a million either way is without information.
 constexpr double kWidest = 13.8;
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace torsio {
 
 /// Bounds and starts of a kernel's numbers together with the logarithm of the noise's variance, all
-/// of standardised data.
+/// for standardised data.
 struct KernelSearch {
   std::size_t iterations = 100;
   LbfgsSettings settings;
@@ -29,7 +29,7 @@ inline constexpr double kLeastLogNoise = -13.815510557964274;  // ln 1e-6
 /// The same moved by chance, by about a factor of e.
 [[nodiscard]] std::vector<double> moved_start(const std::vector<double>& start, Random& random);
 
-/// `f`, told to the context's listener at every evaluation as a fraction of [begin, end).
+/// `f`, with each evaluation reported to the context's progress as a fraction of [begin, end).
 [[nodiscard]] Differentiable reported(Differentiable f, const FitContext& context, double begin,
                                       double end, std::size_t iterations, std::string doing);
 

@@ -15,7 +15,7 @@ namespace {
 struct Share {
   double begin;
   double end;
-  double first_step = 1.0;  ///< of its minimisation
+  double first_step = 1.0;  ///< step size at the start of its minimisation
 };
 
 LbfgsResult search(MarginalLikelihood& process, std::vector<double> start, std::size_t iterations,

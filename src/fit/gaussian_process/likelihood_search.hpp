@@ -12,8 +12,8 @@
 namespace torsio {
 
 struct LikelihoodSearch {
-  std::size_t restarts = 0;    ///< besides the kernel's own numbers
-  std::size_t iterations = 0;  ///< of one search, at most; 0: the kernel's own numbers
+  std::size_t restarts = 0;    ///< in addition to the kernel's own numbers
+  std::size_t iterations = 0;  ///< limit of one search; 0: the kernel's own numbers
 };
 
 /// Numbers of the kernel and ln sigma^2 that maximise the marginal likelihood: from several starts on

@@ -11,7 +11,8 @@
 
 namespace torsio {
 
-/// What an exact Gaussian process says of its own training data when each is left out.
+/// The prediction of an exact Gaussian process for each training sample when that sample is left
+/// out.
 struct LeaveOneOut {
   double rmse = 0.0;
   double log_density = 0.0;  ///< mean, of the left-out target
@@ -40,7 +41,7 @@ class MarginalLikelihood {
 
   /// Factorises K of these numbers. @returns -ln p(y), or infinity.
   double fix(std::span<const double> parameters);
-  /// Of what was fixed last.
+  /// The kernel that was set last.
   [[nodiscard]] const Kernel& kernel() const noexcept { return kernel_; }
   [[nodiscard]] const std::vector<double>& weights() const noexcept { return weights_; }
   [[nodiscard]] double noise_variance() const noexcept { return noise_variance_; }

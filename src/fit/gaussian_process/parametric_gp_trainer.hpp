@@ -31,7 +31,7 @@ class ParametricGpTrainer {
 
   struct Prediction {
     double mean = 0.0;
-    double variance = 0.0;  ///< of f, without noise
+    double variance = 0.0;  ///< variance of f, without noise
   };
   /// Prepares what the calls below need of this input. NaN outside the kernel's domain.
   Prediction predict(std::span<const double> x);
@@ -43,7 +43,7 @@ class ParametricGpTrainer {
   void add_noise_gradient(double target, double share);
   void add_divergence_gradient(double share);
   void add_nlml_gradient();
-  /// Of all `parameters()`; the next sum begins at 0.
+  /// The gradient for all `parameters()`; the next sum begins at 0.
   void take_gradient(std::span<double> gradient);
 
   /// (m, S) after the prepared sample.
@@ -68,13 +68,13 @@ class ParametricGpTrainer {
   Kernel kernel_;
   Matrix points_;
   double noise_variance_;
-  PackedPoints packed_;  ///< Z and, behind them, the present input
+  PackedPoints packed_;  ///< Z followed by the present input
   double jitter_ = 0.0;
   Eigen::MatrixXd k_;
   Eigen::MatrixXd inverse_;
   Eigen::MatrixXd s_;
   Eigen::VectorXd m_;
-  // Of the present input.
+  // Values at the present input.
   std::vector<double> x_;
   Prediction prediction_;
   Eigen::VectorXd q_;

@@ -20,7 +20,8 @@
 namespace torsio {
 namespace {
 
-/// Of a rate's root mean square: dry friction that turns within it, or all but at once.
+/// Share of a rate's root mean square over which dry friction changes its sign: the whole of it, or
+/// nearly a step.
 constexpr std::array kRateShares{0.2, 0.02};
 constexpr double kClearly = 0.99;  // less of the held-out error
 
@@ -72,7 +73,7 @@ AnyModel residual_model(const TrainingData& data, ResidualKind kind, const FitCo
   return Mlp(fit_mlp(data, {.layers = {16, 16}, .activation = Activation::tanh}, own).parameters);
 }
 
-/// One fold of the samples to judge by, and the others to learn from.
+/// The samples of one fold for evaluation, and the others for training.
 std::pair<TrainingData, TrainingData> parted(const TrainingData& data) {
   std::pair<TrainingData, TrainingData> parts{data, data};
   for (std::size_t s = 0; s < data.sequences.size(); ++s) {
@@ -133,10 +134,9 @@ FittedGreyBox chosen_box(const TrainingData& data, const GreyBoxOptions& options
   FittedGreyBox fitted;
   fitted.parameters = search.fitted(chosen.choice);
   fitted.held_out_rmse = chosen.held_out_error;
-  fitted.notes.push_back(fmt::format("{}; held out ({}): RMSE {:.4g}, a straight line {:.4g}",
-                                     search.description_of(chosen.choice),
-                                     search.what_was_held_out(), chosen.held_out_error,
-                                     search.held_out_error({})));
+  fitted.notes.push_back(fmt::format(
+      "{}; held out ({}): RMSE {:.4g}, linear model {:.4g}", search.description_of(chosen.choice),
+      search.what_was_held_out(), chosen.held_out_error, search.held_out_error({})));
   return fitted;
 }
 

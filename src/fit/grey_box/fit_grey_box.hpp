@@ -29,7 +29,7 @@ struct GreyBoxOptions {
   std::string schedule = {};  ///< expression of the input to schedule over; empty: constant
   /// Only slip forces, branches and friction of rates >= 0, which take energy and never give it; no residual.
   bool passive = false;
-  double bound = 3.0;  ///< of the residual, in RMSE of the box
+  double bound = 3.0;  ///< limit of the residual, in RMSE of the box
   ResidualKind residual = ResidualKind::automatic;
 
   template <class Self, class Visit>
@@ -56,14 +56,14 @@ using FittedGreyBox = Fitted<GreyBox>;
 /// Chooses terms by cross-validation and fits them by least squares, slip forces and branches >= 0
 /// unless signed ones are clearly better.
 ///
-/// Starting from a straight line, the step up (more knots of the curve, more slip elements, more
-/// knots of their forces, signed forces, relaxation, viscous and dry friction of rates, less smoothing)
-/// that lowers the held-out error most is taken as long as it lowers it by 1 %. Held out are: the
-/// records one at a time, if there are three; of a schedule the inner knots, one at a time, interpolated
-/// over the others; else fifths of interleaved blocks. Every candidate is judged on sums that are
-/// gathered once (AᵀA of all terms, for each fold), so the search does not see the data again.
-/// Smoothing: λ n Σ (second difference)² over the knots of curve and forces.
-/// Deterministic.
+/// Starting from the linear model, the step (more knots of the curve, more slip elements, more
+/// knots of their forces, signed forces, relaxation, viscous and dry friction of rates, less
+/// smoothing) that lowers the held-out error most is taken as long as it lowers it by 1 %. Held out
+/// are: the records one at a time, if there are three; of a schedule the inner knots, one at a
+/// time, interpolated over the others; else fifths of interleaved blocks. Every candidate is
+/// evaluated on sums that are computed once (AᵀA of all terms, for each fold), so the search does
+/// not read the data again. Smoothing: λ n Σ (second difference)² over the knots of curve and
+/// forces. Deterministic.
 /// @throws Error if the first input is constant, or as `groups_by`, or UsageError for a residual of a passive box.
 [[nodiscard]] FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& options,
                                          const FitContext& context = {});

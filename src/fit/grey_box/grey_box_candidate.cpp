@@ -46,7 +46,7 @@ GreyBoxTerms::Structure structure_of(const GreyBoxTerms::Structure& all,
   return own;
 }
 
-/// Of coarse hats in fine ones: hats at every 2^coarser-th knot.
+/// Coarse hat functions expressed by fine ones: hats at every 2^coarser-th knot.
 void add_hats(std::vector<Eigen::Triplet<double>>& triplets, std::size_t fine_first,
               std::size_t coarse_first, std::size_t level, std::size_t places) {
   const std::size_t step = (GreyBoxSums::kKnots - 1) >> level;
@@ -130,7 +130,7 @@ Eigen::VectorXd solve_mixed(const Eigen::MatrixXd& product, const Eigen::VectorX
     small.square = square;
     const NonNegativeFit fit =
         non_negative_least_squares(small, std::vector<std::uint8_t>(bound.size(), 0));
-    // A search for active sets that went in circles is no fit: NaN is never chosen.
+    // An active-set search that cycles has no result: NaN is never chosen.
     if (!fit.has_converged)
       return Eigen::VectorXd::Constant(projection.size(), std::numeric_limits<double>::quiet_NaN());
     const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(
@@ -186,7 +186,7 @@ std::vector<double> GreyBoxCandidate::solved(const NormalEquations& equations) c
   for (std::size_t i = 0; i < structure_.thresholds.size(); ++i)
     add_smoothing(product, structure_.first_slip() + i * structure_.friction_knots.size(),
                   structure_.friction_knots.size(), weight);
-  // What no sample tells stays 0.
+  // Coefficients that no sample determines remain 0.
   constexpr double kRidge = 1e-9;
   const double mean = product.trace() / static_cast<double>(count);
   std::vector<std::uint8_t> is_free(structure_.columns(), 1);

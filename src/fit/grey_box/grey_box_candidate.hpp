@@ -8,7 +8,7 @@
 
 namespace torsio {
 
-/// Which of all possible terms a grey box has: a place on each of these ladders.
+/// The terms of a grey box: a position in each of these sequences of structures.
 struct GreyBoxChoice {
   std::size_t curve = 0;      ///< 2^curve + 1 knots
   std::size_t slips = 0;      ///< 0, 1, 2, 4, 8 thresholds

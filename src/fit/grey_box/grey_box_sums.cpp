@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMaxSummed = 100000;  // rows; of more every n-th is taken
 constexpr std::size_t kRecordsToLeaveOut = 3;
 
-/// [lowest, highest] first input. @throws Error if that is no range, or of few samples.
+/// [lowest, highest] first input. @throws Error if that range is empty, or has few samples.
 std::pair<double, double> range_of(const Table& table, const TrainingData& data) {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
@@ -125,7 +125,7 @@ struct Range {
   [[nodiscard]] bool holds(double value) const { return value >= low && value <= high; }
 };
 
-/// Of the first input in all records but those of each fold.
+/// Range of the first input in all records but those of each fold.
 std::vector<Range> ranges_of_others(const GreyBoxSums& sums, const TrainingData& data) {
   std::vector<Range> ranges(sums.folds);
   std::size_t record = 0;

@@ -20,14 +20,15 @@ struct GreyBoxSums {
   static constexpr std::size_t kTimeConstants = 6;
 
   GreyBoxTerms::Structure all;
-  std::vector<std::uint8_t> is_rate;   ///< of every input
+  std::vector<std::uint8_t> is_rate;   ///< one per input
   CoefficientSchedule frame;           ///< without values
-  std::size_t levels = 1;              ///< of the schedule
+  std::size_t levels = 1;              ///< levels of the schedule
   std::size_t folds = 1;               ///< 1: levels are held out instead
   bool is_by_record = false;           ///< a fold is some records; else blocks
   std::vector<NormalEquations> cells;  ///< [level * folds + fold]
-  /// Of each cell, what lies beyond the first input's range in all other cells; empty unless folds are
-  /// records. A guard answers there, so it chooses no terms.
+  /// For each cell, the samples beyond the first input's range in all other cells; empty unless
+  /// folds are records. A guard replaces the model's value there, so these samples are not used to
+  /// choose terms.
   std::vector<NormalEquations> beyond;
   std::size_t samples = 0;
 };

@@ -89,7 +89,7 @@ WienerFit fit_or_refuse(const WienerData& own, const WienerShape& shape, std::si
          .problem = "no linear model of this structure stays finite on the training records",
          .expected = "a stable start of the search",
          .found = fmt::format("none with {} zeros and {} poles", shape.zeros, shape.poles),
-         .advice = "Take other orders; torsio check tells whether the records are sound."});
+         .advice = "Use other orders; torsio check reports whether the records are usable."});
   if (!fit->has_converged)
     throw Error({.place = "hammerstein_wiener",
                  .problem = "the search did not converge",
@@ -173,11 +173,11 @@ class Summary {
                               .value = packed[k],
                               .std_error = uncertainty.std_error[k]});
     for (const std::vector<double>& direction : uncertainty.null_directions) {
-      // Where records start from is no part of the model.
+      // The start states of the records are not part of the model.
       const auto own = std::span(direction).first(error.model_size());
       if (std::ranges::all_of(own, [](double part) { return std::abs(part) < 0.05; })) continue;
       fitted.notes.push_back(
-          "the data do not tell " +
+          "the data do not determine " +
           description_of(own, std::span(error.names()).first(error.model_size())));
     }
   }
@@ -257,8 +257,8 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
     return !context.progress || context.progress(begin + (1.0 - begin) * share, doing);
   };
   WienerFit fit = fit_or_refuse(own, shape, options.iterations, last);
-  const Summary telling(data, own);
-  telling.table(fit.numbers, fitted);
+  const Summary summary(data, own);
+  summary.table(fit.numbers, fitted);
   const double discrete_rmse = rmse_of(own, fit.sum_of_squares);
   std::ranges::move(continuous_notes(parameters_of(own, fit.numbers, 1)),
                     std::back_inserter(fitted.notes));
@@ -279,8 +279,8 @@ Fitted<HammersteinWiener> fit_hammerstein_wiener(const TrainingData& data,
     fit = std::move(continuous.fit);
   }
   fitted.parameters = parameters_of(own, fit.numbers, data.input_count());
-  telling.linear_part(fitted.parameters, fitted.notes);
-  telling.what_is_held(fitted.parameters, fit.numbers, fitted.notes);
+  summary.linear_part(fitted.parameters, fitted.notes);
+  summary.what_is_held(fitted.parameters, fit.numbers, fitted.notes);
   return fitted;
 }
 

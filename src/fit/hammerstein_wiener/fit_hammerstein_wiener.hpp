@@ -37,27 +37,27 @@ struct HammersteinWienerOptions {
   std::optional<std::size_t> input_degree = {};
   std::optional<std::size_t> output_degree = {};
   bool is_piecewise_linear = false;
-  std::size_t knots = 5;  ///< of each curve, if piecewise linear
+  std::size_t knots = 5;  ///< per curve, if piecewise linear
   bool is_searched = true;
   ContinuousForm continuous = ContinuousForm::none;
-  std::size_t iterations = 200;            ///< of one search, at most
+  std::size_t iterations = 200;            ///< limit of one search
   std::optional<Paper003> published = {};  ///< the paper's own numbers in place of a fit
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.is_searched,
           {.name = "structure",
-           .help = "search: what stands at auto is chosen by the error on held-out blocks; given: "
+           .help = "search: options at auto are chosen by the error on held-out blocks; given: "
                    "auto is 1 zero, 2 poles (in 1/z), degrees 2 and 3, as (2) to (6) of paper 003",
            .choices = kStructures});
     visit(self.zeros, {.name = "zeros", .maximum = 100, .help = "of the linear part"});
     visit(self.poles, {.name = "poles", .maximum = 100, .help = "of the linear part"});
     visit(self.is_piecewise_linear,
-          {.name = "map", .help = "curves before and behind the linear part", .choices = kMaps});
+          {.name = "map", .help = "curves before and after the linear part", .choices = kMaps});
     visit(self.input_degree,
           {.name = "input_degree", .minimum = 1, .maximum = 20, .help = "of the curve before it"});
     visit(self.output_degree,
-          {.name = "output_degree", .minimum = 1, .maximum = 20, .help = "of the curve behind it"});
+          {.name = "output_degree", .minimum = 1, .maximum = 20, .help = "of the curve after it"});
     visit(self.knots, {.name = "knots",
                        .minimum = 3,
                        .maximum = 100,
@@ -88,17 +88,18 @@ struct HammersteinWienerOptions {
 ///    the unit circle, each record starts from a state of its own (at rest where that would be more than
 ///    64 numbers).
 ///
-/// Source: specification 3.5. The table tells the coefficients with standard errors; notes tell
-/// poles, zeros, the form in continuous time and what the data cannot tell apart.
-/// @throws Error if the first input is constant, there are fewer than ten samples a number or no record
-/// outlasts the lags, nothing stable starts the search, or it does not converge; UsageError for an order
-/// or a degree out of range, or more zeros than poles in continuous time.
+/// Source: specification 3.5. The table contains the coefficients with standard errors; notes state
+/// poles, zeros, the form in continuous time and what the data cannot distinguish.
+/// @throws Error if the first input is constant, there are fewer than ten samples per parameter or
+/// no record outlasts the lags, no start of the search is stable, or it does not converge;
+/// UsageError for an order or a degree out of range, or more zeros than poles in
+/// continuous time.
 [[nodiscard]] Fitted<HammersteinWiener> fit_hammerstein_wiener(
     const TrainingData& data, const HammersteinWienerOptions& options,
     const FitContext& context = {});
 
-/// G in continuous time by Tustin where it has at most three poles, and what stands against reading it
-/// so (`continuous_warning`); a line each.
+/// G in continuous time by Tustin where it has at most three poles, and the reasons against this
+/// interpretation (`continuous_warning`); one line each.
 [[nodiscard]] std::vector<std::string> continuous_notes(
     const HammersteinWiener::Parameters& parameters);
 

@@ -11,7 +11,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kSmallest = 1e-12;  // of a denominator's coefficient, in 1 / sample period
+constexpr double kSmallest = 1e-12;  // denominator's coefficient, in 1 / sample period
 
 /// a b c d e of a section, time in sample periods. Its denominator is (s + p)^2 + d (s + p) + e, p that of
 /// the slowest pole that is allowed, d and e as logarithms.
@@ -71,7 +71,7 @@ std::vector<double> theta_of(const Sections& sections, double slowest) {
   return theta;
 }
 
-/// Logarithms would go on without end towards the slowest pole.
+/// Logarithms would decrease without limit towards the slowest pole.
 std::vector<double> lowest_theta(std::size_t sections, std::size_t size, double slowest) {
   constexpr double kNear = 0.1;
   std::vector<double> lowest(size, -std::numeric_limits<double>::infinity());

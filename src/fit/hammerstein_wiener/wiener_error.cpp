@@ -240,8 +240,8 @@ struct WienerError::Pass {
         start_past(g.rows) {}
 };
 
-/// Calls take(columns, samples) for each block of each record: a row a sample, zero where not judged,
-/// the last column the error, the one before x.
+/// Calls take(columns, samples) for each block of each record: one row per sample, zero where not
+/// scored, the last column the error, the one before x.
 template <class Take>
 bool WienerError::pass(const WienerNumbers& numbers, bool with_slopes, const Take& take) const {
   const Sections& g = numbers.sections;

@@ -19,20 +19,20 @@ void fill_basis(const StaticCurve& curve, double x, std::span<double> basis);
 /// One record: the samples at which a model is stepped.
 struct WienerRecord {
   std::vector<double> input;
-  std::vector<double> target;  ///< finite where judged
+  std::vector<double> target;  ///< finite where scored
   std::vector<std::uint8_t> scored;
 };
 
 struct WienerData {
   std::vector<WienerRecord> records;
   double sample_period_s = 0.0;
-  Interval range;           ///< of the judged inputs
+  Interval range;           ///< range of the scored inputs
   double rest_input = 0.0;  ///< the input of that range that is nearest 0
-  double deviation = 0.0;   ///< standard deviation of the judged targets
+  double deviation = 0.0;   ///< standard deviation of the scored targets
 
   [[nodiscard]] std::size_t scored_samples() const;
-  /// Radius within which a search keeps poles: what decays slower than over ten of the longest record cannot be
-  /// told from what never does.
+  /// Radius within which a search keeps poles: a mode that decays more slowly than over ten times
+  /// the longest record cannot be distinguished from one that never decays.
   [[nodiscard]] double slowest_pole() const;
 };
 
@@ -93,25 +93,26 @@ class WienerError {
 
   [[nodiscard]] std::size_t size() const { return names_.size(); }
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
-  /// Of the model itself, without the starts.
+  /// The number of the model's parameters, without the starts.
   [[nodiscard]] std::size_t model_size() const { return model_size_; }
   [[nodiscard]] std::vector<double> pack(const WienerNumbers& numbers) const;
   [[nodiscard]] WienerNumbers unpack(std::span<const double> packed) const;
   [[nodiscard]] std::size_t sections() const { return frame_.sections.rows; }
   [[nodiscard]] std::size_t scored_samples() const { return data_.scored_samples(); }
   [[nodiscard]] double slowest_pole() const { return data_.slowest_pole(); }
-  /// Where coefficients a1, a2 of the sections stand in the packed numbers; kNowhere: not free.
+  /// Positions of the coefficients a1, a2 of the sections in the packed numbers; kNowhere: not
+  /// free.
   [[nodiscard]] std::pair<std::size_t, std::size_t> poles_at(std::size_t section) const;
-  /// Where the section coefficient stands; kNowhere: not free.
+  /// Position of the section coefficient; kNowhere: not free.
   [[nodiscard]] std::size_t at(std::size_t section, std::size_t column) const;
 
-  /// sum of squares over the judged samples; NaN if it runs away.
+  /// sum of squares over the scored samples; NaN if it diverges.
   [[nodiscard]] double sum_of_squares(const WienerNumbers& numbers) const;
-  /// [J r]^T [J r], (size + 1)^2. @returns false if it runs away
+  /// [J r]^T [J r], (size + 1)^2. @returns false if it diverges
   [[nodiscard]] bool products(const WienerNumbers& numbers, Matrix& gram) const;
-  /// J r themselves, a row a judged sample: for tests.
+  /// J r themselves, one row per scored sample: for tests.
   [[nodiscard]] Matrix rows(const WienerNumbers& numbers) const;
-  /// x of the judged samples of all records.
+  /// x of the scored samples of all records.
   [[nodiscard]] std::vector<double> inner(const WienerNumbers& numbers) const;
 
  private:
@@ -126,7 +127,7 @@ class WienerError {
   std::size_t output_free_ = 0;
   std::vector<std::string> names_;
   std::size_t model_size_ = 0;
-  std::vector<Matrix> basis_;  ///< of each record: one row a value of P, less its value at rest
+  std::vector<Matrix> basis_;  ///< per record: one row per value of P, less its value at rest
 };
 
 }  // namespace torsio

@@ -20,7 +20,8 @@ using WienerChart = std::function<void(std::span<const double>, std::span<double
 /// Poles within radius r, that of the slowest, whatever theta: a2 = r^2 tanh(p), a1 = r (1 + tanh(p))
 /// tanh(q); the other numbers are themselves.
 [[nodiscard]] WienerChart stable_chart(const WienerError& error);
-/// |theta| beyond which a pole does not come nearer to its edge: searches would go on without end.
+/// Bound of |theta| beyond which a pole hardly moves towards its limit: searches would continue
+/// without end.
 [[nodiscard]] std::vector<double> stable_bound(const WienerError& error);
 [[nodiscard]] std::vector<double> stable_start(const WienerError& error,
                                                std::span<const double> packed);

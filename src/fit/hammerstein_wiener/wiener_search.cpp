@@ -157,7 +157,7 @@ std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& sh
   const bool has_start = 2 * sections * data.records.size() <= kMaxStarts;
   std::optional<WienerFit> best;
   std::vector<WienerNumbers> starts = wiener_starts(data, shape, has_start);
-  // Of long records a part tells which start leads farther.
+  // A part of a long record is sufficient to rank the starts.
   constexpr std::size_t kEnough = 10'000;
   if (starts.size() > 1 && data.scored_samples() > 2 * kEnough) {
     const WienerData part = front_of(data, kEnough);
@@ -183,7 +183,7 @@ std::optional<WienerFit> fit_shape(const WienerData& data, const WienerShape& sh
 
 namespace {
 
-/// x of the judged samples.
+/// x of the scored samples.
 Interval inner_range(const WienerData& data, const WienerNumbers& numbers) {
   const std::vector<double> x = WienerError(data, numbers).inner(numbers);
   const auto [lowest, highest] = std::ranges::minmax(x);

@@ -33,7 +33,7 @@ struct WienerFit {
                                                           const WienerNumbers& numbers,
                                                           std::size_t inputs);
 
-/// The model's own error over the judged samples, each record from its start.
+/// The model's own error over the scored samples, each record from its start.
 [[nodiscard]] double held_sum_of_squares(const WienerData& data, const WienerNumbers& numbers);
 
 struct WienerChoice {

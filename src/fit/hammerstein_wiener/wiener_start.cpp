@@ -13,9 +13,9 @@ namespace torsio {
 namespace {
 
 using Eigen::Index;
-using Signals = std::vector<std::vector<double>>;  ///< one a record
+using Signals = std::vector<std::vector<double>>;  ///< one per record
 
-/// Products of columns and target over the judged samples, and what they make of least squares.
+/// Products of columns and target over the scored samples, and their least-squares solution.
 class ColumnProducts {
  public:
   explicit ColumnProducts(std::size_t columns)
@@ -42,7 +42,7 @@ class ColumnProducts {
     const Eigen::MatrixXd scaled =
         scale.asDiagonal() * full.topLeftCorner(n, n) * scale.asDiagonal();
     const Eigen::VectorXd right = scale.asDiagonal() * full.col(n).head(n);
-    // The least-norm solution: columns that the data cannot tell apart share.
+    // The least-norm solution: columns that the data cannot distinguish share the coefficient.
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(n, n);
     solver.setThreshold(1e-13);
     solver.compute(scaled);
@@ -64,7 +64,7 @@ class ColumnProducts {
   Index filled_ = 0;
 };
 
-/// Calls take(record, sample) for each judged sample that has `lags` before it in its record.
+/// Calls take(record, sample) for each scored sample that has `lags` before it in its record.
 template <class Take>
 void for_each_scored(const WienerData& data, std::size_t lags, const Take& take) {
   for (std::size_t r = 0; r < data.records.size(); ++r)
@@ -224,7 +224,7 @@ std::vector<double> knots_of(std::vector<double> samples, std::size_t count) {
   return knots;
 }
 
-/// A curve over these samples, a straight line from -1 to 1 to begin with.
+/// A curve over these samples, initially linear from -1 to 1.
 StaticCurve line_over(std::vector<double> samples, std::size_t values, bool is_piecewise_linear) {
   const auto [lowest, highest] = std::ranges::minmax(samples);
   const double half = highest > lowest ? 0.5 * (highest - lowest) : 1.0;

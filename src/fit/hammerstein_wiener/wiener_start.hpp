@@ -24,8 +24,8 @@ struct WienerShape {
 [[nodiscard]] std::vector<WienerNumbers> wiener_starts(const WienerData& data,
                                                        const WienerShape& shape, bool has_start);
 
-/// G with real poles at well-spread time constants, its numerator by least squares from the inputs to the
-/// targets; nothing if no such fit can be told.
+/// G with real poles at well-spread time constants, its numerator by least squares from the inputs
+/// to the targets; nothing if the data do not determine such a fit.
 [[nodiscard]] std::optional<Sections> slow_start(const WienerData& data, std::size_t zeros,
                                                  std::size_t poles);
 

@@ -175,7 +175,7 @@ Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data, const BoucWenOptions
     return fitted;
   }
   if (shape.exponent > 0.999 * kMaxExponent)
-    fitted.notes.emplace_back("n is at its bound: the knee is sharper than the data tell");
+    fitted.notes.emplace_back("n is at its bound: the data do not determine how sharp the knee is");
   if (found.theta[0] > highest - 1e-3)
     fitted.notes.emplace_back("z_max is at its bound: the hysteresis never comes to its end");
   fitted.table = table_of(search, runs, found.theta, c, fitted.notes);

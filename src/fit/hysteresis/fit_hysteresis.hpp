@@ -15,12 +15,14 @@
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
-// Fits of hysteresis operators. The operator runs through every sample of a record that has
-// features (between two turns where that changes nothing, only those that are judged); usable samples are learned from, the search of a non-linear family using at most
+// Fits of hysteresis operators. The operator is evaluated at every sample of a record that has
+// features (where samples between two turning points change nothing, only at those that are
+// scored); the fit uses the usable samples, the search of a non-linear family at most
 // `kMaxResiduals` of them, evenly spread. Other inputs get slopes as in `fit_polynomial`.
 //
 // All @throw Error if the first input is constant in the training data or there are too few
-// samples; those that search, too, if no start converges: a search that gave up is no fit.
+// samples; those that search, also if no start converges: a search that stopped early has no
+// result.
 
 namespace torsio {
 
@@ -90,15 +92,15 @@ struct ImprovedPrandtlIshlinskiiOptions {
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.thresholds, kThresholdsOption);
-    visit(
-        self.bends,
-        {.name = "bends", .maximum = 32, .help = "of the curve behind, half on either side of 0"});
+    visit(self.bends, {.name = "bends",
+                       .maximum = 32,
+                       .help = "of the curve after the operator, half on either side of 0"});
     visit(self.rates, kRatesOption);
     visit(self.max_iterations, kSearchIterationsOption);
   }
 };
 
-/// Starts from the plain operator. @throws Error if no input tells a rate.
+/// Starts from the plain operator. @throws Error if no input is a rate.
 [[nodiscard]] Fitted<ImprovedPrandtlIshlinskii> fit_improved_prandtl_ishlinskii(
     const TrainingData& data, const ImprovedPrandtlIshlinskiiOptions& options,
     const Progress& progress = {});
@@ -114,9 +116,9 @@ struct BoucWenOptions {
   }
 };
 
-/// z_max, n and gamma / beta are searched from four starts; the rest is linear and solved for each
-/// of their values, the hysteresis held at or above 0. Learns from a quarter of `kMaxResiduals`: its
-/// powers cost.
+/// z_max, n and gamma / beta are searched from four starts; the rest is linear and solved for
+/// each of their values, the hysteresis constrained to be >= 0. Uses a quarter of `kMaxResiduals`
+/// samples, because powers are slow to compute.
 [[nodiscard]] Fitted<BoucWenModel> fit_bouc_wen(const TrainingData& data,
                                                 const BoucWenOptions& options,
                                                 const Progress& progress = {});
@@ -141,7 +143,7 @@ struct BacklashOptions {
                                                                const BacklashOptions& options,
                                                                const Progress& progress = {});
 
-/// The same with the growth by rate. @throws Error if no input tells a rate.
+/// The same with the growth by rate. @throws Error if no input is a rate.
 [[nodiscard]] Fitted<ImprovedNonlinearBacklash> fit_improved_nonlinear_backlash(
     const TrainingData& data, const BacklashOptions& options, const Progress& progress = {});
 

@@ -119,7 +119,7 @@ class ImprovedRun {
   std::vector<double> limit_slope_;
 };
 
-/// Half of them on either side of 0, at even shares of what the plain operator says there.
+/// Half of them on either side of 0, at even shares of the plain operator's output there.
 std::vector<double> knots_of(const OperatorData& data, double bias, std::size_t count) {
   std::vector<double> knots;
   for (const double side : {-1.0, 1.0}) {

@@ -13,7 +13,7 @@
 namespace torsio {
 namespace {
 
-/// Where each parameter stands in theta: powers of m, Bernstein weights of h, slopes, then log k
+/// Position of each parameter in theta: powers of m, Bernstein weights of h, slopes, then log k
 /// and, by rate, beta and alpha of |x_r| in multiples of its RMS.
 struct Layout {
   std::size_t size;  ///< degree + 1
@@ -230,7 +230,7 @@ Fitted<Backlash<kByRate>> fit(const TrainingData& data, const BacklashOptions& o
       .half_range = runs.half_range};
   parameters.slopes.assign(theta.begin() + 2 * size,
                            theta.begin() + static_cast<std::ptrdiff_t>(layout.linear()));
-  // A slope that no column tells stays where it started.
+  // A slope that no column determines keeps its start value.
   for (std::size_t j = 0; j < layout.inputs; ++j)
     if (runs.terms[j].empty()) parameters.slopes[j] = 0.0;
   const ParameterUncertainty uncertainty = uncertainty_of(problem, found.theta, starts.typical);

@@ -35,7 +35,7 @@ std::vector<double> quantile_thresholds(const OperatorData& data, std::size_t co
     const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
     const double threshold =
         distances[static_cast<std::size_t>(share * static_cast<double>(distances.size() - 1))];
-    // An input that stands still most of the time has many equal quantiles.
+    // An input that is constant most of the time has many equal quantiles.
     if (threshold > 0.0 && (thresholds.empty() || threshold > thresholds.back()))
       thresholds.push_back(threshold);
   }

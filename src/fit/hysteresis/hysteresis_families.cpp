@@ -16,7 +16,7 @@ std::vector<FamilyInfo> hysteresis_families() {
                .variations = {{"thresholds", "4"}, {"thresholds", "16"}}}),
           family_of<fit_improved_prandtl_ishlinskii>(
               {.name = ImprovedPrandtlIshlinskii::kFamily,
-               .summary = "the same behind a bent curve, thresholds growing with the rate",
+               .summary = "the same followed by a bent curve, thresholds growing with the rate",
                .only_if_named = true,
                .in_search = true}),
           family_of<fit_bouc_wen>(

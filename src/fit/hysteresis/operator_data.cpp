@@ -174,7 +174,7 @@ void note_null_directions(const ParameterUncertainty& uncertainty,
   names.reserve(table.size());
   for (const FittedParameter& each : table) names.push_back(each.name);
   for (const std::vector<double>& direction : uncertainty.null_directions)
-    notes.push_back("the data do not tell " + description_of(direction, names));
+    notes.push_back("the data do not determine " + description_of(direction, names));
 }
 
 void powers(double z, std::span<double> values) {

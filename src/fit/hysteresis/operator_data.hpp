@@ -19,7 +19,7 @@ struct Stretch {
   static constexpr std::size_t kUnused = static_cast<std::size_t>(-1);
   std::vector<double> x;         ///< the first input
   std::vector<double> rate;      ///< the rate input, or empty
-  std::vector<std::size_t> row;  ///< of the target, or `kUnused`
+  std::vector<std::size_t> row;  ///< row of the target, or `kUnused`
 };
 
 /// What fits of operators share.
@@ -28,7 +28,7 @@ struct OperatorData {
   std::vector<double> target;
   Matrix others;                   ///< rows x inputs; 0 where an input has no slope
   std::vector<std::string> terms;  ///< names of `others`; empty: no slope
-  double centre = 0.0;             ///< of the first input over all samples
+  double centre = 0.0;             ///< mid-range of the first input over all samples
   double half_range = 0.0;
   std::vector<std::string> notes;
   std::string torque_unit;     ///< "Nm"
@@ -66,7 +66,7 @@ struct LinearSolution {
                                             const std::vector<std::vector<double>>& starts,
                                             SearchOptions options, std::string_view family);
 
-/// Notes on parameters that the data do not tell.
+/// Notes on parameters that the data do not determine.
 void note_null_directions(const ParameterUncertainty& uncertainty,
                           const std::vector<FittedParameter>& table,
                           std::vector<std::string>& notes);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kGridPoints = 33;
 
-/// Bias and slopes, and room for `extra` columns behind them.
+/// Bias and slopes, and room for `extra` columns after them.
 Design affine_design(const TrainingData& data, Table& table, const Groups& groups, bool rates,
                      std::size_t extra) {
   const std::size_t columns = 1 + data.input_count() + extra;
@@ -134,9 +134,10 @@ double found_scale(const Design& design, const Groups& groups, std::span<const d
   const double scale = FrictionSearch(design, groups, rate).best_scale(lowest, largest);
   if (scale > 0.99 * largest)
     notes.emplace_back(
-        "the friction still grows at the largest rate: the data do not tell it from a viscous one");
+        "the friction still grows at the largest rate: the data do not distinguish it from a "
+        "viscous one");
   if (scale < 1.01 * lowest)
-    notes.emplace_back("the friction is a step in the rate: the data do not tell its scale");
+    notes.emplace_back("the friction is a step in the rate: the data do not determine its scale");
   return scale;
 }
 

@@ -25,7 +25,7 @@ struct LinearOptions {
 
 /// Least squares over the usable samples; scheduled, one fit at each distinct value of the
 /// scheduling input, which has no slope of its own. Inputs that are constant or depend linearly on
-/// those before them get no term, and a note says so.
+/// those before them get no term, and a note reports it.
 /// @throws Error if no input may have a slope, samples are too few, or the scheduling input has
 /// less than 2 or more than 64 values; UsageError if there is no such input.
 [[nodiscard]] Fitted<Linear> fit_linear(const TrainingData& data, const LinearOptions& options);
@@ -47,8 +47,8 @@ struct LinearCoulombOptions {
   }
 };
 
-/// The same with a friction term on the first input that is a rate. v minimises the sum of squares
-/// of all groups together: a logarithmic grid from a thousandth of the rate's RMS to its maximum,
+/// The same with a friction term on the first input that is a rate. v minimises the total sum of
+/// squares of all groups: a logarithmic grid from a thousandth of the rate's RMS to its maximum,
 /// then golden section, the linear coefficients eliminated at each step (variable projection, Golub
 /// & Pereyra 1973). Deterministic.
 /// @throws Error as `fit_linear`, and if no input is a rate or it never moves.

@@ -48,8 +48,8 @@ inline constexpr std::size_t kHighestChosenDegree = 9;
                                                 const PolynomialOptions& options);
 
 /// The larger of two steps of the first input's resolution (its smallest change between two
-/// samples) and half a percent of its range. Specification 3.7 says 2 LSB; that alone would follow
-/// the noise of a fine encoder.
+/// samples) and half a percent of its range. Specification 3.7 requires 2 LSB; that alone would
+/// follow the noise of a fine encoder.
 [[nodiscard]] double default_dead_band(const TrainingData& data);
 
 }  // namespace torsio

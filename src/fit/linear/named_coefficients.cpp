@@ -21,7 +21,7 @@ struct Column {
   std::string unit;
 };
 
-/// What stands in the parentheses of `function(...)`, if that is the whole expression; else empty.
+/// The argument of `function(...)`, if that is the whole expression; else empty.
 std::string_view argument_of(std::string_view expression, std::string_view function) {
   if (!expression.starts_with(function) || !expression.ends_with(')')) return {};
   const std::string_view inner =
@@ -34,7 +34,7 @@ std::string_view argument_of(std::string_view expression, std::string_view funct
   return inner;
 }
 
-/// Of a channel, its rate, or either behind a filter; empty of other expressions.
+/// Unit of a channel, of its rate, or of either after a filter; empty for other expressions.
 std::string unit_of_input(std::string_view expression) {
   if (const auto filtered = argument_of(expression, "lowpass("); !filtered.empty())
     return unit_of_input(filtered.substr(0, filtered.find_last_of(',')));

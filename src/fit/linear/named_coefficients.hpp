@@ -12,9 +12,9 @@
 
 namespace torsio {
 
-/// The numbers of a linear, linear_coulomb or polynomial model with what they are: "k1
-/// (spring_deflection_rad)", Nm/rad. Terms that are left out (0) are not told; scheduled
-/// coefficients are told at each knot. Empty of other families.
+/// The parameters of a linear, linear_coulomb or polynomial model with their names and units: "k1
+/// (spring_deflection_rad)", Nm/rad. Terms that are left out (0) are not listed; scheduled
+/// coefficients are listed at each knot. Empty for other families.
 /// @param inputs the expressions of the model's inputs
 /// @param errors standard errors of the coefficients, column by column, or none
 [[nodiscard]] std::vector<FittedParameter> named_coefficients(

@@ -20,12 +20,12 @@ namespace torsio {
 namespace {
 
 constexpr std::array kSpreads{0.1, kDefaultSpread, 0.25, 0.4, 0.6, 1.0};
-constexpr std::size_t kDefault = 1;  // of these
+constexpr std::size_t kDefault = 1;  // index in kSpreads
 
 // The search looks at every n-th sample, so that it is given no more than these.
 constexpr std::size_t kMaxSearched = 16000;
 
-// Mean square errors, one for each fold that could be judged.
+// Mean square errors, one for each fold that could be evaluated.
 using FoldErrors = std::vector<double>;
 
 struct Fold {

@@ -25,11 +25,11 @@ struct SpreadChoice {
 using FitWithSpread = std::function<Dgmm::Parameters(const Matrix& samples, double spread)>;
 
 /// Leaves one record out at a time (a single record: every fifth of 50 blocks) and takes the spread
-/// with the least error on what was left out, mean square of the records' RMSE. Two things keep the
-/// choice honest:
+/// with the least error on what was left out, mean square of the records' RMSE. Two rules keep the
+/// choice unbiased:
 /// - A left-out sample counts only if its inputs lie within the range of the other records, by the
-///   margin of the estimator's guard: outside, the estimator does not ask the model.
-/// - The default stays unless the best spread beats it by more than the standard error of the
+///   margin of the estimator's guard: outside, the estimator does not use the model.
+/// - The default is kept unless the best spread is better by more than the standard error of the
 ///   difference over the records.
 /// @param samples all usable samples of `data`, in order.
 [[nodiscard]] SpreadChoice choose_spread(const Matrix& samples, const TrainingData& data,

@@ -40,8 +40,8 @@ Matrix joint_samples(const TrainingData& data) {
   return samples;
 }
 
-// What a data sheet says that a channel can resolve (specification 3.1); 0 for those without one
-// and for what is calculated from channels, whose size may be any.
+// The resolution of a channel according to a data sheet (specification 3.1); 0 for those without
+// one and for what is calculated from channels, whose size may be any.
 double resolution(std::string_view expression, bool is_rate) {
   constexpr double kTorque_Nm = 0.05;
   constexpr double kAngle_rad = rad_from_deg(0.01);
@@ -127,8 +127,8 @@ Moments moments_of(const Matrix& samples, const Standardisation& by) {
   return {mean.transpose(), standardised.transpose() * standardised / static_cast<double>(rows)};
 }
 
-// The least-squares line of the target on the inputs that are no rates (decision 0004); inputs that
-// say the same share the slope.
+// The least-squares fit of the target on the inputs that are not rates (decision 0004); linearly
+// dependent inputs share the slope.
 LinearClamp linear_clamp(const Moments& all, const Standardisation& by,
                          std::span<const InputInfo> inputs, double width_in_rmse) {
   std::vector<Eigen::Index> used;  // among the quantities, of which the target is the first

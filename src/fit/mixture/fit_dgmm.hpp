@@ -18,7 +18,7 @@ struct DgmmOptions {
   OnlineMixtureSettings online = {.novelty_distance = kNotMeasured, .initial_spread = kNotMeasured};
   std::size_t em_iterations = 10;   ///< refinement after the online pass; 0: none
   double clamp = 2.0;               ///< LinearClamp::width in RMSE of the linear model; 0: none
-  double background_weight = 1e-3;  ///< of the one Gaussian over all data; 0: none
+  double background_weight = 1e-3;  ///< weight of the one Gaussian over all data; 0: none
   std::size_t threads = 0;          ///< for search and refinement; 0: as many as the machine has
 
   template <class Self, class Visit>
@@ -28,10 +28,11 @@ struct DgmmOptions {
           {.name = "em_iterations",
            .maximum = 10000,
            .help = "of expectation maximisation after the online pass; 0: none"});
-    visit(self.clamp,
-          {.name = "clamp",
-           .maximum = 1e6,
-           .help = "where data are thin, stay this many RMSE from the straight line; 0: off"});
+    visit(
+        self.clamp,
+        {.name = "clamp",
+         .maximum = 1e6,
+         .help = "where data are sparse, limit to this many RMSE around the linear model; 0: off"});
     visit(self.background_weight, {.name = "background_weight",
                                    .maximum = 0.999,
                                    .help = "of one Gaussian over all data; 0: none"});
@@ -67,15 +68,15 @@ struct DgmmOptions {
   }
 };
 
-/// Learns the joint density of target and inputs from the usable samples in the order of recording
-/// (`OnlineMixture`), refines it by expectation maximisation if asked to, and adds the guards: a
-/// background component, which makes the answer far from all data a linear regression, and the
-/// clamp to the linear model without rates (decision 0004), whose threshold of density is the first percentile over the training
-/// samples.
+/// Fits the joint density of target and inputs to the usable samples in the order of recording
+/// (`OnlineMixture`), refines it by expectation maximisation if requested, and adds the guards: a
+/// background component, which makes the output far from all data a linear regression, and the
+/// clamp to the linear model without rates (decision 0004), whose threshold of density is the first
+/// percentile over the training samples.
 ///
-/// How far components must reach to bridge the gaps between recorded conditions the training
-/// records tell themselves: unless given, the initial spread is the one of a short list that does
-/// best when one record at a time is left out (a single record: every fifth of 50 blocks). The
+/// The spread that components need to bridge the gaps between recorded conditions is estimated from
+/// the training records: unless given, the initial spread is the one of a short list with the least
+/// error when one record at a time is left out (a single record: every fifth of 50 blocks). The
 /// notes state choice and scores.
 ///
 /// Source: specification 3.1. Deterministic; independent of the number of threads.
@@ -87,7 +88,7 @@ struct DgmmOptions {
 struct PaperDgmmOptions {
   std::size_t components = 500;
   double learning_rate = 0.02;
-  double spread = 0.15;  ///< of every component in every direction, standardised
+  double spread = 0.15;  ///< standardised, for every component and direction
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
@@ -102,11 +103,11 @@ struct PaperDgmmOptions {
   }
 };
 
-/// Algorithm 1 of paper 000 as printed, only with the sign of the mean's update mended, for
-/// comparison: the first samples become the components, their covariances stay spread^2 I, and
-/// each later sample moves the nearest mean. No guards. Expect it to be worse than a straight line:
-/// at 1 kHz all components are born within the first half second, and a covariance without
-/// correlation makes the regression a kernel average (specification 3.1).
+/// Algorithm 1 of paper 000 as printed, only with the sign of the mean's update corrected, for
+/// comparison: the first samples become the components, their covariances stay spread^2 I, and each
+/// later sample moves the nearest mean. No guards. It is expected to be worse than the linear
+/// model: at 1 kHz all components are created within the first half second, and a covariance
+/// without correlation makes the regression a kernel average (specification 3.1).
 [[nodiscard]] Fitted<Dgmm> fit_dgmm_paper(const TrainingData& data,
                                           const PaperDgmmOptions& options = {},
                                           const Progress& progress = {});

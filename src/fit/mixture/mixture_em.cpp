@@ -22,7 +22,7 @@ using mixture_em_kernel::kTile;
 
 constexpr std::size_t kTilesPerChunk = 32;
 
-// Fewer samples' worth than this is nobody's.
+// A component with a smaller effective number of samples is not updated.
 constexpr double kDeadCount = 1e-9;
 
 void append_parameters(const GaussianMixture& mixture, std::size_t i,

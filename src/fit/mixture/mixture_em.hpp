@@ -19,7 +19,7 @@ namespace torsio {
 ///     Sigma_i = (nu0 s0^2 I + sum_k r_ki (x~_k - mu_i)(x~_k - mu_i)^T) / (nu0 + n_i)
 ///
 /// nu0 = prior_count and s0 = prior_spread are the inverse-Wishart prior of `OnlineMixture`, so
-/// that no component collapses. Double throughout; the result does not depend on the number of
+/// that no component collapses. Computed in double; the result does not depend on the number of
 /// threads. Responsibilities below e^-40 of a sample's largest are dropped.
 ///
 /// Source: specification 3.1 step 4; Dempster, Laird, Rubin 1977. Cost: about N m (D^2 + 12)

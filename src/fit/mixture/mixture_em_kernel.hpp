@@ -4,7 +4,7 @@
 
 namespace torsio::mixture_em_kernel {
 
-/// Samples stand in tiles of 128: a row of 128 values for each quantity.
+/// Samples are stored in tiles of 128: a row of 128 values for each quantity.
 inline constexpr std::size_t kTile = 128;
 /// Sums are kept in this many lanes.
 inline constexpr std::size_t kLanes = 8;

@@ -5,7 +5,7 @@
 
 namespace torsio::nearest_kernel {
 
-/// Points stand in blocks of 16, a row of 16 values for each dimension.
+/// Points are stored in blocks of 16, a row of 16 values for each dimension.
 inline constexpr std::size_t kLanes = 16;
 
 /// Coordinate of a free slot: no point has a finite distance to it.

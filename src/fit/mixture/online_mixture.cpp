@@ -190,7 +190,7 @@ std::size_t OnlineMixture::neighbour(std::size_t component) {
   *point = kFarAway;  // hides the component from its own search
   const std::size_t found = nearest(means_.row(component)).component;
   *point = kept;
-  // Where all others are too far for a float, the search says 0.
+  // The search returns 0 where all others are too far for a float.
   return found != component ? found : (component == 0 ? 1 : 0);
 }
 

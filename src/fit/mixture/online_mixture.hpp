@@ -30,7 +30,7 @@ struct OnlineMixtureSettings {
   double novelty_distance = 0.25;  ///< a sample farther than this from all means is a new component
   double initial_spread = 0.15;    ///< standard deviation of a component that has seen one sample
   double learning_rate_floor = 0.0;   ///< 0: means settle; above: they keep following
-  double forgetting = 1.0;            ///< of a component's own past with each of its samples
+  double forgetting = 1.0;            ///< factor on a component's past with each of its samples
   std::size_t merge_candidates = 16;  ///< lightest components that are considered for merging
   double prune_count = 0.0;           ///< components lighter than this are dropped ...
   std::size_t prune_age = 0;          ///< ... once this many samples old; 0: never

@@ -89,8 +89,8 @@ FittedModel fit_narx(const TrainingData& data, const NarxOptions& options, const
   const TargetSpread spread = spread_of(data);
   const Narx<Linear>::Parameters rest = narx_frame(data, options.lags, options.range, spread);
   const std::size_t rounds = options.training == NarxTraining::free_run ? options.rounds : 0;
-  const TrainingData& judge = context.validation == nullptr ? data : *context.validation;
-  require_free_run(judge);
+  const TrainingData& evaluation = context.validation == nullptr ? data : *context.validation;
+  require_free_run(evaluation);
   std::optional<TrainingData> validation;
   if (context.validation != nullptr) validation = narx_data(*context.validation, options.lags);
 
@@ -108,12 +108,12 @@ FittedModel fit_narx(const TrainingData& data, const NarxOptions& options, const
                             static_cast<double>(round + 1) * share);
     own.error_of = [&](const AnyModel& f) {
       AnyModel model = inner.wrap(f, rest);
-      return free_run_rmse(simulated(model, judge), judge);
+      return free_run_rmse(simulated(model, evaluation), evaluation);
     };
     FittedModel f =
         inner.fit(narx_data(data, options.lags, outputs.empty() ? nullptr : &outputs), own);
     AnyModel model = inner.wrap(f.model, rest);
-    const double rmse = free_run_rmse(simulated(model, judge), judge);
+    const double rmse = free_run_rmse(simulated(model, evaluation), evaluation);
     if (!best || rmse < least || !std::isfinite(least)) {
       least = rmse;
       best_round = round;

@@ -27,11 +27,11 @@ struct NarxLags {
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.inputs, {.name = "input_lags",
                         .maximum = 1000,
-                        .help = "past samples of each input that the model sees"});
+                        .help = "past samples of each input that the model uses"});
     visit(self.outputs, {.name = "output_lags",
                          .minimum = 1,
                          .maximum = 1000,
-                         .help = "past outputs of its own that it sees"});
+                         .help = "its own past outputs that it uses"});
   }
 };
 
@@ -59,8 +59,8 @@ struct NarxOptions {
   NarxLags lags = {};
   NarxTraining training = NarxTraining::free_run;
   double noise = 0.02;     ///< standard deviation, as a share of the target's
-  std::size_t rounds = 5;  ///< of free_run, behind the first fit one step ahead
-  double range = 1.2;      ///< of the largest |target|: where the output is clipped
+  std::size_t rounds = 5;  ///< free_run after the first fit one step ahead
+  double range = 1.2;      ///< limit of the output over the largest |target|
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
@@ -78,9 +78,9 @@ struct NarxOptions {
 };
 
 /// The regressors of a NARX model as data to fit f on: the inputs, their lags, and past outputs. A
-/// sample may be learned from if all of these lie in its record and are finite; held samples of a
-/// slower sensor count as measured.
-/// @param outputs what stands for the past outputs, a list a sequence; null: the target itself
+/// sample is usable if all of these lie in its record and are finite; held samples of a slower
+/// sensor count as measured.
+/// @param outputs used in place of the past outputs, one list per sequence; null: the target itself
 [[nodiscard]] TrainingData narx_data(const TrainingData& data, const NarxLags& lags,
                                      const std::vector<std::vector<double>>* outputs = nullptr);
 
@@ -91,7 +91,7 @@ struct NarxInner {
   std::function<AnyModel(const AnyModel& f, const Narx<Linear>::Parameters& rest)> wrap;
 };
 
-/// Trains f on `narx_data`, as `options.training` says. Deterministic for a seed. Source:
+/// Trains f on `narx_data`, according to `options.training`. Deterministic for a seed. Source:
 /// specification 3.3 (NARX evaluation).
 /// @throws Error as f's fitter, or if no record outlasts the lags; UsageError for lags out of range.
 [[nodiscard]] FittedModel fit_narx(const TrainingData& data, const NarxOptions& options,

@@ -86,10 +86,10 @@ MultivariatePolynomial::Parameters polynomial_of(const NarxTerms& f) {
           .coefficients = f.coefficients};
 }
 
-/// Records to choose terms on, and records that judge how many.
+/// Records to choose terms on, and records to evaluate their number on.
 struct Split {
   TrainingData training;
-  TrainingData judging;
+  TrainingData evaluation;
   std::string tested_on;
 };
 
@@ -107,19 +107,19 @@ Sequence cut(const Sequence& from, std::size_t first, std::size_t end) {
 
 void hold_out(Split& split, std::size_t sequence, std::size_t first, std::size_t end) {
   Sequence& from = split.training.sequences[sequence];
-  split.judging.sequences.push_back(cut(from, first, end));
+  split.evaluation.sequences.push_back(cut(from, first, end));
   std::fill(from.use.begin() + static_cast<std::ptrdiff_t>(first),
             from.use.begin() + static_cast<std::ptrdiff_t>(end), std::uint8_t{0});
 }
 
-/// Free run wants stretches in one piece, several times as long as their measured start.
+/// Free run requires contiguous stretches, several times as long as their measured start.
 Split split_of(const TrainingData& data, const FitContext& context) {
   constexpr std::size_t kFold = 5;
   constexpr std::size_t kMaxBlocks = 10;
   constexpr std::size_t kLeastBlock = 5 * kCorrected;
   if (context.validation != nullptr) return {data, *context.validation, "the validation records"};
-  Split split{.training = data, .judging = data, .tested_on = "a fifth held out"};
-  split.judging.sequences.clear();
+  Split split{.training = data, .evaluation = data, .tested_on = "a fifth held out"};
+  split.evaluation.sequences.clear();
   const bool has_many = data.sequences.size() >= kFold;
   for (std::size_t s = 0; s < data.sequences.size(); ++s) {
     const std::size_t samples = data.sequences[s].target.size();
@@ -128,14 +128,14 @@ Split split_of(const TrainingData& data, const FitContext& context) {
       if ((has_many ? s : block) % kFold == kFold - 1)
         hold_out(split, s, samples * block / blocks, samples * (block + 1) / blocks);
   }
-  if (split.judging.usable_samples() > 0 && split.training.usable_samples() > 0) return split;
+  if (split.evaluation.usable_samples() > 0 && split.training.usable_samples() > 0) return split;
   return {data, data, "the training records, too short to hold any out"};
 }
 
 double free_run_rmse(const NarxTerms& f, const Narx<Linear>::Parameters& frame,
-                     const TrainingData& judge) {
+                     const TrainingData& evaluation) {
   NarxPolynomial model(framed<MultivariatePolynomial>(polynomial_of(f), frame));
-  const double rmse = free_run_rmse(simulated(model, judge), judge);
+  const double rmse = free_run_rmse(simulated(model, evaluation), evaluation);
   return std::isfinite(rmse) ? rmse : std::numeric_limits<double>::infinity();
 }
 
@@ -147,7 +147,7 @@ Matrix design_of(const NarxTerms& f, const Matrix& regressors) {
   return design;
 }
 
-/// Terms chosen one step ahead, as many as free run wants.
+/// Terms chosen one step ahead, and their number by the error in free run.
 struct Structure {
   NarxTerms f;
   std::vector<double> error_reductions;
@@ -194,7 +194,7 @@ Structure chosen_structure(const Split& split, const Table& table,
   if (options.terms == 0) {
     std::vector<double> rmse;
     for (const ChosenTerms& size : found.sizes)
-      rmse.push_back(free_run_rmse(terms_of(size), frame, split.judging));
+      rmse.push_back(free_run_rmse(terms_of(size), frame, split.evaluation));
     const double enough = kAsGood * *std::ranges::min_element(rmse);
     best = static_cast<std::size_t>(
         std::ranges::find_if(rmse, [&](double each) { return each <= enough; }) - rmse.begin());
@@ -268,13 +268,13 @@ Fitted<NarxPolynomial> fit_narx_polynomial(const TrainingData& data,
   notes.push_back(structure.note);
   if (options.training == NarxTraining::free_run) {
     report_progress(context.progress, 0.6, "refining narx_polynomial");
-    const TrainingData& judge = context.validation == nullptr ? data : *context.validation;
+    const TrainingData& evaluation = context.validation == nullptr ? data : *context.validation;
     Refined refined = refined_in_free_run(f, data, regressors, options.lags,
                                           share_of(context.progress, 0.6, 1.0));
     NarxTerms better = f;
     better.coefficients = std::move(refined.coefficients);
-    const double before = free_run_rmse(f, frame, judge);
-    const double after = free_run_rmse(better, frame, judge);
+    const double before = free_run_rmse(f, frame, evaluation);
+    const double after = free_run_rmse(better, frame, evaluation);
     notes.push_back(refinement_note(before, after, refined.report, context.validation != nullptr));
     if (after < before) f = std::move(better);
   }

@@ -29,7 +29,7 @@ class FreeRun {
   [[nodiscard]] std::size_t samples() const noexcept { return sequence_.target.size(); }
 
   /// @param jacobian samples x terms, or empty.
-  /// @returns false where the run runs away.
+  /// @returns false where the run diverges.
   bool errors(std::span<const double> theta, std::span<double> residuals,
               std::span<double> jacobian) const {
     const bool with_slopes = !jacobian.empty();
@@ -152,7 +152,7 @@ Refined refined_in_free_run(const NarxTerms& f, const TrainingData& data,
   };
   std::vector<double> residuals(samples);
   if (!errors(f.coefficients, residuals, {}))
-    return {.coefficients = f.coefficients, .report = "the free run runs away"};
+    return {.coefficients = f.coefficients, .report = "the free run diverges"};
   SearchResult found =
       minimise_squares({.residuals = samples, .evaluate = errors, .has_jacobian = true},
                        f.coefficients, {.progress = progress});

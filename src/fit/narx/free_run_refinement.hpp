@@ -28,15 +28,15 @@ struct Refined {
 ///
 ///     min sum (yhat_k(theta) - y_k)^2,   dyhat_k/dtheta = phi_k + sum_i (df/dy_k-i) dyhat_k-i/dtheta
 ///
-/// Nothing says that the end is stable elsewhere: compare it with the start. Source: specification
-/// 3.3.
+/// The result is not guaranteed to be stable on other data: compare it with the start. Source:
+/// specification 3.3.
 /// @param regressors `narx_data` of `data`.
 /// @throws Error if the derivatives would not fit into memory; Cancelled.
 [[nodiscard]] Refined refined_in_free_run(const NarxTerms& f, const TrainingData& data,
                                           const TrainingData& regressors, const NarxLags& lags,
                                           const Progress& progress = {});
 
-/// What a fitter says about a refinement.
+/// The note of a fitter about a refinement.
 [[nodiscard]] std::string refinement_note(double rmse_before, double rmse_after,
                                           const std::string& report, bool is_validated = false);
 

@@ -21,12 +21,13 @@ namespace {
 using frols_kernel::Candidate;
 using frols_kernel::kBlock;
 
-// Share of a candidate's square that must be new. Squares are told by differences, to about 1e-15.
+// Share of a candidate's square that must be new. Squares are computed as differences, accurate to
+// about 1e-15.
 constexpr double kDependent = 1e-12;
 constexpr double kNothing = 1e-15;  // share of y.y
 constexpr double kBetter = 1e-9;    // relative gain of an exchange
 
-/// Every monomial up to a degree, each behind its parent.
+/// Every monomial up to a degree, each after its parent.
 struct CandidateList {
   std::vector<Candidate> list;
   std::size_t parents = 0;
@@ -104,7 +105,7 @@ struct Products {
   std::vector<std::size_t> chosen;  ///< that the directions were made of
 };
 
-/// A turn in the plane of a direction and the one behind it.
+/// A rotation in the plane of a direction and the next one.
 struct Rotation {
   std::size_t direction;
   double cosine;
@@ -146,7 +147,7 @@ double take_out(Products& products, std::size_t place, std::vector<Rotation>& ro
 
 struct Placed {
   std::size_t place;  ///< in the basis
-  double reduction;   ///< of y.y
+  double reduction;   ///< reduction of y.y
 };
 
 /// The chosen terms, the one first that explains most of what those before it have left.
@@ -222,7 +223,7 @@ class Search {
       const bool is_better =
           best.reduction > (1.0 + kBetter) * given * given + kNothing * target_square_;
       if (is_better && replace(std::move(without), rotations, best.candidate)) {
-        kept = 0;  // the next has moved to this place, the new one stands last
+        kept = 0;  // the next has moved to this place, the new one is last
         --left;
       } else {
         ++kept;
@@ -245,7 +246,7 @@ class Search {
  private:
   struct Choice {
     std::size_t candidate = 0;
-    double reduction = 0.0;  ///< of y.y
+    double reduction = 0.0;  ///< reduction of y.y
   };
 
   std::vector<double> products_with(const detail::AlignedVector<double>& v,
@@ -275,7 +276,7 @@ class Search {
     for (std::size_t j = 0; j < square.size(); ++j) {
       if (is_useless_[j] != 0 || !(square[j] > kDependent * squares_[j])) continue;
       const double reduction = with_target[j] * with_target[j] / square[j];
-      // Of candidates that are alike but for rounding the first, whatever the processor.
+      // Among candidates that differ only by rounding the first is taken, whatever the processor.
       if (reduction > (1.0 + kBetter) * best.reduction) best = {j, reduction};
     }
     return best;
@@ -293,7 +294,7 @@ class Search {
     return theta;
   }
 
-  /// @returns false, and never offers it again, if it is not as new as its products said.
+  /// @returns false, and never proposes it again, if it is not as new as its products indicated.
   bool add(std::size_t candidate) {
     detail::AlignedVector<double> q = columns_.product(candidates_.monomial(candidate));
     for (int twice = 0; twice < 2; ++twice) {  // once leaves a trace in near-dependent ones

@@ -13,8 +13,8 @@ namespace torsio {
 using Monomial = std::vector<std::size_t>;
 
 struct FrolsOptions {
-  std::size_t degree = 3;  ///< of the candidates, at most
-  std::size_t terms = 8;   ///< to choose, at most
+  std::size_t degree = 3;  ///< highest degree of the candidates
+  std::size_t terms = 8;   ///< largest number of terms
   /// Swaps a chosen term for another candidate wherever that explains more.
   bool exchange = true;
 };
@@ -42,22 +42,23 @@ inline constexpr std::size_t kMaxTerms = 100;
 /// @throws UsageError, with the degree that would do, if there are more than `kMaxCandidates`.
 void check_candidates(std::size_t inputs, std::size_t degree);
 
-/// Chooses monomials of the scaled regressors by forward regression with orthogonal least squares: in
-/// every round the candidate that explains most of what is left,
+/// Chooses monomials of the scaled regressors by forward regression with orthogonal least squares:
+/// in every round the candidate that explains most of the remaining variance,
 ///
 ///     ERR_j = (w_j . y)^2 / (w_j . w_j  y . y),   w_j = phi_j - sum_s q_s (q_s . phi_j)
 ///
-/// with q_s the orthonormal basis of those chosen before. Only the inner products with all candidates
-/// are kept, so that a round is one run over the samples against the newest q, in which the
-/// candidates are made on the way and never stored. Candidates that the chosen ones explain to 1e-6
-/// of their length are passed over; it ends early where none is left that explains 1e-15 of y. With
-/// `exchange`, every chosen term is then taken out in turn, and the best candidate put in its place,
-/// until the set stays (Givens rotations take a term out without a run over the samples).
+/// with q_s the orthonormal basis of those chosen before. Only the inner products with all
+/// candidates are kept, so that a round is one pass over the samples with the newest q, in which
+/// the candidates are computed and never stored. Candidates that the chosen ones explain to 1e-6 of
+/// their length are skipped; the search ends early where no remaining candidate explains 1e-15 of
+/// y. With `exchange`, every chosen term is then removed in turn and replaced by the best
+/// candidate, until the set no longer changes (Givens rotations remove a term without a pass over
+/// the samples).
 ///
 /// Deterministic. Source: Chen, Billings and Luo 1989 (Int. J. Control 50, 1873); the exchange: Li,
 /// Peng and Bai 2006 (Automatica 42, 1189). Cost: 2 multiply-adds for each candidate, sample and
 /// term; memory: (regressors + terms) x samples.
-/// @param regressors samples x inputs, finite; `target` one a sample.
+/// @param regressors samples x inputs, finite; `target` has one value per sample.
 /// @throws Error if the target is 0 throughout or there are fewer samples than terms; UsageError for
 /// a degree or number of terms out of range, or more candidates than `kMaxCandidates`; Cancelled.
 [[nodiscard]] Frols frols(const Matrix& regressors, std::span<const double> target,

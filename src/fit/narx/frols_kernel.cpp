@@ -51,7 +51,7 @@ void add_all(const Candidates& candidates, const double* columns, std::size_t st
   for (std::size_t j = 0; j < candidates.count; ++j) {
     const Candidate& of = candidates.list[j];
     const double* column = columns + of.column * stride;
-    // The first is the constant, which stands in a column.
+    // The first is the constant, which is stored in a column.
     const double* parent = j == 0 ? columns : scratch + of.parent * kBlock;
     double* square = kSquared ? squares + j : nullptr;
     if (j < candidates.parents)

@@ -58,7 +58,7 @@ void require_free_run(const TrainingData& data) {
                               sequence.target, [](double y) { return std::isfinite(y); })));
   if (most > kCorrected) return;
   throw Error(
-      {.problem = "the records are too short to judge a free run, which starts from "
+      {.problem = "the records are too short to evaluate a free run, which starts from "
                   "measured samples",
        .expected = fmt::format("one of more than {} samples of {}", kCorrected, data.target),
        .found = fmt::format("{} in the longest", most)});

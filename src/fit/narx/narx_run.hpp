@@ -69,10 +69,10 @@ template <FeedsBack M>
   return outputs;
 }
 
-/// @throws Error if no record goes on behind the measured start.
+/// @throws Error if no record continues after the measured start.
 void require_free_run(const TrainingData& data);
 
-/// Over what came behind the measured start.
+/// RMSE of the samples after the measured start.
 [[nodiscard]] double free_run_rmse(const OutputLists& outputs, const TrainingData& data);
 
 /// The targets with normal noise.

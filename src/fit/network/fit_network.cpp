@@ -103,7 +103,7 @@ std::string recipe_of(std::string_view family, const TrainingNetwork& network,
       fingerprint(validation, fingerprint(set, 0xcbf29ce484222325U)));
 }
 
-/// The data as the trainer sees them.
+/// The data in the form that the trainer uses.
 struct Material {
   NetworkScaling scaling;
   WindowSet training;
@@ -119,7 +119,8 @@ Material prepare(const TrainingData& data, const TrainingWindows& windows, std::
     split.training = whole_sequences(data);
   } else {
     split = split_for_validation(data, windows, embargo, context.seed);
-    if (split.training.empty()) split.training = whole_sequences(data);  // says below what is wrong
+    if (split.training.empty())
+      split.training = whole_sequences(data);  // the error is reported below
   }
   Material material{.scaling = scaling_of(data, split.training),
                     .training = {},
@@ -133,12 +134,12 @@ Material prepare(const TrainingData& data, const TrainingWindows& windows, std::
     throw Error(
         {.place = "training records",
          .expected = fmt::format("a stretch of {} samples (one window) with finite inputs and "
-                                 "a measured {} behind the burn-in",
+                                 "a measured {} after the burn-in",
                                  windows.length, data.target),
          .found = fmt::format("none; the longest record has {} samples", longest),
          .advice = "Set a shorter window, or give longer records."});
   }
-  TrainingWindows apart = windows;  // every sample judges about once
+  TrainingWindows apart = windows;  // every sample is scored about once
   apart.stride =
       std::max(windows.stride, windows.length - std::min(windows.burn_in, windows.length - 1));
   if (context.validation != nullptr) {
@@ -202,7 +203,7 @@ TrainedNetwork finished_network(const Job& job) {
           .end = {}};
 }
 
-/// Everything that the three fits share. `put_initial(network, weights)` says where to start.
+/// The part that the three fits have in common. `put_initial(network, weights)` sets the start.
 template <class PutInitial>
 std::pair<TrainedNetwork, Material> train(const Job& job, const TrainingData& data,
                                           const FitContext& context,
@@ -227,7 +228,7 @@ std::pair<TrainedNetwork, Material> train(const Job& job, const TrainingData& da
   return {std::move(trained), std::move(material)};
 }
 
-/// Dense layers behind each other, the last one linear with one output.
+/// Dense layers in series, the last one linear with one output.
 void append_dense(std::vector<TrainingLayer>& layers, std::size_t inputs,
                   const std::vector<std::size_t>& hidden, Activation activation) {
   for (const std::size_t units : hidden) {
@@ -301,8 +302,8 @@ Trained<typename Way::Family> train_recurrent(const TrainingData& data,
                                          options.training.epochs);
 }
 
-// A static network's samples follow each other closely: a hundredth of a record between those that
-// teach and those that judge.
+// A static network's samples are highly correlated over short times: training and validation
+// samples are separated by a hundredth of a record.
 std::size_t static_embargo(const TrainingData& data) {
   std::size_t longest = 0;
   for (const Sequence& sequence : data.sequences)

@@ -21,8 +21,8 @@
 namespace torsio {
 
 enum class Optimiser : std::uint8_t { adam, adamw };
-/// Of the learning rate: constant; half a cosine from its full value to 0 over all epochs; a tenth
-/// after half of the epochs and a hundredth after three quarters.
+/// The learning rate over the epochs: constant; half a cosine from its full value to 0 over all
+/// epochs; a tenth after half of the epochs and a hundredth after three quarters.
 enum class RateSchedule : std::uint8_t { constant, cosine, step };
 
 inline constexpr std::array<std::string_view, 2> kOptimisers{"adam", "adamw"};
@@ -38,9 +38,8 @@ struct NetworkTraining {
   std::size_t batch = 64;   ///< windows an update
   double learning_rate = 1e-3;
   Optimiser optimiser = Optimiser::adam;
-  double weight_decay =
-      0.0;            ///< of weights, never of biases; adam: an L2 penalty, adamw: decoupled
-  double clip = 1.0;  ///< greatest norm of the gradient; 0: any
+  double weight_decay = 0.0;  ///< weights, never biases; adam: an L2 penalty, adamw: decoupled
+  double clip = 1.0;          ///< greatest norm of the gradient; 0: any
   RateSchedule schedule = RateSchedule::constant;
   std::size_t patience = 5;  ///< epochs without a better validation loss; 0: all epochs
   std::size_t threads = 0;   ///< 0: as many as the machine has
@@ -105,10 +104,10 @@ struct TrainingWindows {
                         .help = "samples from the start of a window to that of the next"});
     visit(self.burn_in, {.name = "burn_in",
                          .maximum = 1e9,
-                         .help = "first samples of a window, whose output is not judged"});
+                         .help = "first samples of a window, whose output is not scored"});
     visit(self.last_only,
           {.name = "mode",
-           .help = "sequence: every output behind the burn-in is judged; last: only the window's "
+           .help = "sequence: every output after the burn-in is scored; last: only the window's "
                    "last",
            .choices = kWindowModes});
   }
@@ -134,22 +133,22 @@ struct RecurrentOptions {
 };
 
 /// Trains a network on standardised inputs and target by mean square error and backpropagation
-/// (through time, from the end of each window to its start). Every learning sample is seen once an
-/// epoch, windows in a new order each epoch; the weights kept are those of the epoch with the
-/// least loss on the validation records, and training ends when there was no better one for
-/// `patience` epochs. Without validation records a fifth of the training records, whole ones chosen
-/// by the seed, is held out for this; of a single record its last fifth, a window away from the rest.
+/// (through time, from the end of each window to its start). Every training sample is used once per
+/// epoch, windows in a new order each epoch; the weights kept are those of the epoch with the least
+/// loss on the validation records, and training ends when there was no better one for `patience`
+/// epochs. Without validation records a fifth of the training records, whole ones chosen by the
+/// seed, is held out for this; of a single record its last fifth, separated by one window.
 ///
-/// Initial weights: Glorot uniform; He normal in front of relu and elu; recurrent ones orthogonal;
-/// forget bias 1. Windows lie within one record and hold no input that is not finite.
+/// Initial weights: Glorot uniform; He normal before relu and elu; recurrent ones orthogonal;
+/// forget bias 1. Windows lie within one record and contain only finite inputs.
 ///
-/// Source: papers 001 and 004, specification 3.2 and 3.4. Deterministic for a seed, whatever the
-/// number of threads. A loss that explodes (a million times that of a constant, or not finite) ends
-/// the training; the best weights so far are kept and a note says so.
+/// Source: papers 001 and 004, specification 3.2 and 3.4. Deterministic for a seed, for any
+/// number of threads. A loss that explodes (a million times that of a constant, or not finite)
+/// ends the training; the best weights so far are kept and a note reports it.
 /// @throws Error if no stretch of the records is as long as a window, the target is constant or not
-/// finite in a sample to learn from, the network is larger than a model file or the memory, or the
-/// loss explodes in the first epoch; UsageError if an option is out of range or `context.resume` is
-/// of another recipe; Cancelled, after `context.keep`.
+/// finite in a training sample, the network is larger than a model file or the memory, or
+/// the loss explodes in the first epoch; UsageError if an option is out of range or
+/// `context.resume` has another recipe; Cancelled, after `context.keep`.
 [[nodiscard]] Fitted<Mlp> fit_mlp(const TrainingData& data, const MlpOptions& options,
                                   const FitContext& context = {});
 [[nodiscard]] Fitted<Lstm> fit_lstm(const TrainingData& data, const RecurrentOptions& options,

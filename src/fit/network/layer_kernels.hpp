@@ -11,12 +11,12 @@ namespace torsio::layer_kernels {
 
 /// values = f(values)
 void activate(Activation activation, float* values, std::size_t count) noexcept;
-/// slope *= f'(a), told by values = f(a)
+/// slope *= f'(a), computed from values = f(a)
 void activate_backward(Activation activation, const float* values, float* slope,
                        std::size_t count) noexcept;
 
-/// One step of an LSTM. `gates` [rows x 4 width] in the order i, f, g, o: in before, out behind
-/// their activations.
+/// One step of an LSTM. `gates` [rows x 4 width] in the order i, f, g, o: pre-activations on input,
+/// activations on output.
 struct LstmStep {
   std::size_t rows;
   std::size_t width;
@@ -29,14 +29,14 @@ void lstm_forward(const LstmStep& step, float* output, std::size_t output_stride
 /// [rows x width] are those of this step's h and c; `cell_slope` becomes that of the old c.
 void lstm_backward(const LstmStep& step, const float* output_slope, float* cell_slope) noexcept;
 
-/// One step of a GRU. `gates` [rows x 4 width] in the order n, r, z, m, where
-/// n = tanh(a_n + r m) and m = R_n h + b_Rn: in before, out behind their activations (m as it is).
+/// One step of a GRU. `gates` [rows x 4 width] in the order n, r, z, m, where n = tanh(a_n + r m)
+/// and m = R_n h + b_Rn: pre-activations on input, activations on output (m unchanged).
 struct GruStep {
   std::size_t rows;
   std::size_t width;
   float* gates;
   const float* old_output;
-  std::size_t stride;  ///< of the old and the new output
+  std::size_t stride;  ///< stride of the old and the new output
 };
 void gru_forward(const GruStep& step, float* output) noexcept;
 /// `gates` become the slopes before the activations; `output_slope` [rows x width], of this step's

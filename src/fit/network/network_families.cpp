@@ -18,7 +18,7 @@ struct WithMembers {
     visit(self.members, {.name = "members",
                          .minimum = 1,
                          .maximum = MlpEnsemble::kMaxMembers,
-                         .help = "networks of an ensemble, whose mean is told and whose "
+                         .help = "networks of an ensemble, whose mean is the estimate and whose "
                                  "disagreement widens the error bar"});
   }
 };

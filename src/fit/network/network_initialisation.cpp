@@ -14,8 +14,9 @@ void fill_glorot(FloatMatrix& weights, std::size_t inputs, std::size_t outputs, 
     weight = static_cast<float>(bound * (2.0 * random.uniform() - 1.0));
 }
 
-/// Each gate's square part of `weights` becomes an orthogonal matrix, all of them equally likely: Q
-/// of a matrix of normal numbers, signs by the diagonal of R (Mezzadri 2007).
+/// Each gate's square part of `weights` becomes an orthogonal matrix from the uniform distribution:
+/// Q from the QR decomposition of a matrix of normal numbers, signs by the diagonal of R (Mezzadri
+/// 2007).
 void fill_orthogonal(FloatMatrix& weights, Random& random) {
   const std::size_t units = weights.columns;
   const auto size = static_cast<Eigen::Index>(units);

@@ -9,7 +9,7 @@
 
 namespace torsio {
 
-/// Windows side by side, step by step: [steps x rows], with what the network sees and shall say.
+/// Parallel windows, step by step: [steps x rows], with the network's inputs and targets.
 struct SequenceBatch {
   std::size_t steps = 0;
   std::size_t rows = 0;
@@ -24,8 +24,8 @@ class PackedNetwork {
   void pack(const TrainingNetwork& network, const float* parameters);
 
   struct Layer {
-    float_gemm::PackedMatrix forward;        ///< of [1, x], and of h- for an LSTM
-    float_gemm::PackedMatrix forward_state;  ///< of h-, GRU only
+    float_gemm::PackedMatrix forward;        ///< acts on [1, x], for an LSTM also on h-
+    float_gemm::PackedMatrix forward_state;  ///< acts on h-, GRU only
     float_gemm::PackedMatrix to_state;       ///< slopes of the gates -> slope of h-
     float_gemm::PackedMatrix to_inputs;      ///< slopes of the gates -> slope of x
     const float* state_bias = nullptr;       ///< GRU only; points into the parameters
@@ -43,7 +43,7 @@ class NetworkPass {
   /// The batch's `inputs` through all layers.
   void forward(const TrainingNetwork& network, const PackedNetwork& packed,
                const SequenceBatch& batch);
-  /// After `forward`: what the network says at a step of a row.
+  /// After `forward`: the network's output at a step of a row.
   [[nodiscard]] float output(std::size_t step, std::size_t row) const;
   /// After `forward`: sum of weight (output - target)^2.
   [[nodiscard]] double square_error(const SequenceBatch& batch) const;
@@ -54,11 +54,11 @@ class NetworkPass {
 
  private:
   struct LayerMemory {
-    std::size_t stride = 0;               ///< of `rows`
+    std::size_t stride = 0;               ///< stride of `rows`
     detail::AlignedVector<float> rows;    ///< [(steps + 1) x rows]: 1, x, h- with padding
     detail::AlignedVector<float> values;  ///< dense: outputs; else gates, later their slopes
     detail::AlignedVector<float> cells;   ///< LSTM: [(steps + 1) x rows x width]
-    detail::AlignedVector<float> slopes;  ///< of the outputs [steps x rows x width]
+    detail::AlignedVector<float> slopes;  ///< slopes at the outputs [steps x rows x width]
   };
   struct Outputs {
     const float* values;

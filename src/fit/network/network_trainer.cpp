@@ -22,8 +22,8 @@
 namespace torsio {
 namespace {
 
-// Windows of a chunk: few enough that a batch of 64 keeps four threads busy, enough for products
-// of matrices at full speed. Steps of a static network are over too soon to be shared.
+// Windows per chunk: few enough that a batch of 64 keeps four threads busy, enough for matrix
+// products at full speed. Steps of a static network are too short to be shared.
 constexpr std::size_t kChunkWithState = 16;
 constexpr std::size_t kChunkStatic = 256;
 

@@ -60,13 +60,13 @@ class NetworkTrainer {
   std::size_t chunk_rows_;
   PackedNetwork packed_;
   detail::AlignedVector<float> gradients_;  ///< [chunk x parameters], the sum ends up in the first
-  std::mutex guard_;                        ///< of `idle_`
+  std::mutex guard_;                        ///< protects `idle_`
   std::vector<std::unique_ptr<Workspace>> idle_;
 };
 
 /// What came out of a training.
 struct TrainedNetwork {
-  std::vector<float> weights;  ///< of the best epoch
+  std::vector<float> weights;  ///< from the best epoch
   std::size_t epochs = 0;      ///< run in all
   std::size_t best_epoch = 0;
   double best_loss = 0.0;  ///< standardised mean square error

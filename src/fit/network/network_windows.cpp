@@ -153,7 +153,7 @@ NetworkScaling scaling_of(const TrainingData& data, std::span<const SequencePart
     throw Error({.place = data.target,
                  .expected = "a target that changes",
                  .found = fmt::format("{} in every training sample", lowest),
-                 .advice = "Is the sensor connected? torsio check says more."});
+                 .advice = "Is the sensor connected? torsio check reports details."});
   return {.inputs = inputs.parameters(),
           .target_centre = output.parameters().centre.front(),
           .target_scale = output.parameters().scale.front()};

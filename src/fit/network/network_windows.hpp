@@ -24,7 +24,7 @@ struct WindowSet {
   std::size_t burn_in = 0;
   bool last_only = false;
   std::size_t inputs = 0;
-  std::vector<float> features = {};    ///< [samples x inputs], all sequences one behind the other
+  std::vector<float> features = {};    ///< [samples x inputs], all sequences in series
   std::vector<float> targets = {};     ///< [samples]; 0 where not learned from
   std::vector<std::uint8_t> use = {};  ///< [samples]
   std::vector<std::size_t> starts = {};
@@ -35,7 +35,7 @@ struct WindowSet {
   [[nodiscard]] std::size_t counted(std::size_t start) const;
 };
 
-/// Which parts of the training data teach, and which decide when to stop.
+/// The parts of the training data for training, and those that decide when to stop.
 struct TrainingSplit {
   std::vector<SequencePart> training = {};
   std::vector<SequencePart> validation = {};  ///< may be empty

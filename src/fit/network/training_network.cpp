@@ -20,8 +20,8 @@ constexpr std::array<Gate, 4> kLstmGates{{{0, 0}, {1, 1}, {2, 2}, {3, 3}}};
 constexpr std::array<Gate, 3> kGruInputGates{{{0, 1}, {1, 2}, {2, 0}}};
 constexpr std::array<Gate, 3> kGruStateGates{{{0, 0}, {1, 1}, {2, 2}}};
 
-/// Calls `visit(weight, parameter)` for the weights of one gate that stand in the block from that
-/// row on.
+/// Calls `visit(weight, parameter)` for the weights of one gate in the block that starts at that
+/// row.
 template <class Weights, class Parameter, class Visit>
 void for_each_weight(Weights& weights, const TrainingLayer& layer, const ParameterBlock& block,
                      std::size_t first_row, Gate gate, Parameter* parameters, const Visit& visit) {

@@ -16,7 +16,7 @@ struct TrainingLayer {
   Kind kind = Kind::dense;
   std::size_t inputs = 0;
   std::size_t units = 0;
-  Activation activation = Activation::linear;  ///< of a dense layer
+  Activation activation = Activation::linear;  ///< in a dense layer
 
   /// Units with padding: a multiple of 16. The padding has weight 0, and its gradient is 0.
   [[nodiscard]] std::size_t width() const noexcept { return float_gemm::in_panels(units); }
@@ -31,8 +31,8 @@ struct ParameterBlock {
   bool begins_with_bias = true;  ///< row 0, which weight decay leaves alone
 };
 
-/// The layers of a network, and where their parameters stand in one flat list. With rows
-/// [1, x, h-] as the inputs of a layer, its weights stand transposed:
+/// The layers of a network, and the positions of their parameters in one flat list. With rows [1,
+/// x, h-] as the inputs of a layer, its weights are stored transposed:
 ///
 ///     dense  P [(1 + inputs) x width]                a = [1, x] P
 ///     lstm   P [(1 + inputs + units) x 4 width]      a = [1, x, h-] P, gates i f g o

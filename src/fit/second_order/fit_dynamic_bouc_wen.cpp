@@ -37,8 +37,8 @@ Parameters of(const Oscillator& oscillator, Parameters with) {
   return with;
 }
 
-/// Fills in stiffness and miss: from rest, the compliance that explains most of the target.
-void judge(Oscillator& oscillator, const TrainingData& data, Parameters with) {
+/// Computes stiffness and miss: from rest, the compliance that explains most of the target.
+void evaluate(Oscillator& oscillator, const TrainingData& data, Parameters with) {
   constexpr std::size_t kMaxSamples = 8000;
   oscillator.stiffness = 1.0;
   with = of(oscillator, with);
@@ -72,7 +72,7 @@ Oscillator best_oscillator(const TrainingData& data, const Parameters& with) {
       Oscillator oscillator{
           .rate_per_s = slowest * std::pow(fastest / slowest, static_cast<double>(i) / kRates),
           .damping_ratio = damping_ratio};
-      judge(oscillator, data, with);
+      evaluate(oscillator, data, with);
       if (oscillator.miss < best.miss) best = oscillator;
     }
   if (std::isinf(best.miss))
@@ -83,7 +83,7 @@ Oscillator best_oscillator(const TrainingData& data, const Parameters& with) {
   return best;
 }
 
-/// What the search sees of `Parameters`: the mass on its spring, the element, gains but the first.
+/// The parameters that are searched: the mass on its spring, the element, gains but the first.
 std::vector<double> listed(const Parameters& p, bool with_exponent) {
   std::vector<double> all{p.mass, p.damping, p.stiffness, p.hysteretic_stiffness, p.loss, p.skew};
   if (with_exponent) all.push_back(p.exponent);

@@ -12,7 +12,7 @@
 
 namespace torsio {
 
-/// Of the searches over free runs of both second-order families.
+/// Options of the searches over free runs of both second-order families.
 template <class Self, class Visit>
 void visit_free_run_options(Self& self, const Visit& visit) {
   visit(self.substeps, {.name = "substeps",
@@ -22,12 +22,12 @@ void visit_free_run_options(Self& self, const Visit& visit) {
   visit(self.input_order,
         {.name = "input_order",
          .maximum = CausalPolynomial::kHighestOrder,
-         .help = "of the polynomial that tells the force between its samples; 0: held"});
+         .help = "of the polynomial that interpolates the force between its samples; 0: held"});
   visit(self.first_horizon,
         {.name = "first_horizon",
          .minimum = 10,
          .maximum = 1e9,
-         .help = "samples that the first search sees; each further one sees four times as many"});
+         .help = "samples that the first search uses; each further one uses four times as many"});
   visit(
       self.iterations,
       {.name = "iterations", .minimum = 1, .maximum = 1e6, .help = "at most, of the last search"});
@@ -37,8 +37,8 @@ struct DynamicBoucWenOptions {
   double exponent = 1.0;  ///< n; NaN: searched for
   std::size_t substeps = 4;
   std::size_t input_order = 3;
-  std::size_t first_horizon = 500;  ///< samples that the first of the growing searches sees
-  std::size_t iterations = 200;     ///< at most, of the last search
+  std::size_t first_horizon = 500;  ///< samples that the first of the growing searches uses
+  std::size_t iterations = 200;     ///< limit of the last search
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {

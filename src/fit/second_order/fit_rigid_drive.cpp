@@ -24,12 +24,12 @@ namespace {
 
 using Parameters = RigidDrive::Parameters;
 
-/// Of a free run, that put its start: in the fit as in a score (`--initialise`).
+/// Samples of a free run that determine its start: in the fit as in a score (`--initialise`).
 constexpr std::size_t kStartSamples = 50;
 
 /// What the motion of the training records is like, to size the search by.
 struct Scale {
-  double travel = 0.0;  ///< of the target
+  double travel = 0.0;  ///< range of the target
   double speed = 0.0;   ///< largest
   std::string force_unit;
   std::string target_unit;
@@ -172,7 +172,7 @@ std::string names_of(const TermSet& set) {
   return text.empty() ? "none" : text;
 }
 
-/// The searched numbers in their places, gains of the inputs after the first behind them.
+/// Sets the searched parameters; the gains of the inputs after the first follow them.
 Parameters with_fields(Parameters p, const std::vector<Field>& fields,
                        std::span<const double> values) {
   for (std::size_t i = 0; i < fields.size(); ++i) p.*fields[i].place = values[i];
@@ -180,7 +180,7 @@ Parameters with_fields(Parameters p, const std::vector<Field>& fields,
   return p;
 }
 
-/// A set of terms: the model as the search sees it, and where to start from.
+/// A set of terms: the model with its searched parameters, and the start values.
 struct Candidate {
   std::vector<Field> fields;
   SimulatedModel model;

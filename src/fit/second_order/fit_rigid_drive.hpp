@@ -20,8 +20,8 @@ struct RigidDriveOptions {
   std::string terms = "none";
   std::size_t substeps = 1;
   std::size_t input_order = 3;
-  std::size_t first_horizon = 2000;  ///< samples that the first of the growing searches sees
-  std::size_t iterations = 200;      ///< at most, of the last search
+  std::size_t first_horizon = 2000;  ///< samples that the first of the growing searches uses
+  std::size_t iterations = 200;      ///< limit of the last search
 
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {

@@ -30,7 +30,7 @@ double target_spread(const TrainingData& data) {
   return highest - lowest;
 }
 
-/// Of the spread in one sample: a speed that matters.
+/// Share of the spread per sample: a speed that is not negligible.
 constexpr double kVelocityShare = 0.01;
 
 /// The unknowns, each over its typical size: parameters, then the searched states of each sequence.
@@ -79,7 +79,7 @@ class Unknowns {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = unknowns[i] * scale_[i];
     return values;
   }
-  /// Nothing if the first samples cannot be told.
+  /// Nothing if the first samples do not determine the start.
   [[nodiscard]] std::optional<std::vector<double>> start(std::span<const double> unknowns,
                                                          std::size_t i) const {
     if (start_samples_ > 0)
@@ -91,7 +91,7 @@ class Unknowns {
     return state;
   }
 
-  /// Of the first `horizon` samples of each sequence, over the target's spread.
+  /// Residuals of the first `horizon` samples of each sequence, over the target's spread.
   [[nodiscard]] ResidualProblem problem(std::size_t horizon, double difference) const {
     return {.residuals = scored_samples(data_, horizon),
             .evaluate =
@@ -140,7 +140,7 @@ class FirstSamples {
         sequence_(sequence),
         told_(std::min(samples, sequence.target.size())) {}
 
-  /// Nothing if they cannot be told from that state.
+  /// Nothing if they cannot be computed from that state.
   [[nodiscard]] std::optional<Eigen::VectorXd> misses(std::span<const double> state) {
     if (!model_.run(parameters_, state, sequence_, told_)) return std::nullopt;
     Eigen::VectorXd miss = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(told_.size()));
@@ -149,7 +149,7 @@ class FirstSamples {
         miss[static_cast<Eigen::Index>(n)] = told_[n] - sequence_.target[n];
     return miss;
   }
-  /// Of the misses, over each state's scale: samples x states.
+  /// Derivatives of the residuals by the states, each over its scale: samples x states.
   [[nodiscard]] std::optional<Eigen::MatrixXd> slopes(const std::vector<double>& state,
                                                       const Eigen::VectorXd& scale) {
     constexpr double kDifference = 1e-3;
@@ -203,7 +203,7 @@ void add_table(SimulationFit& fit, const SimulatedModel& model, const ResidualPr
     const auto of_parameters = std::span(direction).first(model.parameters.size());
     if (std::ranges::none_of(of_parameters, [](double part) { return std::abs(part) > kPart; }))
       continue;  // starts that leave no trace
-    fit.notes.push_back("the data cannot tell " + description_of(direction, names) +
+    fit.notes.push_back("the data do not determine " + description_of(direction, names) +
                         " (each over its typical size)");
   }
 }
@@ -265,13 +265,13 @@ SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData&
       report_progress(options.progress, fraction, fmt::format("{} samples, {}", horizon, doing));
       return true;
     };
-    constexpr std::size_t kToTellStartsApart = 25;
+    constexpr std::size_t kIterationsToRankStarts = 25;
     std::vector<SearchResult> found;
     for (const double difference : model.differences) {
       found = minimise_squares_each(
           unknowns.problem(horizon, difference), from,
-          unknowns.options(is_last ? options.max_iterations : kToTellStartsApart, options.tolerance,
-                           progress));
+          unknowns.options(is_last ? options.max_iterations : kIterationsToRankStarts,
+                           options.tolerance, progress));
       from.resize(found.size());
       std::ranges::transform(found, from.begin(), &SearchResult::theta);
     }
@@ -384,19 +384,18 @@ TrainingData in_blocks(const TrainingData& data, std::size_t blocks) {
   TrainingData cut = data;
   cut.sequences.clear();
   for (const Sequence& whole : data.sequences) {
-    const std::size_t pieces =
-        std::max<std::size_t>((whole.target.size() + length / 2) / length, 1);
-    for (std::size_t i = 0; i < pieces; ++i) {
-      const std::size_t begin = whole.target.size() * i / pieces;
-      const std::size_t end = whole.target.size() * (i + 1) / pieces;
+    const std::size_t parts = std::max<std::size_t>((whole.target.size() + length / 2) / length, 1);
+    for (std::size_t i = 0; i < parts; ++i) {
+      const std::size_t begin = whole.target.size() * i / parts;
+      const std::size_t end = whole.target.size() * (i + 1) / parts;
       const auto first = static_cast<std::ptrdiff_t>(begin);
       const auto last = static_cast<std::ptrdiff_t>(end);
-      Sequence& piece = cut.sequences.emplace_back(Sequence{
+      Sequence& part = cut.sequences.emplace_back(Sequence{
           .recording = whole.recording, .features = Matrix(end - begin, data.input_count())});
       for (std::size_t n = begin; n < end; ++n)
-        std::ranges::copy(whole.features.row(n), piece.features.row(n - begin).begin());
-      piece.target.assign(whole.target.begin() + first, whole.target.begin() + last);
-      piece.use.assign(whole.use.begin() + first, whole.use.begin() + last);
+        std::ranges::copy(whole.features.row(n), part.features.row(n - begin).begin());
+      part.target.assign(whole.target.begin() + first, whole.target.begin() + last);
+      part.use.assign(whole.use.begin() + first, whole.use.begin() + last);
     }
   }
   return cut;

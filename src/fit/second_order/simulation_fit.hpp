@@ -38,7 +38,7 @@ struct SimulatedModel {
   /// `ResidualProblem::difference`, one search after the other: what stops and starts make rough looks
   /// smooth from afar, and a fine difference alone stays in the first dent.
   std::vector<double> differences = {1e-6};
-  std::size_t free_states = 2;  ///< of the start: position, velocity, ..
+  std::size_t free_states = 2;  ///< free states of the start: position, velocity, ..
 };
 
 /// A model of family M, made from what the search has; nothing if it refuses that.
@@ -66,9 +66,9 @@ bool run_from(std::optional<M> model, std::span<const double> state, const Seque
 }
 
 struct SimulationFitOptions {
-  std::size_t first_horizon = 500;  ///< samples of each sequence that the first search sees
-  std::size_t growth = 4;           ///< of the horizon from one search to the next
-  std::size_t kept = 3;             ///< starts that go on to the second horizon
+  std::size_t first_horizon = 500;  ///< samples of each sequence that the first search uses
+  std::size_t growth = 4;           ///< growth of the horizon from one search to the next
+  std::size_t kept = 3;             ///< starts that continue to the second horizon
   std::size_t max_iterations = 200;
   double tolerance = 1e-9;  ///< relative fall of the squares below which a search has converged
   /// First samples of each record that put its start, as in a score; 0: the start is searched for
@@ -80,17 +80,17 @@ struct SimulationFitOptions {
 struct SimulationFit {
   std::vector<double> parameters;
   std::vector<FittedParameter> table = {};
-  std::vector<std::string> notes = {};  ///< what the data cannot tell
-  double rmse = 0.0;                    ///< in training, of free runs
-  std::size_t samples = 0;              ///< that were judged
+  std::vector<std::string> notes = {};  ///< what the data do not determine
+  double rmse = 0.0;                    ///< RMSE of free runs in training
+  std::size_t samples = 0;              ///< that were scored
 };
 
-/// argmin over the parameters of the sum of (y_k - target_k)^2, y a free run through the record from a
-/// start that is searched for, too, or put by the record's first samples. From all starts of the
-/// search over a short horizon, then from the best over longer ones: a long run has many minima in
-/// frequency and phase, a short one few. Where the records are more than `kMaxSearchedStarts`,
-/// the starts to be searched for stay where the first samples point.
-/// @throws Error if a record is shorter than the unknowns need, every start runs away, or the last
+/// argmin over the parameters of the sum of (y_k - target_k)^2, y a free run through the record
+/// from a start that is a searched parameter, too, or determined by the record's first samples. The
+/// search runs from all starts over a short horizon, then from the best over longer ones: a long
+/// run has many minima in frequency and phase, a short one few. Where the records are more than
+/// `kMaxSearchedStarts`, the starts are not searched but estimated from the first samples.
+/// @throws Error if a record is shorter than the unknowns need, every start diverges, or the last
 /// search did not converge; Cancelled.
 inline constexpr std::size_t kMaxSearchedStarts = 30;
 [[nodiscard]] SimulationFit fit_by_simulation(const SimulatedModel& model, const TrainingData& data,
@@ -102,27 +102,28 @@ inline constexpr std::size_t kMaxSearchedStarts = 30;
 /// Position and velocity of a line through the first measured samples.
 [[nodiscard]] std::vector<double> measured_start(const Sequence& sequence, double sample_rate_Hz);
 
-/// The state from which a free run misses the first samples of a sequence least (Gauss-Newton, from
-/// `measured_start`). Nothing if no run can be told.
+/// The state from which a free run has the least error over the first samples of a sequence
+/// (Gauss-Newton, from `measured_start`). Nothing if no run can be computed.
 [[nodiscard]] std::optional<std::vector<double>> start_by_first(const SimulatedModel& model,
                                                                 std::span<const double> parameters,
                                                                 const Sequence& sequence,
                                                                 double sample_rate_Hz,
                                                                 double spread, std::size_t samples);
 
-/// Root mean square of what free runs miss, the start of each sequence put by its first `initialise`
-/// measured samples, which are not judged. Infinite if a run cannot be told.
+/// Root mean square error of free runs, the start of each sequence determined by its first
+/// `initialise` measured samples, which are not scored. Infinite if a run cannot be computed.
 [[nodiscard]] double held_out_rmse(const SimulatedModel& model, std::span<const double> parameters,
                                    const TrainingData& data, std::size_t initialise);
 
-/// What these families ask of their data: a first input that changes, a target that moves.
-/// @throws Error that says which is missing.
+/// The requirements of these families on their data: a first input that changes, a target that
+/// changes.
+/// @throws Error that states which is missing.
 void require_excitation(const TrainingData& data);
 
 /// Gains of the inputs after the first, to be searched for, from 0 on.
 [[nodiscard]] std::vector<SearchedParameter> further_gains(const TrainingData& data);
 
-/// The sequences cut into about `blocks` contiguous pieces, each a sequence of its own.
+/// The sequences cut into about `blocks` contiguous parts, each a sequence of its own.
 [[nodiscard]] TrainingData in_blocks(const TrainingData& data, std::size_t blocks);
 
 /// The range of the target, widened by five times its width to each side and to 0.

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t kMaxScored = 30'000;
 
-/// "Nm/rad" of torque_Nm and spring_deflection_rad; empty where the names do not tell.
+/// "Nm/rad" for torque_Nm and spring_deflection_rad; empty where the names contain no units.
 std::string stiffness_unit(const TrainingData& data) {
   const std::string& input = data.inputs.front().expression;
   const bool is_sum = input.find_first_of("*/^(.") == std::string::npos;
@@ -51,14 +51,14 @@ std::vector<FittedParameter> table_of(const SpringDashpotNetwork& network, doubl
   return table;
 }
 
-/// Elements that a branch's rate hangs on: |d ln p / d ln value| of a fifth or more.
+/// Elements that determine a branch's rate: |d ln p / d ln value| of a fifth or more.
 std::vector<std::string> elements_after(const SpringDashpotNetwork& network, std::size_t branch) {
   constexpr double kMoved = 1.01;
   constexpr double kShare = 0.2;
   const RelaxationSpectrum spectrum = relaxation_spectrum(network);
   const std::vector<double> values = network.values();
   const std::vector<std::string> names = network.names();
-  std::vector<std::string> behind;
+  std::vector<std::string> sensitive;
   for (std::size_t j = 0; j < values.size(); ++j) {
     std::vector<double> moved = values;
     moved[j] *= kMoved;
@@ -67,9 +67,9 @@ std::vector<std::string> elements_after(const SpringDashpotNetwork& network, std
     const auto branches = relaxation_spectrum(other).branches;
     if (branch >= branches.size()) continue;
     const double change = std::log(branches[branch].rate_1_s / spectrum.branches[branch].rate_1_s);
-    if (std::abs(change) >= kShare * std::log(kMoved)) behind.push_back(names[j]);
+    if (std::abs(change) >= kShare * std::log(kMoved)) sensitive.push_back(names[j]);
   }
-  return behind;
+  return sensitive;
 }
 
 void note_relaxation(std::vector<std::string>& notes, const SpringDashpotNetwork& network,
@@ -98,13 +98,14 @@ void note_uncertainty(std::vector<std::string>& notes, const ParameterUncertaint
   names.reserve(table.size());
   for (const FittedParameter& each : table) names.push_back(each.name);
   for (const auto& direction : uncertainty.null_directions)
-    notes.push_back(fmt::format("the data cannot tell {} (relative changes)",
+    notes.push_back(fmt::format("the data do not determine {} (relative changes)",
                                 description_of(direction, names)));
   constexpr double kHardly = 0.5;
   for (std::size_t j = 0; j + 1 < table.size(); ++j)
     if (table[j].std_error > kHardly * table[j].value)
-      notes.push_back(fmt::format(
-          "the data hardly tell {}: its standard error is above half its value", table[j].name));
+      notes.push_back(
+          fmt::format("the data hardly determine {}: its standard error is above half its value",
+                      table[j].name));
 }
 
 void note_unused(std::vector<std::string>& notes, const TrainingData& data) {

@@ -13,7 +13,7 @@ namespace torsio {
 
 struct ViscoelasticOptions {
   std::string network = "generalised_maxwell(2)";  ///< `parse_network`
-  std::size_t starts = 10;                         ///< of the search, 1 or more
+  std::size_t starts = 10;                         ///< searches, 1 or more
   double prior = 0.0;                              ///< see `fit_viscoelastic`; 0: none
   bool is_refined = true;  ///< false: the given values as they are, the offset alone is fitted
   bool is_at_rest = true;  ///< each record starts relaxed; false: from a state that is fitted too
@@ -43,22 +43,23 @@ struct ViscoelasticOptions {
 ///
 ///     min_(p, b) sum (y_n(p, b) - target_n)^2,    p_j = 1e-4 s_j + exp(q_j) > 0
 ///
-/// Each record starts relaxed at its first deflection, or from the state z_0 that suits it best: z_0 enters
-/// linearly and is eliminated exactly. That lets a slow branch take up what the network cannot
-/// explain, so it is for records that start in motion. s: std(target) / std(u) for springs,
-/// that times the geometric mean of sample period and longest record for dashpots.
-/// Levenberg-Marquardt by Ceres over q and b from several starts (the given values first, then random ones with
-/// relaxation times from two samples to a quarter of the longest record); all are searched a little, the best
-/// three to the end. Of more than 30 000 usable samples every m-th is judged. Networks of one shape
-/// that stand beside each other are interchangeable: the fastest comes first.
+/// Each record starts relaxed at its first deflection, or from the state z_0 with the least error:
+/// z_0 enters linearly and is eliminated exactly. A slow branch can then explain what the network
+/// cannot, so this is for records that start in motion. s: std(target) / std(u) for springs, that
+/// times the geometric mean of sample period and longest record for dashpots. Levenberg-Marquardt
+/// by Ceres over q and b from several starts (the given values first, then random ones with
+/// relaxation times from two samples to a quarter of the longest record); all are searched with few
+/// iterations, the best three to the end. Of more than 30 000 usable samples every m-th is scored.
+/// Parallel networks of one shape are interchangeable: the fastest comes first.
 ///
 /// With `prior` each ln p_j is drawn towards its start value (s_j, if none is given) as if that had
-/// been measured once with this standard deviation, in units of the RMSE without it: a hold on what the
-/// data leave open.
+/// been measured once with this standard deviation, in units of the RMSE without it: a constraint
+/// on the parameters that the data do not determine.
 ///
 /// Source: specification 3.6. The standard errors hold for white residuals and are too small for
-/// coloured ones. The notes say which combinations of parameters the data cannot tell, which they
-/// hardly tell, and which relaxation times lie outside of the band that the records excite.
+/// coloured ones. The notes state which combinations of parameters the data do not determine, which
+/// they hardly determine, and which relaxation times lie outside of the band that the records
+/// excite.
 /// @throws UsageError for the network's text, a number of starts or a prior out of range; Error if
 /// deflection or target are constant, or the search does not converge; Cancelled.
 [[nodiscard]] Fitted<Viscoelastic> fit_viscoelastic(const TrainingData& data,

@@ -31,7 +31,7 @@ struct Steps {
 };
 
 /// min |r + E z|^2 + w |z|^2 over the state z at the start, E the outputs that it adds: exp(-p t).
-/// The last term is for what no judged sample tells.
+/// The last term is for states that no scored sample determines.
 template <std::size_t Count>
 class StartState {
  public:

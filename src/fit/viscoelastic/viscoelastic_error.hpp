@@ -13,14 +13,14 @@ namespace torsio {
 /// By how much a network misses the target over training records.
 class ViscoelasticError {
  public:
-  /// @param max_scored usable samples; of more every m-th is judged
-  /// @param is_at_rest each record starts relaxed; else in the state from which it misses least
+  /// @param max_scored usable samples; of more every m-th is scored
+  /// @param is_at_rest each record starts relaxed; else in the state with the least error
   ViscoelasticError(const TrainingData& data, std::size_t max_scored, bool is_at_rest);
 
   [[nodiscard]] std::size_t residuals() const noexcept { return residuals_; }
   [[nodiscard]] double longest_s() const noexcept { return longest_s_; }
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
-  /// Of first input and target over the judged samples.
+  /// Standard deviations of first input and target over the scored samples.
   [[nodiscard]] double input_deviation() const noexcept { return input_deviation_; }
   [[nodiscard]] double target_deviation() const noexcept { return target_deviation_; }
 

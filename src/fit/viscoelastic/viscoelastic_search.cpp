@@ -15,7 +15,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kFloor = 1e-4;  // of the scale
+constexpr double kFloor = 1e-4;  // share of the scale
 constexpr double kCeiling = 1e6;
 constexpr std::size_t kFirstIterations = 12;
 constexpr std::size_t kMaxIterations = 300;
@@ -184,7 +184,7 @@ ViscoelasticFit search_network(const ViscoelasticError& error, const SpringDashp
     errors.push_back(fmt::format("{:.4g}", rmse_of(each, problem)));
   SearchResult best = found.front();
   if (options.prior > 0.0) {
-    // Networks may have several optima that only the prior tells apart: the one near the start
+    // Networks may have several optima that only the prior distinguishes: the one near the start
     // values must be among those tried.
     std::vector<std::vector<double>> from = search.starts(1, context.seed);
     for (const SearchResult& each : found) from.push_back(each.theta);

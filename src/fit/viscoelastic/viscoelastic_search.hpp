@@ -28,7 +28,7 @@ struct ViscoelasticFit {
 [[nodiscard]] ViscoelasticFit offset_of_network(const ViscoelasticError& error,
                                                 const SpringDashpotNetwork& network);
 
-/// How well the data tell values and, last, the offset.
+/// How well the data determine the values and, last, the offset.
 [[nodiscard]] ParameterUncertainty uncertainty_of(const ViscoelasticError& error,
                                                   const ViscoelasticFit& fit);
 

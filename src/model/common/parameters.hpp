@@ -62,7 +62,7 @@ struct IsVariantFields<std::variant<T...>> : std::true_type {};
 template <class T>
 concept VariantFields = IsVariantFields<T>::value;
 
-/// Of an alternative of a variant: "mlp"; that of `std::monostate` is empty.
+/// Name of an alternative of a variant: "mlp"; that of `std::monostate` is empty.
 template <NamedAlternative T>
 [[nodiscard]] constexpr std::string_view alternative_name() noexcept {
   if constexpr (std::same_as<T, std::monostate>) {

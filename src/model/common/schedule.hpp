@@ -51,11 +51,11 @@ class ScheduledCoefficients {
   [[nodiscard]] const CoefficientSchedule& schedule() const noexcept { return schedule_; }
   [[nodiscard]] std::size_t size() const noexcept { return schedule_.values.columns; }
 
-  /// Where the features stand between the knots; found once a tick for all coefficients.
+  /// Position of the features between the knots; computed once per tick for all coefficients.
   struct Position {
     std::size_t left = 0;                       ///< row of the knot below
     std::size_t right = 0;                      ///< row of the knot above
-    std::array<double, 4> weights{1, 0, 0, 0};  ///< of y_left, m_left, y_right, m_right
+    std::array<double, 4> weights{1, 0, 0, 0};  ///< weights of y_left, m_left, y_right, m_right
   };
   [[nodiscard]] Position locate(Features features) const noexcept TORSIO_REALTIME;
 
@@ -73,7 +73,8 @@ class ScheduledCoefficients {
   [[nodiscard]] double weighted_sum(const Position& at, std::size_t first, Features features,
                                     std::size_t from = 0) const noexcept TORSIO_REALTIME;
 
-  /// How many numbers a fit chose: a column that is zero at every knot is no term and not counted.
+  /// Number of fitted parameters: a column that is zero at every knot has no term and is not
+  /// counted.
   [[nodiscard]] std::size_t fitted_count() const noexcept;
 
  private:

@@ -29,15 +29,15 @@ class SquareMatrix {
   detail::AlignedVector<double> values_;
 };
 
-/// A = L L^T: reads the lower triangle only; what stands above it is spoilt.
-/// By halves, so that nearly all of it is products of matrices (double_gemm).
-/// @returns false, with all of it spoilt, if A is not positive definite.
+/// A = L L^T: reads the lower triangle only; the part above it is overwritten. Recursive by halves,
+/// so that nearly all of it is products of matrices (double_gemm).
+/// @returns false, with all of it overwritten, if A is not positive definite.
 [[nodiscard]] bool cholesky(SquareMatrix& a);
 
 /// b = A^-1 b.
 void solve(const SquareMatrix& factor, std::span<double> b) noexcept;
 
-/// L becomes the lower triangle of A^-1; what stands above it is spoilt.
+/// L becomes the lower triangle of A^-1; the part above it is overwritten.
 void invert(SquareMatrix& factor);
 
 /// ln det A.

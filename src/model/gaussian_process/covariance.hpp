@@ -26,7 +26,7 @@ void fill_covariance(const Kernel& kernel, const Matrix& points, const PackedPoi
                                           const PackedPoints& packed, double noise_variance,
                                           Jitter jitter, SquareMatrix& factor);
 
-/// @throws Error that says what a kernel whose matrix has no factor may be due to.
+/// @throws Error that states possible causes of a kernel whose matrix has no factor.
 [[noreturn]] void refuse_covariance(std::string_view place);
 
 }  // namespace torsio

@@ -99,7 +99,7 @@ void edge_tile(const double* left, const double* right, std::size_t depth, Mode 
 }
 
 struct Block {
-  std::size_t first_row;  // of the whole result, for what lies above its diagonal
+  std::size_t first_row;  // in the whole result, to find its diagonal
   std::size_t first_column;
   bool lower_only;
 };

@@ -6,7 +6,7 @@
 
 namespace torsio::double_gemm {
 
-/// Element (i, j) of a factor stands at values[i * row_step + j * column_step].
+/// Element (i, j) of a factor is values[i * row_step + j * column_step].
 struct Factor {
   const double* values;
   std::size_t row_step;

@@ -72,8 +72,7 @@ class GaussianProcess {
   Kernel kernel_;
   PackedPoints points_;
   detail::AlignedVector<double> weights_;
-  detail::AlignedVector<double>
-      factor_;  ///< L, rows one behind the other, as `whitened_square` reads it
+  detail::AlignedVector<double> factor_;  ///< L, row after row, as `whitened_square` reads it
   detail::AlignedVector<double> input_;
   detail::AlignedVector<double> values_;
 };

@@ -39,7 +39,7 @@ void check_leaf(const KernelNode& node, std::size_t index, std::size_t inputs) {
   };
   const std::size_t scales = node.length_scales.size();
   if (scales != 1 && scales != inputs)
-    refuse(index, "length_scales", fmt::format("1 value, or {}: one an input", inputs),
+    refuse(index, "length_scales", fmt::format("1 value, or {}: one per input", inputs),
            std::to_string(scales));
   // A scale whose square is 0 or infinite would make 0 times infinity of equal points.
   const auto is_scale = [](double value) { return value >= 1e-150 && value <= 1e150; };

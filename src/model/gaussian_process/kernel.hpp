@@ -42,7 +42,7 @@ struct KernelNode {
   double amplitude = 1.0;  ///< a
   double shape = 0.0;      ///< s: offset of linear, period of periodic, alpha of rational_quadratic
   std::vector<double>
-      length_scales;  ///< l: one for all inputs or one an input; none of sum, product
+      length_scales;  ///< l: one for all inputs or one per input; none for sum, product
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
@@ -55,7 +55,7 @@ struct KernelNode {
   bool operator==(const KernelNode&) const = default;
 };
 
-/// A covariance function, its sums and products behind what they join (postfix).
+/// A covariance function; sums and products follow their operands (postfix).
 struct KernelExpression {
   std::vector<KernelNode> nodes;
 
@@ -67,9 +67,10 @@ struct KernelExpression {
 };
 
 /// Reads "se * (linear + periodic * rq)": names se, linear, periodic, rq, matern32, matern52, each
-/// with `_ard` behind it for one length scale an input; +, *, brackets. All numbers are 1, offsets 0.
-/// Every product of kernels without a sum among them has one amplitude, unless a linear one, whose
-/// length scale says the same, is in it: more would not be told apart by any data.
+/// followed by `_ard` for one length scale per input; +, *, brackets. All numbers are 1, offsets 0.
+/// Every product of kernels without a sum among them has one amplitude, unless it contains a linear
+/// kernel, whose length scale has the same effect: further amplitudes could not be identified from
+/// any data.
 /// @throws UsageError that points at the place.
 [[nodiscard]] KernelExpression parse_kernel(std::string_view text, std::size_t inputs);
 
@@ -83,12 +84,12 @@ struct KernelTerm {
   bool shared_scale = true;
   double variance = 1.0;  ///< a^2
   double shape = 0.0;
-  std::size_t left = 0;  ///< of a sum or product; the right one stands right before it
+  std::size_t left = 0;  ///< left operand of a sum or product; the right one is directly before it
   std::size_t first_parameter = 0;
-  std::size_t first_weight = 0;  ///< of 1 / l^2, one an input
+  std::size_t first_weight = 0;  ///< index of 1 / l^2, one per input
 };
 
-/// Points one behind the other for each input, filled up to whole vectors with the last of them.
+/// The points stored input by input, padded to whole vectors with the last point.
 class PackedPoints {
  public:
   PackedPoints() = default;
@@ -122,10 +123,10 @@ class KernelGradient {
 /// A covariance function ready to be evaluated, row by row over many points.
 ///
 /// Its fitted numbers are the logarithms of amplitudes, length scales, periods and alpha, in the
-/// order of the nodes (amplitude, length scales, shape); the offset of a linear kernel stands as it
-/// is. Source: specification 3.3 (paper 002, equations 9 to 13, corrected), Rasmussen and Williams
-/// 2006 chapter 4. Cost: 2 operations an input and point, some 20 a kernel and point (24 an input
-/// for a periodic one).
+/// order of the nodes (amplitude, length scales, shape); the offset of a linear kernel is not in
+/// logarithms. Source: specification 3.3 (paper 002, equations 9 to 13, corrected), Rasmussen and
+/// Williams 2006 chapter 4. Cost: 2 operations per input and point, about 20 per kernel and point
+/// (24 per input for a periodic one).
 class Kernel {
  public:
   static constexpr std::size_t kMaxNodes = 64;

@@ -76,7 +76,7 @@ struct SineCosine {
   V cosine;
 };
 
-// Of pi u for any u.
+// Sine and cosine of pi u for any u.
 template <bool kWithCosine>
 HWY_INLINE SineCosine sine_cosine(V u) {
   const V part = hn::Sub(u, hn::Round(u));
@@ -136,7 +136,7 @@ HWY_INLINE Value radial(const At& at, const KernelTerm& term, V shared_distance)
     case KernelKind::matern32:
     case KernelKind::matern52: {
       const bool rough = term.kind == KernelKind::matern32;
-      // Capped, since 0 times infinity is no number; the exponential is 0 there.
+      // Capped, since 0 times infinity is NaN; the exponential is 0 there.
       const V s = hn::Min(hn::Sqrt(hn::Mul(distance, constant(rough ? 3.0 : 5.0))), constant(1e6));
       const V decay = hn::Mul(variance, hn::Exp(d, hn::Neg(s)));
       const V line = hn::Add(s, constant(1.0));
@@ -322,7 +322,7 @@ double quadratic_form_any(const double* c, const double* q, std::size_t size) {
 double whitened_square_any(const double* rows, double* k, std::size_t size) {
   double square = 0.0;
   for (std::size_t i = 0; i < size; ++i) {
-    // Of the row's last group, what stands behind i is 0; k[i] itself is not yet white.
+    // In the row's last group, the elements after i are 0; k[i] itself is not yet white.
     const double white = (k[i] - dot_any(rows, k, i / kGroup * kGroup) -
                           [&] {
                             double rest = 0.0;

@@ -38,8 +38,8 @@ void add_gradient(const Program& program, const double* x, const Points& points,
 /// q . (C q) of a C [size x in_groups(size)] whose padding is 0; q is padded with finite numbers.
 [[nodiscard]] double quadratic_form(const double* c, const double* q, std::size_t size) noexcept;
 
-/// |L^-1 k|^2 for L's rows one behind the other, row i of in_groups(i + 1) places of which those
-/// behind i are 0, and their diagonal inverted. `k` becomes L^-1 k; its padding is finite.
+/// |L^-1 k|^2 for L stored row after row, row i of in_groups(i + 1) places, 0 after element i, with
+/// the inverse of the diagonal. `k` becomes L^-1 k; its padding is finite.
 [[nodiscard]] double whitened_square(const double* rows, double* k, std::size_t size) noexcept;
 
 }  // namespace torsio::kernel_kernels

@@ -44,14 +44,14 @@ inline detail::AlignedVector<double> padded(const std::vector<double>& values) {
   return result;
 }
 
-/// Of the standardised target.
+/// The variance of the standardised target.
 struct KernelVariance {
   double prior = 0.0;
   double explained = 0.0;
 };
 
-/// A mean of the standardised target in the target's unit; the target's centre and a fault where it
-/// is no number, or the inputs are none: a vanishing kernel would hide that.
+/// A mean of the standardised target in the target's unit; the target's centre and a fault where
+/// the mean or an input is not a number: a vanishing kernel would hide that.
 template <class Parameters>
 Estimate kernel_estimate(const Parameters& parameters, std::span<const double> inputs,
                          double mean) noexcept {

@@ -80,7 +80,7 @@ class Parser {
     if (is_ard) name.remove_suffix(kArd.size());
     const auto* const known = std::ranges::find(kNames, name);
     if (known == kNames.end())
-      refuse(fmt::format("'(' or one of {}, each perhaps with {} behind it",
+      refuse(fmt::format("'(' or one of {}, each optionally followed by {}",
                          "se, linear, periodic, rq, matern32, matern52", kArd),
              text_.substr(at_, end - at_));
     at_ = end;

@@ -12,16 +12,17 @@
 
 namespace torsio {
 
-/// A Gaussian process that knows its data through the values u ~ N(m, S) at M inducing points Z,
-/// in standardised coordinates:
+/// A Gaussian process that represents its data by the values u ~ N(m, S) at M inducing points Z, in
+/// standardised coordinates:
 ///
 ///     K = k(Z, Z),   q = k(Z, x)
 ///     value = q . alpha,                         alpha = K^-1 m
 ///     std_dev^2 = k(x, x) - q . C q + sigma^2,   C = K^-1 - K^-1 S K^-1
 ///     novelty = 1 - q . C q / k(x, x)
 ///
-/// However u was found: sample by sample (paper 002), or as the optimum of a variational bound.
-/// Novelty is the share of the prior variance that the data have not explained.
+/// The estimate of u may come from either method: sample by sample (paper 002), or as the
+/// optimum of a variational bound. Novelty is the share of the prior variance that the data have
+/// not explained.
 ///
 /// Source: paper 002 with the errata of specification 1, specification 3.3. Cost: M kernel values
 /// and M^2 multiply-adds.

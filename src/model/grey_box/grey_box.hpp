@@ -18,7 +18,7 @@
 
 namespace torsio {
 
-/// Which terms a grey box has, without their coefficients, and what they remember.
+/// The terms of a grey box, without their coefficients, and their states.
 ///
 /// x is the first input. A hat function is 1 at its knot, 0 at its neighbours' and straight between
 /// them. Terms, in the order of the columns of the coefficients:
@@ -27,13 +27,13 @@ namespace torsio {
 /// |---|---|
 /// | elastic curve: hats of x over `curve_knots`, straight beyond its ends | knots |
 /// | slip: stop s_i of threshold r_i, over r_i, times hats of x over `friction_knots` (held beyond) | thresholds x knots |
-/// | relaxation: v_j, a spring behind a dashpot of time constant T_j | time constants |
+/// | relaxation: v_j, a spring in series with a dashpot of time constant T_j | time constants |
 /// | slope: every other input | inputs |
 /// | Coulomb: tanh of every input over its scale | inputs |
 ///
 ///     s_i <- clip(s_i + dx, +-r_i),   v_j <- e^(-h/T_j) v_j + (T_j / h) (1 - e^(-h/T_j)) dx
 ///
-/// The v_j are exact where x runs straight between samples.
+/// The v_j are exact where x is linear between samples.
 class GreyBoxTerms {
  public:
   static constexpr std::size_t kMaxThresholds = 32;
@@ -45,7 +45,7 @@ class GreyBoxTerms {
     std::vector<double> thresholds;        ///< r_i, x's unit, > 0
     std::vector<double> friction_knots;    ///< x's unit, ascending; one: the same everywhere
     std::vector<double> time_constants_s;  ///< T_j > 0
-    std::vector<double> rate_scales;       ///< of every input, in its unit; 0: no Coulomb term
+    std::vector<double> rate_scales;       ///< per input, in its unit; 0: no Coulomb term
     double sample_period_s = 0.0;
 
     template <class Self, class Visit>
@@ -104,7 +104,7 @@ class GreyBoxTerms {
   template <class Term>
   void visit_jump(double x, Term&& term) const noexcept {
     std::array<double, kMaxThresholds + kMaxTimeConstants> moved;
-    const double dx = is_started_ ? x - last_ : 0.0;  // a start has no way behind it
+    const double dx = is_started_ ? x - last_ : 0.0;  // the first sample has no increment
     const std::size_t slips = slips_.size();
     for (std::size_t i = 0; i < slips; ++i)
       moved[i] = std::min(std::max(state_[i] + dx * slips_.stiffness()[i], -1.0), 1.0);
@@ -141,7 +141,7 @@ class GreyBoxTerms {
   }
 
   Structure structure_;
-  SlipBank slips_;             ///< of s_i / r_i
+  SlipBank slips_;             ///< s_i / r_i
   std::vector<double> decay_;  ///< e^(-h/T_j)
   std::vector<double> gain_;   ///< (T_j / h) (1 - e^(-h/T_j))
   std::vector<double> state_;
@@ -154,9 +154,9 @@ class GreyBoxTerms {
 struct GreyBoxResidual {
   std::variant<Mlp::Parameters, Dgmm::Parameters> model = {};
   double bound = 0.0;               ///< largest |correction|, target's unit
-  std::vector<double> lowest = {};  ///< of each of its inputs in training
+  std::vector<double> lowest = {};  ///< per input, in training
   std::vector<double> highest = {};
-  static constexpr double kBorder = 0.1;  ///< of the range: how far beyond it the fading ends
+  static constexpr double kBorder = 0.1;  ///< share of the range: end of the fading beyond it
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
@@ -223,11 +223,11 @@ class GreyBox {
     terms_.set_state(state);
   }
 
-  /// The first input at which the box would say `target` if it went there at once from where it is,
-  /// the others as given and the residual as where it is (secants kept inside a bracket, at most `kInversionSteps`). Where the ends
-  /// of the curve do not enclose the target, the nearer end comes back with
-  /// `Fault::outside_training_range`; where the schedule runs over the first input,
-  /// `Fault::model_not_finite`.
+  /// The first input at which the output would be `target` after an immediate change from the
+  /// present input, the others as given and the residual as at the present input (secants kept
+  /// inside a bracket, at most `kInversionSteps`). Where the ends of the curve do not enclose the
+  /// target, the nearer end is returned with `Fault::outside_training_range`; where the schedule
+  /// uses the first input, `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
   static constexpr int kInversionSteps = 100;
 

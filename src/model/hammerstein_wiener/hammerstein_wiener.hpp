@@ -16,28 +16,29 @@ namespace torsio {
 ///
 ///     w = P(u),   x = G(z) w,   y = C(clip(x))
 ///
-/// u the first input (the others are not used), P and C polynomials or piecewise linear, G of any
-/// order. x is held in lowest..highest, what it was in training as far as C is monotone there: beyond,
-/// a polynomial runs away or turns back; more than `kBorder` of that range beyond, a step says
-/// `Fault::outside_training_range`. The memory is that of G; after `reset()` it is that of a long
-/// rest at u = rest_input. A discrete model: it runs at the sample period that it was trained at.
+/// u is the first input (the others are not used), P and C are polynomials or piecewise linear, G
+/// is of any order. x is limited to lowest..highest, its range in training as far as C is monotone
+/// there: beyond, a polynomial diverges or is not monotone; more than `kBorder` of that range
+/// beyond, a step reports `Fault::outside_training_range`. The memory is that of G; after `reset()`
+/// it is that of a long rest at u = rest_input. A discrete model: it runs at the sample period that
+/// it was trained at.
 ///
-/// G runs as a cascade of second-order sections in transposed direct form II: two numbers of memory
-/// a section, which add up small differences of input and output rather than large sums that cancel,
-/// as those of direct form II do next to slow poles.
+/// G runs as a cascade of second-order sections in transposed direct form II: two states per
+/// section, which add up small differences of input and output instead of large sums that cancel,
+/// as the states of direct form II do near slow poles.
 ///
-/// Two scales and one offset are free (w, x -> their multiples, C made up for it): equal outputs, other
-/// numbers. A fit holds them (`fit_hammerstein_wiener`). Source: paper 003, specification 3.5.
-/// Cost: 5 multiply-adds a section and those of the curves. Nothing is allocated after
+/// Two scales and one offset are free (w, x -> their multiples, compensated in C): equal outputs,
+/// other numbers. A fit fixes them (`fit_hammerstein_wiener`). Source: paper 003, specification
+/// 3.5. Cost: 5 multiply-adds per section and those of the curves. Nothing is allocated after
 /// construction.
 class HammersteinWiener {
  public:
   static constexpr std::string_view kFamily = "hammerstein_wiener";
-  static constexpr double kBorder = 0.1;  ///< of highest - lowest: beyond it x being held is told
+  static constexpr double kBorder = 0.1;  ///< share of the range: beyond it, a fault
 
   struct Parameters {
     using Family = HammersteinWiener;
-    std::size_t inputs = 1;  ///< of a tick
+    std::size_t inputs = 1;  ///< per tick
     double sample_period_s = 0.0;
     double rest_input = 0.0;  ///< u of a joint at rest
     StaticCurve input = {};   ///< P
@@ -83,7 +84,7 @@ class HammersteinWiener {
  private:
   Parameters parameters_;
   std::vector<double> state_;
-  double value_ = 0.0;  ///< of the last step
+  double value_ = 0.0;  ///< at the last step
 };
 
 /// What paper 003 prints of its elastomer coupling, from the torsion in rad to the torque in Nm

@@ -47,20 +47,20 @@ void StaticCurve::check(std::string_view place) const {
           "one that does not");
 }
 
-std::size_t StaticCurve::piece(double x) const noexcept {
-  const auto behind = std::upper_bound(knots.begin() + 1, knots.end() - 1, x);
-  return static_cast<std::size_t>(behind - knots.begin()) - 1;
+std::size_t StaticCurve::segment(double x) const noexcept {
+  const auto next = std::upper_bound(knots.begin() + 1, knots.end() - 1, x);
+  return static_cast<std::size_t>(next - knots.begin()) - 1;
 }
 
-double StaticCurve::piece_value(double x) const noexcept {
-  const std::size_t j = piece(x);
+double StaticCurve::segment_value(double x) const noexcept {
+  const std::size_t j = segment(x);
   const double share = (x - knots[j]) / (knots[j + 1] - knots[j]);
   return values[j] + (values[j + 1] - values[j]) * share;
 }
 
 double StaticCurve::slope(double x) const noexcept {
   if (!knots.empty()) {
-    const std::size_t j = piece(x);
+    const std::size_t j = segment(x);
     return (values[j + 1] - values[j]) / (knots[j + 1] - knots[j]);
   }
   const double z = (x - centre) / half_range;
@@ -77,7 +77,7 @@ double StaticCurve::basis(std::size_t i, double x) const noexcept {
     for (std::size_t k = 0; k < i; ++k) power *= z;
     return power;
   }
-  const std::size_t j = piece(x);
+  const std::size_t j = segment(x);
   if (i != j && i != j + 1) return 0.0;
   const double share = (x - knots[j]) / (knots[j + 1] - knots[j]);
   return i == j ? 1.0 - share : share;
@@ -85,7 +85,7 @@ double StaticCurve::basis(std::size_t i, double x) const noexcept {
 
 Interval monotone_part(const StaticCurve& curve, Interval within) {
   const double middle = 0.5 * (within.lowest + within.highest);
-  constexpr double kAside = 1e-9;  // of the range: a slope at a knot is that of one side only
+  constexpr double kAside = 1e-9;  // share of the range: a slope at a knot is that of one side only
   const double aside = kAside * (within.highest - within.lowest);
   const double sign = std::copysign(1.0, curve.slope(middle));
   Interval part = within;

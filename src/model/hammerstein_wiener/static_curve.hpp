@@ -13,11 +13,11 @@ namespace torsio {
 ///     polynomial        y = sum_i v_i z^i,   z = (x - centre) / half_range
 ///     piecewise linear  y = v_j + (v_j+1 - v_j) (x - k_j) / (k_j+1 - k_j)  between knots k_j, k_j+1
 ///
-/// Beyond the first and the last knot the outer pieces go on.
+/// Beyond the first and the last knot the outer segments are extrapolated.
 struct StaticCurve {
   std::vector<double> knots = {};           ///< ascending, in x's unit; empty: a polynomial
-  std::vector<double> values = {0.0, 1.0};  ///< v: constant first, or one a knot
-  double centre = 0.0;                      ///< of a polynomial; x's unit
+  std::vector<double> values = {0.0, 1.0};  ///< v: constant first, or one per knot
+  double centre = 0.0;                      ///< middle of a polynomial's range; x's unit
   double half_range = 1.0;                  ///< x's unit, > 0
 
   static constexpr std::size_t kMaxValues = 200;
@@ -36,21 +36,21 @@ struct StaticCurve {
   void check(std::string_view place) const;
 
   [[nodiscard]] double operator()(double x) const noexcept TORSIO_REALTIME {
-    if (!knots.empty()) return piece_value(x);
+    if (!knots.empty()) return segment_value(x);
     const double z = (x - centre) / half_range;
     double y = 0.0;
     for (std::size_t i = values.size(); i-- > 0;) y = y * z + values[i];
     return y;
   }
 
-  /// dy/dx; at a knot that of the piece behind it.
+  /// dy/dx; at a knot the slope of the segment after it.
   [[nodiscard]] double slope(double x) const noexcept;
   /// The factor of v_i: z^i, or the hat over knot i.
   [[nodiscard]] double basis(std::size_t i, double x) const noexcept;
 
  private:
-  [[nodiscard]] std::size_t piece(double x) const noexcept;
-  [[nodiscard]] double piece_value(double x) const noexcept;
+  [[nodiscard]] std::size_t segment(double x) const noexcept;
+  [[nodiscard]] double segment_value(double x) const noexcept;
 };
 
 struct Interval {

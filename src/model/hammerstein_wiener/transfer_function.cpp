@@ -46,7 +46,7 @@ std::vector<Quadratic> quadratics_of(const std::vector<Complex>& roots) {
   return made;
 }
 
-/// Those of the quadratics with the farthest root from 0 last.
+/// Quadratic factors of a polynomial, sorted so that the farthest root from 0 is last.
 std::vector<Quadratic> sorted_quadratics(std::span<const double> of_z) {
   std::vector<Quadratic> made = quadratics_of(polynomial_roots(of_z));
   std::ranges::stable_sort(made, {}, [](const Quadratic& each) { return std::abs(each.at); });
@@ -128,7 +128,7 @@ std::vector<Complex> polynomial_roots(std::span<const double> highest_first) {
 Sections sections_of(const DiscreteTransfer& transfer) {
   check(transfer);
   std::vector<double> numerator = transfer.numerator;
-  std::size_t delay = 0;  // of whole samples, in front of the numerator
+  std::size_t delay = 0;  // whole samples, in front of the numerator
   while (numerator[delay] == 0.0) ++delay;
   const double gain = numerator[delay];
   std::vector<double> of_z(numerator.begin() + static_cast<std::ptrdiff_t>(delay), numerator.end());

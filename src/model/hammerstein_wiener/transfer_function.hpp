@@ -20,16 +20,16 @@ namespace torsio {
 ///
 ///     G(z) = prod_i (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2)
 ///
-/// One row a section, columns b0 b1 b2 a1 a2. A cascade, since the coefficients of one long
-/// polynomial tell slow poles apart only by their last digits: n poles near z = 1 at a distance d
-/// make them as fine as d^n.
+/// One row per section, columns b0 b1 b2 a1 a2. A cascade, since slow poles change only the last
+/// digits of the coefficients of one long polynomial: n poles near z = 1 at a distance d require an
+/// accuracy of d^n.
 using Sections = Matrix;
 inline constexpr std::size_t kSectionColumns = 5;
 inline constexpr std::size_t kMaxSections = 50;
 
 /// The same in the form of the papers.
 struct DiscreteTransfer {
-  std::vector<double> numerator = {};    ///< of z^0, z^-1, ...
+  std::vector<double> numerator = {};    ///< coefficients of z^0, z^-1, ...
   std::vector<double> denominator = {};  ///< likewise; the first is 1
 };
 
@@ -63,14 +63,13 @@ std::size_t reflect_unstable_poles(Sections& sections);
 /// Its inverse: s = 2/T (z - 1) / (z + 1).
 [[nodiscard]] DiscreteTransfer tustin(const ContinuousTransfer& transfer, double sample_period_s);
 
-/// Exact where the input is a straight line between samples (first-order hold): by a matrix
-/// exponential.
+/// Exact where the input is linear between samples (first-order hold): by a matrix exponential.
 [[nodiscard]] DiscreteTransfer first_order_hold(const ContinuousTransfer& transfer,
                                                 double sample_period_s);
 
-/// What stands against reading a discrete system as a continuous one: a pole that is real and
-/// negative oscillates from sample to sample. No continuous system does that; the pole that Tustin
-/// makes of it lies beyond Nyquist. Empty if there is none. Specification 2.
+/// The reason against interpreting a discrete system as a continuous one: a pole that is real and
+/// negative oscillates from sample to sample. No continuous system does that; Tustin maps it to a
+/// pole beyond Nyquist. Empty if there is no such pole. Specification 2.
 [[nodiscard]] std::string continuous_warning(const Sections& sections, double sample_period_s);
 
 /// "(1.72 s^2 + 688 s + 151) / (s^2 + 975 s + 509)"

@@ -33,9 +33,9 @@ class BoucWenModel {
     double gamma = 0.5;               ///< -beta < gamma <= beta
     double exponent = 1.0;            ///< n, 1 to 20
     double bias = 0.0;                ///< b, target's unit
-    std::vector<double> slopes = {};  ///< 0, k_1 .. k_m-1: one an input
-    double centre = 0.0;              ///< of the training range of x_0
-    double half_range = 1.0;          ///< of the same, > 0
+    std::vector<double> slopes = {};  ///< 0, k_1 .. k_m-1: one per input
+    double centre = 0.0;              ///< middle of the training range of x_0
+    double half_range = 1.0;          ///< half of that range, > 0
 
     template <class Self, class Visit>
     static void visit_fields(Self& self, Visit&& visit) {

@@ -19,7 +19,7 @@ Estimate broken_line_inverse(double wanted, const SlipBank& stops, const Increme
   const double here = increment.last();
   double reach = std::abs(here) > 0.0 ? std::abs(here) : 1.0;
   if (!thresholds.empty()) reach = 4.0 * thresholds.back();
-  // Two points beyond the last corner on either side tell the slopes out there.
+  // Two points beyond the last corner on either side give the slopes there.
   const double farthest_down = curve(here - reach);
   const double farthest_up = curve(here + reach);
   if (!std::isfinite(farthest_down) || !std::isfinite(farthest_up))

@@ -11,8 +11,8 @@ namespace torsio {
 ///
 ///     f(x) = m(z) +- h(z),   z = (x - centre) / half_range,   h >= 0
 ///
-/// m and h polynomials within the training range, z in -1..1; outside, m goes on straight and h
-/// stays what it was at the end, so that neither runs away.
+/// m and h are polynomials within the training range, z in -1..1; outside, m is extrapolated
+/// linearly and h keeps its value at the end, so that neither diverges.
 struct Envelope {
   std::vector<double> middle = {};      ///< m, constant first, in the target's unit
   std::vector<double> half_width = {};  ///< h, likewise; a value below 0 counts as 0

@@ -30,7 +30,7 @@ class ExponentialLoading {
     Envelope curves = {};             ///< upper: rising, lower: falling
     double rising_decay = 1.0;        ///< b+ > 0, one over x_0's unit
     double falling_decay = 1.0;       ///< b- > 0
-    std::vector<double> slopes = {};  ///< 0, k_1 .. k_m-1: one an input
+    std::vector<double> slopes = {};  ///< 0, k_1 .. k_m-1: one per input
 
     template <class Self, class Visit>
     static void visit_fields(Self& self, Visit&& visit) {

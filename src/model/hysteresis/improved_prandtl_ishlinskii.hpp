@@ -16,10 +16,10 @@ namespace torsio {
 ///     y = b + sum_j>0 k_j x_j + S(v),   v = w_0 x_0 + sum_i w_i P_i
 ///     S(v) = v + sum_j g_j D_j(v),      D_j = max(v - c_j, 0) for c_j > 0, min(v - c_j, 0) else
 ///
-/// P_i = x_0 - s_i the play of threshold r_i (1 + beta |x_r|), x_r the input that tells a rate. S
-/// rises everywhere. Where beta = 0 and w_i <= 0 no closed path gives work. Starts and state as
-/// `prandtl_ishlinskii`. Source: specification 3.7 (improved PI). Cost: 8 operations an element, 4
-/// a g_j.
+/// P_i = x_0 - s_i the play of threshold r_i (1 + beta |x_r|), x_r an input that is a rate. S rises
+/// everywhere. Where beta = 0 and w_i <= 0 no closed path gives work. Starts and state as
+/// `prandtl_ishlinskii`. Source: specification 3.7 (improved PI). Cost: 8 operations per element, 4
+/// per g_j.
 class ImprovedPrandtlIshlinskii {
  public:
   static constexpr std::string_view kFamily = "prandtl_ishlinskii_improved";
@@ -27,11 +27,11 @@ class ImprovedPrandtlIshlinskii {
   struct Parameters {
     using Family = ImprovedPrandtlIshlinskii;
     double bias = 0.0;                    ///< b, in the target's unit
-    std::vector<double> slopes = {};      ///< w_0, k_1 .. k_m-1: one an input
+    std::vector<double> slopes = {};      ///< w_0, k_1 .. k_m-1: one per input
     std::vector<double> weights = {};     ///< w_i
     std::vector<double> thresholds = {};  ///< r_i > 0, ascending, in x_0's unit
     std::vector<double> knots = {};       ///< c_j, ascending, none 0, in the target's unit
-    std::vector<double> bends = {};       ///< g_j, one a knot
+    std::vector<double> bends = {};       ///< g_j, one per knot
     double rate_gain = 0.0;               ///< beta >= 0, one over x_r's unit
     std::size_t rate_feature = 0;         ///< which input is x_r
 

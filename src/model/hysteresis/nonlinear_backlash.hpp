@@ -31,11 +31,11 @@ struct BacklashRate {
 ///     t <- clip(t + k dx_0; q f_dc(x_0), q f_ac(x_0)),   y = t + sum_j>0 k_j x_j
 ///
 /// f_ac = m + h holds while x_0 rises far enough, f_dc = m - h while it falls, k joins them after a
-/// turn. `nonlinear_backlash` has q = 1, `nonlinear_backlash_improved` q = 1 + beta |x_r|^alpha
-/// with x_r an input that tells a rate. After `reset()` and until x_0 moves, t is in the middle.
-/// Simple loops lose energy, since f_ac >= f_dc; paths that leave the boundary where it is
+/// turning point. `nonlinear_backlash` has q = 1, `nonlinear_backlash_improved` q = 1 + beta
+/// |x_r|^alpha with x_r an input that is a rate. After `reset()` and until x_0 moves, t is in the
+/// middle. Simple loops lose energy, since f_ac >= f_dc; paths that leave the boundary where it is
 /// steeper than k may gain some. State: t - q m. Source: Choi et al. 2016 as in specification 3.7
-/// (NBM). Cost: two multiply-adds a power of x_0, and a power of x_r.
+/// (NBM). Cost: two multiply-adds per power of x_0, and a power of x_r.
 template <bool kByRate>
 class Backlash {
  public:
@@ -46,7 +46,7 @@ class Backlash {
     using Family = Backlash;
     double stiffness = 1.0;           ///< k > 0, target's unit over x_0's
     Envelope boundaries = {};         ///< f_ac = upper, f_dc = lower
-    std::vector<double> slopes = {};  ///< 0, k_1 .. k_m-1: one an input
+    std::vector<double> slopes = {};  ///< 0, k_1 .. k_m-1: one per input
     BacklashRate rate = {};           ///< written to a model file by the improved family only
 
     template <class Self, class Visit>
@@ -73,8 +73,8 @@ class Backlash {
   [[nodiscard]] std::span<const double> state() const noexcept { return {&offset_, 1}; }
   void set_state(std::span<const double> state) noexcept;
 
-  /// An x_0 within the training range at which the next step would say `target`; where its two ends
-  /// do not enclose the target, the nearer one with `Fault::outside_training_range`.
+  /// An x_0 within the training range at which the next step would output `target`; where its two
+  /// ends do not enclose the target, the nearer one with `Fault::outside_training_range`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
 
  private:

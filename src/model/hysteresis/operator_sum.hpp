@@ -24,18 +24,18 @@ struct PlayOperator {
   static constexpr double of(double x, double stop) noexcept { return x - stop; }
 };
 
-/// A line and a weighted sum of hysteresis operators of the first input:
+/// A linear model plus a weighted sum of hysteresis operators of the first input:
 ///
 ///     y = b + sum_j k_j x_j + sum_i c_i O_i,   s_i <- clip(s_i + dx_0, +-r_i)
 ///
 /// with O_i = s_i the stop operator (`maxwell_slip`: F_i = c_i s_i is a spring of stiffness c_i
 /// that slips at f_i = c_i r_i) or O_i = x_0 - s_i the play operator (`prandtl_ishlinskii`). Since
-/// stop and play add up to the input, both say the same with c_i of opposite sign, the sum of
+/// stop and play add up to the input, both are the same model with c_i of opposite sign, the sum of
 /// them moved into k_0. Where c_i >= 0 for stops or c_i <= 0 for plays, no closed path gives work:
 /// the integral of y dx_0 is >= 0. Independent of rate. After `reset()` all s_i are 0 and the first
 /// tick moves nothing. All but r_i may be scheduled over one input. State: s_i. Source:
-/// specification 3.7, with play weights of the other sign, since weights >= 0 would give work away
-/// (docs/decisions/0018-hysteresis-definitions.md). Cost: 8 operations an element.
+/// specification 3.7, with play weights of the other sign, since weights >= 0 would generate work
+/// (docs/decisions/0018-hysteresis-definitions.md). Cost: 8 operations per element.
 template <class Operator>
 class OperatorSum {
  public:
@@ -54,8 +54,8 @@ class OperatorSum {
     bool operator==(const Parameters&) const = default;
   };
 
-  /// @throws Error if the coefficients are no valid schedule or too few, or the thresholds are not
-  /// positive, finite and ascending.
+  /// @throws Error if the coefficients are not a valid schedule or too few, or the thresholds are
+  /// not positive, finite and ascending.
   explicit OperatorSum(const Parameters& parameters);
 
   [[nodiscard]] Parameters parameters() const;
@@ -73,10 +73,10 @@ class OperatorSum {
   [[nodiscard]] std::span<const double> state() const noexcept { return stops_.forces(); }
   void set_state(std::span<const double> state) noexcept { stops_.set_forces(state); }
 
-  /// The x_0 that would make the next step say `target`: y is a broken line of x_0, solved exactly.
-  /// Where y falls with x_0 here and rises there, or ends before the target, the nearest end of the
-  /// rising part comes back with `Fault::outside_training_range`; where y does not depend on x_0 or
-  /// the schedule runs over it, the given x_0 with `Fault::model_not_finite`.
+  /// The x_0 for which the next step would output `target`: y is piecewise linear in x_0, solved
+  /// exactly. Where y falls with x_0 in one part and rises in another, or ends before the target,
+  /// the nearest end of the rising part is returned with `Fault::outside_training_range`; where y
+  /// does not depend on x_0 or the schedule uses it, the given x_0 with `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
 
  private:

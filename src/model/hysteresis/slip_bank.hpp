@@ -45,7 +45,7 @@ class SlipBank {
 
   void reset() noexcept;
 
-  /// F_i, one an element.
+  /// F_i, one per element.
   [[nodiscard]] std::span<const double> forces() const noexcept {
     return std::span(force_).first(size_);
   }
@@ -53,8 +53,8 @@ class SlipBank {
   /// @param forces `size()` numbers
   void set_forces(std::span<const double> forces) noexcept TORSIO_REALTIME;
 
-  /// Moves the input by `increment`; one that is no number moves nothing.
-  /// @param limit_scale >= 0: the limits of this tick are so many times f_i
+  /// Moves the input by `increment`; without effect if that is not a number.
+  /// @param limit_scale >= 0: the limits of this tick are this multiple of f_i
   void move(double increment, double limit_scale = 1.0) noexcept TORSIO_REALTIME {
     const double dx = finite(increment);
     for (std::size_t i = 0; i < force_.size(); ++i) force_[i] = moved(i, dx, limit_scale);

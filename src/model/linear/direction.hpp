@@ -7,9 +7,9 @@ namespace torsio {
 
 enum class Direction : std::uint8_t { unknown, rising, falling };
 
-/// Tells which way a signal moves, with a dead band against noise: the direction turns when the
-/// signal has moved back from its extreme by more than the dead band. After `reset()` it is unknown
-/// until the signal has moved by more than that either way.
+/// Determines the direction in which a signal moves, with a dead band against noise: the direction
+/// changes when the signal has moved back from its extreme by more than the dead band. After
+/// `reset()` it is unknown until the signal has moved by more than that in either direction.
 class DirectionTracker {
  public:
   explicit DirectionTracker(double dead_band) noexcept : dead_band_(dead_band) {}

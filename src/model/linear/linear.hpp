@@ -32,7 +32,7 @@ class Linear {
     bool operator==(const Parameters&) const = default;
   };
 
-  /// @throws Error if there is no input or the coefficients are no valid schedule.
+  /// @throws Error if there is no input or the coefficients are not a valid schedule.
   explicit Linear(const Parameters& parameters);
 
   [[nodiscard]] Parameters parameters() const { return {coefficients_.schedule()}; }
@@ -44,10 +44,9 @@ class Linear {
   void reset() noexcept {}
   Estimate step(Features features) const noexcept TORSIO_REALTIME;
 
-  /// The first input at which the model says `target`, the other inputs being as given:
-  /// x_1 = (target - b - sum_j>1 k_j x_j) / k_1. Where it has none (no slope, or the schedule runs
-  /// over that very input) the given x_1, or 0 if that is no number, comes back with
-  /// `Fault::model_not_finite`.
+  /// The first input at which the output is `target`, the other inputs as given: x_1 = (target - b
+  /// - sum_j>1 k_j x_j) / k_1. Where there is none (no slope, or the schedule uses that input) the
+  /// given x_1, or 0 if that is not a number, is returned with `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
 
  private:

@@ -35,8 +35,8 @@ class LinearCoulomb {
     bool operator==(const Parameters&) const = default;
   };
 
-  /// @throws Error if there is no input, the coefficients are no valid schedule, `rate_feature` is
-  /// no input, or v is not positive and finite.
+  /// @throws Error if there is no input, the coefficients are not a valid schedule, `rate_feature`
+  /// is not an input, or v is not positive and finite.
   explicit LinearCoulomb(const Parameters& parameters);
 
   [[nodiscard]] Parameters parameters() const {

@@ -9,36 +9,37 @@
 
 namespace torsio {
 
-/// A polynomial spring, alike both ways or with one curve for each direction of the deflection:
+/// A polynomial spring, the same in both directions or with one curve for each direction of the
+/// deflection:
 ///
 ///     y = P(z) + sum_j k_j x_j,   z = (x_0 - centre) / half_range,   P(z) = sum_i a_i z^i
 ///
-/// x_0 the first input (usually the spring deflection), x_j the others, z in -1..1 over the
+/// x_0 is the first input (usually the spring deflection), x_j the others, z in -1..1 over the
 /// training data, a_i in the target's unit. By direction, P is P+ while x_0 rises and P- while it
-/// falls; the direction turns when x_0 has moved back from its extreme by more than the dead band.
-/// From `reset()` until the first movement beyond it the direction is unknown and P is the mean of
-/// both. All but centre, half_range and dead band may be scheduled over one input. Each curve knows
-/// the range of x_0 that it was fitted to: more than `kBorder` of it outside, x_0 is held there and
-/// the value comes with `Fault::outside_training_range`. Source: specification 3.7 (Polynomial,
-/// degree 5). Cost: `degree` multiply-adds, and as `Linear`.
+/// falls; the direction changes when x_0 has moved back from its extreme by more than the dead
+/// band. From `reset()` until the first movement beyond it the direction is unknown and P is the
+/// mean of both. All but centre, half_range and dead band may be scheduled over one input. Each
+/// curve has the range of x_0 that it was fitted to: more than `kBorder` of it outside, x_0 is held
+/// there and the value comes with `Fault::outside_training_range`. Source: specification 3.7
+/// (Polynomial, degree 5). Cost: `degree` multiply-adds, and as `Linear`.
 class Polynomial {
  public:
   static constexpr std::string_view kFamily = "polynomial";
   static constexpr std::size_t kHighestDegree = 20;
-  static constexpr double kBorder = 0.05;  ///< of a curve's range: so far it goes on beyond it
+  static constexpr double kBorder = 0.05;  ///< share of a curve's range by which it is extrapolated
 
   struct Parameters {
     using Family = Polynomial;
     /// Columns: P+ (degree + 1, constant first), P- likewise if `by_direction`, then k_0 .. k_n-1
-    /// (k_0 is 0: that term stands in P).
+    /// (k_0 is 0: that term is in P).
     CoefficientSchedule coefficients = {};
     std::size_t degree = 1;
     bool by_direction = false;
     double dead_band = 0.0;   ///< x_0's unit, >= 0
     double centre = 0.0;      ///< x_0's unit
     double half_range = 1.0;  ///< x_0's unit, > 0
-    /// Lowest and highest x_0 that P+ was fitted to, then those of P- if `by_direction`; a row for each
-    /// of the coefficients. Empty: centre +- half_range for all of them.
+    /// Lowest and highest x_0 that P+ was fitted to, then those of P- if `by_direction`; one row
+    /// per row of the coefficients. Empty: centre +- half_range for all of them.
     Matrix ranges = {};
 
     template <class Self, class Visit>
@@ -58,8 +59,8 @@ class Polynomial {
     [[nodiscard]] std::size_t curves() const noexcept { return by_direction ? 2 : 1; }
   };
 
-  /// @throws Error if the coefficients do not fit the degree or are no valid schedule, k_0 is not
-  /// 0, or centre, half_range, ranges or dead band are out of range.
+  /// @throws Error if the coefficients do not fit the degree or are not a valid schedule, k_0 is
+  /// not 0, or centre, half_range, ranges or dead band are out of range.
   explicit Polynomial(const Parameters& parameters);
 
   [[nodiscard]] Parameters parameters() const;
@@ -74,10 +75,10 @@ class Polynomial {
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
   /// The x_0 in the range of the present direction's curve (centre +- half_range before it has one)
-  /// at which the model says `target`; the other inputs are as given and the search starts from the given x_0 (Newton's
-  /// method kept inside a bracket, at most `kInversionSteps` steps). Where the two ends of that
-  /// range do not enclose the target, the nearer end comes back with
-  /// `Fault::outside_training_range`; where the schedule runs over x_0 itself, the given x_0 with
+  /// at which the output is `target`; the other inputs are as given and the search starts from the
+  /// given x_0 (Newton's method kept inside a bracket, at most `kInversionSteps` steps). Where the
+  /// two ends of that range do not enclose the target, the nearer end is returned with
+  /// `Fault::outside_training_range`; where the schedule uses x_0 itself, the given x_0 with
   /// `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
   static constexpr int kInversionSteps = 100;
@@ -93,7 +94,7 @@ class Polynomial {
     double highest = 1.0;
   };
   using Position = ScheduledCoefficients::Position;
-  /// Of P+ (0) or P- (1).
+  /// Reach of P+ (0) or P- (1).
   [[nodiscard]] Reach reach(const Position& at, std::size_t branch) const noexcept;
   [[nodiscard]] Curve branch(const Position& at, std::size_t branch, double z) const noexcept;
   [[nodiscard]] Curve curve(const Position& at, double z) const noexcept;

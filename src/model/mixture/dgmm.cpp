@@ -17,7 +17,7 @@ Dgmm::Parameters checked(Dgmm::Parameters parameters) {
   if (clamp.slope.size() + 1 != dimension)
     throw Error(
         {.place = "dgmm: clamp.slope",
-         .expected = fmt::format("{} values, one an input", dimension > 0 ? dimension - 1 : 0),
+         .expected = fmt::format("{} values, one per input", dimension > 0 ? dimension - 1 : 0),
          .found = std::to_string(clamp.slope.size())});
   const bool finite = std::isfinite(clamp.intercept) && std::isfinite(clamp.thin_log_density) &&
                       std::isfinite(clamp.thin_log_density_inverse) &&
@@ -38,7 +38,8 @@ double clamped(double mean, double line, double width, double log_ratio) noexcep
   return std::clamp(mean, line - limit, line + limit);
 }
 
-// What `given` says, held near the line; without density the line itself, or else `centre`.
+// The estimate `given`, limited around the linear model; without density the linear model itself,
+// or else `centre`.
 Estimate guarded(const Conditional& given, double line, double centre, double width,
                  double thin_log_density) noexcept {
   Estimate estimate{.value = given.mean, .novelty = -given.log_density};

@@ -12,13 +12,13 @@
 
 namespace torsio {
 
-/// What keeps a mixture's answer near the straight line where training data were thin.
+/// Limits a mixture's output around the linear model where training data were sparse.
 ///
 ///     line(z) = intercept + slope . z
 ///     limit(z) = width max(1, p(z) / p_thin)
-///
-/// The answer stays within line +- limit. So it may leave the line by `width` where the density of
-/// the inputs is at or below p_thin, by ever more where it is higher, and in dense regions the line
+/// The output stays within line +- limit. It may depart from the linear model by `width` where the
+/// density of the inputs is at or below p_thin, and by more where it is higher; in dense regions
+/// the limit has no effect.
 /// means nothing.
 struct LinearClamp {
   double intercept = 0.0;                 ///< target's unit
@@ -38,14 +38,14 @@ struct LinearClamp {
 };
 
 /// Dynamic Gaussian mixture model: the joint density of target and inputs, learned sample by
-/// sample, and conditioned on whatever is known.
+/// sample, and conditioned on the known quantities.
 ///
 ///     value = E[target | inputs]
 ///     std_dev^2 = E[(target - value)^2 | inputs]
 ///     novelty = -ln p(z~)
 ///
-/// p(z~) is the density of the standardised inputs, so novelty has no unit. The same mixture run
-/// the other way tells the first input from the target and the other inputs.
+/// p(z~) is the density of the standardised inputs, so novelty has no unit. The same mixture also
+/// estimates the first input from the target and the other inputs.
 ///
 /// Source: papers 000 and 001, corrected in specification 1 and 3.1. Cost: see
 /// `MixtureRegression::query`.
@@ -79,7 +79,8 @@ class Dgmm {
 
   /// The first input for which the target would be `target`, the other inputs as in `features`
   /// (`features[0]` is ignored): E[input 0 | target, inputs 1...], with error bar and novelty as in
-  /// `step`. Without density there, the line's value comes back with `Fault::model_not_finite`.
+  /// `step`. Without density there, the value of the linear model is returned with
+  /// `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
 
  private:

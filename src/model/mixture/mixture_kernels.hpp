@@ -6,10 +6,10 @@
 
 namespace torsio::mixture_kernels {
 
-/// Components stand in blocks; inside a block, row r holds parameter r of each component.
+/// Components are stored in blocks; inside a block, row r holds parameter r of each component.
 /// `scan`: mean [d], whitening [d(d+1)/2] (rows of the lower triangle of L^-1 / sqrt 2), offset.
-/// `exact`, in double, goes on with: output mean, slope [d], output variance.
-/// `rounded`, in float, is `exact` and then what rounding took from the mean [d].
+/// `exact`, in double, continues with: output mean, slope [d], output variance.
+/// `rounded`, in float, is `exact` followed by the rounding errors of the mean [d].
 /// Padding has offset -infinity.
 inline constexpr std::size_t kScanLanes = 16;
 inline constexpr std::size_t kExactLanes = 8;

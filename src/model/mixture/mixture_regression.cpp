@@ -40,8 +40,8 @@ float lost_to_float(double value) {
 
 std::size_t blocks_of(std::size_t count, std::size_t lanes) { return (count + lanes - 1) / lanes; }
 
-// Splits [first, last) at the median of the widest input until a block is left, so that components
-// of one block are neighbours and few blocks hold those that matter to a query.
+// Splits [first, last) at the median of the widest input until one block remains, so that
+// components in one block are neighbours and few blocks hold those that matter to a query.
 void sort_into_blocks(const GaussianMixture& mixture, std::span<const std::size_t> given,
                       std::span<std::size_t> order) {
   if (order.size() <= kExactLanes) return;
@@ -103,7 +103,7 @@ std::vector<double> conditional_parameters(const GaussianMixture& mixture, std::
                        0.5 * static_cast<double>(n) * std::log(2.0 * std::numbers::pi));
   parameters.push_back(mixture.means(component, output));
   parameters.insert(parameters.end(), slope.begin(), slope.end());
-  // The Schur complement of a positive definite matrix is positive; rounding may say otherwise.
+  // The Schur complement of a positive definite matrix is positive; with rounding it may not be.
   const double variance = covariance[output * dimension + output] - slope.dot(cross);
   parameters.push_back(std::max(variance, std::numeric_limits<double>::min()));
   return parameters;

@@ -12,7 +12,7 @@
 
 namespace torsio {
 
-/// What a mixture says about one of its quantities once the others are known.
+/// The distribution of one of a mixture's quantities given the others.
 struct Conditional {
   double mean = 0.0;         ///< the quantity's unit
   double variance = 0.0;     ///< unit squared
@@ -34,16 +34,16 @@ struct Conditional {
 /// evaluated in double. Where many matter and float32 can be trusted, they are evaluated in
 /// float32, with differences to the means that keep what rounding takes from them.
 ///
-/// How exact that is: for each query a bound on the scan's rounding sees to it that the dropped
-/// components hold less than 1e-10 of the weight. Whether float32 can be trusted is an estimate
-/// from the size of the numbers (a log weight that counts off by 5e-5), not a bound. Tests hold
-/// mean and standard deviation to 1e-4 standard deviations of the output from `query_exact`, which
-/// evaluates all components in double, one by one, and the log density to 1e-4. Where no component
-/// has a density that double can hold, the results are NaN.
+/// Accuracy: for each query a bound on the scan's rounding ensures that the dropped components hold
+/// less than 1e-10 of the weight. Whether float32 is sufficient is an estimate from the size of the
+/// numbers (a relevant log weight that is wrong by 5e-5), not a bound. Tests check that mean and
+/// standard deviation differ by at most 1e-4 standard deviations of the output from `query_exact`,
+/// which evaluates all components in double, one by one, and the log density by at most 1e-4. Where
+/// the density of every component is too small for double, the results are NaN.
 ///
 /// Source: specification 3.1 (paper 000, equations 8 to 11, with the variance of the mixture).
-/// Cost of `query`: 4 (d + d(d+1)/2 + 1) bytes a component from cache, d given
-/// quantities, and `bytes_read()` in all. Nothing is allocated after construction.
+/// Cost of `query`: 4 (d + d(d+1)/2 + 1) bytes per component from cache, d given quantities, and
+/// `bytes_read()` in all. Nothing is allocated after construction.
 class MixtureRegression {
  public:
   /// @param output index of y among the mixture's quantities; z are the others in their order.
@@ -79,11 +79,11 @@ class MixtureRegression {
   double output_scale_ = 1.0;
   std::vector<double> input_centre_;
   std::vector<double> input_scale_;
-  // Bounds from which `query` knows how far a float32 log weight may be off.
+  // Bounds from which `query` computes the largest error of a float32 log weight.
   double largest_mean_ = 0.0;
   double largest_whitening_ = 0.0;
   double largest_offset_ = 0.0;
-  // The components, packed as src/model/mixture/mixture_kernels.hpp says.
+  // The components; packed as described in src/model/mixture/mixture_kernels.hpp.
   detail::AlignedVector<float> scan_;
   detail::AlignedVector<float> rounded_;
   detail::AlignedVector<double> exact_;

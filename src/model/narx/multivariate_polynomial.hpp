@@ -20,11 +20,11 @@ namespace torsio {
 class MultivariatePolynomial {
  public:
   static constexpr std::string_view kFamily = "polynomial";
-  static constexpr std::size_t kHighestDegree = 20;  ///< of one term, all inputs together
+  static constexpr std::size_t kHighestDegree = 20;  ///< degree of one term over all inputs
 
   struct Parameters {
     using Family = MultivariatePolynomial;
-    std::vector<double> scales;  ///< s: one an input, > 0
+    std::vector<double> scales;  ///< s: one per input, > 0
     Matrix powers;               ///< p: terms x inputs
     std::vector<double> coefficients;
 
@@ -57,10 +57,10 @@ class MultivariatePolynomial {
   };
 
   Parameters parameters_;
-  std::vector<Used> used_;            ///< inputs that stand in a term
+  std::vector<Used> used_;            ///< inputs that occur in a term
   std::vector<std::size_t> factors_;  ///< places in `used_`, term after term, x^2 as twice x
-  std::vector<std::size_t> ends_;     ///< of the terms in `factors_`
-  std::vector<double> scaled_;        ///< x_i / s_i of those in use
+  std::vector<std::size_t> ends_;     ///< end of each term in `factors_`
+  std::vector<double> scaled_;        ///< x_i / s_i of `used_`
 };
 
 }  // namespace torsio

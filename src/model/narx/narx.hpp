@@ -35,11 +35,11 @@ class Narx {
   struct Parameters {
     using Family = Narx;
     typename M::Parameters model;  ///< f
-    std::size_t inputs = 0;        ///< of a tick
+    std::size_t inputs = 0;        ///< per tick
     std::size_t input_lags = 0;    ///< n_u
     std::size_t output_lags = 0;   ///< n_y
     double sample_period_s = 0.0;
-    double lowest = 0.0;  ///< of the output
+    double lowest = 0.0;  ///< limit of the output
     double highest = 0.0;
     double start = 0.0;  ///< output before the first sample
 
@@ -88,7 +88,7 @@ class Narx {
   }
 
   Estimate step(Features features) noexcept TORSIO_REALTIME {
-    remember(features);
+    store(features);
     Estimate estimate = model_.step(regressors_);
     const double wanted = estimate.value;
     estimate.value = std::isfinite(wanted)
@@ -110,7 +110,7 @@ class Narx {
     return static_cast<std::ptrdiff_t>(parameters_.output_lags);
   }
 
-  void remember(Features features) noexcept {
+  void store(Features features) noexcept {
     const auto first_output = regressors_.end() - outputs();
     const auto inputs = static_cast<std::ptrdiff_t>(parameters_.inputs);
     if (!is_started_) {

@@ -4,14 +4,14 @@
 
 namespace torsio::adaptation_kernels {
 
-/// Doubles in one vector of this machine. Every vector below is aligned, padded with 0 to a multiple
-/// of it.
+/// Doubles in one vector of this machine. Every vector below is aligned and padded with 0 to a
+/// multiple of it.
 [[nodiscard]] std::size_t lanes() noexcept;
 
 /// The lower triangle of a symmetric matrix in square blocks of `lanes()`: block row by block row up
 /// to the diagonal, each block row by row; the diagonal blocks are whole.
 [[nodiscard]] std::size_t triangle_size(std::size_t padded) noexcept;
-/// Where its diagonal element `row` stands.
+/// Index of its diagonal element `row`.
 [[nodiscard]] std::size_t diagonal_index(std::size_t row) noexcept;
 
 struct Sums {

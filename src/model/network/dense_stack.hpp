@@ -11,8 +11,8 @@
 
 namespace torsio {
 
-/// Dense layers one behind the other, the last linear with one output, packed for the machine's
-/// vectors when constructed. Evaluated in float32.
+/// Dense layers in series, the last linear with one output, packed for the machine's vectors when
+/// constructed. Evaluated in float32.
 class DenseStack {
  public:
   /// @param inputs of the first layer.
@@ -36,8 +36,8 @@ class DenseStack {
     std::size_t units = 0;
     std::size_t blocks = 0;
     Activation activation = Activation::linear;
-    detail::AlignedVector<float> weights;  ///< as src/model/network/network_kernels.hpp says
-    detail::AlignedVector<float> output;   ///< of the last evaluation, padded
+    detail::AlignedVector<float> weights;  ///< layout: src/model/network/network_kernels.hpp
+    detail::AlignedVector<float> output;   ///< from the last evaluation, padded
   };
 
   std::vector<Hidden> hidden_;

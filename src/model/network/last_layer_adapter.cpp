@@ -39,7 +39,7 @@ struct StatedRange {
                .found = fmt::format("{}", found)});
 }
 
-/// NaN, the default of some, stands for "auto".
+/// NaN, the default of some, means "auto".
 bool takes_auto(std::string_view name) {
   bool found = false;
   const AdaptationSettings defaults;
@@ -168,7 +168,8 @@ UpdateOutcome LastLayerAdapter::pass_over(UpdateOutcome reason) noexcept {
 
 UpdateOutcome LastLayerAdapter::outcome_of(const ReferenceSample& reference) noexcept {
   const double value = reference.value;
-  // A slower sensor tells nothing between its samples: that it tells the same again counts.
+  // A slower sensor has no new information between its samples: steps with an unchanged value are
+  // counted.
   const bool is_new = std::isfinite(value) && value != last_reference_;
   unchanged_ticks_ = is_new ? 0 : unchanged_ticks_ + 1;
   if (is_new) last_reference_ = value;

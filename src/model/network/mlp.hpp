@@ -12,9 +12,9 @@
 
 namespace torsio {
 
-/// A static network: dense layers one behind the other, the last one linear with one output,
-/// evaluated in float32. Source: paper 001, specification 3.2. Cost: its weights streamed once from
-/// cache. Nothing is allocated after construction.
+/// A static network: dense layers in series, the last one linear with one output, evaluated in
+/// float32. Source: paper 001, specification 3.2. Cost: its weights are read once from cache.
+/// Nothing is allocated after construction.
 class Mlp {
  public:
   static constexpr std::string_view kFamily = "mlp";

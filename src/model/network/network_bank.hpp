@@ -29,7 +29,7 @@ class NetworkBank {
   void reset(std::size_t joint) noexcept { network_.reset(joint); }
 
   /// @param features joints x inputs, row by row: all inputs of joint 0, then of joint 1, ...
-  /// @param estimates one a joint, each as `Network::step` gives it.
+  /// @param estimates one per joint, as `Network::step` returns it.
   void step(std::span<const double> features,
             std::span<Estimate> estimates) noexcept TORSIO_REALTIME {
     network_.step(features, estimates);

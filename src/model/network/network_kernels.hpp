@@ -6,17 +6,17 @@
 
 namespace torsio::network_kernels {
 
-/// Units stand in blocks of as many as this machine's vectors have lanes; the last is filled up with
-/// units of weight 0. A block is a sequence of rows, one value a unit, in the order in which a step
-/// reads them:
+/// Units are stored in blocks of as many as this machine's vectors have lanes; the last is padded
+/// with units of weight 0. A block is a sequence of rows, one value per unit, in the order in which
+/// a step reads them:
 ///
 /// - dense: bias, then one row for each input;
 /// - LSTM: bias of the gates i, f, g, o, then these four for each input, then for each unit;
-/// - LSTM with biases apart: the same behind eight biases, those of the inputs first;
+/// - LSTM with separate biases: the same after eight biases, those of the inputs first;
 /// - GRU: bias of r, z, n and of n's recurrent part, then r, z, n for each input, then for each unit.
 ///
-/// Every sum is taken in that order, by fused multiply-adds where the machine has them, so that one
-/// joint and many give the same bits. Biases that stand apart are added to the finished sums.
+/// Every sum is computed in that order, by fused multiply-adds where the machine has them, so that
+/// one joint and many give the same bits. Separate biases are added to the finished sums.
 [[nodiscard]] std::size_t lanes() noexcept;
 
 /// A packed layer.
@@ -24,10 +24,10 @@ struct PackedView {
   const float* weights = nullptr;
   std::size_t inputs = 0;
   std::size_t units = 0;   ///< without padding
-  std::size_t blocks = 0;  ///< of `lanes()` units each
+  std::size_t blocks = 0;  ///< `lanes()` units each
 };
 
-/// What a recurrent step reads and writes, for `count` joints one behind the other.
+/// Inputs and outputs of a recurrent step, for `count` joints in sequence.
 struct JointStates {
   std::size_t count = 1;
   const float* inputs = nullptr;
@@ -35,7 +35,7 @@ struct JointStates {
   const float* hidden = nullptr;
   float* next_hidden = nullptr;
   float* cell = nullptr;         ///< LSTM only
-  std::size_t state_stride = 0;  ///< of the three above
+  std::size_t state_stride = 0;  ///< stride of the three above
 };
 
 /// Sigmoid and tanh are within 4e-7 of the exact ones, tanh also relative to itself. NaN stays NaN

@@ -13,10 +13,10 @@ namespace torsio {
 
 /// A network with memory: recurrent layers, then dense ones, evaluated in float32.
 ///
-/// One call is one sample: the state goes on from call to call (specification 3.4, streaming a). It
-/// starts at zero, and until `warm_up_samples` steps after a reset the value carries
-/// `Fault::warming_up`. A discrete model: it runs at the sample period that it was trained at and at
-/// no other. Cost: its weights streamed once from cache. Nothing is allocated after construction.
+/// One call is one sample: the state continues from call to call (specification 3.4, streaming a).
+/// It starts at zero, and until `warm_up_samples` steps after a reset the value carries
+/// `Fault::warming_up`. A discrete model: it runs only at the sample period that it was trained at.
+/// Cost: its weights are read once from cache. Nothing is allocated after construction.
 ///
 /// @tparam RecurrentLayer `LstmLayer` or `GruLayer`.
 template <class RecurrentLayer>
@@ -44,12 +44,13 @@ class RecurrentModel {
   /// To the zero state.
   void reset() noexcept { network_.reset(0); }
 
-  /// Where the network stands: for each layer its h, then its c if it has one; `state_size()` values.
+  /// The state of the network: for each layer its h, then its c if it has one; `state_size()`
+  /// values.
   [[nodiscard]] std::size_t state_size() const noexcept { return network_.state_size(); }
   void get_state(std::span<float> state) const noexcept TORSIO_REALTIME {
     network_.get_state(0, state);
   }
-  /// To a state that `get_state` gave or training knows; it counts as warmed up.
+  /// Resets to a state from `get_state` or from training; it counts as warmed up.
   void reset(std::span<const float> state) noexcept TORSIO_REALTIME {
     network_.set_state(0, state);
   }

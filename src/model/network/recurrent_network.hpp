@@ -59,7 +59,7 @@ class RecurrentNetwork {
   }
   void set_state(std::size_t joint, std::span<const float> state) noexcept TORSIO_REALTIME;
 
-  /// @param features joints x inputs, row by row. @param estimates one a joint.
+  /// @param features joints x inputs, row by row. @param estimates one per joint.
   void step(std::span<const double> features,
             std::span<Estimate> estimates) noexcept TORSIO_REALTIME;
 
@@ -73,7 +73,7 @@ class RecurrentNetwork {
   DenseStack head_;
   std::size_t warm_up_samples_;
   detail::AlignedVector<float> inputs_;  ///< joints x inputs, standardised
-  std::vector<std::size_t> steps_;  ///< of each joint since its reset, up to `warm_up_samples_`
+  std::vector<std::size_t> steps_;       ///< per joint since its reset, up to `warm_up_samples_`
 };
 
 extern template class RecurrentNetwork<LstmLayer>;

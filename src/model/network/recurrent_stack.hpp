@@ -11,9 +11,9 @@
 
 namespace torsio {
 
-/// Recurrent layers one behind the other and their states for some joints that share the weights.
-/// The weights are packed for the machine's vectors when constructed; a step reads them once, in
-/// order, for all joints. A joint's values do not depend on how many there are, to the bit.
+/// Recurrent layers in series and their states for some joints that share the weights. The weights
+/// are packed for the machine's vectors when constructed; a step reads them once, in order, for all
+/// joints. A joint's values do not depend on the number of joints, to the bit.
 ///
 /// @tparam Layer `LstmLayer` or `GruLayer`.
 template <class Layer>
@@ -27,7 +27,7 @@ class RecurrentStack {
                  const std::string& place);
 
   [[nodiscard]] std::size_t joint_count() const noexcept { return joints_; }
-  /// Of the last layer.
+  /// Outputs of the last layer.
   [[nodiscard]] std::size_t output_count() const noexcept { return layers_.back().units; }
 
   /// All joints to the zero state, or one.
@@ -52,7 +52,7 @@ class RecurrentStack {
     std::size_t inputs = 0;
     std::size_t units = 0;
     std::size_t stride = 0;                     ///< units, padded
-    detail::AlignedVector<float> weights = {};  ///< as src/model/network/network_kernels.hpp says
+    detail::AlignedVector<float> weights = {};  ///< layout: src/model/network/network_kernels.hpp
     detail::AlignedVector<float> hidden = {};   ///< joints x stride
     detail::AlignedVector<float> other_hidden = {};  ///< where a step writes the next h
     detail::AlignedVector<float> cell = {};          ///< joints x stride; empty for a GRU

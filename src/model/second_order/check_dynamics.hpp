@@ -35,7 +35,7 @@ inline void check_sampled_time(const SampledTime& time, std::string_view family)
 }
 
 inline void check_gains(std::span<const double> gains, std::string_view family) {
-  require_parameter(!gains.empty(), family, "gains", "one an input", 0.0);
+  require_parameter(!gains.empty(), family, "gains", "one per input", 0.0);
   for (const double gain : gains)
     require_parameter(std::isfinite(gain), family, "gains", "finite numbers", gain);
   require_parameter(gains.front() != 0.0, family, "gains", "a first input that drives", 0.0);

@@ -35,7 +35,8 @@ const DynamicBoucWen::Parameters& checked(const DynamicBoucWen::Parameters& p) {
   check_gains(p.gains, kFamily);
   check_sampled_time(p.time, kFamily);
   check_end_stops(p.lowest, p.highest, kFamily);
-  // Runge-Kutta of order 4 is stable to 2.78 on either axis; the sum is above the eigenvalue.
+  // Runge-Kutta of order 4 is stable up to 2.78 on either axis; the sum is an upper bound of the
+  // eigenvalue.
   constexpr double kStable = 2.7;
   const double fastest_per_s =
       std::max(p.damping / p.mass, std::sqrt((p.stiffness + p.hysteretic_stiffness) / p.mass));

@@ -13,20 +13,21 @@
 
 namespace torsio {
 
-/// A mass on a spring and a damper beside a Bouc-Wen element, driven by a force:
+/// A mass on a spring and a damper in parallel with a Bouc-Wen element, driven by a force:
 ///
 ///     m y'' + c y' + k y + z = u,   u = sum_j g_j x_j
 ///     z' = a y' - b (g |y'| |z|^(n-1) z + d y' |z|^n)
 ///
-/// x the inputs, the first the force, torque or current that drives (g_0 = 1 in a fit), y the target
-/// (displacement, angle), z the force of the hysteretic element. Only the products b g (`loss`) and b d (`skew`) can be told. The element is
-/// passive for a >= 0 and b g >= 0: it loads along dz/dy = a - (b g + b d) |z|^n, unloads along
-/// a + (b g - b d) |z|^n, and gives back what unloading returns, `hysteretic_energy`. Classical
-/// Runge-Kutta of order 4, where a velocity that changes sign makes a kink of order 2; state y, y', z,
-/// each at the time of the last sample. It rests at 0 after a reset; the first sample is told from the
-/// state as it is. Where y leaves lowest..highest it stops there, with `Fault::diverged`.
-/// Source: Noel and Schoukens 2016, the official benchmark's equations, with b g and b d in place of
-/// b, g, d. Cost: 4 evaluations a sub-step; a power in each unless n = 1.
+/// x are the inputs, the first is the driving force, torque or current (g_0 = 1 in a fit), y is the
+/// target (displacement, angle), z the force of the hysteretic element. Only the products b g
+/// (`loss`) and b d (`skew`) can be identified. The element is passive for a >= 0 and b g >= 0: it
+/// loads along dz/dy = a - (b g + b d) |z|^n, unloads along a + (b g - b d) |z|^n, and gives back
+/// what unloading returns, `hysteretic_energy`. Classical Runge-Kutta of order 4, where a velocity
+/// that changes sign makes a kink of order 2; state y, y', z, each at the time of the last sample.
+/// It is at rest at 0 after a reset; the first output is computed from the unchanged state. Where y
+/// leaves lowest..highest it stops there, with `Fault::diverged`. Source: Noel and Schoukens 2016,
+/// the official benchmark's equations, with b g and b d in place of b, g, d. Cost: 4 evaluations
+/// per sub-step; a power in each unless n = 1.
 class DynamicBoucWen {
  public:
   static constexpr std::string_view kFamily = "dynamic_bouc_wen";
@@ -41,9 +42,9 @@ class DynamicBoucWen {
     double loss = 0.0;                  ///< b g >= 0, u^(1-n) / y
     double skew = 0.0;                  ///< b d, u^(1-n) / y
     double exponent = 1.0;              ///< n >= 1
-    std::vector<double> gains = {1.0};  ///< g, one an input
+    std::vector<double> gains = {1.0};  ///< g, one per input
     SampledTime time = {};
-    double lowest = 0.0;  ///< of y; 0 lies between them
+    double lowest = 0.0;  ///< limit of y; 0 lies between them
     double highest = 0.0;
 
     template <class Self, class Visit>

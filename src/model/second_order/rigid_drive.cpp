@@ -47,7 +47,7 @@ const RigidDrive::Parameters& checked(const RigidDrive::Parameters& p) {
   check_gains(p.gains, RigidDrive::kFamily);
   check_sampled_time(p.time, RigidDrive::kFamily);
   check_end_stops(p.lowest, p.highest, RigidDrive::kFamily);
-  constexpr double kStable = 2.0;  // of the leapfrog
+  constexpr double kStable = 2.0;  // limit of the leapfrog
   const double turn = std::sqrt((std::max(p.spring, 0.0) + bristle_stiffness(p)) / p.inertia) *
                       p.time.sample_period_s / static_cast<double>(p.time.substeps);
   require_parameter(turn < kStable, RigidDrive::kFamily, "substeps",

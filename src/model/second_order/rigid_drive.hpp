@@ -20,14 +20,15 @@ namespace torsio {
 ///     dry   = F(q, q') sgn(q'),   at rest whatever holds the rest, up to F(q, 0)
 ///     F     = Fc max(0, 1 + s q) (1 + (r - 1) exp(-(q' / v_s)²))
 ///
-/// x the inputs, the first the force, torque or current that drives, q the target (position, angle). With a bristle, z0 > 0,
-/// dry is instead LuGre's z of stiffness r Fc / z0 (`relaxed_bristle`). In each sub-step: half of the
-/// way, then the velocity from the forces half way (viscous friction by the trapezoid rule, Coulomb's
-/// so that it stops the motion and never turns it round), then the other half: order 2, without a
-/// stop or a Stribeck curve, and exact sticking. State q, q', z; z stays 0 without a bristle. It rests
-/// at 0 after a reset; the first sample is told from the state as it is. Where q leaves
-/// lowest..highest it stops there, with `Fault::diverged`. Source: Gautier, Janot and Vandanjon 2013
-/// (J, Fv, Fc, offset); Canudas de Wit et al. 1995 (Stribeck, LuGre); the other terms are ours.
+/// x are the inputs, the first is the driving force, torque or current, q is the target (position,
+/// angle). With a bristle, z0 > 0, dry is instead LuGre's z of stiffness r Fc / z0
+/// (`relaxed_bristle`). In each sub-step: half of the motion, then the velocity from the forces
+/// there (viscous friction by the trapezoid rule, Coulomb's so that it stops the motion and never
+/// reverses it), then the other half: order 2, without a stop or a Stribeck curve, and exact
+/// sticking. State q, q', z; z stays 0 without a bristle. It is at rest at 0 after a reset; the
+/// first output is computed from the unchanged state. Where q leaves lowest..highest it stops
+/// there, with `Fault::diverged`. Source: Gautier, Janot and Vandanjon 2013 (J, Fv, Fc, offset);
+/// Canudas de Wit et al. 1995 (Stribeck, LuGre); the other terms are ours.
 class RigidDrive {
  public:
   static constexpr std::string_view kFamily = "rigid_drive";
@@ -47,9 +48,9 @@ class RigidDrive {
     double viscous_quadratic = 0.0;     ///< Fq >= 0, force / (q/s)²
     double spring = 0.0;                ///< k, force / q; negative: an unstable balance
     double coulomb_slope = 0.0;         ///< s, 1 / q
-    std::vector<double> gains = {1.0};  ///< g, force / input, one an input
+    std::vector<double> gains = {1.0};  ///< g, force / input, one per input
     SampledTime time = {};
-    double lowest = 0.0;  ///< of q; 0 lies between them
+    double lowest = 0.0;  ///< limit of q; 0 lies between them
     double highest = 0.0;
 
     template <class Self, class Visit>

@@ -7,8 +7,8 @@ namespace torsio {
 /// How a model given by a differential equation runs between two samples.
 struct SampledTime {
   double sample_period_s = 0.0;
-  std::size_t substeps = 2;     ///< of the integrator in one sample period
-  std::size_t input_order = 3;  ///< of the polynomial between samples, `CausalPolynomial`
+  std::size_t substeps = 2;     ///< integrator steps per sample period
+  std::size_t input_order = 3;  ///< polynomial order between samples, `CausalPolynomial`
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {

@@ -150,7 +150,7 @@ void check_leaf(const SpringDashpotNetwork& network, std::size_t index) {
            fmt::format("{}", node.value));
   for (std::size_t i = 0; i < index; ++i)
     if (network.nodes[i].is_leaf() && network.nodes[i].name() == node.name())
-      refuse(index, "a name that stands nowhere else", node.name());
+      refuse(index, "a name that is used only once", node.name());
 }
 
 }  // namespace

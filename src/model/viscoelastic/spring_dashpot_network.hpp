@@ -11,12 +11,12 @@ namespace torsio {
 /// The numbers are stored in model files: never reorder.
 enum class NetworkKind : std::uint8_t { spring = 0, dashpot = 1, series = 2, parallel = 3 };
 
-/// A spring or dashpot, or what joins the networks that stand before it. Plain data.
+/// A spring or dashpot, or an operator that joins the networks before it. Plain data.
 struct NetworkNode {
   std::size_t kind = 0;
-  std::size_t label = 0;     ///< 1 + the number behind its k or d; 0: no number
+  std::size_t label = 0;     ///< 1 + the number after its k or d; 0: no number
   double value = 0.0;        ///< k [Nm/rad] or d [Nm s/rad]; NaN: not given
-  std::size_t children = 0;  ///< of series and parallel: how many
+  std::size_t children = 0;  ///< number of networks that series or parallel joins
 
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
@@ -37,7 +37,7 @@ struct NetworkNode {
   [[nodiscard]] std::string name() const;
 };
 
-/// Springs and dashpots in series and parallel, what joins them behind them (postfix).
+/// Springs and dashpots in series and parallel, each operator after its operands (postfix).
 struct SpringDashpotNetwork {
   std::vector<NetworkNode> nodes;
 
@@ -47,7 +47,7 @@ struct SpringDashpotNetwork {
   }
   bool operator==(const SpringDashpotNetwork&) const = default;
 
-  /// Of springs and dashpots, in the order of the text.
+  /// Names of springs and dashpots, in the order of the text.
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] std::vector<double> values() const;
   /// @param values one a spring or dashpot
@@ -55,7 +55,7 @@ struct SpringDashpotNetwork {
 };
 
 inline constexpr std::size_t kMaxNetworkNodes = 100;
-/// Of a k [Nm/rad] or d [Nm s/rad].
+/// Smallest k [Nm/rad] or d [Nm s/rad].
 inline constexpr double kSmallestElement = 1e-12;
 inline constexpr double kLargestElement = 1e12;
 
@@ -66,15 +66,15 @@ inline constexpr double kLargestElement = 1e12;
 ///     dashpot = 'd' [number] ['=' value]       pair = kv | maxwell
 ///
 /// `kv` (Kelvin-Voigt) is a spring and a dashpot in parallel, `maxwell` in series; depth is free.
-/// Values are in Nm/rad and Nm s/rad. Every name stands once: a parameter that were two elements at
-/// once could not be told from the two that it stands for. Instead of a network one of these names:
+/// Values are in Nm/rad and Nm s/rad. Every name occurs once: one parameter for two elements could
+/// not be distinguished from two parameters. Instead of a network one of these names:
 ///
 ///     hooke  maxwell  kelvin_voigt  standard_linear_solid  burgers  generalised_maxwell(n)
 ///     003a  003b  003c  003d
 ///
 /// the last four with the published values of paper 003 (Table 3, specification 2.1; those of 003d
 /// do not describe the paper's coupling).
-/// @throws UsageError that points at the place and says what was expected there.
+/// @throws UsageError that points at the place and states what was expected there.
 [[nodiscard]] SpringDashpotNetwork parse_network(std::string_view text);
 
 /// The reverse; values that are given are written with `digits` digits, not at all if 0.
@@ -100,12 +100,12 @@ struct RelaxationSpectrum {
   std::vector<RelaxationBranch> branches;  ///< rising rates
 };
 
-/// Of a network whose values are positive. Parallel networks add their operators. Series networks
-/// add s / H, which is again of that form: its rates are the zeros of H(s) / s, which lie
-/// between its poles and are found there by bisection, relative to the nearer pole. Every number
-/// comes out to a few roundings however far apart the rates are.
-/// @throws Error for nodes that are no network, a value outside
-/// `kSmallestElement` to `kLargestElement`, more nodes than `kMaxNetworkNodes`, or two elements of one name.
+/// The spectrum of a network whose values are positive. Parallel networks add their operators.
+/// Series networks add s / H, which is again of that form: its rates are the zeros of H(s) / s,
+/// which lie between its poles and are computed there by bisection, relative to the nearer pole.
+/// Every number is accurate to a few roundings however far apart the rates are.
+/// @throws Error for nodes that are not a network, a value outside `kSmallestElement` to
+/// `kLargestElement`, more nodes than `kMaxNetworkNodes`, or two elements with one name.
 [[nodiscard]] RelaxationSpectrum relaxation_spectrum(const SpringDashpotNetwork& network);
 
 }  // namespace torsio

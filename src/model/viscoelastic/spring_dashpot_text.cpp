@@ -26,7 +26,7 @@ constexpr std::size_t kHighestNumber = 999'999;
 struct Preset {
   std::string_view name;
   std::string_view text;
-  double scale = 1.0;  ///< of its values, to Nm/rad
+  double scale = 1.0;  ///< factor of its values, to Nm/rad
 };
 
 // Paper 003, Table 3, is per degree. Topologies: specification 2.1.
@@ -88,7 +88,7 @@ class Parser {
     return std::move(network_);
   }
 
-  /// The n of generalised_maxwell(n), if that is what the text says.
+  /// The n of generalised_maxwell(n), if the text has this form.
   std::size_t branches() {
     skip_space();
     if (take_word() != kGeneralised) return 0;
@@ -175,7 +175,7 @@ class Parser {
   }
 
   void join(NetworkKind kind, std::string_view word, std::size_t start) {
-    want('(', fmt::format("'(' behind {}", word));
+    want('(', fmt::format("'(' after {}", word));
     std::size_t children = 0;
     do {
       network();
@@ -187,7 +187,7 @@ class Parser {
   }
 
   void pair(NetworkKind kind, std::string_view word, std::size_t start) {
-    want('(', fmt::format("'(' behind {}", word));
+    want('(', fmt::format("'(' after {}", word));
     element("k", fmt::format("the spring of {}, like k1", word));
     want(',', fmt::format("',' and the dashpot of {}", word));
     element("d", fmt::format("the dashpot of {}, like d1", word));
@@ -211,8 +211,7 @@ class Parser {
       return other.is_leaf() && other.kind == node.kind && other.label == node.label;
     });
     if (is_taken)
-      refuse(start, "a name that stands nowhere else: each element is a parameter of its own",
-             word);
+      refuse(start, "a name that is used only once: each element is a separate parameter", word);
     if (take('=')) node.value = value();
     add(node, start);
   }

@@ -20,9 +20,9 @@ namespace torsio {
 ///
 ///     z_i <- exp(-p_i h) z_i + g_i (1 - exp(-p_i h)) / (p_i h) (u_n - u_n-1)
 ///
-/// A continuous-time model: model files run it at any sample rate. After `reset()` it is relaxed at the first
-/// deflection that it sees. The state is z, the torques [Nm] of the branches. Source: specification
-/// 3.6, paper 003. Cost: 3 multiply-adds a branch.
+/// A continuous-time model: model files run it at any sample rate. After `reset()` it is relaxed at
+/// the first deflection that it receives. The state is z, the torques [Nm] of the branches. Source:
+/// specification 3.6, paper 003. Cost: 3 multiply-adds per branch.
 class Viscoelastic {
  public:
   static constexpr std::string_view kFamily = "viscoelastic";
@@ -32,7 +32,7 @@ class Viscoelastic {
     SpringDashpotNetwork network;  ///< values in target unit per input unit: Nm/rad and Nm s/rad
     double offset = 0.0;           ///< b, target's unit
     double sample_period_s = 0.0;  ///< h
-    std::size_t inputs = 1;        ///< of a tick; the first is u
+    std::size_t inputs = 1;        ///< per tick; the first is u
 
     template <class Self, class Visit>
     static void visit_fields(Self& self, Visit&& visit) {
@@ -63,16 +63,16 @@ class Viscoelastic {
   [[nodiscard]] const RelaxationSpectrum& spectrum() const noexcept { return spectrum_; }
 
   void reset() noexcept;
-  /// Where numbers are too large for a double the model is at rest again and says its offset, with a
-  /// fault.
+  /// Where numbers are too large for a double the model returns to rest and outputs its offset,
+  /// with a fault.
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
   /// z; of a model that has not been stepped since its reset, z at the first deflection.
   [[nodiscard]] std::span<const double> state() const noexcept { return torque_; }
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
 
-  /// The first input of the last step for which it would have said `target`. Where there is none (a
-  /// fluid, before it has moved) the given one comes back with `Fault::model_not_finite`.
+  /// The first input of the last step for which its output would have been `target`. Where there is
+  /// none (a fluid, before it has moved) the given one is returned with `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
 
  private:
@@ -80,9 +80,9 @@ class Viscoelastic {
   RelaxationSpectrum spectrum_;
   std::size_t parameter_count_;
   std::vector<double> decay_;   ///< exp(-p_i h)
-  std::vector<double> gain_;    ///< of z_i in the increment
-  double slope_ = 0.0;          ///< of y in the increment, without the branches
-  double moving_slope_ = 0.0;   ///< of y in u within a step
+  std::vector<double> gain_;    ///< gain of z_i in the increment
+  double slope_ = 0.0;          ///< slope of y in the increment, without the branches
+  double moving_slope_ = 0.0;   ///< slope of y in u within a step
   std::vector<double> torque_;  ///< z_i
   double last_ = 0.0;           ///< u of the last step
   bool is_started_ = false;

@@ -64,7 +64,7 @@ AnyModel spring(double stiffness) {
   return Linear(parameters);
 }
 
-TEST(Guards, TheResidualTableTellsTheSpreadByRegionOfTheOutput) {
+TEST(Guards, TheResidualTableContainsTheSpreadByRegionOfTheOutput) {
   Random random(6);
   const auto data = training_data_of(deflection_and_rate(), oscillation(8000), [&](Row x) {
     return 100.0 * x[0] + (x[0] > 0.0 ? 2.0 : 0.5) * random.normal();
@@ -137,7 +137,7 @@ TEST(Guards, WidenErrorBarsFromTrainingToWhatTheFitHeldOut) {
   const double wider = 3.0 * std::sqrt(own);
   EXPECT_NEAR(mean_square(nullptr, wider), 9.0 * own, 1e-9 * own);
   EXPECT_EQ(mean_square(nullptr, 0.1 * wider), own) << "never narrower";
-  EXPECT_EQ(mean_square(&training, wider), own) << "validation records tell it better";
+  EXPECT_EQ(mean_square(&training, wider), own) << "validation records have priority";
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ TEST(ResolveInputs, RefusesTwoMeaningsOfOneName) {
   EXPECT_EQ(resolve_inputs(dataset, {"twist_rad"}).definitions.size(), 1U);
 }
 
-TEST(FindLeak, SeesDeclaredAndComputedOnes) {
+TEST(FindLeak, FindsDeclaredAndComputedOnes) {
   Dataset dataset = bench_dataset();
   const FeatureSpec spec = resolve_inputs(dataset, {});
   EXPECT_EQ(find_leak(dataset, spec), "");
@@ -70,7 +70,7 @@ TEST(FindLeak, SeesDeclaredAndComputedOnes) {
   EXPECT_EQ(refuse_leak(dataset, spec, true), "gear_angle_rad");
 }
 
-TEST(FindLeak, SeesADifferenceWhoseSourcesAreBothInputs) {
+TEST(FindLeak, FindsADifferenceWhoseSourcesAreBothInputs) {
   Dataset dataset = bench_dataset();
   dataset.target = "spring_deflection_rad";
   for (DatasetRecord& record : dataset.records)

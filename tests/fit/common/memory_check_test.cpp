@@ -11,7 +11,7 @@ namespace {
 using testing::ContainsRegex;
 using testing::HasSubstr;
 
-TEST(RequireMemory, TellsTheCountThatFits) {
+TEST(RequireMemory, StatesTheCountThatFits) {
   MemoryNeed need{.what = "the table",
                   .bytes = 8e18,
                   .count = 1'000'000'000,
@@ -26,7 +26,7 @@ TEST(RequireMemory, TellsTheCountThatFits) {
   EXPECT_EQ(test::error_message([&] { require_memory(need); }), "");
 }
 
-TEST(RequireMemory, TellsTheMemoryWhereNothingIsCounted) {
+TEST(RequireMemory, StatesTheMemoryWhereNothingIsCounted) {
   const MemoryNeed need{.what = "the training", .bytes = 8e18, .advice = "Take fewer layers."};
   EXPECT_THAT(test::error_message([&] { require_memory(need); }), HasSubstr("Take fewer layers."));
 }

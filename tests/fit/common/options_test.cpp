@@ -62,7 +62,7 @@ TEST(Options, RefuseAnUnknownNameAndListTheKnownOnes) {
             "unknown option \"grade\"; expected one of scale, gain, degree, branch, schedule");
 }
 
-TEST(Options, SayWhatValueTheyExpect) {
+TEST(Options, StateWhichValueTheyExpect) {
   EXPECT_EQ(refusal("degree", "5.5"),
             "option degree: expected a whole number from 1 to 20, found \"5.5\"");
   EXPECT_EQ(refusal("scale", "11"),

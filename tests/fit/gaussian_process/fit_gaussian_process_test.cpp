@@ -50,7 +50,7 @@ double rmse(const typename Model::Parameters& parameters, double input_scale = 1
   return std::sqrt(squares / 200.0);
 }
 
-TEST(FitGaussianProcess, FindsACurveItsNoiseAndSaysSo) {
+TEST(FitGaussianProcess, FindsACurveAndItsNoiseAndReportsThem) {
   const auto fitted = fit_gaussian_process(curve(300), {.kernel = "se"});
   EXPECT_LT(rmse<GaussianProcess>(fitted.parameters), 0.04);
   EXPECT_NEAR(std::sqrt(fitted.parameters.noise_variance) * fitted.parameters.scaling.target_scale,
@@ -147,7 +147,7 @@ TEST(FitParametricGp, EveryModeMakesAModelAndAllButThePapersFindTheCurve) {
             0.03);
 }
 
-TEST(FitParametricGp, LearnsNothingFromASampleAtWhichItsNumbersAreNone) {
+TEST(FitParametricGp, LearnsNothingFromASampleAtWhichItsValuesAreNotFinite) {
   // Steps of this size throw the kernel's numbers to the ends of the range of a double.
   for (const auto mode : {ParametricGpMode::nlml, ParametricGpMode::elbo})
     for (const std::size_t batch : {1U, 10U})
@@ -167,7 +167,7 @@ TEST(FitParametricGp, TheUseDecidesWhetherTheClosedFormIsKept) {
   }
 }
 
-TEST(FitGaussianProcess, AsksForAFewSamples) {
+TEST(FitGaussianProcess, RequiresAFewSamples) {
   for (const char* family :
        {"gaussian_process", "parametric_gp", "parametric_gp_variational", "mlp"}) {
     const FamilyInfo& info = find_family(family);
@@ -187,7 +187,7 @@ TEST(FitParametricGp, KeepsTheClosedFormOnlyWhereItIsBetter) {
   const TrainingData data = curve(2000);
   const auto fitted = fit_parametric_gp(data, {.kernel = "se", .updates = 3000}, {.seed = 2});
   EXPECT_THAT(fitted.notes, Contains(AllOf(HasSubstr("held out"), HasSubstr("which is kept"))));
-  // A validation record of the learned model's own answers cannot be met better.
+  // No refit improves on a validation record of the learned model's own outputs.
   const auto learned = fit_parametric_gp(data, {.kernel = "se", .updates = 3000, .refit = false},
                                          {.seed = 2, .validation = &data});
   TrainingData own = curve(100);
@@ -223,7 +223,7 @@ TEST(KernelPlain, IsTheCombinedKernelOfThePaper) {
   EXPECT_NEAR(value[0], expected, 1e-12 * expected);
 }
 
-TEST(KernelPlain, RefusesNumbersThatDivideByNothing) {
+TEST(KernelPlain, RefusesNumbersThatDivideByZero) {
   PlainKernel theta = kTable2;
   theta[6] = 0.0;
   EXPECT_THAT(error_message([&] { (void)kernel_plain(theta); }), HasSubstr("theta_7"));
@@ -288,7 +288,7 @@ double covered(const typename Model::Parameters& parameters, const Matrix& featu
   return static_cast<double>(inside) / static_cast<double>(target.size());
 }
 
-/// Functions drawn from a Gaussian process; the first half to learn from, the second to judge.
+/// Functions drawn from a Gaussian process; the first half for training, the second for evaluation.
 TEST(FitGaussianProcess, ItsIntervalsCoverDataFromThePrior) {
   constexpr std::size_t kLearned = 300;
   constexpr std::size_t kScored = 300;

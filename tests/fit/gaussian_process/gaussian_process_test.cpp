@@ -180,7 +180,7 @@ struct Trained {
     }
   }
 
-  /// What `f` says of another trainer with those numbers and the same (m, S).
+  /// The value of `f` for another trainer with those numbers and the same (m, S).
   Objective objective(const std::function<double(ParametricGpTrainer&)>& f) const {
     return [this, f](const std::vector<double>& numbers) {
       ParametricGpTrainer other = trainer;

@@ -65,7 +65,7 @@ TrainingData spring_data(std::uint64_t seed, double start = 0.0) {
 TEST(FitGreyBox, FindsAStiffeningSpringWithFrictionToItsNoise) {
   const Fitted<GreyBox> fitted = fit_grey_box(spring_data(1), kBoxAlone);
   EXPECT_LT(evaluate(GreyBox(fitted.parameters), spring_data(2, 100.0)).rmse, 0.2)
-      << "the noise, and a start that it is not told";
+      << "the noise, and an unknown start";
   EXPECT_FALSE(fitted.parameters.terms.thresholds.empty());
   ASSERT_FALSE(fitted.notes.empty());
   EXPECT_THAT(fitted.notes[0], HasSubstr("slip elements"));
@@ -190,7 +190,7 @@ TEST(FitGreyBox, InterpolatesOverAConditionThatItIsScheduledBy) {
   EXPECT_LT(evaluate(GreyBox(fitted.parameters), at(0.02, 9)).rmse, 0.15);
 }
 
-TEST(FitGreyBox, KnowsHowWrongItIsBetweenTheKnotsOfItsSchedule) {
+TEST(FitGreyBox, EstimatesItsErrorBetweenTheKnotsOfItsSchedule) {
   const auto at = [](double support) {
     Matrix features(4000, 2);
     const Matrix motion = wander(4000, support);
@@ -198,7 +198,7 @@ TEST(FitGreyBox, KnowsHowWrongItIsBetweenTheKnotsOfItsSchedule) {
       features(n, 0) = motion(n, 0);
       features(n, 1) = support;
     }
-    // No curve through four supports tells what is between them.
+    // No curve through four supports determines what is between them.
     return test::training_data_of(
         {{.expression = "spring_deflection_rad"}, {.expression = "support_m"}}, std::move(features),
         [](Row x) { return 400.0 * x[0] * (1.0 + std::sin(400.0 * x[1])); });
@@ -215,7 +215,7 @@ TEST(FitGreyBox, KnowsHowWrongItIsBetweenTheKnotsOfItsSchedule) {
   EXPECT_LT(fitted.held_out_rmse, 3.0 * between);
 }
 
-TEST(FitGreyBox, IsNotJudgedWhereAHeldOutRecordLeavesTheOthersRange) {
+TEST(FitGreyBox, IsNotEvaluatedWhereAHeldOutRecordLeavesTheOthersRange) {
   // Beyond +-0.06 the spring is another one, and one record of four goes there.
   const auto record = [](double amplitude, std::uint64_t seed) {
     Random random(seed);
@@ -237,7 +237,7 @@ TEST(FitGreyBox, IsNotJudgedWhereAHeldOutRecordLeavesTheOthersRange) {
       << "what lies there is fitted all the same";
 }
 
-TEST(FitGreyBox, FindsDryFrictionThatTurnsAtAFractionOfTheUsualRate) {
+TEST(FitGreyBox, FindsDryFrictionThatChangesSignWithinAFractionOfTheUsualRate) {
   const auto scale_of = [](double turns_within) {
     Matrix features(8000, 2);
     const Matrix motion = wander(8000);
@@ -280,7 +280,7 @@ TEST(FitGreyBox, ANetworkIsKeptOnlyWhereItHelps) {
             0.5 * evaluate(GreyBox(fit_grey_box(bent, kBoxAlone).parameters), bent).rmse);
 }
 
-TEST(FitGreyBox, SaysWhyItCannotBeFitted) {
+TEST(FitGreyBox, StatesWhyItCannotBeFitted) {
   TrainingData still = spring_data(1);
   for (std::size_t n = 0; n < still.sequences[0].features.rows; ++n)
     still.sequences[0].features(n, 0) = 0.1;

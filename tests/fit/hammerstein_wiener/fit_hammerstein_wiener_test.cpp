@@ -36,7 +36,7 @@ std::vector<double> sorted_poles(const Sections& sections) {
   return found;
 }
 
-/// Of the model against what it would have said without noise, on another record.
+/// RMSE of the model against the noise-free output, on another record.
 double error_on_new_record(const HammersteinWiener::Parameters& parameters) {
   const TrainingData clean = recorded(known_hammerstein_wiener(), 3000, 0.0, 77);
   HammersteinWiener model(parameters);
@@ -59,7 +59,7 @@ TEST(FitHammersteinWiener, RecoversAKnownSystemFromNoisyData) {
   EXPECT_LT(error_on_new_record(fitted.parameters), 0.1 * kNoise);
 }
 
-TEST(FitHammersteinWiener, TellsStandardErrorsThatHold) {
+TEST(FitHammersteinWiener, EstimatesStandardErrorsThatHold) {
   // The true value lies within three standard errors for nearly all of the numbers of several fits.
   std::size_t within = 0;
   std::size_t count = 0;
@@ -141,7 +141,7 @@ TEST(FitHammersteinWiener, KeepsPolesInsideTheUnitCircle) {
   }
 }
 
-TEST(FitHammersteinWiener, SaysWhereSlowMotionLeavesWhatItLearnedFrom) {
+TEST(FitHammersteinWiener, ReportsWhereSlowMotionLeavesItsTrainingRange) {
   // Fast motion never fills the slow pole; slow motion of the same amplitude does.
   HammersteinWiener::Parameters slow = known_hammerstein_wiener();
   slow.sections = sections_of({{0.05}, {1.0, -0.99}});
@@ -163,7 +163,7 @@ TEST(FitHammersteinWiener, SaysWhereSlowMotionLeavesWhatItLearnedFrom) {
 }
 
 TEST(FitHammersteinWiener, ClaimsNoMemoryThatNoRecordCouldShow) {
-  // Torque that drifts off in a straight line: any pole beyond the record's length does as well.
+  // Torque that drifts linearly: any pole slower than the record's length fits as well.
   TrainingData data = recorded(known_hammerstein_wiener(), 3000, 0.01, 12);
   for (std::size_t n = 0; n < 3000; ++n)
     data.sequences[0].target[n] += 1e-3 * static_cast<double>(n);
@@ -194,11 +194,11 @@ TEST(FitHammersteinWiener, GoesToContinuousTimeAndWarnsOfArtefacts) {
   EXPECT_THAT(refined.notes, Contains(HasSubstr("refined in continuous time")));
   const auto found = sorted_poles(refined.parameters.sections);
   EXPECT_NEAR(std::log(found[0]) / 0.005, -1.416, 0.1);
-  EXPECT_NEAR(std::log(found[1]) / 0.005, -0.128, 0.1);  // 40 s tell little of 8 s
+  EXPECT_NEAR(std::log(found[1]) / 0.005, -0.128, 0.1);  // 40 s are few for 8 s
   EXPECT_LT(evaluate(AnyModel(HammersteinWiener(refined.parameters)), of_slow).rmse, 0.003);
 }
 
-TEST(FitHammersteinWiener, SaysThatOnlyTheFirstInputIsUsed) {
+TEST(FitHammersteinWiener, ReportsThatOnlyTheFirstInputIsUsed) {
   TrainingData data = recorded(known_hammerstein_wiener(), 2000, 0.05, 9);
   data.inputs.push_back({"v_1"});
   Matrix both(2000, 2);
@@ -209,7 +209,7 @@ TEST(FitHammersteinWiener, SaysThatOnlyTheFirstInputIsUsed) {
   EXPECT_EQ(fitted.parameters.inputs, 2U);
 }
 
-TEST(FitHammersteinWiener, RefusesWhatTellsNothing) {
+TEST(FitHammersteinWiener, RefusesDataWithoutInformation) {
   const auto message = [](TrainingData data, const HammersteinWienerOptions& options) {
     return test::error_message([&] { (void)fit_hammerstein_wiener(data, options); });
   };
@@ -240,7 +240,7 @@ TEST(FitHammersteinWiener, RefusesWhatTellsNothing) {
   EXPECT_THAT(message(unseen, {}), HasSubstr("measured samples"));
 }
 
-TEST(FitHammersteinWiener, SaysThatItDidNotConverge) {
+TEST(FitHammersteinWiener, ReportsThatItDidNotConverge) {
   auto hurried = kTrueShape;
   hurried.iterations = 1;
   EXPECT_THAT(test::error_message([&] {
@@ -292,8 +292,8 @@ TEST(HammersteinWienerFamily, RefusesWordsThatItDoesNotKnow) {
                 AllOf(HasSubstr(option), HasSubstr("\"maybe\"")));
 }
 
-TEST(FitHammersteinWiener, TellsWhatTheDataLeaveOpen) {
-  // A constant but for one jump to one other value: a square cannot be told from a line.
+TEST(FitHammersteinWiener, StatesWhatTheDataDoNotDetermine) {
+  // A constant but for one jump to one other value: a square and a linear function are equivalent.
   TrainingData data = recorded(known_hammerstein_wiener(), 400, 0.0, 9);
   Sequence& sequence = data.sequences[0];
   HammersteinWiener model(known_hammerstein_wiener());
@@ -302,7 +302,7 @@ TEST(FitHammersteinWiener, TellsWhatTheDataLeaveOpen) {
     sequence.target[n] = model.step(sequence.features.row(n)).value;
   }
   const auto fitted = fit_hammerstein_wiener(data, kTrueShape);
-  EXPECT_THAT(fitted.notes, Contains(HasSubstr("the data do not tell ")));
+  EXPECT_THAT(fitted.notes, Contains(HasSubstr("the data do not determine ")));
 }
 
 }  // namespace

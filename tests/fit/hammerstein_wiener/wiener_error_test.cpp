@@ -9,7 +9,7 @@
 namespace torsio {
 namespace {
 
-/// Two sections, two records that start anywhere, some samples not judged.
+/// Two sections, two records with any start, some samples not scored.
 class WienerErrorTest : public testing::TestWithParam<bool> {
  protected:
   WienerErrorTest() {
@@ -50,7 +50,7 @@ TEST_P(WienerErrorTest, SensitivitiesAreFiniteDifferences) {
       miss += std::pow(slope - rows(n, k), 2);
       size += slope * slope;
     }
-    // A curve of pieces has no slope at its knots: few samples pass one within the step.
+    // A piecewise linear curve has no slope at its knots: few samples pass one within the step.
     EXPECT_LT(std::sqrt(miss), (GetParam() ? 1e-4 : 1e-6) * std::sqrt(size)) << error.names()[k];
     EXPECT_GT(size, 0.0) << error.names()[k];
   }
@@ -133,7 +133,7 @@ TEST_P(WienerErrorTest, TheTriangleHasTheErrorsSlopeAlongTheSearch) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Curves, WienerErrorTest, testing::Bool(),
-                         [](const auto& of) { return of.param ? "pieces" : "polynomials"; });
+                         [](const auto& of) { return of.param ? "piecewise" : "polynomials"; });
 
 }  // namespace
 }  // namespace torsio

@@ -36,7 +36,7 @@ Matrix wander(std::size_t samples) {
   return features;
 }
 
-/// What a model says to that, with noise.
+/// The output of a model for that input, with noise.
 template <class M>
 TrainingData recording_of(M model, double noise = 0.0, std::size_t samples = 12000) {
   Random random(12);
@@ -94,7 +94,7 @@ TEST(FitMaxwellSlip, ComesNearWithGenericThresholds) {
   }
 }
 
-TEST(FitPrandtlIshlinskii, SaysInPlaysWhatStopsSay) {
+TEST(FitPrandtlIshlinskii, IsEquivalentToTheFitOfStops) {
   const auto truth = test::example<PrandtlIshlinskii>();
   const auto data = recording_of(truth, 0.05);
   const auto passive = fit_prandtl_ishlinskii(data, {.rates = true});
@@ -188,7 +188,7 @@ TEST(FitOperators, UnusableSamplesMoveTheOperatorButAreNotLearnedFrom) {
   EXPECT_LT(std::abs(slip.parameters.coefficients.values.values[0]), 2.0);
 }
 
-TEST(FitOperators, SayWhatIsMissing) {
+TEST(FitOperators, StateWhatIsMissing) {
   TrainingData still = recording_of(test::example<MaxwellSlipModel>(), 0.0, 400);
   for (std::size_t n = 0; n < 400; ++n) still.sequences[0].features(n, 0) = 0.1;
   EXPECT_THAT(test::error_message([&] { static_cast<void>(fit_maxwell_slip(still, {})); }),
@@ -200,7 +200,7 @@ TEST(FitOperators, SayWhatIsMissing) {
   no_rate.inputs[1].is_rate = false;
   EXPECT_THAT(
       test::error_message([&] { static_cast<void>(fit_improved_nonlinear_backlash(no_rate, {})); }),
-      HasSubstr("nonlinear_backlash_improved has no input that tells a rate"));
+      HasSubstr("nonlinear_backlash_improved has no input that is a rate"));
   TrainingData data = recording_of(test::example<BoucWenModel>(), 0.1, 3000);
   EXPECT_THAT(
       test::error_message([&] { static_cast<void>(fit_bouc_wen(data, {.max_iterations = 1})); }),

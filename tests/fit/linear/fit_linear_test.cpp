@@ -50,7 +50,7 @@ TEST(FitLinear, RecoversASpringAndLeavesRatesOut) {
   EXPECT_TRUE(fitted.notes.empty());
 }
 
-TEST(FitLinear, TellsTheStiffnessWithUnitAndError) {
+TEST(FitLinear, ReportsTheStiffnessWithUnitAndError) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(500), [](Row x) {
     return 0.7 + 350.0 * x[0] + 0.01 * std::sin(1e4 * x[0]);
   });
@@ -67,7 +67,7 @@ TEST(FitLinear, TellsTheStiffnessWithUnitAndError) {
   EXPECT_EQ(coulomb[4].unit, "rad/s");
 }
 
-TEST(FitLinear, GivesRatesASlopeWhenAsked) {
+TEST(FitLinear, GivesRatesASlopeIfRequested) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(500),
                                      [](Row x) { return 0.7 + 350.0 * x[0] - 2.0 * x[1]; });
   expect_coefficients(fit_linear(data, {.rates = true}).parameters.coefficients,
@@ -84,7 +84,7 @@ TEST(FitLinear, LearnsOnlyFromUsableSamples) {
   expect_coefficients(fit_linear(data, {}).parameters.coefficients, {0.7, 350.0, 0.0});
 }
 
-TEST(FitLinear, LeavesAConstantInputOutAndSaysSo) {
+TEST(FitLinear, LeavesAConstantInputOutAndReportsIt) {
   const auto data = with_condition({0.033}, [](Row x) { return 1.0 + 10.0 * x[0]; });
   const auto fitted = fit_linear(data, {});
   expect_coefficients(fitted.parameters.coefficients, {1.0, 10.0, 0.0, 0.0});
@@ -92,7 +92,7 @@ TEST(FitLinear, LeavesAConstantInputOutAndSaysSo) {
             std::vector<std::string>{"input support_m is constant in the training data: no term"});
 }
 
-TEST(FitLinear, LeavesADependentInputOutAndSaysSo) {
+TEST(FitLinear, LeavesADependentInputOutAndReportsIt) {
   auto data = with_condition({0.0, 1.0}, [](Row x) { return 1.0 + 10.0 * x[0]; });
   for (std::size_t n = 0; n < data.sequences[0].features.rows; ++n)
     data.sequences[0].features(n, 2) = 3.0 - 2.0 * data.sequences[0].features(n, 0);
@@ -187,7 +187,7 @@ TEST(FitLinearCoulomb, SharesOneScaleBetweenAllKnots) {
                       {0.0, 10.0, 0.0, 0.0, 1.0, 0.0, 10.0, 0.0, 0.0, 2.0}, 1e-5);
 }
 
-TEST(FitLinearCoulomb, SaysWhenTheFrictionIsViscous) {
+TEST(FitLinearCoulomb, ReportsWhenTheFrictionIsViscous) {
   const auto data = training_data_of(deflection_and_rate(), oscillation(2000),
                                      [](Row x) { return 600.0 * x[0] + 2.0 * x[1]; });
   const auto fitted = fit_linear_coulomb(data, {});
@@ -198,9 +198,8 @@ TEST(FitLinearCoulomb, SaysWhenTheFrictionIsViscous) {
 TEST(FitLinearCoulomb, NeedsARateThatMoves) {
   const auto target = [](Row) { return 1.0; };
   const auto none = training_data_of({{.expression = "x"}}, Matrix(100, 1, 1.0), target);
-  EXPECT_NE(
-      refusal([&] { return fit_linear_coulomb(none, {}); }).find("no input that tells a rate"),
-      std::string::npos);
+  EXPECT_NE(refusal([&] { return fit_linear_coulomb(none, {}); }).find("no input that is a rate"),
+            std::string::npos);
   const auto still = training_data_of(deflection_and_rate(), Matrix(100, 2), target);
   EXPECT_NE(refusal([&] { return fit_linear_coulomb(still, {}); }).find("0 throughout"),
             std::string::npos);

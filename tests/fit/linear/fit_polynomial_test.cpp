@@ -74,7 +74,7 @@ TEST(FitPolynomial, BeatsOneCurveOnANoisyLoop) {
   EXPECT_LT(two, 0.5 * one);
 }
 
-TEST(FitPolynomial, DerivesItsDeadBandFromResolutionAndRangeAndSaysSo) {
+TEST(FitPolynomial, DerivesItsDeadBandFromResolutionAndRangeAndReportsIt) {
   const auto coarse = training_data_of(
       {{.expression = "x"}},
       [] {
@@ -129,15 +129,16 @@ TEST(FitPolynomial, SchedulesItsCurvesOverACondition) {
       });
   const auto fitted = fit_polynomial(data, {.dead_band = 0.001, .schedule = "support_m"});
   EXPECT_EQ(fitted.parameters.coefficients.knots, (std::vector{0.1, 0.3}));
-  // Two knots: a straight line between them, here exactly right.
+  // Two knots: linear interpolation between them, here exact.
   Polynomial model(fitted.parameters);
   model.step(std::array{0.0, 0.2});
   EXPECT_NEAR(model.step(std::array{0.05, 0.2}).value, 110.0 * 0.05 + 2.0, 1e-9);
   EXPECT_NEAR(model.step(std::array{0.04, 0.2}).value, 110.0 * 0.04 - 2.0, 1e-9);
 }
 
-TEST(FitPolynomial, KnowsWhereEachCurveHasData) {
-  // It falls all the way, but rises over the lower fifth only: what degree 5 says above is anything.
+TEST(FitPolynomial, StoresTheRangeOfEachCurvesData) {
+  // It falls all the way, but rises over the lower fifth only: above, degree 5 extrapolates without
+  // bound.
   Matrix features(2000, 1);
   for (std::size_t n = 0; n < 1000; ++n) {
     features(n, 0) = 0.1 - 0.2 * static_cast<double>(n) / 999.0;
@@ -156,7 +157,7 @@ TEST(FitPolynomial, KnowsWhereEachCurveHasData) {
   }
 }
 
-TEST(FitPolynomial, KnowsWhereEachKnotHasData) {
+TEST(FitPolynomial, StoresTheRangeOfEachKnotsData) {
   Matrix features(8000, 2);
   const Matrix loop = triangle(8000);
   for (std::size_t n = 0; n < features.rows; ++n) {
@@ -172,7 +173,7 @@ TEST(FitPolynomial, KnowsWhereEachKnotHasData) {
   EXPECT_EQ(model.step(std::array{0.019, 0.3}).fault, Fault::none);
 }
 
-TEST(FitPolynomial, RefusesDataThatCannotTellItsCurves) {
+TEST(FitPolynomial, RefusesDataThatDoNotDetermineItsCurves) {
   const auto message = [](const TrainingData& data) -> std::string {
     try {
       (void)fit_polynomial(data, {});

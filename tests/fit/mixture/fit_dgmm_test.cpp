@@ -103,7 +103,7 @@ TEST(FitDgmm, ItsLineLeavesRatesOut) {
   EXPECT_TRUE(std::isfinite(clamp.intercept));
 }
 
-// A spread of an expression says nothing about what a sensor resolves.
+// The spread of an expression is not related to the resolution of a sensor.
 TEST(FitDgmm, OnlyAChannelHasTheResolutionOfItsSensor) {
   TrainingData data = sweeps(1000, 1, 1e-5);
   constexpr double kResolution_rad = rad_from_deg(0.01);
@@ -143,7 +143,7 @@ TEST(FitDgmm, IsDeterministicForAnyNumberOfThreads) {
             fit_dgmm(sweeps(3000, 1), two).parameters.mixture);
 }
 
-TEST(FitDgmm, AcceptsInputsThatSayTheSame) {
+TEST(FitDgmm, AcceptsLinearlyDependentInputs) {
   TrainingData data = sweeps(2000, 1);
   data.inputs[1] = data.inputs[0];
   for (Sequence& sequence : data.sequences)
@@ -223,7 +223,7 @@ TEST(FitDgmmSpread, OfOneRecordIsFoundByItsBlocks) {
   EXPECT_NE(fit_dgmm(data).notes.at(0).find("a fifth of the record at a time"), std::string::npos);
 }
 
-TEST(FitDgmmSpread, StaysAtTheDefaultWhereNoRecordCanBeJudgedByTheOthers) {
+TEST(FitDgmmSpread, StaysAtTheDefaultWhereNoRecordCanBeEvaluatedByTheOthers) {
   TrainingData data = supports(0.8, 1.2);
   data.sequences.resize(2);
   const Fitted<Dgmm> fitted = fit_dgmm(data);
@@ -234,7 +234,7 @@ TEST(FitDgmmSpread, StaysAtTheDefaultWhereNoRecordCanBeJudgedByTheOthers) {
   EXPECT_EQ(fitted.parameters.mixture, fit_dgmm(data, given).parameters.mixture);
 }
 
-TEST(FitDgmm, SaysWhatIsWrong) {
+TEST(FitDgmm, StatesWhatIsWrong) {
   TrainingData empty = sweeps(10, 1);
   for (Sequence& sequence : empty.sequences) sequence.use.assign(10, 0);
   EXPECT_THROW(static_cast<void>(fit_dgmm(empty)), Error);

@@ -29,7 +29,7 @@ void learn_all(OnlineMixture& learner, const Matrix& samples) {
   for (std::size_t i = 0; i < samples.rows; ++i) learner.learn(samples.row(i));
 }
 
-// Sum over components of counts, means and scatters about zero, from what the mixture tells.
+// Sum over components of counts, means and scatters about zero, computed from the mixture.
 struct Totals {
   std::vector<double> first;
   Matrix second;
@@ -138,8 +138,8 @@ TEST(OnlineMixture, GivesASampleToTheNearestOfManyComponents) {
   }
 }
 
-// Samples about the distance at which float32 has no squares any more: every slot that is free must
-// stay so, which a sanitiser sees, and the component that looks for a neighbour must find another.
+// Samples at about the distance at which squares overflow in float32: every free slot must remain
+// free, which a sanitiser checks, and the component that searches a neighbour must find another.
 TEST(OnlineMixture, AnEnormousSampleIsAComponentOfItsOwn) {
   for (const double far : {1e17, 2e18, 1.2e19, 1.8e19, 1e25, 1e45, 1e150}) {
     OnlineMixture learner(plain(3), {.components = 20});

@@ -92,7 +92,7 @@ TEST(FitNarxPolynomial, IsBiasedByNoiseOfTheSensorUntilItIsRefined) {
   EXPECT_LT(error(NarxTraining::free_run), 0.01);
 }
 
-TEST(FitNarxPolynomial, TellsItsEquationAndWhatEachTermExplains) {
+TEST(FitNarxPolynomial, ReportsItsEquationAndWhatEachTermExplains) {
   TrainingData data = known_system(4000, 0.0, 0.0, 4);
   const auto fitted = fit_narx_polynomial(data, {.terms = 5});
   const std::string equation = equation_of(fitted.parameters, kInputs, "y_1");

@@ -74,7 +74,7 @@ TEST(FitArx, RefinesAcrossAGapInTheTarget) {
   EXPECT_NEAR(fit_arx(data, kTrueOrder).parameters.model.coefficients.values.values[3], 1.6, 0.03);
 }
 
-TEST(NarxData, PutsInputsTheirLagsAndPastOutputsSideBySide) {
+TEST(NarxData, CombinesInputsTheirLagsAndPastOutputs) {
   TrainingData data = second_order(10, 0.0, 1);
   data.sequences[0].target[5] = std::numeric_limits<double>::quiet_NaN();
   data.sequences[0].use[5] = 0;
@@ -144,7 +144,7 @@ TEST(FitNarx, RefusesWhatItCannotDo) {
   const TrainingData brief = second_order(40, 0.1, 5);
   for (const char* family : {"arx", "narx_dgmm", "narx_polynomial"})
     EXPECT_THAT(test::error_message([&] { (void)fit_named(family, brief, {}); }),
-                HasSubstr("too short to judge a free run"))
+                HasSubstr("too short to evaluate a free run"))
         << family;
 }
 

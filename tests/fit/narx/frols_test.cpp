@@ -160,14 +160,14 @@ TEST(Frols, PassesOverCandidatesThatAreAlike) {
   for (std::size_t n = 0; n < x.rows; ++n) {
     x(n, 2) = x(n, 1);                  // a copy
     x(n, 3) = 4.0;                      // like the constant
-    x(n, 4) = 2.0 * x(n, 0) - x(n, 1);  // of both
+    x(n, 4) = 2.0 * x(n, 0) - x(n, 1);  // combination of both
   }
   std::vector<double> y;
   Random random(3);
   for (std::size_t n = 0; n < x.rows; ++n)
     y.push_back(1.0 + x(n, 0) + 2.0 * x(n, 1) + random.normal());
   const Frols found = frols(x, y, {.degree = 2, .terms = 20});
-  // Of two free inputs there are six monomials that differ.
+  // Two free inputs have six different monomials.
   ASSERT_EQ(found.sizes.size(), 6U);
   for (const double coefficient : found.sizes.back().coefficients)
     EXPECT_LT(std::abs(coefficient), 1e3);

@@ -21,7 +21,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// Sum of sines; the target is what the input was `delay` samples ago. No single sample tells it.
+// Sum of sines; the target is the input `delay` samples ago. No single sample determines it.
 TrainingData delayed_sines(std::size_t records, std::size_t samples, std::size_t delay) {
   Random random(17);
   TrainingData data;
@@ -81,7 +81,7 @@ double spread(const TrainingData& data) {
   return std::sqrt(square / count - sum * sum / (count * count));
 }
 
-TEST(FitNetwork, AnLstmRemembersWhatAStaticNetworkCannot) {
+TEST(FitNetwork, AnLstmFitsAMemoryThatAStaticNetworkCannot) {
   const TrainingData data = delayed_sines(5, 1500, 8);
   TrainingData test = delayed_sines(6, 600, 8);
   test.sequences.erase(test.sequences.begin(), test.sequences.begin() + 5);  // a phase of its own
@@ -179,7 +179,7 @@ TEST(FitNetwork, KeepsTheWeightsOfTheBestEpochAndStopsWithoutABetterOne) {
   for (double& value : data.sequences[0].features.values) value = random.normal();
   data.sequences.push_back(data.sequences[0]);
   for (double& value : data.sequences[1].target) value = random.normal();
-  const TrainingData judge = [&] {
+  const TrainingData validation = [&] {
     TrainingData other = data;
     other.sequences.erase(other.sequences.begin());
     return other;
@@ -188,22 +188,22 @@ TEST(FitNetwork, KeepsTheWeightsOfTheBestEpochAndStopsWithoutABetterOne) {
 
   MlpOptions options{.layers = {40, 40}};
   options.training = {.epochs = 200, .batch = 16, .learning_rate = 5e-3, .patience = 4};
-  const Fitted<Mlp> stopped = fit_mlp(data, options, {.seed = 1, .validation = &judge});
+  const Fitted<Mlp> stopped = fit_mlp(data, options, {.seed = 1, .validation = &validation});
   EXPECT_THAT(stopped.notes, testing::Contains(HasSubstr("no better loss for 4 epochs")));
   options.training.patience = 0;
-  const Fitted<Mlp> all = fit_mlp(data, options, {.seed = 1, .validation = &judge});
-  EXPECT_LE(free_run_rmse(Mlp(all.parameters), judge, 0),
-            free_run_rmse(Mlp(stopped.parameters), judge, 0) * (1.0 + 1e-6));
+  const Fitted<Mlp> all = fit_mlp(data, options, {.seed = 1, .validation = &validation});
+  EXPECT_LE(free_run_rmse(Mlp(all.parameters), validation, 0),
+            free_run_rmse(Mlp(stopped.parameters), validation, 0) * (1.0 + 1e-6));
   // The same course, cut where the best epoch was, ends with the same weights.
   std::size_t best = 0;
   ASSERT_EQ(std::sscanf(stopped.notes.front().c_str(), "weights of epoch %zu", &best), 1);
   EXPECT_LT(best, 100U);
   options.training.epochs = best;
-  EXPECT_EQ(fit_mlp(data, options, {.seed = 1, .validation = &judge}).parameters,
+  EXPECT_EQ(fit_mlp(data, options, {.seed = 1, .validation = &validation}).parameters,
             stopped.parameters);
 }
 
-/// Stops a fit at the `calls`-th report and keeps where it stood.
+/// Stops a fit at the `calls`-th report and keeps its checkpoint.
 template <class Fit>
 TrainingCheckpoint stopped_at(std::size_t calls, const Fit& fit) {
   TrainingCheckpoint kept;
@@ -215,7 +215,8 @@ TrainingCheckpoint stopped_at(std::size_t calls, const Fit& fit) {
   return kept;
 }
 
-/// Of a single record whose last fifth is held out behind an embargo of a hundredth.
+/// Batches per epoch for a single record whose last fifth is held out after an embargo of a
+/// hundredth.
 std::size_t batches_an_epoch(const TrainingData& data, std::size_t batch) {
   const std::size_t samples = data.sequences.front().target.size();
   const std::size_t learned = samples - samples / 5 - samples / 100;
@@ -266,7 +267,7 @@ TEST(FitNetwork, WindowsNeitherLeaveARecordNorCrossAGapInItsInputs) {
   EXPECT_EQ(set.starts, expected);
 }
 
-TEST(FitNetwork, LeavesWindowsOutThatHaveNothingToLearn) {
+TEST(FitNetwork, LeavesOutWindowsWithoutTargets) {
   TrainingData data = delayed_sines(1, 100, 3);
   for (std::size_t n = 0; n < 60; ++n) data.sequences[0].use[n] = 0;
   const auto parts = whole_sequences(data);
@@ -340,7 +341,7 @@ TEST(FitNetwork, RefusesOptionsOutOfRange) {
   refused([](RecurrentOptions& o) { o.training.clip = std::nan(""); });
 }
 
-TEST(FitNetwork, AnExplodingLossKeepsTheBestOrSaysSo) {
+TEST(FitNetwork, AnExplodingLossKeepsTheBestOrIsReported) {
   const TrainingData data = test::noisy_spring();
   MlpOptions options{.activation = Activation::linear};
   options.training = {.epochs = 30, .learning_rate = 1e30, .clip = 0.0, .patience = 0};

@@ -46,25 +46,25 @@ TEST(FitDynamicBoucWen, FindsWhatMadeTheRecordWithinItsErrorBars) {
   EXPECT_EQ(fitted.parameters.mass, fitted.table[0].value);
 }
 
-TEST(FitDynamicBoucWen, FindsTheExponentIfAsked) {
+TEST(FitDynamicBoucWen, FindsTheExponentIfRequested) {
   const TrainingData data =
       recorded(hysteretic(1.5), multisine(1500, 750.0, 5.0, 100.0, 60.0), 1e-7);
   const auto fitted = fit_dynamic_bouc_wen(data, {.exponent = NAN});
   EXPECT_NEAR(fitted.parameters.exponent, 1.5, 0.05);
 }
 
-TEST(FitDynamicBoucWen, SaysWhichParametersTheRecordCannotTell) {
+TEST(FitDynamicBoucWen, StatesWhichParametersTheRecordDoesNotDetermine) {
   // Without hysteresis in the record: a spring is a spring, whichever of the two carries it.
   auto parameters = hysteretic().parameters();
   parameters.loss = parameters.skew = 0.0;
   const TrainingData data =
       recorded(DynamicBoucWen(parameters), multisine(2000, 750.0, 5.0, 100.0, 60.0), 0.0);
   const auto fitted = fit_dynamic_bouc_wen(data, {});
-  EXPECT_THAT(fitted.notes, Contains(HasSubstr("the data cannot tell")));
+  EXPECT_THAT(fitted.notes, Contains(HasSubstr("the data do not determine")));
   EXPECT_TRUE(std::isnan(fitted.table[2].std_error));
 }
 
-TEST(FitDynamicBoucWen, SaysWhyItCannotFit) {
+TEST(FitDynamicBoucWen, StatesWhyItCannotFit) {
   const std::vector<double> force = multisine(600, 750.0, 5.0, 100.0, 60.0);
   const TrainingData good = recorded(hysteretic(), force, 5e-6);
   const auto refused = [&](auto change, DynamicBoucWenOptions options = {}) {
@@ -112,7 +112,7 @@ TEST(FitRigidDrive, ChoosesATermThatIsThere) {
   EXPECT_THAT(with.notes, Contains(HasSubstr("chosen terms: quadratic")));
 }
 
-TEST(FitRigidDrive, SaysWhyItCannotFit) {
+TEST(FitRigidDrive, StatesWhyItCannotFit) {
   EXPECT_THAT(test::error_message(
                   [] { (void)fit_rigid_drive(carriage_record(), {.terms = "lugre+stribek"}); }),
               testing::AllOf(HasSubstr("stribek"), HasSubstr("Did you mean")));
@@ -122,7 +122,7 @@ TEST(FitRigidDrive, SaysWhyItCannotFit) {
               HasSubstr("accelerates the target in its own direction"));
 }
 
-/// Pushed by a hand that the record knows nothing of, from a speed of 0.3 m/s on.
+/// Pushed by an external force that is not recorded, from a speed of 0.3 m/s on.
 Recording drifting_record() {
   std::vector<double> force = multisine(4000, 1000.0, 0.5, 4.0, 80.0);
   RigidDrive drive = carriage();
@@ -138,7 +138,7 @@ Recording drifting_record() {
   return recording;
 }
 
-TEST(FitRigidDrive, PutsAStartByTheFirstSamplesHoweverFarTheRunDrifts) {
+TEST(FitRigidDrive, EstimatesAStartFromTheFirstSamplesHoweverFarTheRunDrifts) {
   Dataset dataset;
   dataset.target = "position_m";
   Recording recording = drifting_record();

@@ -85,10 +85,10 @@ TEST(FitViscoelastic, FindsTheParametersThatMadeTheData) {
   EXPECT_EQ(fitted.table[1].unit, "Nm s/rad");
   EXPECT_EQ(fitted.table.back().unit, "Nm");
   EXPECT_THAT(fitted.notes, Contains(HasSubstr("relaxes within 7.79 s, 0.386 s")));
-  EXPECT_THAT(fitted.notes, Not(Contains(HasSubstr("cannot tell"))));
+  EXPECT_THAT(fitted.notes, Not(Contains(HasSubstr("do not determine"))));
 }
 
-TEST(FitViscoelastic, TellsErrorsThatHoldInNoise) {
+TEST(FitViscoelastic, EstimatesStandardErrorsThatHoldInNoise) {
   const std::vector<double> expected = parse_network("003a").values();
   const auto fitted = fit_viscoelastic(data_of("003a", 0.05), {.network = "003a"});
   double squares = 0.0;
@@ -102,7 +102,7 @@ TEST(FitViscoelastic, TellsErrorsThatHoldInNoise) {
 }
 
 // Specification 3.6: six parameters, five coefficients.
-TEST(FitViscoelastic, SaysWhichCombinationTheDataCannotTell) {
+TEST(FitViscoelastic, StatesWhichCombinationTheDataDoNotDetermine) {
   const char* near_b = "parallel(series(kv(k2=30, d2=40), k3=60), maxwell(k6=40, d3=350), k5=9)";
   const char* near_d =
       "series(k7=300, parallel(k5=30, maxwell(k6=70, d3=500), maxwell(k4=9, d4=9)))";
@@ -111,7 +111,7 @@ TEST(FitViscoelastic, SaysWhichCombinationTheDataCannotTell) {
     const auto fitted = fit_viscoelastic(data_of(network, 0.02), {.network = network, .starts = 1});
     std::size_t nulls = 0;
     for (const std::string& note : fitted.notes) {
-      if (note.find("cannot tell") == std::string::npos) continue;
+      if (note.find("do not determine") == std::string::npos) continue;
       ++nulls;
       EXPECT_THAT(note, AllOf(HasSubstr(first), HasSubstr(second)));
     }
@@ -119,7 +119,7 @@ TEST(FitViscoelastic, SaysWhichCombinationTheDataCannotTell) {
   }
 }
 
-TEST(FitViscoelastic, TellsOnlyTheSumOfTwoSpringsSideBySide) {
+TEST(FitViscoelastic, EstimatesOnlyTheSumOfTwoParallelSprings) {
   const auto fitted =
       fit_viscoelastic(data_of("k1=40", 0.01), {.network = "parallel(k1, k2)", .starts = 2});
   EXPECT_NEAR(value_of(fitted, "k1") + value_of(fitted, "k2"), 40.0, 0.05);
@@ -127,7 +127,7 @@ TEST(FitViscoelastic, TellsOnlyTheSumOfTwoSpringsSideBySide) {
   EXPECT_TRUE(std::isnan(fitted.table[0].std_error));
 }
 
-TEST(FitViscoelastic, SaysThatNothingExcitedASlowRelaxation) {
+TEST(FitViscoelastic, ReportsThatNothingExcitedASlowRelaxation) {
   const auto fitted = fit_viscoelastic(data_of("003a", 0.001, 0.4), {.network = "003a"});
   EXPECT_THAT(fitted.notes, Contains(AllOf(HasSubstr("s (0.02 Hz) lies below the 0."),
                                            HasSubstr("k2, d2"), HasSubstr("add a slow record"))));

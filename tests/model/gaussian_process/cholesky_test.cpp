@@ -24,7 +24,7 @@ MatrixXd random_matrix(Index rows, Index columns, std::uint64_t seed) {
   return MatrixXd::NullaryExpr(rows, columns, [&] { return random.normal(); });
 }
 
-/// Its lower triangle; above it NaN, which nobody may read.
+/// Its lower triangle; above it NaN, which must not be read.
 SquareMatrix lower_of(const MatrixXd& matrix) {
   SquareMatrix lower(static_cast<std::size_t>(matrix.rows()));
   for (std::size_t i = 0; i < lower.size(); ++i)

@@ -42,7 +42,7 @@ Matrix standardised(const NetworkScaling& scaling, Features features) {
   return row;
 }
 
-TEST(GaussianProcess, SaysMeanAndSpreadOfItsDefinition) {
+TEST(GaussianProcess, ReturnsMeanAndSpreadOfItsDefinition) {
   auto model = example<GaussianProcess>();
   const auto& [scaling, expression, noise, points, weights, with_std_dev] = model.parameters();
   Eigen::MatrixXd k = covariance(expression, points, points);
@@ -67,7 +67,7 @@ TEST(GaussianProcess, SaysMeanAndSpreadOfItsDefinition) {
   });
 }
 
-TEST(GaussianProcess, LeavesTheSpreadOutIfToldSo) {
+TEST(GaussianProcess, LeavesTheSpreadOutIfConfiguredSo) {
   auto parameters = example<GaussianProcess>().parameters();
   parameters.with_std_dev = false;
   GaussianProcess plain(parameters);
@@ -78,7 +78,7 @@ TEST(GaussianProcess, LeavesTheSpreadOutIfToldSo) {
   EXPECT_TRUE(std::isnan(plain.step(x).novelty));
 }
 
-TEST(ParametricGp, SaysMeanAndSpreadOfItsDefinition) {
+TEST(ParametricGp, ReturnsMeanAndSpreadOfItsDefinition) {
   auto model = example<ParametricGp>();
   const ParametricGp::Parameters& p = model.parameters();
   const Matrix features = test::example_features(50, 2);
@@ -132,7 +132,7 @@ TEST(GaussianProcess, RefusesParametersThatMakeNone) {
 
 TEST(GaussianProcess, RefusesAKernelThatIsNotPositiveDefinite) {
   auto parameters = example<GaussianProcess>().parameters();
-  // (1 - R / 20)^10 rises again behind R = 20: far points would be closer than near ones.
+  // (1 - R / 20)^10 rises again for R > 20: far points would be closer than near ones.
   parameters.kernel = parse_kernel("rq", 2);
   parameters.kernel.nodes[0].shape = -10.0;
   parameters.kernel.nodes[0].length_scales = {0.1};

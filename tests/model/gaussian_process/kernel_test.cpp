@@ -223,7 +223,7 @@ TEST(Kernel, RefusesNumbersThatMakeNone) {
   EXPECT_THAT(complaint([](auto& k) { k.nodes.pop_back(); }), HasSubstr("one expression"));
   EXPECT_THAT(complaint([](auto& k) { k.nodes.erase(k.nodes.begin()); }), HasSubstr("fewer"));
   EXPECT_THAT(complaint([](auto& k) { k.nodes[0].length_scales.push_back(1.0); }),
-              HasSubstr("one an input"));
+              HasSubstr("one per input"));
   EXPECT_THAT(complaint([](auto& k) { k.nodes[0].length_scales[1] = 0.0; }),
               HasSubstr("length_scales"));
   EXPECT_THAT(complaint([](auto& k) { k.nodes[1].amplitude = -1.0; }), HasSubstr("amplitude"));

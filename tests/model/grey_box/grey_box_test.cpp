@@ -114,7 +114,7 @@ TEST(GreyBox, GoesOnFromAStateThatItIsGiven) {
   const double x = 0.3 * std::sin(0.3 * 49);
   GreyBox second(parameters);
   second.set_state(state);
-  // A start has no step behind it: the branch decays for a period more.
+  // The first sample has no increment: the branch decays for one more period.
   first.step(std::array{x});
   EXPECT_DOUBLE_EQ(estimate(first, x), (estimate(second, x), estimate(second, x)));
 }
@@ -127,7 +127,7 @@ TEST(GreyBox, BringsAStateOutOfBoundsToItsBoundAndPassesOverWhatIsNoNumber) {
   EXPECT_THAT(box.state(), testing::ElementsAre(1.0, 0.25));
 }
 
-/// A network that says `value` whatever it is told.
+/// A network whose output is `value` for any input.
 Mlp::Parameters constant_network(std::size_t inputs, double value) {
   Mlp::Parameters network;
   network.scaling.inputs.centre.assign(inputs, 0.0);
@@ -169,7 +169,7 @@ TEST(GreyBox, InvertsFromWhereItIsWithinItsCurve) {
   }
 }
 
-TEST(GreyBox, SaysWhereATargetIsBeyondItsCurve) {
+TEST(GreyBox, ReportsATargetBeyondItsCurve) {
   GreyBox::Parameters parameters = plain();
   parameters.coefficients.values.values = {-10.0, 0.0, 20.0, 0.0, 0.0};
   GreyBox box(parameters);

@@ -158,7 +158,7 @@ TEST(HammersteinWiener, SurvivesAnInputThatOverflows) {
   EXPECT_EQ(step(model, 0.3), step(other, 0.3));
 }
 
-TEST(HammersteinWiener, StaysAtTheEndOfItsRangeAndSaysSo) {
+TEST(HammersteinWiener, StaysAtTheEndOfItsRangeAndReportsIt) {
   const Parameters p = example_parameters();
   const double gain = dc_gain(p.sections);
   HammersteinWiener model(p);
@@ -208,9 +208,9 @@ TEST(StaticCurve, GoesThroughItsKnotsAndOnBeyondThem) {
 }
 
 TEST(StaticCurve, IsTheSumOfItsValuesTimesTheirBasis) {
-  const StaticCurve pieces{.knots = {-1.0, 0.0, 2.0}, .values = {3.0, 0.5, 1.0}};
+  const StaticCurve segments{.knots = {-1.0, 0.0, 2.0}, .values = {3.0, 0.5, 1.0}};
   const StaticCurve powers{.values = {0.5, 1.0, -2.0, 0.3}, .centre = 0.4, .half_range = 1.7};
-  for (const StaticCurve& curve : {pieces, powers}) {
+  for (const StaticCurve& curve : {segments, powers}) {
     for (const double x : {-3.0, -1.0, -0.2, 0.0, 1.9, 2.0, 5.0}) {
       double sum = 0.0;
       for (std::size_t i = 0; i < curve.values.size(); ++i)
@@ -222,7 +222,7 @@ TEST(StaticCurve, IsTheSumOfItsValuesTimesTheirBasis) {
   }
 }
 
-TEST(StaticCurve, IsMonotoneBetweenItsTurns) {
+TEST(StaticCurve, IsMonotoneBetweenItsExtremes) {
   const StaticCurve cubic{.values = {0.0, -3.0, 0.0, 1.0}};  // turns at -1 and 1
   const Interval inner = monotone_part(cubic, {-1.5, 1.5});
   EXPECT_NEAR(inner.lowest, -1.0, 1e-12);
@@ -231,9 +231,9 @@ TEST(StaticCurve, IsMonotoneBetweenItsTurns) {
   EXPECT_NEAR(outer.lowest, 1.0, 1e-12);
   EXPECT_EQ(outer.highest, 4.0);
   const StaticCurve flat_then_up{.knots = {0.0, 1.0, 2.0, 3.0}, .values = {1.0, 0.0, 1.0, 0.0}};
-  const Interval piece = monotone_part(flat_then_up, {0.0, 3.0});
-  EXPECT_EQ(piece.lowest, 1.0);
-  EXPECT_EQ(piece.highest, 2.0);
+  const Interval part = monotone_part(flat_then_up, {0.0, 3.0});
+  EXPECT_EQ(part.lowest, 1.0);
+  EXPECT_EQ(part.highest, 2.0);
 }
 
 }  // namespace

@@ -91,7 +91,7 @@ TEST(TransferFunction, WarnsOfPolesThatNoContinuousSystemHas) {
   EXPECT_EQ(continuous_warning(sections_of({{1.0}, {1.0, -1.8, 0.9}}), kPeriod_s), "");
 }
 
-TEST(TransferFunction, KnowsThePolesAndZerosOfTheRefinedForm) {
+TEST(TransferFunction, HasThePolesAndZerosOfTheRefinedForm) {
   const ContinuousTransfer refined = continuous_of(Paper003::refined);
   const auto found = real_parts(polynomial_roots(refined.denominator));
   EXPECT_NEAR(found[0], -1.416, 1e-3);   // specification 2
@@ -101,7 +101,7 @@ TEST(TransferFunction, KnowsThePolesAndZerosOfTheRefinedForm) {
   EXPECT_NEAR(of_numerator[1], -0.0479, 1e-4);
 }
 
-// A straight line through a first-order lag: x' = -p x + u has a closed form between samples.
+// A ramp through a first-order lag: x' = -p x + u has a closed form between samples.
 TEST(TransferFunction, FirstOrderHoldIsExactForARamp) {
   const double rate = 3.0;
   const DiscreteTransfer held = first_order_hold({{1.0}, {1.0, rate}}, 0.1);
@@ -138,7 +138,7 @@ TEST(Sections, AreTheTransferFunctionThatTheyCameFrom) {
   }
 }
 
-TEST(Sections, TellSlowPolesApartThatOnePolynomialBlurs) {
+TEST(Sections, DistinguishSlowPolesThatOnePolynomialBlurs) {
   Sections sections(3, kSectionColumns);
   const std::vector<double> slow{0.9999, 0.9998, 0.9997, 0.9996, 0.9995, 0.9994};
   for (std::size_t i = 0; i < 3; ++i) {

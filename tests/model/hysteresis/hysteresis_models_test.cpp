@@ -102,7 +102,7 @@ TYPED_TEST_SUITE(EnergyLaws, Dissipative);
 TYPED_TEST(EnergyLaws, LosesEnergyOnEveryRepeatedLoop) {
   EXPECT_TRUE(rc::check([] {
     auto model = test::example<TypeParam>();
-    // A few turning points, run through again and again until the loop stands.
+    // A few turning points, repeated until the loop is periodic.
     const auto corners = *rc::gen::container<std::vector<int>>(4, rc::gen::inRange(-100, 101));
     std::vector<double> turns;
     for (const int each : corners) turns.push_back(1e-3 * each);
@@ -188,7 +188,7 @@ TEST(ImprovedModels, LoopsGrowWithTheRate) {
             1.1 * lost(test::example<ImprovedNonlinearBacklash>(), 0.0));
 }
 
-TEST(OperatorSums, StopsAndPlaysSayTheSame) {
+TEST(OperatorSums, StopsAndPlaysAreEquivalent) {
   auto stops = test::example<MaxwellSlipModel>();
   auto plays = test::example<PrandtlIshlinskii>();
   Random random(9);
@@ -206,7 +206,7 @@ TEST(PrandtlIshlinskii, AnInnerLoopLeavesNoTraceOnTheOuterOne) {
   const auto there = path_through({0.0, 0.09, -0.05}, 1e-3);
   torques(with, there);
   torques(without, there);
-  // Wiping out: the inner loop closes and is forgotten.
+  // Wiping out: the inner loop closes and no longer has an effect.
   torques(with, path_through({-0.05, 0.01, -0.02, 0.01, -0.05}, 1e-3));
   const auto onward = path_through({-0.05, -0.08, 0.09}, 1e-3);
   const auto remembered = torques(with, onward);
@@ -214,7 +214,7 @@ TEST(PrandtlIshlinskii, AnInnerLoopLeavesNoTraceOnTheOuterOne) {
   for (std::size_t n = 0; n < onward.size(); ++n) ASSERT_NEAR(remembered[n], expected[n], 1e-9);
 }
 
-TEST(PrandtlIshlinskii, LoopsBetweenTheSameTurnsAreCongruent) {
+TEST(PrandtlIshlinskii, LoopsBetweenTheSameTurningPointsAreCongruent) {
   const auto loop = path_through({-0.01, 0.02, -0.01}, 5e-4);
   const auto after = [&](const std::vector<double>& history) {
     auto model = test::example<PrandtlIshlinskii>();

@@ -87,17 +87,17 @@ TEST(SlipBank, DependsOnThePathAndNotOnItsSteps) {
   }
 }
 
-TEST(SlipBank, TellsWhatAStepWouldGiveWithoutTakingIt) {
+TEST(SlipBank, ReturnsTheForceOfAStepWithoutTakingIt) {
   SlipBank bank(kThresholds, "test");
   const std::vector<double> weights{1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0};
   bank.move(0.3);
   const std::vector<double> before(bank.forces().begin(), bank.forces().end());
-  const double foretold = bank.sum_after(-0.17, weights);
+  const double predicted = bank.sum_after(-0.17, weights);
   EXPECT_TRUE(std::ranges::equal(bank.forces(), before));
-  EXPECT_EQ(bank.step(-0.17, weights), foretold);
+  EXPECT_EQ(bank.step(-0.17, weights), predicted);
 }
 
-TEST(SlipBank, NoNumberMovesNothingAndAnEndlessStepSlipsAll) {
+TEST(SlipBank, NaNMovesNothingAndAnInfiniteStepSlipsAll) {
   SlipBank bank(std::vector{10.0, 0.0, 1e300}, std::vector{1.0, 0.5, 2.0}, "test");
   bank.step(0.05);
   const double before = bank.sum();
@@ -107,7 +107,7 @@ TEST(SlipBank, NoNumberMovesNothingAndAnEndlessStepSlipsAll) {
   EXPECT_EQ(bank.step(-std::numeric_limits<double>::infinity()), -3.0);
 }
 
-TEST(SlipBank, StartsWhereItIsPut) {
+TEST(SlipBank, StartsFromTheGivenState) {
   SlipBank bank(std::vector{10.0, 20.0, 5.0}, std::vector{1.0, 0.5, 2.0}, "test");
   bank.step(0.02);
   bank.set_forces(std::vector{3.0, -0.25, std::numeric_limits<double>::quiet_NaN()});

@@ -24,14 +24,14 @@ TEST(DirectionTracker, IsUnknownUntilTheSignalLeftTheDeadBand) {
             (std::vector{kUnknown, kUnknown, kFalling}));
 }
 
-TEST(DirectionTracker, TurnsBehindTheExtremeNotBehindTheLastSample) {
+TEST(DirectionTracker, ChangesRelativeToTheExtremeNotToTheLastSample) {
   // From the extreme 3.0 back in small steps: each is inside the dead band, their sum is not.
   EXPECT_EQ(
       directions(DirectionTracker(1.0), {0.0, 2.0, 3.0, 2.6, 2.2, 1.8, 1.9, 2.9}),
       (std::vector{kUnknown, kRising, kRising, kRising, kRising, kFalling, kFalling, kRising}));
 }
 
-TEST(DirectionTracker, NoiseInsideTheDeadBandNeverTurnsIt) {
+TEST(DirectionTracker, NoiseInsideTheDeadBandNeverChangesIt) {
   DirectionTracker tracker(0.5);
   tracker.step(0.0);
   for (int i = 1; i < 1000; ++i) {
@@ -43,7 +43,7 @@ TEST(DirectionTracker, NoiseInsideTheDeadBandNeverTurnsIt) {
   }
 }
 
-TEST(DirectionTracker, ForgetsAtReset) {
+TEST(DirectionTracker, IsUnknownAfterReset) {
   DirectionTracker tracker(1.0);
   tracker.step(0.0);
   ASSERT_EQ(tracker.step(2.0), kRising);

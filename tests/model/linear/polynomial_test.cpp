@@ -13,7 +13,7 @@ namespace {
 
 using test::example;
 
-double says(Polynomial& model, double x0, double x1 = 0.0) {
+double output(Polynomial& model, double x0, double x1 = 0.0) {
   return model.step(std::array{x0, x1}).value;
 }
 
@@ -21,13 +21,13 @@ TEST(Polynomial, TakesTheBranchOfItsDirectionAndTheMeanBeforeItHasOne) {
   auto model = example<Polynomial>();
   const auto rising = [](double z) { return 1.2 + 50.0 * z - z * z + 12.0 * z * z * z; };
   const auto falling = [](double z) { return -1.1 + 52.0 * z + 0.5 * z * z + 10.0 * z * z * z; };
-  EXPECT_NEAR(says(model, 0.01), 0.5 * (rising(0.1) + falling(0.1)), 1e-13);
-  EXPECT_NEAR(says(model, 0.05), rising(0.5), 1e-13);
-  EXPECT_NEAR(says(model, 0.049), rising(0.49), 1e-13) << "inside the dead band of 0.002";
-  EXPECT_NEAR(says(model, 0.047), falling(0.47), 1e-13);
-  EXPECT_NEAR(says(model, 0.047, 2.0), falling(0.47) + 0.8, 1e-13) << "linear second input";
+  EXPECT_NEAR(output(model, 0.01), 0.5 * (rising(0.1) + falling(0.1)), 1e-13);
+  EXPECT_NEAR(output(model, 0.05), rising(0.5), 1e-13);
+  EXPECT_NEAR(output(model, 0.049), rising(0.49), 1e-13) << "inside the dead band of 0.002";
+  EXPECT_NEAR(output(model, 0.047), falling(0.47), 1e-13);
+  EXPECT_NEAR(output(model, 0.047, 2.0), falling(0.47) + 0.8, 1e-13) << "linear second input";
   model.reset();
-  EXPECT_NEAR(says(model, 0.01), 0.5 * (rising(0.1) + falling(0.1)), 1e-13);
+  EXPECT_NEAR(output(model, 0.01), 0.5 * (rising(0.1) + falling(0.1)), 1e-13);
 }
 
 TEST(Polynomial, WithoutDirectionIsOneCurve) {
@@ -73,20 +73,20 @@ TEST(Polynomial, InvertsWithAnInputBeyondItsRange) {
   EXPECT_DOUBLE_EQ(model.invert(-1e6, std::array{0.0, 0.0}).value, -0.1);
 }
 
-TEST(Polynomial, StaysAtTheEndOfTheRangeOfItsDirectionAndSaysSo) {
+TEST(Polynomial, StaysAtTheEndOfTheRangeOfItsDirectionAndReportsIt) {
   Polynomial::Parameters parameters = example<Polynomial>().parameters();
   parameters.ranges = Matrix(1, 4);
-  parameters.ranges.values = {-0.1, 0.0, -0.1, 0.1};  // P+ knows the lower half alone
+  parameters.ranges.values = {-0.1, 0.0, -0.1, 0.1};  // P+ was fitted to the lower half only
   Polynomial model(parameters);
   const auto rising = [](double z) { return 1.2 + 50.0 * z - z * z + 12.0 * z * z * z; };
-  says(model, -0.1);
+  output(model, -0.1);
   EXPECT_EQ(model.step(std::array{0.004, 0.0}).fault, Fault::none) << "a twentieth beyond";
   const Estimate estimate = model.step(std::array{0.08, 0.0});
   EXPECT_EQ(estimate.fault, Fault::outside_training_range);
   EXPECT_NEAR(estimate.value, rising(0.05), 1e-12);
   const Estimate back = model.step(std::array{0.07, 0.0});
-  EXPECT_EQ(back.fault, Fault::none) << "falling, P- knows that";
-  // Backwards: what P+ says at the end of its range is the most that it says.
+  EXPECT_EQ(back.fault, Fault::none) << "falling, P- was fitted there";
+  // Inverse: the value of P+ at the end of its range is its maximum.
   model.step(std::array{-0.05, 0.0});
   model.step(std::array{-0.02, 0.0});
   const Estimate found = model.invert(rising(0.5), std::array{0.0, 0.0});

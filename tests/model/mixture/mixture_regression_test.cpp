@@ -189,7 +189,8 @@ TEST(MixtureRegression, DoesNotDependOnTheOrderOfComponents) {
 }
 
 TEST(MixtureRegression, FindsANarrowComponentThatFloatCannotPlace) {
-  // Two components a hundred times closer to each other than float32 can tell at their position.
+  // Two components a hundred times closer to each other than the resolution of float32 at their
+  // position.
   GaussianMixture mixture{.centre = {0.0, 0.0},
                           .scale = {1.0, 1.0},
                           .weights = {0.5, 0.5},
@@ -228,7 +229,7 @@ TEST(MixtureRegression, KeepsTheVarianceWhereANeighbourOfNoWeightIsFarOff) {
   }
 }
 
-TEST(MixtureRegression, AsksForTheInstructionSetsWhenConstructed) {
+TEST(MixtureRegression, DetectsTheInstructionSetsWhenConstructed) {
   if ((HWY_TARGETS & (HWY_TARGETS - 1)) == 0)
     GTEST_SKIP() << "compiled for a single instruction set: there is nothing to ask for";
   hwy::GetChosenTarget().DeInit();
@@ -236,7 +237,7 @@ TEST(MixtureRegression, AsksForTheInstructionSetsWhenConstructed) {
   EXPECT_TRUE(hwy::GetChosenTarget().IsInitialized());
 }
 
-TEST(MixtureRegression, SaysNaNWhereNoDensityIsLeft) {
+TEST(MixtureRegression, ReturnsNaNWhereNoDensityIsLeft) {
   MixtureRegression regression(random_mixture({}, 3), 0);
   for (const double value : {1e200, -1e300, std::numeric_limits<double>::infinity(),
                              std::numeric_limits<double>::quiet_NaN()}) {

@@ -47,11 +47,11 @@ TEST(Narx, TakesAMeasurementForItsLastOutput) {
   EXPECT_NEAR(corrected.step(features).value, 0.5 + 300.0 * 0.01 + 0.5 * 7.0, 1e-12);
 }
 
-TEST(Narx, StaysAtTheEndOfItsRangeAndSaysSo) {
+TEST(Narx, StaysAtTheEndOfItsRangeAndReportsIt) {
   auto parameters = test::example<Narx<Linear>>().parameters();
   parameters.lowest = -200.0;
   parameters.highest = 200.0;
-  parameters.model.coefficients.values.values.back() = 0.6;  // 0.6 + 0.6 > 1: it runs away
+  parameters.model.coefficients.values.values.back() = 0.6;  // 0.6 + 0.6 > 1: it diverges
   Narx<Linear> model(parameters);
   const std::vector<double> push{0.1, 0.0};
   Estimate estimate;

@@ -16,7 +16,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(Ensemble, TellsTheMeanOfItsMembersAndWhatTheyDisagreeBy) {
+TEST(Ensemble, ReturnsTheMeanOfItsMembersAndTheirSpread) {
   auto ensemble = test::example<GruEnsemble>();
   std::vector<Gru> members;
   for (const auto& parameters : ensemble.parameters().members) members.emplace_back(parameters);

@@ -53,7 +53,7 @@ double value_of(const DenseLayer& layer, const std::vector<float>& features) {
   return kScale * sum;
 }
 
-/// Nothing stands in the way of an update.
+/// Nothing prevents an update.
 AdaptationSettings unguarded(AdaptationRule rule = AdaptationRule::nlms) {
   return {.rule = rule,
           .step_size = 0.05,
@@ -65,7 +65,7 @@ AdaptationSettings unguarded(AdaptationRule rule = AdaptationRule::nlms) {
           .comparison_s = 1e6};
 }
 
-/// A frozen layer, and an adapter that is told what another layer says.
+/// A frozen layer, and an adapter whose references are the outputs of another layer.
 class Pupil {
  public:
   Pupil(const AdaptationSettings& settings, std::size_t inputs, std::uint64_t seed = 1)
@@ -85,8 +85,8 @@ class Pupil {
   UpdateOutcome learn(double wrong_by = 0.0) {
     return adapter.learn({.value = value_of(teacher, features) + wrong_by});
   }
-  /// The error after `count` lessons.
-  double taught(int count) {
+  /// The error after `count` updates.
+  double trained_error(int count) {
     for (int i = 0; i < count; ++i) {
       (void)step();
       (void)learn();
@@ -103,7 +103,7 @@ class Pupil {
   Random random_;
 };
 
-TEST(LastLayerAdapter, WithoutUpdatesTellsTheNetworksOwnValueToTheBit) {
+TEST(LastLayerAdapter, WithoutUpdatesReturnsTheNetworksOwnValueToTheBit) {
   for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
     Pupil pupil(unguarded(rule), 13);
     for (int i = 0; i < 20; ++i) {
@@ -141,13 +141,13 @@ TEST(LastLayerAdapter, NlmsTakesTheStepOfItsEquation) {
   });
 }
 
-TEST(LastLayerAdapter, NlmsConvergesToANoiselessTeacher) {
+TEST(LastLayerAdapter, NlmsConvergesToANoiselessReference) {
   for (const double step_size : {0.05, 1.0, 1.9}) {
     AdaptationSettings settings = unguarded();
     settings.step_size = step_size;
     Pupil pupil(settings, 20);
     const double before = std::abs(pupil.step());
-    EXPECT_LT(pupil.taught(6000), 1e-5 * before) << step_size;
+    EXPECT_LT(pupil.trained_error(6000), 1e-5 * before) << step_size;
     for (std::size_t j = 0; j < 20; ++j)
       EXPECT_NEAR(pupil.adapter.adapted().weights(0, j), pupil.teacher.weights(0, j), 1e-5);
   }
@@ -170,11 +170,11 @@ TEST(LastLayerAdapter, AFullNlmsStepMeetsTheSampleAndTwiceThatLeavesTheErrorAsLa
 TEST(LastLayerAdapter, LeakLeadsBackToTheFrozenWeights) {
   AdaptationSettings settings = unguarded();
   Pupil pupil(settings, 8);
-  (void)pupil.taught(3000);
+  (void)pupil.trained_error(3000);
   const double without = pupil.adapter.relative_change();
   settings.leak = 0.05;
   Pupil leaky(settings, 8);
-  (void)leaky.taught(3000);
+  (void)leaky.trained_error(3000);
   EXPECT_LT(leaky.adapter.relative_change(), 0.8 * without);
 }
 
@@ -234,7 +234,7 @@ TEST(LastLayerAdapter, RlsConvergesFasterThanNlms) {
   settings.initial_covariance = 100.0;
   Pupil rls(settings, 40);
   Pupil nlms(unguarded(), 40);
-  EXPECT_LT(rls.taught(120), 0.01 * nlms.taught(120));
+  EXPECT_LT(rls.trained_error(120), 0.01 * nlms.trained_error(120));
 }
 
 TEST(LastLayerAdapter, RlsStaysSoundForLongWithoutExcitation) {
@@ -260,7 +260,7 @@ TEST(LastLayerAdapter, RlsStaysSoundForLongWithoutExcitation) {
 
 // ---- guards -------------------------------------------------------------------------------------
 
-TEST(LastLayerAdapter, ErrorsWithinTheNoiseTeachNothing) {
+TEST(LastLayerAdapter, ErrorsWithinTheNoiseChangeNoWeights) {
   AdaptationSettings settings = unguarded();
   settings.sensor_std = 2.0;
   Pupil pupil(settings, 5);
@@ -272,7 +272,7 @@ TEST(LastLayerAdapter, ErrorsWithinTheNoiseTeachNothing) {
   EXPECT_EQ(pupil.learn(6.1), UpdateOutcome::updated);
 }
 
-TEST(LastLayerAdapter, ErrorsBeyondTheLargestTeachNothing) {
+TEST(LastLayerAdapter, ErrorsBeyondTheLargestChangeNoWeights) {
   AdaptationSettings settings = unguarded();
   settings.largest_error = kNaN;  // the network's scale
   Pupil pupil(settings, 5);
@@ -287,7 +287,7 @@ TEST(LastLayerAdapter, ErrorsBeyondTheLargestTeachNothing) {
   EXPECT_EQ(pupil.learn(kScale - 0.1), UpdateOutcome::updated);
 }
 
-TEST(LastLayerAdapter, AReferenceThatIsNoNumberChangesNothing) {
+TEST(LastLayerAdapter, AReferenceThatIsNotANumberChangesNothing) {
   for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
     Pupil pupil(unguarded(rule), 6);
     Pupil twin(unguarded(rule), 6);
@@ -307,10 +307,10 @@ TEST(LastLayerAdapter, AReferenceThatIsNoNumberChangesNothing) {
   }
 }
 
-TEST(LastLayerAdapter, FeaturesThatAreNoNumbersAreTold_AndTeachNothing) {
+TEST(LastLayerAdapter, FeaturesThatAreNotNumbersAreReportedAndChangeNoWeights) {
   for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
     Pupil pupil(unguarded(rule), 6);
-    (void)pupil.taught(10);
+    (void)pupil.trained_error(10);
     const DenseLayer before = pupil.adapter.adapted();
     for (const float bad :
          {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
@@ -344,7 +344,7 @@ TEST(LastLayerAdapter, HugeFeaturesLeaveTheStateFinite) {
   }
 }
 
-TEST(LastLayerAdapter, StaleReferencesTeachNothing) {
+TEST(LastLayerAdapter, StaleReferencesChangeNoWeights) {
   AdaptationSettings settings = unguarded();
   settings.oldest_reference_s = 0.004;
   Pupil pupil(settings, 5);
@@ -383,7 +383,7 @@ TEST(LastLayerAdapter, AFrozenReferenceIsStaleUntilItMoves) {
   EXPECT_EQ(pupil.adapter.learn({.value = 1.1}), UpdateOutcome::updated);
 }
 
-TEST(LastLayerAdapter, ASaturatedReferenceTeachesNothing) {
+TEST(LastLayerAdapter, ASaturatedReferenceChangesNoWeights) {
   AdaptationSettings settings = unguarded();
   settings.saturation = 50.0;
   Pupil pupil(settings, 5);
@@ -410,7 +410,7 @@ TEST(LastLayerAdapter, LearnsAtMostOnceFromAStep) {
 
 TEST(LastLayerAdapter, PausedKeepsWhatItLearned) {
   Pupil pupil(unguarded(), 5);
-  (void)pupil.taught(100);
+  (void)pupil.trained_error(100);
   const DenseLayer learned = pupil.adapter.adapted();
   pupil.adapter.pause();
   (void)pupil.step();
@@ -427,16 +427,16 @@ TEST(LastLayerAdapter, PausedKeepsWhatItLearned) {
 TEST(LastLayerAdapter, ResetMakesARunRepeatable) {
   for (const AdaptationRule rule : {AdaptationRule::nlms, AdaptationRule::rls}) {
     Pupil first(unguarded(rule), 11);
-    (void)first.taught(200);
+    (void)first.trained_error(200);
     Pupil again(unguarded(rule), 11, 7);
-    (void)again.taught(77);
+    (void)again.trained_error(77);
     LastLayerAdapter adapter = first.adapter;
     adapter.reset();
     EXPECT_EQ(adapter.adapted(), first.frozen);
     EXPECT_EQ(adapter.counts(), AdaptationCounts{});
     Pupil fresh(unguarded(rule), 11);
     fresh.adapter = adapter;
-    (void)fresh.taught(200);
+    (void)fresh.trained_error(200);
     EXPECT_EQ(fresh.adapter.adapted(), first.adapter.adapted());
     EXPECT_EQ(fresh.adapter.counts(), first.adapter.counts());
   }
@@ -446,7 +446,7 @@ TEST(LastLayerAdapter, IsDrawnBackToTheLargestChange) {
   AdaptationSettings settings = unguarded();
   settings.largest_change = 0.05;  // the teacher is twice as far away
   Pupil pupil(settings, 20);
-  (void)pupil.taught(3000);
+  (void)pupil.trained_error(3000);
   EXPECT_GT(pupil.adapter.counts().of(UpdateOutcome::limited), 100U);
   EXPECT_NEAR(pupil.adapter.relative_change(), 0.05, 0.002);
 }
@@ -506,7 +506,7 @@ TEST(LastLayerAdapter, RollsBackAfterTenSecondsOfBeingWorseThanFrozen) {
     EXPECT_EQ(adapter.counts().roll_backs, 0U);
     EXPECT_NE(adapter.adapted(), frozen);
     (void)adapter.step(features, 1.0);
-    adapter.pass_over(UpdateOutcome::no_estimate);  // ends the ten seconds and teaches nothing
+    adapter.pass_over(UpdateOutcome::no_estimate);  // ends the ten seconds and changes no weights
     EXPECT_EQ(adapter.counts().roll_backs, 1U);
     EXPECT_EQ(adapter.adapted(), frozen);
     EXPECT_EQ(adapter.step(features, 1.0), 1.0);
@@ -517,7 +517,7 @@ TEST(LastLayerAdapter, DoesNotRollBackWhatIsBetter) {
   AdaptationSettings settings = unguarded();
   settings.comparison_s = 0.5;
   Pupil pupil(settings, 10);
-  (void)pupil.taught(3000);
+  (void)pupil.trained_error(3000);
   EXPECT_EQ(pupil.adapter.counts().roll_backs, 0U);
 }
 
@@ -526,7 +526,7 @@ TEST(LastLayerAdapter, UnbelievableReferencesAreNoEvidenceAgainstIt) {
   settings.comparison_s = 0.2;
   settings.largest_error = 100.0;
   Pupil pupil(settings, 10);
-  (void)pupil.taught(1000);
+  (void)pupil.trained_error(1000);
   // 1e6 below: the frozen model, which is wrong by less here, would win by that alone.
   for (int n = 0; n < 400; ++n) {
     (void)pupil.step();

@@ -33,7 +33,7 @@ using testing::HasSubstr;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kSteps = 60;
 
-/// Of the network's answers over a run, relative to the spread of the target.
+/// Error of the network's outputs over a run, relative to the spread of the target.
 template <class Network>
 double largest_error(const NetworkShape& shape, std::uint64_t seed) {
   const auto parameters = random_network<Network>(shape, seed);
@@ -145,7 +145,7 @@ class Recurrent : public testing::Test {};
 using RecurrentNetworks = testing::Types<Lstm, Gru>;
 TYPED_TEST_SUITE(Recurrent, RecurrentNetworks);
 
-TYPED_TEST(Recurrent, WarmsUpForAsManySamplesAsItSays) {
+TYPED_TEST(Recurrent, WarmsUpForItsStatedNumberOfSamples) {
   TypeParam network(random_network<TypeParam>({.warm_up_samples = 3}, 2));
   const std::vector<double> features{0.1, 0.2};
   for (int run = 0; run < 2; ++run) {
@@ -172,7 +172,7 @@ TYPED_TEST(Recurrent, GoesOnFromAStateThatItGave) {
   }
 }
 
-TYPED_TEST(Recurrent, TellsWhatItsLastLayerSaw) {
+TYPED_TEST(Recurrent, ReturnsTheInputsOfItsLastLayer) {
   for (const std::vector<std::size_t>& hidden : {std::vector<std::size_t>{}, {5}}) {
     TypeParam network(random_network<TypeParam>({.units = {7}, .hidden = hidden}, 4));
     const TypeParam copy_before = network;
@@ -219,7 +219,7 @@ TYPED_TEST(Recurrent, ABankEqualsOneNetworkAJoint) {
   }
 }
 
-TEST(NetworkBank, RefusesToServeNobody) {
+TEST(NetworkBank, RefusesABankWithoutJoints) {
   EXPECT_THAT(error_message([] { LstmBank(random_network<Lstm>({}, 1), 0); }),
               HasSubstr("network bank: expected at least one joint, found none"));
 }

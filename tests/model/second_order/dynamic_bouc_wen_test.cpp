@@ -50,7 +50,7 @@ double answer_to_cube(double t) {
          std::exp(-decay * t) * (-a0 * std::cos(turn * t) + sine * std::sin(turn * t));
 }
 
-TEST(DynamicBoucWen, WithoutHysteresisAnswersACubicForceAsTheEquationDoes) {
+TEST(DynamicBoucWen, WithoutHysteresisFollowsTheEquationForACubicForce) {
   DynamicBoucWen model(oscillator(4));
   double worst = 0.0;
   for (int n = 0; n < 750; ++n) {
@@ -118,7 +118,7 @@ TEST(DynamicBoucWen, GivesBackNoMoreEnergyThanItWasGiven) {
   }
 }
 
-TEST(DynamicBoucWen, TellsTheFirstSampleFromTheStateItWasGiven) {
+TEST(DynamicBoucWen, ComputesTheFirstSampleFromTheGivenState) {
   DynamicBoucWen model(benchmark());
   model.reset();
   const std::vector<double> start{1e-3, -0.2, 20.0};
@@ -130,7 +130,7 @@ TEST(DynamicBoucWen, TellsTheFirstSampleFromTheStateItWasGiven) {
   EXPECT_TRUE(std::isfinite(model.state()[1]));
 }
 
-TEST(DynamicBoucWen, StopsAtTheEndOfItsRangeAndSaysSo) {
+TEST(DynamicBoucWen, StopsAtTheEndOfItsRangeAndReportsIt) {
   auto parameters = benchmark();
   parameters.highest = 1e-3;
   DynamicBoucWen model(parameters);

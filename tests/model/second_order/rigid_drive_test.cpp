@@ -26,7 +26,7 @@ RigidDrive::Parameters sliding(std::size_t substeps = 1) {
 
 double step(RigidDrive& model, double force) { return model.step({&force, 1}).value; }
 
-TEST(RigidDrive, BrakesAsCoulombSaysAndStays) {
+TEST(RigidDrive, BrakesByCoulombFrictionAndStays) {
   auto parameters = sliding();
   parameters.viscous = 0.0;
   parameters.time.input_order = 1;  // a cubic would overshoot where the force jumps
@@ -92,7 +92,7 @@ TEST(RigidDrive, NeedsTheBreakawayForceToStart) {
   EXPECT_GT(model.state()[1], 0.01);  // and then slides against less
 }
 
-TEST(RigidDrive, FeelsMoreFrictionWhereItsSlopeSays) {
+TEST(RigidDrive, HasMoreFrictionAccordingToItsSlope) {
   auto parameters = sliding();
   parameters.coulomb_slope = 0.5;
   RigidDrive model(parameters);

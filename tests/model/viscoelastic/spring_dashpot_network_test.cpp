@@ -86,13 +86,13 @@ TEST(SpringDashpotText, NamesItsElementsInOrder) {
   EXPECT_NEAR(parse_network("003a").values()[0], deg_from_rad(3.803), 1e-12);
 }
 
-TEST(SpringDashpotText, PointsAtTheMistakeAndSaysWhatWasExpected) {
+TEST(SpringDashpotText, PointsAtTheMistakeAndStatesWhatWasExpected) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "expected a network like series(kv(k1, d1), k2), or one of hooke, maxwell,"},
       {"series(k1, k2", "column 14: expected ',' or ')', found the end"},
       {"series(k1 k2)", "column 11: expected ',' and a second network to be in series, found 'k2'"},
       {"series(k1)", "column 10: expected ',' and a second network to be in series, found ')'"},
-      {"series k1", "column 8: expected '(' behind series, found 'k1'"},
+      {"series k1", "column 8: expected '(' after series, found 'k1'"},
       {"seires(k1, k2)", "column 1: expected series, parallel, kv, maxwell, a spring k1 or a"},
       {"series(k1, x2)", "column 12: expected series, parallel, kv, maxwell, a spring k1 or a"},
       {"series(k1,, k2)", "column 11: expected series, parallel, kv, maxwell, a spring k1"},
@@ -102,8 +102,8 @@ TEST(SpringDashpotText, PointsAtTheMistakeAndSaysWhatWasExpected) {
       {"kv(k1, d1, k2)", "column 10: expected ')': kv takes a spring and a dashpot, found ','"},
       {"maxwell(kv(k1, d1), d2)", "column 9: expected the spring of maxwell, like k1, found 'kv'"},
       {"series(kv(k1, d1), k1)",
-       "column 20: expected a name that stands nowhere else: each element is a parameter of its "
-       "own, found 'k1'"},
+       "column 20: expected a name that is used only once: each element is a separate "
+       "parameter, found 'k1'"},
       {"kv(k1, d1) k2", "column 12: expected the end, found 'k2'"},
       {"kv(k1=, d1)", "column 7: expected a start value, like 0.68, found ','"},
       {"kv(k1=-3, d1)", "column 7: expected a start value from 1e-12 to 1e+12"},
@@ -151,7 +151,7 @@ TEST(RelaxationSpectrum, RefusesNodesThatAreNoNetwork) {
               HasSubstr("node 1: expected 2 to 1 networks to join, found 2"));
   EXPECT_THAT(
       message({{.kind = 0, .value = 1.0}, {.kind = 0, .value = 1.0}, {.kind = 2, .children = 2}}),
-      HasSubstr("node 1: expected a name that stands nowhere else, found k"));
+      HasSubstr("node 1: expected a name that is used only once, found k"));
 }
 
 // Specification 7.
@@ -201,7 +201,7 @@ TEST(RelaxationSpectrum, OfTheStartValuesIsThePapersTransferFunction) {
   const RelaxationSpectrum spectrum = relaxation_spectrum(
       parse_network("series(kv(k1=0.684218, d1=14.2903), kv(k2=4.52983, d2=4.43722), k3=1.61244)"));
   const ContinuousTransfer g = continuous_of(Paper003::refined);
-  constexpr double kGains = 1137.56 * 0.00187;  // of the curves about 0
+  constexpr double kGains = 1137.56 * 0.00187;  // slopes of the curves at 0
   for (const double frequency : {0.001, 0.01, 0.1, 0.4, 1.0, 4.0, 20.0}) {
     const Complex s = at_Hz(frequency);
     const Complex expected = kGains * ((g.numerator[0] * s + g.numerator[1]) * s + g.numerator[2]) /
@@ -226,7 +226,7 @@ TEST(RelaxationSpectrum, Of003bAnd003cIsNearlyThatOf003a) {
   }
 }
 
-TEST(RelaxationSpectrum, OfSimpleNetworksIsWhatTheTextbookSays) {
+TEST(RelaxationSpectrum, OfSimpleNetworksIsTheTextbooks) {
   const auto of = [](const char* text) { return relaxation_spectrum(parse_network(text)); };
   EXPECT_EQ(of("kv(k1=3, d1=2)").stiffness, 3.0);
   EXPECT_EQ(of("kv(k1=3, d1=2)").damping, 2.0);

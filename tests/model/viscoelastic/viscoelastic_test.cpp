@@ -135,7 +135,7 @@ TEST(Viscoelastic, IsTheStateSpaceOfTheSpecification) {
 TEST(Viscoelastic, RelaxesAsTheStandardLinearSolidDoes) {
   Viscoelastic model = model_of("parallel(k0=300, maxwell(k1=120, d1=30))", 1e-3);
   (void)step(model, 0.0);
-  // A jump within one step: the branch has relaxed within it already, which the ramp tells.
+  // A jump within one step: the branch has relaxed within it already, as the ramp shows.
   const double held = -std::expm1(-1e-3 * 4.0) / (1e-3 * 4.0);
   for (int n = 0; n < 2000; ++n)
     ASSERT_NEAR(step(model, 0.1), 30.0 + 12.0 * held * std::exp(-n * 1e-3 * 4.0), 1e-12) << n;
@@ -155,7 +155,7 @@ TEST(Viscoelastic, IsExactOnARampAtAnyStep) {
   }
 }
 
-TEST(Viscoelastic, AtHalfTheRateTellsTheSameOnRamps) {
+TEST(Viscoelastic, HasTheSameOutputAtHalfTheRateOnRamps) {
   Viscoelastic fine = model_of("003c", 1e-3);
   Viscoelastic coarse = model_of("003c", 2e-3);
   for (int n = 0; n < 400; ++n) {
@@ -232,7 +232,7 @@ TEST(Viscoelastic, StaysAccurateWithStiffAndNearlyIntegratingParts) {
   EXPECT_NEAR(step(model, u), 11.0 * u, 1e-4);  // the slow one is a spring yet, to 5000 s / 1e9 s
 }
 
-TEST(Viscoelastic, StartsRelaxedOrWhereItIsTold) {
+TEST(Viscoelastic, StartsRelaxedOrFromTheGivenState) {
   Viscoelastic model = model_of("parallel(k0=300, maxwell(k1=120, d1=30))", 1e-3, 2.0);
   EXPECT_EQ(step(model, 0.1), 32.0);
   EXPECT_EQ(step(model, 0.1), 32.0);

@@ -15,44 +15,45 @@
 
 namespace torsio {
 
-/// A fitted model of any family, what the user should be told about the fit, and its parameters.
+/// A fitted model of any family, the messages about the fit for the user, and its parameters.
 struct FittedModel {
   AnyModel model;
   std::vector<std::string> notes;
   std::vector<FittedParameter> table = {};
-  /// On training data that the fit held out to choose by; NaN of families that do not. Error bars that no
-  /// validation records tell are no narrower.
+  /// RMSE on training data that the fit held out for its choices; NaN for families that hold out
+  /// none. Where error bars cannot be estimated on validation records, they are not smaller than
+  /// this.
   double held_out_rmse = kNotMeasured;
 };
 
-/// One setting besides the defaults that a structure search tries.
+/// One setting that a structure search tries in addition to the defaults.
 struct OptionVariation {
   std::string_view option;
   std::string_view value;
 };
 
-/// What the parameters of a model mean, for people.
+/// The meaning of a model's parameters, for display.
 struct ParameterDescription {
   std::vector<std::string> lines = {};             ///< "kernel se (length 1)"
   std::string covered = {};                        ///< prefix of the fields that the lines state
   std::vector<FittedParameter> coefficients = {};  ///< if a table of them states everything
 };
 
-/// How one family is trained: what `fit --list`, the command line, cross-validation, `compare` and the
-/// structure search know about it.
+/// How one family is trained: the information for `fit --list`, the command line, cross-validation,
+/// `compare` and the structure search.
 struct FamilyInfo {
   std::string_view name;
   std::string_view summary;              ///< one line
-  std::string_view model_family = name;  ///< of the models that it fits: "dgmm" of "dgmm_paper"
+  std::string_view model_family = name;  ///< family of the fitted models: "dgmm" for "dgmm_paper"
   std::span<const OptionInfo> options = {};
   /// Deterministic for a seed. @throws Error if the data do not suffice, Cancelled.
   FittedModel (*fit)(const TrainingData&, const Options&, const FitContext&) = nullptr;
-  bool is_spring = true;            ///< of its models: `FamilyTraits::is_spring`
-  bool can_resume = false;          ///< uses `FitContext::resume` and `keep`
-  bool only_if_named = false;       ///< not in `all`: slow, or made for other data than most have
-  bool in_search = !only_if_named;  ///< a structure search tries it
+  bool is_spring = true;                         ///< `FamilyTraits::is_spring` of its models
+  bool can_resume = false;                       ///< uses `FitContext::resume` and `keep`
+  bool only_if_named = false;                    ///< not in `all`: slow, or made for special data
+  bool in_search = !only_if_named;               ///< a structure search tries it
   std::vector<OptionVariation> variations = {};  ///< orders, sizes, structures that a search tries
-  /// Of its models' parameters; null: their fields say all.
+  /// Describes its models' parameters; null: their fields are sufficient.
   ParameterDescription (*describe)(const AnyParameters&, const EstimatorSettings&) = nullptr;
 };
 

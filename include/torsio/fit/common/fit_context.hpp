@@ -11,19 +11,20 @@ namespace torsio {
 
 class AnyModel;
 
-/// What surrounds a fit besides its data and options. Fits that end within seconds need only the
+/// The inputs of a fit in addition to data and options. Fits that end within seconds need only the
 /// first two.
 struct FitContext {
   std::uint64_t seed = 0;
   Progress progress = {};
-  /// Decides when to stop; null: a fitter that needs such records holds out some of its own.
+  /// Determines when to stop; null: a fitter that needs such records holds out some of the training
+  /// data.
   const TrainingData* validation = nullptr;
-  /// How wrong a model is in the use that it is fitted for (as f of a NARX model: in free run); null: a
-  /// fitter that chooses between models judges them by its own means.
+  /// The error of a model in its intended use (for example free run for a NARX model); null: a
+  /// fitter that chooses between models evaluates them by its own means.
   std::function<double(const AnyModel&)> error_of = {};
-  /// Go on from here; null: from the start.
+  /// Continue from this checkpoint; null: from the start.
   const TrainingCheckpoint* resume = nullptr;
-  /// Called before `Cancelled` is thrown, by fitters that can go on later.
+  /// Called before `Cancelled` is thrown, by fitters that can resume later.
   std::function<void(const TrainingCheckpoint&)> keep = {};
 };
 

@@ -8,8 +8,8 @@
 
 namespace torsio {
 
-/// What the user asked for -> what a model is built on: the wanted input expressions with every
-/// definition they need, so that the model's raw inputs are measured channels.
+/// From the user's inputs to those of the model: the wanted input expressions with every definition
+/// they need, so that the model's raw inputs are measured channels.
 ///
 /// Definitions are those of the recordings' mapping and, unless recorded themselves, the canonical
 /// ones (specification 0):
@@ -18,26 +18,25 @@ namespace torsio {
 ///     spring_deflection_rate_rad_s = rate(spring_deflection_rad)
 ///     joint_speed_rad_s = rate(joint_angle_rad)
 ///
-/// Without wanted inputs: the dataset's first
-/// input set, else the deflection, its 10 Hz-filtered rate and the filtered joint speed, as far as
-/// present.
+/// Without wanted inputs: the dataset's first input set, else the deflection, its 10 Hz-filtered
+/// rate and the filtered joint speed, as far as present.
 /// @throws Error listing the channels if an input needs one that a record lacks, or no default
 /// applies, or if two records define one name differently.
 [[nodiscard]] FeatureSpec resolve_inputs(const Dataset& dataset,
                                          const std::vector<std::string>& wanted);
 
-/// The first input at every sample of a recording, from a fresh pipeline; NaN where a raw channel
-/// is not finite. What a plot over "the input" needs.
+/// The first input at every sample of a recording, from a new pipeline; NaN where a raw channel is
+/// not finite. Used for plots over "the input".
 [[nodiscard]] std::vector<double> first_feature(const Recording& recording,
                                                 const FeatureSpec& spec);
 
 /// A raw input that the target was computed from, declared by the dataset or found in the data (the
-/// target is a straight line of the input to 3e-5 of its spread), or all inputs if only together
-/// they give the target so; empty if there is none. Such an
-/// input is a leak: a score with it means nothing.
+/// target is a linear function of the input to 3e-5 of its spread), or all inputs if they give the
+/// target only together; empty if there is none. Such an input is a leak: a score with it means
+/// nothing.
 [[nodiscard]] std::string find_leak(const Dataset& dataset, const FeatureSpec& spec);
 
-/// `find_leak`, and unless the user allows it, @throws UsageError if there is one.
+/// `find_leak`; if there is a leak and the user does not allow it, @throws UsageError.
 std::string refuse_leak(const Dataset& dataset, const FeatureSpec& spec, bool allow_leak);
 
 }  // namespace torsio

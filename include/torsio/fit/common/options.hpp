@@ -9,21 +9,21 @@
 
 namespace torsio {
 
-/// One setting of a fitter, as `--help`, the checks and later tuning read it. Options structs state it
-/// beside their fields (`fit/common/option_fields.hpp`), from which the tables are made.
+/// One setting of a fitter, for `--help`, the checks and later tuning. Options structs declare it
+/// next to their fields (`fit/common/option_fields.hpp`), from which the tables are made.
 struct OptionInfo {
   enum class Kind { number, integer, boolean, text, choice };
   std::string_view name;
   Kind kind = Kind::number;
-  std::string_view default_value = {};  ///< "auto": the fitter finds it
+  std::string_view default_value = {};  ///< "auto": the fitter determines it
   double minimum = 0.0;                 ///< numbers and integers only
   double maximum = 0.0;
   std::string_view help = {};
-  std::span<const std::string_view> choices = {};  ///< of `Kind::choice`
+  std::span<const std::string_view> choices = {};  ///< for `Kind::choice`
   bool takes_auto = false;  ///< `auto` may be given though it is not the default
 };
 
-/// Range or choices as help lists them: " (0 to 1)", " (adam, adamw)"; empty of other kinds.
+/// Range or choices as help lists them: " (0 to 1)", " (adam, adamw)"; empty for other kinds.
 [[nodiscard]] std::string range_of(const OptionInfo& option);
 
 /// Settings of one fit as given by the user (`--set name=value`), checked against a family's table.
@@ -39,7 +39,7 @@ class Options {
   [[nodiscard]] bool boolean(std::string_view name) const;
   [[nodiscard]] const std::string& text(std::string_view name) const;
 
-  /// Every setting with the value in force, defaults too: what a model's card keeps.
+  /// Every setting with its value, defaults included: stored in a model's card.
   [[nodiscard]] std::map<std::string, std::string> values() const {
     return {values_.begin(), values_.end()};
   }

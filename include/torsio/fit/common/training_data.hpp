@@ -11,7 +11,7 @@
 
 namespace torsio {
 
-/// One input of a model as a fitter sees it.
+/// Name and rate property of one input of a model.
 struct InputInfo {
   std::string expression;
   bool is_rate = false;  ///< FeaturePipeline::is_rate
@@ -23,14 +23,14 @@ struct Sequence {
   std::string recording;
   Matrix features = {};             ///< samples x inputs
   std::vector<double> target = {};  ///< NaN where not measured
-  /// 1: may be learned from (role, settled filters, fresh and finite target, finite features)
+  /// 1: usable for training (role, settled filters, fresh and finite target, finite features)
   std::vector<std::uint8_t> use = {};
 
-  /// False where a feature is not finite (a division, a power): no model is stepped there.
+  /// False where a feature is not finite (a division, a power): models skip this sample.
   [[nodiscard]] bool has_features(std::size_t sample) const;
 };
 
-/// What every fitter is given.
+/// The data for every fitter.
 struct TrainingData {
   std::vector<InputInfo> inputs = {};
   std::string target;

@@ -7,14 +7,14 @@
 
 namespace torsio {
 
-/// What shared code asks about a family, instead of comparing its name. A family whose answer is not
-/// the default has a member `static constexpr FamilyTraits kTraits`.
+/// Properties of a family that shared code uses instead of comparing names. A family that differs
+/// from the defaults has a member `static constexpr FamilyTraits kTraits`.
 struct FamilyTraits {
   /// The first input is the deflection of a spring; false: a force that drives a mass, whose motion
   /// is the target.
   bool is_spring = true;
   /// An equation of motion, which holds beyond the inputs that it was fitted to: the range guard
-  /// leaves it as much room again on either side.
+  /// adds as much room again on either side.
   bool extrapolates = false;
   /// The output is an integral of the input. The error of its first samples is that of a drift that
   /// has hardly begun, so it does not show how uncertain the start is.

@@ -14,19 +14,19 @@ namespace torsio {
 /// The inputs of one tick, in the order that the model's own `inputs` list names.
 using Features = std::span<const double>;
 
-/// What a model or an estimator says at one tick. `value` is finite in every case.
+/// The output of a model or an estimator at one tick. `value` is finite in every case.
 struct Estimate {
   double value = 0.0;  ///< in the target's unit
   double std_dev =
       kNotMeasured;  ///< one standard deviation, same unit; NaN where there is no evidence, never 0
-  double novelty = kNotMeasured;  ///< larger: less like the training data; NaN if untold
+  double novelty = kNotMeasured;  ///< larger: less like the training data; NaN if unknown
   Fault fault = Fault::none;
 };
 
-/// What every model family offers; tests/laws says what it must mean.
+/// The interface of every model family; tests/laws checks its meaning.
 ///
 /// `M::Parameters` is plain data with everything that `step` needs; constructing from it checks it
-/// and may throw `Error`. `step` may assume `input_count()` finite features (the estimator sees to
+/// and may throw `Error`. `step` may assume `input_count()` finite features (the estimator ensures
 /// both) and never allocates, locks or throws.
 template <class M>
 concept Model = std::copyable<M> && requires(M model, const M fixed, Features features) {
@@ -38,17 +38,17 @@ concept Model = std::copyable<M> && requires(M model, const M fixed, Features fe
   { model.step(features) } noexcept -> std::same_as<Estimate>;
 };
 
-/// A model whose memory is a few numbers that mean something (a creep, a bristle, a position), so
-/// that a run may start anywhere. `set_state` takes as many numbers as `state` has, brings those
-/// out of bounds (a force above its slip limit) to the nearest bound and passes over what is not
-/// finite; after `reset()` the state is that of a joint at rest.
+/// A model whose memory is a few interpretable numbers (a creep, a bristle, a position), so that a
+/// run may start from any state. `set_state` takes as many numbers as `state` has, limits them to
+/// their bounds (a force above its slip limit) and ignores those that are not finite; after
+/// `reset()` the state is that of a joint at rest.
 template <class M>
 concept HasState = Model<M> && requires(M model, const M fixed, std::span<const double> state) {
   { fixed.state() } noexcept -> std::same_as<std::span<const double>>;
   { model.set_state(state) } noexcept;
 };
 
-/// A model that feeds its own past output back: its output depends on its outputs before.
+/// A model that feeds its own past output back: its output depends on its earlier outputs.
 template <class M>
 concept FeedsBack = Model<M> && requires(M model, double measured) {
   { model.correct(measured) } noexcept;
@@ -62,7 +62,7 @@ concept Invertible = requires(M& model, double target, Features features) {
   { model.invert(target, features) } noexcept -> std::same_as<Estimate>;
 };
 
-/// A network whose last layer can be adapted: it shows the input of that layer in the last step.
+/// A network whose last layer can be adapted: it provides the input of that layer in the last step.
 template <class M>
 concept HasLastLayer = requires(const M& model) {
   { model.last_layer_input() } noexcept -> std::same_as<std::span<const float>>;
@@ -70,7 +70,7 @@ concept HasLastLayer = requires(const M& model) {
 
 namespace detail {
 
-/// Where a model has no inverse: the given first input, or 0 where that is no number.
+/// Where a model has no inverse: the given first input, or 0 where that is not a number.
 [[nodiscard]] inline Estimate no_inverse(Features features) noexcept {
   return {.value = std::isfinite(features[0]) ? features[0] : 0.0,
           .fault = Fault::model_not_finite};

@@ -17,8 +17,9 @@ namespace torsio {
 /// Normalised least mean squares, or recursive least squares with forgetting.
 enum class AdaptationRule : std::uint8_t { nlms, rls };
 
-/// How a last layer is adapted, and what keeps that safe. Errors, noise and limits of the reference
-/// are in the target's unit. `LastLayerAdapter` accepts the ranges that `visit_options` states.
+/// How a last layer is adapted, and the guards of the adaptation. Errors, noise and limits of the
+/// reference are in the target's unit. `LastLayerAdapter` accepts the ranges that `visit_options`
+/// states.
 struct AdaptationSettings {
   AdaptationRule rule = AdaptationRule::nlms;
   double step_size = 0.003;             ///< NLMS: mu; docs/decisions/0015
@@ -32,12 +33,12 @@ struct AdaptationSettings {
   double largest_error = kNotMeasured;  ///< NaN: the network's target_scale
   double oldest_reference_s = 0.0;      ///< an older value is stale; not negative
   double frozen_after_s = 0.2;
-  double saturation = kNotMeasured;  ///< of |reference|; NaN: nowhere
-  double largest_change = 0.2;       ///< rho, of |W - W0| over |W0|
+  double saturation = kNotMeasured;  ///< limit of |reference|; NaN: no limit
+  double largest_change = 0.2;       ///< rho, limit of |W - W0| / |W0|
   double comparison_s = 10.0;
 
   /// The settings that a user gives by name, with range and help. `rule` has a flag of its own, and
-  /// a recording's references are never old.
+  /// a recording's references are never stale.
   template <class Self, class Visit>
   static void visit_options(Self& self, const Visit& visit) {
     visit(self.step_size,
@@ -102,23 +103,23 @@ struct AdaptationSettings {
   }
 };
 
-/// What the sensor to learn from says at one tick.
+/// One measurement of the reference sensor, from which the layer is trained.
 struct ReferenceSample {
   double value = kNotMeasured;  ///< in the target's unit; NaN where nothing was measured
   double age_s = 0.0;           ///< since it was measured; not 0 for a value that is held
 };
 
-/// What became of one reference.
+/// The result of one reference.
 enum class UpdateOutcome : std::uint8_t {
-  updated,               ///< the weights have moved
-  limited,               ///< they have, and were drawn back to `largest_change`
-  paused,                ///< by the caller
-  warming_up,            ///< filters or hidden state have not settled
-  no_estimate,           ///< no step since the last reference, or a guard answered for the model
+  updated,      ///< the weights have changed
+  limited,      ///< they have changed, limited by `largest_change`
+  paused,       ///< by the caller
+  warming_up,   ///< filters or hidden state have not settled
+  no_estimate,  ///< no step since the last reference, or a guard replaced the model's value
   reference_not_finite,  ///< NaN or infinite: not measured
   reference_stale,       ///< older than `oldest_reference_s`, or frozen
   reference_saturated,   ///< at the end of the sensor's range
-  error_too_large,       ///< beyond `largest_error`: rather the sensor's fault than the weights'
+  error_too_large,       ///< beyond `largest_error`: probably a fault of the sensor
   dead_zone,             ///< no more than noise
 };
 inline constexpr std::size_t kUpdateOutcomes =
@@ -127,11 +128,11 @@ inline constexpr std::size_t kUpdateOutcomes =
 /// The enumerator's own spelling, for logs and JSON.
 [[nodiscard]] std::string_view name(UpdateOutcome outcome) noexcept;
 
-/// How often each came.
+/// Number of references with each result.
 struct AdaptationCounts {
   std::array<std::size_t, kUpdateOutcomes> outcomes{};
-  std::size_t roll_backs = 0;         ///< to the frozen weights, which had been better
-  std::size_t covariance_resets = 0;  ///< RLS: rounding had spoilt P
+  std::size_t roll_backs = 0;         ///< to the frozen weights, which had the smaller error
+  std::size_t covariance_resets = 0;  ///< RLS: P was not valid because of rounding
 
   [[nodiscard]] std::size_t of(UpdateOutcome outcome) const noexcept {
     return outcomes[static_cast<std::size_t>(outcome)];
@@ -142,7 +143,8 @@ struct AdaptationCounts {
   bool operator==(const AdaptationCounts&) const = default;
 };
 
-/// Adapts the last layer of a network to a reference, sample by sample, while the rest of it stays.
+/// Adapts the last layer of a network to a reference, sample by sample, while the other layers stay
+/// constant.
 ///
 /// With features h~ = [h; 1] of the last layer, its frozen weights W0 = [w; b], and the error
 /// e = reference - W h~ in standardised units:
@@ -156,9 +158,9 @@ struct AdaptationCounts {
 /// RMSE over the last `comparison_s` exceeds that of the frozen weights on the same samples. Samples
 /// whose reference is beyond the largest error of both do not count there.
 ///
-/// All in double. What is kept is W - W0: without updates the value is the network's, to the bit.
-/// Source: paper 004, specification 3.4. Cost for n features: NLMS 5 n multiply-adds; RLS one pass
-/// over n^2 / 2 doubles. Nothing is allocated after construction.
+/// All in double. The stored state is W - W0: without updates the value is the network's, to the
+/// bit. Source: paper 004, specification 3.4. Cost for n features: NLMS 5 n multiply-adds; RLS one
+/// pass over n^2 / 2 doubles. Nothing is allocated after construction.
 class LastLayerAdapter {
  public:
   /// @param last the network's last layer. @param target_scale of its `NetworkScaling`.
@@ -169,20 +171,21 @@ class LastLayerAdapter {
 
   [[nodiscard]] const AdaptationSettings& settings() const noexcept { return settings_; }
 
-  /// Back to the frozen weights; forgets what was learned and counted.
+  /// Returns to the frozen weights and resets the counters.
   void reset() noexcept TORSIO_REALTIME;
 
-  /// While paused, references are passed over; what was learned stays in use.
+  /// While paused, references are ignored; the adapted weights stay in use.
   void pause() noexcept { paused_ = true; }
   void resume() noexcept { paused_ = false; }
   [[nodiscard]] bool is_paused() const noexcept { return paused_; }
 
-  /// @param features what the last layer saw. @param frozen_value what the network made of them, in
-  /// the target's unit. @returns what the adapted weights make of them, or the frozen value if
-  /// something is not finite.
+  /// @param features input of the last layer. @param frozen_value the network's output for them, in
+  /// the target's unit. @returns the output with the adapted weights, or the frozen
+  /// value if something is not finite.
   double step(std::span<const float> features, double frozen_value) noexcept TORSIO_REALTIME;
 
-  /// Learns from the reference of the last step. Call it once a tick, with NaN where there is none.
+  /// Trains on the reference of the last step. Call it in every tick, with NaN where there is no
+  /// reference.
   UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
   /// Counts a tick whose estimate was not the model's: `warming_up` or `no_estimate`.
   UpdateOutcome pass_over(UpdateOutcome reason) noexcept TORSIO_REALTIME;
@@ -195,7 +198,7 @@ class LastLayerAdapter {
 
  private:
   [[nodiscard]] UpdateOutcome outcome_of(const ReferenceSample& reference) noexcept;
-  /// Why a reference is not to be believed; `updated` if it is.
+  /// Why a reference must not be used; `updated` if it may be.
   [[nodiscard]] UpdateOutcome doubt_about(const ReferenceSample& reference) const noexcept;
   void compare(double adapted_error, double frozen_error) noexcept;
   void roll_back() noexcept;
@@ -209,18 +212,18 @@ class LastLayerAdapter {
   double target_scale_;
   double bound_;  ///< on |W - W0|
   std::size_t frozen_after_ticks_;
-  std::size_t features_;  ///< of the last layer, without the 1
+  std::size_t features_;  ///< inputs of the last layer, without the 1
 
-  detail::AlignedVector<double> deviation_;  ///< W - W0, the bias behind the weights, padded
+  detail::AlignedVector<double> deviation_;  ///< W - W0, the bias after the weights, padded
   double square_ = 0.0;                      ///< its square
   detail::AlignedVector<double> extended_;   ///< h~ of the last step, padded
   double extended_square_ = 0.0;
-  double frozen_value_ = 0.0;   ///< of the last step
-  double adapted_value_ = 0.0;  ///< of the last step
+  double frozen_value_ = 0.0;   ///< at the last step
+  double adapted_value_ = 0.0;  ///< at the last step
   bool has_step_ = false;
 
   // RLS. The last rank-one update waits until the next pass over P, which then costs no more.
-  detail::AlignedVector<double> covariance_;  ///< as src/model/network/adaptation_kernels.hpp says
+  detail::AlignedVector<double> covariance_;  ///< layout: src/model/network/adaptation_kernels.hpp
   detail::AlignedVector<double>
       pending_;  ///< P is pending_scale_ (covariance_ - pending_ pending_')
   detail::AlignedVector<double> product_;  ///< P h~

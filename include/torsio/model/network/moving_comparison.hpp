@@ -8,10 +8,10 @@
 namespace torsio::detail {
 
 /// Compares two mean square errors over the last stretch of time, in blocks of a hundredth of it:
-/// sums of blocks do not drift, as running sums would. Nothing is allocated after construction.
+/// sums of blocks do not drift, unlike running sums. Nothing is allocated after construction.
 class MovingComparison {
  public:
-  /// @param ticks of the stretch, rounded up to a multiple of 100.
+  /// @param ticks length of the stretch, rounded up to a multiple of 100.
   explicit MovingComparison(std::size_t ticks);
 
   void reset() noexcept;

@@ -10,7 +10,8 @@
 
 namespace torsio {
 
-/// What stands behind a dense layer. The numbers are stored in model files: never reorder.
+/// The activation function after a dense layer. The numbers are stored in model files: never
+/// reorder.
 enum class Activation : std::uint8_t { linear = 0, relu = 1, tanh = 2, softsign = 3, elu = 4 };
 
 [[nodiscard]] std::string_view name(Activation activation) noexcept;
@@ -42,7 +43,7 @@ struct DenseLayer {
 ///
 /// Source: paper 004 Eqs. 3-8, specification 3.4.
 struct LstmLayer {
-  static constexpr std::string_view kFamily = "lstm";  ///< of a network of such layers
+  static constexpr std::string_view kFamily = "lstm";  ///< family of a network of such layers
 
   FloatMatrix input_weights;      ///< W: 4H x inputs
   FloatMatrix recurrent_weights;  ///< R: 4H x H
@@ -66,7 +67,7 @@ struct LstmLayer {
 ///
 /// Source: specification 3.4.
 struct GruLayer {
-  static constexpr std::string_view kFamily = "gru";  ///< of a network of such layers
+  static constexpr std::string_view kFamily = "gru";  ///< family of a network of such layers
 
   FloatMatrix input_weights;          ///< W: 3H x inputs
   FloatMatrix recurrent_weights;      ///< R: 3H x H
@@ -84,8 +85,8 @@ struct GruLayer {
   bool operator==(const GruLayer&) const = default;
 };
 
-/// What a network sees and says is standardised: x = (feature - centre) / scale, and the target is
-/// target.centre + target.scale y.
+/// Inputs and output of a network are standardised: x = (feature - centre) / scale, and the target
+/// is target.centre + target.scale y.
 struct NetworkScaling {
   Normaliser::Parameters inputs;
   double target_centre = 0.0;
@@ -111,7 +112,7 @@ template <class Layer>
   return count;
 }
 
-/// No layer wider, no network deeper: a file that says so is refused before memory is taken.
+/// Limits of width and depth: a file that exceeds them is rejected before memory is allocated.
 inline constexpr std::size_t kMaxUnits = 65536;
 inline constexpr std::size_t kMaxLayers = 64;
 
