@@ -1,4 +1,5 @@
-# An export set for each of runtime with files, realtime, lab and onnx, so that a robot that links runtime and files need not have the lab's libraries.
+# One export set each for runtime with files, realtime, lab and onnx, so that a robot that links runtime and files does not need the
+# libraries of the lab.
 include(CMakePackageConfigHelpers)
 set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
 
