@@ -10,19 +10,19 @@
 
 namespace torsio::bench {
 
-/// A folder of this process; what lies in it is gone at its end.
+/// A folder of this process; it is deleted at the end.
 [[nodiscard]] const std::filesystem::path& scratch_folder();
-/// Writes them there, raw, for a peer.
+/// Writes them there as raw doubles for a peer.
 void write_doubles(const char* file, const std::vector<double>& values);
 
 /// One measurement. A value in "<something>/s" is better the larger, any other the smaller.
 struct Row {
   double value = 0.0;
   std::string unit;
-  std::optional<double> floor = {};  ///< what this machine could do at best, same unit
+  std::optional<double> floor = {};  ///< the lower bound on this machine, same unit
 };
 
-/// The shortest of repeated runs: what the work costs when nothing disturbs it.
+/// The shortest of repeated runs: the time of the work without disturbance.
 template <class Work>
 double best_seconds(const Work& work, double at_least_s = 0.5, std::size_t at_least_runs = 5) {
   using Clock = std::chrono::steady_clock;
@@ -38,10 +38,10 @@ double best_seconds(const Work& work, double at_least_s = 0.5, std::size_t at_le
   return best;
 }
 
-/// Time to read `bytes` once, over and over, so that they lie in the nearest cache that holds them.
+/// Time to read `bytes` once, repeated so that they are in the nearest cache that is large enough.
 [[nodiscard]] double stream_seconds(std::size_t bytes);
 
-/// Multiply-adds of doubles that one thread does in a second.
+/// Multiply-adds of doubles per second in one thread.
 [[nodiscard]] double multiply_adds_per_second();
 /// Doubles in one vector.
 [[nodiscard]] std::size_t vector_lanes();

@@ -19,7 +19,7 @@ namespace {
 constexpr double kRate_Hz = 1000.0;
 constexpr std::size_t kTicks = 10000;
 
-/// Seconds a tick of `step(t_s)`, which returns a number that is kept.
+/// Seconds per call of `step(t_s)`, which returns a number that is kept.
 template <class Step>
 double seconds_a_tick(const Step& step) {
   double sum = 0.0;
@@ -73,7 +73,7 @@ EstimatorSettings settings_around_mixture() {
       .residuals = {}};
 }
 
-/// A tick of the torque loop of dfki-50 through this inverse.
+/// One step of the torque loop of dfki-50 through this inverse.
 template <SpringInverse I>
 Row torque_loop_row(I inverse, TorqueLoopCore::Settings settings = {}) {
   settings.deflection.joint = series_elastic_joint(data_sheet("dfki-50"));
@@ -110,7 +110,7 @@ Row impedance_step() {
   return {.value = seconds * 1e6, .unit = "us"};
 }
 
-/// The loop itself, with the line for an inverse.
+/// The loop itself, with a linear inverse.
 Row torque_loop_linear_step() {
   return torque_loop_row(LinearInverse(573.0),
                          {.friction = FrictionCompensation{}, .observer_cutoff_Hz = 5.0});

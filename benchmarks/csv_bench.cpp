@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kRows = 1000000;
 
-// Eight columns at 1 kHz with as many digits as loggers write; the angles are to be converted.
+// Eight columns at 1 kHz with the usual number of digits; the angles are converted.
 void write_log(const std::filesystem::path& file) {
   Random random(1);
   std::string text =
@@ -46,7 +46,7 @@ void read_once(const std::filesystem::path& file, std::vector<char>& block) {
 
 }  // namespace
 
-// As a user gets it: parsed, checked, hashed (SHA-256), converted to SI.
+// As for a user: parsed, checked, hashed (SHA-256), converted to SI.
 Row csv_load() {
   const std::filesystem::path file = scratch_folder() / "log.csv";
   write_log(file);

@@ -15,7 +15,7 @@ constexpr std::size_t kQueries = 100000;
 constexpr std::size_t kFewQueries = 1000;
 constexpr std::size_t kInputs = 3;
 
-// A lever swung to and fro on a spring with friction, the amplitude swelling: torque, deflection,
+// A lever moved back and forth on a spring with friction, with growing amplitude: torque, deflection,
 // deflection rate, joint speed. Numbers without unit, all of the order of one.
 Matrix spring_samples(std::size_t count, std::uint64_t seed) {
   Random random(seed);
@@ -134,12 +134,12 @@ void write_query_inputs() {
   const Matrix inputs = query_inputs(kFewQueries);
   write_doubles("queries.f64", inputs.values);
   MixtureRegression regression(mixture, 0);
-  std::vector<double> answers;
+  std::vector<double> conditionals;
   for (std::size_t i = 0; i < kFewQueries; ++i) {
     const Conditional answer = regression.query_exact(inputs.row(i));
-    answers.insert(answers.end(), {answer.mean, answer.variance, answer.log_density});
+    conditionals.insert(conditionals.end(), {answer.mean, answer.variance, answer.log_density});
   }
-  write_doubles("answers.f64", answers);
+  write_doubles("conditionals.f64", conditionals);
 }
 
 void write_em_inputs() {

@@ -7,8 +7,8 @@
 
 namespace torsio::bench {
 
-/// What a fit makes of a stiffening spring with three slip elements, a branch, and friction of its rate: one of
-/// the larger boxes.
+/// A fit of a stiffening spring with three slip elements, a branch, and friction of its rate: one of
+/// the larger models.
 inline GreyBox fitted_grey_box() {
   Random random(7);
   TrainingData data{

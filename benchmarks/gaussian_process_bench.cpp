@@ -17,10 +17,10 @@ namespace torsio::bench {
 namespace {
 
 constexpr std::size_t kInputs = 3;
-constexpr std::size_t kRegressors = 15;  // of paper 002
+constexpr std::size_t kRegressors = 15;  // as in paper 002
 constexpr std::size_t kClusters = 14;
 
-using Samples = Table;  ///< standardised as it is
+using Samples = Table;  ///< already standardised
 
 /// A smooth function with noise, everything of about unit size.
 Samples samples_of(std::size_t count, std::size_t inputs) {
@@ -45,7 +45,7 @@ MarginalLikelihood process_of(const Samples& samples) {
   return {kernel_of("se", kInputs), samples.features, samples.target};
 }
 
-/// The search's own way: from one start, on a part of the samples first.
+/// As in the fit: from one start, on a part of the samples first.
 double best_likelihood(const Samples& samples) {
   MarginalLikelihood process = process_of(samples);
   Random random(1);
@@ -126,7 +126,8 @@ Row pgpr_200k() {
 }
 
 Row pgpr_step() {
-  constexpr std::size_t kTimed = 20;  // at once: short enough to be left alone on a busy machine
+  constexpr std::size_t kTimed =
+      20;  // in one run: short enough to be undisturbed on a loaded machine
   const Samples points = samples_of(kClusters, kRegressors);
   ParametricGp::Parameters parameters;
   parameters.scaling = no_scaling(kRegressors);

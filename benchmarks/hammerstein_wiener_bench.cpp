@@ -62,8 +62,7 @@ Row hw_step() {
   return {.value = seconds / kTimed * 1e9, .unit = "ns"};
 }
 
-/// Input and output scaled as our search has them, the numbers that it starts from, the error that it
-/// ends at.
+/// Input and output as scaled in our search, its start values, and its final error.
 void write_hw_40k() {
   const TrainingData data = samples();
   const WienerData own = wiener_data(data);

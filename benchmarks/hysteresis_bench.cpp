@@ -26,7 +26,7 @@ Row slip_bank_step() {
   const double seconds = best_seconds([&] {
     for (std::size_t n = 0; n < kSteps; ++n) torques[n] = bank.step(increments[n]);
   });
-  // A multiply-add, two comparisons as dear as one, and the sum.
+  // A multiply-add, two comparisons with the cost of one, and the sum.
   const double floor_s = 4.0 * kElements / multiply_adds_per_second();
   return {.value = seconds / kSteps * 1e9, .unit = "ns", .floor = floor_s * 1e9};
 }

@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Who else does the work of a row.
+/// The other library that does the work of a row.
 struct Peer {
   std::string_view name;
   void (*write_inputs)() = nullptr;
@@ -106,7 +106,7 @@ Arguments parse(int count, char** values) {
   return arguments;
 }
 
-/// How many times better the first is: less time, or more of something in a second.
+/// Ratio by which the first is better: less time, or more per second.
 double ratio(const Row& row, double better, double worse) {
   return row.unit.ends_with("/s") ? better / worse : worse / better;
 }

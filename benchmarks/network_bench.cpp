@@ -22,10 +22,11 @@ namespace {
 using test::NetworkShape;
 
 constexpr std::size_t kSteps = 1000;
-constexpr std::size_t kTimed = 20;  // at once: short enough to be left alone on a busy machine
+constexpr std::size_t kTimed =
+    20;  // in one run: short enough to be undisturbed on a loaded machine
 constexpr std::size_t kJoints = 12;
 
-/// What comes in and goes out is standardised already, so that a peer need not do it.
+/// Inputs and outputs are already standardised, so that a peer need not do it.
 template <class Network>
 typename Network::Parameters plain_network(const NetworkShape& shape) {
   auto parameters = test::random_network<Network>(shape, 1);
@@ -77,7 +78,7 @@ class FileOf {
   std::ofstream out_;
 };
 
-/// All weights in the order of the fields, then inputs and this network's answers to them.
+/// All weights in the order of the fields, then inputs and the outputs of this network.
 template <class Network>
 void write_network(const NetworkShape& shape) {
   const auto parameters = plain_network<Network>(shape);
@@ -89,9 +90,9 @@ void write_network(const NetworkShape& shape) {
   const Matrix features = waves(shape.inputs);
   FileOf("network_inputs.f64").write(std::span(features.values));
   Network network(parameters);
-  std::vector<double> answers;
-  for (std::size_t n = 0; n < kSteps; ++n) answers.push_back(network.step(features.row(n)).value);
-  FileOf("network_answers.f64").write(std::span<const double>(answers));
+  std::vector<double> outputs;
+  for (std::size_t n = 0; n < kSteps; ++n) outputs.push_back(network.step(features.row(n)).value);
+  FileOf("network_outputs.f64").write(std::span<const double>(outputs));
 }
 
 const NetworkShape kLstm250{.units = {250}};
@@ -134,8 +135,8 @@ namespace {
 
 constexpr std::size_t kAdapted = 250;  // features of the last layer
 
-/// One update on the features that an LSTM 250 tells; the network's own step is not in it.
-/// @param pass_bytes streamed in one update, at the least. @param multiply_adds done in it.
+/// One update with the features of an LSTM of 250 cells; the step of the network is not included.
+/// @param pass_bytes read and written in one update, at least. @param multiply_adds computed in it.
 Row update_row(AdaptationRule rule, std::size_t pass_bytes, double multiply_adds) {
   const auto parameters = plain_network<Lstm>(kLstm250);
   LastLayerAdapter adapter({.rule = rule, .frozen_after_s = 0.0}, parameters.head.back(), 1.0,

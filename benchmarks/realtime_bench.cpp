@@ -28,8 +28,8 @@ Row mailbox_read() {
   return {.value = sum > 0.0 ? 1e9 * seconds / kTimes : 0.0, .unit = "ns"};
 }
 
-/// A frame of twenty channels, which is what a joint's loop sees, into the recorder's ring; taken
-/// out again untimed, so that none is dropped.
+/// A frame of twenty channels, as of a joint's loop, into the recorder's ring; read
+/// again outside of the measured time, so that none is dropped.
 Row recorder_push() {
   using Clock = std::chrono::steady_clock;
   constexpr std::size_t kChannels = 20;

@@ -53,8 +53,8 @@ Row torque_loop_grey_box_step();
 Row mailbox_read();
 Row recorder_push();
 
-/// What these rows work on, into `scratch_folder()`, as raw doubles row by row, for the peers to
-/// work on the same. The peer of `csv_load` reads the file which that row leaves there.
+/// Writes the data of these rows to `scratch_folder()`, as raw doubles row by row, so that the peers use
+/// the same data. The peer of `csv_load` reads the file that this row writes there.
 void write_query_inputs();
 void write_em_inputs();
 void write_simulate_inputs();

@@ -17,7 +17,7 @@ PlantParameters dfki_120(const char* name = "dfki-120") {
   return plant_parameters(data_sheet(name));
 }
 
-/// What the peer is driven with too: 1 Hz, and 2 % of 37 Hz, on a lever of 0.4 m with 9 kg.
+/// The input, also of the peer: 1 Hz, and 2 % of 37 Hz, on a lever of 0.4 m with 9 kg.
 std::vector<PlantCommand> commands_of_a_second() {
   std::vector<PlantCommand> commands(10000);
   for (std::size_t i = 0; i < commands.size(); ++i) {
@@ -43,12 +43,12 @@ double steps_per_second(const PlantParameters& parameters) {
 }
 
 /// Additions, multiplications, multiply-adds, divisions, comparisons and conversions of doubles in a
-/// step of dfki-120 with all effects at work: those in the compiled kernel of PlantBatch. Sines and
+/// step of dfki-120 with all effects: those in the compiled kernel of PlantBatch. Sines and
 /// cosines are 22 each, exponentials 24, and together some 60 % of all; a step that needs no Stribeck
 /// curve, no play and no moving bristle has 100 fewer.
 constexpr double kOperations = 360.0;
 
-/// Steps in a second if the units that multiply and add were never idle.
+/// Steps per second if the units that multiply and add were never idle.
 double floor_with_lanes(std::size_t lanes) {
   const double each_lane = multiply_adds_per_second() / static_cast<double>(vector_lanes());
   return each_lane * static_cast<double>(lanes) / kOperations;
@@ -60,7 +60,7 @@ Row single(const PlantParameters& parameters) {
 
 }  // namespace
 
-// The whole of what `torsio simulate` does before it writes: plant, sensors, position loop.
+// The work of `torsio simulate` before it writes: plant, sensors, position loop.
 Row simulate_dfki_120() {
   double steps = 0.0;
   const double seconds = best_seconds([&] {

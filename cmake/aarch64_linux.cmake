@@ -1,4 +1,4 @@
-# Debian's cross compiler for ARM64, with headers and libraries from TORSIO_SYSROOT (tools/arm64_sysroot makes one).
+# Debian's cross compiler for ARM64, with headers and libraries from TORSIO_SYSROOT (tools/arm64_sysroot creates one).
 # Programs of that build, the tests among them, run under qemu-user.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)

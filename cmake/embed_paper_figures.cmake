@@ -1,5 +1,5 @@
 # cmake -DFIGURES=paper_figures.csv -DOUTPUT=paper_figures.inc -P embed_paper_figures.cmake
-# Writes the figures that others published as initialisers of `PaperFigure`. An unknown item or unit ends the build.
+# Writes the published figures as initialisers of `PaperFigure`. An unknown item or unit is a build error.
 cmake_minimum_required(VERSION 3.25)
 
 set(header "paper,item,condition,quantity,value,unit")

@@ -1,4 +1,5 @@
-# An export set for each of runtime with files, realtime, lab and onnx, so that a robot that links runtime and files need not have the lab's libraries.
+# One export set each for runtime with files, realtime, lab and onnx, so that a robot that links runtime and files does not need the
+# libraries of the lab.
 include(CMakePackageConfigHelpers)
 set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
 
@@ -22,5 +23,5 @@ configure_package_config_file(cmake/torsioConfig.cmake.in ${PROJECT_BINARY_DIR}/
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/torsioConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/torsioConfig.cmake ${PROJECT_BINARY_DIR}/torsioConfigVersion.cmake
         DESTINATION ${torsio_package_dir})
-install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES LICENSE README.md CHANGELOG.md CONTRIBUTING.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -1,4 +1,4 @@
-# The settings that every target of ours shares; users of the installed library inherit none of them but C++20.
+# The settings of all targets of this repository; users of the installed library inherit only C++20.
 add_library(torsio_build_settings INTERFACE)
 target_compile_options(torsio_build_settings INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -ffp-contract=off
@@ -6,13 +6,13 @@ target_compile_options(torsio_build_settings INTERFACE
 if(TORSIO_SANITIZE)
   target_compile_options(torsio_build_settings INTERFACE -fsanitize=${TORSIO_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all
-    # g++ sees uninitialised reads in the instrumented <regex> that the plain one does not have.
+    # g++ warns of uninitialised reads in the instrumented <regex>, which the normal one does not have.
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(torsio_build_settings INTERFACE -fsanitize=${TORSIO_SANITIZE})
 endif()
 if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
-  # Kernels hold vectors in arrays and structures, which those of unknown length cannot be in: machines that have
-  # them use their NEON.
+  # Kernels store vectors in arrays and structures, which is not possible for vectors of unknown length (SVE): machines
+  # with SVE use NEON.
   target_compile_definitions(torsio_build_settings INTERFACE
     "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV)")
 endif()

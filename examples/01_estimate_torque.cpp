@@ -9,7 +9,7 @@
 
 namespace {
 
-/// Stands for your joint: it swings a spring that is wound by up to 2 degrees.
+/// A simulated joint in place of yours: its spring is wound by up to 2 degrees.
 torsio::JointSample read_joint(int tick) {
   const double t_s = 1e-3 * tick;
   torsio::JointSample joint;

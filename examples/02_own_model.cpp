@@ -1,4 +1,4 @@
-// A model of your own inside torsio's estimator: anything that satisfies the concept `Model` gets
+// A model of your own inside torsio's estimator: a class that satisfies the concept `Model` gets
 // the feature pipeline, the guards and the fault handling.
 #include <array>
 #include <cmath>

@@ -1,5 +1,4 @@
-// Lets a network go on learning from a load cell while it runs in a 1 kHz loop, and keeps what it
-// learned:
+// Adapts a network to a load cell while it runs in a 1 kHz loop, and saves the adapted network:
 //   03_adapt joint.safetensors adapted.safetensors
 #include <array>
 #include <cmath>
@@ -11,7 +10,7 @@
 
 namespace {
 
-/// Stands in for your joint: angles on both sides of the spring, and a load cell at 250 Hz.
+/// Simulated measurements: angles on both sides of the spring, and a load cell at 250 Hz.
 struct Tick {
   std::array<double, 2> angles_rad;  ///< gear, joint
   double load_cell_Nm;

@@ -11,7 +11,7 @@
 
 namespace {
 
-/// Stands for your joint, its output held fast: J N² δ'' + b δ' + K δ = N k_t i.
+/// A simulated joint with locked output: J N² δ'' + b δ' + K δ = N k_t i.
 class LockedJoint {
  public:
   explicit LockedJoint(const torsio::SeriesElasticJoint& parts) : parts_(parts) {}
@@ -43,7 +43,7 @@ int run(const char* model_file) {
   torsio::TorqueController controller(
       torsio::AnyInverse::of(model.settings, model.parameters),
       torsio::TorqueLoopCore::Settings{.deflection = {.joint = parts}, .largest_torque_Nm = 40.0},
-      1000.0);  // throws where gains are unstable, or the model asks for what the joint has not
+      1000.0);  // throws if gains are unstable, or the model needs inputs that the joint does not have
   const torsio::Margins margins = controller.core().margins_of(torsio::JointOutput::locked);
   const torsio::Passivity passive = torsio::passivity(parts, controller.core().feedback());
   std::printf("phase margin %.0f degrees, gain margin %.1f, passive to %.0f rad/s\n",

@@ -1,5 +1,4 @@
-// What a torque loop on each actuator can do: margins, passivity, and how stiff an impedance on top
-// of it may be.
+// Torque loops on each actuator: margins, passivity, and the stiffest passive impedance.
 //   05_loop_margins [BANDWIDTH_RAD_S]
 #include <cstdio>
 #include <cstdlib>

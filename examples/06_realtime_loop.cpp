@@ -1,5 +1,5 @@
-// A torque loop at 1 kHz on its own thread: set-points come in through a mailbox, a watchdog lets go of the
-// joint when they stop coming, what the loop saw goes out to a recorder. A simulated joint stands for yours.
+// A torque loop at 1 kHz on its own thread: set-points arrive through a mailbox, a watchdog stops the
+// joint when there are no more, and a recorder writes the measurements. The joint is simulated.
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -33,7 +33,7 @@ void run(const char* recording) {
   torsio::RealtimeLoop loop({.period_s = 1e-3, .stop_after_overruns = 1000});
   torsio::JointSample joint = {.gear_angle_rad = 0.0, .joint_angle_rad = 0.0};
   loop.start([&, rate_rad_s = 0.0](const torsio::Tick& tick) mutable noexcept {
-    if (tick.index == 0) watchdog.arm(tick.due_ns);  // in a robot: when its operator says so
+    if (tick.index == 0) watchdog.arm(tick.due_ns);  // in a robot: on the operator's request
     const auto& letter = wanted_Nm.read();
     const bool is_valid = letter.sequence > 0 && std::isfinite(letter.value);
     double current_A = 0.0;
@@ -42,7 +42,7 @@ void run(const char* recording) {
       current_A = controller.step(letter.value, joint).current_A;
     else
       controller.reset();
-    // The joint, its output held fast: J N² δ'' + b δ' + K δ = N k_t i.
+    // The joint with locked output: J N² δ'' + b δ' + K δ = N k_t i.
     const double torque_Nm = parts.stiffness_Nm_rad * joint.gear_angle_rad;
     rate_rad_s += 1e-3 / parts.drive.inertia() *
                   (parts.drive.torque_per_current() * current_A - torque_Nm -
@@ -56,7 +56,7 @@ void run(const char* recording) {
     wanted_Nm.write(std::array{5.0, -5.0, 10.0}.at(n / 50), clock.now_ns());
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // nobody speaks any more
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // no more set-points
   loop.request_stop();
   const torsio::LoopReport report = loop.wait();
   const torsio::RecorderReport recorded = recorder.close();

@@ -1,5 +1,5 @@
-// What `torsio check`, `fit` and `evaluate` do, from code: load recordings, check them, fit a model,
-// score it on a record that the fit did not use, save it.
+// `torsio check`, `fit` and `evaluate` from code: loads recordings, checks them, fits, scores the model
+// on a recording that was not used for the fit, and saves it.
 //
 //     example_07_fit_from_code test.csv model.safetensors train_1.csv [train_2.csv ...]
 #include <cstdio>
@@ -44,7 +44,7 @@ int run(const std::string& test_file, const std::string& model_file,
 
   const torsio::Estimator estimator = torsio::make_estimator(trained.file);
   const torsio::Score score = torsio::evaluate(estimator, dataset, torsio::Role::test).together;
-  std::printf("RMSE %.3g Nm on %zu test samples, %.0f ns a step\n", score.metrics.rmse,
+  std::printf("RMSE %.3g Nm on %zu test samples, %.0f ns per step\n", score.metrics.rmse,
               score.metrics.samples, score.step_ns_p50);
 
   torsio::save_model(model_file, trained.file);

@@ -67,7 +67,7 @@ def best_seconds(work, runs):
 def main():
     row, folder = sys.argv[1:]
     regression = Regression(folder)
-    queries, wanted = read(folder, "queries", -1, 3), read(folder, "answers", -1, 3)
+    queries, wanted = read(folder, "queries", -1, 3), read(folder, "conditionals", -1, 3)
     np.testing.assert_allclose(np.transpose(regression(queries)), wanted, rtol=1e-2, atol=1e-2)
 
     def blocks(size):

@@ -1,7 +1,7 @@
 % Hammerstein-Wiener by simulation error with Octave's optim: the same samples, numbers and scaling as ours.
 % Usage: octave-cli --no-gui peer_hammerstein_wiener.m FOLDER
-% Prints the seconds of the fastest of its methods that ends at our error, from a plain start: time constants of
-% a tenth of a second and one second, straight curves. What it takes from our own start is told on stderr.
+% Prints the seconds of the fastest of its methods that reaches our error, from a simple start: time constants of
+% a tenth of a second and one second, linear curves. The time from our start is printed on stderr.
 warning ("off", "all");
 pkg load optim
 1;

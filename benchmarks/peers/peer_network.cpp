@@ -134,9 +134,9 @@ int main(int argc, char** argv) try {
   const std::string folder = argv[2];
   at::set_num_threads(1);
   const c10::InferenceMode guard;
-  const auto answers = read<double>(folder + "/network_answers.f64");
+  const auto expected = read<double>(folder + "/network_outputs.f64");
   const auto values = read<double>(folder + "/network_inputs.f64");
-  const auto count = static_cast<std::int64_t>(answers.size());
+  const auto count = static_cast<std::int64_t>(expected.size());
   const std::int64_t inputs = static_cast<std::int64_t>(values.size()) / count;
   const std::int64_t batch = row == "lstm250_x12_step" ? kJoints : 1;
   std::vector<torch::Tensor> rows;
@@ -150,8 +150,8 @@ int main(int argc, char** argv) try {
   for (Step& step : steps_of(row, folder)) {
     for (std::size_t n = 0; n < rows.size(); ++n) {
       const double output = step(rows[n])[batch - 1][0].item<double>();
-      if (!(std::abs(output - answers[n]) < 1e-4))
-        throw std::runtime_error("libtorch says something else at step " + std::to_string(n));
+      if (!(std::abs(output - expected[n]) < 1e-4))
+        throw std::runtime_error("libtorch has another output at step " + std::to_string(n));
     }
     const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(2);
     while (std::chrono::steady_clock::now() < limit) {
