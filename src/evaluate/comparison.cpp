@@ -37,7 +37,7 @@ FamilyChoice parse_choice(std::string_view text) {
       const std::size_t equals = part.find('=');
       if (equals == std::string_view::npos)
         throw UsageError({.place = "--models",
-                          .expected = "option=value behind a colon",
+                          .expected = "option=value after a colon",
                           .found = std::string(part)});
       choice.options.emplace(part.substr(0, equals), part.substr(equals + 1));
     }
@@ -144,7 +144,7 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
       ModelCard& card = scored.trained->file.card;
       note_held_out_scores(card, scored.rows);
       if (chosen_on == Role::test)
-        card.held_out += fmt::format("; this score chose the model among {}", choices.size());
+        card.held_out += fmt::format("; this score selected the model among {}", choices.size());
       comparison.best = std::move(scored.trained);
     }
     std::ranges::move(scored.rows, std::back_inserter(results.rows));

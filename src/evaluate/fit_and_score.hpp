@@ -15,8 +15,8 @@
 // What `compare` and `crossvalidate` do with each model.
 namespace torsio {
 
-/// The data of one input set after another, made once for all models that share it: those stand
-/// next to each other in a list of choices.
+/// The data of one input set after another, made once for all models that share it, which are
+/// adjacent in a list of choices.
 class InputSets {
  public:
   /// @param dataset must outlive this.
@@ -43,7 +43,7 @@ struct ScoredModel {
   std::vector<ResultRow> rows;
 };
 
-/// Trains a choice and scores it on `roles`. A fit that fails is one row that says why.
+/// Trains a choice and scores it on `roles`. A fit that fails is one row with the reason.
 /// @throws UsageError for a wrong setting or a leak that is not allowed, Cancelled.
 [[nodiscard]] ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets,
                                         const ModelChoice& choice, std::uint64_t seed,
@@ -54,15 +54,15 @@ struct ScoredModel {
                                               const Dataset& dataset, std::span<const Role> roles,
                                               const Progress& progress);
 
-/// What results say before there is a row.
+/// Results without rows.
 [[nodiscard]] Results empty_results(const Dataset& dataset);
 /// Enters the inputs of a choice, unless its input set is known already.
 void note_inputs(Results& results, const ModelChoice& choice);
 /// One input set without a name is none.
 void forget_only_set(Results& results);
 
-/// A file that is both trained and tested on would make every score a lie. (Blocks of one record are
-/// another matter.) @throws UsageError naming it.
+/// A file that is both trained and tested on would make every score a lie. (Blocks of one record
+/// are another matter.) @throws UsageError naming it.
 void refuse_seen_test_records(const Dataset& dataset);
 
 /// The share of work `index` of `count` in the whole work's progress. `progress` must outlive it.

@@ -55,7 +55,7 @@ struct SquareSum {
 /// One input's blocks in another order.
 struct Shuffle {
   std::size_t input = 0;
-  std::vector<Block> source;  ///< of each block
+  std::vector<Block> source;  ///< source of each block
 };
 
 Shuffle shuffled(std::size_t input, std::vector<Block> blocks, std::uint64_t seed) {

@@ -137,11 +137,12 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
     for (const std::string& remark : means.remarks) remarks += remark + "\n";
   }
   return fmt::format(
-      "{} ({}), output {}, {} of {:.4g} Nm, {} run{} a model\n{}{}"
-      "errors: of the joint's torque without noise, the first 2 s left out; limits: how often one "
-      "cut;\nfallback: ticks in which the inverse told its line; cycles: runs with a limit cycle;\n"
-      "-3 dB Hz: where a sweep's answer has fallen to 0.71, - where it has not, or never was "
-      "above\n",
+      "{} ({}), output {}, {} of {:.4g} Nm, {} run{} per model\n{}{}"
+      "errors: of the joint's torque without noise, without the first 2 s; limits: number of limit "
+      "events;\nfallback: steps on the linear fallback; cycles: runs with a limit cycle;\n"
+      "-3 dB Hz: frequency at which the response to a sweep has fallen to 0.71, - if it has not, "
+      "or "
+      "never was above\n",
       first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,
       rows.size() / models.size(), rows.size() == models.size() ? "" : "s", table.text(), remarks);
 }

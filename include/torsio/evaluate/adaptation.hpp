@@ -32,7 +32,7 @@ struct AdaptationScore {
 
 /// A network that was adapted by a replay of recordings.
 struct AdaptedModel {
-  ModelFile file;  ///< with the weights at the end, and a card that says where they came from
+  ModelFile file;  ///< with the final weights and a card that records the adaptation
   AdaptationCounts counts = {};
   double relative_change = 0.0;  ///< |W - W0| / |W0| at the end
   /// The error before each update, on the samples that were learned from (guards passed over).
@@ -41,11 +41,13 @@ struct AdaptedModel {
   std::vector<AdaptationScore> held_out = {};
 };
 
-/// Streams the records through an `AdaptiveEstimator`, in their order, as a robot would: it learns from
-/// the target in segments with the role train. Then both networks, the frozen and the adapted, are scored
-/// on those with the role test. Error bars by region are taken anew on what was learned from.
-/// @throws UsageError if the family has no last layer or there are no segments to learn from or to score
-/// on, Error as `predict`, or if not a single sample could be learned from or scored, Cancelled.
+/// Streams the records through an `AdaptiveEstimator`, in their order, as a robot would: it learns
+/// from the target in segments with the role train. Then both networks, the frozen and the adapted,
+/// are scored on those with the role test. Error bars by region are taken anew on what was learned
+/// from.
+/// @throws UsageError if the family has no last layer or there are no segments to learn from or to
+/// score on, Error as `predict`, or if no sample could be used for the adaptation or scored,
+/// Cancelled.
 [[nodiscard]] AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
                                        const AdaptationSettings& settings,
                                        const Progress& progress = {});

@@ -14,13 +14,13 @@
 
 namespace torsio {
 
-/// `FoldScheme::by` for leave-one-record-out; no channel can be called that, for want of a unit.
+/// `FoldScheme::by` for leave-one-record-out; not a possible name of a channel, which has a unit.
 inline constexpr std::string_view kByRecord = "record";
 
 /// How a dataset is cut into folds. Source: specification 3.10.
 struct FoldScheme {
-  /// K-fold: whole records are dealt to the folds. Fewer records than folds: each record is cut
-  /// into that many contiguous blocks, and a fold holds out one block of each.
+  /// K-fold: whole recordings are assigned to the folds. Fewer recordings than folds: each one is
+  /// cut into that many contiguous blocks, and a fold holds out one block of each.
   std::size_t folds = 5;
   /// Between a held-out block and what is learned from; nothing to whole records.
   double embargo_s = 1.0;
@@ -43,17 +43,17 @@ struct FoldPlan {
   std::vector<Fold> folds;
 };
 
-/// Only what has the role train is dealt to the folds: each such sample is held out exactly once.
-/// Test segments are left out of all of it. Validation segments stay (for error bars and early
-/// stopping), except in a record that is held out, or has the condition that is, and in the
+/// Only samples with the role train are assigned to the folds: each of them is held out exactly
+/// once. Test segments are used in no fold. Validation segments are kept (for error bars and early
+/// stopping), except in a recording that is held out, or has the held-out condition, and in the
 /// embargo. Deterministic for a seed.
-/// @throws UsageError for fewer than two folds, records, values or samples a fold, an unknown
-/// condition, a recording that is given twice, or an embargo that leaves nothing to learn from.
+/// @throws UsageError for fewer than two folds, recordings, values or samples per fold, an unknown
+/// condition, a recording that is given twice, or an embargo that leaves no training samples.
 [[nodiscard]] FoldPlan plan_folds(const Dataset& dataset, const FoldScheme& scheme,
                                   std::uint64_t seed);
 
-/// Over the folds, each counting once. `std_dev` is that of one fold (divided by n - 1); folds share
-/// training data, so it is no standard error of the mean.
+/// Statistics over the folds with equal weights. `std_dev` is that of one fold (divided by n - 1);
+/// folds share training data, so that it is not a standard error of the mean.
 struct FoldStatistic {
   double mean = kNotMeasured;
   double std_dev = kNotMeasured;  ///< NaN for fewer than two folds
@@ -65,23 +65,24 @@ struct FoldSummary {
   std::string variant = {};
   std::string input_set = {};
   bool leak = false;
-  std::size_t folds = 0;  ///< that the statistics are of
+  std::size_t folds = 0;  ///< folds in the statistics
   std::size_t failed_folds = 0;
-  std::string reason = {};  ///< of the first failure
+  std::string reason = {};  ///< reason of the first failure
   std::string worst_fold = {};
   FoldStatistic rmse = {};
   FoldStatistic mad = {};
   FoldStatistic max_abs = {};
   FoldStatistic fit_percent = {};
-  double guarded_share = kNotMeasured;  ///< of all scored samples
+  double guarded_share = kNotMeasured;  ///< share of all scored samples
   double step_ns_p50 = kNotMeasured;    ///< mean over the folds
   double fit_seconds = kNotMeasured;    ///< all folds together
-  std::size_t parameter_count = 0;      ///< of the largest
+  std::size_t parameter_count = 0;      ///< parameters of the largest model
 };
 
 struct CrossValidation {
   /// A row for each model and fold, and for each recording of it, with `fold` set and the split
-  /// `validation`: these scores are there to choose by. A fit that failed is a row that says why.
+  /// `validation`: these scores are used for the selection. A fit that failed is a row with the
+  /// reason.
   Results results;
   FoldPlan plan;  ///< without segments
   /// Lowest mean RMSE first; models that failed in a fold come last, since their mean is of other
