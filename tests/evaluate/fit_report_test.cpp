@@ -50,7 +50,7 @@ TEST(FitReportOf, WhiteResidualsAreIndependent) {
   EXPECT_NEAR(report.table[0].std_error, 1.0, 0.15);
 }
 
-TEST(FitReportOf, ColouredResidualsTellLessThanTheirNumber) {
+TEST(FitReportOf, ColouredResidualsHaveFewerEffectiveSamples) {
   // First order with 0.95: 1 + 2 sum = 39.
   Random random(4);
   double state = 0.0;
@@ -63,7 +63,7 @@ TEST(FitReportOf, ColouredResidualsTellLessThanTheirNumber) {
   EXPECT_NEAR(report.table[0].std_error, std::sqrt(4000.0 / report.effective_samples), 1e-9);
 }
 
-TEST(FitReportOf, PartOfARecordTellsNoMoreThanItsSamples) {
+TEST(FitReportOf, PartOfARecordHasNoMoreEffectiveThanScoredSamples) {
   Random random(4);
   double state = 0.0;
   Dataset dataset =
