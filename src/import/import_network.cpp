@@ -32,7 +32,7 @@ ForeignNetwork as_wanted(ForeignNetwork network, const ImportOptions& options) {
   if (!options.input_scale.empty()) {
     if (options.input_scale.size() != network.inputs)
       throw UsageError({.place = "--input-scale",
-                        .expected = fmt::format("{} numbers, one an input", network.inputs),
+                        .expected = fmt::format("{} numbers, one per input", network.inputs),
                         .found = fmt::format("{}", options.input_scale.size())});
     for (const double scale : options.input_scale) check_scale(scale, "--input-scale");
     network.stages.insert(
@@ -48,7 +48,7 @@ ForeignNetwork as_wanted(ForeignNetwork network, const ImportOptions& options) {
 void check_inputs(const ForeignNetwork& network, const ImportOptions& options) {
   if (options.features.inputs.size() == network.inputs) return;
   throw UsageError({.place = "--inputs",
-                    .expected = fmt::format("{} expressions, one an input of {}, in its order",
+                    .expected = fmt::format("{} expressions, one per input of {}, in its order",
                                             network.inputs, network.place),
                     .found = fmt::format("{} ({})", options.features.inputs.size(),
                                          fmt::join(options.features.inputs, ", "))});
@@ -133,9 +133,8 @@ ImportedModel import_network(const ForeignNetwork& network, const Source& source
   const AnyModel model(imported.file.parameters);
   if (guards == nullptr) {
     imported.notes.emplace_back(
-        "the file does not say where the network may be trusted: no range is guarded, there is no "
-        "error "
-        "bar, and the fallback is 0; --guards RECORDING takes them from measured data");
+        "the file does not contain the range of the training data: there is no range guard and no "
+        "error bar, and the fallback is 0; --guards RECORDING computes them from measured data");
     return imported;
   }
   const TrainingData data = training_data(all_for_training(*guards), options.features);

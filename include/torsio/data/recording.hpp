@@ -12,7 +12,7 @@
 
 namespace torsio {
 
-/// Channels of a simulation that no sensor sees are called truth_...
+/// Channels of a simulation that no sensor measures are called truth_...
 inline constexpr std::string_view kTruthPrefix = "truth_";
 
 /// One measured quantity on the recording's clock, in SI; the name ends in the SI unit.

@@ -21,7 +21,7 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// @throws Error if the disk is full, or nobody reads the pipe any more.
+  /// @throws Error if the disk is full, or the pipe has no reader any more.
   void write(std::span<const std::byte> bytes);
   /// Call once, at the end. @throws Error; the target is then untouched.
   void commit();

@@ -11,7 +11,8 @@
 
 namespace torsio {
 
-/// A larger file of another program is refused: what it unfolds to in memory is many times its size.
+/// A larger file of another program is refused: what it unfolds to in memory is many times its
+/// size.
 inline constexpr std::size_t kMaxForeignBytes = std::size_t{64} << 20;
 
 /// What a network of another program does one after the other, in double so that stages may be
@@ -44,7 +45,7 @@ using ForeignStage = std::variant<AffineStage, DenseStage, ActivationStage, Recu
 /// A network as another program wrote it.
 struct ForeignNetwork {
   std::string place;       ///< the file's name, for messages
-  std::size_t inputs = 0;  ///< of the first stage
+  std::size_t inputs = 0;  ///< inputs of the first stage
   std::vector<ForeignStage> stages = {};
   /// Samples of the window that a graph with memory is fixed to, from the zero state; none if any.
   std::optional<std::size_t> window = {};
