@@ -58,7 +58,7 @@ onnx::TensorProto& tensor_of(onnx::GraphProto& graph, const std::string& name) {
   throw std::runtime_error("no tensor " + name);
 }
 
-/// What is said of a good graph after `change` has been at it.
+/// The error for a good graph after `change`.
 std::string refusal_after(const std::string& name, const Change& change) {
   return refusal(changed(name, change));
 }
