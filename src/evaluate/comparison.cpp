@@ -70,8 +70,8 @@ bool is_on_by_default(const FamilyInfo& family, std::string_view option) {
   });
 }
 
-/// Every family as it comes, without its branches by direction, and scheduled over a condition
-/// where the data have one.
+/// Every family with its default settings, without its branches by direction, and scheduled over a
+/// condition if the data have one.
 std::vector<FamilyChoice> all_choices(const Dataset& dataset,
                                       const std::vector<std::string>& inputs) {
   const std::string condition = schedulable_condition(dataset, inputs);

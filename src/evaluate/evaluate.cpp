@@ -53,7 +53,7 @@ std::vector<const std::vector<double>*> raw_channels(const Estimator& estimator,
   return channels;
 }
 
-/// Counts how often the truth is within one and two error bars.
+/// Counts how often the target is within one and two error bars.
 struct Coverage {
   std::size_t samples = 0;
   std::size_t within = 0;

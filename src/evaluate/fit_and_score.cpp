@@ -82,7 +82,7 @@ ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets, const M
   } catch (const Cancelled&) {
     throw;
   } catch (const UsageError&) {
-    throw;  // a setting is wrong; what merely cannot be fitted to these data is another Error
+    throw;  // a wrong setting; a fit that fails on these data throws another Error
   } catch (const Error& error) {
     scored = {.trained = {}, .rows = {failed_row(choice, error)}};
   }

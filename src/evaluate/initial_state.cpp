@@ -10,8 +10,8 @@
 namespace torsio {
 namespace {
 
-/// Squares of the outputs' misses from a state, then of the distance from rest, so weighted that it
-/// decides only what the samples leave open.
+/// Squares of the outputs' errors from a state, then of the distance from rest with a weight so
+/// small that it is effective only where the samples do not determine the state.
 class Start {
  public:
   Start(AnyModel& model, const Matrix& features, std::span<const double> target, double usual_error)
@@ -61,7 +61,8 @@ class Start {
 
   bool evaluate(std::span<const double> state, std::span<const double> typical,
                 std::span<double> residuals) {
-    constexpr double kRestWeight = 0.2;  // a drive's speed is not to be drawn to rest
+    constexpr double kRestWeight =
+        0.2;  // small, so that a drive's speed is not biased towards rest
     model_.reset();
     model_.set_state(state);
     std::size_t next = 0;

@@ -156,7 +156,7 @@ bool is_constant(const Recording& recording, std::string_view channel) {
          std::ranges::all_of(values, [&](double value) { return value == values.front(); });
 }
 
-/// The channels that are constant in every record: what folds can be made by.
+/// The channels that are constant in every recording, by which folds can be made.
 std::vector<std::string> conditions_of(const Dataset& dataset) {
   std::vector<std::string> names;
   for (const Channel& channel : dataset.records.front().recording.channels())
@@ -182,7 +182,7 @@ FoldPlan leave_one_condition_out(const Dataset& dataset, const std::vector<std::
   const auto value_of = [&](const DatasetRecord& record) {
     return record.recording.channel(condition).values.front();
   };
-  std::map<double, std::size_t> values;  // value: records to learn from
+  std::map<double, std::size_t> values;  // value: recordings to train on
   for (const std::size_t i : records) ++values[value_of(dataset.records[i])];
   if (values.size() < 2)
     throw UsageError({.place = "--by " + condition,

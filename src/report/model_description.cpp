@@ -96,7 +96,7 @@ std::string parameter_lines(const std::vector<Leaf>& leaves) {
   return fmt::format("{}\n", fmt::join(lines, "\n"));
 }
 
-/// As the first family that describes such models does.
+/// The description by the first family with such models.
 ParameterDescription description_of(const ModelFile& model) {
   const std::string_view of = model.parameters.family();
   for (const FamilyInfo& family : families())
@@ -113,7 +113,7 @@ std::string coefficient_table(const std::vector<FittedParameter>& description) {
   return table.text();
 }
 
-/// A network of another program comes without the range of its inputs.
+/// A network of another program has no range of its inputs.
 bool is_open(double limit) { return std::abs(limit) >= kOpenRange; }
 
 std::string range_table(const EstimatorSettings& settings) {

@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kFreeRun = "free_run";
 
-/// @param mode of how the past outputs of a model that feeds back are had
+/// @param mode how a model with feedback gets its past outputs
 Json row_json(const ResultRow& row, const Metrics& metrics, std::string_view mode,
               bool non_causal_zero) {
   Json json{{"family", row.family},

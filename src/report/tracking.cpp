@@ -22,24 +22,24 @@ std::string_view name(JointOutput output) {
   return output == JointOutput::locked ? "locked" : "free";
 }
 
-/// "-" of no run.
+/// "-" if there is no run.
 std::string text(const RunningMean& of, const char* format = "{:.4g}") {
   return of.count() == 0 ? std::string("-") : fmt::format(fmt::runtime(format), of.mean());
 }
 
-/// Nothing of fewer than two runs.
+/// Empty for fewer than two runs.
 std::string spread(const RunningMean& of) {
   return of.count() < 2 ? std::string() : fmt::format("{:.2g}", of.std_dev());
 }
 
-/// What the bandwidth's number is, or why there is none.
+/// The bandwidth, or the reason why there is none.
 std::string_view bandwidth_outcome(const TrackingRow& row) {
   if (!row.bandwidth_Hz) return "not_measured";
   if (*row.bandwidth_Hz == 0.0) return "below_sweep";
   return std::isfinite(*row.bandwidth_Hz) ? "measured" : "above_sweep";
 }
 
-/// Over the runs of one model that came to their end.
+/// Means over the completed runs of one model.
 struct ModelMeans {
   RunningMean mad, std_abs, rmse, to_linear, error_ratio, bandwidth, overshoot, limit_events,
       faults;

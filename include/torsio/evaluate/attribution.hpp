@@ -29,19 +29,19 @@ struct AttributionOptions {
   std::size_t window_samples = 0;  ///< 0: the model's memory (`memory_samples`)
   std::size_t repeats = 5;         ///< shuffles of each input
   std::uint64_t seed = 1;
-  std::size_t threads = 0;  ///< 0: as many as the machine has; changes no bit of the result
+  std::size_t threads = 0;  ///< 0: all cores; the result does not depend on it
 };
 
 /// The model's output at the end of a window, from a reset at its beginning, and each input's share
 /// in its distance from `Attribution::expected_value`.
 struct ExplainedWindow {
   std::string recording;
-  std::size_t sample = 0;  ///< the window's last
+  std::size_t sample = 0;  ///< last sample of the window
   double value = 0.0;
   std::vector<double> shapley;
 };
 
-/// What one input is worth to the model, in the target's unit.
+/// The importance of one input to the model, in the target's unit.
 struct InputAttribution {
   std::string input;
   double mean_abs_shapley = kNotMeasured;   ///< mean |phi| over the explained windows
@@ -64,7 +64,7 @@ struct Attribution {
   std::size_t block_samples = 0;  ///< length of the blocks that are shuffled
 };
 
-/// What a model makes of its inputs on some recordings: exact interventional Shapley values, in
+/// The importance of a model's inputs on some recordings: exact interventional Shapley values, in
 /// which an absent input's whole window is replaced by that of the same input in a background
 /// window, v(S) being the mean over these; and permutation importance, the increase of the RMSE
 /// when one input is shuffled over all recordings in blocks no shorter than a window. The model

@@ -46,8 +46,8 @@ struct Comparison {
 [[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
                                      const Progress& progress = {});
 
-/// Puts a model's scores on all test records (validation, if there are no test records) into its
-/// card, with words for what they were measured on. Nothing held out: nothing changes.
+/// Writes a model's scores on all test recordings (validation, if there are no test recordings) to
+/// its card, with a description of the samples. Without held-out recordings nothing changes.
 void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows);
 
 }  // namespace torsio

@@ -22,7 +22,7 @@ struct FoldScheme {
   /// K-fold: whole recordings are assigned to the folds. Fewer recordings than folds: each one is
   /// cut into that many contiguous blocks, and a fold holds out one block of each.
   std::size_t folds = 5;
-  /// Between a held-out block and what is learned from; nothing to whole records.
+  /// Time between a held-out block and the training samples; not used for whole recordings.
   double embargo_s = 1.0;
   /// Empty: K-fold. `kByRecord`: each record is a fold. Else a condition, or a channel that is
   /// constant in every record: all records of one value are a fold.
@@ -34,12 +34,12 @@ struct Fold {
   std::string name;                     ///< "fold 2", "sweep.csv", "support_m = 0.02"
   std::vector<std::string> recordings;  ///< held out, whole or in part
   std::size_t held_out_samples = 0;
-  /// For each record of the dataset, in order; what is held out has the role test.
+  /// For each recording of the dataset, in order; held-out segments have the role test.
   std::vector<std::vector<Segment>> segments;
 };
 
 struct FoldPlan {
-  std::string label;  ///< what the folds are, to be printed with the scores
+  std::string label;  ///< description of the folds, printed with the scores
   std::vector<Fold> folds;
 };
 
@@ -85,14 +85,14 @@ struct CrossValidation {
   /// reason.
   Results results;
   FoldPlan plan;  ///< without segments
-  /// Lowest mean RMSE first; models that failed in a fold come last, since their mean is of other
+  /// Lowest mean RMSE first; models that failed in a fold come last, since their mean is over other
   /// folds.
   std::vector<FoldSummary> ranking;
 };
 
-/// Trains every choice on each fold's rest, as `compare` does, and scores it in free run on what
-/// the fold holds out. Fold after fold: the times of a step are measured on an idle machine, and
-/// fitters use several threads themselves.
+/// Trains every choice on each fold's rest, as `compare` does, and scores it in free run on the
+/// held-out part. Folds run one after the other: the times of a step are measured on an idle
+/// machine, and fitters use several threads themselves.
 /// @throws UsageError as `plan_folds` and `compare`, Cancelled.
 [[nodiscard]] CrossValidation cross_validate(Dataset dataset,
                                              const std::vector<ModelChoice>& choices,

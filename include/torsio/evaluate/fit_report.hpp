@@ -10,22 +10,23 @@
 
 namespace torsio {
 
-/// How the residuals e_n = y_n - target_n hang together with something over lags of k samples:
+/// Correlation of the residuals e_n = y_n - target_n with themselves or an input x over lags of k
+/// samples:
 ///
 ///     r_k = sum_n e_n x_(n-k) / sqrt(sum e^2 sum x^2),   both without their means
 ///
-/// If they do not, 99 % of all |r_k| are below 2.58 / sqrt(N).
+/// Without correlation, 99 % of all |r_k| are below 2.58 / sqrt(N).
 struct ResidualCorrelation {
-  std::string with;            ///< an input's expression; of the residuals themselves: "residual"
-  double strongest = 0.0;      ///< r_k of the largest |r_k|; with itself k >= 1
-  double lag_s = 0.0;          ///< its k
+  std::string with;            ///< an input's expression, or "residual" for the autocorrelation
+  double strongest = 0.0;      ///< r_k of the largest |r_k|; k >= 1 for the autocorrelation
+  double lag_s = 0.0;          ///< lag of `strongest`
   double bound = 0.0;          ///< 2.58 / sqrt(N)
   double share_outside = 0.0;  ///< share of lags with |r_k| > `bound`: 0.01 for white residuals
 };
 
 /// Correlation of the residuals, and how well the data determine the parameters.
 struct FitReport {
-  std::string split;  ///< "test", "validation" or "train": the first of these that there is
+  std::string split;  ///< "test", "validation" or "train": the first of these that exists
   std::size_t samples = 0;
   std::vector<ResidualCorrelation>
       correlations;  ///< autocorrelation of the residuals, then with each input

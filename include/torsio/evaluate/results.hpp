@@ -22,10 +22,10 @@ struct ResultRow {
   std::string fold = {};                      ///< fold of a cross-validation; else empty
   std::optional<std::string> recording = {};  ///< empty: the whole split together
   Score score = {};
-  double fit_seconds = kNotMeasured;  ///< not measured where the model came from a file
+  double fit_seconds = kNotMeasured;  ///< not measured for a model from a file
   std::size_t parameter_count = 0;
   std::string status = "ok";  ///< ok, failed, diverged
-  std::string reason = {};    ///< why it failed, or what to know about the row
+  std::string reason = {};    ///< why it failed, or a remark on the row
   bool leak = false;          ///< an input was computed from the target, or the target from it
 };
 

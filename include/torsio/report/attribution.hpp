@@ -6,7 +6,7 @@
 
 namespace torsio {
 
-/// What an attribution is of.
+/// The subject of an attribution.
 struct AttributionSubject {
   std::string model;  ///< the model file's name
   std::string family;
