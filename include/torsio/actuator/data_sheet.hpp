@@ -189,7 +189,7 @@ struct DataSheet {
 /// One line of a printed data sheet.
 struct SheetRow {
   std::string name;
-  std::string_view unit;  ///< as a person writes it; empty for a plain number
+  std::string_view unit;  ///< as printed; empty for a dimensionless number
   SheetValue value;
 };
 
@@ -205,10 +205,10 @@ struct SheetRow {
 /// @throws UsageError that lists the known names or variants.
 [[nodiscard]] DataSheet data_sheet(std::string_view name);
 
-/// @returns what `data_sheet` takes: the variant only where it is not the default
+/// @returns the name for `data_sheet`, with the variant only if it is not the default
 [[nodiscard]] std::string full_name(const DataSheet& sheet);
 
-/// Identifies what is simulated: a hash of the full name, variant included, and of every number.
+/// Identifies a data sheet: a hash of the full name, including the variant, and of every number.
 /// @returns 16 hexadecimal digits, the same on every platform
 [[nodiscard]] std::string sheet_hash(const DataSheet& sheet);
 

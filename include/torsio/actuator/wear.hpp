@@ -4,7 +4,7 @@
 
 namespace torsio {
 
-/// In what state an actuator is run. All laws here are assumed (A): specification 4.1 asks for a
+/// Temperature and age of an actuator. All laws here are assumed (A): specification 4.1 requires a
 /// temperature factor and names its source for the trend (Wolf & Iskandar), but gives no numbers.
 struct OperatingConditions {
   static constexpr double kReference_K = 273.15 + 25.0;  ///< the data sheets' temperature

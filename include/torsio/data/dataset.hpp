@@ -15,8 +15,8 @@ enum class Role : std::uint8_t { train, validation, test };
 
 [[nodiscard]] std::string_view name(Role role) noexcept;
 
-/// Samples [begin, end) of a record and what they are for. Samples in no segment (an embargo) are
-/// used for nothing, but a filter or a hidden state runs through them.
+/// Samples [begin, end) of a recording and their role. Samples in no segment (an embargo) are
+/// not used for training or scores, but filters and hidden states are run through them.
 struct Segment {
   std::size_t begin = 0;
   std::size_t end = 0;
@@ -31,7 +31,7 @@ struct DatasetRecord {
   [[nodiscard]] bool has_role(Role role) const noexcept;
 };
 
-/// Recordings with a role each, on one sample rate. Splits are by record or by contiguous block,
+/// Recordings with their roles, at one sample rate. Splits are by recording or by contiguous block,
 /// never by shuffled sample.
 struct Dataset {
   std::vector<DatasetRecord> records;

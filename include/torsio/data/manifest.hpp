@@ -16,7 +16,7 @@ namespace torsio {
 struct SplitRule {
   std::size_t interleaved_blocks = 0;
   std::size_t test_every = 0;
-  double contiguous = 0.0;  ///< share of the record that trains
+  double contiguous = 0.0;  ///< share of the recording that is used for training
   double embargo_s = 0.0;
 };
 
@@ -36,7 +36,7 @@ struct ManifestFile {
   std::vector<std::pair<std::string, double>> conditions;  ///< in SI
 };
 
-/// A dataset as a YAML file: which logs, what they are for and how they are read. See
+/// A dataset as a YAML file: the logs, their roles and how they are read. See
 /// docs/recordings.md.
 struct Manifest {
   std::string file;

@@ -20,7 +20,7 @@ struct ChannelRule {
   double offset = 0.0;
 };
 
-/// How the time stamps are taken. Default: they must be even.
+/// How the time stamps are used. Default: they must be uniform.
 struct ClockRule {
   bool rebuild = false;          ///< spread the samples evenly between first and last stamp
   double max_stray_steps = 2.0;  ///< with rebuild: how far a stamp may be from there
@@ -29,7 +29,7 @@ struct ClockRule {
   double resample_Hz = 0.0;
 };
 
-/// A channel whose sensor reports late by this much.
+/// A channel and the latency of its sensor.
 struct LatencyRule {
   std::string channel;
   double latency_s = 0.0;

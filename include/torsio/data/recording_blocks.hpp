@@ -16,7 +16,7 @@ struct RecordingBlocks {
   Recording recording;
   std::size_t frames = 0;
   std::size_t blocks = 0;      ///< with frames
-  std::uint64_t dropped = 0;   ///< frames lost on the way, up to the last one in the file
+  std::uint64_t dropped = 0;   ///< dropped frames, up to the last one in the file
   std::size_t torn_bytes = 0;  ///< after the last sealed block: ignored
   bool was_closed = false;     ///< false: the process ended without closing the recorder
 };

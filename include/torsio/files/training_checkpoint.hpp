@@ -20,7 +20,7 @@ struct TrainingCheckpoint {
   double best_loss = 0.0;
   std::vector<float> weights;
   std::vector<float> mean;    ///< the optimiser's, of the gradient
-  std::vector<float> square;  ///< the optimiser's, of the gradient's square
+  std::vector<float> square;  ///< the optimiser's mean of the squared gradient
   std::vector<float> best;    ///< weights of the best epoch
   // In an ensemble, the members that were trained before this one.
   std::vector<float> finished;        ///< their weights, one after the other
@@ -44,7 +44,7 @@ struct TrainingCheckpoint {
   bool operator==(const TrainingCheckpoint&) const = default;
 };
 
-/// Writes a checkpoint whole or not at all, as safetensors with the recipe for metadata.
+/// Writes a checkpoint completely or not at all, as safetensors with the recipe for metadata.
 void save_checkpoint(const std::filesystem::path& path, const TrainingCheckpoint& checkpoint);
 
 /// Reads one from an untrusted file.

@@ -36,7 +36,7 @@ struct ForeignFile {
 
 struct ImportedModel {
   ModelFile file;
-  std::vector<std::string> notes;  ///< what its user should know
+  std::vector<std::string> notes;  ///< remarks for the user
 };
 
 /// Means no limit in the ranges of inputs: beyond every quantity, and a range of this size on

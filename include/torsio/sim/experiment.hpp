@@ -20,7 +20,7 @@ struct ExperimentSpec {
   std::string actuator = "dfki-50";  ///< as `data_sheet` takes it
   std::string experiment = "sweep";
   std::uint64_t seed = 1;
-  std::optional<double> duration_s = {};  ///< none: as long as the experiment's protocol is
+  std::optional<double> duration_s = {};  ///< none: that of the experiment's protocol
   std::optional<double> lever_m = {};     ///< none: the first of `sweep_protocol`, or locked
   double inclination_rad = 0.0;  ///< angle of the lever's plane of motion from the vertical
   // Excitation; an experiment has one of the amplitudes (`ExperimentInfo::amplitude_unit`); none:
@@ -36,9 +36,9 @@ struct ExperimentSpec {
 
 struct ExperimentInfo {
   std::string_view name;
-  std::string_view actuators;  ///< that have it
+  std::string_view actuators;  ///< actuators that have it
   std::string_view description;
-  std::string_view amplitude_unit = {};  ///< "Nm", "rad", or empty: it takes none
+  std::string_view amplitude_unit = {};  ///< "Nm", "rad", or empty: no amplitude
 };
 
 /// The experiments of all benches. A name may be listed for more than one family.
@@ -46,7 +46,7 @@ struct ExperimentInfo {
 /// The experiments of one actuator.
 [[nodiscard]] std::vector<ExperimentInfo> experiments(const DataSheet& sheet);
 
-/// How the sweeps of one actuator are made: the lever with its 9 kg mass goes to and fro between
+/// The sweeps of one actuator: the lever with its 9 kg mass moves back and forth between
 /// +-amplitude (specification 4.7). Levers of dfki-28, for which it has none, are ours: its
 /// torques reach the shares of the rating that those of the others do (0.2 to 0.55).
 struct SweepProtocol {
@@ -71,7 +71,7 @@ struct SweepProtocol {
 /// @throws UsageError for an unknown name, or a value that the experiment cannot take; Cancelled if
 /// `progress` asks to stop.
 [[nodiscard]] Recording simulate(const ExperimentSpec& spec, const Progress& progress = {});
-/// The same with an actuator of one's own: `spec.actuator` is not looked at.
+/// The same with another data sheet: `spec.actuator` is not used.
 [[nodiscard]] Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec,
                                  const Progress& progress = {});
 
@@ -81,11 +81,11 @@ struct SweepProtocol {
 [[nodiscard]] std::vector<double> measured_twist(const DataSheet& sheet,
                                                  const Recording& recording);
 
-/// What a simulation of the actuator must follow.
+/// The dynamics that a simulation of the actuator must resolve.
 struct PlantFigures {
   /// [Hz], the lower first: both ends free, no load on the joint, without damping.
   std::array<double, 2> natural_frequencies_Hz{};
-  double longest_step_s = 0.0;  ///< that its stiffest mode and its strongest damping allow
+  double longest_step_s = 0.0;  ///< limit from the stiffest mode and the strongest damping
 };
 [[nodiscard]] PlantFigures plant_figures(const DataSheet& sheet);
 

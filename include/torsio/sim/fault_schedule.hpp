@@ -10,22 +10,22 @@
 
 namespace torsio {
 
-/// What goes wrong. The first seven happen to sensors, the last two to the spring; drift happens to
-/// both sensors and parts.
+/// Kinds of faults. The first seven are faults of sensors, the last two of the spring; drift is a
+/// fault of both sensors and parts.
 enum class FaultKind : std::uint8_t {
   freeze,     ///< always the same value, marked as new
   jump,       ///< `amount` is added
   drift,      ///< sensor: `amount` per second since the start is added; part: its factor
               ///< changes from 1 to `amount` in `over_s` and remains there
   sign_flip,  ///< the sign is wrong
-  quantised,  ///< nothing finer than `amount` is left
+  quantised,  ///< resolution of `amount`
   dropout,    ///< no new samples: the last value is held and not marked as new
   nan,        ///< not a number
   broken,     ///< the spring's torque falls to the share `amount`, 0 for a broken spring
   bottom,     ///< the spring's deflection meets a stop at `amount` radians, to either side
 };
 
-/// One thing that goes wrong, and when.
+/// One fault and its time.
 struct ScheduledFault {
   /// A sensor, by the name of its logged channel ("gear_angle_rad"), or a part: "spring" ("gear"
   /// for actuators with a gear after their spring), "friction", "torque-constant".
