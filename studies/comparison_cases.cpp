@@ -17,9 +17,9 @@
 namespace torsio {
 namespace {
 
-constexpr std::uint64_t kScored = 50;  // seeds of runs to be judged on
-/// What a DFKI bench tells at the samples of its load cell (125 Hz), whose known latency is taken off: a log of
-/// 1 kHz tells no more of the torque, at eight times the cost.
+constexpr std::uint64_t kScored = 50;  // seeds of test runs
+/// The samples of a DFKI bench's load cell (125 Hz), without its known latency: a log of 1 kHz
+/// contains no more information about the torque, at eight times the cost.
 Recording at_load_cell(const Recording& log, const DataSheet& sheet) {
   const Channel& torque = log.channel("torque_Nm");
   const double tick_s = 1.0 / log.sample_rate_Hz();
@@ -47,7 +47,7 @@ void thin_out(Dataset& dataset, const DataSheet& sheet) {
   }
 }
 
-/// Adds a run; one that is judged under a condition of its own names it.
+/// Adds a run; a test run with a separate condition names it.
 void add(ComparisonCase& to, const ExperimentSpec& spec, Role role, const Progress& progress,
          const std::string& condition = {}) {
   Recording recording = simulate(spec, progress);
@@ -114,7 +114,8 @@ ComparisonCase rubber(std::uint64_t seed, const Progress& progress) {
 /// Pushes of 10 and 20 Nm under either impedance, then of 15 Nm.
 ComparisonCase pushes(const std::string& actuator, double duration_s, std::uint64_t seed,
                       const Progress& progress) {
-  // The twist of the tube; a rigid one's cannot be measured, and gear and tube stand for it (specification 3.4).
+  // The twist of the tube; that of a rigid one cannot be measured: the twist of gear and tube
+  // replaces it (specification 3.4).
   const bool is_rigid = actuator.ends_with("rigid");
   const std::string twist = is_rigid ? "lowpass(motor_angle_rad / 2 - 51 * joint_angle_rad, 10Hz)"
                                      : "motor_angle_rad / 2 - wave_generator_angle_rad";
@@ -138,7 +139,7 @@ ComparisonCase pushes(const std::string& actuator, double duration_s, std::uint6
   return made;
 }
 
-// As in tests/real_data, whose comments say why.
+// As in tests/real_data, where comments give the reasons.
 constexpr std::string_view kAnkle = R"yaml(
 target: torque_Nm
 root: ["${TORSIO_DATA}", ../shared/data]
@@ -192,7 +193,7 @@ ComparisonCase one_cam(const std::string& cam, const Progress& progress) {
                        cam, progress)};
 }
 
-/// Trained on one preload of a printed drive, judged on two others.
+/// A printed drive: trained on one preload, tested on two others.
 struct Drive {
   const char* name;
   std::array<const char*, 3> files;

@@ -11,13 +11,13 @@
 
 namespace torsio {
 
-/// What all models of one actuator, or of one real drive, learn from and are judged on.
+/// Training and test data of one actuator, or of one real drive.
 struct ComparisonCase {
   Dataset dataset = {};
-  std::vector<std::string> inputs = {};  ///< empty: the usual ones (`resolve_inputs`)
-  std::string schedule = {};             ///< an input that families which can are scheduled over
-  /// TestCase recording and the condition that it is a row of; none: all together are one, called as the
-  /// case.
+  std::vector<std::string> inputs = {};  ///< empty: the defaults (`resolve_inputs`)
+  std::string schedule = {};             ///< scheduling input, for the families that have one
+  /// Test recordings and the conditions of their rows; empty: all together are one condition with
+  /// the name of the case.
   std::vector<std::pair<std::string, std::string>> conditions = {};
 };
 
@@ -27,7 +27,7 @@ struct ComparisonPlan {
   std::function<ComparisonCase(std::uint64_t seed, const Progress& progress)> make;
 };
 
-/// Every simulated actuator in all variants. What is judged is of another kind than what is learned from:
+/// Every simulated actuator in all variants. Test runs differ from training runs:
 /// another lever in another plane, another reference, another amplitude.
 /// @param is_quick two short ones
 [[nodiscard]] std::vector<ComparisonPlan> simulated_plans(bool is_quick);

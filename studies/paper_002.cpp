@@ -25,8 +25,8 @@ constexpr double kFullScale_Nm = 0.5;  // where the clutch slips
 constexpr const char* kTwist = "input_angle_rad - joint_angle_rad";
 constexpr const char* kTwistRate = "lowpass(rate(input_angle_rad - joint_angle_rad), 10Hz)";
 constexpr const char* kMultisine = "multisine";
-constexpr std::uint64_t kScored = 50;  // seeds of recordings to be judged on
-/// A network with memory tells nothing before; the others are not judged there either.
+constexpr std::uint64_t kScored = 50;  // seeds of test recordings
+/// A network with memory is not valid before; the other models are not scored there either.
 constexpr std::size_t kWarmUp = 200;
 
 constexpr const char* kPapersModel = "improved PGPR";
@@ -42,8 +42,8 @@ struct Candidate {
   bool has_rate = false;  ///< given the twist's rate besides
 };
 
-/// The paper's: n_y = n_u = 8 (Table II), that is 7 past torques and 8 twists, trained one step ahead with the number
-/// of updates of Algorithm 1.
+/// The candidates of the paper: n_y = n_u = 8 (Table II), that is 7 past torques and 8 twists,
+/// trained one step ahead with the number of updates of Algorithm 1.
 std::vector<Candidate> papers_candidates(bool is_quick) {
   const std::string one_step = "input_lags=7:output_lags=7:training=one_step";
   const int updates = is_quick ? 2000 : 200000;
@@ -61,8 +61,8 @@ std::vector<Candidate> papers_candidates(bool is_quick) {
       {kPapersModel, pgpr("paper", "")},
       {"improved PGPR, Table II",
        fmt::format("narx_parametric_gp:{}:updates={}:kernel_plain={}", one_step, updates, kTable2)},
-      {"PGPR, mended", pgpr("recommended", kPlain)},
-      {"improved PGPR, mended", pgpr("recommended", "")}};
+      {"PGPR, corrected", pgpr("recommended", kPlain)},
+      {"improved PGPR, corrected", pgpr("recommended", "")}};
 }
 
 /// The same models, but that they learn to forget errors of what is fed back to them.
@@ -80,8 +80,8 @@ std::vector<Candidate> our_candidates(bool is_quick) {
 }
 
 std::vector<Candidate> baselines() {
-  return {{"line", "linear"},
-          {"line, friction", "linear_coulomb", true},
+  return {{"linear", "linear"},
+          {"linear, friction", "linear_coulomb", true},
           {"ARX 5", "arx"},
           {"ARX 15", "arx:input_lags=7:output_lags=7"}};
 }
@@ -93,10 +93,10 @@ std::vector<Candidate> all_candidates(bool is_quick) {
   return candidates;
 }
 
-/// Those of them that the other tests are judged with: none that still warms up when the clutch slips.
+/// The candidates of the other tests: none of them is still warming up when the clutch slips.
 std::vector<Candidate> few_candidates(bool is_quick) {
   std::vector<Candidate> candidates = all_candidates(is_quick);
-  constexpr std::array<std::string_view, 4> kFew{"line", "ARX 5", "improved PGPR, mended",
+  constexpr std::array<std::string_view, 4> kFew{"linear", "ARX 5", "improved PGPR, corrected",
                                                  "variational GP, noise"};
   std::erase_if(candidates, [&](const Candidate& candidate) {
     return std::ranges::find(kFew, candidate.label) == kFew.end();
@@ -113,9 +113,9 @@ struct Bench {
   Dataset dataset;
   StudyConditions conditions = {};
 
-  void judge(const Recording& from, const std::string& condition, std::size_t begin,
-             std::size_t end) {
-    // Two stretches of one recording are two to the scores.
+  void add_test(const Recording& from, const std::string& condition, std::size_t begin,
+                std::size_t end) {
+    // Two parts of one recording have separate scores.
     Recording recording(fmt::format("{} {}", from.name(), conditions.size()), from.sample_rate_Hz(),
                         from.time_s(0));
     for (const Channel& channel : from.channels()) recording.add(channel);
@@ -124,7 +124,8 @@ struct Bench {
   }
 };
 
-/// Trained on the grid. No measured torque is told to any model: all start from rest, as the bench.
+/// Trained on the grid. No model is initialised with the measured torque: all start from rest, as
+/// the bench.
 Bench trained_on_grid(std::uint64_t seed) {
   Bench bench;
   Recording grid = recorded("grid", seed);
@@ -146,7 +147,7 @@ std::size_t first_slip(const Recording& recording) {
 void compare_into(StudyRows& rows, const Bench& bench, const std::vector<Candidate>& candidates,
                   std::uint64_t seed, const Progress& progress) {
   std::vector<ModelChoice> choices;
-  std::vector<std::pair<std::string, std::string>> models;  // of each choice
+  std::vector<std::pair<std::string, std::string>> models;  // name of each choice
   for (const Candidate& candidate : candidates) {
     std::vector<std::string> inputs{kTwist};
     if (candidate.has_rate) inputs.emplace_back(kTwistRate);
@@ -169,7 +170,7 @@ const ErrorRow& best_of(const std::vector<ErrorRow>& rows, std::string_view name
   });
 }
 
-/// What the rows of one condition say about the paper's claim.
+/// The results of one condition compared with the paper's claim.
 std::vector<std::string> verdicts(const std::vector<ErrorRow>& rows) {
   const ErrorRow& arx = best_of(rows, "ARX");
   std::vector<std::string> notes;
@@ -215,9 +216,9 @@ Study beyond_slip(Study study, const std::vector<std::string>& experiments,
     for (const std::string& experiment : experiments) {
       const Recording recording = recorded(experiment, seed + kScored);
       const std::size_t slip = first_slip(recording);
-      bench.judge(recording, experiment + ", clutch holds", 0, slip);
+      bench.add_test(recording, experiment + ", clutch holds", 0, slip);
       if (slip < recording.size())
-        bench.judge(recording, experiment + ", has slipped", slip, recording.size());
+        bench.add_test(recording, experiment + ", has slipped", slip, recording.size());
     }
     compare_into(rows, bench, few_candidates(options.is_quick), seed,
                  nth_of(progress, k, options.repeats, "beyond slip"));
@@ -243,7 +244,7 @@ Study sensor_models_002(const StudyOptions& options, const Progress& progress) {
     Bench bench = trained_on_grid(seed);
     for (std::size_t i = 0; i < multisines; ++i) {
       const Recording recording = recorded(kMultisine, seed + kScored + i);
-      bench.judge(recording, kMultisine, kWarmUp, recording.size());
+      bench.add_test(recording, kMultisine, kWarmUp, recording.size());
     }
     compare_into(rows, bench, candidates, seed, nth_of(progress, k, options.repeats, kActuator));
   }

@@ -21,7 +21,7 @@ namespace {
 /// A model of the sequence that the paper goes through, or one of ours beside it.
 struct ModelStep {
   std::string_view choice;  ///< as `--models` takes it
-  std::string_view name;    ///< of its rows
+  std::string_view name;    ///< model name in its rows
 };
 
 constexpr std::array kSequence{
@@ -42,7 +42,7 @@ constexpr std::array kSequence{
     ModelStep{"viscoelastic:network=003d", "viscoelastic 003d"},
 };
 
-/// What is judged: a bench run that no model has learned from.
+/// A bench run that no model was trained on.
 struct TestCase {
   const char* experiment;
   const char* condition;
@@ -61,7 +61,7 @@ struct ModelSequence {
            std::uint64_t seed, Role role, bool is_quick) {
     ExperimentSpec spec{
         .actuator = "elastomer:" + coupling, .experiment = experiment, .seed = seed};
-    // One slow cycle takes 20 s; thirty of them say the same.
+    // One slow cycle takes 20 s; five of them are sufficient.
     if (experiment == std::string_view("slow-cycles")) spec.duration_s = is_quick ? 20.0 : 100.0;
     Recording recording = simulate(spec);
     conditions.add(recording.name(), condition);

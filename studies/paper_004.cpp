@@ -17,8 +17,8 @@
 namespace torsio {
 namespace {
 
-// The paper's encoder sets (specification 3.4): the twist of the tube, the torque asked of the motor,
-// the joint's acceleration; the third one looks through tube and gear together.
+// The paper's encoder sets (specification 3.4): the twist of the tube, the torque asked of the
+// motor, the joint's acceleration; the third one looks through tube and gear together.
 constexpr const char* kTwist = "motor_angle_rad / 2 - wave_generator_angle_rad";
 constexpr const char* kTwistThroughGear =
     "lowpass(motor_angle_rad / 2 - 51 * joint_angle_rad, 10Hz)";
@@ -28,7 +28,7 @@ constexpr const char* kTwistRate =
     "lowpass(rate(motor_angle_rad / 2 - wave_generator_angle_rad), 10Hz)";
 constexpr const char* kGeneratorSpeed = "lowpass(rate(wave_generator_angle_rad), 10Hz)";
 
-constexpr std::uint64_t kScored = 50;  // seeds of recordings to be judged on
+constexpr std::uint64_t kScored = 50;  // seeds of test recordings
 
 using InputSet = std::pair<std::string, std::vector<std::string>>;
 const InputSet kSet1{"I", {kTwist, kMotorTorque, kAcceleration}};
@@ -37,15 +37,15 @@ const InputSet kSet2Plus{"II+", {kTwist, kMotorTorque, kGeneratorSpeed}};
 const InputSet kSet3{"III", {kTwistThroughGear, kMotorTorque}};
 
 /// The paper's network and training on each input set (Table 2; stride, burn-in, learning rate and
-/// clipping are assumed), beside what is cheap: a line, a static
-/// network, and a line with friction that is given the twist's rate besides set II.
+/// clipping are assumed), compared with simple models: linear, a static
+/// network, and linear with friction, which has the twist's rate in addition to set II.
 std::vector<ModelChoice> choices_of(const Dataset& dataset, const StudyOptions& options) {
   const std::string models = fmt::format(
       "linear,mlp,lstm:layers={}:window=200:stride=20:burn_in=20:epochs=3:batch=64:"
       "learning_rate=0.001:clip=1:patience=0",
       options.is_quick ? 32 : 250);
   std::vector<ModelChoice> choices = model_choices(dataset, models, {});
-  if (dataset.input_sets.front() == kSet2Plus) return choices;  // stands beside II already
+  if (dataset.input_sets.front() == kSet2Plus) return choices;  // is compared with II already
   const std::vector<std::string> with_rate{kTwist, kMotorTorque, kTwistRate};
   for (ModelChoice& choice : model_choices(dataset, "linear_coulomb", with_rate))
     choices.insert(choices.begin(), std::move(choice));

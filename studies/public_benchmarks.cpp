@@ -19,7 +19,7 @@ namespace torsio {
 namespace {
 
 struct Entry {
-  std::string_view name;    ///< of its rows
+  std::string_view name;    ///< model name in its rows
   std::string_view choice;  ///< as `--models` takes it
   std::string_view quick;   ///< the same for `--quick`; empty: left out
   bool is_seeded = false;   ///< another seed makes another model: fitted in every repeat
@@ -31,7 +31,7 @@ struct Benchmark {
   std::array<std::string_view, 2> tests;  ///< the second may be empty
   std::string_view target;
   std::string_view input;
-  double rate_Hz;  ///< of recordings without a clock; 0: theirs
+  double rate_Hz;  ///< sample rate of recordings without a clock; 0: they have one
   std::span<const PaperEntry> published;
 };
 
@@ -52,7 +52,8 @@ constexpr Benchmark kEmps{.name = "emps",
                           .rate_Hz = 0.0,
                           .published = kPublishedEmps};
 
-// Settings of the networks: docs/benchmarks.md says how they were chosen, inside the training record.
+// Settings of the networks: docs/benchmarks.md describes how they were selected on the training
+// recording.
 constexpr std::array kBoucWenModels{
     Entry{"linear", "linear", "linear"},
     Entry{"arx", "arx", "arx"},

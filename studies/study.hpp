@@ -18,16 +18,16 @@ namespace torsio {
 struct StudyOptions {
   std::uint64_t seed = 1;
   std::size_t repeats = 3;  ///< each with plants' noise, weights and folds of its own
-  bool is_quick = false;    ///< shorter recordings and smaller networks: to see that it runs
+  bool is_quick = false;    ///< shorter recordings and smaller networks, as a quick test
 };
 
 /// A figure that a paper prints, as it prints it.
 struct PaperFigure {
   std::string_view paper;      ///< its number in docs/sources.md
   std::string_view item;       ///< table, figure or section
-  std::string_view condition;  ///< under which it was found
-  std::string_view quantity;   ///< in the paper's own term
-  std::string_view text;       ///< with the digits that are printed
+  std::string_view condition;  ///< condition of the measurement
+  std::string_view quantity;   ///< in the paper's term
+  std::string_view text;       ///< the digits as printed
   std::string_view unit;
   double value = kNotMeasured;
 };
@@ -57,9 +57,9 @@ struct PaperEntry {
 struct StudyRow {
   std::string condition = {};
   std::string model = {};
-  std::size_t runs = 0;            ///< fits that the statistics are of; 0: only published figures
+  std::size_t runs = 0;            ///< fits in the statistics; 0: only published figures
   double rmse = kNotMeasured;      ///< mean, in `Study::unit`; NaN without a run, as all means
-  double rmse_std = kNotMeasured;  ///< of one run; NaN of fewer than two
+  double rmse_std = kNotMeasured;  ///< standard deviation of one run; NaN for fewer than two
   std::vector<std::pair<RowQuantity, PaperFigure>> published = {};
 };
 
@@ -70,15 +70,16 @@ struct ErrorRow : StudyRow {
   double max_abs = kNotMeasured;   ///< largest |error| of all runs
   double one_step = kNotMeasured;  ///< mean RMSE one step ahead; NaN of a model without feedback
   std::size_t blank = 0;           ///< runs with fit_percent below 5, no more than the mean
-  double guarded_percent = 0.0;    ///< of the scored samples, estimated by a guard
-  std::size_t diverged = 0;        ///< of the runs
+  double guarded_percent = 0.0;    ///< share of the scored samples with the fallback of a guard
+  std::size_t diverged = 0;        ///< number of runs that diverged
   double fit_percent = kNotMeasured;  ///< mean of `Metrics::fit_percent` (BF)
   double fit_seconds = kNotMeasured;  ///< mean of the runs
 };
 
 struct ErrorTable {
   std::vector<ErrorRow> rows = {};  ///< condition by condition, in the order of their first fit
-  std::optional<double> full_scale = {};  ///< of the sensor: errors are also shown in % of it
+  std::optional<double> full_scale =
+      {};  ///< full scale of the sensor: errors are also shown in % of it
   bool shows_fit_time = false;
 };
 
@@ -89,7 +90,7 @@ struct ComparisonRow : StudyRow {
   double within_std_dev = kNotMeasured;  ///< mean of `Score::within_std_dev`; NaN: no error bar
   double within_2_std_dev = kNotMeasured;
   std::size_t diverged = 0;
-  std::string failure = {};  ///< why a fit failed; the study goes on
+  std::string failure = {};  ///< why a fit failed; the study continues
 
   /// Every run was fitted and stayed within the output's range.
   [[nodiscard]] bool is_ranked() const { return runs > 0 && diverged == 0 && failure.empty(); }
@@ -100,10 +101,11 @@ struct ComparisonTable {
   std::string subject;  ///< the model that the study is about
 };
 
-/// Errors of a torque loop through the inverse of a model; means over the runs (specification 3.10).
+/// Errors of a torque loop through the inverse of a model; means over the runs (specification
+/// 3.10).
 struct LoopRow : StudyRow {
   double mad = kNotMeasured;
-  double mad_std = kNotMeasured;  ///< of one run; NaN of fewer than two
+  double mad_std = kNotMeasured;  ///< standard deviation of one run; NaN for fewer than two
   double std_abs = kNotMeasured;
   /// MAD over that of the linear model of the sweeps, where both completed the run.
   double mad_to_linear = kNotMeasured;
@@ -120,7 +122,7 @@ struct StudyVerdict {
   std::string condition;
   std::string best = {};  ///< model of the least RMSE among those that are ranked
   double best_rmse = 0.0;
-  std::optional<double> rmse = {};  ///< of the subject; none if it is not ranked
+  std::optional<double> rmse = {};  ///< RMSE of the subject; none if it is not ranked
 
   [[nodiscard]] bool is_near_best() const { return rmse && *rmse <= kNear * best_rmse; }
   static constexpr double kNear = 1.05;
@@ -129,17 +131,17 @@ struct StudyVerdict {
 /// A simulated bench that a study used.
 struct StudyPlant {
   std::string name;
-  std::string fingerprint;  ///< of name, variant and every number of its data sheet
+  std::string fingerprint;  ///< hash of name, variant and every number of its data sheet
 };
 
 /// A paper's experiment, run here.
 struct Study {
   std::string protocol;  ///< what was recorded, trained on and tested on
-  std::string unit;      ///< of the errors
+  std::string unit;      ///< unit of the errors
   StudyOptions options;
   std::vector<StudyPlant> plants = {};
   std::variant<ErrorTable, ComparisonTable, LoopTable> table = {};
-  std::vector<std::string> notes = {};  ///< conclusions in words, settings behind the models' names
+  std::vector<std::string> notes = {};  ///< conclusions, and settings of the named models
 };
 
 /// Condition by condition. @throws Error if none is ranked under one.

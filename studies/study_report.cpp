@@ -81,7 +81,7 @@ std::string diverged_runs(std::size_t diverged, std::size_t runs) {
   return diverged == 0 ? std::string() : fmt::format("diverged in {} of {}", diverged, runs);
 }
 
-/// Of a study of torque loops: what the papers rate these by.
+/// Columns for a study of torque loops: the measures that the papers use.
 std::vector<Column<LoopRow>> columns_of(const LoopTable& table, const std::string& unit) {
   using Row = LoopRow;
   const auto fixed = [](double Row::*value) {
@@ -118,7 +118,7 @@ std::string unranked(const ComparisonRow& row) {
   return "failed: " + row.failure.substr(0, row.failure.find('\n'));
 }
 
-/// Of a study that compares families: how far each is from the best.
+/// Columns for a study that compares families: the distance of each from the best.
 std::vector<Column<ComparisonRow>> columns_of(const ComparisonTable& table,
                                               const std::string& unit) {
   using Row = ComparisonRow;
@@ -236,7 +236,7 @@ std::string text_of(const ComparisonTable& table, const std::string& unit) {
   return fmt::format(
       "\n{}\n{}/ best: RMSE over the lowest of the condition; {}in 1 sd %, in 2 sd %: samples "
       "whose "
-      "error is at most one, two error bars (honest: 68 and 95)\n",
+      "error is at most one, two error bars (calibrated: 68 and 95)\n",
       verdict_text(table, unit), table_text(table, unit), kPercentOfMax);
 }
 
@@ -266,7 +266,7 @@ Json published_json(const StudyRow& row) {
   return all;
 }
 
-/// What every row has; what is NaN for want of runs is written as null.
+/// The fields of every row; values that are NaN because there are no runs are written as null.
 Json row_json(const StudyRow& row) {
   return {{"condition", row.condition}, {"model", row.model},
           {"runs", row.runs},           {"rmse", row.rmse},

@@ -42,8 +42,8 @@ class StudyRows {
 
   /// The rows of single recordings in a split, each under its condition.
   /// @param condition_of (recording) -> condition
-  /// @param model_of (row) -> what the study calls its model
-  /// @throws Error if a fit failed: a study has no holes. A free run that diverged counts with its error.
+  /// @param model_of (row) -> name of its model in the study
+  /// @throws Error if a fit failed. A free run that diverged counts with its error.
   template <class ConditionOf, class ModelOf>
   void add(const Results& results, const Dataset& dataset, Role split,
            const ConditionOf& condition_of, const ModelOf& model_of) {
@@ -65,7 +65,8 @@ class StudyRows {
   /// One row, whatever its split.
   void add(const std::string& condition, const std::string& model, const ResultRow& row,
            const Dataset& dataset);
-  /// A fit that failed: a row that says why. A study that compares all families has such holes.
+  /// Adds a row for a failed fit with its reason. Only a study that compares all families has such
+  /// rows.
   void failed(const std::string& condition, const std::string& model, const std::string& reason);
 
   [[nodiscard]] std::vector<ErrorRow> errors() const;
@@ -89,7 +90,8 @@ class StudyRows {
     bool operator==(const Key&) const = default;
   };
 
-  /// Condition by condition, in the order of their first row. @param fill writes the row's own fields.
+  /// Condition by condition, in the order of their first row. @param fill writes the row's own
+  /// fields.
   template <class Row, class Fill>
   [[nodiscard]] std::vector<Row> rows(const Fill& fill) const;
 
@@ -97,7 +99,7 @@ class StudyRows {
   static std::string model_of(const ResultRow& row);
   Sum& sum_of(Key key);
 
-  /// Of one recording, or of all.
+  /// The largest |target| of one recording, or of all.
   static double largest_target(const Dataset& dataset, const std::optional<std::string>& recording);
 
   std::vector<std::pair<Key, Sum>> sums_;
@@ -107,7 +109,7 @@ class StudyRows {
 /// The name, and the hash of the data sheet (`sheet_hash`), which covers variant and numbers.
 [[nodiscard]] StudyPlant study_plant(std::string_view actuator);
 
-/// Of the k-th repeat; far enough apart for a dataset to count on from it.
+/// Seed of the k-th repeat; the distance leaves room for the following seeds of a dataset.
 [[nodiscard]] std::uint64_t repeat_seed(const StudyOptions& options, std::size_t k) noexcept;
 
 /// The deflection becomes the torque's function, with the rates of the forward models.

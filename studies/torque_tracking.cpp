@@ -30,10 +30,10 @@ using Kind = TorqueReference::Kind;
 
 constexpr std::array kVariants{"maxwell-slip", "bouc-wen", "lugre"};
 constexpr double kQuick_s = 20.0;
-constexpr std::uint64_t kScored = 50;  // seeds of runs to be judged on
-constexpr double kObserver_Hz = 8.0;   // of the loop that does what a controller can
+constexpr std::uint64_t kScored = 50;  // seeds of test runs
+constexpr double kObserver_Hz = 8.0;   // loop with feed-forward and observer
 
-/// What a loop is asked for (specification 6).
+/// The task of a loop (specification 6).
 struct Task {
   const char* actuator;
   double amplitude_Nm;
@@ -61,8 +61,8 @@ bool exists(std::string_view family) {
                              [&](const FamilyInfo& info) { return info.name == family; });
 }
 
-/// The torque-mode recordings beside the sweeps: chirps (or walks) under the linear controller of the
-/// data sheet, other amplitudes, the same output (specification 6, observation 1).
+/// The torque-mode recordings beside the sweeps: chirps (or walks) under the linear controller of
+/// the data sheet, other amplitudes, the same output (specification 6, observation 1).
 void add_torque_mode(Dataset& dataset, const std::string& actuator, const Task& task, Kind kind,
                      std::uint64_t seed, bool is_quick) {
   const bool is_locked = task.output == JointOutput::locked;
@@ -178,7 +178,7 @@ struct Trial {
 };
 
 /// Both references, where rating and lever allow them.
-void judge(const Trial& trial, bool is_helped, TrackingRows& rows, const Progress& progress) {
+void run_tests(const Trial& trial, bool is_helped, TrackingRows& rows, const Progress& progress) {
   const Task& task = trial.task;
   const DataSheet sheet = data_sheet(trial.actuator);
   for (const Kind kind : {Kind::chirp, Kind::random_walk}) {
@@ -219,11 +219,11 @@ void run_task(const Task& task, const std::string& actuator, std::uint64_t seed,
   const auto of_sweeps = static_cast<std::ptrdiff_t>(inverses.size());
   train_more(Kind::chirp, "+ torque mode");
   const LinearInverse line = sweep_line(data_sheet(actuator), seed, progress);
-  judge({task, actuator, seed, line, inverses, options.is_quick}, false, rows, progress);
+  run_tests({task, actuator, seed, line, inverses, options.is_quick}, false, rows, progress);
   if (!task.is_helped) return;
   inverses.erase(inverses.begin(), inverses.begin() + of_sweeps);
   train_more(Kind::random_walk, "+ walks");
-  judge({task, actuator, seed, line, inverses, options.is_quick}, true, rows, progress);
+  run_tests({task, actuator, seed, line, inverses, options.is_quick}, true, rows, progress);
 }
 
 }  // namespace

@@ -54,18 +54,19 @@ void run(const AdaptFlags& flags) {
   const auto settings = torsio::adaptation_settings(flags.method, parse_settings(flags.settings));
   const torsio::ModelFile file = torsio::load_model(flags.model);
   torsio::require_last_layer(file.parameters);  // before recordings are read
-  ProgressBar bar;
-  const torsio::Dataset dataset = load(flags, file, bar.listener());
+  ProgressBar progress;
+  const torsio::Dataset dataset = load(flags, file, progress.listener());
   warn_of_seen_recordings(file, dataset);
   warn_of_missing_zeros(file, dataset);
-  torsio::AdaptedModel adapted = torsio::adapt_model(file, dataset, settings, bar.listener());
+  torsio::AdaptedModel adapted = torsio::adapt_model(file, dataset, settings, progress.listener());
   if (!flags.device_serial.empty()) adapted.file.card.device_serial = flags.device_serial;
   if (flags.json.wants_tables()) print(torsio::adaptation_text(adapted, flags.model));
   flags.json.write(torsio::adaptation_json(adapted, flags.model));
   const torsio::AdaptationScore& held_out = adapted.held_out.back();
   if (held_out.adapted.rmse > held_out.frozen.rmse)
     remark(
-        "warning: on what was held out the adapted weights are worse than the frozen ones; try a "
+        "warning: on the held-out samples the adapted weights are worse than the frozen ones; try "
+        "a "
         "smaller step_size (initial_covariance for rls), or comparison_s as long as a cycle");
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, adapted.file);  // last: untouched unless all else succeeded
@@ -77,28 +78,33 @@ void run(const AdaptFlags& flags) {
 void add_adapt(CLI::App& app) {
   auto flags = std::make_shared<AdaptFlags>();
   CLI::App* verb = app.add_subcommand(
-      "adapt", "replay recordings through a network whose last layer goes on learning");
+      "adapt", "replay recordings through a network and adapt its last layer to them");
   verb->footer(
-      "Example: torsio adapt joint.safetensors other_piece.csv -o other_joint.safetensors\n"
+      "Example: torsio adapt joint.safetensors other_specimen.csv -o other_joint.safetensors\n"
       "         torsio adapt joint.safetensors warm.csv --test warm2.csv --method rls\n"
-      "Without --test, the last 30 % of each recording are not learned from but scored on; of a\n"
-      "manifest, what has the role train is learned from, what has the role test scored on.\n" +
+      "Without --test, the last 30 % of each recording are used for the scores only. In a "
+      "manifest,\n"
+      "recordings with the role train are used for the adaptation and those with the role test "
+      "for\n"
+      "the scores.\n" +
       settings_list());
   verb->add_option("MODEL", flags->model, "model file of an mlp, lstm or gru")->required();
-  flags->data.add_recordings(*verb, "recordings to learn from, in this order, or a manifest");
+  flags->data.add_recordings(*verb, "recordings to adapt to, in this order, or a manifest");
   flags->data.add_mapping(*verb);
-  CLI::Option* test = verb->add_option("--test", flags->test, "recordings that are only scored on");
+  CLI::Option* test =
+      verb->add_option("--test", flags->test, "recordings that are used for the scores only");
   verb->add_option("--held-out", flags->held_out,
-                   "share of each recording, at its end, that is only scored on")
+                   "share of each recording, at its end, that is used for the scores only")
       ->capture_default_str()
       ->excludes(test);
-  verb->add_option("--embargo", flags->embargo, "time before that part that is used for nothing")
+  verb->add_option("--embargo", flags->embargo, "time before that part that is used in neither")
       ->capture_default_str();
-  verb->add_option("--method", flags->method,
-                   "nlms: cheap, steady; rls: learns in fewer samples, costs the square of the "
-                   "last layer's width")
+  verb->add_option(
+          "--method", flags->method,
+          "nlms: cheap and robust; rls: converges in fewer samples, its cost is quadratic in the "
+          "last layer's width")
       ->capture_default_str();
-  verb->add_option("--set", flags->settings, "a setting, option=value; listed below")
+  verb->add_option("--set", flags->settings, "set an option, option=value; listed below")
       ->allow_extra_args(false);
   verb->add_option("-o,--output", flags->output,
                    "adapted model file; untouched unless all else succeeds");

@@ -34,7 +34,7 @@ std::size_t window_samples(const AttributeFlags& flags, double sample_rate_Hz) {
   return static_cast<std::size_t>(samples);
 }
 
-/// All that was recorded, whatever a manifest wants it for.
+/// All recordings, whatever their roles in a manifest.
 torsio::Dataset load(const AttributeFlags& flags, const std::string& target,
                      const torsio::Progress& progress) {
   DataFlags data = flags.data;
@@ -49,8 +49,8 @@ torsio::Dataset load(const AttributeFlags& flags, const std::string& target,
 void run(const AttributeFlags& flags) {
   flags.data.check_outputs({flags.json.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
-  ProgressBar bar;
-  const torsio::Dataset dataset = load(flags, file.settings.target, bar.listener());
+  ProgressBar progress;
+  const torsio::Dataset dataset = load(flags, file.settings.target, progress.listener());
   warn_of_missing_zeros(file, dataset);
   // Refuses a sample rate that the model cannot run at.
   (void)torsio::estimator_at(file, dataset.sample_rate_Hz());
@@ -59,7 +59,8 @@ void run(const AttributeFlags& flags) {
   const torsio::AnyModel model(file.parameters);
   const torsio::TrainingData data =
       torsio::training_data(dataset, file.settings.features, torsio::Role::test);
-  const torsio::Attribution attribution = torsio::attribute(model, data, options, bar.listener());
+  const torsio::Attribution attribution =
+      torsio::attribute(model, data, options, progress.listener());
   const torsio::AttributionSubject subject{.model = flags.model,
                                            .family = file.card.fitted_as,
                                            .target = dataset.target,
@@ -84,22 +85,21 @@ void add_attribute(CLI::App& app) {
       "Ctrl-C\n"
       "stops it.");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
-  flags->data.add_recordings(*verb, "recordings to ask the model about, or a manifest");
+  flags->data.add_recordings(*verb, "recordings on which the model is evaluated, or a manifest");
   flags->data.add_mapping(*verb);
   verb->add_option("--windows", flags->options.windows, "samples (or windows) that are explained")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   verb->add_option("--background", flags->options.background,
-                   "samples (or windows) that absent inputs are taken from")
+                   "samples (or windows) from which the values of absent inputs are taken")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  verb->add_option("--window", flags->window,
-                   "length of a window: 0.2s; auto: as long as the model remembers")
+  verb->add_option("--window", flags->window, "length of a window: 0.2s; auto: the model's memory")
       ->capture_default_str();
   verb->add_option("--repeats", flags->options.repeats, "shuffles of each input")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  add_seed(*verb, flags->options.seed, "seed of everything random");
+  add_seed(*verb, flags->options.seed, "seed of the random number generators");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

@@ -52,11 +52,11 @@ std::string json_of(const std::vector<torsio::Finding>& findings) {
   return torsio::json_text(document);
 }
 
-/// A clock that is not uniform keeps a recording from being read: that is a finding, too.
+/// A recording whose clock is not uniform cannot be read: that is a finding, too.
 std::vector<torsio::Finding> findings_of(const CheckFlags& flags) {
   try {
-    ProgressBar bar;
-    const torsio::Dataset dataset = flags.data.load({}, flags.test, bar.listener());
+    ProgressBar progress;
+    const torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
     const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
     std::vector<torsio::Finding> findings{{torsio::Verdict::pass, "clock", "", "uniform", ""}};
     std::ranges::move(torsio::check_dataset(dataset, spec), std::back_inserter(findings));
@@ -75,10 +75,10 @@ void run(const CheckFlags& flags) {
   if (flags.json.wants_tables())
     print(text_of(findings) + fmt::format("{}: {}\n", torsio::name(verdict),
                                           verdict == torsio::Verdict::fail
-                                              ? "mend this before learning from it"
+                                              ? "fix this before training"
                                           : verdict == torsio::Verdict::warn
-                                              ? "a model can be learned; mind the warnings"
-                                              : "a model can be learned from this"));
+                                              ? "a model can be trained; read the warnings"
+                                              : "a model can be trained on this"));
   flags.json.write(json_of(findings));
   if (verdict == torsio::Verdict::fail)
     throw torsio::Error({.problem = "the recordings did not pass"});
@@ -88,7 +88,8 @@ void run(const CheckFlags& flags) {
 
 void add_check(CLI::App& app) {
   auto flags = std::make_shared<CheckFlags>();
-  CLI::App* verb = app.add_subcommand("check", "can a model be learned from these recordings?");
+  CLI::App* verb =
+      app.add_subcommand("check", "check whether a model can be trained on recordings");
   verb->footer("Example: torsio check sweep1.csv sweep2.csv --test other_lever.csv");
   flags->data.add_recordings(*verb, "recordings, or a manifest");
   flags->data.add_mapping(*verb);

@@ -31,17 +31,19 @@ struct CompareFlags {
 void run(const CompareFlags& flags) {
   flags.data.check_outputs({flags.output, flags.report, flags.json.destination}, flags.test);
   require_model_file(flags.output);
-  ProgressBar bar;
-  const torsio::Dataset dataset = flags.data.load(flags.validation, flags.test, bar.listener());
+  ProgressBar progress;
+  const torsio::Dataset dataset =
+      flags.data.load(flags.validation, flags.test, progress.listener());
   std::optional<torsio::StructureSearch> search;
   if (flags.models == torsio::kSearch) {
     const auto candidates = torsio::search_candidates(dataset, flags.data.wanted_inputs());
     remark(fmt::format(
-        "search: {} structures, each fitted on {} folds, then the best of each family: {} fits and "
-        "more, many of them slow. Ctrl-C stops it; --models with fewer families is quicker.",
+        "search: {} structures, each fitted on {} folds, then the best of each family: at least {} "
+        "fits, "
+        "many of them slow. Ctrl-C stops it; --models with fewer families is quicker.",
         candidates.size(), torsio::kSearchFolds, candidates.size() * torsio::kSearchFolds));
     search = torsio::search_structures(dataset, candidates, flags.seed, flags.allow_leak,
-                                       bar.listener());
+                                       progress.listener());
     if (search->winners.empty())
       throw torsio::Error({.problem = first_failure(search->scores.results)});
     if (flags.json.wants_tables()) print(cross_validation_text(search->scores) + "\n");
@@ -50,7 +52,7 @@ void run(const CompareFlags& flags) {
       search ? search->winners
              : torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   const auto comparison =
-      torsio::compare(dataset, choices, flags.seed, flags.allow_leak, bar.listener());
+      torsio::compare(dataset, choices, flags.seed, flags.allow_leak, progress.listener());
   flags.json.write(search ? torsio::search_json(comparison.results, search->scores)
                           : torsio::results_json(comparison.results));
   if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
@@ -75,7 +77,7 @@ void add_compare(CLI::App& app) {
   flags->data.add_mapping(*verb);
   flags->data.add_initialise(*verb);
   flags->data.add_target_and_inputs(*verb);
-  verb->add_option("--test", flags->test, "held-out recordings: they rank the models");
+  verb->add_option("--test", flags->test, "held-out recordings, on which the models are ranked");
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
   verb->add_option(
           "--models", flags->models,
@@ -88,10 +90,10 @@ void add_compare(CLI::App& app) {
               "minutes to hours")
       ->capture_default_str();
   verb->add_option("-o,--output", flags->output, "write the best model to this file");
-  verb->add_option("--report", flags->report, "write the tables as a page for a browser");
-  add_seed(*verb, flags->seed, "seed of everything random");
+  verb->add_option("--report", flags->report, "write the tables as an HTML page");
+  add_seed(*verb, flags->seed, "seed of the random number generators");
   verb->add_flag("--allow-leak", flags->allow_leak,
-                 "accept an input that the target was computed from; rows say so");
+                 "accept an input that the target was computed from; the results are marked");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

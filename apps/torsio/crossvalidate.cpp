@@ -39,7 +39,7 @@ std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
                               .found = "--models " + flags.models});
   for (torsio::ModelChoice& choice : choices) {
     for (const auto& [option, value] : settings) choice.options[option] = value;
-    // Refuses what the family does not know before any work is done.
+    // Refuses unknown options before any work is done.
     (void)torsio::Options(torsio::find_family(choice.family).options, choice.options);
   }
   return choices;
@@ -51,11 +51,11 @@ void run(const CrossValidateFlags& flags) {
   const torsio::FoldScheme scheme{.folds = flags.folds,
                                   .embargo_s = torsio::si_quantity(flags.embargo, "s", "--embargo"),
                                   .by = flags.by};
-  ProgressBar bar;
-  torsio::Dataset dataset = flags.data.load({}, {}, bar.listener());
+  ProgressBar progress;
+  torsio::Dataset dataset = flags.data.load({}, {}, progress.listener());
   const auto choices = choices_of(flags, settings, dataset);
   const torsio::CrossValidation validation = torsio::cross_validate(
-      std::move(dataset), choices, scheme, flags.seed, flags.allow_leak, bar.listener());
+      std::move(dataset), choices, scheme, flags.seed, flags.allow_leak, progress.listener());
   flags.json.write(torsio::cross_validation_json(validation));
   if (std::ranges::none_of(validation.ranking,
                            [](const torsio::FoldSummary& summary) { return summary.folds > 0; }))
@@ -72,10 +72,10 @@ void add_crossvalidate(CLI::App& app) {
   verb->footer(
       "Example: torsio crossvalidate sweep*.csv --folds 5 --models linear,dgmm\n"
       "         torsio crossvalidate bench.yaml --by support_m --models dgmm --set components=100\n"
-      "Whole recordings are dealt to the folds; with fewer recordings than folds, each recording "
-      "is\n"
-      "cut into contiguous blocks. Of a manifest only what has the role train is dealt. Cost: one\n"
-      "compare for each fold.");
+      "Whole recordings are assigned to the folds; if there are fewer recordings than folds, each\n"
+      "recording is cut into contiguous blocks. Of a manifest only recordings with the role train "
+      "are\n"
+      "used. Cost: one compare per fold.");
   flags->data.add_recordings(*verb, "recordings, or a manifest with roles");
   flags->data.add_mapping(*verb);
   flags->data.add_initialise(*verb);
@@ -86,7 +86,7 @@ void add_crossvalidate(CLI::App& app) {
           "but " +
               families_beyond_all() + ", which are added by name: all,lstm")
       ->capture_default_str();
-  verb->add_option("--set", flags->settings, "a setting of every model named, option=value")
+  verb->add_option("--set", flags->settings, "set an option of every model, option=value")
       ->allow_extra_args(false);
   CLI::Option* folds =
       verb->add_option("--folds", flags->folds, "number of folds")->capture_default_str();
@@ -95,12 +95,12 @@ void add_crossvalidate(CLI::App& app) {
                    "recordings of one value at a time")
       ->excludes(folds);
   verb->add_option("--embargo", flags->embargo,
-                   "time between a held-out block and what is learned from; whole recordings need "
+                   "time between a held-out block and the training samples; whole recordings need "
                    "none")
       ->capture_default_str();
-  add_seed(*verb, flags->seed, "seed of everything random");
+  add_seed(*verb, flags->seed, "seed of the random number generators");
   verb->add_flag("--allow-leak", flags->allow_leak,
-                 "accept an input that the target was computed from; rows say so");
+                 "accept an input that the target was computed from; the results are marked");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

@@ -30,8 +30,8 @@ torsio::LoadOptions load_options(const DataFlags& flags, const torsio::Progress&
   return options;
 }
 
-/// Whether both paths are one place that holds one document: a file, or standard output. Devices and
-/// pipes may take several.
+/// Whether both paths are the same file, or both are standard output. Devices and
+/// pipes may be given more than once.
 bool is_same_file(const std::string& one, const std::string& other) {
   if (one.empty() || other.empty()) return false;
   if (is_standard_output(one) || is_standard_output(other))
@@ -96,7 +96,7 @@ void DataFlags::add_mapping(CLI::App& verb) {
 }
 
 void DataFlags::add_target_and_inputs(CLI::App& verb) {
-  verb.add_option("--target", target, "channel to be told (default torque_Nm)");
+  verb.add_option("--target", target, "target channel (default torque_Nm)");
   verb.add_option("--inputs", inputs,
                   "the model's inputs, separated by commas (default: the manifest's, else the "
                   "deflection, its filtered rate and the filtered joint speed)");
@@ -104,8 +104,9 @@ void DataFlags::add_target_and_inputs(CLI::App& verb) {
 
 void DataFlags::add_initialise(CLI::App& verb) {
   verb.add_option("--initialise", initialise,
-                  "measured samples that tell a model with memory where it starts, at the start "
-                  "of a recording, and that are not scored; 0: a cold start")
+                  "measured samples at the start of a recording from which the memory of a model "
+                  "is initialised; "
+                  "they are not scored; 0: no initialisation")
       ->capture_default_str();
 }
 
@@ -161,7 +162,7 @@ void DataFlags::check_outputs(const std::vector<std::string>& outputs,
       if (!is_same_file(outputs[j], outputs[i])) continue;
       throw torsio::UsageError({.place = outputs[i],
                                 .problem = "two outputs would be written to it",
-                                .advice = "Give each output a name of its own."});
+                                .advice = "Give each output a different name."});
     }
   }
 }
@@ -174,7 +175,7 @@ std::map<std::string, std::string> parse_settings(const std::vector<std::string>
       throw torsio::UsageError({.place = "--set",
                                 .expected = "option=value in one word, such as degree=3",
                                 .found = "'" + setting + "'",
-                                .advice = "Each setting has a --set of its own."});
+                                .advice = "Give one --set for each setting."});
     options[setting.substr(0, equals)] = setting.substr(equals + 1);
   }
   return options;

@@ -32,23 +32,24 @@ struct DataFlags {
   [[nodiscard]] torsio::Dataset load_as_test(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
   /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that
-  /// are one and the same file, or that have no folder to stand in.
+  /// are the same file, or whose folder does not exist.
   void check_outputs(const std::vector<std::string>& outputs,
                      const std::vector<std::string>& more_inputs = {}) const;
 };
 
 inline constexpr std::uint64_t kDefaultSeed = 1;
 
-/// A frequency of a loop in Hz or rad/s ("8Hz", "50rad_s"), in rad/s. @throws torsio::UsageError if it is not above 0.
+/// A frequency of a loop in Hz or rad/s ("8Hz", "50rad_s"), in rad/s.
+/// @throws torsio::UsageError if it is not above 0.
 [[nodiscard]] double angular_frequency_rad_s(const std::string& text, const char* option);
 /// The families that `--models all` leaves out, for help and remarks.
 [[nodiscard]] std::string families_beyond_all();
-/// Whether `all` stands in a list of models.
+/// Whether `all` is in a list of models.
 [[nodiscard]] bool has_all(const std::string& models);
 /// `--seed`, for every verb that draws random numbers.
 void add_seed(CLI::App& verb, std::uint64_t& seed, const char* help);
 /// @returns the number. @throws UsageError naming the flag unless it is finite and above 0.
 [[nodiscard]] double above_zero(double value, const char* flag);
-/// What `--set option=value` said, each time it was given.
+/// The options of all `--set option=value` by name.
 [[nodiscard]] std::map<std::string, std::string> parse_settings(
     const std::vector<std::string>& settings);

@@ -50,7 +50,8 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
   const torsio::Score& together = score.together;
   return fmt::format(
       "\nbest model {} saved to {}, loaded back, {} samples streamed through it:\n"
-      "RMSE {:.3f}, {:.0f} ns a step (99.9 %: {:.0f} ns), {} samples outside the training range or "
+      "RMSE {:.3f}, {:.0f} ns per step (99.9 %: {:.0f} ns), {} samples outside the training range "
+      "or "
       "faulty\n",
       best.file.card.fitted_as, flags.output, together.metrics.samples, together.metrics.rmse,
       together.step_ns_p50, together.step_ns_p999, together.guarded_samples);
@@ -59,15 +60,15 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
 void run(const DemoFlags& flags) {
   flags.data.check_outputs({flags.output, flags.json.destination}, flags.test);
   require_model_file(flags.output);
-  ProgressBar bar;
+  ProgressBar progress;
   const bool is_simulated = flags.data.recordings.empty();
   if (is_simulated) remark(fmt::format("simulating four sweeps of {} ...", flags.actuator));
   const torsio::Dataset dataset =
-      is_simulated ? torsio::sweep_dataset(flags.actuator, flags.seed, bar.listener())
-                   : flags.data.load({}, flags.test, bar.listener());
+      is_simulated ? torsio::sweep_dataset(flags.actuator, flags.seed, progress.listener())
+                   : flags.data.load({}, flags.test, progress.listener());
   const auto choices = torsio::model_choices(dataset, flags.models, flags.data.wanted_inputs());
   const torsio::Comparison comparison =
-      torsio::compare(dataset, choices, flags.seed, false, bar.listener());
+      torsio::compare(dataset, choices, flags.seed, false, progress.listener());
   if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
   const std::string deployed = deployment(flags, dataset, *comparison.best);
   if (flags.json.wants_tables())
@@ -80,8 +81,9 @@ void run(const DemoFlags& flags) {
 
 void add_demo(CLI::App& app) {
   auto flags = std::make_shared<DemoFlags>();
-  CLI::App* verb =
-      app.add_subcommand("demo", "the main job end to end, on a simulated bench or on your files");
+  CLI::App* verb = app.add_subcommand("demo",
+                                      "the complete workflow, from recordings to a deployed model, "
+                                      "on a simulated bench or on your files");
   verb->footer(
       "Example: torsio demo\n         torsio demo sweep1.csv sweep2.csv --test other_lever.csv");
   flags->data.add_recordings(
@@ -91,10 +93,10 @@ void add_demo(CLI::App& app) {
   verb->add_option("--test", flags->test, "held-out recordings");
   verb->add_option("--actuator", flags->actuator, "the simulated bench")->capture_default_str();
   verb->add_option("--models", flags->models, "as for compare")->capture_default_str();
-  verb->add_option("-o,--output", flags->output, "where the best model goes")
-      ->capture_default_str();
-  add_seed(*verb, flags->seed, "seed of everything random");
-  verb->add_option("--json", flags->json.destination,
-                   "write compare's document to a file, or - for standard output");
+  verb->add_option("-o,--output", flags->output, "file of the best model")->capture_default_str();
+  add_seed(*verb, flags->seed, "seed of the random number generators");
+  verb->add_option(
+      "--json", flags->json.destination,
+      "write the results of the comparison as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });
 }

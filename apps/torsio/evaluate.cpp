@@ -57,8 +57,8 @@ void run(const EvaluateFlags& flags) {
   }
   DataFlags data = flags.data;
   data.target = file.settings.target;
-  ProgressBar bar;
-  const torsio::Dataset dataset = data.load_as_test(bar.listener());
+  ProgressBar progress;
+  const torsio::Dataset dataset = data.load_as_test(progress.listener());
   if (!flags.predictions.empty() && dataset.records.size() != 1)
     throw torsio::UsageError({.place = "--predictions",
                               .expected = "one recording",
@@ -66,7 +66,7 @@ void run(const EvaluateFlags& flags) {
                               .advice = "Call evaluate once for each recording."});
   warn_of_seen_recordings(file, dataset);
   warn_of_missing_zeros(file, dataset);
-  const torsio::Results results = torsio::evaluate_model(file, dataset, bar.listener());
+  const torsio::Results results = torsio::evaluate_model(file, dataset, progress.listener());
   warn_of_another_unit(file, dataset);
   if (!flags.predictions.empty()) {
     const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
@@ -86,7 +86,7 @@ void run(const EvaluateFlags& flags) {
 void add_evaluate(CLI::App& app) {
   auto flags = std::make_shared<EvaluateFlags>();
   CLI::App* verb = app.add_subcommand(
-      "evaluate", "score a model file on recordings; without recordings, say what it is");
+      "evaluate", "score a model file on recordings; without recordings, show its description");
   verb->footer(
       "Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv\n"
       "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "

@@ -35,7 +35,7 @@ struct FitFlags {
   bool resume = false;
   JsonOutput json;
 
-  /// Where a fit that was stopped leaves how far it was.
+  /// The checkpoint of a fit that was stopped.
   [[nodiscard]] std::string checkpoint() const { return output + ".checkpoint"; }
 };
 
@@ -52,7 +52,7 @@ std::string family_list() {
   return text;
 }
 
-/// `train_model` from the start or from the checkpoint; stopped, it leaves a checkpoint.
+/// `train_model` from the start or from the checkpoint; if it is stopped, it writes a checkpoint.
 torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset,
                            const torsio::ModelChoice& choice, torsio::Progress progress) {
   torsio::TrainingCheckpoint start;
@@ -70,9 +70,9 @@ torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset
     return torsio::train_model(dataset, choice, context);
   } catch (const torsio::Cancelled&) {
     if (!is_kept) throw;
-    throw torsio::Error(
-        {.problem = "stopped on request; the best so far is kept in " + flags.checkpoint(),
-         .advice = "The same call with --resume goes on from there."});
+    throw torsio::Error({.problem = "stopped on request; the best parameters so far are saved in " +
+                                    flags.checkpoint(),
+                         .advice = "The same call with --resume continues from there."});
   }
 }
 
@@ -90,14 +90,15 @@ void run(const FitFlags& flags) {
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
   flags.data.check_outputs({flags.output, flags.json.destination}, flags.validation);
   require_model_file(flags.output);
-  ProgressBar bar;
-  const torsio::Dataset dataset = flags.data.load(flags.validation, {}, bar.listener());
+  ProgressBar progress;
+  const torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   (void)torsio::refuse_leak(dataset, features, flags.allow_leak);
   const torsio::ModelChoice choice{flags.family, settings, "", features};
-  torsio::TrainedModel trained = train(flags, dataset, choice, bar.listener());
+  torsio::TrainedModel trained = train(flags, dataset, choice, progress.listener());
   trained.file.card.device_serial = flags.device_serial;
-  const torsio::Results results = torsio::evaluate_model(trained.file, dataset, bar.listener());
+  const torsio::Results results =
+      torsio::evaluate_model(trained.file, dataset, progress.listener());
   torsio::note_held_out_scores(trained.file.card, results.rows);
   const torsio::FitReport report = torsio::fit_report(trained, dataset);
   if (flags.json.wants_tables()) print(evaluation_text(results) + torsio::fit_report_text(report));
@@ -122,17 +123,17 @@ void add_fit(CLI::App& app) {
   flags->data.add_mapping(*verb);
   flags->data.add_target_and_inputs(*verb);
   verb->add_option("--model", flags->family, "family; --list shows them");
-  verb->add_option("--set", flags->settings, "a setting of the family, option=value")
+  verb->add_option("--set", flags->settings, "set an option of the family, option=value")
       ->allow_extra_args(false);
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
   verb->add_option("-o,--output", flags->output, "model file; untouched unless the fit succeeds");
   verb->add_option("--serial", flags->device_serial,
                    "serial number of the joint that the model belongs to");
-  add_seed(*verb, flags->seed, "seed of everything random");
+  add_seed(*verb, flags->seed, "seed of the random number generators");
   verb->add_flag("--allow-leak", flags->allow_leak,
-                 "accept an input that the target was computed from; rows say so");
+                 "accept an input that the target was computed from; the results are marked");
   verb->add_flag("--resume", flags->resume,
-                 "go on from <output>.checkpoint, which a network's stopped fit leaves");
+                 "continue from <output>.checkpoint, which a stopped fit of a network writes");
   verb->add_flag("--list", flags->list, "show the families and their settings");
   verb->add_option("--json", flags->json.destination,
                    "write the scores as JSON to a file, or - for standard output");

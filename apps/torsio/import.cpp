@@ -22,7 +22,7 @@ namespace {
 
 struct ImportFlags {
   std::string file;
-  DataFlags data;  ///< its recordings are those that the guards are taken from
+  DataFlags data;  ///< its recordings are those from which the guards are computed
   std::vector<double> input_scale;
   double output_scale = 1.0;
   std::string activation;
@@ -51,14 +51,14 @@ torsio::ForeignNetwork read_graph(const ImportFlags& flags,
                                   [[maybe_unused]] const torsio::ForeignFile& file) {
   if (!flags.activation.empty())
     throw torsio::UsageError({.place = "--activation",
-                              .problem = "an ONNX graph has its activations in it",
-                              .advice = "Leave --activation away."});
+                              .problem = "an ONNX graph contains its activations",
+                              .advice = "Omit --activation."});
 #ifdef TORSIO_HAS_ONNX
   return torsio::parse_onnx(file.bytes, flags.file, flags.graph_output);
 #else
   throw torsio::Error({.place = flags.file,
                        .expected = "weights as JSON",
-                       .found = "something else",
+                       .found = "another format",
                        .advice = "This torsio was built without ONNX: install libonnx-dev and "
                                  "libprotobuf-dev and build it again."});
 #endif
@@ -68,14 +68,14 @@ torsio::ForeignNetwork read_weights(const ImportFlags& flags, const torsio::Fore
   if (!flags.graph_output.empty())
     throw torsio::UsageError({.place = "--output-name",
                               .problem = "weights as JSON have no graph with outputs",
-                              .advice = "Leave --output-name away."});
+                              .advice = "Omit --output-name."});
   std::optional<torsio::Activation> activation;
   if (!flags.activation.empty()) activation = torsio::activation_of(flags.activation);
   return torsio::parse_weights_json(file.bytes, flags.file, activation);
 }
 
 torsio::ImportOptions options_of(const ImportFlags& flags) {
-  // Not among the braces below: g++ 12 destroys what a throw there has left half made.
+  // Not inside the braces below: if it throws there, g++ 12 destroys members that were never made.
   const double rate_Hz = torsio::si_quantity(flags.data.rate, "Hz", "--rate");
   return {.features = {.inputs = flags.data.wanted_inputs(), .definitions = {}},
           .target = flags.data.target.empty() ? "torque_Nm" : flags.data.target,
@@ -89,18 +89,17 @@ torsio::ImportOptions options_of(const ImportFlags& flags) {
 void run(const ImportFlags& flags) {
   if (flags.data.inputs.empty() || flags.data.rate.empty() || flags.output.empty())
     throw torsio::UsageError({.place = "torsio import",
-                              .expected =
-                                  "--inputs, --rate and -o: the file does not say what goes "
-                                  "into its network, nor how often",
+                              .expected = "--inputs, --rate and -o: the file does not specify the "
+                                          "inputs of its network, nor the sample rate",
                               .advice = kExample});
   flags.data.check_outputs({flags.output, flags.json.destination}, {flags.file});
   require_model_file(flags.output);
   const torsio::ForeignFile file = torsio::read_foreign_file(flags.file);
   const torsio::ForeignNetwork network =
       is_json(file.bytes) ? read_weights(flags, file) : read_graph(flags, file);
-  ProgressBar bar;
+  ProgressBar progress;
   std::optional<torsio::Dataset> guards;
-  if (!flags.data.recordings.empty()) guards = flags.data.load({}, {}, bar.listener());
+  if (!flags.data.recordings.empty()) guards = flags.data.load({}, {}, progress.listener());
   torsio::ImportedModel imported =
       torsio::import_network(network, file.source, options_of(flags), guards ? &*guards : nullptr);
   imported.file.card.device_serial = flags.device_serial;
@@ -117,37 +116,38 @@ void run(const ImportFlags& flags) {
 
 void add_import(CLI::App& app) {
   auto flags = std::make_shared<ImportFlags>();
-  CLI::App* verb =
-      app.add_subcommand("import", "make a model file of a network that another program trained");
+  CLI::App* verb = app.add_subcommand(
+      "import", "convert a network that another program trained into a model file");
   verb->footer(kExample);
   verb->add_option("FILE", flags->file, "ONNX graph, or PyTorch weights by name as JSON")
       ->required();
-  verb->add_option(
-      "--inputs", flags->data.inputs,
-      "what goes into the network, in its order: expressions of channels, separated by "
-      "commas");
+  verb->add_option("--inputs", flags->data.inputs,
+                   "inputs of the network, in its order: expressions of channels, separated by "
+                   "commas");
   verb->add_option("--target", flags->data.target,
-                   "channel that the network tells (default torque_Nm)");
+                   "channel that the network estimates (default torque_Nm)");
   verb->add_option("--rate", flags->data.rate,
                    "sample rate that the network was trained at; recordings are resampled to it");
-  verb->add_option("--input-scale", flags->input_scale,
-                   "what its program multiplied each input by, separated by commas (default 1)")
+  verb->add_option(
+          "--input-scale", flags->input_scale,
+          "factors by which its program multiplied the inputs, separated by commas (default 1)")
       ->delimiter(',');
   verb->add_option("--output-scale", flags->output_scale,
-                   "what its program multiplied the output by (default 1)");
+                   "factor by which its program multiplied the output (default 1)");
   verb->add_option(
       "--activation", flags->activation,
-      "of the hidden dense layers of JSON weights: linear, relu, tanh, softsign or elu");
+      "activation of the hidden dense layers of JSON weights: linear, relu, tanh, softsign or elu");
   verb->add_option("--output-name", flags->graph_output,
-                   "the output of an ONNX graph that tells the target (default: its first)");
+                   "the output of an ONNX graph that estimates the target (default: its first)");
   verb->add_option(
       "--warm-up", flags->warm_up,
       "samples after a reset before a network with memory is valid (default: the graph's "
       "window, else 0)");
-  verb->add_flag("--fold-biases", flags->fold_biases,
-                 "one bias a gate of an LSTM: a faster step, which rounds otherwise than PyTorch");
+  verb->add_flag(
+      "--fold-biases", flags->fold_biases,
+      "one bias per gate of an LSTM: a faster step, which is rounded differently than in PyTorch");
   verb->add_option("--guards", flags->data.recordings,
-                   "recordings to take range guard, fallback and error bar from");
+                   "recordings from which range guard, fallback and error bar are computed");
   verb->add_option("--mapping", flags->data.mapping,
                    "YAML file that renames and converts the columns of these recordings");
   verb->add_option("-o,--output", flags->output,
@@ -155,6 +155,6 @@ void add_import(CLI::App& app) {
   verb->add_option("--serial", flags->device_serial,
                    "serial number of the joint that the model belongs to");
   verb->add_option("--json", flags->json.destination,
-                   "write what the model is as JSON to a file, or - for standard output");
+                   "write the model's description as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });
 }

@@ -24,7 +24,7 @@ int complain(const char* message, int exit_code) {
 
 int run(int argc, char** argv) {
   CLI::App app(
-      "Learns how a series-elastic actuator's spring behaves and tells the joint torque from it.",
+      "Fits models of a series-elastic actuator's spring and estimates the joint torque with them.",
       "torsio");
   app.set_version_flag("--version", torsio::kVersion);
   app.require_subcommand(1);

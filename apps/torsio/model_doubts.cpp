@@ -14,7 +14,8 @@ namespace {
 
 constexpr int kSettled = 2000;  // ticks of 1 ms
 
-/// From -torque to torque, the joint being at rest; none where the model does not tell.
+/// Deflection range from -torque to torque with the joint at rest; none if the inverse has no
+/// solution.
 std::optional<double> deflection_range_rad(torsio::AnyInverse inverse, double torque_Nm) {
   double range_rad = 0.0;
   for (const double sign : {-1.0, 1.0}) {
@@ -37,16 +38,17 @@ std::optional<double> deflection_range_rad(torsio::AnyInverse inverse, double to
 void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse,
                             const torsio::LinearInverse& line, const torsio::DataSheet& sheet,
                             double torque_Nm) {
-  constexpr double kAnother = 1.4;  // hysteresis and wear of one spring stay below it
+  constexpr double kAnother = 1.4;  // hysteresis and wear of one spring remain below it
   const auto inverted = deflection_range_rad(std::move(inverse), torque_Nm);
   const auto swept = deflection_range_rad(line, torque_Nm);
   if (!inverted || !swept || !(*inverted > 0.0)) return;
   const double ratio = *inverted / *swept;
   if (ratio < kAnother && ratio > 1.0 / kAnother) return;
-  remark(fmt::format(
-      "warning: for {:.3g} Nm {} winds the spring {:.2g} times as far as sweeps of {} do: was it "
-      "trained on another actuator?",
-      torque_Nm, model, ratio, sheet.name));
+  remark(
+      fmt::format("warning: for {:.3g} Nm {} deflects the spring {:.2g} times as far as the linear "
+                  "model of {} does: was it "
+                  "trained on another actuator?",
+                  torque_Nm, model, ratio, sheet.name));
 }
 
 void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
@@ -58,7 +60,7 @@ void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Datase
     });
     if (is_known)
       remark("warning: the model was trained on " + recording.name() +
-             "; its score is no held-out one");
+             "; its score is not a held-out score");
   }
 }
 
@@ -82,6 +84,6 @@ void warn_of_another_unit(const torsio::ModelFile& file, const torsio::Dataset& 
       remark("warning: " + file.settings.target + " of " + record.recording.name() + " over " +
              file.settings.features.inputs.front() +
              " differs from the training data by the factor between " + mistake +
-             ": look at the units of the recording");
+             ": check the units of the recording");
   }
 }

@@ -7,14 +7,16 @@
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
 
-/// Warns of recordings that the model was trained on: a score on them is no held-out one.
+/// Warns of recordings that the model was trained on: a score on them is not a held-out score.
 void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Dataset& dataset);
-/// Warns of channels that the model expects with their zero taken, but a recording has as measured.
+/// Warns of channels that the model expects with their zero removed, but a recording has as
+/// measured.
 void warn_of_missing_zeros(const torsio::ModelFile& file, const torsio::Dataset& dataset);
-/// Warns of recordings whose torque over the first input differs from the training data's by a unit.
+/// Warns of recordings whose torque over the first input differs from that of the training data by
+/// the factor between two units.
 void warn_of_another_unit(const torsio::ModelFile& file, const torsio::Dataset& dataset);
-/// Warns of an inverse that tells a deflection for `torque_Nm` at rest that is far from that of the
-/// actuator's own line: the model learned another spring.
+/// Warns of an inverse whose deflection for `torque_Nm` at rest is far from that of the actuator's
+/// linear model: the model was trained on another spring.
 void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse,
                             const torsio::LinearInverse& line, const torsio::DataSheet& sheet,
                             double torque_Nm);

@@ -17,7 +17,7 @@ bool is_standard_output(std::string_view path) { return path == "-" || path == "
 void print(std::string_view text) {
   const std::size_t written = std::fwrite(text.data(), 1, text.size(), stdout);
   if (written != text.size() || std::fflush(stdout) != 0)
-    throw torsio::Error({.place = "standard output", .problem = "could not be written to the end"});
+    throw torsio::Error({.place = "standard output", .problem = "could not be written completely"});
 }
 
 void remark(std::string_view text) {
@@ -42,11 +42,11 @@ void require_writable(const std::string& path) {
     throw torsio::UsageError({.place = path,
                               .expected = "a file to write",
                               .found = "a folder",
-                              .advice = "Add the name that the file in it is to have."});
+                              .advice = "Add the name of the file in this folder."});
   const bool is_replaced = !fs::exists(path, absent) || fs::is_regular_file(path, absent);
   const std::string written = !is_replaced ? path : folder.empty() ? "." : folder.string();
   if (!is_standard_output(path) && ::access(written.c_str(), W_OK) != 0)
-    throw torsio::UsageError({.place = path, .problem = "you may not write to " + written});
+    throw torsio::UsageError({.place = path, .problem = "no permission to write to " + written});
 }
 
 void require_model_file(const std::string& path) {
@@ -58,7 +58,7 @@ void require_model_file(const std::string& path) {
   throw torsio::UsageError({.place = path,
                             .expected = "a file to write the model to",
                             .found = "a device, pipe or standard output",
-                            .advice = "A model is written whole or not at all: name a file."});
+                            .advice = "A model is written completely or not at all: name a file."});
 }
 
 void require_ending(const char* option, const std::string& path,

@@ -31,12 +31,12 @@ torsio::Progress ProgressBar::listener() {
     if (is_terminal_)
       draw(fraction, doing);
     else
-      tell(fraction, doing);
+      print_line(fraction, doing);
     return !is_interrupted();
   };
 }
 
-void ProgressBar::tell(double fraction, std::string_view doing) {
+void ProgressBar::print_line(double fraction, std::string_view doing) {
   const auto now = Clock::now();
   if (now - last_ < kBetweenLines) return;
   last_ = now;

@@ -6,8 +6,8 @@
 
 #include "torsio/core/progress.hpp"
 
-/// A bar on stderr, if that is a terminal and the work lasts over a second; in a log or pipe a line
-/// every half minute. It also carries Ctrl-C to the work.
+/// A progress bar on stderr if that is a terminal and the work lasts over a second; in a log or
+/// pipe a line every half minute. It also stops the work after Ctrl-C.
 class ProgressBar {
  public:
   ProgressBar();
@@ -15,11 +15,11 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// To be handed to the work; valid while the bar lives.
+  /// To be passed to the work; valid as long as this object exists.
   [[nodiscard]] torsio::Progress listener();
 
  private:
-  void tell(double fraction, std::string_view doing);
+  void print_line(double fraction, std::string_view doing);
   void draw(double fraction, std::string_view doing);
 
   bool is_terminal_;

@@ -10,7 +10,7 @@
 
 namespace {
 
-/// Target, what the split means, and the inputs.
+/// Target, split and inputs.
 std::string heading(const torsio::Results& results) {
   std::string text = fmt::format("target {}{}\n", results.target,
                                  results.label.empty() ? "" : ", " + results.label);
@@ -56,7 +56,7 @@ std::string evaluation_text(const torsio::Results& results) {
   torsio::TextTable table;
   table.header({"split", "RMSE", "MAD", "max|e|", "fit %", "samples", "by a guard", "in 1 sd %",
                 "in 2 sd %", "step ns", "p99.9"});
-  // Four places, or three digits where the smallest error would be lost in them (metres).
+  // Four decimals, or three significant digits if the smallest error needs more decimals (metres).
   constexpr double kTooSmallForFourPlaces = 0.0005;
   const bool is_small = std::ranges::any_of(results.rows, [](const torsio::ResultRow& row) {
     return row.score.metrics.rmse < kTooSmallForFourPlaces;

@@ -5,11 +5,11 @@
 #include "torsio/report/cross_validation.hpp"
 #include "torsio/report/results.hpp"
 
-/// What a person is shown of a comparison: what was compared, the ranked test table, and the
+/// The text of a comparison: target and inputs, the ranked test table, and the
 /// remarks to its rows.
 [[nodiscard]] std::string comparison_text(const torsio::Results& results);
 
-/// The ranking over the folds, with what each of them holds out.
+/// The ranking over the folds, with the held-out part of each.
 [[nodiscard]] std::string cross_validation_text(const torsio::CrossValidation& validation);
 
 /// The scores of one model on each role and recording.

@@ -25,7 +25,7 @@ struct ReproduceFlags {
 
 void list() {
   torsio::TextTable table;
-  table.header({"item", "paper", "what it asks"});
+  table.header({"item", "paper", "question"});
   for (const torsio::StudyInfo& info : torsio::studies())
     table.row({std::string(info.name), std::string(info.paper), std::string(info.title)});
   print(table.text());
@@ -41,8 +41,8 @@ void run(const ReproduceFlags& flags) {
   DataFlags().check_outputs({flags.json.destination});
   auto documents = nlohmann::ordered_json::array();
   for (const torsio::StudyInfo* info : wanted) {
-    ProgressBar bar;
-    const torsio::Study study = torsio::run_study(*info, flags.options, bar.listener());
+    ProgressBar progress;
+    const torsio::Study study = torsio::run_study(*info, flags.options, progress.listener());
     documents.push_back(nlohmann::ordered_json::parse(torsio::study_json(*info, study)));
     if (flags.json.wants_tables()) {
       print(torsio::study_text(*info, study) + "\n");
@@ -56,19 +56,20 @@ void run(const ReproduceFlags& flags) {
 
 void add_reproduce(CLI::App& app) {
   auto flags = std::make_shared<ReproduceFlags>();
-  CLI::App* verb =
-      app.add_subcommand("reproduce", "run the papers' experiments, their figures beside ours");
+  CLI::App* verb = app.add_subcommand(
+      "reproduce", "run the papers' experiments and compare the published figures with ours");
   verb->footer(
       "Example: torsio reproduce 001-models --repeats 1\n"
-      "Without an item all of them run that need no recordings: the best part of an hour on two "
+      "Without an item all experiments that need no recordings are run: almost an hour on two "
       "cores. public-benchmarks and model-comparison read recordings in TORSIO_DATA or "
       "../shared/data.");
-  verb->add_option("ITEM", flags->items, "which; --list shows them");
+  verb->add_option("ITEM", flags->items, "name of an experiment; --list shows them");
   verb->add_flag("--list", flags->list, "show the experiments");
   verb->add_flag("--quick", flags->options.is_quick,
-                 "shorter recordings and smaller networks: to see that it runs");
-  verb->add_option("--repeats", flags->options.repeats, "with other seeds")->capture_default_str();
-  add_seed(*verb, flags->options.seed, "of the first repeat");
+                 "shorter recordings and smaller networks, as a quick test");
+  verb->add_option("--repeats", flags->options.repeats, "repeats with different seeds")
+      ->capture_default_str();
+  add_seed(*verb, flags->options.seed, "seed of the first repeat");
   verb->add_option("--json", flags->json.destination,
                    "write the figures as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

@@ -60,7 +60,7 @@ std::string inputs_for(std::string_view actuator, std::string_view variant) {
     return "input_angle_rad - joint_angle_rad, lowpass(rate(input_angle_rad - joint_angle_rad), "
            "10Hz)";
   if (actuator != "harmonic-drive") return {};
-  // A rigid tube's twist cannot be measured: gear and tube stand for it.
+  // A rigid tube's twist cannot be measured: the twist of gear and tube is used instead.
   const std::string twist = variant == "rigid"
                                 ? "lowpass(motor_angle_rad / 2 - 51 * joint_angle_rad, 10Hz)"
                                 : "motor_angle_rad / 2 - wave_generator_angle_rad";
@@ -69,7 +69,7 @@ std::string inputs_for(std::string_view actuator, std::string_view variant) {
 
 std::string bench_list() {
   torsio::TextTable actuators;
-  actuators.header({"actuator", "variants (NAME:VARIANT)", "what it is"});
+  actuators.header({"actuator", "variants (NAME:VARIANT)", "description"});
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
     actuators.row({std::string(sheet.name), fmt::format("{}", fmt::join(variants(sheet), ", ")),
                    std::string(sheet.title)});
@@ -78,11 +78,12 @@ std::string bench_list() {
     if (const std::string named = inputs_for(sheet.name, sheet.variant); !named.empty())
       inputs += fmt::format("check and train {} with --inputs '{}'\n", sheet.name, named);
   torsio::TextTable experiments;
-  experiments.header({"experiment", "actuators", "what is done"});
+  experiments.header({"experiment", "actuators", "description"});
   for (const torsio::ExperimentInfo& info : torsio::experiments())
     experiments.row(
         {std::string(info.name), std::string(info.actuators), std::string(info.description)});
-  return actuators.text() + "\nA piece of its own, by serial number: NAME#03\n" + inputs + "\n" +
+  return actuators.text() +
+         "\nA specimen with manufacturing tolerances, by serial number: NAME#03\n" + inputs + "\n" +
          experiments.text();
 }
 
@@ -98,7 +99,7 @@ std::string description(const torsio::DataSheet& sheet) {
       "{}: {}\n{}origin: P printed in a paper, D derived from printed numbers, A assumed\n"
       "longest step: {:.3g} us\n"
       "natural frequencies, both ends free: {:.4g} Hz, {:.4g} Hz\n"
-      "faults can happen to the sensors {} and to {}\n",
+      "faults can be simulated in the sensors {} and in {}\n",
       torsio::full_name(sheet), sheet.title, table.text(), 1e6 * plant.longest_step_s, low_Hz,
       high_Hz, fmt::join(torsio::fault_sensors(sheet), ", "),
       fmt::join(torsio::fault_parts(sheet), ", "));
@@ -226,7 +227,7 @@ std::string loop_picture(const SimulateFlags& flags, const torsio::Recording& re
                           fmt::format("{} {}", flags.actuator, flags.experiment));
 }
 
-/// What a person or, with --json, a machine is shown.
+/// Prints text or, with --json, JSON.
 void show(const SimulateFlags& flags, const std::string& text, const Json& document) {
   if (flags.json.wants_tables()) print(text);
   flags.json.write(torsio::json_text(document));
@@ -237,7 +238,7 @@ void run(const SimulateFlags& flags) {
   if (!flags.describe.empty()) {
     if (!flags.actuator.empty())
       throw torsio::UsageError({.place = "torsio simulate --describe",
-                                .expected = "one name and nothing to simulate",
+                                .expected = "one name and no simulation",
                                 .found = flags.actuator});
     const torsio::OperatingConditions of = conditions(flags);
     torsio::check(of);
@@ -247,13 +248,13 @@ void run(const SimulateFlags& flags) {
   if (flags.actuator.empty() || flags.experiment.empty() || flags.output.empty())
     throw torsio::UsageError({.place = "torsio simulate",
                               .expected = "ACTUATOR EXPERIMENT -o FILE",
-                              .advice = "torsio simulate --list shows what there is; example: "
+                              .advice = "torsio simulate --list shows all names; example: "
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
   DataFlags().check_outputs({flags.output, flags.json.destination, flags.plot}, {flags.faults});
   require_ending("--plot", flags.plot, {".svg"});
   const torsio::ExperimentSpec spec = experiment_spec(flags);
-  ProgressBar bar;
-  const torsio::Recording recording = torsio::simulate(spec, bar.listener());
+  ProgressBar progress;
+  const torsio::Recording recording = torsio::simulate(spec, progress.listener());
   torsio::write_csv(recording, flags.output);
   if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, recording));
   flags.json.write(torsio::json_text(recording_json(flags, spec, recording)));
@@ -268,41 +269,43 @@ void run(const SimulateFlags& flags) {
 
 void add_simulate(CLI::App& app) {
   auto flags = std::make_shared<SimulateFlags>();
-  CLI::App* verb = app.add_subcommand("simulate", "record a run of a simulated bench");
+  CLI::App* verb = app.add_subcommand("simulate", "record an experiment on a simulated bench");
   verb->footer("Example: torsio simulate dfki-50 sweep --lever 0.17m --seed 2 -o sweep.csv");
   verb->add_option("ACTUATOR", flags->actuator, "--list shows the names");
   verb->add_option("EXPERIMENT", flags->experiment, "--list shows the names");
   verb->add_option("-o,--output", flags->output,
                    "CSV file to write (packed if it ends in .gz), or - for standard output");
-  verb->add_option("--duration", flags->duration, "length of the record (default: the protocol's)");
-  verb->add_option("--lever", flags->lever, "where the 9 kg mass hangs on the lever: 0.17m");
+  verb->add_option("--duration", flags->duration,
+                   "length of the recording (default: that of the protocol)");
+  verb->add_option("--lever", flags->lever, "distance of the 9 kg mass from the joint axis: 0.17m");
   verb->add_option("--inclination", flags->inclination,
-                   "of the lever's plane of motion from the vertical: 37.8deg");
-  verb->add_option("--amplitude", flags->amplitude, "of the excitation: 20Nm or 9deg");
-  verb->add_option("--frequency", flags->frequency, "of the excitation: 0.4Hz");
-  verb->add_option("--impedance", flags->impedance, "of the joint's controller: high or zero")
+                   "angle between the lever's plane of motion and the vertical: 37.8deg");
+  verb->add_option("--amplitude", flags->amplitude, "amplitude of the excitation: 20Nm or 9deg");
+  verb->add_option("--frequency", flags->frequency, "frequency of the excitation: 0.4Hz");
+  verb->add_option("--impedance", flags->impedance,
+                   "impedance of the joint's controller: high or zero")
       ->check(CLI::IsMember({"high", "zero"}))
       ->capture_default_str();
   verb->add_option("--faults", flags->faults,
-                   "YAML schedule of what fails when (docs/faults.md); --describe shows what can");
-  verb->add_option("--temperature", flags->temperature,
-                   "of the gear, -40degC to 85degC (default 25degC): friction falls as it rises");
-  verb->add_option("--warm-up", flags->warm_up,
-                   "by how much the gear gets warmer: 20K (default 0)");
+                   "YAML schedule of faults (docs/faults.md); --describe shows the possible ones");
+  verb->add_option(
+      "--temperature", flags->temperature,
+      "gear temperature, -40degC to 85degC (default 25degC): friction decreases with it");
+  verb->add_option("--warm-up", flags->warm_up, "temperature rise of the gear: 20K (default 0)");
   verb->add_option("--warm-up-time", flags->warm_up_time,
                    "time constant of the warm-up (default 20min)");
   verb->add_option(
       "--age", flags->age,
-      "0 (default) to 1: the served share of the life; softer, more friction and play");
-  add_seed(*verb, flags->seed, "seed of every sensor's noise, and of what the experiment draws");
-  verb->add_flag("--truth", flags->with_truth, "add the truth_ channels that no sensor sees");
-  verb->add_option("--plot", flags->plot, "draw the torque over the twist into an SVG file");
+      "0 (default) to 1: the used share of the service life; softer, more friction and play");
+  add_seed(*verb, flags->seed, "seed of the sensors' noise and of random excitations");
+  verb->add_flag("--truth", flags->with_truth, "add the truth_ channels, which no sensor measures");
+  verb->add_option("--plot", flags->plot, "plot the torque over the deflection into an SVG file");
   verb->add_flag("--list", flags->list, "show actuators with their variants, and experiments");
   verb->add_option(
       "--describe", flags->describe,
       "show a data sheet: dfki-50, dfki-50:bouc-wen, dfki-50#03; with --age a worn one");
-  verb->add_option(
-      "--json", flags->json.destination,
-      "write what was recorded, or the list, as JSON to a file, or - for standard output");
+  verb->add_option("--json", flags->json.destination,
+                   "write the description of the recording, or the list, as JSON to a file, or - "
+                   "for standard output");
   verb->callback([flags] { run(*flags); });
 }

@@ -52,7 +52,7 @@ void check_replayed(const std::string& file, const torsio::TorqueReference& refe
   const auto sample = static_cast<double>(gap - reference.recorded_Nm.begin());
   throw torsio::UsageError({.place = fmt::format("{}: torque_Nm {:g} s from its start", file,
                                                  sample / reference.recorded_Hz),
-                            .expected = "a number: what is replayed has no gaps",
+                            .expected = "a number: a replayed reference has no gaps",
                             .found = fmt::format("{}", *gap)});
 }
 
@@ -110,7 +110,7 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
 std::vector<torsio::NamedInverse> inverses_of(const TrackFlags& flags) {
   std::vector<torsio::NamedInverse> models;
   for (const std::string& path : flags.models) {
-    if (path == torsio::kSweepLineName) continue;  // always run beside the models
+    if (path == torsio::kSweepLineName) continue;  // always run in addition to the models
     const torsio::ModelFile file = torsio::load_model(path);
     try {
       models.push_back({path, torsio::inverse_of(file)});
@@ -143,11 +143,11 @@ void check(const TrackFlags& flags) {
       throw torsio::UsageError({.place = "--model", .problem = *model + " is given twice"});
 }
 
-/// Of the output that the loop's joint has; people who mean a file are told where it is named.
+/// Refuses other values of `--output`; the message names the options that write files.
 std::string refuse_output(const std::string& text) {
   if (text == "locked" || text == "free") return {};
-  return "expected locked or free, of the joint's output, found '" + text +
-         "'. Results go to --json FILE, what the loop saw to --record FILE.csv";
+  return "expected locked or free for the joint's output, found '" + text +
+         "'. Results are written with --json FILE, the loop's signals with --record FILE.csv";
 }
 
 void run(const TrackFlags& flags) {
@@ -155,23 +155,25 @@ void run(const TrackFlags& flags) {
   const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
   const torsio::TrackingSpec spec = spec_of(flags, sheet);
   const std::vector<torsio::NamedInverse> models = inverses_of(flags);
-  torsio::check_tracking(sheet, spec, flags.seed);  // before the sweeps for the line are run
-  ProgressBar bar;
-  const torsio::LinearInverse linear = torsio::sweep_line(sheet, kDefaultSeed, bar.listener());
+  torsio::check_tracking(sheet, spec,
+                         flags.seed);  // before the sweeps for the linear model are run
+  ProgressBar progress;
+  const torsio::LinearInverse linear = torsio::sweep_line(sheet, kDefaultSeed, progress.listener());
   for (const torsio::NamedInverse& model : models)
     warn_of_another_spring(model.name, model.inverse, linear, sheet,
                            0.5 * torsio::amplitude_of(spec.reference, sheet));
   std::vector<std::uint64_t> seeds;
   for (std::size_t k = 0; k < flags.seeds; ++k) seeds.push_back(flags.seed + k);
   const std::vector<torsio::TrackingRow> rows =
-      torsio::track_models(sheet, spec, linear, models, seeds, bar.listener());
+      torsio::track_models(sheet, spec, linear, models, seeds, progress.listener());
   if (!flags.record.empty()) {
     const torsio::AnyInverse inverse =
         models.empty() ? torsio::AnyInverse(linear) : models.front().inverse;
     torsio::TrackingSpec recorded = spec;
     recorded.measures_bandwidth = false;
-    torsio::write_csv(torsio::track(sheet, recorded, inverse, flags.seed, bar.listener()).record,
-                      flags.record);
+    torsio::write_csv(
+        torsio::track(sheet, recorded, inverse, flags.seed, progress.listener()).record,
+        flags.record);
   }
   if (flags.json.wants_tables()) print(torsio::tracking_text(rows));
   flags.json.write(torsio::tracking_json(rows));
@@ -184,46 +186,48 @@ void run(const TrackFlags& flags) {
 void add_track(CLI::App& app) {
   auto flags = std::make_shared<TrackFlags>();
   CLI::App* verb = app.add_subcommand(
-      "track", "close a torque loop on a simulated joint and measure how well it follows");
+      "track", "close a torque loop on a simulated joint and measure its tracking error");
   verb->footer(
       "Example: torsio track --actuator dfki-120 --reference chirp --amplitude 20Nm \\\n"
       "           --model joint.safetensors --seeds 3\n"
-      "The loop turns the spring to the deflection that gives the wanted torque: by a line that\n"
-      "sweeps of this bench gave (\"linear\", always run beside), and by each model, run backwards "
-      "or\n"
-      "trained with --target spring_deflection_rad.");
+      "The loop controls the spring to the deflection that gives the reference torque. The "
+      "deflection\n"
+      "comes from a linear model fitted to sweeps of this bench (\"linear\", always run) and from "
+      "each\n"
+      "given model, which is inverted or was trained with --target spring_deflection_rad.");
   verb->add_option("--actuator", flags->actuator, "dfki-28 to dfki-300, as NAME:VARIANT#SERIAL")
       ->capture_default_str();
   verb->add_option("--output", flags->output,
-                   "of the spring: locked, or free with a lever and 9 kg; no file")
+                   "output of the joint: locked, or free with a lever and 9 kg; not a file")
       ->check(refuse_output)
       ->capture_default_str();
-  verb->add_option("--lever", flags->lever, "free: where the 9 kg hang (default 0.8m)");
+  verb->add_option("--lever", flags->lever,
+                   "free: distance of the 9 kg from the joint axis (default 0.8m)");
   verb->add_option("--reference", flags->reference, "chirp, random-walk, steps, sweep, replay")
       ->capture_default_str();
-  verb->add_option("--replay", flags->replayed, "recording whose torque_Nm is to be followed");
-  verb->add_option("--amplitude", flags->amplitude, "of the torque: 20Nm");
-  verb->add_option("--duration", flags->duration, "of the reference: 30s");
+  verb->add_option("--replay", flags->replayed, "recording whose torque_Nm is the reference");
+  verb->add_option("--amplitude", flags->amplitude, "amplitude of the torque: 20Nm");
+  verb->add_option("--duration", flags->duration, "duration of the reference: 30s");
   verb->add_option("--model", flags->models, "model file, or linear; may be given more than once");
-  verb->add_option(
-      "--bandwidth", flags->bandwidth,
-      "that the gains are made for, as 8Hz or 50rad_s (default 50 rad/s: 7.96Hz); torsio "
-      "tune-loop");
-  verb->add_option("--damping", flags->damping, "that the gains are made for")
+  verb->add_option("--bandwidth", flags->bandwidth,
+                   "bandwidth for which the gains are computed, as 8Hz or 50rad_s (default 50 "
+                   "rad/s: 7.96Hz); torsio "
+                   "tune-loop");
+  verb->add_option("--damping", flags->damping, "damping for which the gains are computed")
       ->capture_default_str();
   verb->add_option("--friction", flags->friction,
-                   "share of the drive's friction to make up for, 0 to 1")
+                   "share of the drive's friction to compensate, 0 to 1")
       ->capture_default_str();
   verb->add_option("--observer", flags->observer, "cut-off of a disturbance observer: 10Hz");
   verb->add_flag("--feed-forward", flags->feeds_rate_forward,
-                 "feed the rate of the wanted torque forward: no lag");
-  verb->add_option("--faults", flags->faults, "YAML schedule of what fails when (docs/faults.md)");
-  add_seed(*verb, flags->seed, "of the first run's sensor noise, and of a random walk");
+                 "feed the rate of the reference torque forward: no lag");
+  verb->add_option("--faults", flags->faults, "YAML schedule of faults (docs/faults.md)");
+  add_seed(*verb, flags->seed, "seed of the first run's sensor noise and of a random walk");
   verb->add_option("--seeds", flags->seeds, "runs of each model, seed after seed")
       ->capture_default_str();
   verb->add_option("--record", flags->record,
-                   "write all that the loop saw and each term of its command in the first run of "
-                   "the one --model as CSV");
+                   "write all signals of the loop and each term of its command in the first run of "
+                   "the only --model as CSV");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

@@ -24,9 +24,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kRate_Hz = 1000.0;
-constexpr double kSpeedCutoff_Hz = 40.0;  // of the impedance's damping
+constexpr double kSpeedCutoff_Hz = 40.0;  // filter of the speed for the impedance's damping
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kContact_rad_s = kTurn;  // motions of a second: what a person or a table does
+constexpr double kContact_rad_s = kTurn;  // 1 Hz: contact with a person or a table
 
 struct TuneFlags {
   std::string actuator = "dfki-120";
@@ -37,7 +37,7 @@ struct TuneFlags {
   JsonOutput json;
 };
 
-/// What a loop with these gains is worth.
+/// Margins and passivity of a loop with these gains.
 struct Tuned {
   torsio::DeflectionController controller;
   torsio::Margins locked;
@@ -79,19 +79,19 @@ std::string number(double value) {
 
 std::string passivity_text(const torsio::Passivity& passive) {
   if (passive.passive_to_rad_s >= std::numbers::pi * kRate_Hz)
-    return "passive at every frequency of the loop: stable against any passive surroundings\n";
+    return "passive at every frequency: stable in contact with any passive environment\n";
   const std::string below =
       passive.passive_to_rad_s > 0.0
           ? fmt::format(
-                "passive up to {:.4g} Hz: contact with passive surroundings cannot build up "
-                "a slower motion;\n",
+                "passive up to {:.4g} Hz: contact with a passive environment cannot excite "
+                "a slower oscillation;\n",
                 passive.passive_to_rad_s / kTurn)
-          : std::string("not passive, even for slow motions;\n");
-  return below +
-         fmt::format(
-             "least real part of the impedance {:.3g} Nms/rad at {:.4g} Hz: unstable against "
-             "some\nsurroundings, not against all\n",
-             passive.least_Nms_rad, passive.least_rad_s / kTurn);
+          : std::string("not passive, even at low frequencies;\n");
+  return below + fmt::format(
+                     "least real part of the impedance {:.3g} Nms/rad at {:.4g} Hz: unstable in "
+                     "contact with "
+                     "some\nenvironments, not with all\n",
+                     passive.least_Nms_rad, passive.least_rad_s / kTurn);
 }
 
 std::string text_of(const TuneFlags& flags, const Tuned& loop) {
@@ -116,7 +116,7 @@ std::string text_of(const TuneFlags& flags, const Tuned& loop) {
   row("free", loop.free);
   return fmt::format(
       "{}: deflection control on the current at {} Hz, bandwidth {:.4g} Hz, damping {:.3g}\n"
-      "spring {:.4g} Nm/rad, drive {:.4g} kg m2 at the joint, {:.4g} Nm/A, derivative behind "
+      "spring {:.4g} Nm/rad, drive {:.4g} kg m2 at the joint, {:.4g} Nm/A, derivative filtered at "
       "{:g} Hz\n{}\nstable for any gain between the least and the margin:\n{}\n{}"
       "an impedance on it{} is passive up to {:.3g} Hz with at most {} Nm/rad\n",
       flags.actuator, kRate_Hz, settings.bandwidth_rad_s / kTurn, settings.damping,
@@ -173,25 +173,27 @@ void run(const TuneFlags& flags) {
 
 void add_tune_loop(CLI::App& app) {
   auto flags = std::make_shared<TuneFlags>();
-  CLI::App* verb =
-      app.add_subcommand("tune-loop", "gains of a torque loop for a bandwidth, with their margins");
+  CLI::App* verb = app.add_subcommand(
+      "tune-loop",
+      "compute the gains of a torque loop for a bandwidth, with their stability margins");
   verb->footer(
       "Example: torsio tune-loop --actuator dfki-120 --bandwidth 8Hz --damping 0.9\n"
       "From the data sheet: spring, drive, current loop, delay of one sample; without dry "
       "friction.\n"
-      "What would be unstable is refused with its margin. torsio track closes the loop.");
+      "Unstable gains are refused; the message gives the margin. torsio track closes the loop.");
   verb->add_option("--actuator", flags->actuator, "torsio simulate --list shows the names")
       ->capture_default_str();
   verb->add_option("--bandwidth", flags->bandwidth,
                    "natural frequency of the closed loop, in Hz or rad_s")
       ->capture_default_str();
-  verb->add_option("--damping", flags->damping, "of the closed loop")->capture_default_str();
+  verb->add_option("--damping", flags->damping, "damping of the closed loop")
+      ->capture_default_str();
   verb->add_option("--observer", flags->observer,
-                   "with a disturbance observer of this cut-off: 8Hz");
+                   "add a disturbance observer with this cut-off: 8Hz");
   verb->add_option("--load-inertia", flags->load_inertia_kg_m2,
-                   "on the joint, in kg m2, for the free output")
+                   "inertia on the joint side, in kg m2, for the free output")
       ->capture_default_str();
   verb->add_option("--json", flags->json.destination,
-                   "write the same as JSON to a file, or - for standard output");
+                   "write the results as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });
 }

@@ -30,9 +30,10 @@ std::string text_of(const torsio::RecordingBlocks& blocks, const UnpackFlags& fl
   if (missing_frames(blocks) > 0)
     text += fmt::format("\n{} ticks have no frame and are nan ({} frames were dropped)",
                         missing_frames(blocks), blocks.dropped);
-  if (!blocks.was_closed) text += "\nthe recorder was not closed: what was not sealed yet is lost";
+  if (!blocks.was_closed)
+    text += "\nthe recorder was not closed: frames that were not sealed are lost";
   if (blocks.torn_bytes > 0)
-    text += fmt::format("\n{} bytes behind the last sealed block were left out", blocks.torn_bytes);
+    text += fmt::format("\n{} bytes after the last sealed block were ignored", blocks.torn_bytes);
   return text;
 }
 
@@ -61,11 +62,12 @@ void run(const UnpackFlags& flags) {
 
 void add_unpack(CLI::App& app) {
   auto flags = std::make_shared<UnpackFlags>();
-  CLI::App* verb = app.add_subcommand("unpack", "a recorder's file (.tsr) as CSV");
+  CLI::App* verb = app.add_subcommand("unpack", "convert a recorder's file (.tsr) to CSV");
   verb->footer("Example: torsio unpack run.tsr -o run.csv.gz");
-  verb->add_option("recording", flags->recording, "what torsio::Recorder wrote")->required();
-  verb->add_option("-o,--output", flags->output, "the CSV file; .gz packs it")->required();
+  verb->add_option("recording", flags->recording, "file of a torsio::Recorder")->required();
+  verb->add_option("-o,--output", flags->output, "CSV file to write; compressed if it ends in .gz")
+      ->required();
   verb->add_option("--json", flags->json.destination,
-                   "write what the file holds as JSON to a file, or - for standard output");
+                   "write the contents of the file as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });
 }

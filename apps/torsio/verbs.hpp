@@ -2,9 +2,9 @@
 
 #include <CLI/App.hpp>
 
-/// One function a verb: it declares the sub-command's flags and what it does. Verbs throw
-/// `torsio::Error`; main turns that into a message and an exit code (0 good, 1 the work failed, 2
-/// the call was wrong).
+/// One function per verb: it declares the sub-command's flags and its action. Verbs throw
+/// `torsio::Error`; main turns that into a message and an exit code (0 success, 1 the work failed,
+/// 2 the call was wrong).
 void add_simulate(CLI::App& app);
 void add_check(CLI::App& app);
 void add_fit(CLI::App& app);

@@ -13,8 +13,8 @@ namespace {
 std::string refusal(std::string_view place, std::string_view kind, std::string_view wrong,
                     const std::vector<std::string>& known) {
   const std::string nearest = torsio::did_you_mean(wrong, known);
-  return fmt::format("{}: there is no {} '{}'. {}{}{} --help lists what there is.", place, kind,
-                     wrong, nearest, nearest.empty() ? "" : " ", place);
+  return fmt::format("{}: there is no {} '{}'. {}{}{} --help lists them.", place, kind, wrong,
+                     nearest, nearest.empty() ? "" : " ", place);
 }
 
 std::string unknown_option(const CLI::App& verb, const std::vector<std::string>& left) {

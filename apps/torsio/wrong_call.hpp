@@ -3,6 +3,6 @@
 #include <CLI/App.hpp>
 #include <string>
 
-/// What to say of a verb or an option that there is not, with the nearest name that there is; empty
-/// where the call is wrong in another way.
+/// The message for an unknown verb or option, with the nearest known name; empty
+/// if the call is wrong in another way.
 [[nodiscard]] std::string unknown_name(const CLI::App& app, int argc, char** argv);

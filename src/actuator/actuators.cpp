@@ -170,7 +170,7 @@ constexpr std::array<DataSheet, 7> kSheets = {
     DataSheet{
         .family = ActuatorFamily::rubber_clutch,
         .name = "rubber-clutch",
-        .title = "0.5 Nm torque sensor of rubber behind a friction clutch",
+        .title = "0.5 Nm torque sensor of rubber after a friction clutch",
         .rating = {printed(0.5), assumed(0.75), assumed(10.0)},
         .motor = {.torque_constant_Nm_A = assumed(0.0164),
                   .rotor_inertia_kg_m2 = assumed(1e-6),

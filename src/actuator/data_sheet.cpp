@@ -39,7 +39,7 @@ std::optional<unsigned> serial_of(std::string_view digits) {
   unsigned serial = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), serial);
   if (error != std::errc() || end != digits.data() + digits.size() || serial > 9999)
-    refuse("serial number", "0 to 9999 behind the #, as dfki-300#03", digits);
+    refuse("serial number", "0 to 9999 after the #, as dfki-300#03", digits);
   return serial;
 }
 
@@ -52,7 +52,7 @@ ActuatorName parse(std::string_view text) {
   if (const auto mark = name.base.find(':'); mark != std::string_view::npos) {
     name.variant = name.base.substr(mark + 1);
     name.base = name.base.substr(0, mark);
-    if (name.variant.empty()) refuse("variant", "a name behind the colon", text);
+    if (name.variant.empty()) refuse("variant", "a name after the colon", text);
   }
   return name;
 }

@@ -9,7 +9,8 @@
 namespace torsio {
 namespace {
 
-/// What one piece has of each spread. The order of the draws is part of what a serial number means.
+/// The random deviations of one specimen. Their order must not change: it determines every
+/// specimen.
 struct SpecimenDraws {
   explicit SpecimenDraws(std::uint64_t seed) : random(seed) {}
   /// Uniform within +-bound.
@@ -37,49 +38,49 @@ void scale_each(Values& values, double factor) noexcept {
   for (SheetValue& value : values) scale(value, factor);
 }
 
-void spread(SpringSheet& spring, const SpecimenDraws& piece) noexcept {
-  scale(spring.stiffness_Nm_rad, piece.stiffness);
-  scale(spring.stage_stiffness_Nm_rad, piece.stiffness);
-  scale(spring.friction_Nm, piece.inner_friction);
-  scale(spring.half_gap_rad, piece.backlash);
-  shift(spring.asymmetry, piece.asymmetry);
+void spread(SpringSheet& spring, const SpecimenDraws& specimen) noexcept {
+  scale(spring.stiffness_Nm_rad, specimen.stiffness);
+  scale(spring.stage_stiffness_Nm_rad, specimen.stiffness);
+  scale(spring.friction_Nm, specimen.inner_friction);
+  scale(spring.half_gap_rad, specimen.backlash);
+  shift(spring.asymmetry, specimen.asymmetry);
 }
 
-void spread(ElastomerSheet& coupling, const SpecimenDraws& piece) noexcept {
-  scale(coupling.stiffness_Nm_rad, piece.stiffness);
-  scale_each(coupling.branch_stiffness_Nm_rad, piece.stiffness);
-  scale_each(coupling.slip_Nm, piece.inner_friction);
+void spread(ElastomerSheet& coupling, const SpecimenDraws& specimen) noexcept {
+  scale(coupling.stiffness_Nm_rad, specimen.stiffness);
+  scale_each(coupling.branch_stiffness_Nm_rad, specimen.stiffness);
+  scale_each(coupling.slip_Nm, specimen.inner_friction);
 }
 
-void spread(RubberSheet& rubber, const SpecimenDraws& piece) noexcept {
-  shift(rubber.asymmetry_Nm_rad, piece.asymmetry * rubber.stiffness_Nm_rad.value);
-  scale(rubber.asymmetry_Nm_rad, piece.stiffness);
-  scale(rubber.stiffness_Nm_rad, piece.stiffness);
-  scale(rubber.slip_Nm, piece.inner_friction);
+void spread(RubberSheet& rubber, const SpecimenDraws& specimen) noexcept {
+  shift(rubber.asymmetry_Nm_rad, specimen.asymmetry * rubber.stiffness_Nm_rad.value);
+  scale(rubber.asymmetry_Nm_rad, specimen.stiffness);
+  scale(rubber.stiffness_Nm_rad, specimen.stiffness);
+  scale(rubber.slip_Nm, specimen.inner_friction);
 }
 
-void spread(TubeSheet& tube, const SpecimenDraws& piece) noexcept {
-  scale(tube.stiffness_Nm_rad, piece.stiffness);
+void spread(TubeSheet& tube, const SpecimenDraws& specimen) noexcept {
+  scale(tube.stiffness_Nm_rad, specimen.stiffness);
 }
 
-void spread(const GearSheet& /*gear*/, const SpecimenDraws& /*piece*/) noexcept {}
-void spread(const ClutchSheet& /*clutch*/, const SpecimenDraws& /*piece*/) noexcept {}
+void spread(const GearSheet& /*gear*/, const SpecimenDraws& /*specimen*/) noexcept {}
+void spread(const ClutchSheet& /*clutch*/, const SpecimenDraws& /*specimen*/) noexcept {}
 
 }  // namespace
 
 void spread_specimen(DataSheet& sheet) {
   if (!sheet.serial) return;
-  const SpecimenDraws piece(text_hash(sheet.name) + *sheet.serial);
-  const auto spread_part = [&](auto& part) { spread(part, piece); };
+  const SpecimenDraws specimen(text_hash(sheet.name) + *sheet.serial);
+  const auto spread_part = [&](auto& part) { spread(part, specimen); };
   std::visit(spread_part, sheet.first);
   std::visit(spread_part, sheet.second);
-  scale(sheet.friction.coulomb_Nm, piece.coulomb);
-  scale(sheet.joint.bearing_friction_Nm, piece.coulomb);
-  shift(sheet.sensors.motor_zero_rad, piece.motor_zero_rad);
-  shift(sheet.sensors.middle_zero_rad, piece.middle_zero_rad);
-  shift(sheet.sensors.joint_zero_rad, piece.joint_zero_rad);
+  scale(sheet.friction.coulomb_Nm, specimen.coulomb);
+  scale(sheet.joint.bearing_friction_Nm, specimen.coulomb);
+  shift(sheet.sensors.motor_zero_rad, specimen.motor_zero_rad);
+  shift(sheet.sensors.middle_zero_rad, specimen.middle_zero_rad);
+  shift(sheet.sensors.joint_zero_rad, specimen.joint_zero_rad);
   if (sheet.sensors.twist_sensor_bits.value > 0.0)
-    shift(sheet.sensors.twist_zero_rad, piece.twist_zero_rad);
+    shift(sheet.sensors.twist_zero_rad, specimen.twist_zero_rad);
 }
 
 }  // namespace torsio

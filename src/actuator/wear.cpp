@@ -42,7 +42,7 @@ class Ageing {
     rub(rubber.slip_Nm);
     rub(rubber.break_away_rad);
   }
-  /// The hysteresis is told as an angle.
+  /// The hysteresis is specified as an angle.
   void operator()(GearSheet& gear) const {
     soften(gear.stiffness_Nm_rad);
     rub(gear.hysteresis_rad);

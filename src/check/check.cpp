@@ -21,7 +21,7 @@ bool has_segment(const DatasetRecord& record, Role role) {
 
 std::vector<Finding> Checker::run() {
   check_length();
-  if (has_failed()) return std::move(findings_);  // too short: nothing else can be said
+  if (has_failed()) return std::move(findings_);  // too short for the other checks
   check_missing();
   check_constant();
   check_saturation();
@@ -67,7 +67,7 @@ void Checker::check_length() {
       });
 }
 
-// Hysteresis shows only at reversals; a rate that never changes cannot be told from a constant.
+// Hysteresis is visible only at reversals; the effect of a constant speed looks like an offset.
 void Checker::check_excitation() {
   std::size_t reversals = 0;
   Extent speeds;
@@ -79,14 +79,14 @@ void Checker::check_excitation() {
     for (const double speed : typical_speeds(movement(pairs_[r].input, window)))
       speeds.include(speed);
   }
-  if (speeds.width() < 0.0) return;  // nothing to train on: another check says so
+  if (speeds.width() < 0.0) return;  // nothing to train on: another check reports it
   if (reversals < kFewReversals)
     add(Verdict::warn, "excitation", "",
         fmt::format("{} reversals of {} in training", reversals, spec_.inputs.front()),
-        "Hysteresis shows only where the motion turns back: load and unload several times.");
+        "Hysteresis is visible only where the motion reverses: load and unload several times.");
   if (speeds.highest < kSpeedRatio * speeds.lowest)
     add(Verdict::warn, "excitation", "", "the training data move at one speed only",
-        "A model cannot learn what speed does; add recordings that are twice as slow and twice "
+        "A model cannot learn the effect of speed; add recordings that are twice as slow and twice "
         "as fast.");
   if (findings_.empty() || findings_.back().check != "excitation")
     add(Verdict::pass, "excitation", "",
@@ -100,13 +100,13 @@ void Checker::check_leak() {
   } else {
     add(Verdict::fail, "leak", "",
         leak.starts_with(kTruthPrefix)
-            ? fmt::format("{} is truth that no sensor sees", leak)
+            ? fmt::format("{} is a quantity of the simulation that no sensor measures", leak)
             : fmt::format("{} was computed from {}", dataset_.target, leak),
         "Leave it out of --inputs: a model would learn the formula, not the spring.");
   }
 }
 
-// The guard acts on features, so features are compared; what cannot be learned from at all has failed above.
+// The guard acts on features, so features are compared; unusable recordings have failed before.
 void Checker::check_range() {
   if (!dataset_.has_role(Role::test) || !dataset_.has_role(Role::train) || has_failed()) return;
   const FeatureRanges trained = feature_ranges(training_data(dataset_, spec_, Role::train));
@@ -121,7 +121,7 @@ void Checker::check_range() {
           fmt::format("{}: tested on {:.4g} to {:.4g}, trained on {:.4g} to {:.4g}",
                       spec_.inputs[j], tested.lowest[j], tested.highest[j], trained.lowest[j],
                       trained.highest[j]),
-          "Models guess out there: the range guard answers with its linear fallback.");
+          "Models are not valid there: the range guard returns its linear fallback.");
     }
   });
 }

@@ -9,8 +9,8 @@
 
 namespace torsio {
 
-// A locked output: next to the deflection the channel does not move, and the torque follows that
-// deflection, as it would not if a sensor were dead while its side moved.
+// A locked output: compared with the deflection the channel does not move, and the torque follows
+// that deflection, which it would not do if a sensor were dead while its side moved.
 bool Checker::stands_still(std::size_t r, const std::string& name) const {
   const Recording& recording = dataset_.records[r].recording;
   if (sources_.size() < 2 || name == dataset_.target || is_condition(recording, name) ||
@@ -18,7 +18,7 @@ bool Checker::stands_still(std::size_t r, const std::string& name) const {
     return false;
   const Pair& pair = pairs_[r];
   return extent_of(recording.channel(name).values).width() <
-             kStandstillShare * extent_of(pair.input).width() &&
+             kRestShare * extent_of(pair.input).width() &&
          std::abs(correlation(pair.input, pair.target)) > kFollows;
 }
 
@@ -40,7 +40,7 @@ void Checker::check_missing() {
           fmt::format("{}: {} of {} samples are NaN", channel.name, missing, channel.values.size()),
           is_target
               ? "They are neither trained on nor scored."
-              : fmt::format("An input may not be missing. If it is a slower sensor: hold: [{}]",
+              : fmt::format("An input must have every value. If it is a slower sensor: hold: [{}]",
                             channel.name));
     });
   });
@@ -52,19 +52,20 @@ void Checker::check_constant() {
       if (is_condition(recording, channel.name) || extent_of(channel.values).width() > 0.0) return;
       add(Verdict::fail, "constant channels", recording.name(),
           fmt::format("{} never changes from {:g}", channel.name, channel.values.front()),
-          "Is the sensor connected? If it is a condition of the record, name it under "
+          "Check that the sensor is connected. If it is a condition of the recording, list it "
+          "under "
           "conditions: in a manifest.");
     });
     for (std::size_t r = 0; r < pairs_.size(); ++r)
       for (const std::string& name : channels_)
         if (stands_still(r, name))
           add(Verdict::pass, "constant channels", dataset_.records[r].recording.name(),
-              fmt::format("{} stands still, as behind a lock, and {} follows {}", name,
+              fmt::format("{} does not move, as at a locked output, and {} follows {}", name,
                           dataset_.target, spec_.inputs.front()));
   });
 }
 
-// A range limit shows as many samples in runs exactly at the extreme value.
+// A range limit causes many consecutive samples exactly at the extreme value.
 void Checker::check_saturation() {
   pass_unless_found("saturation", "no channel rests at its extreme value", [&] {
     for_each_moving_channel([&](std::size_t, const Recording& recording, const Channel& channel) {
@@ -81,15 +82,14 @@ void Checker::check_saturation() {
         add(Verdict::warn, "saturation", recording.name(),
             fmt::format("{}: {:.1f} % of the samples are exactly {:g}", channel.name, 100.0 * share,
                         extreme),
-            "Is that the sensor's limit? Then cut those parts out, or use a sensor of larger "
+            "If that is the sensor's limit, cut those parts out or use a sensor of larger "
             "range.");
       }
     });
   });
 }
 
-// A signal that turns round at its extreme spends time near it too; one that is cut off sits
-// exactly on it.
+// A signal that reverses at its extreme has samples near it too; a saturated one is exactly at it.
 bool Checker::approaches_gradually(const Channel& channel, double extreme, const Extent& span) {
   std::size_t at_extreme = 0;
   std::size_t near_extreme = 0;
@@ -100,9 +100,10 @@ bool Checker::approaches_gradually(const Channel& channel, double extreme, const
   return 2 * at_extreme < near_extreme;
 }
 
-// A sensor that tells one number while the others move on is stuck; at a standstill it is right.
+// A sensor with a constant value is frozen if the other channels move; at a standstill it is
+// correct.
 void Checker::check_frozen() {
-  pass_unless_found("frozen sensors", "none rests while the others move", [&] {
+  pass_unless_found("frozen sensors", "none is constant while the others move", [&] {
     for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
       if (is_condition(recording, channel.name)) return;
       const auto shortest = static_cast<std::size_t>(0.5 * kFrozen_s * recording.sample_rate_Hz());
@@ -112,7 +113,7 @@ void Checker::check_frozen() {
       for (const Rest& rest : rests) {
         const auto samples = static_cast<double>(rest.length());
         const double duration_s = samples / recording.sample_rate_Hz();
-        // A silent sensor delivers nothing where it should have delivered many times.
+        // A sensor without output has no new samples for many of its periods.
         if (duration_s < kFrozen_s || share_fresh(channel) * samples < kFrozenDeliveries ||
             rest.length() == channel.values.size())
           return;
@@ -120,12 +121,12 @@ void Checker::check_frozen() {
           const double moved = share_moved(other, rest);
           if (moved < kMovedMeanwhile && !is_odd_one_out(rest, rests, channel, other)) continue;
           add(Verdict::warn, "frozen sensors", recording.name(),
-              fmt::format("{} tells {:g} for {:.3g} s from t = {:.4g} s, while {} moves through "
-                          "{:.{}f} % of its range",
-                          channel.name, channel.values[rest.begin], duration_s,
-                          recording.time_s(rest.begin), other.name, 100.0 * moved,
-                          moved < 0.1 ? 1 : 0),
-              "Did its bus stall? Cut that part out: a model would learn the stall.");
+              fmt::format(
+                  "{} is constant at {:g} for {:.3g} s from t = {:.4g} s, while {} moves through "
+                  "{:.{}f} % of its range",
+                  channel.name, channel.values[rest.begin], duration_s,
+                  recording.time_s(rest.begin), other.name, 100.0 * moved, moved < 0.1 ? 1 : 0),
+              "Check its bus. Cut that part out: a model would be trained on the constant value.");
           leave_out(r, rest);
           return;
         }
@@ -134,8 +135,8 @@ void Checker::check_frozen() {
   });
 }
 
-/// What should move where a channel does; the target goes with the first input rather than with
-/// what that is made of.
+/// The channels that should move if a channel does; the target is compared with the first input,
+/// not with the channels of its expression.
 std::vector<Channel> Checker::others_of(std::size_t r, const std::string& name) const {
   std::vector<Channel> others;
   for (const std::string& each : channels_)
@@ -145,7 +146,7 @@ std::vector<Channel> Checker::others_of(std::size_t r, const std::string& name) 
   return others;
 }
 
-/// What a stall tells of the other checks' questions is wrong.
+/// Excludes the samples of a frozen sensor from the other checks.
 void Checker::leave_out(std::size_t r, const Rest& rest) {
   for (std::size_t i = rest.begin; i < std::min(rest.end + 1, pairs_[r].input.size()); ++i)
     pairs_[r].input[i] = kNotMeasured;
@@ -158,14 +159,14 @@ bool Checker::is_end_of_stall(std::size_t r, std::size_t sample) const {
   });
 }
 
-// What the first input is made of may move through much more than it does: codes of a gear's angle
-// are to be judged by the deflection.
+// The channels of the first input may have a much larger range than the input: the resolution of a
+// gear's angle is compared with the range of the deflection.
 void Checker::check_resolution() {
   const auto unit_of = [](const std::string& name) {
     const auto parts = split_channel_name(name);
     return parts ? parts->unit->si_suffix : std::string_view();
   };
-  pass_unless_found("resolution", "no sensor's codes are coarse", [&] {
+  pass_unless_found("resolution", "every sensor resolves its range", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
       const Recording& recording = dataset_.records[r].recording;
       const double first_input = extent_of(pairs_[r].input).width();
@@ -179,10 +180,11 @@ void Checker::check_resolution() {
         const double code = finest_step(values);
         if (!(range > 0.0) || code < kCoarseShare * range) continue;
         add(Verdict::warn, "resolution", recording.name(),
-            fmt::format("{} tells in steps of {:.3g}: {:.0f} of them are all that {} moves through",
-                        name, code, range / code,
-                        range == first_input ? spec_.inputs.front() : name),
-            "Has the sensor lost bits, or its log digits? A model cannot see finer.");
+            fmt::format("{} has a resolution of {:.3g}: {} moves through only {:.0f} such steps",
+                        name, code, range == first_input ? spec_.inputs.front() : name,
+                        range / code),
+            "Check whether the sensor has lost bits or the log has too few digits. No model "
+            "resolves finer steps.");
       }
     }
   });
@@ -207,13 +209,13 @@ void Checker::check_gaps() {
             is_sign_flip(r, name, jump) || (spoiled_[r] != 0 && is_source(name)))
           continue;
         add(Verdict::warn, "gaps", recording.name(), jump_text(recording, name, jump),
-            "Were samples lost there, or did the sensor slip? Cut the record in two.");
+            "Check for lost samples and a slipping sensor. Cut the recording in two there.");
       }
     }
   });
 }
 
-// A step that is small for an angle can be all that the deflection between two of them ever does.
+// A step that is small for an angle can be the whole range of the deflection between two angles.
 void Checker::check_jump_of_input(std::size_t r) {
   const std::vector<double>& input = pairs_[r].input;
   const Jump jump = largest_jump(input);
@@ -225,8 +227,9 @@ void Checker::check_jump_of_input(std::size_t r) {
   add(Verdict::warn, "gaps", recording.name(),
       jump_text(recording, spec_.inputs.front(), jump) +
           fmt::format("; it comes from {}", source_of(recording, jump)),
-      "Did that sensor slip, lose counts or samples, or did a part break? Cut the record in two "
-      "there, and take each part's zero anew.");
+      "Check whether that sensor slipped or lost counts or samples, or a part broke. Cut the "
+      "recording in two "
+      "there, and determine the zero of each part.");
 }
 
 std::string Checker::jump_text(const Recording& recording, const std::string& name,
@@ -238,7 +241,7 @@ std::string Checker::jump_text(const Recording& recording, const std::string& na
                          : "and does not move");
 }
 
-/// The channel that steps most beyond its steps next to a jump of the first input.
+/// The channel whose step at a jump of the first input is largest compared with its other steps.
 const std::string& Checker::source_of(const Recording& recording, const Jump& jump) const {
   const auto excess = [&](const std::string& name) {
     const std::vector<double>& values = recording.channel(name).values;

@@ -8,10 +8,10 @@
 
 namespace torsio {
 
-// The sensors of both sides of a spring turn alike, so one of them in another unit turns by a unit's
-// factor as much; and records of one joint have one stiffness.
+// The sensors of both sides of a spring turn by the same angle, so one of them in another unit
+// turns by a unit's factor as much; and recordings of one joint have one stiffness.
 void Checker::check_units() {
-  pass_unless_found("units", "the records agree", [&] {
+  pass_unless_found("units", "the recordings agree", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) check_units_within(r);
     if (pairs_.size() < 2) return;
     std::vector<double> slopes;
@@ -43,18 +43,18 @@ void Checker::report_slope(std::size_t r, double slope, std::size_t usual, doubl
       fmt::format("the slope of {} over {} is {:.4g} times {} in {} than in {}{}", dataset_.target,
                   spec_.inputs.front(), ratio_of(slope, usual_slope),
                   slope > usual_slope ? "larger" : "smaller", own,
-                  is_majority ? "the other records, as in " : "", other.name()),
+                  is_majority ? "the other recordings, as in " : "", other.name()),
       mistake.empty()
-          ? "Another spring, or another unit? Records of one joint have one stiffness."
+          ? "Check spring and units: recordings of one joint have one stiffness."
           : fmt::format(
-                "That is the factor between {}: look at the unit of {} in {}, and say it in "
+                "That is the factor between {}: check the unit of {} in {}, and specify it in "
                 "the column's name or with unit: in a mapping.",
                 mistake, by_torque ? dataset_.target : spec_.inputs.front(),
-                is_majority ? "this record"
-                            : "both records (they alone cannot tell which is right)"));
+                is_majority ? "this recording"
+                            : "both recordings (two recordings do not show which is correct)"));
 }
 
-/// The record whose slope most others share; the first of equals.
+/// The recording whose slope most others have, too; the first of equals.
 std::size_t Checker::usual_slope(const std::vector<double>& slopes) {
   const auto company = [&](double slope) {
     return slope > 0.0
@@ -85,7 +85,7 @@ void Checker::check_units_within(std::size_t r) {
   add(Verdict::fail, "units", recording.name(),
       fmt::format("{} moves {:.4g} times as far as {}", slope > 1.0 ? sources_[1] : sources_[0],
                   std::max(slope, 1.0 / slope), slope > 1.0 ? sources_[0] : sources_[1]),
-      fmt::format("That is the factor between {}: say the column's unit in its name or with "
+      fmt::format("That is the factor between {}: specify the column's unit in its name or with "
                   "unit: in a mapping.",
                   mistake));
 }
@@ -97,9 +97,9 @@ void Checker::check_sign_flips() {
       flips_[r] = find_sign_flip(pairs_[r]);
 }
 
-// Friction makes the torque lead the deflection, so a bare cross-correlation would call every
-// hysteretic spring early. The delay is therefore the shift at which spring and friction together
-// explain the torque best.
+// Friction makes the torque lead the deflection, so that the cross-correlation alone would report a
+// delay for every hysteretic spring. The delay is therefore the shift at which spring and friction
+// together explain the torque best.
 void Checker::check_delay() {
   const double rate = dataset_.sample_rate_Hz();
   const auto longest = static_cast<std::ptrdiff_t>(std::round(kLongestDelay_s * rate));
@@ -120,11 +120,11 @@ void Checker::check_delay() {
                   dataset_.target, std::abs(delay_ms), delay_ms > 0 ? "after" : "before",
                   spec_.inputs.front(), 100.0 * least, 100.0 * at_zero),
               delay_ms > 0 && best < longest
-                  ? fmt::format("Mapping line that takes it out: latency: {{{}: {:.1f}ms}}",
+                  ? fmt::format("Mapping line that removes it: latency: {{{}: {:.1f}ms}}",
                                 dataset_.target, delay_ms)
               : best == longest
-                  ? "The search ends there: look at the loggers' clocks."
-                  : "Look at the loggers' clocks: a torque cannot precede its deflection.");
+                  ? "The search ends there: check the loggers' clocks."
+                  : "Check the loggers' clocks: a torque cannot precede its deflection.");
         }
       });
 }
@@ -142,8 +142,8 @@ void Checker::check_sign() {
           const std::string& recording = dataset_.records[r].recording.name();
           if (!flipped.empty() && values[r] < kTogether) {
             add(Verdict::fail, "sign", recording,
-                fmt::format("{} does not follow {} (correlation {:.3f}), but would with {} turned "
-                            "round",
+                fmt::format("{} does not follow {} (correlation {:.3f}), but would with the sign "
+                            "of {} inverted",
                             dataset_.target, spec_.inputs.front(), values[r], flipped),
                 fmt::format(
                     "Mapping: channels: {{{0}: {{from: ..., sign: -1}}}}, with the column of {0}",
@@ -154,18 +154,19 @@ void Checker::check_sign() {
             add(Verdict::fail, "sign", recording,
                 fmt::format("{} falls with {} (correlation {:.3f})", dataset_.target,
                             spec_.inputs.front(), values[r]),
-                some_rise ? fmt::format("In other records it rises: in this one {} has the wrong "
-                                        "sign, or every angle has. Give it a mapping with sign: -1 "
-                                        "(channels: {{{}: {{from: ..., sign: -1}}}})",
-                                        dataset_.target, dataset_.target)
-                          : fmt::format("Mapping: flip one of them with sign: -1 (channels: "
-                                        "{{{}: {{from: ..., sign: -1}}}})",
-                                        dataset_.target));
+                some_rise
+                    ? fmt::format("In other recordings it rises: in this one {} has the wrong "
+                                  "sign, or every angle has. Give it a mapping with sign: -1 "
+                                  "(channels: {{{}: {{from: ..., sign: -1}}}})",
+                                  dataset_.target, dataset_.target)
+                    : fmt::format("Mapping: invert one of them with sign: -1 (channels: "
+                                  "{{{}: {{from: ..., sign: -1}}}})",
+                                  dataset_.target));
           } else if (values[r] < kClearCorrelation) {
             add(Verdict::warn, "sign", recording,
                 fmt::format("{} hardly follows {} (correlation {:.3f})", dataset_.target,
                             spec_.inputs.front(), values[r]),
-                "Is this the channel that the torque comes from?");
+                "Check that the torque depends on this channel.");
           }
         }
       });
@@ -180,11 +181,11 @@ void Checker::report_flip(std::size_t r) {
                   dataset_.target, flips_[r]->before > 0.0 ? "rises" : "falls",
                   spec_.inputs.front(), recording.time_s(flips_[r]->sample),
                   flips_[r]->after > 0.0 ? "rises" : "falls", flips_[r]->before, flips_[r]->after),
-      "A sign changed while recording: cut the record in two there, and turn one part round.");
+      "A sign changed while recording: cut the recording in two there, and invert one part.");
 }
 
-/// The one of two angles with which, turned round, the torque follows their difference in every
-/// record, while it does not as they are; empty if there is none.
+/// The one of two angles with whose inverted sign the torque follows their difference in every
+/// recording, while it does not follow the difference as recorded; empty if there is none.
 std::string Checker::flipped_source(const std::vector<double>& values) const {
   if (std::ranges::all_of(values, [](double v) { return v > kTogether; })) return {};
   bool is_first_minuend = true;
@@ -204,13 +205,14 @@ std::string Checker::flipped_source(const std::vector<double>& values) const {
     direction = now;
     narrowest = std::min(narrowest, extent_of(sum).width() / extent_of(pairs_[r].input).width());
   }
-  // Two sides of a spring turn alike: their difference is small beside their sum.
+  // Both sides of a spring turn in the same direction: their difference is small compared with
+  // their sum.
   if (narrowest > kNarrow) return {};
   return is_first_minuend == (direction > 0.0) ? sources_[1] : sources_[0];
 }
 
-/// 1 if the first input is the first of its two sources less the second, -1 the other way round, 0
-/// if it is no difference.
+/// 1 if the first input is the first of its two sources minus the second, -1 if it is the second
+/// minus the first, 0 if it is not a difference.
 int Checker::order_of_difference(std::size_t r) const {
   if (sources_.size() != 2) return 0;
   const Recording& recording = dataset_.records[r].recording;
@@ -227,18 +229,17 @@ int Checker::order_of_difference(std::size_t r) const {
   return is_difference(1.0) ? 1 : is_difference(-1.0) ? -1 : 0;
 }
 
-// What no jump shows: a zero that creeps away, a spring that breaks.
+// Changes without a jump: a zero that drifts, a spring that breaks.
 void Checker::check_change() {
-  pass_unless_found("change", "each record is the same early and late", [&] {
+  pass_unless_found("change", "each recording has the same relation early and late", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
       if (spoiled_[r] != 0) continue;
       const auto change = find_relation_change(pairs_[r], dataset_.sample_rate_Hz());
       if (!change) continue;
       const Recording& recording = dataset_.records[r].recording;
-      const std::string when =
-          change->is_gradual
-              ? std::string("little by little from beginning to end")
-              : fmt::format("at about t = {:.3g} s", recording.time_s(change->sample));
+      const std::string when = change->is_gradual ? std::string("gradually from beginning to end")
+                                                  : fmt::format("at about t = {:.3g} s",
+                                                                recording.time_s(change->sample));
       add(Verdict::warn, "change", recording.name(),
           change->is_of_slope
               ? fmt::format("at equal {} and speed the slope of {} changes to {:.2g} times, {}",
@@ -246,16 +247,17 @@ void Checker::check_change() {
               : fmt::format("at equal {} and speed {} changes by {:.3g} {}, {}",
                             spec_.inputs.front(), dataset_.target, change->offset,
                             unit_label(dataset_.target), when),
-          "Did a sensor's zero slip or drift, a part break or creep? Look at the record there; a "
-          "model would learn the mean of before and after.");
+          "Check for a zero that slipped or drifted and for a part that broke or crept. A model "
+          "would "
+          "learn the mean of before and after.");
     }
   });
 }
 
-// Two records of one joint whose torques differ by a constant at the same deflection disagree
-// about zero.
+// Two recordings of one joint whose torques differ by a constant at the same deflection have
+// different zeros.
 void Checker::check_offsets() {
-  pass_unless_found("offsets", "the records agree about zero", [&] {
+  pass_unless_found("offsets", "the recordings have the same zero", [&] {
     double slope = 0.0;
     double spread = 0.0;
     std::vector<Line> lines;
@@ -278,9 +280,10 @@ void Checker::check_offsets() {
     for (std::size_t r = 0; r < offsets.size(); ++r)
       if (std::abs(offsets[r] - median) > kOffsetShare * spread)
         add(Verdict::warn, "offsets", dataset_.records[records[r]].recording.name(),
-            fmt::format("zero lies {:.3g} {} away from the other records'", offsets[r] - median,
-                        unit_label(dataset_.target)),
-            "Take each record's own zero in the mapping: zero: [{channel: ..., first: 0.1s}]");
+            fmt::format("the zero is {:.3g} {} away from that of the other recordings",
+                        offsets[r] - median, unit_label(dataset_.target)),
+            "Remove the zero of each recording in the mapping: zero: [{channel: ..., first: "
+            "0.1s}]");
   });
 }
 

@@ -47,7 +47,7 @@ class Checker {
         body(record.recording, record.recording.channel(channel));
   }
 
-  /// As above, without what stands still by design.
+  /// As above, without channels that are constant by design.
   template <class Body>
   void for_each_moving_channel(Body&& body) {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
@@ -102,22 +102,23 @@ class Checker {
   static constexpr double kCodesAtATurn = 2.0;
   static constexpr double kFrozen_s = 0.2;
   static constexpr double kFrozenDeliveries = 10.0;
-  static constexpr double kMovedMeanwhile = 0.4;  ///< of another channel's range
+  static constexpr double kMovedMeanwhile = 0.4;  ///< share of another channel's range
   static constexpr double kTogether = 0.9;        ///< correlation
-  static constexpr double kCoarseShare = 0.02;    ///< of the range: 50 codes
+  static constexpr double kCoarseShare = 0.02;    ///< share of the range: 50 codes
   static constexpr double kJumpShare = 0.02;
   static constexpr double kJumpOverOthers = 5.0;
   static constexpr double kInputJumpShare = 0.05;
   static constexpr double kSameMoment_s = 0.05;
-  static constexpr double kStandstillShare = 0.02;  ///< of the first input's range
+  static constexpr double kRestShare = 0.02;  ///< share of the first input's range
   static constexpr double kFollows = 0.8;           ///< correlation
   static constexpr double kOneMotion = 0.99;        ///< correlation
   static constexpr double kNarrow = 0.5;
   static constexpr double kSlopeRatio = 5.0;
   static constexpr double kLongestDelay_s = 0.1;
   static constexpr double kExplainsLittle =
-      0.2;  ///< of the variance: a fit that leaves more tells no delay
-  static constexpr double kDelayGain = 0.7;  ///< of what is unexplained without shift
+      0.2;  ///< share of the variance: if a fit leaves more, there is no delay to find
+  static constexpr double kDelayGain =
+      0.7;  ///< share of the variance that is unexplained without shift
   static constexpr std::size_t kFewReversals = 3;
   static constexpr double kSpeedHalfWindow_s = 0.05;
   static constexpr double kSpeedRatio = 2.0;
@@ -127,7 +128,7 @@ class Checker {
   const FeatureSpec& spec_;
   FeaturePipeline pipeline_;
   std::vector<std::string> channels_;  ///< raw inputs and the target
-  std::vector<std::string> sources_;   ///< what the first input is made of
+  std::vector<std::string> sources_;   ///< channels of the first input's expression
   std::vector<Pair> pairs_;
   std::vector<std::uint8_t> spoiled_;  ///< by record: its relation is known to be wrong
   std::vector<std::pair<std::size_t, Rest>> stalls_;  ///< record, samples

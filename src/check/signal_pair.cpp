@@ -15,7 +15,7 @@ constexpr double kSmallStep = 0.1;
 constexpr std::size_t kEnoughSamples = 20000;
 constexpr std::size_t kJumpNeighbourhood = 3;
 constexpr double kReversalShare = 0.05;
-constexpr double kStandstillShare = 0.05;
+constexpr double kRestShare = 0.05;
 
 }  // namespace
 
@@ -114,7 +114,7 @@ double share_moved(const Channel& channel, const Rest& meanwhile) {
 
 bool is_odd_one_out(const Rest& rest, const std::vector<Rest>& rests, const Channel& channel,
                     const Channel& other) {
-  constexpr double kLittle = 0.02;  // of the other's range
+  constexpr double kLittle = 0.02;  // share of the other's range
   constexpr double kTogether = 0.9;
   constexpr double kFewCodes = 5.0;
   const double moved = share_moved(other, rest);
@@ -171,7 +171,7 @@ std::vector<double> typical_speeds(const std::vector<double>& differences) {
     if (is_finite(difference)) speeds.push_back(std::abs(difference));
   if (speeds.empty()) return {};
   const double fastest = *std::ranges::max_element(speeds);
-  std::erase_if(speeds, [&](double speed) { return speed <= kStandstillShare * fastest; });
+  std::erase_if(speeds, [&](double speed) { return speed <= kRestShare * fastest; });
   std::ranges::sort(speeds);
   if (speeds.empty()) return {};
   return {speeds[speeds.size() / 10], speeds[speeds.size() * 9 / 10]};

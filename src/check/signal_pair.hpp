@@ -10,13 +10,13 @@
 
 namespace torsio {
 
-/// `std::isfinite` as something that algorithms can be handed.
+/// `std::isfinite` as a function object for algorithms.
 inline bool is_finite(double value) { return std::isfinite(value); }
 
 /// The first input and the target of one recording, on the recording's clock.
 struct Pair {
   std::vector<double> input;
-  std::vector<double> target;  ///< straight lines between fresh samples
+  std::vector<double> target;  ///< interpolated linearly between new samples
 };
 
 struct Extent {
@@ -31,43 +31,44 @@ struct Extent {
 };
 [[nodiscard]] Extent extent_of(const std::vector<double>& values);
 
-/// A channel at every sample, straight lines between those that the sensor delivered: a held value
-/// would look late.
+/// A channel at every sample, interpolated linearly between the samples that the sensor delivered:
+/// a held value would seem delayed.
 [[nodiscard]] std::vector<double> bridged(const Channel& channel);
 
-/// Pearson's, over the samples where both are finite; 0 if one does not move.
+/// Pearson's correlation over the samples where both are finite; 0 if one does not move.
 [[nodiscard]] double correlation(const std::vector<double>& x, const std::vector<double>& y);
 
-/// The highest step between two neighbours, and the highest one away from there.
+/// The highest step between two neighbouring samples, and the highest one elsewhere.
 struct Jump {
-  std::size_t sample = 0;  ///< behind the step
+  std::size_t sample = 0;  ///< the first after the step
   double height = 0.0;
   double next_height = 0.0;
 };
 [[nodiscard]] Jump largest_jump(const std::vector<double>& values);
 
-/// A stretch over which a channel tells the very same number.
+/// A part over which a channel is constant.
 struct Rest {
   std::size_t begin = 0;
   std::size_t end = 0;
   [[nodiscard]] std::size_t length() const { return end - begin; }
   bool operator==(const Rest&) const = default;
 };
-/// Those of so many samples or more, the longest first.
+/// Constant parts of at least `shortest` samples, the longest first.
 [[nodiscard]] std::vector<Rest> rests_of(const Channel& channel, std::size_t shortest);
 
-/// The smallest step that a channel makes: the code of a sensor that has codes, next to nothing of
+/// The smallest step of a channel: the resolution of a quantised sensor, nearly zero for
 /// any other; 0 if it never moves.
 [[nodiscard]] double finest_step(const std::vector<double>& values);
 
-/// The share of all samples at which the sensor delivered.
+/// The share of new samples.
 [[nodiscard]] double share_fresh(const Channel& channel);
 
-/// The share of its whole range that a channel passes through meanwhile.
+/// The share of its range that a channel passes through meanwhile.
 [[nodiscard]] double share_moved(const Channel& channel, const Rest& meanwhile);
 
-/// A stall while little moves: the channel goes with another one everywhere else, and nowhere else did it
-/// stay behind like that, as a joint does that sticks at every turn.
+/// Whether a stall while little moves is a fault: the channel is correlated with another one
+/// everywhere else, and does not rest like that elsewhere, as a joint does that sticks at every
+/// reversal.
 /// @param rests of the channel, from half the length of `rest` on
 [[nodiscard]] bool is_odd_one_out(const Rest& rest, const std::vector<Rest>& rests,
                                   const Channel& channel, const Channel& other);
@@ -80,29 +81,29 @@ struct Line {
 };
 [[nodiscard]] Line line_through(const Pair& pair);
 
-/// How often the motion turns back by more than 5 % of its range.
+/// The number of reversals by more than 5 % of the range.
 [[nodiscard]] std::size_t count_reversals(const std::vector<double>& values);
 
 /// Lower and upper decile of the speeds while moving; empty if nothing moves.
 [[nodiscard]] std::vector<double> typical_speeds(const std::vector<double>& differences);
 
-/// Differences over the `half_window` samples before and after each: what moves, without offset or
+/// Differences over the `half_window` samples before and after each: the motion without offset or
 /// delay; NaN at both ends.
 [[nodiscard]] std::vector<double> movement(const std::vector<double>& values,
                                            std::size_t half_window);
 
-/// target(t) = a + k input(t - lag) + c sign(rate of input(t - lag)): how much of the target it
-/// leaves unexplained.
+/// The fit target(t) = a + k input(t - lag) + c sign(rate of input(t - lag)) and the share of the
+/// target that it does not explain.
 class ShiftedFit {
  public:
   ShiftedFit(const Pair& pair, double sample_rate_Hz);
 
-  /// Share of the target's variance; 1 if there is nothing to tell it from.
+  /// Share of the target's variance; 1 if there are no data.
   [[nodiscard]] double unexplained(std::ptrdiff_t lag) const;
 
  private:
   const Pair& pair_;
-  std::vector<double> direction_;  ///< of the input's motion, -1 to 1
+  std::vector<double> direction_;  ///< direction of the input's motion, -1 to 1
   std::ptrdiff_t stride_ = 1;
 };
 

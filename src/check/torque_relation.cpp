@@ -12,19 +12,19 @@ namespace torsio {
 namespace {
 
 constexpr double kStrongCorrelation = 0.8;
-constexpr double kShortestPart = 0.05;  ///< of the record
+constexpr double kShortestPart = 0.05;  ///< share of the recording
 constexpr double kHalfWindow_s = 0.05;
 constexpr double kInputBins = 48.0;
-constexpr double kSlowest = 0.05;  ///< of the upper decile of the speeds
+constexpr double kSlowest = 0.05;  ///< share of the upper decile of the speeds
 constexpr double kSpeedStep = 4.0;
 constexpr std::size_t kFewPassages = 40;
 constexpr std::size_t kFewSharedCells = 6;
 constexpr int kCandidates = 80;
 constexpr std::size_t kFewReversals = 3;
-constexpr double kOffsetTells = 0.65;  ///< of the scatter
-constexpr double kSlopeTells = 0.45;
+constexpr double kOffsetExplains = 0.65;  ///< share of the scatter
+constexpr double kSlopeExplains = 0.45;
 constexpr double kOverScatter = 3.0;
-constexpr double kOffsetShare = 0.15;  ///< of the torque's range
+constexpr double kOffsetShare = 0.15;  ///< share of the torque's range
 constexpr double kSlopeFactor = 2.0;
 
 /// Running sums of one part of a record.
@@ -50,7 +50,7 @@ struct Passage {
   double time = 0.0;  ///< in samples
 };
 
-/// The upper decile: one snap does not count.
+/// The upper decile: a single snap has no effect.
 double fast(const std::vector<double>& speeds) {
   std::vector<double> sorted;
   for (const double speed : speeds)
@@ -61,7 +61,7 @@ double fast(const std::vector<double>& speeds) {
   return *decile;
 }
 
-/// Cell of a sample, -1 where it rests: creep and relaxation are no passage.
+/// Cell of a sample, -1 at rest: creep and relaxation are not passages.
 std::vector<int> cells_of(const Pair& pair, double sample_rate_Hz) {
   const auto window =
       static_cast<std::size_t>(std::max(1.0, std::round(kHalfWindow_s * sample_rate_Hz)));
@@ -86,7 +86,7 @@ std::vector<int> cells_of(const Pair& pair, double sample_rate_Hz) {
 std::vector<Passage> passages_of(const Pair& pair, double sample_rate_Hz) {
   const std::vector<int> cells = cells_of(pair, sample_rate_Hz);
   std::vector<Passage> passages;
-  std::map<int, std::size_t> last;  // a flicker over a border is no new passage
+  std::map<int, std::size_t> last;  // noise at a border does not start a new passage
   const double apart = std::max(1.0, sample_rate_Hz * kHalfWindow_s);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (cells[i] < 0) continue;
@@ -100,17 +100,17 @@ std::vector<Passage> passages_of(const Pair& pair, double sample_rate_Hz) {
     passage.weight += 1.0;
     passage.input += (pair.input[i] - passage.input) / passage.weight;
     passage.torque += (pair.target[i] - passage.torque) / passage.weight;
-    passage.time = now;  // of its end
+    passage.time = now;  // the end of the passage
   }
   return passages;
 }
 
-/// What a course in time tells of the passages' torque.
+/// The part of the passages' torque that a change over time explains.
 struct Explained {
   double explained = 0.0;  ///< share of the scatter at equal input and speed
   double offset = 0.0;     ///< in the middle of the input's range
   double slope = 0.0;
-  double scatter = 0.0;  ///< what it leaves, root of the mean square
+  double scatter = 0.0;  ///< the remainder, root mean square
 };
 
 /// Passages through cells, compared with the others of their cell.
@@ -192,7 +192,8 @@ class Comparison {
   std::vector<double> torque_;
 };
 
-// Before its first turn a hysteretic spring is on its virgin curve: another torque, but no change.
+// Before its first reversal a hysteretic spring is on its virgin curve: another torque, but no
+// change.
 bool turns_on_both_sides(const std::vector<double>& input, double sample) {
   constexpr std::size_t kThereAndBack = 2;
   const auto middle = input.begin() + static_cast<std::ptrdiff_t>(sample);
@@ -259,11 +260,11 @@ std::optional<RelationChange> find_relation_change(const Pair& pair, double samp
   const double early = comparison.slope() - 0.5 * best.slope;
   const double late = comparison.slope() + 0.5 * best.slope;
   change.slope_ratio = early > 0.0 && late > 0.0 ? late / early : 1.0;
-  change.is_of_slope = best.explained >= kSlopeTells &&
+  change.is_of_slope = best.explained >= kSlopeExplains &&
                        std::max(change.slope_ratio, 1.0 / change.slope_ratio) >= kSlopeFactor;
   const double least =
       std::max(kOffsetShare * extent_of(pair.target).width(), kOverScatter * best.scatter);
-  const bool is_of_offset = best.explained >= kOffsetTells && std::abs(change.offset) >= least;
+  const bool is_of_offset = best.explained >= kOffsetExplains && std::abs(change.offset) >= least;
   if (is_of_offset) change.is_of_slope = false;
   return is_of_offset || change.is_of_slope ? std::optional(change) : std::nullopt;
 }

@@ -15,12 +15,12 @@ class ByteSource {
   virtual ~ByteSource() = default;
   /// Up to `size` bytes into `out`; 0 only at the end. @throws Error if reading fails.
   virtual std::size_t read(char* out, std::size_t size) = 0;
-  /// SHA-256 (hex) of the bytes as they stand in the file; call at the end.
+  /// SHA-256 (hex) of the bytes of the file before unpacking; call at the end.
   virtual std::string sha256() = 0;
 };
 
 /// A file or pipe by path, "-" for standard input; unpacked if it starts like gzip. The progress is
-/// told with each block and whenever a signal interrupts the wait for one.
+/// called with each block and whenever a signal interrupts the wait for one.
 [[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::string& path,
                                                      const Progress& progress = {});
 

@@ -96,7 +96,7 @@ std::string mapping_line(std::string_view quantity, std::string_view unit, std::
                      is_clock ? "t" : channel_like(quantity), si, quoted(column), rest);
 }
 
-/// "Torque [Nm]", "Winkel (deg)": the name and what stands in the brackets at its end.
+/// "Torque [Nm]", "Winkel (deg)": the name and the unit in brackets at its end.
 std::pair<std::string_view, std::string_view> without_brackets(std::string_view name) {
   if (name.empty() || (name.back() != ']' && name.back() != ')')) return {name, {}};
   const auto open = name.find_last_of(name.back() == ']' ? '[' : '(');
@@ -118,22 +118,22 @@ std::string advice_without_unit(std::string_view column) {
     }
   }
   if (const std::string_view meant = unit_meant(unit); !meant.empty())
-    return fmt::format("If that is {}, say in a mapping  {}", meant,
+    return fmt::format("If that is {}, write in a mapping  {}", meant,
                        mapping_line(quantity, meant, column, fmt::format("unit: {}", meant))) +
            drop;
   const std::string_view si = unit_of_quantity(quantity);
   if (si.empty())
     return fmt::format(
-               "Rename the column to NAME_UNIT, or say in a mapping  channels: {{NAME_UNIT: "
+               "Rename the column to NAME_UNIT, or write in a mapping  channels: {{NAME_UNIT: "
                "{{from: {}, unit: UNIT}}}}",
                quoted(column)) +
            drop;
   if (unit.empty())
-    return fmt::format("Rename the column, or tell its unit in a mapping; if it is {0}:  {1}", si,
-                       mapping_line(quantity, si, column, fmt::format("unit: {}", si))) +
+    return fmt::format("Rename the column, or specify its unit in a mapping; if it is {0}:  {1}",
+                       si, mapping_line(quantity, si, column, fmt::format("unit: {}", si))) +
            drop;
   return fmt::format(
-             "Tell in a mapping how many {0} one {1} is:  {2}", si, unit,
+             "Specify in a mapping how many {0} one {1} is:  {2}", si, unit,
              mapping_line(quantity, si, column, fmt::format("unit: {}, scale: FACTOR", si))) +
          drop;
 }

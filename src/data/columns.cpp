@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::string_view kFreshEnding = "_fresh_1";
 
-/// The name without its unit, or all of it where there is none (a mapping may tell the unit).
+/// The name without its unit, or the whole name if it has none (a mapping may specify the unit).
 std::string_view quantity_of(std::string_view column_name) {
   const auto parts = split_channel_name(column_name);
   return parts ? parts->quantity : column_name;
@@ -50,7 +50,7 @@ TableChannel channel_from_rule(const ChannelRule& rule, const CsvTable& table,
     throw Error({.place = place,
                  .expected = fmt::format("a column in a unit of {}", name->unit->si_suffix),
                  .found = fmt::format("'{}' in {}", rule.from, unit->suffix),
-                 .advice = fmt::format("Tell the column's unit ('unit:'), or how {} become {} "
+                 .advice = fmt::format("Specify the column's unit ('unit:'), or how {} become {} "
                                        "('scale:').",
                                        unit->si_suffix, name->unit->si_suffix)});
   return {.channel = {.name = name->si(),
@@ -65,7 +65,7 @@ TableChannel channel_from_column(const CsvColumn& column, const CsvTable& table)
     const auto ending = column.name.rfind('_');
     const bool has_ending = ending != std::string::npos && ending + 1 < column.name.size();
     throw Error({.place = table.header_place(column),
-                 .problem = has_ending ? fmt::format("'{}' is no known unit",
+                 .problem = has_ending ? fmt::format("'{}' is not a known unit",
                                                      column.name.substr(ending + 1))
                                        : "the name has no unit",
                  .expected = "a name that ends in one of " + known_unit_list(),

@@ -39,19 +39,19 @@ class TableParser {
         ++at;
       }
       double value = kNotMeasured;
-      const char* behind = at;
+      const char* after = at;
       if (read_[i] == 0) {
         at = cell_end(at, end);
         continue;
       }
-      if (!read_decimal(behind, value) || (behind != end && *behind != separator_)) {
-        behind = cell_end(at, end);
-        value = unusual_cell({at, behind}, number, columns_[i]);
-      } else if (comma_seen_ && std::string_view(at, behind).find('.') != std::string_view::npos) {
+      if (!read_decimal(after, value) || (after != end && *after != separator_)) {
+        after = cell_end(at, end);
+        value = unusual_cell({at, after}, number, columns_[i]);
+      } else if (comma_seen_ && std::string_view(at, after).find('.') != std::string_view::npos) {
         refuse_mixture(number, columns_[i]);
       }
       columns_[i].values.push_back(value);
-      at = behind;
+      at = after;
     }
     if (at != end) refuse_ragged(line, number);
     mark(number);
@@ -100,8 +100,8 @@ class TableParser {
       throw Error({.place = place(line, column),
                    .expected = "a number, nan or nothing",
                    .found = "'" + printable(whole) + "'",
-                   .advice = "Mend the cell, or leave the column out with  drop: [" + column.name +
-                             "]  in a mapping."});
+                   .advice = "Correct the cell, or leave the column out with  drop: [" +
+                             column.name + "]  in a mapping."});
     return value;
   }
 
@@ -141,7 +141,7 @@ class TableParser {
                  .expected = fmt::format("{} cells, as in the header (line {})", columns_.size(),
                                          table_.header_line),
                  .found = fmt::format("{}", found),
-                 .advice = "The line may have been cut off while logging: remove or mend it."});
+                 .advice = "The line may have been cut off while logging: remove or correct it."});
   }
 
   CsvTable& table_;
@@ -238,10 +238,10 @@ const CsvColumn* CsvTable::find(std::string_view name) const noexcept {
 }
 
 std::size_t CsvTable::line_of(std::size_t row) const noexcept {
-  const auto behind =
+  const auto after =
       std::ranges::upper_bound(line_marks, row, {}, &std::pair<std::size_t, std::size_t>::first);
-  if (behind == line_marks.begin()) return 0;
-  const auto& [first_row, first_line] = *(behind - 1);
+  if (after == line_marks.begin()) return 0;
+  const auto& [first_row, first_line] = *(after - 1);
   return first_line + row - first_row;
 }
 

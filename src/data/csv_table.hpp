@@ -11,7 +11,7 @@
 
 namespace torsio {
 
-/// One column of a CSV file, as it stands there: nothing converted yet. An empty cell is NaN.
+/// One column of a CSV file without conversion. An empty cell is NaN.
 struct CsvColumn {
   std::string name;
   std::size_t number = 0;  ///< counted from 1 in the header
@@ -48,17 +48,17 @@ struct CsvOptions {
   std::vector<std::string> skip = {};  ///< columns that are not read and may hold anything
   CsvLimits limits = {};
   Progress progress =
-      {};  ///< told with each block that is read, also while a pipe keeps it waiting
+      {};  ///< is called with each block that is read, also while waiting for a pipe
 };
 
-/// Reads a CSV file, plain or gzipped (told by its first bytes); "-" is standard input. The header
-/// gives the names; separator comma, semicolon or tab; lines that start with '#' are comments.
-/// See docs/recordings.md.
-/// @throws Error with line and column for whatever is not a table of numbers, Cancelled if the
+/// Reads a CSV file, plain or gzipped (detected by its first bytes); "-" is standard input. The
+/// header gives the names; separator comma, semicolon or tab; lines that start with '#' are
+/// comments. See docs/recordings.md.
+/// @throws Error with line and column if it is not a table of numbers, Cancelled if the
 /// progress asks to stop.
 [[nodiscard]] CsvTable read_csv(const std::string& path, const CsvOptions& options = {});
 
-/// The same from bytes in memory; `name` stands for the file in messages.
+/// The same from bytes in memory; `name` is the file name in messages.
 [[nodiscard]] CsvTable parse_csv(std::string_view bytes, const std::string& name,
                                  const CsvOptions& options = {});
 

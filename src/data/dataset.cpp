@@ -40,15 +40,15 @@ std::vector<Segment> with_embargo(const std::vector<Segment>& blocks, std::size_
     Segment& segment = segments[i];
     if (segment.role != Role::train) continue;
     const std::size_t before = i > 0 ? embargo : 0;
-    const std::size_t behind = i + 1 < segments.size() ? embargo : 0;
+    const std::size_t after = i + 1 < segments.size() ? embargo : 0;
     const std::size_t length = segment.end - segment.begin;
-    if (length <= before || length - before <= behind)
-      throw Error({.problem = fmt::format("a training block of {} samples does not outlast the "
-                                          "embargo of {} samples beside each test block",
+    if (length <= before || length - before <= after)
+      throw Error({.problem = fmt::format("a training block of {} samples is not longer than the "
+                                          "embargo of {} samples next to each test block",
                                           length, embargo),
                    .advice = "Use fewer blocks or a shorter embargo."});
     segment.begin += before;
-    segment.end -= behind;
+    segment.end -= after;
   }
   return segments;
 }

@@ -9,12 +9,12 @@
 namespace torsio {
 
 /// Reads one decimal number at `at`, which must be followed somewhere by a character that cannot
-/// belong to a number; moves `at` behind it. Correctly rounded.
+/// belong to a number; moves `at` to the end of it. Correctly rounded.
 ///
 /// Up to 2^53 a mantissa is exact, and so are powers of ten up to 10^22: one multiplication or
-/// division of the two rounds once, which is right (Clinger 1990). Everything else goes to
+/// division of the two rounds once, which is correct (Clinger 1990). Everything else goes to
 /// std::from_chars.
-/// @returns false, `at` unmoved, if no finite number stands there.
+/// @returns false, `at` unmoved, if there is no finite number.
 inline bool read_decimal(const char*& at, double& value) {
   static constexpr std::array<double, 23> kPowers = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                                      1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
@@ -60,8 +60,8 @@ inline bool read_decimal(const char*& at, double& value) {
       magnitude *= kPowers[static_cast<std::size_t>(exponent)];
   } else {
     const auto [end, code] = std::from_chars(first, p, magnitude);
-    // from_chars leaves the value alone both for too large and for too small numbers. Their first
-    // digit tells which: it stands for about 10^exponent, far from 10^0.
+    // from_chars does not change the value for too large and for too small numbers. Their first
+    // digit distinguishes them: its value is about 10^exponent, far from 10^0.
     if (code == std::errc::result_out_of_range) {
       const char* at_digit = first;
       for (; at_digit != p && (*at_digit == '0' || *at_digit == '.'); ++at_digit)

@@ -5,15 +5,17 @@
 
 namespace torsio {
 
-/// What the time stamps of a log say about its clock.
+/// Properties of a log's clock, from its time stamps.
 struct ClockReport {
-  double sample_rate_Hz = 0.0;     ///< from the first and the last stamp; 0 if it cannot be told
-  double stamp_step_s = 0.0;       ///< median of the positive differences between neighbours
-  double largest_stray_s = 0.0;    ///< of a stamp from an even spread between first and last
-  std::size_t max_stray = 0;       ///< sample where that happens
-  std::size_t worst_interval = 0;  ///< the interval that ends at this sample is the oddest
-  std::size_t duplicated = 0;      ///< stamps equal to the one before
-  std::size_t backward = 0;        ///< stamps before the one before
+  double sample_rate_Hz = 0.0;  ///< from the first and the last stamp; 0 if it cannot be determined
+  double stamp_step_s = 0.0;    ///< median of the positive differences between neighbours
+  double largest_stray_s =
+      0.0;  ///< largest distance of a stamp from equal spacing between first and last
+  std::size_t max_stray = 0;  ///< sample where that happens
+  std::size_t worst_interval =
+      0;  ///< the interval that ends at this sample differs most from the others
+  std::size_t duplicated = 0;            ///< stamps equal to the one before
+  std::size_t backward = 0;              ///< stamps before the one before
   std::size_t first_not_increasing = 0;  ///< 0: none
   std::size_t not_finite = 0;
 

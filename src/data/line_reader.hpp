@@ -67,7 +67,7 @@ class LineReader {
     throw Error({.place = fmt::format("{}: line {}", name_, number_ + 1),
                  .expected = "a line of text",
                  .found = fmt::format("{} bytes and no end of the line", length),
-                 .advice = "This is no CSV file, or its line ends are missing."});
+                 .advice = "This is not a CSV file, or its line ends are missing."});
   }
 
   ByteSource& source_;
@@ -75,7 +75,7 @@ class LineReader {
   std::vector<char> buffer_;
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
-  std::size_t searched_ = 0;  ///< bytes behind begin_ that are known to hold no line end
+  std::size_t searched_ = 0;  ///< bytes after begin_ without a line end
   std::size_t number_ = 0;
 };
 

@@ -29,7 +29,7 @@ bool is_manifest(const std::string& path) {
   return path.ends_with(".yaml") || path.ends_with(".yml");
 }
 
-/// One log and everything that was said about it.
+/// One log with its options.
 struct Log {
   std::string path;
   ManifestFile entry = {};
@@ -50,7 +50,7 @@ void refuse_latency_of_inputs(const Mapping& mapping, const std::string& target)
            .advice = "Leave the input late, or name it with --target if it is the target."});
 }
 
-/// A target that nobody recorded, if it is canonical and its sources are there: for an inverse model
+/// A target that was not recorded, if it is canonical and its sources exist: for an inverse model
 /// the deflection.
 void derive_target(Recording& recording, const std::string& target) {
   if (recording.has(target)) return;
@@ -97,7 +97,7 @@ std::vector<Segment> segments_of(const Recording& recording, const ManifestFile&
   }
 }
 
-/// Collects what the files and manifests of one call say.
+/// Collects the contents of the files and manifests of one call.
 class Collector {
  public:
   explicit Collector(LoadOptions options) : options_(std::move(options)) {
@@ -183,7 +183,7 @@ class Collector {
         throw UsageError(
             {.place = planned.log.path,
              .problem = "the recording is given twice",
-             .advice = "Leave one out: the same samples twice tell no more than once."});
+             .advice = "Leave one out: repeated samples contain no further information."});
     }
   }
 
@@ -196,16 +196,16 @@ class Collector {
         planned.log.entry.name = planned.log.entry.file;
   }
 
-  /// The user's word counts more than a manifest's; two manifests must say the same.
-  void agree(std::string& current, const std::string& said, const std::string& what,
+  /// The user's option overrides a manifest; two manifests must agree.
+  void agree(std::string& current, const std::string& given, const std::string& what,
              const std::string& file) const {
-    if (said.empty() || (what == "target" && !options_.target.empty())) return;
-    if (current.empty()) current = said;
-    if (current != said)
+    if (given.empty() || (what == "target" && !options_.target.empty())) return;
+    if (current.empty()) current = given;
+    if (current != given)
       throw UsageError({.place = file + ": " + what,
                         .problem = "the manifests disagree",
                         .expected = current,
-                        .found = said});
+                        .found = given});
   }
 
   [[nodiscard]] Mapping mapping_of(const ManifestFile& entry, const Manifest& manifest) const {

@@ -93,7 +93,7 @@ ManifestFile manifest_file(const YamlValue& yaml) {
   return file;
 }
 
-/// A mapping in a recording's place, told by a key that only mappings have.
+/// Refuses a mapping in a recording's place, which has a key that only mappings have.
 void refuse_mapping(const YamlValue& yaml) {
   for (const std::string_view key : {"channels", "derive", "drop", "split_by", "clock", "hold"})
     if (yaml.find(key) && !yaml.find("files"))
@@ -132,7 +132,7 @@ std::optional<std::string> expanded(std::string text) {
     const auto end = text.find('}', begin);
     if (end == std::string::npos) return std::nullopt;
     const std::string variable = text.substr(begin + 2, end - begin - 2);
-    // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): the environment is not written
     const char* const value = std::getenv(variable.c_str());
     if (value == nullptr || *value == '\0') return std::nullopt;
     const std::string_view inserted = value;

@@ -64,7 +64,7 @@ std::vector<NamedRows> records_of(const CsvTable& table, const Mapping& mapping,
   return {{.name = stem, .rows = {.begin = 0, .end = table.rows()}}};
 }
 
-/// The rows of a channel; all of them are moved out, for then no other record wants any.
+/// The rows of a channel; all rows are moved out, because then no other recording uses any.
 Channel cut(Channel& channel, Rows rows) {
   if (rows.size() == channel.values.size()) return std::move(channel);
   const auto part = [rows](const auto& all) {

@@ -46,7 +46,8 @@ ClockRule clock_rule(const YamlValue& yaml) {
   if (const auto rate = yaml.find("resample")) rule.resample_Hz = rate->positive_number("Hz");
   if (rule.rebuild && rule.resample_Hz > 0.0)
     yaml.refuse("either rebuild or resample",
-                "rebuild takes coarse stamps for even samples; resample believes uneven stamps.");
+                "rebuild assumes even samples with coarse stamps; resample uses uneven stamps as "
+                "they are.");
   return rule;
 }
 
@@ -96,7 +97,7 @@ Mapping mapping_from(const YamlValue& yaml) {
     throw Error({.place = yaml.place(),
                  .expected = "a mapping",
                  .found = "a manifest (it has files:)",
-                 .advice = "A manifest stands where recordings stand, without --mapping."});
+                 .advice = "Give a manifest in the place of a recording, without --mapping."});
   yaml.allow_only({"channels", "derive", "drop", "split_by", "keep", "clock", "rate", "zero",
                    "hold", "latency", "computed_from"});
   Mapping mapping;

@@ -10,10 +10,10 @@
 namespace torsio {
 
 /// The measured channels of a table as recordings in SI: columns, splitting, clock, holding,
-/// latency and zeros, in this order. Derived channels come later (`add_derived`), behind resampling
-/// and conditions. `rate_Hz` is the clock of a log that has none and whose mapping tells none;
-/// `name` names the records, the file's own name if empty.
-/// @throws Error naming place, expected, found and the mapping line that would help.
+/// latency and zeros, in this order. Derived channels are added later (`add_derived`), after
+/// resampling and conditions. `rate_Hz` is the sample rate of a log without clock whose mapping
+/// gives none; `name` names the recordings, the file's name if empty.
+/// @throws Error naming place, expected, found and the mapping line that helps.
 [[nodiscard]] std::vector<Recording> measured_recordings(const CsvTable& table,
                                                          const Mapping& mapping,
                                                          double rate_Hz = 0.0,

@@ -33,7 +33,7 @@ struct Stamps {
   }
 };
 
-/// Near the rate of the log; stamps that come several times tell only their number.
+/// An estimate of the log's rate; repeated stamps contribute only their number.
 double rate_of_steps(const Stamps& stamps) {
   constexpr double kRounding = 1e-3;
   constexpr double kCoarseRounding = 1e-2;
@@ -43,10 +43,10 @@ double rate_of_steps(const Stamps& stamps) {
 
 std::string remedies(const Stamps& stamps) {
   return fmt::format(
-      "If the samples were taken evenly and only the stamps are coarse, say in a mapping  clock: "
-      "{{rebuild: true}}\n  If they were really taken unevenly, say  clock: {{resample: {:.6g}Hz}} "
+      "If the samples were taken evenly and only the stamps are coarse, write in a mapping  clock: "
+      "{{rebuild: true}}\n  If they were taken unevenly, write  clock: {{resample: {:.6g}Hz}} "
       " "
-      "or another rate that you want.",
+      "or another rate.",
       rate_of_steps(stamps));
 }
 
@@ -54,7 +54,7 @@ std::string remedies(const Stamps& stamps) {
 struct Loss {
   std::size_t samples = 0;
   std::size_t longest = 0;  ///< samples lost at one place
-  std::size_t first = 0;    ///< the sample behind the first gap
+  std::size_t first = 0;    ///< the sample after the first gap
 };
 
 /// Empty where the stamps may just as well be coarse: their doubled steps come evenly.
@@ -84,7 +84,7 @@ void refuse_lost(const Stamps& stamps) {
   const auto gap = static_cast<double>(loss.longest + 1);
   throw ClockError(
       {.place = stamps.place(loss.first),
-       .problem = fmt::format("{} {} missing, the first behind t = {:.6g} s", loss.samples,
+       .problem = fmt::format("{} {} missing, the first after t = {:.6g} s", loss.samples,
                               loss.samples == 1 ? "sample is" : "samples are", before_s),
        .expected = fmt::format("an interval near {:.6g} s", stamps.report.stamp_step_s),
        .found = fmt::format("{:.6g} s", stamps.values_s[loss.first] - before_s),
@@ -98,7 +98,7 @@ void refuse_lost(const Stamps& stamps) {
 void refuse_unusable(const Stamps& stamps) {
   if (stamps.rows.size() < 2)
     throw ClockError({.place = stamps.place(0),
-                      .expected = "at least two samples, to tell the sample rate",
+                      .expected = "at least two samples, to determine the sample rate",
                       .found = "one sample"});
   if (stamps.report.not_finite > 0) {
     const auto missing =
@@ -107,14 +107,14 @@ void refuse_unusable(const Stamps& stamps) {
         {.place = stamps.place(static_cast<std::size_t>(missing - stamps.values_s.begin())),
          .expected = "a time stamp",
          .found = "nothing",
-         .advice = "Remove the line, or drop the clock column and tell the rate."});
+         .advice = "Remove the line, or drop the clock column and give the rate."});
   }
   if (!(stamps.report.sample_rate_Hz > 0.0))
     throw ClockError(
         {.place = stamps.place(stamps.rows.size() - 1),
-         .problem = "the last time stamp is not behind the first",
+         .problem = "the last time stamp is not after the first",
          .found = fmt::format("{} s after {} s", stamps.values_s.back(), stamps.values_s.front()),
-         .advice = "Drop the clock column in a mapping and tell the rate:  rate: 1000Hz"});
+         .advice = "Drop the clock column in a mapping and give the rate:  rate: 1000Hz"});
 }
 
 void refuse_not_increasing(const Stamps& stamps, const std::string& advice) {
@@ -195,7 +195,7 @@ double given_rate(const CsvTable& table, const Mapping& mapping, double rate_Hz)
                .problem = "the log has no clock",
                .expected = "a column t_s (or t_ms, time_us ...)",
                .found = "the columns " + table.column_list(),
-               .advice = "Tell the sample rate: --rate 1000, or  rate: 1000Hz  in a mapping."});
+               .advice = "Give the sample rate: --rate 1000, or  rate: 1000Hz  in a mapping."});
 }
 
 }  // namespace

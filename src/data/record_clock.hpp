@@ -23,15 +23,16 @@ struct RecordClock {
   double start_s = 0.0;
 };
 
-/// The clock of some rows by the mapping's rules; `rate_Hz` where neither log nor mapping tells.
+/// The clock of some rows by the mapping's rules; `rate_Hz` if neither log nor mapping has a rate.
 [[nodiscard]] RecordClock record_clock(const CsvTable& table, const TableChannels& columns,
                                        Rows rows, const Mapping& mapping, double rate_Hz);
 
 /// Samples that share a stamp, spread evenly up to the next stamp (the last ones as those before),
-/// so that stamps coarser than the sampling tell a time for each sample.
+/// so that stamps coarser than the sampling give a time for each sample.
 [[nodiscard]] std::vector<double> spread_within_stamps(std::span<const double> stamps_s);
 
-/// Puts a channel of uneven stamps onto an even clock of so many samples: interpolated, or held if it has a mask.
+/// Puts a channel of uneven stamps onto an even clock of so many samples: interpolated, or held if
+/// it has a mask.
 [[nodiscard]] Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,
                                     double sample_rate_Hz, std::size_t samples);
 

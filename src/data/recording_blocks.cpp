@@ -76,7 +76,7 @@ Recording recording_of(const RecordingHeader& header, const FrameBlock& frames,
                        const std::string& name) {
   const bool is_empty = frames.ticks.empty();
   const std::int64_t first = is_empty ? 0 : frames.ticks.front();
-  // Unsigned: two ticks may be further apart than a signed number can say.
+  // Unsigned: the distance of two ticks may exceed the range of a signed number.
   const std::uint64_t last_row = is_empty ? 0
                                           : static_cast<std::uint64_t>(frames.ticks.back()) -
                                                 static_cast<std::uint64_t>(first);
@@ -103,8 +103,8 @@ Recording recording_of(const RecordingHeader& header, const FrameBlock& frames,
 std::string sha256_of(std::span<const std::byte> bytes, const std::string& name) {
   const auto source =
       bytes_in_memory({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, name);
-  std::vector<char> piece(std::size_t{1} << 16);
-  while (source->read(piece.data(), piece.size()) > 0) {
+  std::vector<char> buffer(std::size_t{1} << 16);
+  while (source->read(buffer.data(), buffer.size()) > 0) {
   }
   return source->sha256();
 }

@@ -36,7 +36,7 @@ void TextSink::add(std::string_view more) {
 
 void TextSink::add(double value) {
   if (std::isnan(value)) return add("nan");
-  char digits[kLongestNumber];  // NOLINT(modernize-avoid-c-arrays): to_chars wants pointers
+  char digits[kLongestNumber];  // NOLINT(modernize-avoid-c-arrays): to_chars takes pointers
   const auto [end, code] = std::to_chars(std::begin(digits), std::end(digits), value);
   add(std::string_view(std::begin(digits), end));
 }

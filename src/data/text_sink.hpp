@@ -12,8 +12,8 @@
 
 namespace torsio {
 
-/// Text on its way to a file, in large pieces, packed as gzip if asked. Equal text gives equal
-/// bytes: no name and no time of day stand in the header.
+/// Writes text to a file in large blocks, optionally packed as gzip. Equal text gives equal
+/// bytes: the header contains no name and no time of day.
 class TextSink {
  public:
   TextSink(OutputFile& file, bool packs);

@@ -28,7 +28,7 @@ YamlValue YamlValue::parse(std::string_view text, const std::string& file) {
   } catch (const YAML::Exception& problem) {
     throw Error({.place = fmt::format("{}: line {}, column {}", file, problem.mark.line + 1,
                                       problem.mark.column + 1),
-                 .problem = "this is no YAML: " + problem.msg});
+                 .problem = "this is not YAML: " + problem.msg});
   }
 }
 
@@ -69,7 +69,7 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
     std::string key = entry.first.Scalar();
     if (!seen.insert(key).second)
       throw Error({.place = YamlValue(entry.first, file_, path_).place(),
-                   .problem = "the key '" + printable(key) + "' stands twice"});
+                   .problem = "the key '" + printable(key) + "' is given twice"});
     const std::string path = path_.empty() ? key : path_ + "." + key;
     all.emplace_back(std::move(key), YamlValue(entry.second, file_, path));
   }

@@ -12,10 +12,10 @@
 
 namespace torsio {
 
-/// A YAML value that knows its place, so that every complaint names file, line and key.
+/// A YAML value with its place, so that every message names file, line and key.
 class YamlValue {
  public:
-  /// @throws Error if the text is no YAML or too large.
+  /// @throws Error if the text is not YAML or too large.
   static YamlValue parse(std::string_view text, const std::string& file);
   static YamlValue read(const std::string& path);
 
@@ -25,14 +25,16 @@ class YamlValue {
   [[nodiscard]] bool is_list() const { return node_.IsSequence(); }
   [[nodiscard]] bool is_scalar() const { return node_.IsScalar(); }
 
-  /// Key and value of a map, in file order. @throws Error if this is no map or a key stands twice.
+  /// Key and value of a map, in file order. @throws Error if this is not a map or a key is
+  /// repeated.
   [[nodiscard]] std::vector<std::pair<std::string, YamlValue>> entries() const;
   /// @throws Error for a key that is not listed, with the nearest one that is.
   void allow_only(std::initializer_list<std::string_view> keys) const;
   [[nodiscard]] std::optional<YamlValue> find(std::string_view wanted) const;
   [[nodiscard]] YamlValue at(std::string_view key) const;  ///< @throws Error if missing
 
-  [[nodiscard]] std::vector<YamlValue> items() const;  ///< of a list, or a scalar as a list of one
+  [[nodiscard]] std::vector<YamlValue> items()
+      const;  ///< items of a list; a scalar is a list of one
   [[nodiscard]] std::vector<std::string> texts() const;
   [[nodiscard]] std::string text() const;
   /// A number in the SI unit, which may carry another unit of the same quantity.

@@ -43,7 +43,7 @@ class Replay {
       channels_.push_back(&record.recording.channel(input).values);
   }
 
-  /// @param frozen what the frozen network says to the same record.
+  /// @param frozen the estimates of the frozen network for the same recording.
   void run(const Prediction& frozen, Tally& own, Tally& together, const Progress& progress) {
     const std::size_t samples = record_.recording.size();
     const DenormalsOff denormals_off;
@@ -95,7 +95,7 @@ void require_role(const Dataset& dataset, Role role, const char* what, const cha
       reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", counts.outcomes[i],
                              name(static_cast<UpdateOutcome>(i)));
   throw Error(
-      {.problem = "not a single sample could be learned from",
+      {.problem = "no sample could be used for the adaptation",
        .expected = fmt::format(
            "samples with a measured {} after the model has warmed up, inside its range", target),
        .found = reasons.empty() ? "none at all" : reasons,
@@ -156,7 +156,7 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
   refuse_seen_test_records(dataset);
   const Estimator frozen = estimator_at(model, dataset.sample_rate_Hz());
   AdaptiveEstimator adaptive(frozen.settings(), model.parameters, settings);
-  require_role(dataset, Role::train, "adapt to", "Name recordings to learn from.");
+  require_role(dataset, Role::train, "adapt to", "Name recordings to adapt to.");
   require_role(dataset, Role::test, "score on", "Name held-out recordings with --test.");
   for (const std::string& channel : frozen.settings().zeroed_channels)
     adaptive.set_zero(channel, 0.0);  // a loaded recording had its own subtracted already
@@ -188,7 +188,7 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
   const SplitScore after = evaluate(estimator_at(adapted.file, dataset.sample_rate_Hz()), dataset,
                                     Role::test, part_of(progress, parts - 1, parts, "adapted"));
   if (after.together.metrics.samples == 0)
-    throw Error({.problem = "not a single held-out sample could be scored",
+    throw Error({.problem = "no held-out sample could be scored",
                  .advice = "Hold out more: --test recordings, or a larger --held-out share."});
   adapted.held_out = held_out_scores(before, after);
   note_held_out_scores(adapted.file.card, {{.family = {}, .score = after.together}});
@@ -203,9 +203,10 @@ void hold_out_ends(Dataset& dataset, double share, double embargo_s) {
   for (DatasetRecord& record : dataset.records) {
     const Recording& recording = record.recording;
     if (record.segments != whole_record(recording.size(), Role::train))
-      throw UsageError({.place = recording.name(),
-                        .problem = "its manifest gives it roles, but none to be scored on",
-                        .advice = "Give records the role test there, or name them with --test."});
+      throw UsageError(
+          {.place = recording.name(),
+           .problem = "its manifest gives it roles, but not the role test",
+           .advice = "Give recordings the role test there, or name them with --test."});
     const auto embargo =
         static_cast<std::size_t>(std::llround(embargo_s * recording.sample_rate_Hz()));
     try {
@@ -213,7 +214,7 @@ void hold_out_ends(Dataset& dataset, double share, double embargo_s) {
     } catch (const Error& error) {
       ErrorReport report = error.report();
       report.place = recording.name();
-      report.advice = "Give longer recordings, or whole ones to be scored on: --test.";
+      report.advice = "Give longer recordings, or separate ones with --test.";
       throw Error(std::move(report));
     }
   }

@@ -62,7 +62,7 @@ class Windows {
     return data_.sequences[end.sequence].features.row(end.sample + 1 - length_ + n);
   }
 
-  /// What the model says at the end of a window whose inputs come from `present` where their bit in
+  /// The estimate at the end of a window whose inputs come from `present` where their bit in
   /// the coalition is set, and from `absent` otherwise.
   [[nodiscard]] Estimate estimate(AnyModel& model, const End& present, const End& absent,
                                   std::size_t coalition, std::vector<double>& scratch) const {
@@ -96,7 +96,7 @@ std::vector<std::vector<Estimate>> run_all(const AnyModel& model, const Training
   return estimates;
 }
 
-/// Standard deviation of what the model says.
+/// Standard deviation of the estimates.
 double spread_of(const TrainingData& data, const std::vector<std::vector<Estimate>>& estimates) {
   double count = 0.0;
   double mean = 0.0;
@@ -198,12 +198,11 @@ void refuse_bad_calls(const AnyModel& model, const TrainingData& data,
     throw Error({.expected = fmt::format("{} inputs, as the model has", model.input_count()),
                  .found = std::to_string(data.input_count())});
   if (model.input_count() > kMaxAttributedInputs)
-    throw Error(
-        {.problem = "this model has too many inputs for exact Shapley values",
-         .expected =
-             fmt::format("at most {}: each one more doubles the work", kMaxAttributedInputs),
-         .found = std::to_string(model.input_count()),
-         .advice = "Fit a model with fewer inputs; torsio crossvalidate says what that costs."});
+    throw Error({.problem = "this model has too many inputs for exact Shapley values",
+                 .expected = fmt::format("at most {}: each further input doubles the work",
+                                         kMaxAttributedInputs),
+                 .found = std::to_string(model.input_count()),
+                 .advice = "Use fewer inputs; torsio crossvalidate shows the loss of accuracy."});
 }
 
 void enter_shapley(Attribution& attribution) {
@@ -249,7 +248,7 @@ std::vector<double> shapley_values(std::span<const double> values) {
                  .found = std::to_string(values.size())});
   const auto players = static_cast<std::size_t>(std::countr_zero(values.size()));
   std::vector<double> weight(players);  // |S|! (n-|S|-1)! / n!
-  double choose = 1.0;                  // of |S| among n - 1
+  double choose = 1.0;                  // binomial coefficient of |S| among n - 1
   for (std::size_t size = 0; size < players; ++size) {
     weight[size] = 1.0 / (choose * static_cast<double>(players));
     choose *= static_cast<double>(players - 1 - size) / static_cast<double>(size + 1);
@@ -282,9 +281,10 @@ Attribution attribute(const AnyModel& model, const TrainingData& data,
 
   const std::vector<End> candidates = window_ends(data, attribution.window_samples);
   if (candidates.empty())
-    throw Error({.problem = fmt::format("no recording holds a window of {} samples that the model "
-                                        "could be asked about",
-                                        attribution.window_samples),
+    throw Error({.problem = fmt::format(
+                     "no recording contains a window of {} samples on which the model can be "
+                     "evaluated",
+                     attribution.window_samples),
                  .advice = "Use a shorter window, or longer recordings."});
   Random random(options.seed);
   const std::vector<End> explained = drawn(candidates, options.windows, random);

@@ -37,7 +37,7 @@ FamilyChoice parse_choice(std::string_view text) {
       const std::size_t equals = part.find('=');
       if (equals == std::string_view::npos)
         throw UsageError({.place = "--models",
-                          .expected = "option=value behind a colon",
+                          .expected = "option=value after a colon",
                           .found = std::string(part)});
       choice.options.emplace(part.substr(0, equals), part.substr(equals + 1));
     }
@@ -70,8 +70,8 @@ bool is_on_by_default(const FamilyInfo& family, std::string_view option) {
   });
 }
 
-/// Every family as it comes, without its branches by direction, and scheduled over a condition
-/// where the data have one.
+/// Every family with its default settings, without its branches by direction, and scheduled over a
+/// condition if the data have one.
 std::vector<FamilyChoice> all_choices(const Dataset& dataset,
                                       const std::vector<std::string>& inputs) {
   const std::string condition = schedulable_condition(dataset, inputs);
@@ -144,7 +144,7 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
       ModelCard& card = scored.trained->file.card;
       note_held_out_scores(card, scored.rows);
       if (chosen_on == Role::test)
-        card.held_out += fmt::format("; this score chose the model among {}", choices.size());
+        card.held_out += fmt::format("; this score selected the model among {}", choices.size());
       comparison.best = std::move(scored.trained);
     }
     std::ranges::move(scored.rows, std::back_inserter(results.rows));

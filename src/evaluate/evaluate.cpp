@@ -24,7 +24,7 @@ double nanoseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::nano>(duration).count();
 }
 
-/// What one reading of the clock costs: it stands in every measured step.
+/// The time of one reading of the clock, which every measured step includes.
 double clock_cost_ns() {
   static const double cost = [] {
     double least = 1e9;
@@ -53,7 +53,7 @@ std::vector<const std::vector<double>*> raw_channels(const Estimator& estimator,
   return channels;
 }
 
-/// Counts how often the truth is within one and two error bars.
+/// Counts how often the target is within one and two error bars.
 struct Coverage {
   std::size_t samples = 0;
   std::size_t within = 0;
@@ -115,9 +115,9 @@ struct Tally {
   }
 };
 
-/// What a model is usually wrong by in a record's first samples: root mean square over the regions of the
-/// residual table; NaN without one, and for a family that integrates its input (`FamilyTraits`), whose speed such a
-/// start would draw to rest.
+/// The usual error of a model in the first samples of a recording: root mean square over the
+/// regions of the residual table. NaN without a table, and for a family that integrates its input
+/// (`FamilyTraits`), whose speed such a start would move towards rest.
 double usual_error(const EstimatorSettings& settings, FamilyTraits traits) {
   if (traits.integrates) return kNotMeasured;
   double sum = 0.0;

@@ -19,7 +19,8 @@ ResultRow row_for(const ModelFile& file, Role split, const Score& score) {
   row.split = split;
   row.score = score;
   row.parameter_count = AnyModel(file.parameters).parameter_count();
-  constexpr double kDiverged = 0.01;  // of the samples; less is a moment at the range's end
+  constexpr double kDiverged =
+      0.01;  // share of the samples; a smaller one is a short excursion at the end of the range
   const auto share = [&](std::size_t samples) {
     return static_cast<double>(samples) / static_cast<double>(row.score.metrics.samples);
   };
@@ -31,7 +32,7 @@ ResultRow row_for(const ModelFile& file, Role split, const Score& score) {
     row.reason = fmt::format("free run left the output's range in {:.1f} % of the samples",
                              100.0 * share(row.score.diverged_samples));
   } else if (row.score.guarded_samples > 0) {
-    row.reason = fmt::format("{:.1f} % of the samples were answered by a guard",
+    row.reason = fmt::format("{:.1f} % of the samples are the fallback of a guard",
                              100.0 * share(row.score.guarded_samples));
   }
   return row;
@@ -81,7 +82,7 @@ ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets, const M
   } catch (const Cancelled&) {
     throw;
   } catch (const UsageError&) {
-    throw;  // a setting is wrong; what merely cannot be fitted to these data is another Error
+    throw;  // a wrong setting; a fit that fails on these data throws another Error
   } catch (const Error& error) {
     scored = {.trained = {}, .rows = {failed_row(choice, error)}};
   }
@@ -140,7 +141,7 @@ void refuse_seen_test_records(const Dataset& dataset) {
         trained.contains(record.recording.source.sha256))
       throw UsageError(
           {.place = record.recording.name(),
-           .problem = "this file is both trained and judged on",
+           .problem = "this file is used for training and for the scores",
            .advice = "Hold another recording out, or split one with `split:` in a manifest."});
   }
 }

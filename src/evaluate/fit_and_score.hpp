@@ -12,11 +12,11 @@
 #include "torsio/evaluate/results.hpp"
 #include "torsio/fit/train_model.hpp"
 
-// What `compare` and `crossvalidate` do with each model.
+// The steps of `compare` and `crossvalidate` for each model.
 namespace torsio {
 
-/// The data of one input set after another, made once for all models that share it: those stand
-/// next to each other in a list of choices.
+/// The data of one input set after another, made once for all models that share it, which are
+/// adjacent in a list of choices.
 class InputSets {
  public:
   /// @param dataset must outlive this.
@@ -26,7 +26,7 @@ class InputSets {
   const std::string& leak_of(const FeatureSpec& features);
   /// @throws Error as `learning_data`, each time again.
   const LearningData& data_of(const FeatureSpec& features);
-  /// The dataset's segments were changed: a leak stays one, the data are made anew.
+  /// Call after a change of the dataset's segments: leaks are kept, the data are computed again.
   void forget_data() noexcept { data_.reset(); }
 
  private:
@@ -43,7 +43,7 @@ struct ScoredModel {
   std::vector<ResultRow> rows;
 };
 
-/// Trains a choice and scores it on `roles`. A fit that fails is one row that says why.
+/// Trains a choice and scores it on `roles`. A fit that fails is one row with the reason.
 /// @throws UsageError for a wrong setting or a leak that is not allowed, Cancelled.
 [[nodiscard]] ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets,
                                         const ModelChoice& choice, std::uint64_t seed,
@@ -54,15 +54,15 @@ struct ScoredModel {
                                               const Dataset& dataset, std::span<const Role> roles,
                                               const Progress& progress);
 
-/// What results say before there is a row.
+/// Results without rows.
 [[nodiscard]] Results empty_results(const Dataset& dataset);
 /// Enters the inputs of a choice, unless its input set is known already.
 void note_inputs(Results& results, const ModelChoice& choice);
-/// One input set without a name is none.
+/// A single input set without a name is not listed.
 void forget_only_set(Results& results);
 
-/// A file that is both trained and tested on would make every score a lie. (Blocks of one record are
-/// another matter.) @throws UsageError naming it.
+/// Refuses a file that is used for training and test, whose scores would be biased. (Blocks of one
+/// recording are allowed.) @throws UsageError naming it.
 void refuse_seen_test_records(const Dataset& dataset);
 
 /// The share of work `index` of `count` in the whole work's progress. `progress` must outlive it.

@@ -12,7 +12,7 @@
 namespace torsio {
 namespace {
 
-/// Residuals of one record, sample by sample, NaN where nothing is judged, and its features.
+/// Residuals of one recording, sample by sample, NaN where none is scored, and its features.
 struct Run {
   std::vector<double> residual;
   Matrix features;
@@ -49,8 +49,8 @@ std::vector<Run> runs_of(const TrainedModel& model, const Dataset& dataset, Role
   return runs;
 }
 
-/// Samples from one judged one to the next, usually: what a slow load cell repeats between its fresh ones is not
-/// judged, nor is what lies outside of the split's segments.
+/// The usual distance between scored samples: repeated values of a slow load cell and samples
+/// outside of the split's segments are not scored.
 std::size_t stride_of(const std::vector<Run>& runs) {
   std::vector<std::size_t> steps;
   for (const Run& run : runs) {
@@ -139,7 +139,7 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
   const std::size_t stride = stride_of(runs);
   const std::size_t lags = std::min(kMaxLags, longest / 10 + 1);
   if (report.samples < 2 || lags < 2) return report;
-  constexpr double kQuantile = 2.576;  // of |x|, 99 %, standard normal
+  constexpr double kQuantile = 2.576;  // 99 % quantile of |x|, standard normal
   const auto samples = static_cast<double>(report.samples);
   const double bound = kQuantile / std::sqrt(samples);
   const double step_s = static_cast<double>(stride) / model.file.settings.sample_rate_Hz;

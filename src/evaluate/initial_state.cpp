@@ -10,8 +10,8 @@
 namespace torsio {
 namespace {
 
-/// Squares of the outputs' misses from a state, then of the distance from rest, so weighted that it
-/// decides only what the samples leave open.
+/// Squares of the outputs' errors from a state, then of the distance from rest with a weight so
+/// small that it is effective only where the samples do not determine the state.
 class Start {
  public:
   Start(AnyModel& model, const Matrix& features, std::span<const double> target, double usual_error)
@@ -35,7 +35,8 @@ class Start {
   [[nodiscard]] bool is_determined() const { return !rest_.empty() && !scored_.empty(); }
   [[nodiscard]] std::size_t residuals() const { return scored_.size() + rest_.size(); }
 
-  /// Of each state, what moves some output by the target's spread; 1 where nothing moves one.
+  /// For each state, the change that moves an output by the target's spread; 1 if no output depends
+  /// on it.
   [[nodiscard]] std::vector<double> typical() {
     constexpr double kProbe = 1e-6;
     const std::vector<double> unit(rest_.size(), 1.0);
@@ -60,7 +61,8 @@ class Start {
 
   bool evaluate(std::span<const double> state, std::span<const double> typical,
                 std::span<double> residuals) {
-    constexpr double kRestWeight = 0.2;  // a drive's speed is not to be drawn to rest
+    constexpr double kRestWeight =
+        0.2;  // small, so that a drive's speed is not biased towards rest
     model_.reset();
     model_.set_state(state);
     std::size_t next = 0;
@@ -81,8 +83,8 @@ class Start {
   std::span<const double> target_;
   std::vector<double> rest_;
   std::vector<std::size_t> scored_;
-  double spread_ = 0.0;  ///< of the measured outputs, about 0
-  double weight_ = 1.0;  ///< of an output's miss
+  double spread_ = 0.0;  ///< root mean square of the measured outputs
+  double weight_ = 1.0;  ///< weight of an output's error
 };
 
 }  // namespace

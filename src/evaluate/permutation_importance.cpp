@@ -32,7 +32,8 @@ std::size_t block_length(const TrainingData& data, std::size_t shortest) {
       1, std::min({std::max(shortest, second), total / kFewestBlocks, longest / 2}));
 }
 
-/// The full blocks of every sequence, one after another; a rest stays as it is and is not scored.
+/// The full blocks of every sequence, one after another; the remainder is not shuffled and not
+/// scored.
 std::vector<Block> blocks_of(const TrainingData& data, std::size_t length) {
   std::vector<Block> blocks;
   for (std::size_t k = 0; k < data.sequences.size(); ++k)
@@ -55,7 +56,7 @@ struct SquareSum {
 /// One input's blocks in another order.
 struct Shuffle {
   std::size_t input = 0;
-  std::vector<Block> source;  ///< of each block
+  std::vector<Block> source;  ///< source of each block
 };
 
 Shuffle shuffled(std::size_t input, std::vector<Block> blocks, std::uint64_t seed) {
@@ -68,7 +69,7 @@ bool is_scored(const Sequence& sequence, const std::vector<Estimate>& by_sequenc
   return sequence.use[n] != 0 && by_sequence[n].fault == Fault::none;
 }
 
-/// Runs the model through all blocks in their order, with one input from elsewhere.
+/// Runs the model through all blocks in their order, with one input from other blocks.
 double shuffled_rmse(AnyModel model, const TrainingData& data,
                      const std::vector<std::vector<Estimate>>& by_sequence,
                      const std::vector<Block>& blocks, const Shuffle& shuffle, std::size_t length,

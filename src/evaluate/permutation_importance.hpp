@@ -17,9 +17,9 @@ struct PermutationImportance {
   std::vector<std::vector<double>> increase;  ///< by input and repeat
 };
 
-/// @param told what the model says in the course of each sequence.
-/// @param shortest_block blocks are this long or a second, whichever is longer, but short enough for
-/// 20 of them if the data are few.
+/// @param by_sequence the estimates of each sequence.
+/// @param shortest_block blocks have this length or one second, whichever is longer, but are short
+/// enough for 20 of them if the data are few.
 [[nodiscard]] PermutationImportance permutation_importance(
     const AnyModel& model, const TrainingData& data,
     const std::vector<std::vector<Estimate>>& by_sequence, std::size_t shortest_block,

@@ -41,7 +41,7 @@ std::vector<Segment> cut(const DatasetRecord& record, HeldOut hole, std::size_t 
     if (begin < end) segments.push_back({.begin = begin, .end = end, .role = role});
   };
   const std::size_t before = hole.begin - std::min(hole.begin, embargo);
-  const std::size_t behind = hole.end + std::min(record.recording.size() - hole.end, embargo);
+  const std::size_t after = hole.end + std::min(record.recording.size() - hole.end, embargo);
   for (const Segment& segment : record.segments) {
     if (segment.role == Role::test) continue;
     if (hole.begin == hole.end) {
@@ -51,7 +51,7 @@ std::vector<Segment> cut(const DatasetRecord& record, HeldOut hole, std::size_t 
     add(segment.begin, std::min(segment.end, before), segment.role);
     if (segment.role == Role::train)
       add(std::max(segment.begin, hole.begin), std::min(segment.end, hole.end), Role::test);
-    add(std::max(segment.begin, behind), segment.end, segment.role);
+    add(std::max(segment.begin, after), segment.end, segment.role);
   }
   return segments;
 }
@@ -94,7 +94,7 @@ FoldPlan record_folds(const Dataset& dataset, const std::vector<std::size_t>& re
   return plan;
 }
 
-/// The sample at which the record's `index`-th training sample stands.
+/// The sample number of the recording's `index`-th training sample.
 std::size_t train_sample_at(const DatasetRecord& record, std::size_t index) {
   for (const Segment& segment : record.segments) {
     if (segment.role != Role::train) continue;
@@ -136,7 +136,7 @@ FoldPlan block_folds(const Dataset& dataset, const std::vector<std::size_t>& rec
 FoldPlan leave_one_record_out(const Dataset& dataset, const std::vector<std::size_t>& records) {
   if (records.size() < 2)
     throw UsageError({.place = "--by record",
-                      .expected = "at least two recordings to learn from",
+                      .expected = "at least two recordings to train on",
                       .found = std::to_string(records.size()),
                       .advice = "--folds cuts a single recording into blocks."});
   FoldPlan plan{.label = fmt::format("leave one recording out, {} recordings", records.size()),
@@ -156,7 +156,7 @@ bool is_constant(const Recording& recording, std::string_view channel) {
          std::ranges::all_of(values, [&](double value) { return value == values.front(); });
 }
 
-/// The channels that are constant in every record: what folds can be made by.
+/// The channels that are constant in every recording, by which folds can be made.
 std::vector<std::string> conditions_of(const Dataset& dataset) {
   std::vector<std::string> names;
   for (const Channel& channel : dataset.records.front().recording.channels())
@@ -182,11 +182,11 @@ FoldPlan leave_one_condition_out(const Dataset& dataset, const std::vector<std::
   const auto value_of = [&](const DatasetRecord& record) {
     return record.recording.channel(condition).values.front();
   };
-  std::map<double, std::size_t> values;  // value: records to learn from
+  std::map<double, std::size_t> values;  // value: recordings to train on
   for (const std::size_t i : records) ++values[value_of(dataset.records[i])];
   if (values.size() < 2)
     throw UsageError({.place = "--by " + condition,
-                      .expected = "at least two values among the recordings to learn from",
+                      .expected = "at least two values among the recordings to train on",
                       .found = fmt::format("{:g} in all of them", values.begin()->first),
                       .advice = "Use --by record or --folds."});
   FoldPlan plan{.label = fmt::format("leave one {} out, {} values over {} recordings", condition,
@@ -201,7 +201,7 @@ FoldPlan leave_one_condition_out(const Dataset& dataset, const std::vector<std::
   return plan;
 }
 
-/// A recording that is in two folds would be learned from and judged on.
+/// A recording that is in two folds would be used for training and for scoring.
 void refuse_duplicates(const Dataset& dataset, const std::vector<std::size_t>& records) {
   const auto is_same = [](double a, double b) {
     return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
@@ -215,8 +215,9 @@ void refuse_duplicates(const Dataset& dataset, const std::vector<std::size_t>& r
           std::ranges::equal(a.channel(dataset.target).values, b.channel(dataset.target).values,
                              is_same))
         throw UsageError({.place = b.name(),
-                          .problem = "this recording is given twice: one fold would learn what "
-                                     "another is judged on",
+                          .problem =
+                              "this recording is given twice: one fold would be trained on samples "
+                              "that another is scored on",
                           .advice = "Name each recording once."});
     }
 }
@@ -229,8 +230,8 @@ void refuse_empty_folds(const FoldPlan& plan, const FoldScheme& scheme) {
     if (std::ranges::none_of(fold.segments, has_train))
       throw UsageError(
           {.place = fold.name,
-           .problem = "no sample is left to learn from",
-           .expected = fmt::format("blocks that outlast the embargo of {:g} s", scheme.embargo_s),
+           .problem = "no sample is left to train on",
+           .expected = fmt::format("blocks longer than the embargo of {:g} s", scheme.embargo_s),
            .advice = "Use a shorter --embargo, or more or longer recordings."});
 }
 

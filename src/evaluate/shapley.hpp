@@ -18,12 +18,12 @@ namespace torsio {
 /// @throws Error if their number is not a power of two.
 [[nodiscard]] std::vector<double> shapley_values(std::span<const double> values);
 
-/// The samples after which a model has forgotten its start: the least power of two, up to 1024,
-/// after which it says in 95 % of the cases what it says in the course of the record, to 0.1 % of
-/// that value's spread. 1 for a model without memory.
+/// The samples after which a model's output is independent of its start: the least power of two, up
+/// to 1024, after which it differs in 95 % of the cases by at most 0.1 % of its spread from its
+/// output in the course of the recording. 1 for a model without memory.
 struct Memory {
   std::size_t samples = 1;
-  bool is_longer = false;  ///< than 1024 samples, or than the records
+  bool is_longer = false;  ///< longer than 1024 samples, or than the recordings
 };
 
 [[nodiscard]] Memory memory_samples(const AnyModel& model, const TrainingData& data,

@@ -21,7 +21,7 @@ namespace {
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-/// One JSON object with the place where it stands, for messages.
+/// One JSON object with its place, for messages.
 class CardObject {
  public:
   CardObject(const json& object, std::string place) : object_(object), place_(std::move(place)) {
@@ -79,7 +79,7 @@ class CardObject {
     if (!value.is_string()) refuse(place, "a text", value);
     return value.get<std::string>();
   }
-  /// JSON has no NaN: it stands as null.
+  /// JSON has no NaN: it is written as null.
   static double number_of(const json& value, const std::string& place) {
     if (value.is_null()) return kNotMeasured;
     if (!value.is_number()) refuse(place, "a number", value);
@@ -141,7 +141,7 @@ AnyModel::Parameters empty_parameters(const std::string& family, const std::stri
                  .found = fmt::format("'{}'", family),
                  .advice =
                      "Update torsio if a newer one has this family. A build with -DTORSIO_FAMILIES "
-                     "knows only those that it names (docs/library.md): add this one there."});
+                     "has only those that it names (docs/library.md): add this one there."});
   }
 }
 
@@ -183,7 +183,7 @@ std::string card_json(const ModelFile& model) {
   json_card["device_serial"] = card.device_serial;
   json_card["seed"] = card.seed;
   json_card["options"] = card.options;
-  // Bytes that are no UTF-8 (in a file's name) become the replacement character.
+  // Bytes that are not UTF-8 (in a file's name) become the replacement character.
   return json_card.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 

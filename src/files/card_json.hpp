@@ -7,7 +7,7 @@
 
 namespace torsio {
 
-/// The card as JSON text: everything of a model file that is no tensor.
+/// The card as JSON text: everything in a model file except the tensors.
 [[nodiscard]] std::string card_json(const ModelFile& model);
 
 /// The reverse. The model comes back with empty parameters of its family and without guards: those

@@ -18,8 +18,8 @@ constexpr int kDeepest = 8;
 }  // namespace
 
 json parse_json(std::string_view text, std::string_view place) {
-  std::vector<std::set<std::string>> open_keys;  // of every object and array around the cursor
-  // The library accepts deep nesting and keys that come twice without a word.
+  std::vector<std::set<std::string>> open_keys;  // keys of every object and array around the cursor
+  // The library accepts deep nesting and keys that come twice without an error.
   const auto check = [&](int depth, json::parse_event_t event, const json& parsed) {
     switch (event) {
       case json::parse_event_t::object_start:

@@ -6,8 +6,8 @@
 namespace torsio {
 
 /// Parses untrusted JSON.
-/// @throws Error at `place` for text that is no JSON, nested deeper than eight levels, or has a key
-/// twice in one object.
+/// @throws Error at `place` for text that is not JSON, nested deeper than eight levels, or has a
+/// key twice in one object.
 [[nodiscard]] nlohmann::json parse_json(std::string_view text, std::string_view place);
 
 }  // namespace torsio

@@ -132,7 +132,8 @@ using KnownFamilies = AllFamilies::In<detail::NamedFamilies>;
 using KnownFamilies = AllFamilies;
 #endif
 
-/// Calls `use` with the parameters as their own type. @throws Error if this build does not know them.
+/// Calls `use` with the parameters as their own type. @throws Error if this build does not know
+/// them.
 template <class Parameters, class Use>
 void with_own_type(Parameters& parameters, const Use& use) {
   bool is_known = false;
@@ -145,9 +146,9 @@ void with_own_type(Parameters& parameters, const Use& use) {
   });
   if (!is_known)
     throw Error({.place = "family",
-                 .expected = "one that this build of torsio knows",
+                 .expected = "one that this build of torsio has",
                  .found = std::string(parameters.family()),
-                 .advice = "A build with -DTORSIO_FAMILIES knows only those that it names."});
+                 .advice = "A build with -DTORSIO_FAMILIES has only those that it names."});
 }
 
 }  // namespace torsio

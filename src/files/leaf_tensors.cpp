@@ -23,7 +23,7 @@ constexpr std::size_t kLongestEmpty = 65536;
   throw Error({.place = std::move(place),
                .expected = std::move(expected),
                .found = std::move(found),
-               .advice = "The file does not hold what its card says: fit the model again."});
+               .advice = "The contents of the file do not match its card: fit the model again."});
 }
 
 /// The values of a tensor that must have that element type and number of dimensions.
@@ -130,7 +130,7 @@ std::size_t list_size(const Safetensors& contents, const std::string& name, std:
     const std::string_view rest = std::string_view(at->first).substr(prefix.size());
     std::size_t index = 0;
     const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), index);
-    // Whatever else it is, it is no element; somebody else asks for it, or nobody does.
+    // It is not an element; it is either another field or unknown.
     if (error != std::errc() || end == rest.data() + rest.size() || *end != '.') continue;
     if (index >= kMaxElements)
       refuse(fmt::format("{}: /{}", file, at->first),

@@ -46,13 +46,14 @@ void put_leaves(Safetensors& contents, const std::string& prefix, const Fields& 
       prefix);
 }
 
-/// Takes the tensor of that name out of `contents`, so that what remains was asked for by nobody.
+/// Takes the tensor of that name out of `contents`, so that only unknown tensors remain at the end.
 /// @throws Error if there is none, or it holds numbers that are not finite (NaN excepted where
 /// `may_be_nan`: an error bar without evidence).
 [[nodiscard]] Tensor take_tensor(Safetensors& contents, const std::string& name,
                                  std::string_view file, bool may_be_nan);
 
-/// No list of a model file is longer; a file that says so is refused before memory is taken.
+/// No list of a model file is longer; a file with a longer one is refused before memory is
+/// allocated.
 inline constexpr std::size_t kMaxElements = kMaxLayers;
 
 /// How many elements `contents` has of the list of that name: its tensors are called
@@ -65,7 +66,8 @@ inline constexpr std::size_t kMaxElements = kMaxLayers;
 [[nodiscard]] bool has_tensors_of(const Safetensors& contents, const std::string& name);
 
 /// Which of the alternatives `contents` has of the variant of that name: its tensors are called
-/// "name.alternative.field". An empty name among the alternatives is chosen where there is no tensor.
+/// "name.alternative.field". An empty name among the alternatives is chosen where there is no
+/// tensor.
 /// @throws Error that names a tensor of a second alternative, or of one that is not in the list, or
 /// the variant if it has no tensor and must have one.
 [[nodiscard]] std::size_t alternative_index(const Safetensors& contents, const std::string& name,

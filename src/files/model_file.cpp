@@ -49,7 +49,7 @@ void check_nothing_left(const Safetensors& contents, std::string_view place,
   throw Error({.place = fmt::format("{}: /{}", place, contents.tensors.begin()->first),
                .expected = fmt::format("only tensors of the family {}", family),
                .found = "one that it does not have",
-               .advice = "The file does not hold what its card says: fit the model again."});
+               .advice = "The contents of the file do not match its card: fit the model again."});
 }
 
 /// Clocks that differ by less are one: a recording's rate is measured.

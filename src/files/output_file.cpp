@@ -22,8 +22,8 @@ fs::path temporary_name(const fs::path& target) {
          fmt::format(".{}.{}-{}.tmp", target.filename().string(), ::getpid(), count++);
 }
 
-/// Tells the folder's storage about the new name. Not every file system can; the data is safe
-/// already.
+/// Writes the folder's entry of the new name to storage. Not every file system can; the data is
+/// safe already.
 void sync_folder(const fs::path& folder) {
   const int opened =
       ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -42,7 +42,8 @@ OutputFile::OutputFile(fs::path place, int descriptor)
 OutputFile OutputFile::standard_output() { return {"standard output", ::dup(STDOUT_FILENO)}; }
 
 OutputFile::OutputFile(const fs::path& path) : place_(path) {
-  // Behind a link such as /dev/stdout no name may stand ("pipe:[1234]"): the kernel follows it.
+  // The target of a link such as /dev/stdout may have no name ("pipe:[1234]"): the kernel follows
+  // it.
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
   if (path == "/dev/stdout") {

@@ -55,12 +55,12 @@ std::optional<std::size_t> product(std::span<const std::size_t> factors, std::si
 
 // ---- reading
 
-/// What the header says of one tensor, checked in itself.
+/// The header's entry of one tensor, checked by itself.
 struct Entry {
   std::string name;
   std::size_t type = 0;  ///< index in kElementTypes
   std::vector<std::size_t> shape;
-  std::size_t begin = 0;  ///< in the data behind the header
+  std::size_t begin = 0;  ///< in the data after the header
   std::size_t end = 0;
 };
 
@@ -172,9 +172,9 @@ std::string_view header_of(std::span<const std::byte> bytes, std::string_view pl
          .expected = fmt::format("at most {} bytes", kMaxHeaderBytes),
          .found = is_text(bytes.first(kLengthBytes)) ? "text" : fmt::format("{}", length),
          .advice = is_text(bytes.first(kLengthBytes))
-                       ? "This is no model file. If it is a recording: the model comes first, "
+                       ? "This is not a model file. If it is a recording: the model comes first, "
                          "then the recordings."
-                       : "This is no safetensors file, or not one of ours."});
+                       : "This is not a safetensors file, or torsio did not write it."});
   if (length > bytes.size() - kLengthBytes)
     refuse(fmt::format("{}: header", place), fmt::format("{} bytes", length),
            fmt::format("{} (the file is truncated)", bytes.size() - kLengthBytes));
@@ -245,7 +245,7 @@ std::vector<std::byte> safetensors_bytes(const Safetensors& contents) {
                     {"data_offsets", {at, end}}};
     at = end;
   }
-  // Bytes that are no UTF-8 (in a file's name) become the replacement character.
+  // Bytes that are not UTF-8 (in a file's name) become the replacement character.
   std::string text = header.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   text.resize((text.size() + kLengthBytes - 1) / kLengthBytes * kLengthBytes, ' ');
   if (text.size() > kMaxHeaderBytes)

@@ -37,9 +37,9 @@ struct Safetensors {
 [[nodiscard]] std::string shape_text(std::span<const std::size_t> shape);
 
 /// Reads untrusted bytes. Types, shapes and positions of all tensors are checked against the size
-/// of `bytes` before memory is taken for them.
+/// in `bytes` before memory is allocated for them.
 /// @param place the file's name, for messages.
-/// @throws Error if the header is too long, no JSON, nested too deep, names something twice, or
+/// @throws Error if the header is too long, not JSON, nested too deep, names something twice, or
 /// describes tensors that overlap, leave gaps or end elsewhere than the file.
 [[nodiscard]] Safetensors parse_safetensors(std::span<const std::byte> bytes,
                                             std::string_view place);

@@ -52,10 +52,10 @@ void absorb(const DenseStage& before, Matrix& weights, std::vector<double>& bias
 }
 
 /// gain (W x + b) + offset as W' x + b'.
-void absorb_after(const AffineStage& behind, DenseStage& dense) {
+void absorb_after(const AffineStage& after, DenseStage& dense) {
   for (std::size_t row = 0; row < dense.weights.rows; ++row) {
-    for (double& weight : dense.weights.row(row)) weight *= behind.gain[row];
-    dense.bias[row] = behind.gain[row] * dense.bias[row] + behind.offset[row];
+    for (double& weight : dense.weights.row(row)) weight *= after.gain[row];
+    dense.bias[row] = after.gain[row] * dense.bias[row] + after.offset[row];
   }
 }
 
@@ -151,16 +151,16 @@ class Assembly {
   void finish() {
     if (width_ != 1)
       refuse("one output", fmt::format("{}", width_),
-             "torsio tells one quantity: cut the others off before exporting.");
+             "torsio estimates one quantity: remove the others before exporting.");
     if (is_at_start()) refuse("at least one layer with weights", "none");
-    const std::optional<AffineStage> behind = std::exchange(pending_, std::nullopt);
+    const std::optional<AffineStage> after = std::exchange(pending_, std::nullopt);
     if (!ends_linear()) add(DenseStage{identity(1), {0.0}});
-    if (!behind) return;
-    if (is_positive(*behind)) {
-      scaling_.target_scale = behind->gain.front();
-      scaling_.target_centre = behind->offset.front();
+    if (!after) return;
+    if (is_positive(*after)) {
+      scaling_.target_scale = after->gain.front();
+      scaling_.target_centre = after->offset.front();
     } else {
-      absorb_after(*behind, dense_.back().map);
+      absorb_after(*after, dense_.back().map);
     }
   }
 
@@ -225,8 +225,8 @@ class Assembly {
   std::size_t width_;
   NetworkScaling scaling_;
   std::vector<RecurrentStage> recurrent_;
-  std::vector<ActivatedDense> dense_;   ///< behind the last recurrent layer so far
-  std::optional<AffineStage> pending_;  ///< behind the last layer so far
+  std::vector<ActivatedDense> dense_;   ///< after the last recurrent layer so far
+  std::optional<AffineStage> pending_;  ///< after the last layer so far
 };
 
 }  // namespace

@@ -114,7 +114,7 @@ const std::map<std::string_view, Evaluator::Method>& Evaluator::methods() {
   return all;
 }
 
-bool Evaluator::knows(std::string_view op) { return methods().contains(op); }
+bool Evaluator::supports(std::string_view op) { return methods().contains(op); }
 
 void Evaluator::evaluate(const Node& node) {
   if (node.outputs.empty()) return;
@@ -139,7 +139,7 @@ ForeignNetwork Evaluator::network(const std::string& output) {
     network.notes.push_back(
         window_ ? fmt::format(
                       "the graph starts every window of {} samples from the zero state; here the "
-                      "state goes on from sample to sample, so that the first {} samples after a "
+                      "state continues from sample to sample, so that the first {} samples after a "
                       "reset are the graph's",
                       *window_, *window_)
                 : std::string(
@@ -222,7 +222,7 @@ Tensor Evaluator::taken_from(const Node& node, const Tensor& tensor, std::size_t
   return taken(tensor, axis, indices);
 }
 
-Signal Evaluator::behind(const Node& node, Signal signal, ForeignStage stage) {
+Signal Evaluator::appended(const Node& node, Signal signal, ForeignStage stage) {
   if (signal.stages.size() >= kMaxStages)
     refuse(graph_, node, fmt::format("at most {} stages", kMaxStages), "more");
   signal.stages.push_back(stages_.size());
@@ -277,7 +277,7 @@ ForeignNetwork network_of(const Graph& graph, const std::string& output) {
   const std::set<const Node*> is_needed = needed(graph, wanted);
   std::string unknown;
   for (const Node& node : graph.nodes)
-    if (is_needed.contains(&node) && !Evaluator::knows(node.op))
+    if (is_needed.contains(&node) && !Evaluator::supports(node.op))
       unknown += (unknown.empty() ? "" : ", ") + title(node);
   if (!unknown.empty())
     throw Error(

@@ -17,11 +17,11 @@ class Evaluator {
  public:
   explicit Evaluator(const Graph& graph);
 
-  [[nodiscard]] static bool knows(std::string_view op);
+  [[nodiscard]] static bool supports(std::string_view op);
 
   /// In the graph's order. @throws Error that names the node.
   void evaluate(const Node& node);
-  /// The stages behind the graph's input up to a value. @throws Error if it is no signal.
+  /// The stages from the graph's input up to a value. @throws Error if it is not a signal.
   [[nodiscard]] ForeignNetwork network(const std::string& output);
 
  private:
@@ -39,14 +39,15 @@ class Evaluator {
   [[nodiscard]] std::optional<std::vector<std::int64_t>> whole_numbers(
       const Node& node, std::size_t index, const std::string& attribute) const;
   [[nodiscard]] std::vector<std::int64_t> whole_numbers(const Node& node, std::size_t index) const;
-  /// To be called before numbers are made from constants: a small file must not ask for much memory.
+  /// To be called before numbers are made from constants: a small file must not ask for much
+  /// memory.
   void reserve(const Node& node, std::size_t count);
   [[nodiscard]] Tensor copy_of(const Node& node, const Tensor& tensor);
   [[nodiscard]] Tensor taken_from(const Node& node, const Tensor& tensor, std::size_t axis,
                                   const std::vector<std::size_t>& indices);
-  [[nodiscard]] Signal behind(const Node& node, Signal signal, ForeignStage stage);
+  [[nodiscard]] Signal appended(const Node& node, Signal signal, ForeignStage stage);
 
-  // graph_shapes.cpp: what moves numbers about
+  // graph_shapes.cpp: operators that move numbers
   Value identity(const Node& node);
   Value cast(const Node& node);
   Value dropout(const Node& node);
@@ -89,7 +90,7 @@ class Evaluator {
   std::map<std::string, Value> values_;
   std::vector<ForeignStage> stages_;
   std::optional<std::size_t> window_;
-  bool starts_from_zeros_ = false;  ///< of every window, as the graph says
+  bool starts_from_zeros_ = false;  ///< every window starts from zeros in the graph
   std::size_t folded_ = 0;          ///< numbers made from constants so far
 };
 

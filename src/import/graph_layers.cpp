@@ -16,7 +16,7 @@ std::string shape_of(const Tensor& tensor) {
   return shape_text(std::vector<std::size_t>(tensor.shape.begin(), tensor.shape.end()));
 }
 
-/// Whether the features are the innermost axis, as every layer wants them.
+/// Whether the features are the innermost axis, as every layer requires them.
 bool ends_in_features(const Signal& signal) {
   if (signal.axes.empty()) return false;
   const Axis& last = signal.axes.back();
@@ -38,7 +38,7 @@ std::vector<double> reordered(const double* rows, std::size_t block,
   return result;
 }
 
-// Where torsio's gates (i, f, g, o; r, z, n) stand among ONNX's (i, o, f, c; z, r, h).
+// Positions of torsio's gates (i, f, g, o; r, z, n) among ONNX's (i, o, f, c; z, r, h).
 constexpr std::array<std::size_t, 4> kLstmGates{0, 2, 3, 1};
 constexpr std::array<std::size_t, 3> kGruGates{1, 0, 2};
 
@@ -64,7 +64,7 @@ Signal Evaluator::dense(const Node& node, const Signal& from, Matrix weights,
   Signal result = from;
   result.width = weights.rows;
   result.axes.back() = feature_axis(result.width);
-  return behind(node, std::move(result), DenseStage{std::move(weights), std::move(bias)});
+  return appended(node, std::move(result), DenseStage{std::move(weights), std::move(bias)});
 }
 
 Value Evaluator::matmul(const Node& node) {
@@ -118,21 +118,21 @@ std::vector<double> Evaluator::by_feature(const Node& node, Signal& from,
   }
   if (!ends_in_features(from) || tensor.values.size() != from.width || tensor.shape.empty() ||
       tensor.shape.back() != static_cast<std::int64_t>(from.width))
-    refuse(graph_, node, fmt::format("one number, or {}: one a channel", from.width),
+    refuse(graph_, node, fmt::format("one number, or {}: one per channel", from.width),
            "shape " + shape_of(tensor));
   return tensor.values;
 }
 
 Signal Evaluator::affine(const Node& node, const Signal& from, std::vector<double> gain,
                          std::vector<double> offset) {
-  // A single number stands for all channels.
+  // A single number applies to all channels.
   gain.resize(from.width, gain.front());
   offset.resize(from.width, offset.front());
   for (std::size_t j = 0; j < from.width; ++j)
     if (!std::isfinite(gain[j]) || !std::isfinite(offset[j]) || is_symbol(gain[j]) ||
         is_symbol(offset[j]))
       refuse(graph_, node, "finite numbers", "others");
-  return behind(node, from, AffineStage{std::move(gain), std::move(offset)});
+  return appended(node, from, AffineStage{std::move(gain), std::move(offset)});
 }
 
 Value Evaluator::add(const Node& node) {
@@ -170,7 +170,7 @@ Value Evaluator::divide(const Node& node) {
   if (const auto* const below = std::get_if<Magnitude>(&input(node, 1))) {
     if (below->added != 1.0 || below->signal != from)
       refuse(graph_, node, "x / (1 + |x|), a softsign", "another quotient");
-    return behind(node, std::move(from), ActivationStage{Activation::softsign});
+    return appended(node, std::move(from), ActivationStage{Activation::softsign});
   }
   std::vector<double> gain = by_feature(node, from, constant(node, 1));
   for (double& value : gain) value = 1.0 / value;
@@ -186,7 +186,7 @@ Value Evaluator::activation(const Node& node) {
   std::ranges::transform(name, name.begin(), [](unsigned char letter) {
     return static_cast<char>(std::tolower(letter));
   });
-  return behind(node, signal(node, 0), ActivationStage{activation_of(name)});
+  return appended(node, signal(node, 0), ActivationStage{activation_of(name)});
 }
 
 void Evaluator::check_recurrent(const Node& node) const {
@@ -293,7 +293,7 @@ Value Evaluator::recurrent(const Node& node) {
   Signal every = from;
   every.time = time;
   every.width = stage.recurrent_weights.columns;
-  every = behind(node, std::move(every), std::move(stage));
+  every = appended(node, std::move(every), std::move(stage));
   const Axis units = feature_axis(every.width);
   Signal last = every;
   last.is_last_sample = time != kUnitLabel;

@@ -126,7 +126,7 @@ Signal Evaluator::last_sample(const Node& node, Signal signal, std::size_t axis,
   if (!is_last)
     refuse(graph_, node, "the last sample along the time of a recurrent layer",
            fmt::format("index {} of axis {}", index, axis),
-           "Inputs are chosen and put in order by --inputs, not in the graph.");
+           "Inputs are selected and ordered by --inputs, not in the graph.");
   signal.is_last_sample = signal.is_last_sample || !parts.empty();
   if (keeps_axis)
     signal.axes[axis].clear();
@@ -193,7 +193,7 @@ Value Evaluator::slice(const Node& node) {
       if (!is_to_the_end || (start != -1 && start != size - 1))
         refuse(graph_, node, "all samples or the last one",
                fmt::format("{} to {} of axis {}", start, end, axis),
-               "Inputs are chosen and put in order by --inputs, not in the graph.");
+               "Inputs are selected and ordered by --inputs, not in the graph.");
       *signal = last_sample(node, *signal, axis, start, true);
     } else if (const auto* const tensor = std::get_if<Tensor>(&result)) {
       const std::size_t axis = axis_of(graph_, node, (*axes)[i], tensor->shape.size());

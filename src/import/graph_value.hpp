@@ -10,7 +10,7 @@
 
 namespace torsio::graph {
 
-/// One of the graph's input axes. What has size 1 is no part of anything.
+/// One of the graph's input axes, unless its size is 1.
 struct Part {
   int label = 0;
   std::optional<std::int64_t> size;  ///< none: any
@@ -26,9 +26,9 @@ using Axis = std::vector<Part>;
 struct Signal {
   std::vector<Axis> axes;
   std::size_t width = 0;            ///< features; their axis is of size 1 if there is but one
-  std::vector<std::size_t> stages;  ///< behind the input, as indices
+  std::vector<std::size_t> stages;  ///< stages after the input, as indices
   std::optional<int> time;          ///< the axis that recurrent layers run along
-  bool is_last_sample = false;      ///< of the samples along it
+  bool is_last_sample = false;      ///< only the last sample along it
   bool operator==(const Signal&) const = default;
 };
 
@@ -38,12 +38,12 @@ struct Magnitude {
   double added = 0.0;
 };
 
-struct Zeros {};  ///< of any shape
+struct Zeros {};  ///< zeros of any shape
 struct State {};  ///< a state that the graph is given
 
 using Value = std::variant<Signal, Magnitude, Tensor, Zeros, State>;
 
-/// A size that is unknown when the graph is read stands in a shape as one of these numbers.
+/// A size that is unknown when the graph is read is represented in a shape by one of these numbers.
 inline constexpr double kFirstSymbol = -1e300;
 [[nodiscard]] constexpr double symbol_of(int label) { return kFirstSymbol * (1.0 + label); }
 [[nodiscard]] constexpr bool is_symbol(double value) { return value <= kFirstSymbol; }
@@ -55,11 +55,11 @@ inline constexpr double kFirstSymbol = -1e300;
 [[nodiscard]] Tensor taken(const Tensor& tensor, std::size_t axis,
                            const std::vector<std::size_t>& indices);
 [[nodiscard]] Tensor transposed(const Tensor& tensor, const std::vector<std::size_t>& order);
-/// One behind the other along an axis; all other sizes are equal.
+/// Concatenates along an axis; all other sizes are equal.
 [[nodiscard]] Tensor joined(const std::vector<Tensor>& tensors, std::size_t axis);
 
-/// The axes after a reshape to `target` (whole numbers, -1 for one that follows, symbols), or none if it
-/// is not certain that every sample and channel keeps its place.
+/// The axes after a reshape to `target` (whole numbers, -1 for one that follows, symbols), or none
+/// if it is not certain that every sample and channel keeps its place.
 [[nodiscard]] std::optional<std::vector<Axis>> reshaped(const Signal& signal,
                                                         const std::vector<double>& target);
 

@@ -133,9 +133,8 @@ ImportedModel import_network(const ForeignNetwork& network, const Source& source
   const AnyModel model(imported.file.parameters);
   if (guards == nullptr) {
     imported.notes.emplace_back(
-        "the file does not say where the network may be trusted: no range is guarded, there is no "
-        "error "
-        "bar, and the fallback is 0; --guards RECORDING takes them from measured data");
+        "the file does not contain the range of the training data: there is no range guard and no "
+        "error bar, and the fallback is 0; --guards RECORDING computes them from measured data");
     return imported;
   }
   const TrainingData data = training_data(all_for_training(*guards), options.features);

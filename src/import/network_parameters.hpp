@@ -7,10 +7,10 @@
 
 namespace torsio {
 
-/// The network as parameters of `mlp`, `lstm` or `gru`. Scales and offsets before the first layer and
-/// behind the last become its standardisation where they are positive; others, and linear layers
+/// The network as parameters of `mlp`, `lstm` or `gru`. Scales and offsets before the first layer
+/// and after the last become its standardisation where they are positive; others, and linear layers
 /// in front of a recurrent one, are multiplied into the next layer.
-/// @throws Error for a network that torsio has no place for: more than one output, an activation in
+/// @throws Error for a network that torsio cannot represent: more than one output, an activation in
 /// front of a recurrent layer, LSTM and GRU in one, weights beyond float32.
 [[nodiscard]] AnyModel::Parameters network_parameters(const ForeignNetwork& network,
                                                       double sample_period_s,

@@ -32,7 +32,7 @@ static_assert(std::endian::native == std::endian::little, "raw data of ONNX are 
 void check_count(std::size_t expected, std::size_t found, const char* of,
                  const std::string& place) {
   if (found != expected)
-    refuse(place, fmt::format("{} {}, as its shape says", expected, of), fmt::format("{}", found));
+    refuse(place, fmt::format("{} {}, as in its shape", expected, of), fmt::format("{}", found));
 }
 
 template <class Number, class Field>
@@ -68,8 +68,8 @@ std::vector<double> values_of(const onnx::TensorProto& tensor, std::size_t count
   }
 }
 
-/// Reads the constants of a graph. All of them together are few: elements of one byte in a file become
-/// numbers of eight.
+/// Reads the constants of a graph. All of them together are few: elements of one byte in a file
+/// become numbers of eight.
 class Constants {
  public:
   graph::Tensor tensor_of(const onnx::TensorProto& tensor, const std::string& place) {
@@ -81,7 +81,7 @@ class Constants {
     constexpr std::size_t kMaxRank = 8;
     const auto count = graph::element_count(shape);
     if (shape.size() > kMaxRank || !count)
-      refuse(place, "as many numbers as its shape says", "a shape that no file holds");
+      refuse(place, "a shape that fits into a file", "a larger one");
     numbers_ += *count;
     constexpr std::size_t kMax = kMaxForeignBytes / sizeof(float);
     if (numbers_ > kMax)
@@ -144,7 +144,7 @@ graph::Graph::Input input_of(const onnx::ValueInfoProto& proto) {
   for (const auto& size : proto.type().tensor_type().shape().dim())
     input.shape.push_back(size.has_dim_value() && size.dim_value() > 0
                               ? std::optional(size.dim_value())
-                              : std::nullopt);  // -1 and 0 stand for "any" in some exporters
+                              : std::nullopt);  // -1 and 0 mean "any" in some exporters
   return input;
 }
 
@@ -154,7 +154,7 @@ std::int64_t opset_of(const onnx::ModelProto& model, const std::string& place) {
     if (opset.domain().empty() || opset.domain() == "ai.onnx") version = opset.version();
   if (version < kFirstOpset || version > kLastOpset)
     refuse(place + ": opset", fmt::format("{} to {}", kFirstOpset, kLastOpset),
-           fmt::format("{}", version), "Export with opset_version=13, say.");
+           fmt::format("{}", version), "Export with opset_version=13, for example.");
   return version;
 }
 

@@ -26,7 +26,7 @@ struct Weights {
   std::vector<double> values;
 };
 
-/// "10.weight" behind "2.weight": digits count as the number that they are.
+/// "10.weight" after "2.weight": digits are compared as numbers.
 struct NaturalOrder {
   static bool is_digit(char c) { return c >= '0' && c <= '9'; }
   static std::size_t digits(std::string_view text, std::size_t at) {
@@ -84,7 +84,7 @@ Weights weights_of(const json& tensor, const std::string& place) {
   }
   if (data->size() != count)
     refuse(place + "/data",
-           fmt::format("{} numbers, as the shape {} says", count, shape_text(weights.shape)),
+           fmt::format("{} numbers for the shape {}", count, shape_text(weights.shape)),
            fmt::format("{}", data->size()));
   for (const json& value : *data) {
     if (!value.is_number() || !std::isfinite(value.get<double>()))
@@ -105,7 +105,7 @@ Tensors tensors_of(const json& document, const std::string& place) {
   return tensors;
 }
 
-/// Hands out tensors by name, each once, and refuses those that nobody asked for.
+/// Returns tensors by name, each once, and refuses those that were not used.
 class WeightReader {
  public:
   WeightReader(Tensors tensors, std::string place)
@@ -141,7 +141,7 @@ class WeightReader {
       refuse(at(name), fmt::format("shape [{}]", length), shape_text(weights->shape));
     return weights->values;
   }
-  /// @returns what stands before `suffix` in the first name that ends in it
+  /// @returns the part before `suffix` of the first name that ends in it
   [[nodiscard]] std::optional<std::string> prefix_of(std::string_view suffix) const {
     for (const auto& [name, weights] : tensors_)
       if (name.ends_with(suffix)) return name.substr(0, name.size() - suffix.size());
@@ -211,8 +211,8 @@ void read_dense(WeightReader& reader, std::optional<Activation> activation,
     if (!is_first) {
       if (!activation)
         throw UsageError({.place = reader.at(*prefix + "weight"),
-                          .expected = "--activation: what stands between the dense layers",
-                          .found = "none, and names of tensors do not tell it"});
+                          .expected = "--activation: the function between the dense layers",
+                          .found = "none, and the names of the tensors do not contain it"});
       stages.emplace_back(ActivationStage{*activation});
     }
     is_first = false;

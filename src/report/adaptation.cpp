@@ -95,9 +95,9 @@ std::string adaptation_text(const AdaptedModel& adapted, const std::string& mode
   return fmt::format(
       "last layer of {} ({}) adapted by {}, errors in {}\n\n{}\n"
       "as it ran: the error before each update; held out: after the last one, on samples that "
-      "nothing was\nlearned from\n\n"
-      "updates {}, of them drawn back to the largest change {}; passed over: {}\n"
-      "roll-backs to the frozen weights {}{}; weights changed by {:.2g} % of their length\n",
+      "were\nnot used for the adaptation\n\n"
+      "updates {}, of them limited to the largest change {}; skipped: {}\n"
+      "roll-backs to the frozen weights {}{}; weights changed by {:.2g} % of their norm\n",
       model, adapted.file.parameters.family(), method_of(adapted),
       unit_label(adapted.file.settings.target), table.text(), counts.updates(),
       counts.of(UpdateOutcome::limited), skipped_text(counts), counts.roll_backs,

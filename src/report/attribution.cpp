@@ -31,7 +31,7 @@ std::string increase_text(const InputAttribution& input) {
              : error_text(input.rmse_increase);
 }
 
-/// Where a window begins and ends, or that there is none.
+/// The length of the windows, or that there are none.
 std::string window_text(const Attribution& attribution, double sample_rate_Hz) {
   if (attribution.window_samples == 1 && attribution.window_is_long_enough)
     return "single samples (the model has no memory)";
@@ -39,7 +39,7 @@ std::string window_text(const Attribution& attribution, double sample_rate_Hz) {
                      static_cast<double>(attribution.window_samples) / sample_rate_Hz,
                      attribution.window_is_long_enough
                          ? ""
-                         : ", which the model remembers beyond: its values are those from a reset");
+                         : ", shorter than the model's memory: its values are those from a reset");
 }
 
 /// Breaks a text between words.
@@ -108,9 +108,9 @@ std::string attribution_text(const Attribution& attribution, const AttributionSu
     table.row({input.input, error_text(input.mean_abs_shapley), share_text(input.share),
                increase_text(input)});
   return fmt::format(
-      "{} of {}, what it makes of its inputs\n\n{}\n"
+      "{} of {}, attribution to its inputs\n\n{}\n"
       "Shapley values: {} {}, absent inputs from {} others;\n"
-      "they add up to the value less its mean over these ({:.4g} {}) within {:.1g}.\n"
+      "their sum is the output minus its mean over these ({:.4g} {}), within {:.1g}.\n"
       "Shuffling: blocks of {} samples; unshuffled RMSE {} over {} samples, free run, no "
       "guards.\n\n"
       "{}",

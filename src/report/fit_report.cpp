@@ -39,22 +39,21 @@ Json report_json(const FitReport& report) {
           {"parameters", std::move(parameters)}};
 }
 
-/// What the correlations say, in a sentence.
+/// The result of the correlations in one sentence.
 std::string verdict(const FitReport& report) {
-  // Long records tell any correlation from none; residuals with a memory show one that is chance.
+  // Long recordings make any correlation significant; correlated residuals show some by chance.
   const double matters = std::max(0.1, 2.576 / std::sqrt(std::max(report.effective_samples, 1.0)));
-  constexpr double kChance = 0.05;  // of the lags; one in a hundred lies outside by chance
+  constexpr double kChance = 0.05;  // share of the lags; one in a hundred is outside by chance
   std::vector<std::string> with;
   for (const ResidualCorrelation& each : report.correlations)
     if (std::abs(each.strongest) > matters && each.share_outside > kChance)
-      with.push_back(&each == report.correlations.data() ? "their own past" : each.with);
-  if (with.empty())
-    return "neither their past nor an input tells the residuals: nothing is left to learn\n";
+      with.push_back(&each == report.correlations.data() ? "their past" : each.with);
+  if (with.empty()) return "the residuals are white and uncorrelated with the inputs\n";
   return fmt::format(
-      "the residuals follow {}: what is left there another model could learn{} "
+      "the residuals are correlated with {}: another model could reduce them{} "
       "(docs/fit_report.md)\n",
       fmt::join(with, ", "),
-      report.table.empty() ? "" : "; the standard errors below are widened for it");
+      report.table.empty() ? "" : "; the standard errors below account for it");
 }
 
 }  // namespace
@@ -62,11 +61,10 @@ std::string verdict(const FitReport& report) {
 std::string fit_report_text(const FitReport& report) {
   std::string text;
   if (!report.correlations.empty()) {
-    text +=
-        fmt::format("\nresiduals on {}: {} samples that tell as much as {:.0f} independent ones",
-                    report.split, report.samples, report.effective_samples);
+    text += fmt::format("\nresiduals on {}: {} samples, effective sample size {:.0f}", report.split,
+                        report.samples, report.effective_samples);
     if (std::isfinite(report.memory_s))
-      text += fmt::format("; they are forgotten (1/e) after {:.3g} s", report.memory_s);
+      text += fmt::format(" (correlation time {:.3g} s)", report.memory_s);
     text += "\n";
     TextTable table;
     table.header({"correlation with", "strongest", "at lag s", "99 % bound", "lags outside %"});

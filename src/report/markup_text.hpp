@@ -5,7 +5,7 @@
 
 namespace torsio {
 
-/// Text as it may stand in HTML or SVG, between tags or in an attribute.
+/// Text escaped for HTML or SVG, between tags or in an attribute.
 inline std::string markup_text(std::string_view text) {
   std::string safe;
   for (const char c : text) {

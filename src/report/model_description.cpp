@@ -69,14 +69,14 @@ std::string_view list_element(std::string_view name) {
                                                                          : std::string_view();
 }
 
-/// What a field of a list is, without its numbers: they say little one by one.
+/// The names of a list's fields without their numbers.
 std::string outline(const Leaf& leaf) {
   const std::string field = leaf.name.substr(leaf.name.rfind('.') + 1);
   if (field == "activation") return std::string(name(static_cast<Activation>(leaf.values.front())));
   return fmt::format("{} {}", field, leaf.shape);
 }
 
-/// One line a number or table; one line an element of a list (a layer of a network).
+/// One line per number or table; one line per element of a list (a layer of a network).
 std::string parameter_lines(const std::vector<Leaf>& leaves) {
   std::vector<std::string> lines;
   std::string_view last;
@@ -96,7 +96,7 @@ std::string parameter_lines(const std::vector<Leaf>& leaves) {
   return fmt::format("{}\n", fmt::join(lines, "\n"));
 }
 
-/// As the first family that describes such models does.
+/// The description by the first family with such models.
 ParameterDescription description_of(const ModelFile& model) {
   const std::string_view of = model.parameters.family();
   for (const FamilyInfo& family : families())
@@ -113,7 +113,7 @@ std::string coefficient_table(const std::vector<FittedParameter>& description) {
   return table.text();
 }
 
-/// A network of another program comes without the range of its inputs.
+/// A network of another program has no range of its inputs.
 bool is_open(double limit) { return std::abs(limit) >= kOpenRange; }
 
 std::string range_table(const EstimatorSettings& settings) {
@@ -127,15 +127,15 @@ std::string range_table(const EstimatorSettings& settings) {
   for (std::size_t j = 0; j < settings.features.inputs.size(); ++j)
     inputs.row({settings.features.inputs[j], limit(settings.ranges.lowest[j]),
                 limit(settings.ranges.highest[j])});
-  return inputs.text() +
-         (has_open ? "open: nobody said what the model was trained on; no guard answers there\n"
-                   : "");
+  return inputs.text() + (has_open ? "open: the range of the training data is not known; the model "
+                                     "has no range guard there\n"
+                                   : "");
 }
 
 std::string zero_line(const EstimatorSettings& settings) {
   if (settings.zeroed_channels.empty()) return {};
   return fmt::format(
-      "wants the zero of {}: set_zero(channel, value) before the loop, the mapping's zero: on "
+      "requires the zero of {}: set_zero(channel, value) before the loop, the mapping's zero: on "
       "files; "
       "without it every step is zero_not_set\n",
       fmt::join(settings.zeroed_channels, ", "));

@@ -6,7 +6,7 @@
 
 #include "torsio/evaluate/results.hpp"
 
-// What the tables and documents of scores are made of.
+// Parts of the tables and documents of scores.
 namespace torsio {
 
 /// A number that is not finite is null.
@@ -17,8 +17,8 @@ namespace torsio {
 
 /// "polynomial[branch=false]"
 [[nodiscard]] std::string model_label(std::string_view family, std::string_view variant);
-/// Three decimals, until they would fill the line; three digits in a table whose smallest error would
-/// be lost in them.
+/// Three decimals below 1e6; three significant digits in a table whose smallest error needs
+/// more decimals.
 [[nodiscard]] std::string error_text(double value, double smallest = 1.0);
 [[nodiscard]] std::string seconds_text(double seconds);
 

@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kFreeRun = "free_run";
 
-/// @param mode of how the past outputs of a model that feeds back are had
+/// @param mode how a model with feedback gets its past outputs
 Json row_json(const ResultRow& row, const Metrics& metrics, std::string_view mode,
               bool non_causal_zero) {
   Json json{{"family", row.family},
@@ -53,8 +53,8 @@ bool is_same_model(const ResultRow& a, const ResultRow& b) {
   return a.family == b.family && a.variant == b.variant && a.input_set == b.input_set;
 }
 
-/// The recordings of a split, in order of appearance; none if there is only one (the total says
-/// it).
+/// The recordings of a split, in order of appearance; none if there is only one, which the total
+/// shows.
 std::vector<std::string> recordings_of(const Results& results, Role split) {
   std::vector<std::string> names;
   for (const ResultRow& row : results.rows)
@@ -66,7 +66,7 @@ std::vector<std::string> recordings_of(const Results& results, Role split) {
   return names;
 }
 
-/// The rows that stand for a whole split, best first, failed ones last.
+/// The rows of a whole split, best first, failed ones last.
 std::vector<const ResultRow*> ranking(const Results& results, Role split) {
   std::vector<const ResultRow*> ranked;
   for (const ResultRow& row : results.rows)

@@ -30,7 +30,7 @@ double tick_step(double width) {
   return power;
 }
 
-/// A range widened to whole ticks, and where it lies on the picture.
+/// A range widened to whole ticks, and its position on the picture.
 class Axis {
  public:
   Axis(const PlotRange& range, double from, double to)

@@ -19,9 +19,9 @@ void TextTable::row(std::vector<std::string> cells) {
 
 namespace {
 
-constexpr std::size_t kLongestNumber = 24;  // with its unit; beyond, words begin with a number
+constexpr std::size_t kLongestNumber = 24;  // with its unit; a longer text begins with a number
 
-/// Whether a cell reads as a number; a missing one does not tell.
+/// Whether a cell is a number; a missing one is not.
 bool is_numeric(const std::string& cell) {
   if (cell.size() > kLongestNumber) return false;
   return cell.empty() || cell == "nan" ||

@@ -22,24 +22,24 @@ std::string_view name(JointOutput output) {
   return output == JointOutput::locked ? "locked" : "free";
 }
 
-/// "-" of no run.
+/// "-" if there is no run.
 std::string text(const RunningMean& of, const char* format = "{:.4g}") {
   return of.count() == 0 ? std::string("-") : fmt::format(fmt::runtime(format), of.mean());
 }
 
-/// Nothing of fewer than two runs.
+/// Empty for fewer than two runs.
 std::string spread(const RunningMean& of) {
   return of.count() < 2 ? std::string() : fmt::format("{:.2g}", of.std_dev());
 }
 
-/// What the bandwidth's number is, or why there is none.
+/// The bandwidth, or the reason why there is none.
 std::string_view bandwidth_outcome(const TrackingRow& row) {
   if (!row.bandwidth_Hz) return "not_measured";
   if (*row.bandwidth_Hz == 0.0) return "below_sweep";
   return std::isfinite(*row.bandwidth_Hz) ? "measured" : "above_sweep";
 }
 
-/// Over the runs of one model that came to their end.
+/// Means over the completed runs of one model.
 struct ModelMeans {
   RunningMean mad, std_abs, rmse, to_linear, error_ratio, bandwidth, overshoot, limit_events,
       faults;
@@ -137,11 +137,12 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
     for (const std::string& remark : means.remarks) remarks += remark + "\n";
   }
   return fmt::format(
-      "{} ({}), output {}, {} of {:.4g} Nm, {} run{} a model\n{}{}"
-      "errors: of the joint's torque without noise, the first 2 s left out; limits: how often one "
-      "cut;\nfallback: ticks in which the inverse told its line; cycles: runs with a limit cycle;\n"
-      "-3 dB Hz: where a sweep's answer has fallen to 0.71, - where it has not, or never was "
-      "above\n",
+      "{} ({}), output {}, {} of {:.4g} Nm, {} run{} per model\n{}{}"
+      "errors: of the joint's torque without noise, without the first 2 s; limits: number of limit "
+      "events;\nfallback: steps on the linear fallback; cycles: runs with a limit cycle;\n"
+      "-3 dB Hz: frequency at which the response to a sweep has fallen to 0.71, - if it has not, "
+      "or "
+      "never was above\n",
       first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,
       rows.size() / models.size(), rows.size() == models.size() ? "" : "s", table.text(), remarks);
 }

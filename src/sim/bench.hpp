@@ -15,7 +15,7 @@
 
 namespace torsio {
 
-/// How a bench is run, apart from what is done on it.
+/// The conditions of a bench run, without the experiment.
 struct BenchRun {
   std::string name;  ///< for messages
   double duration_s = 0.0;
@@ -30,13 +30,13 @@ class Bench {
   /// @throws Error if the plant refuses its load or condition, UsageError as `FaultInjector`.
   Bench(const DataSheet& sheet, const BenchRun& run, const BenchProgram& start);
 
-  /// What the sensors tell at this tick, faults included.
+  /// The sensor signals at this tick, including faults.
   [[nodiscard]] Measurement sense();
-  /// The same without the faults, as of the last `sense`.
+  /// The same without the faults, at the last `sense`.
   [[nodiscard]] const Measurement& sound() const noexcept { return sound_; }
-  /// What no sensor sees, as of the last `sense`.
+  /// The quantities that no sensor measures, at the last `sense`.
   [[nodiscard]] BenchTruth truth() const;
-  /// Until the next tick. @throws Error if the plant refuses.
+  /// Advances to the next tick. @throws Error if the plant refuses.
   void act(const BenchAction& action);
 
   [[nodiscard]] double time_s() const noexcept {
@@ -58,7 +58,7 @@ class Bench {
   Load load_;
   std::size_t tick_ = 0;
   Measurement sound_;
-  double torque_Nm_ = 0.0;  ///< that the load cell feels in this tick
+  double torque_Nm_ = 0.0;  ///< torque at the load cell in this tick
 };
 
 }  // namespace torsio

@@ -7,22 +7,24 @@
 
 namespace torsio {
 
-/// The torque controller of a series-elastic actuator: it turns its spring to a deflection.
+/// The torque controller of a series-elastic actuator: it controls the deflection of its spring.
 ///
 ///     e = δ* − δ,   i = K_p e + K_i ∫ e dt − K_d δ̇ + K δ* / (N k_t)
 ///
 /// designed on the plant with its output locked, J N² δ̈ + K δ = N k_t i:
 ///
-///     K_p = (J N² ω² − K) / (N k_t),  K_d = 2 ζ ω J N² / (N k_t),  K_i = 6 K_p,  ω = 50 rad/s, ζ = 0.9
+///     K_p = (J N² ω² − K) / (N k_t),  K_d = 2 ζ ω J N² / (N k_t),  K_i = 6 K_p,  ω = 50 rad/s, ζ =
+/// 0.9
 ///
-/// δ is gear angle minus joint angle as the encoders tell them, δ̇ its difference behind a 120 Hz
-/// low-pass; the integral stops at the peak current. Which δ* gives a wanted torque is the
-/// caller's: a straight line (τ − b) / K, or the inverse of a model. Source: specification 3.11.
+/// δ is gear angle minus joint angle as measured by the encoders, δ̇ its difference filtered by a
+/// 120 Hz low-pass; the integral stops at the peak current. The caller computes δ* for a torque:
+/// with the linear model (τ − b) / K, or with the inverse of a model. Source: specification 3.11.
 class DeflectionLoop {
  public:
-  static constexpr double kLargest_rad = rad_from_deg(9.0);  ///< |δ*| is cut there
+  static constexpr double kLargest_rad = rad_from_deg(9.0);  ///< limit of |δ*|
 
-  /// @throws Error if the second stage is no spring, or stiffer than the design allows (K_p <= 0)
+  /// @throws Error if the second stage is not a spring, or is stiffer than the design allows (K_p
+  /// <= 0)
   DeflectionLoop(const PlantParameters& plant, double sample_rate_Hz);
 
   void reset() noexcept;

@@ -24,23 +24,23 @@ constexpr double kTriangleAmplitude_Nm = 5.0;
 constexpr double kTriangles_s = 30.0;
 constexpr double kCycle_Hz = 0.05;
 constexpr double kSlowCycles = 30.0;
-constexpr double kPhase_s = 60.0;  // of `hold`
+constexpr double kPhase_s = 60.0;  // duration of a phase of `hold`
 constexpr double kHoldRamp_Nm_s = 10.0;
 constexpr double kWalkAmplitude_Nm = 2.0;
 
 /// Triangles one after the other and again from the first, each from 0 to 0.
 class Triangles {
  public:
-  struct Piece {
+  struct Segment {
     double frequency_Hz;
     double amplitude_Nm;
     double cycles;
   };
 
-  explicit Triangles(const std::vector<Piece>& pieces) {
-    for (const Piece& piece : pieces) {
-      const double samples = piece.cycles / piece.frequency_Hz * kBenchRate_Hz;
-      runs_.push_back({Triangle({piece.amplitude_Nm, piece.frequency_Hz}, kBenchRate_Hz),
+  explicit Triangles(const std::vector<Segment>& segments) {
+    for (const Segment& segment : segments) {
+      const double samples = segment.cycles / segment.frequency_Hz * kBenchRate_Hz;
+      runs_.push_back({Triangle({segment.amplitude_Nm, segment.frequency_Hz}, kBenchRate_Hz),
                        static_cast<std::size_t>(std::lround(samples))});
     }
   }
@@ -87,11 +87,11 @@ BenchProgram torque_tracking(const DataSheet& sheet, double duration_s, auto ref
 BenchProgram triangles(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double amplitude_Nm = spec.torque_amplitude_Nm.value_or(kTriangleAmplitude_Nm);
   if (!spec.frequency_Hz) {
-    // What the prototype of specification 4.3 learns from, in shares of 5 Nm.
-    std::vector<Triangles::Piece> pieces = {{0.4, 1.0, 4.0},  {1.0, 0.8, 4.0}, {2.0, 0.6, 6.0},
-                                            {4.0, 0.4, 12.0}, {0.6, 0.6, 4.0}, {1.5, 1.0, 5.0}};
-    for (auto& piece : pieces) piece.amplitude_Nm *= amplitude_Nm;
-    return torque_tracking(sheet, kTriangles_s, Triangles(pieces));
+    // The training data of the prototype of specification 4.3, in shares of 5 Nm.
+    std::vector<Triangles::Segment> segments = {{0.4, 1.0, 4.0},  {1.0, 0.8, 4.0}, {2.0, 0.6, 6.0},
+                                                {4.0, 0.4, 12.0}, {0.6, 0.6, 4.0}, {1.5, 1.0, 5.0}};
+    for (auto& segment : segments) segment.amplitude_Nm *= amplitude_Nm;
+    return torque_tracking(sheet, kTriangles_s, Triangles(segments));
   }
   if (*spec.frequency_Hz < kLowestTriangle_Hz || *spec.frequency_Hz > kHighestTriangle_Hz) {
     throw UsageError(
@@ -104,9 +104,9 @@ BenchProgram triangles(const DataSheet& sheet, const ExperimentSpec& spec) {
                          Triangle({amplitude_Nm, *spec.frequency_Hz}, kBenchRate_Hz));
 }
 
-/// Glue that creeps carries less with each cycle, and the output curve ends near the rated torque: a
-/// loop that asks for more turns the coupling without end. So the rated torque times what the last
-/// cycle leaves of the glue is asked.
+/// Glue that creeps carries less with each cycle, and the output curve ends near the rated torque:
+/// a loop that asks for more turns the coupling without end. So the rated torque times what the
+/// last cycle leaves of the glue is asked.
 BenchProgram slow_cycles(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double duration_s = spec.duration_s.value_or(kSlowCycles / kCycle_Hz);
   const double creep = std::get<ElastomerSheet>(sheet.second).creep_per_cycle.value;

@@ -53,13 +53,15 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
   const auto require_amplitude = [&](const std::optional<double>& value, std::string_view unit,
                                      double highest, double shown, const char* shown_unit) {
     if (!value) return;
-    const auto said = [&](double of) { return fmt::format("{:.6g} {}", shown * of, shown_unit); };
+    const auto shown_text = [&](double of) {
+      return fmt::format("{:.6g} {}", shown * of, shown_unit);
+    };
     require(!entry.info.amplitude_unit.empty(), "amplitude",
-            "none: this experiment has an amplitude of its own", said(*value));
+            "none: the amplitude of this experiment is fixed", shown_text(*value));
     require(entry.info.amplitude_unit == unit, "amplitude",
-            fmt::format("one in {}", entry.info.amplitude_unit), said(*value));
-    require(*value > 0.0 && *value <= highest, "amplitude", "above 0 and at most " + said(highest),
-            said(*value));
+            fmt::format("one in {}", entry.info.amplitude_unit), shown_text(*value));
+    require(*value > 0.0 && *value <= highest, "amplitude",
+            "above 0 and at most " + shown_text(highest), shown_text(*value));
   };
   require_amplitude(
       spec.torque_amplitude_Nm, "Nm",
@@ -68,7 +70,7 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
   require_amplitude(spec.angle_amplitude_rad, "rad", entry.highest_angle_rad, deg_from_rad(1.0),
                     "deg");
   if (spec.frequency_Hz) {
-    require(entry.has_frequency, "frequency", "none: this experiment has a frequency of its own",
+    require(entry.has_frequency, "frequency", "none: the frequency of this experiment is fixed",
             text(*spec.frequency_Hz));
     require(*spec.frequency_Hz >= kLowest_Hz && *spec.frequency_Hz <= 10.0, "frequency",
             fmt::format("{} to 10 Hz", kLowest_Hz), text(*spec.frequency_Hz));
@@ -77,7 +79,7 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
           "none: no impedance controller runs in this experiment", "zero");
 }
 
-/// What the bench's loop acts on: where a sensor tells no number, the last one.
+/// The input of the bench's loop: if a sensor gives NaN, its last number.
 Measurement with_last_numbers(Measurement measured, const Measurement& last,
                               std::span<const SensedChannel> channels) {
   for (const SensedChannel& channel : channels)

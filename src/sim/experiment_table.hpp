@@ -20,7 +20,7 @@ struct BenchAction {
   Load load;
 };
 
-/// What the load cell feels.
+/// The torque at the load cell.
 enum class LoadCell {
   joint,     ///< the torque between joint and load
   external,  ///< what the joint does to the hand that pushes it, so that it rises with the twist
@@ -30,7 +30,7 @@ enum class LoadCell {
 /// An experiment that is ready to run: its load at the start, and what follows each measurement.
 struct BenchProgram {
   Load start;
-  double start_angle_rad = 0.0;  ///< of the joint
+  double start_angle_rad = 0.0;  ///< start angle of the joint
   LoadCell load_cell = LoadCell::joint;
   double duration_s = 0.0;
   std::function<BenchAction(const Measurement&)> next;
@@ -41,13 +41,13 @@ struct BenchProgram {
 [[nodiscard]] BenchProgram static_cycle_program(double amplitude_Nm,
                                                 LoadCell load_cell = LoadCell::joint);
 
-/// A row of the table of experiments. A name may stand in more than one family.
+/// A row of the table of experiments. A name may be in more than one family.
 struct ExperimentEntry {
   ExperimentInfo info;
   ActuatorFamily family = ActuatorFamily::series_elastic;
-  // Which options it takes.
+  // Its options.
   bool has_lever = false;
-  double highest_torque_share = 1.0;  ///< of the rated torque
+  double highest_torque_share = 1.0;  ///< share of the rated torque
   double highest_torque_Nm = std::numeric_limits<double>::infinity();
   double highest_angle_rad = 0.0;
   bool has_frequency = false;

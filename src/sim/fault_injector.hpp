@@ -28,7 +28,7 @@ class FaultInjector {
 
   void reset() noexcept;
 
-  /// Call once a tick, with rising times.
+  /// Call once per tick, with increasing times.
   void apply(Measurement& measured, double time_s) noexcept TORSIO_REALTIME;
   /// @param sound the condition without these faults (temperature)
   [[nodiscard]] PlantCondition condition(

@@ -15,8 +15,8 @@
 namespace torsio {
 namespace {
 
-constexpr double kLargest = 1e6;    // of an amount in its unit: everything stays finite
-constexpr double kSmallest = 1e-9;  // of an amount that does anything
+constexpr double kLargest = 1e6;    // largest amount in its unit: everything remains finite
+constexpr double kSmallest = 1e-9;  // smallest amount with an effect
 constexpr double kLongest_s = 1e6;
 constexpr std::string_view kSpring = "spring";
 constexpr std::string_view kFriction = "friction";

@@ -9,20 +9,21 @@
 
 namespace torsio {
 
-/// Of one drift and of all together: with ten times the friction the plant's steps still follow its
-/// bristles, whose rate grows with the root.
+/// Limit of one drift and of the product of all: with ten times the friction the plant's steps
+/// still resolve its bristles, whose rate increases with the root.
 constexpr double kLargestFactor = 10.0;
 
 /// What can happen to whom: the one table that the reader and the injector go by.
 struct FaultRule {
   std::string_view name;  ///< as a schedule writes it
   FaultKind kind = FaultKind::freeze;
-  std::string_view part = {};                ///< empty: any sensor
-  std::string_view amount_key = {};          ///< how a schedule names `amount`; empty: none
-  std::string_view amount_unit = {};         ///< of a part; of a sensor it is the channel's
-  double lowest = 0.0;                       ///< of |amount|
-  double highest = 0.0;                      ///< of |amount|
-  double PlantCondition::*factor = nullptr;  ///< that the amount becomes
+  std::string_view part = {};        ///< empty: any sensor
+  std::string_view amount_key = {};  ///< key of `amount` in a schedule; empty: none
+  std::string_view amount_unit =
+      {};                ///< unit for a part; a sensor's amount has the unit of its channel
+  double lowest = 0.0;   ///< lower limit of |amount|
+  double highest = 0.0;  ///< upper limit of |amount|
+  double PlantCondition::*factor = nullptr;  ///< factor that is set to the amount
 };
 
 /// The part's name in `FaultRule::part`, whatever this actuator calls it; empty: no part of it.

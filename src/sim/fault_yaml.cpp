@@ -38,7 +38,7 @@ double stop_stiffness(const YamlValue& yaml, const DataSheet& sheet) {
   return stiffness ? stiffness->number("Nm_rad") : times->number() * second_stage_stiffness(sheet);
 }
 
-/// What a rule's own keys say.
+/// Reads the keys of one rule.
 void read_amounts(const YamlValue& yaml, const FaultRule& rule, const DataSheet& sheet,
                   ScheduledFault& fault) {
   const std::string_view who = rule.part.empty() ? "sensor" : "part";

@@ -19,7 +19,7 @@ ImpedanceLoop::ImpedanceLoop(const PlantParameters& plant, const Gains& gains, T
     throw Error({.place = "impedance loop",
                  .problem = "the plant has no torsion tube before a gear",
                  .expected = "two gears",
-                 .found = tube == nullptr ? "a clutch" : "a spring behind the gear"});
+                 .found = tube == nullptr ? "a clutch" : "a spring after the gear"});
   inverse_tube_ratio_ = 1.0 / tube->ratio;
   gear_ratio_ = gear->ratio;
   if (!(gains.position >= 0.0 && gains.torque_Nm_rad >= 0.0 &&

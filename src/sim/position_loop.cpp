@@ -6,9 +6,9 @@
 namespace torsio {
 namespace {
 
-constexpr double kPositionGainShare = 0.32;  // of the bandwidth
-constexpr double kCutoff_Hz_s_rad = 2.4;     // of the speed's low-pass
-constexpr double kHighestCutoffShare = 0.2;  // of the sample rate
+constexpr double kPositionGainShare = 0.32;  // share of the bandwidth
+constexpr double kCutoff_Hz_s_rad = 2.4;     // cut-off of the speed's low-pass
+constexpr double kHighestCutoffShare = 0.2;  // share of the sample rate
 
 }  // namespace
 

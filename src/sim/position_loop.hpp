@@ -6,16 +6,16 @@
 
 namespace torsio {
 
-/// The bench's own position controller, on the rotor's encoder: it moves the lever so that there is
-/// something to record.
+/// The position controller of the bench, on the rotor's encoder: it moves the lever for a
+/// recording.
 ///
 ///     e = k_p (q* − θ_m / N) + q̇* − v,   i = k_v (e + k_i ∫ e dt)
 ///     k_v = J_m N ω_c / k_t,  k_p = k_i = 0.32 ω_c
 ///
-/// v is the difference of θ_m / N behind a low-pass at 2.4 Hz a rad/s of ω_c (but at most a fifth of
-/// the sample rate), q̇* the difference of q*; the integral stops at the peak current. With the
-/// 25 rad/s of the levers k_p = k_i = 8 1/s and the low-pass lies at 60 Hz. Source: specification
-/// 4.7; how the gains go with the bandwidth is ours.
+/// v is the difference of θ_m / N, filtered by a low-pass at 2.4 Hz per rad/s of ω_c (but at most a
+/// fifth of the sample rate), q̇* the difference of q*; the integral stops at the peak current.
+/// With the 25 rad/s of the levers k_p = k_i = 8 1/s and the low-pass is at 60 Hz. Source:
+/// specification 4.7; the dependence of the gains on the bandwidth is ours.
 class PositionLoop {
  public:
   static constexpr double kDefaultBandwidth_rad_s = 25.0;

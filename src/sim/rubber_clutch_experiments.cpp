@@ -53,7 +53,7 @@ constexpr double kSlipEnd_rad = rad_from_deg(20.0);
 constexpr double kStand_s = 2.0;
 constexpr double kHold_s = 30.0;
 
-constexpr double kCycleShare = 0.8;  // of the rated torque, at which the clutch would slip
+constexpr double kCycleShare = 0.8;  // share of the rated torque, at which the clutch would slip
 
 // This is not the rig of the paper, where 2.5 kg fall from the horizontal onto a sensor whose input
 // end is fixed, with 8.82 N at the contact with the clutch and 18.29 N without. Here the motor
@@ -67,7 +67,7 @@ constexpr double kWallStiffness_Nm_rad = 1e5 * kArm_m * kArm_m;
 constexpr double kWallDamping_Nms_rad = 0.8;
 constexpr double kBeyondWall_rad = rad_from_deg(27.0);
 
-/// A straight way to an angle, and a stand there.
+/// A motion to an angle at constant speed, and a rest there.
 struct Leg {
   double to_rad = 0.0;
   double speed_rad_s = 0.0;
@@ -116,7 +116,7 @@ struct SinePoint {
   double frequency_Hz = 0.0;
 };
 
-/// One sine after the other, each for some periods behind a rest at 0.
+/// One sine after the other, each for some periods after a rest at 0.
 class SineWalk {
  public:
   SineWalk(std::vector<SinePoint> points, double periods, double rest_s)
@@ -188,7 +188,7 @@ BenchProgram grid(const DataSheet& sheet, const ExperimentSpec& spec) {
     throw UsageError({.place = "grid frequency",
                       .expected = fmt::format("0 < Hz <= {}", kHighestFrequency_Hz),
                       .found = fmt::format("{}", frequency_Hz),
-                      .advice = "an angle that stands is the experiment hold"});
+                      .advice = "For a constant angle use the experiment hold."});
   }
   const SinePoint point{spec.angle_amplitude_rad.value_or(kAmplitude_rad), frequency_Hz};
   return turning(sheet, kClamped, kPointPeriods / frequency_Hz,
@@ -290,17 +290,17 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
               .description = "input angle at 1 rad/min until the clutch slips, both ways, twice"},
      .family = ActuatorFamily::rubber_clutch,
      .program = slow_cycles},
-    {.info = {.name = "slip",
-              .actuators = kActuators,
-              .description =
-                  "10 deg/s to 20 deg, beyond where the clutch slips, a stand, and back, "
-                  "both ways"},
+    {.info =
+         {.name = "slip",
+          .actuators = kActuators,
+          .description =
+              "10 deg/s to 20 deg, so that the clutch slips, a rest, and back, in both directions"},
      .family = ActuatorFamily::rubber_clutch,
      .program = slip},
     {.info = {.name = "collision",
               .actuators = kActuators,
               .description = "a link with 2.5 kg swings at 10 deg/s against a wall, and the drive "
-                             "goes on; torque_Nm is that of the contact"},
+                             "continues; torque_Nm is that of the contact"},
      .family = ActuatorFamily::rubber_clutch,
      .program = collision},
     {.info = {.name = "hold",

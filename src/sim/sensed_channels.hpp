@@ -8,8 +8,8 @@
 
 namespace torsio {
 
-/// A logged channel and where it stands in a measurement: the one table that the log, and faults by
-/// channel name, go by.
+/// A logged channel and its field in a measurement: this table defines the log and the channel
+/// names of faults.
 struct SensedChannel {
   std::string_view name;
   double Measurement::*value;

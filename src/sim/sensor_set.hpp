@@ -11,14 +11,14 @@
 
 namespace torsio {
 
-/// What the loop and the logger see at one tick.
+/// The signals of the loop and the log at one tick.
 struct Measurement {
-  double motor_angle_rad = 0.0;   ///< of the rotor
-  double middle_angle_rad = 0.0;  ///< of the body between the stages
+  double motor_angle_rad = 0.0;   ///< angle of the rotor
+  double middle_angle_rad = 0.0;  ///< angle of the body between the stages
   double joint_angle_rad = 0.0;
-  double twist_rad = 0.0;  ///< of the second stage, where a sensor of its own tells it
+  double twist_rad = 0.0;  ///< twist of the second stage, if it has a sensor
   double motor_current_A = 0.0;
-  double torque_Nm = 0.0;  ///< load cell: held between its samples, late
+  double torque_Nm = 0.0;  ///< load cell: held between its samples, delayed
   // Whether the sensor delivered at this tick; where not, its last value is held.
   bool is_motor_angle_fresh = true;
   bool is_middle_angle_fresh = true;
@@ -32,12 +32,12 @@ struct Measurement {
 /// does, so that equal seeds compare plants under equal noise.
 class SensorSet {
  public:
-  /// @throws Error if the loop's rate is no multiple of the load cell's.
+  /// @throws Error if the loop's rate is not a multiple of the load cell's.
   SensorSet(const DataSheet& sheet, double sample_rate_Hz, std::uint64_t seed);
 
-  /// As if the load cell had been running at this torque for long. Goes on in the same noise.
+  /// Sets the load cell to the steady state at this torque. The noise sequence continues.
   void reset(double torque_Nm) noexcept;
-  /// @param torque_Nm what the load cell feels
+  /// @param torque_Nm torque at the load cell
   Measurement step(const Plant& plant, double torque_Nm) noexcept;
 
  private:

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kBandwidth_rad_s = 100.0;
 constexpr double kDamping = 0.9;
-constexpr double kIntegralShare = 0.2;  // of the bandwidth
+constexpr double kIntegralShare = 0.2;  // share of the bandwidth
 constexpr double kSpeedCutoff_Hz = 120.0;
 
 }  // namespace

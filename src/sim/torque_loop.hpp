@@ -15,11 +15,13 @@ namespace torsio {
 /// under P and D gets the bandwidth ω = 100 rad/s and the damping ζ = 0.9, the integral taking over
 /// five times slower:
 ///
-///     K_p = (J N² ω² / K − 1) / (N k_t),  K_d = 2 ζ ω J N² / (N k_t),  K_i = ω/5 (K_p + 1 / (N k_t))
+///     K_p = (J N² ω² / K − 1) / (N k_t),  K_d = 2 ζ ω J N² / (N k_t),  K_i = ω/5 (K_p + 1 / (N
+/// k_t))
 ///
-/// K is the stiffness of a fast motion, nothing relaxing. θ̇_m is the encoder's difference behind a
-/// 120 Hz low-pass, τ̇* the difference of τ*; the integral stops at the peak current. Paper 003 says
-/// only that its loop is PI; feed-forward, damping and gains are ours (specification 4.7).
+/// K is the stiffness of a fast motion without relaxation. θ̇_m is the encoder's difference,
+/// filtered by a 120 Hz low-pass, τ̇* the difference of τ*; the integral stops at the peak current.
+/// Paper 003 states only that its loop is PI; feed-forward, damping and gains are ours
+/// (specification 4.7).
 class TorqueLoop {
  public:
   /// @param stiffness_Nm_rad K, of the second stage

@@ -23,11 +23,11 @@ constexpr double kWalkAmplitude = 0.35;
 /// 0.01 to 0.3 Hz over 100 s.
 [[nodiscard]] Chirp torque_chirp(double amplitude_Nm);
 
-/// White steps behind a 1 Hz filter. Its first 100 s have, for every seed, the RMS that those of
+/// White steps, filtered at 1 Hz. Its first 100 s have, for every seed, the RMS that those of
 /// `torque_chirp(amplitude_Nm)` have.
 [[nodiscard]] BandLimitedNoise torque_walk(double amplitude_Nm, std::uint64_t seed);
 
-/// Hangs on the levers of the benches.
+/// The mass on the levers of the benches.
 constexpr double kLeverMass_kg = 9.0;
 
 /// A lever that a torque is to move.

@@ -34,7 +34,7 @@ class TruthWriter {
  public:
   using Value = std::function<double(const BenchTruth&)>;
 
-  void tell(std::string_view part, std::string_view what, Value value) {
+  void add(std::string_view part, std::string_view what, Value value) {
     const std::string_view joint = part.empty() ? "" : "_";
     channels_.push_back(
         {fmt::format("{}{}{}{}", kTruthPrefix, part, joint, what), std::move(value)});
@@ -43,7 +43,7 @@ class TruthWriter {
   template <class Array>
   void write_each(std::string_view part, std::string_view what, Array (*values)(const Plant&)) {
     for (std::size_t i = 0; i < std::tuple_size_v<Array>; ++i) {
-      tell(part, fmt::format(fmt::runtime(what), i + 1),
+      add(part, fmt::format(fmt::runtime(what), i + 1),
            [=](const BenchTruth& truth) { return values(truth.plant)[i]; });
     }
   }
@@ -59,32 +59,32 @@ const Stage& second(const Plant& plant) {
 }
 
 void write_stages(TruthWriter& to, const PartNames& names) {
-  to.tell(names.second, "torque_Nm",
+  to.add(names.second, "torque_Nm",
           [](const BenchTruth& t) { return t.plant.torques().second_Nm; });
-  to.tell(names.second, "friction_Nm",
+  to.add(names.second, "friction_Nm",
           [](const BenchTruth& t) { return t.plant.second_friction_torque(); });
-  to.tell(names.second, "deflection_rad",
+  to.add(names.second, "deflection_rad",
           [](const BenchTruth& t) { return t.plant.second_twist(); });
-  to.tell(names.first, "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().first_Nm; });
-  to.tell(names.first, "friction_Nm",
+  to.add(names.first, "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().first_Nm; });
+  to.add(names.first, "friction_Nm",
           [](const BenchTruth& t) { return t.plant.first_friction_torque(); });
-  to.tell(names.first, "deflection_rad", [](const BenchTruth& t) { return t.plant.first_twist(); });
+  to.add(names.first, "deflection_rad", [](const BenchTruth& t) { return t.plant.first_twist(); });
 }
 
 void write_bodies(TruthWriter& to, const PartNames& names) {
-  to.tell("motor", "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().motor_Nm; });
-  to.tell("motor", "current_A", [](const BenchTruth& t) { return t.plant.current(); });
-  to.tell("motor", "angle_rad",
+  to.add("motor", "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().motor_Nm; });
+  to.add("motor", "current_A", [](const BenchTruth& t) { return t.plant.current(); });
+  to.add("motor", "angle_rad",
           [](const BenchTruth& t) { return t.plant.state().rotor_angle_rad; });
-  to.tell("motor", "speed_rad_s",
+  to.add("motor", "speed_rad_s",
           [](const BenchTruth& t) { return t.plant.state().rotor_speed_rad_s; });
-  to.tell(names.middle, "angle_rad",
+  to.add(names.middle, "angle_rad",
           [](const BenchTruth& t) { return t.plant.state().middle_angle_rad; });
-  to.tell(names.middle, "speed_rad_s",
+  to.add(names.middle, "speed_rad_s",
           [](const BenchTruth& t) { return t.plant.state().middle_speed_rad_s; });
-  to.tell("joint", "angle_rad",
+  to.add("joint", "angle_rad",
           [](const BenchTruth& t) { return t.plant.state().joint_angle_rad; });
-  to.tell("joint", "speed_rad_s",
+  to.add("joint", "speed_rad_s",
           [](const BenchTruth& t) { return t.plant.state().joint_speed_rad_s; });
 }
 
@@ -93,9 +93,9 @@ void write_friction(TruthWriter& to, std::string_view place, const LuGreFriction
                     double PlantTorques::*friction,
                     const LuGreFriction& (Plant::*block)() const noexcept) {
   if (parts.coulomb_Nm == 0.0 && parts.viscous_Nms_rad == 0.0) return;
-  to.tell(place, "friction_Nm", [=](const BenchTruth& t) { return t.plant.torques().*friction; });
+  to.add(place, "friction_Nm", [=](const BenchTruth& t) { return t.plant.torques().*friction; });
   if (parts.coulomb_Nm == 0.0) return;
-  to.tell(place, "bristle_Nm",
+  to.add(place, "bristle_Nm",
           [=](const BenchTruth& t) { return (t.plant.*block)().bristle_torque(); });
 }
 
@@ -111,8 +111,8 @@ void write_clutch(TruthWriter& to) {
   const auto clutch = [](const BenchTruth& t) -> const SlipClutch& {
     return std::get<SlipClutch>(t.plant.first());
   };
-  to.tell("clutch", "slip_rad", [=](const BenchTruth& t) { return clutch(t).slip(); });
-  to.tell("clutch", "is_slipping_1",
+  to.add("clutch", "slip_rad", [=](const BenchTruth& t) { return clutch(t).slip(); });
+  to.add("clutch", "is_slipping_1",
           [=](const BenchTruth& t) { return clutch(t).is_slipping() ? 1.0 : 0.0; });
 }
 
@@ -130,7 +130,7 @@ void write_coupling(TruthWriter& to, bool is_bonded) {
   to.write_each(
       "coupling", "slip{}_Nm",
       +[](const Plant& p) { return second<ElastomerCoupling>(p).slip().forces(); });
-  to.tell("coupling", "glue_1",
+  to.add("coupling", "glue_1",
           [](const BenchTruth& t) { return second<ElastomerCoupling>(t.plant).glue(); });
 }
 
@@ -149,7 +149,7 @@ std::vector<TruthChannel> truth_channels(const DataSheet& sheet) {
   const PartNames names = part_names(sheet.family);
   const PlantParameters parts = plant_parameters(sheet);
   TruthWriter to;
-  to.tell("", "torque_Nm", [](const BenchTruth& t) { return t.load_cell_Nm; });
+  to.add("", "torque_Nm", [](const BenchTruth& t) { return t.load_cell_Nm; });
   write_stages(to, names);
   write_bodies(to, names);
   write_frictions(to, names, parts);
@@ -165,7 +165,7 @@ std::vector<TruthChannel> truth_channels(const DataSheet& sheet) {
           return std::get<MaxwellSlip<4>>(second<Spring>(p).friction()).forces();
         });
   }
-  to.tell("", "temperature_K", [](const BenchTruth& t) { return t.temperature_K; });
+  to.add("", "temperature_K", [](const BenchTruth& t) { return t.temperature_K; });
   return std::move(to).channels();
 }
 

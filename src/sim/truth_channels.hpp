@@ -9,7 +9,7 @@
 
 namespace torsio {
 
-/// What a bench really is at one tick, as no sensor tells it.
+/// The true state of a bench at one tick, which no sensor measures.
 struct BenchTruth {
   const Plant& plant;
   double load_cell_Nm = 0.0;

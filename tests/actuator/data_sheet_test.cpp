@@ -17,13 +17,13 @@
 namespace torsio {
 namespace {
 
-/// Of the parts that hold nothing else.
+/// The size of the parts that contain only values.
 std::size_t bytes_of_values(const DataSheet& sheet) {
   std::size_t bytes = sizeof(sheet.rating) + sizeof(sheet.motor) + sizeof(sheet.friction) +
                       sizeof(sheet.middle_inertia_kg_m2) + sizeof(sheet.joint) +
                       sizeof(sheet.sensors);
   const auto add = [&]<class Part>(const Part& /*part*/) {
-    // What says which variant it is stands before the values.
+    // The variant is stored before the values.
     bytes += sizeof(Part) / sizeof(SheetValue) * sizeof(SheetValue);
   };
   std::visit(add, sheet.first);
@@ -87,7 +87,7 @@ TEST(DataSheet, ListsEveryValueOnceWithAnOrigin) {
   }
 }
 
-TEST(DataSheet, TellsPrintedFromDerivedFromAssumed) {
+TEST(DataSheet, DistinguishesPrintedDerivedAndAssumed) {
   std::map<std::string, SheetRow> rows;
   for (const SheetRow& row : describe(data_sheet("dfki-120"))) rows[row.name] = row;
   EXPECT_EQ(rows["spring_stiffness"].value.origin, Origin::printed);
@@ -127,8 +127,8 @@ TEST(DataSheet, OriginsAreThoseOfThePapers) {
 TEST(DataSheet, EveryActuatorVariantAndPieceHasAHashOfItsOwn) {
   std::map<std::string, std::string> names;  // by hash
   for (const std::string& actuator : test::every_actuator()) {
-    for (const char* piece : {"", "#01", "#02"}) {
-      const std::string name = actuator + piece;
+    for (const char* specimen : {"", "#01", "#02"}) {
+      const std::string name = actuator + specimen;
       const auto [at, is_new] = names.emplace(sheet_hash(data_sheet(name)), name);
       EXPECT_TRUE(is_new) << name << " and " << at->second;
     }
@@ -157,10 +157,10 @@ TEST(DataSheet, UnknownNameListsTheKnownOnes) {
 }
 
 TEST(DataSheet, TakesAVariantAndASerialNumber) {
-  const DataSheet piece = data_sheet("dfki-300:lugre#03");
-  EXPECT_EQ(std::get<SpringSheet>(piece.second).variant, SpringVariant::lugre);
-  EXPECT_EQ(piece.serial, 3U);
-  EXPECT_EQ(full_name(piece), "dfki-300:lugre#03");
+  const DataSheet specimen = data_sheet("dfki-300:lugre#03");
+  EXPECT_EQ(std::get<SpringSheet>(specimen.second).variant, SpringVariant::lugre);
+  EXPECT_EQ(specimen.serial, 3U);
+  EXPECT_EQ(full_name(specimen), "dfki-300:lugre#03");
   EXPECT_EQ(full_name(data_sheet("dfki-300:maxwell-slip")), "dfki-300");
   const auto tube_Nm_rad = [](const char* name) {
     return std::get<TubeSheet>(data_sheet(name).first).stiffness_Nm_rad.value;
@@ -182,7 +182,7 @@ std::string message_of(const char* name) {
 TEST(DataSheet, RefusesVariantsAndSerialNumbersThatItDoesNotHave) {
   EXPECT_NE(message_of("dfki-50:bouc").find("maxwell-slip, bouc-wen, lugre"), std::string::npos);
   EXPECT_NE(message_of("rubber-clutch:soft").find("it has no variants"), std::string::npos);
-  EXPECT_NE(message_of("dfki-50:").find("behind the colon"), std::string::npos);
+  EXPECT_NE(message_of("dfki-50:").find("after the colon"), std::string::npos);
   for (const char* name : {"dfki-50#", "dfki-50#x", "dfki-50#-1", "dfki-50#10000", "dfki-50#3#4"})
     EXPECT_NE(message_of(name).find("0 to 9999"), std::string::npos) << name;
 }

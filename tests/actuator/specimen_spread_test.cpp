@@ -39,7 +39,7 @@ void expect_spread(const Range& range, double middle, double bound, const std::s
   EXPECT_GT(range.high, middle + 0.9 * bound) << what;
 }
 
-/// The value over the nominal one of a thousand pieces.
+/// The value over the nominal one of a thousand specimens.
 void expect_share(const std::string& name, const std::string& row, double bound) {
   const double nominal = rows(name).at(row).value;
   Range range;
@@ -129,7 +129,7 @@ TEST(PieceSpread, AnotherActuatorsPieceOfTheSameNumberHasOtherDraws) {
 TEST(PieceSpread, VariantsOfOnePieceShareItsDraws) {
   for (const DataSheet& sheet : data_sheets()) {
     const std::string base(sheet.name);
-    const Rows piece = rows(base + "#11");
+    const Rows specimen = rows(base + "#11");
     const Rows nominal = rows(base);
     for (const std::string_view variant : sheet.variants) {
       if (variant.empty()) continue;
@@ -138,10 +138,10 @@ TEST(PieceSpread, VariantsOfOnePieceShareItsDraws) {
       for (const auto& [row, value] : rows(name + "#11")) {
         const double own = nominal_variant.at(row).value;
         if (own == 0.0 || nominal.at(row).value == 0.0) {
-          EXPECT_NEAR(value.value - own, piece.at(row).value - nominal.at(row).value, 1e-15)
+          EXPECT_NEAR(value.value - own, specimen.at(row).value - nominal.at(row).value, 1e-15)
               << name << " " << row;
         } else {
-          EXPECT_DOUBLE_EQ(value.value / own, piece.at(row).value / nominal.at(row).value)
+          EXPECT_DOUBLE_EQ(value.value / own, specimen.at(row).value / nominal.at(row).value)
               << name << " " << row;
         }
       }

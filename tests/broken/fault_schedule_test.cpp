@@ -58,7 +58,7 @@ std::string part(const std::string& more) { return one("part: " + more); }
 INSTANTIATE_TEST_SUITE_P(
     All, BrokenFaultSchedule,
     testing::Values(
-        BadSchedule{"NoYaml", "faults: [", {"faults.yaml: line", "this is no YAML"}},
+        BadSchedule{"NoYaml", "faults: [", {"faults.yaml: line", "this is not YAML"}},
         BadSchedule{"Empty", "", {"faults.yaml", "keys with values", "found nothing"}},
         BadSchedule{"TooLong", std::string(1100000, ' '), {"at most 1048576 bytes"}},
         BadSchedule{"OtherKey", "fault: []", {"line 1 (fault): unknown key 'fault'", "faults"}},
@@ -107,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadSchedule{"KeyOfAnotherFault",
                     gear("fault: freeze, at: 1s, by: 2deg"),
                     {"unknown key 'by'", "one of sensor, fault, at, for"}},
-        BadSchedule{"KeyTwice", gear("fault: sign_flip, at: 1s, at: 2s"), {"'at' stands twice"}},
+        BadSchedule{"KeyTwice", gear("fault: sign_flip, at: 1s, at: 2s"), {"'at' is given twice"}},
         BadSchedule{
             "NoFaultKind", gear("at: 1s"), {"line 2 (faults[0]): the key 'fault' is missing"}},
         BadSchedule{"NoTime", gear("fault: freeze"), {"the key 'at' is missing"}},

@@ -129,7 +129,7 @@ TEST(BrokenModelFile, OfAnotherVersionSaysWhatToDo) {
 TEST(BrokenModelFile, NamesTheEntryOfTheCardThatIsWrong) {
   EXPECT_THAT(complaint_about_card(R"("family":"linear_coulomb")", R"("family":"telepathy")"),
               AllOf(HasSubstr("card/family: expected one of linear, linear_coulomb"),
-                    HasSubstr("A build with -DTORSIO_FAMILIES knows only those that it names")));
+                    HasSubstr("A build with -DTORSIO_FAMILIES has only those that it names")));
   EXPECT_THAT(complaint_about_card(R"("family":"linear_coulomb")", R"("familie":"linear_coulomb")"),
               HasSubstr("card/family: expected an entry, found none"));
   EXPECT_THAT(complaint_about_card(R"("seed":18446744073709551615)", R"("seed":-1)"),

@@ -84,10 +84,10 @@ INSTANTIATE_TEST_SUITE_P(
         gzipped("t_s,torque_Nm\n0,1.5\n") + gzipped("0.5,-2\n")));
 
 TEST(Csv, AQuotedHeaderMayHoldSeparatorsAndQuotes) {
-  const CsvTable table = parse_csv("\"a,b_rad\",\"say \"\"x\"\"_1\"\n1,2\n", "a.csv");
+  const CsvTable table = parse_csv("\"a,b_rad\",\"the \"\"x\"\"_1\"\n1,2\n", "a.csv");
   ASSERT_EQ(table.columns.size(), 2U);
   EXPECT_EQ(table.columns[0].name, "a,b_rad");
-  EXPECT_EQ(table.columns[1].name, "say \"x\"_1");
+  EXPECT_EQ(table.columns[1].name, "the \"x\"_1");
 }
 
 TEST(Csv, EmptyCellsAndNanAreMissingValues) {

@@ -149,7 +149,7 @@ TEST_F(Manifests, KeepTheirRolesWhereAllElseIsTest) {
   EXPECT_TRUE(dataset.records[0].has_role(Role::train)) << "by the split";
   EXPECT_TRUE(dataset.records[1].has_role(Role::validation));
   EXPECT_EQ(dataset.records[3].segments.front().role, Role::test) << "a CSV file";
-  EXPECT_EQ(dataset.records[4].segments.front().role, Role::test) << "said in no manifest";
+  EXPECT_EQ(dataset.records[4].segments.front().role, Role::test) << "listed in no manifest";
 }
 
 TEST_F(Manifests, AnEmbargoLongerThanTheRecordIsRefused) {
@@ -175,7 +175,7 @@ TEST_F(Manifests, TheUsersWordCountsMore) {
   }
 }
 
-TEST(LoadDataset, TellsACanonicalTargetFromItsSources) {
+TEST(LoadDataset, DistinguishesACanonicalTargetFromItsSources) {
   const TemporaryFolder folder;
   const std::string log =
       folder.file("a.csv", "t_s,gear_angle_rad,joint_angle_rad\n0,1,0.75\n0.1,2,1.5\n0.2,3,2.25\n");

@@ -26,7 +26,7 @@ std::vector<Recording> read(const std::string& csv, const std::string& mapping =
 
 constexpr double kDeg = std::numbers::pi / 180.0;
 
-TEST(Mapping, WithoutOneTheHeadersTellEverything) {
+TEST(Mapping, WithoutOneTheHeadersAreSufficient) {
   const auto recordings = read("t_ms,angle_deg,torque_mNm\n500,1,10\n502,2,20\n504,3,nan\n");
   ASSERT_EQ(recordings.size(), 1U);
   const Recording& recording = recordings[0];
@@ -69,7 +69,7 @@ TEST(Mapping, DropsTextAndSplitsIntoRecords) {
   EXPECT_EQ(kept[0].name(), "log[run=8]");
 }
 
-TEST(Mapping, ALogWithoutAClockTakesTheRateThatIsTold) {
+TEST(Mapping, ALogWithoutAClockTakesTheGivenRate) {
   EXPECT_EQ(read("x_m\n1\n2\n", "rate: 2kHz")[0].sample_rate_Hz(), 2000.0);
   EXPECT_EQ(read("x_m\n1\n2\n", "{}", 50.0)[0].sample_rate_Hz(), 50.0);
   EXPECT_EQ(read("x_m\n1\n", "{}", 50.0)[0].size(), 1U);

@@ -25,7 +25,7 @@ TEST(Recording, KnowsItsClock) {
   EXPECT_THROW(Recording("x", std::nan("")), Error);
 }
 
-TEST(Recording, TellsFreshSamplesFromHeldOnes) {
+TEST(Recording, DistinguishesNewSamplesFromHeldOnes) {
   const Recording recording = example();
   EXPECT_TRUE(recording.channel("angle_rad").is_fresh(1));
   EXPECT_FALSE(recording.channel("torque_Nm").is_fresh(1));

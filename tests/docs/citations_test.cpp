@@ -61,7 +61,7 @@ std::set<std::string> section_numbers(std::string_view markdown) {
 }
 
 /// @returns the sections that are cited in `text`: one number, or several as in "4.2, 4.3 and 4.5",
-/// also across the lines of a comment. Numbers of errata such as 002-24 are no sections.
+/// also across the lines of a comment. Numbers of errata such as 002-24 are not sections.
 std::vector<std::string> cited_sections(std::string_view text) {
   constexpr std::string_view kWord = "pecification";
   constexpr std::string_view kBetween = " \t\r\n/#*";

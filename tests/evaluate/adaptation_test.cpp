@@ -37,8 +37,8 @@ const ModelFile& bench_model() {
   return model;
 }
 
-/// Another piece: its torque is off by an offset, and its spring is softer.
-Dataset other_piece(std::size_t samples = 20000) {
+/// Another specimen: its torque has an offset, and its spring is softer.
+Dataset other_specimen(std::size_t samples = 20000) {
   Dataset dataset;
   add_record(
       dataset,
@@ -61,7 +61,7 @@ AdaptationSettings settings_for(const std::string& method) {
 
 TEST(AdaptModel, ImprovesOnAnotherPieceByEitherMethod) {
   for (const char* method : {"nlms", "rls"}) {
-    const AdaptedModel adapted = adapt_model(bench_model(), other_piece(), settings_for(method));
+    const AdaptedModel adapted = adapt_model(bench_model(), other_specimen(), settings_for(method));
     EXPECT_LT(adapted.held_out.back().adapted.rmse, 0.7 * adapted.held_out.back().frozen.rmse)
         << method;
     EXPECT_LT(adapted.as_it_ran.back().adapted.rmse, adapted.as_it_ran.back().frozen.rmse);
@@ -71,8 +71,8 @@ TEST(AdaptModel, ImprovesOnAnotherPieceByEitherMethod) {
   }
 }
 
-TEST(AdaptModel, ScoresAreThoseOfTheFilesItTells) {
-  const Dataset dataset = other_piece();
+TEST(AdaptModel, ScoresAreThoseOfTheFilesThatItNames) {
+  const Dataset dataset = other_specimen();
   const AdaptedModel adapted = adapt_model(bench_model(), dataset, settings_for("nlms"));
   const TemporaryFolder folder;
   save_model(folder.path("adapted.safetensors"), adapted.file);
@@ -90,7 +90,7 @@ TEST(AdaptModel, ScoresAreThoseOfTheFilesItTells) {
 }
 
 TEST(AdaptModel, IsDeterministic) {
-  const auto run = [] { return adapt_model(bench_model(), other_piece(), settings_for("rls")); };
+  const auto run = [] { return adapt_model(bench_model(), other_specimen(), settings_for("rls")); };
   const AdaptedModel one = run();
   const AdaptedModel two = run();
   EXPECT_EQ(model_bytes(one.file), model_bytes(two.file));
@@ -98,7 +98,7 @@ TEST(AdaptModel, IsDeterministic) {
 }
 
 TEST(AdaptModel, TheCardSaysWhereTheWeightsComeFrom) {
-  Dataset dataset = other_piece();
+  Dataset dataset = other_specimen();
   dataset.records[0].recording.source = {"lesson.csv", "abc"};
   const ModelCard card = adapt_model(bench_model(), dataset, settings_for("nlms")).file.card;
   EXPECT_EQ(card.options.at("adaptation.method"), "nlms");
@@ -109,13 +109,13 @@ TEST(AdaptModel, TheCardSaysWhereTheWeightsComeFrom) {
 }
 
 TEST(AdaptModel, ErrorBarsAreThoseOfTheAdaptedWeights) {
-  const AdaptedModel adapted = adapt_model(bench_model(), other_piece(), settings_for("nlms"));
+  const AdaptedModel adapted = adapt_model(bench_model(), other_specimen(), settings_for("nlms"));
   EXPECT_NE(adapted.file.settings.residuals.std_dev, bench_model().settings.residuals.std_dev);
   EXPECT_FALSE(adapted.file.settings.residuals.std_dev.empty());
 }
 
 TEST(AdaptModel, LearnsFromSegmentsWithTheRoleTrainOnly) {
-  Dataset dataset = other_piece();
+  Dataset dataset = other_specimen();
   dataset.records.erase(dataset.records.begin() + 1);
   hold_out_ends(dataset, 0.25, 1.0);
   ASSERT_EQ(dataset.records[0].segments.size(), 2U);
@@ -136,8 +136,8 @@ TEST(AdaptModel, LearnsFromSegmentsWithTheRoleTrainOnly) {
   EXPECT_NE(whole.held_out.back().adapted.rmse, again.held_out.back().adapted.rmse);
 }
 
-TEST(AdaptModel, HeldAndMissingReferencesTeachNothing) {
-  Dataset dataset = other_piece();
+TEST(AdaptModel, DoesNotLearnFromHeldAndMissingReferences) {
+  Dataset dataset = other_specimen();
   const Recording& given = dataset.records[0].recording;
   Recording slow("lesson", 1000.0);
   Channel torque = given.channel("torque_Nm");
@@ -161,16 +161,16 @@ TEST(AdaptModel, HeldAndMissingReferencesTeachNothing) {
 }
 
 TEST(AdaptModel, RefusesWhatItCannotLearnFrom) {
-  Dataset no_exam = other_piece();
+  Dataset no_exam = other_specimen();
   no_exam.records.erase(no_exam.records.begin() + 1);
   EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), no_exam, {}); }),
               HasSubstr("nothing to score on"));
-  Dataset no_lesson = other_piece();
+  Dataset no_lesson = other_specimen();
   no_lesson.records.erase(no_lesson.records.begin());
   EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), no_lesson, {}); }),
               HasSubstr("nothing to adapt to"));
-  EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), other_piece(20), {}); }),
-              HasSubstr("not a single sample could be learned from"));
+  EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), other_specimen(20), {}); }),
+              HasSubstr("no sample could be used for the adaptation"));
   EXPECT_THAT(error_message([&] { hold_out_ends(no_exam, 0.99, 1.0); }),
               HasSubstr("lesson: a training block"));
   EXPECT_THAT(error_message([&] { hold_out_ends(no_exam, 1.0, 1.0); }), HasSubstr("--held-out"));
@@ -178,7 +178,7 @@ TEST(AdaptModel, RefusesWhatItCannotLearnFrom) {
 
 TEST(AdaptModel, StopsWhenAsked) {
   const Progress stop = [](double, std::string_view) { return false; };
-  EXPECT_THROW((void)adapt_model(bench_model(), other_piece(), {}, stop), Cancelled);
+  EXPECT_THROW((void)adapt_model(bench_model(), other_specimen(), {}, stop), Cancelled);
 }
 
 TEST(AdaptationSettings, AreCheckedAgainstTheirTable) {
@@ -213,15 +213,15 @@ TEST(AdaptModel, AnLstmOfOneHarmonicDriveImprovesOnOthers) {
   const FeatureSpec features =
       resolve_inputs(first, {"motor_angle_rad - wave_generator_angle_rad", "motor_torque_Nm"});
   const ModelFile lstm = train_model(first, {.family = "lstm", .features = features}, 1).file;
-  for (const char* piece : {"#02", "#03", "#04"}) {
+  for (const char* specimen : {"#02", "#03", "#04"}) {
     Dataset other;
-    const std::string actuator = std::string("harmonic-drive:soft") + piece;
+    const std::string actuator = std::string("harmonic-drive:soft") + specimen;
     add_record(other, human_torque(actuator, 11), Role::train);
     add_record(other, human_torque(actuator, 12), Role::test);
     for (const char* method : {"nlms", "rls"}) {
       const AdaptedModel adapted = adapt_model(lstm, other, settings_for(method));
       const AdaptationScore& held_out = adapted.held_out.back();
-      EXPECT_LT(held_out.adapted.rmse, 0.95 * held_out.frozen.rmse) << piece << ' ' << method;
+      EXPECT_LT(held_out.adapted.rmse, 0.95 * held_out.frozen.rmse) << specimen << ' ' << method;
     }
   }
 }

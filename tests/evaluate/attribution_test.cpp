@@ -229,7 +229,7 @@ TEST(Attribute, RefusesWhatItCannotDo) {
   EXPECT_THROW((void)attribute(hysteresis(), data), Error) << "two inputs, not three";
   EXPECT_NE(test::error_message([&] {
               (void)attribute(spring(), data, {.window_samples = 201});
-            }).find("no recording holds a window of 201 samples"),
+            }).find("no recording contains a window of 201 samples"),
             std::string::npos);
   EXPECT_THROW((void)attribute(spring(), data, {}, [](double, std::string_view) { return false; }),
                Cancelled);

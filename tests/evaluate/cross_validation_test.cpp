@@ -33,7 +33,7 @@ std::vector<int> roles(const Dataset& dataset, const Fold& fold, std::size_t rec
   std::vector<int> of_sample(dataset.records[record].recording.size(), -1);
   for (const Segment& segment : fold.segments[record])
     for (std::size_t n = segment.begin; n < segment.end; ++n) {
-      EXPECT_EQ(of_sample[n], -1) << "sample " << n << " stands in two segments";
+      EXPECT_EQ(of_sample[n], -1) << "sample " << n << " is in two segments";
       of_sample[n] = static_cast<int>(segment.role);
     }
   return of_sample;
@@ -74,15 +74,15 @@ TEST(PlanFolds, DealsWholeRecordsSoThatEachIsHeldOutOnce) {
 
 TEST(PlanFolds, DependsOnTheSeedAlone) {
   const Dataset dataset = records(8);
-  const auto dealt = [&](std::uint64_t seed) {
+  const auto assigned = [&](std::uint64_t seed) {
     std::vector<std::vector<std::string>> recordings;
     for (const Fold& fold : plan_folds(dataset, {.folds = 4}, seed).folds)
       recordings.push_back(fold.recordings);
     return recordings;
   };
-  EXPECT_EQ(dealt(1), dealt(1));
+  EXPECT_EQ(assigned(1), assigned(1));
   std::set<std::vector<std::vector<std::string>>> different;
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) different.insert(dealt(seed));
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) different.insert(assigned(seed));
   EXPECT_GT(different.size(), 1U);
 }
 
@@ -130,7 +130,7 @@ TEST(PlanFolds, LeavesOneConditionOut) {
   EXPECT_EQ(roles(dataset, plan.folds[0], 4).front(), kValidation);
   EXPECT_EQ(plan.folds[1].recordings, std::vector<std::string>{"record 1"});
   EXPECT_EQ(roles(dataset, plan.folds[1], 4).front(), kNone)
-      << "a validation record of the held-out condition would tell the fit about it";
+      << "the fit would use a validation recording of the held-out condition";
 }
 
 TEST(PlanFolds, LeavesTestSegmentsOutAndValidationSegmentsIn) {

@@ -50,7 +50,7 @@ TEST(FitReportOf, WhiteResidualsAreIndependent) {
   EXPECT_NEAR(report.table[0].std_error, 1.0, 0.15);
 }
 
-TEST(FitReportOf, ColouredResidualsTellLessThanTheirNumber) {
+TEST(FitReportOf, ColouredResidualsHaveFewerEffectiveSamples) {
   // First order with 0.95: 1 + 2 sum = 39.
   Random random(4);
   double state = 0.0;
@@ -63,7 +63,7 @@ TEST(FitReportOf, ColouredResidualsTellLessThanTheirNumber) {
   EXPECT_NEAR(report.table[0].std_error, std::sqrt(4000.0 / report.effective_samples), 1e-9);
 }
 
-TEST(FitReportOf, PartOfARecordTellsNoMoreThanItsSamples) {
+TEST(FitReportOf, PartOfARecordHasNoMoreEffectiveThanScoredSamples) {
   Random random(4);
   double state = 0.0;
   Dataset dataset =
@@ -95,11 +95,12 @@ TEST(FitReportOf, ItsTextAndDocumentHaveWhatWasFound) {
   const std::string text = fit_report_text(report);
   EXPECT_NE(text.find("spring_deflection_rad"), std::string::npos);
   EXPECT_NE(text.find("Nm/rad"), std::string::npos);
-  EXPECT_NE(text.find("nothing is left to learn"), std::string::npos);
+  EXPECT_NE(text.find("white and uncorrelated"), std::string::npos);
   double state = 0.0;
   const std::string coloured = fit_report_text(
       report_of(spring_with([&](std::size_t) { return state = 0.95 * state + random.normal(); })));
-  EXPECT_NE(coloured.find("the residuals follow their own past: "), std::string::npos) << coloured;
+  EXPECT_NE(coloured.find("the residuals are correlated with their past: "), std::string::npos)
+      << coloured;
   const std::string document = fit_json({}, report, {"a note"});
   EXPECT_NE(document.find("\"effective_samples\""), std::string::npos);
   EXPECT_NE(document.find("\"a note\""), std::string::npos);

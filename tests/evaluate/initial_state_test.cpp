@@ -45,7 +45,7 @@ Measured run_from(const std::vector<double>& state, std::size_t samples, double 
 }
 
 const std::vector<double> kState{8.0, -3.0};  // slowest first
-constexpr double kError = 1e-6;               // of a model that is right
+constexpr double kError = 1e-6;               // error of a correct model
 
 TEST(InitialState, IsTheOneThatTheRunWasStartedFrom) {
   const Measured run = run_from(kState, 200, 0.0);
@@ -70,7 +70,7 @@ TEST(InitialState, PassesOverSamplesThatWereNotMeasured) {
   EXPECT_THAT(model.state(), Pointwise(DoubleNear(1e-4), kState));
 }
 
-TEST(InitialState, StaysAtRestWhereNothingIsTold) {
+TEST(InitialState, RemainsAtRestWithoutMeasuredSamples) {
   Measured run = run_from(kState, 20, 0.0);
   for (double& target : run.target) target = kNotMeasured;
   AnyModel model = two_branches();

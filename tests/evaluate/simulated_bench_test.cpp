@@ -1,5 +1,5 @@
-// The main job on the simulated benches: how well each family tells the torque of a sweep that it
-// never saw.
+// The main job on the simulated benches: how well each family estimates the torque of a sweep that
+// it was not trained on.
 #include <gtest/gtest.h>
 
 #include <string>

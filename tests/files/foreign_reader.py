@@ -22,7 +22,7 @@ for name, tensor in sorted(header.items(), key=lambda item: item[1]["data_offset
     assert tensor["data_offsets"][0] % size == 0, f"{name} is not aligned"
     end = tensor["data_offsets"][1]
     assert tensor["data_offsets"][1] - tensor["data_offsets"][0] == math.prod(tensor["shape"]) * size, name
-assert end == len(data), "bytes behind the last tensor"
+assert end == len(data), "bytes after the last tensor"
 
 wanted = header[sys.argv[2]]
 values = struct.iter_unpack("<" + types[wanted["dtype"]][0], data[slice(*wanted["data_offsets"])])

@@ -80,7 +80,7 @@ Joint read(Safetensors contents, Joint joint = {}) {
   return joint;
 }
 
-/// What is said of a joint with a table on its output after one tensor was added or renamed.
+/// The error for a joint with a table on its output after one tensor was added or renamed.
 std::string complaint(const std::string& removed, const std::string& added) {
   Safetensors contents = contents_of({.load = table()});
   if (!removed.empty()) contents.tensors.erase(removed);

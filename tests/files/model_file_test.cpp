@@ -123,9 +123,9 @@ TEST(ModelFile, IsBoundToItsDevice) {
   EXPECT_THAT(
       error_message([&] { (void)load_estimator(folder.path("elbow.safetensors"), "knee-1"); }),
       HasSubstr("elbow.safetensors: device_serial: expected 'knee-1', found 'elbow-7'"));
-  ModelFile nobody = example_model_file(example<Linear>());
-  nobody.card.device_serial = "";
-  EXPECT_THAT(error_message([&] { (void)parse_model(model_bytes(nobody), "m", "knee-1"); }),
+  ModelFile without_serial = example_model_file(example<Linear>());
+  without_serial.card.device_serial = "";
+  EXPECT_THAT(error_message([&] { (void)parse_model(model_bytes(without_serial), "m", "knee-1"); }),
               HasSubstr("expected 'knee-1', found none"));
 }
 

@@ -63,7 +63,7 @@ TEST(OutputFile, TwoOfOneNameDoNotMix) {
 TEST(OutputFile, WritesStraightIntoADeviceOrPipeThroughALink) {
   std::array<int, 2> ends{};
   ASSERT_EQ(pipe(ends.data()), 0);
-  // A link to a link of the kernel's to "pipe:[1234]", which is no name.
+  // A link to a link of the kernel's to "pipe:[1234]", which is not a name.
   const TemporaryFolder folder;
   std::filesystem::create_symlink("/dev/fd/" + std::to_string(ends[1]), folder.path("link"));
   {

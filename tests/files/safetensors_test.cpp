@@ -72,8 +72,8 @@ TEST(Safetensors, AlignEveryTensorToItsElements) {
   std::memcpy(&header, bytes.data(), 8);
   EXPECT_EQ(header % 8, 0U);
   const std::string text(reinterpret_cast<const char*>(bytes.data()) + 8, header);
-  EXPECT_LT(text.find("weights"), text.find("b_floats")) << "floats stand behind the doubles";
-  EXPECT_LT(text.find("b_floats"), text.find("a_flag")) << "bytes stand behind the floats";
+  EXPECT_LT(text.find("weights"), text.find("b_floats")) << "floats follow the doubles";
+  EXPECT_LT(text.find("b_floats"), text.find("a_flag")) << "bytes follow the floats";
 }
 
 TEST(Safetensors, RefuseValuesThatDoNotFillTheirShape) {

@@ -18,8 +18,8 @@
 #include "torsio/files/model_file.hpp"
 
 // Any bytes are refused as a model file with an Error, or give an estimator whose value is finite.
-// The first byte says how the others become a file: as they are, as changes to a good file (so that
-// the fuzzer need not find one), or as the card of one.
+// The first byte selects how the others become a file: as they are, as changes to a good file (so
+// that the fuzzer need not find one), or as the card of one.
 
 namespace {
 

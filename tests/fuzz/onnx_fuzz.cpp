@@ -17,9 +17,9 @@
 #include "torsio/core/error.hpp"
 #include "torsio/import/onnx_network.hpp"
 
-// Any bytes are refused as an ONNX graph with an Error, or give a network that steps. The first byte
-// says how the others become a graph: as they are, as changes to the bytes of a good one, or as changes
-// to its nodes, which random bytes seldom are.
+// Any bytes are refused as an ONNX graph with an Error, or give a network that steps. The first
+// byte selects how the others become a graph: as they are, as changes to the bytes of a good one,
+// or as changes to its nodes, which random bytes seldom are.
 
 namespace {
 

@@ -50,7 +50,7 @@ std::size_t warm_up(const AnyModel::Parameters& parameters) {
 
 class ImportGolden : public testing::TestWithParam<Json> {};
 
-TEST_P(ImportGolden, StreamsWhatPyTorchTells) {
+TEST_P(ImportGolden, StreamsTheOutputOfPyTorch) {
   const Json& one = GetParam();
   const ImportedModel import = imported(one);
   EXPECT_EQ(import.file.parameters.family(), one.at("family"));
@@ -64,12 +64,13 @@ TEST_P(ImportGolden, StreamsWhatPyTorchTells) {
   for (std::size_t n = 0; n < outputs.size(); ++n) {
     const Estimate estimate =
         model.step(std::span(inputs).subspan(n * model.input_count(), model.input_count()));
-    // Weights, sums and activations are float32: a few units in the last place of the largest value.
+    // Weights, sums and activations are float32: a few units in the last place of the largest
+    // value.
     EXPECT_NEAR(estimate.value, outputs[n], 2e-6 * size) << "sample " << n;
   }
 }
 
-TEST_P(ImportGolden, TellsTheSameFromItsModelFile) {
+TEST_P(ImportGolden, HasTheSameOutputFromItsModelFile) {
   const ImportedModel import = imported(GetParam());
   const auto bytes = model_bytes(import.file);
   EXPECT_EQ(model_bytes(parse_model(bytes, "again")), bytes);

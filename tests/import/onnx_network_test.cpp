@@ -58,7 +58,7 @@ onnx::TensorProto& tensor_of(onnx::GraphProto& graph, const std::string& name) {
   throw std::runtime_error("no tensor " + name);
 }
 
-/// What is said of a good graph after `change` has been at it.
+/// The error for a good graph after `change`.
 std::string refusal_after(const std::string& name, const Change& change) {
   return refusal(changed(name, change));
 }
@@ -132,11 +132,11 @@ TEST(OnnxNetwork, WithBadTensorsNamesThem) {
   EXPECT_THAT(spoiled([](onnx::TensorProto& tensor) { tensor.mutable_raw_data()->pop_back(); }),
               HasSubstr("tensor 'W'"));
   EXPECT_THAT(spoiled([](onnx::TensorProto& tensor) { tensor.set_dims(1, 13); }),
-              AllOf(HasSubstr("tensor 'W'"), HasSubstr("as its shape says")));
+              AllOf(HasSubstr("tensor 'W'"), HasSubstr("as in its shape")));
   EXPECT_THAT(spoiled([](onnx::TensorProto& tensor) { tensor.set_dims(1, INT64_MAX); }),
-              AllOf(HasSubstr("tensor 'W'"), HasSubstr("as its shape says")));
+              AllOf(HasSubstr("tensor 'W'"), HasSubstr("as in its shape")));
   EXPECT_THAT(spoiled([](onnx::TensorProto& tensor) { tensor.set_dims(1, -1); }),
-              AllOf(HasSubstr("tensor 'W'"), HasSubstr("as its shape says")));
+              AllOf(HasSubstr("tensor 'W'"), HasSubstr("as in its shape")));
   EXPECT_THAT(
       spoiled([](onnx::TensorProto& tensor) { tensor.set_data_type(onnx::TensorProto::FLOAT16); }),
       AllOf(HasSubstr("tensor 'W'"), HasSubstr("float32")));

@@ -47,14 +47,14 @@ TEST(WeightsJson, TakesScalesIntoTheStandardisation) {
   EXPECT_EQ(lstm.layers.at(0).bias, std::vector<float>(4, 0.0F));
 }
 
-TEST(WeightsJson, TellsWhichBiasesItTookForZero) {
+TEST(WeightsJson, NotesTheBiasesThatItTookForZero) {
   const ForeignNetwork network = parse(small_lstm(tensor("m.bias_ih_l0", "4", "1, 2, 3, 4")));
   EXPECT_EQ(network.notes,
             (std::vector<std::string>{"the file has no m.bias_hh_l0, h.bias: taken as "
                                       "0, as of a layer without bias"}));
 }
 
-TEST(WeightsJson, KeepsTwoBiasesApartUnlessToldOtherwise) {
+TEST(WeightsJson, KeepsTwoBiasesSeparateUnlessTheyAreFolded) {
   ForeignNetwork network = parse(small_lstm(tensor("m.bias_ih_l0", "4", "1, 2, 3, 4") + "," +
                                             tensor("m.bias_hh_l0", "4", "5, 6, 7, 8")));
   const auto bias = [&] {

@@ -203,7 +203,8 @@ TEST_F(BrokenCalls, OfAdaptationSayWhatIsMissingAndLeaveTheOutputUntouched) {
   expect_error(torsio(call + "--set step_size"), kCallWasWrong, "option=value");
   expect_error(torsio(call + "--held-out 1"), kCallWasWrong, "a share between 0 and 1");
   expect_error(torsio(call + "--held-out 0.2 --test b.csv"), kCallWasWrong, "excludes");
-  expect_error(torsio(call + "--test a.csv"), kCallWasWrong, "both trained and judged on");
+  expect_error(torsio(call + "--test a.csv"), kCallWasWrong,
+               "used for training and for the scores");
   expect_error(torsio(call + "--embargo 3Nm"), kCallWasWrong, "--embargo");
   expect_error(torsio(call + "--embargo 100s"), kWorkFailed, "Give longer recordings");
   expect_error(torsio(call + "--json old.safetensors"), kCallWasWrong, "two outputs");
@@ -230,7 +231,7 @@ TEST_F(BrokenCalls, OfAdaptationNameWhatARecordingLacks) {
   std::string text = "t_s,gear_angle_rad,joint_angle_rad,torque_Nm\n";
   for (int i = 0; i < 40; ++i) text += std::to_string(i * 0.001) + ",0.001,0,1\n";
   folder_.file("b.csv", text);
-  expect_error(torsio(call), kWorkFailed, "not a single sample could be learned from");
+  expect_error(torsio(call), kWorkFailed, "no sample could be used for the adaptation");
   expect_error(torsio(call), kWorkFailed, "28 warming_up");
 }
 
@@ -268,7 +269,7 @@ TEST_F(BrokenCalls, CtrlCDuringAFitLeavesTheOutputUntouched) {
   EXPECT_EQ(contents("m.safetensors"), "precious");
 }
 
-TEST_F(BrokenCalls, CtrlCStopsTheWaitForAPipeAndTellsTheShell) {
+TEST_F(BrokenCalls, CtrlCStopsTheWaitForAPipeAndEndsAsASignal) {
   for (const auto& [signal, exit_code] :
        {std::pair("INT", kInterrupted), std::pair("TERM", 128 + SIGTERM)}) {
     const Outcome outcome = shell(
@@ -301,7 +302,7 @@ TEST_F(BrokenCalls, OnAFullDiskSaySoAndLeaveNothing) {
 
 TEST_F(BrokenCalls, NameTheOutputThatCannotBeAFile) {
   record();
-  // "precious" is no recording: what is refused, is refused before it is read.
+  // "precious" is not a recording: the refusal comes before it is read.
   folder_.file("b.csv", "precious");
   expect_error(torsio("fit b.csv --model linear -o /dev/full"), kCallWasWrong,
                "/dev/full: expected a file to write the model to");
@@ -321,7 +322,7 @@ TEST_F(BrokenCalls, OnAnEndlessPipeStopEarly) {
   EXPECT_NE(outcome.err.find("standard input"), std::string::npos) << outcome.err;
 }
 
-TEST_F(BrokenCalls, PrintTheMappingLineThatMendsAClock) {
+TEST_F(BrokenCalls, PrintTheMappingLineThatCorrectsAClock) {
   std::string text = "t_s,gear_angle_rad,joint_angle_rad,torque_Nm\n";
   for (int i = 0; i < 500; ++i)
     text += std::to_string(i / 7 * 0.0156) + ",0.0" + std::to_string(i % 10) + ",0,1\n";
@@ -354,7 +355,8 @@ TEST_F(BrokenCalls, NeverReplaceWhatTheyRead) {
 
 TEST_F(BrokenCalls, DoNotPassTrainingDataOffAsHeldOut) {
   record();
-  expect_error(torsio("compare a.csv --test a.csv"), kCallWasWrong, "both trained and judged on");
+  expect_error(torsio("compare a.csv --test a.csv"), kCallWasWrong,
+               "used for training and for the scores");
   ASSERT_EQ(torsio("fit a.csv --model linear -o m.safetensors").exit_code, 0);
   const Outcome evaluate = torsio("evaluate m.safetensors a.csv");
   EXPECT_EQ(evaluate.exit_code, 0);

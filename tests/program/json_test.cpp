@@ -10,7 +10,7 @@ namespace {
 
 struct JsonCase {
   const char* name;
-  const char* before;  ///< what the verb reads is made by these calls; one a line
+  const char* before;  ///< calls that make the files that the verb reads; one per line
   const char* call;
 };
 

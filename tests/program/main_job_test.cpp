@@ -77,11 +77,11 @@ TEST_F(MainJob, SearchesStructuresWithinTheTrainingRecords) {
   bool is_ranked = true;
   for (const auto& row : tried) {
     const bool is_ok = row.at("status") == "ok";
-    EXPECT_TRUE(is_ranked || !is_ok) << "a failure stands before " << row;
+    EXPECT_TRUE(is_ranked || !is_ok) << "a failure is ranked before " << row;
     is_ranked = is_ok;
     if (is_ok) winner.emplace(row.at("family"), row.at("variant").dump());
   }
-  // No input tells a rate: its fit fails in each fold, says so, and is not compared.
+  // No input is a rate: its fit fails in each fold with this reason and is not compared.
   EXPECT_FALSE(winner.contains("linear_coulomb"));
   EXPECT_NE(search.out.find("linear_coulomb: failed in 3 of 3 folds"), std::string::npos)
       << search.out;
@@ -216,7 +216,7 @@ TEST_F(MainJob, RunsTheExamples) {
             0);
   const Outcome lacking =
       shell(std::string(TORSIO_EXAMPLES) + "/example_01_estimate_torque current.safetensors");
-  EXPECT_EQ(lacking.out, "t = 0.000 s: fault input_not_finite\n") << "told once, not in silence";
+  EXPECT_EQ(lacking.out, "t = 0.000 s: fault input_not_finite\n") << "the fault is reported once";
   const Outcome control =
       shell(std::string(TORSIO_EXAMPLES) + "/example_04_torque_control joint.safetensors");
   EXPECT_EQ(control.exit_code, 0) << control.err;
@@ -259,7 +259,7 @@ TEST_F(MainJob, RunsFromCodeWhatTheProgramDoes) {
   EXPECT_NE(missing.err.find("none.csv"), std::string::npos) << missing.err;
 }
 
-TEST_F(MainJob, TellsMachinesWhatItSimulated) {
+TEST_F(MainJob, WritesADescriptionOfTheSimulationAsJson) {
   const Outcome outcome = torsio("simulate dfki-28 sweep --duration 2s -o a.csv --json -");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(nlohmann::json::parse(outcome.out).at("samples"), 2000);
@@ -304,7 +304,7 @@ TEST_F(MainJob, RecordsAnActuatorThatFailsAndWears) {
   EXPECT_EQ(json.at("conditions").at("temperature_K"), 313.15);
   EXPECT_NE(contents("a.csv").find("joint_angle_fresh_1"), std::string::npos);
   EXPECT_NE(contents("a.csv").find(",nan,"), std::string::npos);
-  // What stands for the defaults changes nothing.
+  // Options with their default values change nothing.
   ASSERT_EQ(torsio(call + "-o b.csv").exit_code, 0);
   ASSERT_EQ(torsio(call + "--temperature 25degC --warm-up 0K --age 0 -o c.csv").exit_code, 0);
   EXPECT_EQ(contents("c.csv"), contents("b.csv"));

@@ -22,12 +22,12 @@ struct Outcome {
 /// The built program, run through the shell in a folder of its own.
 class Program : public testing::Test {
  protected:
-  /// `arguments` as they would be typed behind "torsio".
+  /// `arguments` as they would be typed after "torsio".
   Outcome torsio(const std::string& arguments) {
     return shell(std::string(TORSIO_PROGRAM) + " " + arguments);
   }
 
-  /// Any shell command; {torsio} stands for the program.
+  /// Any shell command; {torsio} is replaced by the program.
   Outcome shell(std::string command) {
     const std::string name = "{torsio}";
     if (const std::size_t at = command.find(name); at != std::string::npos)

@@ -18,7 +18,7 @@ std::string contents(const fs::path& path) {
   return text.str();
 }
 
-/// The lines between the markers of an example, without the indentation that they stand in.
+/// The lines between the markers of an example, without their common indentation.
 std::string quoted_part(const std::string& example) {
   std::istringstream lines(example);
   std::string part;

@@ -50,7 +50,7 @@ TEST_F(TrackVerb, WarnsOfAModelOfAnotherActuator) {
   ASSERT_EQ(torsio("fit stiff.csv --model linear -o stiff.safetensors").exit_code, 0);
   const Outcome table = torsio("track --actuator dfki-50 --duration 5s --model stiff.safetensors");
   EXPECT_EQ(table.exit_code, 0) << table.err;
-  EXPECT_NE(table.err.find("stiff.safetensors winds the spring 0."), std::string::npos)
+  EXPECT_NE(table.err.find("stiff.safetensors deflects the spring 0."), std::string::npos)
       << table.err;
   EXPECT_NE(table.err.find("was it trained on another actuator?"), std::string::npos) << table.err;
 }

@@ -1,4 +1,5 @@
-// The released LSTM of the ANYdrive joint against the outputs that PyTorch gave (float32) on five input sequences.
+// The released LSTM of the ANYdrive joint against the outputs that PyTorch gave (float32) on five
+// input sequences.
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -16,7 +17,7 @@
 namespace torsio {
 namespace {
 
-/// All recordings stand in one folder.
+/// All recordings are in one folder.
 std::string anydrive(const std::string& file) {
   return data_folder(read_manifest(manifest_path("desr_dualcam"))) + "/anydrive_lstm/" + file;
 }
@@ -31,8 +32,9 @@ ImportedModel imported(bool fold_biases = false) {
 }
 
 struct Deviation {
-  double streaming = 0.0;  ///< of the float32 step from PyTorch's float32
-  double exact = 0.0;      ///< of the imported numbers, evaluated in double, from PyTorch's float32
+  double streaming = 0.0;  ///< deviation of the float32 step from PyTorch's float32
+  double exact =
+      0.0;  ///< deviation of the imported numbers, evaluated in double, from PyTorch's float32
 };
 
 Deviation deviation(bool fold_biases = false) {
@@ -61,7 +63,7 @@ TEST(Anydrive, IsImportedWithoutLoss) {
   EXPECT_LT(deviation().exact, 1.3e-5);
 }
 
-TEST(Anydrive, StreamsWhatPyTorchTells) {
+TEST(Anydrive, StreamsTheOutputOfPyTorch) {
   TORSIO_NEEDS_DATA("desr_dualcam");
   test::on_each_instruction_set([](const char* name) {
     // Those before AVX2 have no fused multiply-adds: the sums round otherwise.

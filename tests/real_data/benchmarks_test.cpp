@@ -14,7 +14,7 @@
 namespace torsio {
 namespace {
 
-/// The scores of one model, fitted as the manifest says, on one test recording.
+/// The scores of one model, fitted as in the manifest, on one test recording.
 ResultRow scored(const Results& results, const std::string& recording) {
   for (const ResultRow& row : results.rows)
     if (row.split == Role::test && row.recording.value_or("") == recording) return row;
@@ -50,7 +50,8 @@ TEST(BoucWenBenchmark, IsSimulatedToThreeMillionthsOfAMetre) {
   EXPECT_LT(scored(results, "multisine").score.metrics.rmse, 1.5e-6);  // 1.2e-6
 }
 
-// The setting of `torsio reproduce public-benchmarks` has twice the units and four times the epochs.
+// The setting of `torsio reproduce public-benchmarks` has twice the units and four times the
+// epochs.
 TEST(BoucWenBenchmark, IsSimulatedByANetworkThatHearsItsPast) {
   TORSIO_NEEDS_DATA("boucwen");
   const Results results =

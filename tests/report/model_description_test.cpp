@@ -33,7 +33,8 @@ TEST(ModelDescription, OfALineNamesItsCoefficientsAndTheirUnits) {
 
 TEST(ModelDescription, SaysWhichZerosTheModelWants) {
   ModelFile file = test::example_model_file(test::example<Linear>());
-  EXPECT_THAT(model_description(file), HasSubstr("wants the zero of joint_angle_rad: set_zero("));
+  EXPECT_THAT(model_description(file),
+              HasSubstr("requires the zero of joint_angle_rad: set_zero("));
   file.settings.zeroed_channels.clear();
   EXPECT_THAT(model_description(file), testing::Not(HasSubstr("zero")));
 }
@@ -44,7 +45,7 @@ TEST(ModelDescription, DoesNotCallAnOpenRangeTrainedOn) {
   file.settings.ranges.highest[0] = kOpenRange;
   const std::string text = model_description(file);
   EXPECT_THAT(text, testing::Not(HasSubstr("e+300")));
-  EXPECT_THAT(text, HasSubstr("open: nobody said what the model was trained on"));
+  EXPECT_THAT(text, HasSubstr("open: the range of the training data is not known"));
 }
 
 TEST(ModelDescription, StatesAKernelAsAnExpressionWithItsNumbers) {

@@ -22,7 +22,7 @@ std::vector<std::string> lines_of(const std::string& text) {
 TEST(TerminalPlot, DrawsARisingLineFromBottomLeftToTopRight) {
   const std::vector<double> x{0.0, 1.0, 2.0, 3.0};
   const auto lines = lines_of(terminal_plot({{"", x, x}}, {"x", "y"}, 8, 4));
-  // Line 0 names y; the plot's rows follow, top first, each of 8 characters of 3 bytes behind "|".
+  // Line 0 names y; the plot's rows follow, top first, each of 8 characters of 3 bytes after "|".
   const auto dots_at = [&](std::size_t row, std::size_t column) {
     const std::string& line = lines[1 + row];
     return line.substr(line.find('|') + 1 + 3 * column, 3) != "\u2800";

@@ -20,8 +20,8 @@ namespace {
 
 using test::error_message;
 
-/// What the injector makes of a gear encoder that turns at 1 rad/s and a load cell at 125 Hz that
-/// feels 1 Nm more each second, tick by tick at 1 kHz.
+/// The output of the injector for a gear encoder that turns at 1 rad/s and a load cell at 125 Hz
+/// whose torque increases by 1 Nm/s, tick by tick at 1 kHz.
 std::vector<Measurement> seen(const std::vector<ScheduledFault>& faults, std::size_t ticks = 100) {
   FaultInjector injector({faults}, data_sheet("dfki-50"));
   std::vector<Measurement> all(ticks);
@@ -44,7 +44,7 @@ ScheduledFault gear(FaultKind kind, double amount = 0.0) {
           .amount = amount};
 }
 
-TEST(FaultInjector, LastsAsLongAsItIsToldAndLeavesNothingBehind) {
+TEST(FaultInjector, LastsAsLongAsSpecifiedAndHasNoLaterEffect) {
   for (const FaultKind kind :
        {FaultKind::freeze, FaultKind::jump, FaultKind::drift, FaultKind::sign_flip,
         FaultKind::quantised, FaultKind::dropout, FaultKind::nan}) {
@@ -288,7 +288,7 @@ TEST(SimulateWithFaults, LogsWhatTheSensorSaysAndKeepsTheTruth) {
 
 TEST(SimulateWithFaults, TheLoopSeesThem) {
   const Recording sound = simulate(faulty_sweep({}));
-  // The sweep's loop stands on the rotor's encoder: 12 rad too much there is 0.1 rad at the joint.
+  // The sweep's loop uses the rotor's encoder: an error of 12 rad there is 0.1 rad at the joint.
   const Recording faulty = simulate(faulty_sweep(
       {{.what = "motor_angle_rad", .kind = FaultKind::jump, .start_s = 1.0, .amount = 12.0}}));
   EXPECT_NEAR(faulty.channel("joint_angle_rad").values.back(),

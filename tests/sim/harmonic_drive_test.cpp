@@ -40,7 +40,7 @@ PlantParameters ideal(const std::string& name) {
   return parts;
 }
 
-/// Of the tube's twist, which the rotor starts with.
+/// Frequency of the tube's twist, with which the rotor starts.
 double mode_Hz(const PlantParameters& parts, bool is_motor_held, bool is_locked) {
   Plant plant(parts);
   const double twist_rad = 1e-3;
@@ -151,7 +151,7 @@ TEST(ImpedanceLoop, RefusesOtherActuatorsAndImpossibleGains) {
   EXPECT_THROW(static_cast<void>(make("harmonic-drive", std::nan(""))), Error);
 }
 
-// What the recordings say.
+// Properties of the recordings.
 
 using Values = std::vector<double>;
 
@@ -182,7 +182,7 @@ double largest(const Values& values) {
   return std::abs(*std::ranges::max_element(values, {}, [](double x) { return std::abs(x); }));
 }
 
-/// What the best straight line leaves, as a share of the largest.
+/// RMSE of the linear least-squares fit, as a share of the largest value.
 double share_off_the_line(const Values& x, const Values& y) {
   return test::straight_line(x, y).rmse / largest(y);
 }

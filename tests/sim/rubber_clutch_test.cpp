@@ -67,7 +67,7 @@ double range(std::span<const double> of) {
   return *high - *low;
 }
 
-/// What a sine's last periods tell.
+/// Results from the last periods of a sine.
 struct Loop {
   double width_Nm = 0.0;          ///< at the middle
   double stiffness_Nm_rad = 0.0;  ///< from end to end
@@ -142,7 +142,8 @@ TEST(RubberClutch, TorqueSensorSeesTheDropFromStaticToSlidingFriction) {
   double drop_Nm = 0.0;
   for (std::size_t i = 1; i < 100; ++i) drop_Nm = std::max(drop_Nm, torque[i - 1] - torque[i]);
   EXPECT_GT(drop_Nm, 0.8 * (kStatic_Nm - kSliding_Nm));
-  for (std::size_t i = 110; i < 200; ++i) EXPECT_LT(torque[i], kSliding_Nm) << "the stand relaxes";
+  for (std::size_t i = 110; i < 200; ++i)
+    EXPECT_LT(torque[i], kSliding_Nm) << "the torque relaxes at rest";
 }
 
 TEST(RubberClutch, SticksAgainOnReversal) {
@@ -240,7 +241,7 @@ TEST(RubberClutch, RubberIsStifferWhenTurnedFaster) {
 TEST(RubberClutch, HeldAngleRelaxes) {
   const Recording recording = record("hold");
   const auto& torque = values(recording, "truth_torque_Nm");
-  EXPECT_GT(torque[46] - torque[96], 0.003) << "one second behind the ramp";
+  EXPECT_GT(torque[46] - torque[96], 0.003) << "one second after the ramp";
   EXPECT_LT(std::abs(torque[1000] - torque[1500]), 1e-4) << "relaxed";
   EXPECT_NEAR(deg_from_rad(values(recording, "input_angle_rad").back()), 9.0, 0.02);
 }
@@ -285,7 +286,7 @@ TEST(RubberClutch, CollisionTouchesAtTheWallAndLetsGo) {
   EXPECT_EQ(contact.back(), 0.0);
 }
 
-/// The input follows a reference, the output clamped; `after_step` is called behind each.
+/// The input follows a reference, the output clamped; `after_step` is called after each step.
 template <class Reference, class AfterStep>
 void follow(Plant& plant, Reference reference, double duration_s, double dt_s,
             const AfterStep& after_step) {
@@ -304,8 +305,8 @@ void follow(Plant& plant, Reference reference, double duration_s, double dt_s,
 
 struct Books {
   double hysteretic_loss_J = 0.0;
-  double largest_fall_J = 0.0;  ///< of that loss below what it was before
-  double residual_share = 0.0;  ///< of the throughput
+  double largest_fall_J = 0.0;  ///< largest decrease of that loss
+  double residual_share = 0.0;  ///< residual as a share of the throughput
 };
 template <class Reference>
 Books books(const Reference& reference, double duration_s, double dt_s) {

@@ -22,7 +22,7 @@ using test::moments;
 constexpr double kRate_Hz = 1000.0;
 constexpr int kReadings = 60000;
 
-/// One encoder of a sheet: what it tells and what is true.
+/// One encoder of a sheet: measured and true angle.
 struct EncoderUnderTest {
   std::string_view name;
   SheetValue SensorSheet::*bits;
@@ -81,7 +81,7 @@ TEST(SensorSet, EncoderErrorsAreJitterAndQuantisationOnEverySheet) {
   for (const DataSheet& sheet : data_sheets()) expect_encoder_errors(sheet);
 }
 
-TEST(SensorSet, EncodersTellTheZeroErrorsOfThePiece) {
+TEST(SensorSet, EncodersHaveTheZeroErrorsOfTheSpecimen) {
   for (const DataSheet& sheet : data_sheets())
     expect_encoder_errors(data_sheet(std::string(sheet.name) + "#05"));
 }

@@ -18,8 +18,8 @@
 #include "torsio/signal/excitation.hpp"
 #include "torsio/sim/experiment.hpp"
 
-// Tracking of a torque. What specification 6 gives are MAD and STD of |e| of a controller whose
-// straight line was fitted to sweeps, with 13 Nm on dfki-50 and 20 Nm on dfki-120.
+// Tracking of a torque. Specification 6 gives MAD and STD of |e| of a controller whose
+// linear model was fitted to sweeps, with 13 Nm on dfki-50 and 20 Nm on dfki-120.
 
 namespace torsio {
 namespace {
@@ -30,7 +30,7 @@ constexpr std::size_t kSettled = 2000;
 /// [Nm]
 struct TrackingError {
   double mad = 0.0;
-  double std = 0.0;  ///< of |e|
+  double std = 0.0;  ///< standard deviation of |e|
   double rmse = 0.0;
 };
 
@@ -143,7 +143,7 @@ TEST(Chirp, LeverSwingsFreely) {
   EXPECT_LT(swing_deg(free), 60.0);
   const TrackingError error =
       error_of(wanted_chirp(13.0, free.size()), free.channel("truth_torque_Nm").values);
-  EXPECT_NEAR(error.mad, 1.47, 0.15);  // the prototype's own line: 1.29
+  EXPECT_NEAR(error.mad, 1.47, 0.15);  // the prototype's linear model: 1.29
 }
 
 TEST(Chirp, RefusesWhatTipsTheLeverOver) {
@@ -166,8 +166,8 @@ TEST(Chirp, RefusesWhatTipsTheLeverOver) {
   EXPECT_NE(message(spec).find("at most 17.5 Nm"), std::string::npos);
 }
 
-// The references have equal RMS for every seed. The friction of dfki-28's spring is so large a part
-// of its torque that the two answers differ.
+// The references have equal RMS for every seed. The two results differ because the friction of
+// dfki-28's spring is a large part of its torque.
 TEST(RandomWalk, HasTheRmsOfTheChirp) {
   for (const DataSheet& sheet : test::series_elastic_sheets()) {
     const std::string actuator(sheet.name);

@@ -14,7 +14,7 @@
 namespace torsio {
 namespace {
 
-Recording estimate(const std::string& actuator, const std::string& experiment, double duration_s) {
+Recording simulated(const std::string& actuator, const std::string& experiment, double duration_s) {
   return simulate({.actuator = actuator,
                    .experiment = experiment,
                    .duration_s = duration_s,
@@ -51,7 +51,7 @@ double range(const std::vector<double>& of) {
 }
 
 TEST(Truth, TheSlipElementsOfASpringAddUpToItsFriction) {
-  const Recording recording = estimate("dfki-50", "static-cycle", 6.0);
+  const Recording recording = simulated("dfki-50", "static-cycle", 6.0);
   const Sum slip = sum_of(recording, "spring_slip");
   EXPECT_EQ(slip.parts, 4);
   EXPECT_GT(range(slip.of), 0.5);
@@ -59,7 +59,7 @@ TEST(Truth, TheSlipElementsOfASpringAddUpToItsFriction) {
 }
 
 TEST(Truth, SlipElementsAndBranchesOfRubberAddUpToItsFriction) {
-  const Recording recording = estimate("rubber-clutch", "slow-cycles", 20.0);
+  const Recording recording = simulated("rubber-clutch", "slow-cycles", 20.0);
   Sum sum = sum_of(recording, "rubber_slip");
   const Sum branches = sum_of(recording, "rubber_branch");
   EXPECT_EQ(sum.parts, 3);
@@ -81,11 +81,11 @@ double viscosity(const Recording& recording, const std::string& place, const std
 
 TEST(Truth, FrictionIsTheBristleAndWhatIsViscous) {
   // The friction is that of the speed before the step: equal to a percent or so.
-  const Recording sweep = estimate("dfki-120", "sweep", 4.0);
+  const Recording sweep = simulated("dfki-120", "sweep", 4.0);
   const double motor = plant_parameters(data_sheet("dfki-120")).rotor_friction.viscous_Nms_rad;
   EXPECT_GT(range(values(sweep, "motor_bristle_Nm")), 0.01);
   EXPECT_NEAR(viscosity(sweep, "motor", "motor"), motor, 0.02 * motor);
-  const Recording drive = estimate("harmonic-drive", "human-torque", 4.0);
+  const Recording drive = simulated("harmonic-drive", "human-torque", 4.0);
   const double generator =
       plant_parameters(data_sheet("harmonic-drive")).middle_friction.viscous_Nms_rad;
   EXPECT_GT(range(values(drive, "wave_generator_bristle_Nm")), 0.01);
@@ -93,8 +93,8 @@ TEST(Truth, FrictionIsTheBristleAndWhatIsViscous) {
   EXPECT_FALSE(drive.has("truth_motor_bristle_Nm"));
 }
 
-TEST(Truth, EncodersTellTheTrueAnglesToAFewCodes) {
-  const Recording recording = estimate("dfki-50", "sweep", 4.0);
+TEST(Truth, EncodersMeasureTheTrueAnglesToAFewCodes) {
+  const Recording recording = simulated("dfki-50", "sweep", 4.0);
   const double code_rad = rad_from_deg(0.1);
   for (const char* body : {"gear", "joint"}) {
     const auto& measured = recording.channel(std::string(body) + "_angle_rad").values;
@@ -104,8 +104,8 @@ TEST(Truth, EncodersTellTheTrueAnglesToAFewCodes) {
   }
 }
 
-TEST(Truth, TheClutchTellsHowFarItSlipped) {
-  const Recording recording = estimate("rubber-clutch", "slip", 40.0);
+TEST(Truth, TheClutchReportsItsSlip) {
+  const Recording recording = simulated("rubber-clutch", "slip", 40.0);
   const auto& slip = values(recording, "clutch_slip_rad");
   const auto& is_slipping = values(recording, "clutch_is_slipping_1");
   EXPECT_GT(range(slip), 0.05);
@@ -119,10 +119,10 @@ TEST(Truth, TheClutchTellsHowFarItSlipped) {
 }
 
 TEST(Truth, AnUnbondedCouplingHasTwoChainsAndACreepingGlue) {
-  const Recording bonded = estimate("elastomer", "triangles", 3.0);
+  const Recording bonded = simulated("elastomer", "triangles", 3.0);
   EXPECT_TRUE(bonded.has("truth_coupling_creep3_rad"));
   EXPECT_FALSE(bonded.has("truth_coupling_positive_creep1_rad"));
-  const Recording unbonded = estimate("elastomer:unbonded", "triangles", 3.0);
+  const Recording unbonded = simulated("elastomer:unbonded", "triangles", 3.0);
   EXPECT_GE(*std::ranges::min_element(values(unbonded, "coupling_positive_creep1_rad")), -1e-15);
   EXPECT_LE(*std::ranges::max_element(values(unbonded, "coupling_negative_creep1_rad")), 1e-15);
   EXPECT_GT(range(values(unbonded, "coupling_positive_creep1_rad")), 0.0);
@@ -138,7 +138,7 @@ TEST(Truth, TemperatureIsThatOfTheConditions) {
               1e-9);
 }
 
-TEST(Truth, EveryActuatorTellsFiniteNumbersAndNoneUnasked) {
+TEST(Truth, EveryActuatorHasFiniteNumbersOnlyIfRequested) {
   for (const std::string& name : test::every_actuator()) {
     const ExperimentSpec plain{.actuator = name, .experiment = "static-cycle", .duration_s = 1.0};
     ExperimentSpec with = plain;

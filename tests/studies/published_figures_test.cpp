@@ -11,8 +11,8 @@
 #include "studies/study.hpp"
 #include "studies/study_report.hpp"
 
-// docs/results holds the output of commands: what it prints as a figure of a paper must be the figure of
-// paper_figures.csv, which is compiled into `StudyInfo::published`.
+// docs/results holds the output of commands: what it prints as a figure of a paper must be the
+// figure of paper_figures.csv, which is compiled into `StudyInfo::published`.
 
 namespace torsio {
 namespace {
@@ -22,7 +22,7 @@ const std::filesystem::path kResults = std::filesystem::path(TORSIO_SOURCE) / "d
 /// (condition, model, title of the column) -> text
 using Cells = std::map<std::vector<std::string>, std::string>;
 
-/// Of all files in docs/results, one after the other.
+/// The lines of all files in docs/results, one after the other.
 std::vector<std::string> lines_of_results() {
   std::vector<std::string> lines;
   for (const auto& entry : std::filesystem::directory_iterator(kResults)) {
@@ -61,7 +61,8 @@ std::string cell_until(const std::string& line, std::size_t end) {
   return line.substr(line.rfind(' ', end - 1) + 1, end - 1 - line.rfind(' ', end - 1));
 }
 
-/// The figures of papers in the printed table of a study; no entry if the document does not have it.
+/// The figures of papers in the printed table of a study; no entry if the document does not have
+/// it.
 Cells printed(const std::vector<std::string>& lines, std::string_view study, bool& is_found) {
   Cells cells;
   auto line = lines.begin();

@@ -49,7 +49,7 @@ constexpr PaperFigure kFigure{.paper = "009",
                               .unit = "Nm",
                               .value = 0.666};
 
-TEST(Studies, OfSpringModelsJudgeEveryModelOnTheNewSweep) {
+TEST(Studies, OfSpringModelsScoreEveryModelOnTheNewSweep) {
   const Study study = run_study(find_study("001-models"), kQuick);
   ASSERT_EQ(study.plants.size(), 1U);
   EXPECT_EQ(study.plants.front().fingerprint.size(), 16U);
@@ -100,8 +100,8 @@ TEST(Studies, OfTheRubberSensorSayWhetherPgprBeatsALine) {
   EXPECT_EQ(arx.runs, 2U);
   EXPECT_LT(arx.one_step, 0.5 * arx.rmse);
   EXPECT_GT(arx.max_abs, arx.rmse);
-  EXPECT_LT(arx.rmse, row_of(study, "multisine", "line").rmse);
-  EXPECT_TRUE(std::isnan(row_of(study, "multisine", "line").one_step));
+  EXPECT_LT(arx.rmse, row_of(study, "multisine", "linear").rmse);
+  EXPECT_TRUE(std::isnan(row_of(study, "multisine", "linear").one_step));
   const ErrorRow& proposed = row_of(study, "multisine", "improved PGPR");
   EXPECT_EQ(published(proposed, RowQuantity::rmse_percent), "1.86");
   EXPECT_EQ(published(proposed, RowQuantity::max_percent), "5.24");
@@ -128,7 +128,7 @@ TEST(Studies, OfTheRubberSensorAreWorseOnceTheClutchHasSlipped) {
   }
 }
 
-TEST(Studies, OfAllFamiliesSayWhereGreyBoxStandsAndRankNoFailure) {
+TEST(Studies, OfAllFamiliesCompareGreyBoxWithTheBestAndRankNoFailure) {
   const StudyInfo& info = find_study("model-comparison");
   const Study study = run_study(info, kQuick);
   const auto& table = std::get<ComparisonTable>(study.table);
@@ -151,7 +151,7 @@ TEST(Studies, OfAllFamiliesSayWhereGreyBoxStandsAndRankNoFailure) {
   EXPECT_THAT(study_text(info, study), HasSubstr("is lowest or within 5 % of the lowest in"));
 }
 
-TEST(Studies, WithAModelToJudgeTellRatiosAndWhyARowIsNotRanked) {
+TEST(Studies, WithASubjectReportRatiosAndWhyARowIsNotRanked) {
   const StudyInfo info{"009-x", "all", "a title", nullptr};
   const auto row = [](const char* model, double rmse) {
     ComparisonRow made;
@@ -309,12 +309,13 @@ TEST(Studies, OfASensorShowErrorsInPercentOfItsFullScaleAndWhatDiverged) {
   network.max_abs = 0.04;
   network.one_step = 0.002;
   network.diverged = 2;
-  const Study study{.protocol = "a protocol",
-                    .unit = "Nm",
-                    .options = {},
-                    .table = ErrorTable{.rows = {network, error_row("multisine", "line", 3, 0.02)},
-                                        .full_scale = 0.5},
-                    .notes = {"a note"}};
+  const Study study{
+      .protocol = "a protocol",
+      .unit = "Nm",
+      .options = {},
+      .table = ErrorTable{.rows = {network, error_row("multisine", "linear", 3, 0.02)},
+                          .full_scale = 0.5},
+      .notes = {"a note"}};
   const std::string text = study_text(info, study);
   EXPECT_THAT(text,
               testing::ContainsRegex(

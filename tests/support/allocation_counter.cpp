@@ -3,7 +3,7 @@
 #include <cerrno>
 #include <cstdlib>
 
-// glibc's own functions behind the names that are replaced here.
+// glibc's functions whose names are replaced here.
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);

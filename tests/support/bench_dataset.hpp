@@ -53,7 +53,7 @@ inline void add_record(Dataset& dataset, Recording recording, Role role) {
   dataset.records.push_back({std::move(recording), whole_record(samples, role)});
 }
 
-/// Two records to learn from, one to be judged on.
+/// Two recordings for training, one for the test.
 inline Dataset bench_dataset() {
   Dataset dataset;
   add_record(dataset, bench_recording("first", {.seed = 1}), Role::train);

@@ -12,7 +12,7 @@
 
 namespace torsio::test {
 
-/// Of parameters whose family is known only at run time; defined in support/dump_any.hpp.
+/// The dump of parameters whose family is known only at run time; defined in support/dump_any.hpp.
 std::string dump(const AnyParameters& parameters);
 
 /// Every leaf of a set of parameters, written out exactly.

@@ -8,7 +8,7 @@ namespace {
 
 thread_local std::size_t calls = 0;
 
-/// glibc's own function behind a name that is replaced here.
+/// glibc's function whose name is replaced here.
 template <class Function>
 Function* real(const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));

@@ -7,7 +7,7 @@ namespace torsio::test {
 
 /// Calls of this thread so far into what takes a lock or waits for another thread: pthread's
 /// mutexes, conditions and read-write locks, semaphores. Counts only in programs that are linked
-/// with lock_counter.cpp, which stands in front of them: not under a sanitizer, which does so itself.
+/// with lock_counter.cpp, which replaces them: not under a sanitizer, which replaces them, too.
 [[nodiscard]] std::size_t lock_calls() noexcept;
 
 /// Such calls while `work` runs.

@@ -14,11 +14,11 @@ namespace torsio::test {
 
 struct NetworkShape {
   std::size_t inputs = 2;
-  std::vector<std::size_t> units = {8};  ///< of the recurrent layers
-  std::vector<std::size_t> hidden = {};  ///< of the dense layers before the last
+  std::vector<std::size_t> units = {8};  ///< units of the recurrent layers
+  std::vector<std::size_t> hidden = {};  ///< units of the dense layers before the last
   Activation activation = Activation::tanh;
   std::size_t warm_up_samples = 0;
-  bool biases_apart = false;  ///< of an LSTM
+  bool biases_apart = false;  ///< separate biases of an LSTM
 };
 
 /// Weights that keep signals of the order of one; 1 kHz.

@@ -46,7 +46,7 @@ inline std::vector<double> deflection_deg(const Recording& recording) {
   return deflection;
 }
 
-/// Of the torque [Nm] over the deflection [deg], the first two seconds left out.
+/// Linear fit of the torque [Nm] over the deflection [deg], without the first two seconds.
 inline Line spring_line(const Recording& recording) {
   constexpr std::size_t kFirst = 2000;
   const std::vector<double> x = deflection_deg(recording);

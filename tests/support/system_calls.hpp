@@ -18,8 +18,8 @@
 
 namespace torsio::test {
 
-/// From here on any other system call of this thread kills the process with SIGSYS. Other threads go
-/// on as before.
+/// From here on any other system call of this thread kills the process with SIGSYS. Other threads
+/// continue as before.
 /// @returns false if the kernel does not take the filter
 template <std::size_t kCount>
 bool allow_only(const std::array<unsigned, kCount>& allowed) {
@@ -47,9 +47,9 @@ inline bool allow_only_clock_calls() {
 /// `_exit`: who blocks, sleeps, reads or writes is killed.
 inline bool allow_no_calls() { return allow_only(std::to_array<unsigned>({SYS_exit_group})); }
 
-/// What a process of its own does in `work()` besides computing: "" if it asks nothing of the heap,
-/// of a lock or of the kernel and `work` returns true. A kernel that takes no filter is asked
-/// nothing (`SystemCalls.AreSeenByTheKernelsFilter` says so).
+/// What a separate process calls in `work()` besides computing: "" if it calls neither the heap,
+/// nor a lock, nor the kernel, and `work` returns true. Also "" if the kernel takes no filter
+/// (which `SystemCalls.AreSeenByTheKernelsFilter` reports).
 template <class Work>
 std::string besides_computing(Work&& work) {
   enum Found : int { nothing, heap, locks, wrong };

@@ -16,7 +16,7 @@ namespace torsio {
 enum class Origin : char {
   printed = 'P',  ///< printed in a paper
   derived = 'D',  ///< computed from printed numbers
-  assumed = 'A',  ///< engineering judgement
+  assumed = 'A',  ///< engineering estimate
 };
 
 /// A number and where it comes from.
@@ -33,14 +33,14 @@ constexpr SheetValue assumed(double value) { return {value, Origin::assumed}; }
 struct RatingSheet {
   SheetValue torque_Nm;  ///< at the joint
   SheetValue current_A;
-  SheetValue speed_rad_s;  ///< of the joint
+  SheetValue speed_rad_s;  ///< speed of the joint
 };
 
 struct MotorSheet {
   SheetValue torque_constant_Nm_A;
   SheetValue rotor_inertia_kg_m2;
   SheetValue winding_resistance_Ohm;
-  SheetValue viscous_Nms_rad = assumed(0.0);  ///< of the rotor's own bearing
+  SheetValue viscous_Nms_rad = assumed(0.0);  ///< friction of the rotor's bearing
   SheetValue supply_V;
   SheetValue peak_current_ratio = assumed(2.0);  ///< over the rated current
   SheetValue current_time_constant_s = assumed(0.5e-3);
@@ -61,7 +61,7 @@ struct GearSheet {
   SheetValue error_4_phase_rad = assumed(1.1);
 };
 
-/// A torsion tube behind a first reduction that neither errs nor loses.
+/// A torsion tube after an ideal first reduction.
 struct TubeSheet {
   SheetValue ratio;
   SheetValue stiffness_Nm_rad;
@@ -71,13 +71,13 @@ struct TubeSheet {
 /// A planetary gearhead and a cable drive that end in a friction clutch.
 struct ClutchSheet {
   SheetValue ratio;
-  SheetValue stiffness_Nm_rad;  ///< of the cable
+  SheetValue stiffness_Nm_rad;  ///< stiffness of the cable
   SheetValue damping_Nms_rad;
   SheetValue static_torque_Nm;
   SheetValue sliding_ratio;  ///< sliding over static torque
 };
 
-/// Dry and viscous friction at the gear's input, as felt at its output.
+/// Dry and viscous friction at the gear's input, referred to its output.
 struct FrictionSheet {
   SheetValue coulomb_Nm;
   SheetValue viscous_Nms_rad;
@@ -130,7 +130,7 @@ struct RubberSheet {
   SheetValue elastic_share;
   SheetValue branch_share;  ///< each branch's stiffness over the spring's
   std::array<SheetValue, 3> branch_relaxation_s;
-  SheetValue slip_Nm;  ///< of each element
+  SheetValue slip_Nm;  ///< slip torque of each element
   std::array<SheetValue, 3> break_away_rad;
 };
 
@@ -145,9 +145,10 @@ struct SensorSheet {
   SheetValue motor_encoder_bits = printed(19.0);
   SheetValue middle_encoder_bits = printed(19.0);
   SheetValue joint_encoder_bits = printed(19.0);
-  SheetValue twist_sensor_bits = assumed(0.0);  ///< of the second stage's twist; 0: there is none
+  SheetValue twist_sensor_bits =
+      assumed(0.0);  ///< sensor of the second stage's twist; 0: there is none
   SheetValue encoder_jitter_lsb = assumed(0.5);
-  SheetValue motor_zero_rad = assumed(0.0);  ///< what the encoder tells too much
+  SheetValue motor_zero_rad = assumed(0.0);  ///< zero error of the encoder
   SheetValue middle_zero_rad = assumed(0.0);
   SheetValue joint_zero_rad = assumed(0.0);
   SheetValue twist_zero_rad = assumed(0.0);
@@ -159,7 +160,7 @@ struct SensorSheet {
   SheetValue log_rate_Hz = printed(1000.0);
 };
 
-/// Whose bench an actuator stands on: what can be done to it, and what is logged.
+/// The bench of an actuator: its experiments and its logged channels.
 enum class ActuatorFamily { series_elastic, elastomer, rubber_clutch, harmonic_drive };
 
 /// Everything that the plant and the sensors of one actuator are built from, in SI.
@@ -173,12 +174,12 @@ struct DataSheet {
   std::string_view title;
   std::array<std::string_view, 3> variants = {};  ///< the first is the default; empty: no more
   std::string_view variant = {};                  ///< one of them
-  std::optional<unsigned> serial = {};            ///< none: the nominal piece
+  std::optional<unsigned> serial = {};            ///< none: the nominal actuator
 
   RatingSheet rating;
   MotorSheet motor;
   std::variant<GearSheet, TubeSheet, ClutchSheet> first;
-  FrictionSheet friction;  ///< of the gear and what drives it
+  FrictionSheet friction;  ///< friction of the gear and its drive
   SheetValue middle_inertia_kg_m2;
   std::variant<SpringSheet, ElastomerSheet, RubberSheet, GearSheet> second;
   JointSheet joint;
@@ -188,7 +189,7 @@ struct DataSheet {
 /// One line of a printed data sheet.
 struct SheetRow {
   std::string name;
-  std::string_view unit;  ///< as a person writes it; empty for a plain number
+  std::string_view unit;  ///< as printed; empty for a dimensionless number
   SheetValue value;
 };
 
@@ -199,15 +200,15 @@ struct SheetRow {
 [[nodiscard]] std::span<const DataSheet> data_sheets() noexcept;
 
 /// @param name NAME, NAME:VARIANT, NAME#SERIAL or NAME:VARIANT#SERIAL, as "dfki-50:bouc-wen#03". A
-/// serial number is a piece of its own, with the spread of specification 4.6; the same one always
-/// gives the same piece.
+/// serial number names a specimen with the spread of specification 4.6; the same one always
+/// gives the same specimen.
 /// @throws UsageError that lists the known names or variants.
 [[nodiscard]] DataSheet data_sheet(std::string_view name);
 
-/// @returns what `data_sheet` takes: the variant only where it is not the default
+/// @returns the name for `data_sheet`, with the variant only if it is not the default
 [[nodiscard]] std::string full_name(const DataSheet& sheet);
 
-/// Identifies what is simulated: a hash of the full name, variant included, and of every number.
+/// Identifies a data sheet: a hash of the full name, including the variant, and of every number.
 /// @returns 16 hexadecimal digits, the same on every platform
 [[nodiscard]] std::string sheet_hash(const DataSheet& sheet);
 

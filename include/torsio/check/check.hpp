@@ -15,26 +15,26 @@ enum class Verdict : std::uint8_t { pass, warn, fail };
 
 [[nodiscard]] std::string_view name(Verdict verdict) noexcept;
 
-/// What one check has to say about one recording, or about all of them together.
+/// The result of one check for one recording, or for all of them together.
 struct Finding {
   Verdict verdict = Verdict::pass;
   std::string check;      ///< clock, gaps, delay, sign, ...
   std::string recording;  ///< empty: the recordings together
-  std::string message;    ///< what was measured
+  std::string message;    ///< the measured values
   std::string advice;     ///< what to do; empty if nothing
 };
 
-/// Can a torque model be learned from these recordings? Looks at each channel that the inputs need
-/// and at the target: values that are missing, constant or saturated; frozen sensors; coarse codes;
-/// units; gaps and slips; the delay and the sign between the first input and the target; their
-/// relation early and late in a record; reversals and speeds; offsets that differ between records; a
-/// target computed from an input; test data outside the training range. Every check gives at least
-/// one finding, PASS ones included, in a fixed order.
+/// Checks whether a torque model can be trained on these recordings. Looks at each channel of the
+/// inputs and at the target: values that are missing, constant or saturated; frozen sensors; coarse
+/// codes; units; gaps and slips; the delay and the sign between the first input and the target;
+/// their relation early and late in a record; reversals and speeds; offsets that differ between
+/// records; a target computed from an input; test data outside the training range. Every check
+/// reports at least one finding, PASS ones included, in a fixed order.
 [[nodiscard]] std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec);
 
 /// The unit mistake ("degrees and radians") that makes a recording's slope of target over first
 /// input differ from the one that a model was trained on, `EstimatorSettings::fallback`; empty if
-/// they differ by no unit's factor, or the recording tells no slope.
+/// they do not differ by a unit's factor, or the recording has no slope.
 [[nodiscard]] std::string unit_doubt(const Recording& recording, const EstimatorSettings& trained);
 
 }  // namespace torsio

@@ -4,7 +4,7 @@
 
 namespace torsio {
 
-/// The stamps of a log make no uniform clock; the advice names the mapping line that mends them.
+/// The time stamps of a log are not uniform; the advice gives the mapping line that corrects them.
 class ClockError : public Error {
  public:
   using Error::Error;

@@ -15,8 +15,8 @@ enum class Role : std::uint8_t { train, validation, test };
 
 [[nodiscard]] std::string_view name(Role role) noexcept;
 
-/// Samples [begin, end) of a record and what they are for. Samples in no segment (an embargo) are
-/// used for nothing, but a filter or a hidden state runs through them.
+/// Samples [begin, end) of a recording and their role. Samples in no segment (an embargo) are
+/// not used for training or scores, but filters and hidden states are run through them.
 struct Segment {
   std::size_t begin = 0;
   std::size_t end = 0;
@@ -31,7 +31,7 @@ struct DatasetRecord {
   [[nodiscard]] bool has_role(Role role) const noexcept;
 };
 
-/// Recordings with a role each, on one sample rate. Splits are by record or by contiguous block,
+/// Recordings with their roles, at one sample rate. Splits are by recording or by contiguous block,
 /// never by shuffled sample.
 struct Dataset {
   std::vector<DatasetRecord> records;
@@ -42,11 +42,11 @@ struct Dataset {
   /// Channels that the target was computed from ("torque from motor current"): a leak if used as an
   /// input.
   std::vector<std::string> target_computed_from;
-  /// Measured samples at the start of each recording that a model which feeds back is told; they
+  /// Measured samples at the start of each recording that initialise a model with memory; they
   /// are not scored.
   std::size_t initialise_samples = 50;
-  std::string
-      label;  ///< what the split means, printed with its scores: "interpolation within one cycle"
+  /// Description of the split, printed with its scores: "interpolation within one cycle".
+  std::string label;
 
   [[nodiscard]] double sample_rate_Hz() const;  ///< @throws Error if empty
   [[nodiscard]] bool has_role(Role role) const noexcept;
@@ -59,8 +59,8 @@ struct Dataset {
 
 /// Cuts a record into `blocks` blocks of equal length and gives every `test_every`-th (the last of
 /// each group) the role test, the others train. `embargo_samples` are left out of the training side
-/// of every border between the roles.
-/// @throws Error if a block would not outlast the embargo.
+/// at every border between the roles.
+/// @throws Error if a block is not longer than the embargo.
 [[nodiscard]] std::vector<Segment> interleaved_blocks(std::size_t samples, std::size_t blocks,
                                                       std::size_t test_every,
                                                       std::size_t embargo_samples);

@@ -10,15 +10,16 @@
 
 namespace torsio {
 
-/// What a user says beside the files.
+/// Options of a user, in addition to the files.
 struct LoadOptions {
   std::optional<std::string> mapping;  ///< file; replaces the mapping of a manifest
   /// All records are brought to this rate; it is also the clock of a log that has none.
   std::optional<double> rate_Hz;
   std::string target;  ///< empty: the manifest's, else torque_Nm
-  /// Of what is given none: a CSV file of the first list, a manifest's file without role or split.
+  /// Role where none is given: a CSV file of the first list, a manifest's file without role or
+  /// split.
   Role role = Role::train;
-  Progress progress = {};  ///< told while a file is read
+  Progress progress = {};  ///< is called while a file is read
 };
 
 /// Loads a CSV file, plain or gzipped, or every file of a manifest (`.yaml`).
@@ -33,7 +34,7 @@ struct LoadOptions {
                                    const std::vector<std::string>& test_files,
                                    const LoadOptions& options = {});
 
-/// The dataset of a manifest that stands in no file.
+/// The dataset of a manifest that was not read from a file.
 [[nodiscard]] Dataset load_manifest(const Manifest& manifest, const LoadOptions& options = {});
 
 }  // namespace torsio

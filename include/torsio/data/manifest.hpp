@@ -16,11 +16,11 @@ namespace torsio {
 struct SplitRule {
   std::size_t interleaved_blocks = 0;
   std::size_t test_every = 0;
-  double contiguous = 0.0;  ///< share of the record that trains
+  double contiguous = 0.0;  ///< share of the recording that is used for training
   double embargo_s = 0.0;
 };
 
-/// A mapping that stands in the manifest, or in a file of its own.
+/// A mapping in the manifest, or in a separate file.
 struct MappingChoice {
   std::string file;  ///< relative to the manifest; empty: `here`
   Mapping here;
@@ -28,7 +28,7 @@ struct MappingChoice {
 
 struct ManifestFile {
   std::string file;
-  std::string name;  ///< of the record; empty: from the file
+  std::string name;  ///< name of the recording; empty: from the file
   std::optional<Role> role;
   std::optional<SplitRule> split;
   std::optional<MappingChoice> mapping;
@@ -36,7 +36,7 @@ struct ManifestFile {
   std::vector<std::pair<std::string, double>> conditions;  ///< in SI
 };
 
-/// A dataset as a YAML file: which logs, what they are for and how they are read. See
+/// A dataset as a YAML file: the logs, their roles and how they are read. See
 /// docs/recordings.md.
 struct Manifest {
   std::string file;
@@ -54,8 +54,8 @@ struct Manifest {
 [[nodiscard]] Manifest read_manifest(const std::string& path);
 [[nodiscard]] Manifest parse_manifest(std::string_view text, const std::string& name);
 
-/// The folder that the manifest's files stand in: the first of `roots` that exists, with
-/// `${VARIABLE}` put in (a root whose variable is not set is passed over), else the manifest's own.
+/// The folder of the manifest's files: the first of `roots` that exists, after `${VARIABLE}` is
+/// replaced (a root whose variable is not set is skipped), else the manifest's folder.
 /// @throws Error that lists what was tried if none exists.
 [[nodiscard]] std::string data_folder(const Manifest& manifest);
 

@@ -14,13 +14,13 @@ namespace torsio {
 struct ChannelRule {
   std::string name;  ///< with a unit; inside torsio it becomes the SI one
   std::string from;  ///< column
-  std::string unit;  ///< of the column; empty: its own suffix, else that of `name`
+  std::string unit;  ///< unit of the column; empty: its suffix, else that of `name`
   double sign = 1.0;
   double scale = 1.0;  ///< from SI to SI; needed where the quantities differ
   double offset = 0.0;
 };
 
-/// How the time stamps are taken. Default: they must be even.
+/// How the time stamps are used. Default: they must be uniform.
 struct ClockRule {
   bool rebuild = false;          ///< spread the samples evenly between first and last stamp
   double max_stray_steps = 2.0;  ///< with rebuild: how far a stamp may be from there
@@ -29,7 +29,7 @@ struct ClockRule {
   double resample_Hz = 0.0;
 };
 
-/// A channel whose sensor reports late by this much.
+/// A channel and the latency of its sensor.
 struct LatencyRule {
   std::string channel;
   double latency_s = 0.0;
@@ -42,9 +42,9 @@ struct Mapping {
   std::vector<ChannelDefinition> derive;
   std::vector<std::string> drop;
   std::string split_by;      ///< column; each run of equal values becomes a record
-  std::vector<double> keep;  ///< of its values; empty: all
+  std::vector<double> keep;  ///< values of `split_by` that are kept; empty: all
   ClockRule clock;
-  double rate_Hz = 0.0;  ///< of a log without clock; 0: not told
+  double rate_Hz = 0.0;  ///< sample rate of a log without clock; 0: not given
   std::vector<ZeroRule> zero;
   std::vector<std::string> hold;
   std::vector<LatencyRule> latency;

@@ -12,15 +12,15 @@
 
 namespace torsio {
 
-/// Channels of a simulation that no sensor sees are called truth_...
+/// Channels of a simulation that no sensor measures are called truth_...
 inline constexpr std::string_view kTruthPrefix = "truth_";
 
 /// One measured quantity on the recording's clock, in SI; the name ends in the SI unit.
 struct Channel {
   std::string name;
   std::vector<double> values;
-  /// 1 where the sensor delivered a new value, 0 where the last one is held (a load cell at 125 Hz
-  /// beside encoders at 1 kHz). Empty: every sample is new.
+  /// 1 where the sensor measured again, 0 where the last value is held (a load cell at 125 Hz
+  /// in a log of 1 kHz). Empty: every sample is new.
   std::vector<std::uint8_t> fresh = {};
 
   [[nodiscard]] bool is_fresh(std::size_t sample) const {

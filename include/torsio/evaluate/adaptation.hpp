@@ -32,27 +32,30 @@ struct AdaptationScore {
 
 /// A network that was adapted by a replay of recordings.
 struct AdaptedModel {
-  ModelFile file;  ///< with the weights at the end, and a card that says where they came from
+  ModelFile file;  ///< with the final weights and a card that records the adaptation
   AdaptationCounts counts = {};
   double relative_change = 0.0;  ///< |W - W0| / |W0| at the end
-  /// The error before each update, on the samples that were learned from (guards passed over).
+  /// The error before each update, on the samples of the adaptation (without guarded samples).
   std::vector<AdaptationScore> as_it_ran = {};
-  /// After the last update, with the weights of `file`, on samples that nothing was learned from.
+  /// After the last update, with the weights of `file`, on samples that were not used for the
+  /// adaptation.
   std::vector<AdaptationScore> held_out = {};
 };
 
-/// Streams the records through an `AdaptiveEstimator`, in their order, as a robot would: it learns from
-/// the target in segments with the role train. Then both networks, the frozen and the adapted, are scored
-/// on those with the role test. Error bars by region are taken anew on what was learned from.
-/// @throws UsageError if the family has no last layer or there are no segments to learn from or to score
-/// on, Error as `predict`, or if not a single sample could be learned from or scored, Cancelled.
+/// Streams the recordings through an `AdaptiveEstimator`, in their order, as a robot does: it
+/// adapts to the target in segments with the role train. Then both networks, the frozen and the
+/// adapted, are scored on those with the role test. Error bars by region are recomputed from the
+/// samples of the adaptation.
+/// @throws UsageError if the family has no last layer or there are no segments to adapt to or to
+/// score on, Error as `predict`, or if no sample could be used for the adaptation or scored,
+/// Cancelled.
 [[nodiscard]] AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
                                        const AdaptationSettings& settings,
                                        const Progress& progress = {});
 
-/// Every record is to be learned from, but its last `share`, which is to be scored on; `embargo_s`
-/// between the two are used for nothing.
-/// @throws UsageError for a share that is none, Error naming the record that is too short.
+/// Every recording gets the role train, except its last `share`, which gets the role test;
+/// `embargo_s` between the two is used in neither.
+/// @throws UsageError for an invalid share, Error naming the recording that is too short.
 void hold_out_ends(Dataset& dataset, double share, double embargo_s);
 
 }  // namespace torsio

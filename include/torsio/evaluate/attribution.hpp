@@ -13,39 +13,39 @@
 
 namespace torsio {
 
-/// To be printed with every attribution.
+/// Is printed with every attribution.
 inline constexpr std::string_view kAttributionCaveat =
-    "These numbers tell what the model uses, not what causes the target. Inputs that move together "
+    "These numbers show what the model uses, not what causes the target. Inputs that move together "
     "(a deflection and its rate, a current and a torque) share the credit in a way that the data "
-    "do not settle, and replacing one of them alone shows the model combinations that the joint "
-    "never makes.";
+    "do not determine, and replacing one of them alone gives the model combinations that the joint "
+    "never produces.";
 
 /// Exact values take 2^inputs coalitions.
 inline constexpr std::size_t kMaxAttributedInputs = 12;
 
 struct AttributionOptions {
-  std::size_t windows = 200;       ///< explained, drawn from the data
-  std::size_t background = 50;     ///< what an absent input is replaced by, drawn from the data
-  std::size_t window_samples = 0;  ///< 0: as long as the model remembers (`memory_samples`)
+  std::size_t windows = 200;       ///< number of explained windows, drawn from the data
+  std::size_t background = 50;     ///< samples that replace absent inputs, drawn from the data
+  std::size_t window_samples = 0;  ///< 0: the model's memory (`memory_samples`)
   std::size_t repeats = 5;         ///< shuffles of each input
   std::uint64_t seed = 1;
-  std::size_t threads = 0;  ///< 0: as many as the machine has; changes no bit of the result
+  std::size_t threads = 0;  ///< 0: all cores; the result does not depend on it
 };
 
-/// The value that the model gives at the end of a window, from a reset at its begin, and the share
-/// of each input in its distance from `Attribution::expected_value`.
+/// The model's output at the end of a window, from a reset at its beginning, and each input's share
+/// in its distance from `Attribution::expected_value`.
 struct ExplainedWindow {
   std::string recording;
-  std::size_t sample = 0;  ///< the window's last
+  std::size_t sample = 0;  ///< last sample of the window
   double value = 0.0;
   std::vector<double> shapley;
 };
 
-/// What one input is worth to the model, in the target's unit.
+/// The importance of one input to the model, in the target's unit.
 struct InputAttribution {
   std::string input;
   double mean_abs_shapley = kNotMeasured;   ///< mean |phi| over the explained windows
-  double share = kNotMeasured;              ///< of the sum of these
+  double share = kNotMeasured;              ///< share of the sum of `mean_abs_shapley`
   double rmse_increase = kNotMeasured;      ///< when this input's blocks are shuffled
   double rmse_increase_std = kNotMeasured;  ///< over the shuffles, divided by n - 1
 };
@@ -55,16 +55,16 @@ struct Attribution {
   std::vector<ExplainedWindow> explained;
   std::size_t background = 0;
   std::size_t window_samples = 0;
-  /// False: the model still remembered more than a window; its values are those from a reset.
+  /// False: the model's memory is longer than a window; its values are those from a reset.
   bool window_is_long_enough = true;
   double expected_value = 0.0;    ///< mean value over the background, E f
   double additivity_error = 0.0;  ///< largest |sum phi - (f - E f)|
-  double rmse = kNotMeasured;     ///< of the model alone, free run, on what is shuffled
-  std::size_t samples = 0;        ///< that `rmse` is of
-  std::size_t block_samples = 0;  ///< what is shuffled as a whole
+  double rmse = kNotMeasured;     ///< RMSE of the model alone, free run, without shuffling
+  std::size_t samples = 0;        ///< number of samples in `rmse`
+  std::size_t block_samples = 0;  ///< length of the blocks that are shuffled
 };
 
-/// What a model makes of its inputs on some recordings: exact interventional Shapley values, in
+/// The importance of a model's inputs on some recordings: exact interventional Shapley values, in
 /// which an absent input's whole window is replaced by that of the same input in a background
 /// window, v(S) being the mean over these; and permutation importance, the increase of the RMSE
 /// when one input is shuffled over all recordings in blocks no shorter than a window. The model

@@ -13,11 +13,11 @@
 
 namespace torsio {
 
-/// Reads `--models`: families separated by commas, each with settings behind colons
-/// (`linear,polynomial:degree=7:branch=true`), or `all` in the place of one (`all,lstm`); what is
-/// asked for twice is taken once. Each is paired with every input set. `all` is every
-/// family that is not `only_if_named`, `polynomial` also without branches, and, where a condition
-/// takes several values in training, the scheduled variants over it.
+/// Reads `--models`: families separated by commas, each with settings after colons
+/// (`linear,polynomial:degree=7:branch=true`), or `all` in the place of one (`all,lstm`);
+/// duplicates are removed. Each is paired with every input set. `all` is every family that is not
+/// `only_if_named`, `polynomial` also without branches, and, where a condition takes several values
+/// in training, the scheduled variants over it.
 /// @throws UsageError for a family or setting that does not exist.
 [[nodiscard]] std::vector<ModelChoice> model_choices(const Dataset& dataset,
                                                      std::string_view models,
@@ -25,15 +25,15 @@ namespace torsio {
 
 struct Comparison {
   Results results;
-  /// Lowest RMSE on the validation records, or on the test records where there are no others: its card
-  /// then says that the score which it carries also chose it. None if every fit failed.
+  /// Lowest RMSE on the validation recordings, or on the test recordings if there are no others:
+  /// its card then states that its score was also used to select it. None if every fit failed.
   std::optional<TrainedModel> best;
 };
 
-/// Trains every choice on the training records and scores it on the other roles. A fit that fails
-/// is a row that says why.
-/// @throws UsageError if there are no test records, an input is a leak and `allow_leak` is not set,
-/// or a setting names an input that there is not.
+/// Trains every choice on the training recordings and scores it on the other roles. A fit that
+/// fails is a row with the reason.
+/// @throws UsageError if there are no test recordings, an input is a leak and `allow_leak` is not
+/// set, or a setting names an input that does not exist.
 [[nodiscard]] Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
                                  std::uint64_t seed, bool allow_leak,
                                  const Progress& progress = {});
@@ -46,8 +46,8 @@ struct Comparison {
 [[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
                                      const Progress& progress = {});
 
-/// Puts a model's scores on all test records (validation, if there are no test records) into its
-/// card, with words for what they were measured on. Nothing held out: nothing changes.
+/// Writes a model's scores on all test recordings (validation, if there are no test recordings) to
+/// its card, with a description of the samples. Without held-out recordings nothing changes.
 void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows);
 
 }  // namespace torsio

@@ -14,15 +14,15 @@
 
 namespace torsio {
 
-/// `FoldScheme::by` for leave-one-record-out; no channel can be called that, for want of a unit.
+/// `FoldScheme::by` for leave-one-record-out; not a possible name of a channel, which has a unit.
 inline constexpr std::string_view kByRecord = "record";
 
 /// How a dataset is cut into folds. Source: specification 3.10.
 struct FoldScheme {
-  /// K-fold: whole records are dealt to the folds. Fewer records than folds: each record is cut
-  /// into that many contiguous blocks, and a fold holds out one block of each.
+  /// K-fold: whole recordings are assigned to the folds. Fewer recordings than folds: each one is
+  /// cut into that many contiguous blocks, and a fold holds out one block of each.
   std::size_t folds = 5;
-  /// Between a held-out block and what is learned from; nothing to whole records.
+  /// Time between a held-out block and the training samples; not used for whole recordings.
   double embargo_s = 1.0;
   /// Empty: K-fold. `kByRecord`: each record is a fold. Else a condition, or a channel that is
   /// constant in every record: all records of one value are a fold.
@@ -34,26 +34,26 @@ struct Fold {
   std::string name;                     ///< "fold 2", "sweep.csv", "support_m = 0.02"
   std::vector<std::string> recordings;  ///< held out, whole or in part
   std::size_t held_out_samples = 0;
-  /// For each record of the dataset, in order; what is held out has the role test.
+  /// For each recording of the dataset, in order; held-out segments have the role test.
   std::vector<std::vector<Segment>> segments;
 };
 
 struct FoldPlan {
-  std::string label;  ///< what the folds are, to be printed with the scores
+  std::string label;  ///< description of the folds, printed with the scores
   std::vector<Fold> folds;
 };
 
-/// Only what has the role train is dealt to the folds: each such sample is held out exactly once.
-/// Test segments are left out of all of it. Validation segments stay (for error bars and early
-/// stopping), except in a record that is held out, or has the condition that is, and in the
+/// Only samples with the role train are assigned to the folds: each of them is held out exactly
+/// once. Test segments are used in no fold. Validation segments are kept (for error bars and early
+/// stopping), except in a recording that is held out, or has the held-out condition, and in the
 /// embargo. Deterministic for a seed.
-/// @throws UsageError for fewer than two folds, records, values or samples a fold, an unknown
-/// condition, a recording that is given twice, or an embargo that leaves nothing to learn from.
+/// @throws UsageError for fewer than two folds, recordings, values or samples per fold, an unknown
+/// condition, a recording that is given twice, or an embargo that leaves no training samples.
 [[nodiscard]] FoldPlan plan_folds(const Dataset& dataset, const FoldScheme& scheme,
                                   std::uint64_t seed);
 
-/// Over the folds, each counting once. `std_dev` is that of one fold (divided by n - 1); folds share
-/// training data, so it is no standard error of the mean.
+/// Statistics over the folds with equal weights. `std_dev` is that of one fold (divided by n - 1);
+/// folds share training data, so that it is not a standard error of the mean.
 struct FoldStatistic {
   double mean = kNotMeasured;
   double std_dev = kNotMeasured;  ///< NaN for fewer than two folds
@@ -65,33 +65,34 @@ struct FoldSummary {
   std::string variant = {};
   std::string input_set = {};
   bool leak = false;
-  std::size_t folds = 0;  ///< that the statistics are of
+  std::size_t folds = 0;  ///< folds in the statistics
   std::size_t failed_folds = 0;
-  std::string reason = {};  ///< of the first failure
+  std::string reason = {};  ///< reason of the first failure
   std::string worst_fold = {};
   FoldStatistic rmse = {};
   FoldStatistic mad = {};
   FoldStatistic max_abs = {};
   FoldStatistic fit_percent = {};
-  double guarded_share = kNotMeasured;  ///< of all scored samples
+  double guarded_share = kNotMeasured;  ///< share of all scored samples
   double step_ns_p50 = kNotMeasured;    ///< mean over the folds
   double fit_seconds = kNotMeasured;    ///< all folds together
-  std::size_t parameter_count = 0;      ///< of the largest
+  std::size_t parameter_count = 0;      ///< parameters of the largest model
 };
 
 struct CrossValidation {
   /// A row for each model and fold, and for each recording of it, with `fold` set and the split
-  /// `validation`: these scores are there to choose by. A fit that failed is a row that says why.
+  /// `validation`: these scores are used for the selection. A fit that failed is a row with the
+  /// reason.
   Results results;
   FoldPlan plan;  ///< without segments
-  /// Lowest mean RMSE first; models that failed in a fold come last, since their mean is of other
+  /// Lowest mean RMSE first; models that failed in a fold come last, since their mean is over other
   /// folds.
   std::vector<FoldSummary> ranking;
 };
 
-/// Trains every choice on each fold's rest, as `compare` does, and scores it in free run on what
-/// the fold holds out. Fold after fold: the times of a step are measured on an idle machine, and
-/// fitters use several threads themselves.
+/// Trains every choice on each fold's rest, as `compare` does, and scores it in free run on the
+/// held-out part. Folds run one after the other: the times of a step are measured on an idle
+/// machine, and fitters use several threads themselves.
 /// @throws UsageError as `plan_folds` and `compare`, Cancelled.
 [[nodiscard]] CrossValidation cross_validate(Dataset dataset,
                                              const std::vector<ModelChoice>& choices,

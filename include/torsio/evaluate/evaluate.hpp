@@ -17,34 +17,36 @@ namespace torsio {
 /// back).
 struct Score {
   Metrics metrics;
-  Metrics one_step = {};  ///< of a model that feeds back, each past output measured; else 0 samples
-  std::size_t initialised_samples = 0;  ///< not scored: filters had not settled
-  std::size_t guarded_samples = 0;      ///< scored, but answered by a guard instead of the model
-  std::size_t diverged_samples = 0;     ///< of these, because the model had run away
-  /// Shares of the scored samples whose error is at most one, or two, of the error bar told with them;
-  /// NaN if none had one. Of an honest Gaussian error bar 0.683 and 0.954.
+  Metrics one_step = {};  ///< one-step-ahead errors of a model with feedback; else 0 samples
+  std::size_t initialised_samples = 0;  ///< not scored: filters not settled
+  std::size_t guarded_samples = 0;      ///< scored, but with the fallback of a guard
+  std::size_t diverged_samples = 0;     ///< guarded samples at which the model diverged
+  /// Shares of the scored samples whose error is at most one, or two, of their error bars;
+  /// NaN if none had one. A calibrated Gaussian error bar gives 0.683 and 0.954.
   double within_std_dev = kNotMeasured;
   double within_2_std_dev = kNotMeasured;
-  double step_ns_p50 = kNotMeasured;  ///< of `Estimator::step`, the clock's own cost taken off
+  double step_ns_p50 = kNotMeasured;  ///< time of `Estimator::step` without the cost of the clock
   double step_ns_p999 = kNotMeasured;
 };
 
-/// The estimator's answer to every sample of a recording, streamed through `step` from `reset()`.
+/// The estimates of every sample of a recording, streamed through `step` from `reset()`.
 struct Prediction {
-  std::size_t initialised = 0;  ///< samples up to the last one that told the model where it starts
+  std::size_t initialised =
+      0;  ///< samples up to the last one that was used to initialise the model
   std::vector<Estimate> estimates;
   std::vector<double> step_ns;
 };
 
-/// What a model with memory is told of the target: the first so many fresh samples. One that feeds
-/// back hears each in turn, one with a state (`HasState`) starts where it fits them best.
+/// Measured target samples that initialise a model with memory: the first `most` new samples. A
+/// model with feedback is given each in turn, one with a state (`HasState`) is set to the state
+/// that fits them best.
 struct Corrections {
   const Channel* target = nullptr;
   std::size_t most = 0;
 };
 
-/// Zeros of `zeroed_channels` are 0 here, whatever was set: a loaded recording had its own
-/// subtracted already.
+/// Zeros of `zeroed_channels` are 0 here, whatever was set: they were already
+/// subtracted from a loaded recording.
 /// @throws Error naming the recording, the channel and the sample if a raw input is missing or not
 /// finite, or the recording has another sample rate than the estimator.
 [[nodiscard]] Prediction predict(Estimator estimator, const Recording& recording,

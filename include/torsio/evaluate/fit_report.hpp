@@ -10,36 +10,37 @@
 
 namespace torsio {
 
-/// How the residuals e_n = y_n - target_n hang together with something over lags of k samples:
+/// Correlation of the residuals e_n = y_n - target_n with themselves or an input x over lags of k
+/// samples:
 ///
 ///     r_k = sum_n e_n x_(n-k) / sqrt(sum e^2 sum x^2),   both without their means
 ///
-/// If they do not, 99 % of all |r_k| are below 2.58 / sqrt(N).
+/// Without correlation, 99 % of all |r_k| are below 2.58 / sqrt(N).
 struct ResidualCorrelation {
-  std::string with;        ///< an input's expression; of the residuals themselves: "residual"
-  double strongest = 0.0;  ///< r_k of the largest |r_k|; with itself k >= 1
-  double lag_s = 0.0;      ///< its k
-  double bound = 0.0;      ///< 2.58 / sqrt(N)
-  double share_outside =
-      0.0;  ///< of lags with |r_k| above it: 0.01 if there is nothing left to learn
+  std::string with;            ///< an input's expression, or "residual" for the autocorrelation
+  double strongest = 0.0;      ///< r_k of the largest |r_k|; k >= 1 for the autocorrelation
+  double lag_s = 0.0;          ///< lag of `strongest`
+  double bound = 0.0;          ///< 2.58 / sqrt(N)
+  double share_outside = 0.0;  ///< share of lags with |r_k| > `bound`: 0.01 for white residuals
 };
 
-/// What is left over, and how well the data tell the parameters.
+/// Correlation of the residuals, and how well the data determine the parameters.
 struct FitReport {
-  std::string split;  ///< "test", "validation" or "train": the first of these that there is
+  std::string split;  ///< "test", "validation" or "train": the first of these that exists
   std::size_t samples = 0;
   std::vector<ResidualCorrelation>
-      correlations;                ///< of the residuals with themselves, then each input
-  double memory_s = kNotMeasured;  ///< lag at which r with themselves falls below 1/e
-  /// N / (1 + 2 sum_k r_k) up to the first r_k <= 0: as many white residuals would tell as much.
+      correlations;  ///< autocorrelation of the residuals, then with each input
+  double memory_s =
+      kNotMeasured;  ///< correlation time: lag at which the autocorrelation falls below 1/e
+  /// Effective sample size N / (1 + 2 sum_k r_k) up to the first r_k <= 0.
   double effective_samples = kNotMeasured;
-  /// As fitted; the standard errors are widened by sqrt(N / effective_samples), since those of the
-  /// fit take residuals for white.
+  /// As fitted; the standard errors are multiplied by sqrt(N / effective_samples), since those of
+  /// the fit assume white residuals.
   std::vector<FittedParameter> table;
 };
 
-/// Residuals of the estimator's streamed run, at fresh samples of the split, over lags of up to a
-/// tenth of the longest record or `kMaxLags`.
+/// Residuals of the estimator's streamed run, at new samples of the split, over lags of up to a
+/// tenth of the longest recording or `kMaxLags`.
 inline constexpr std::size_t kMaxLags = 500;
 [[nodiscard]] FitReport fit_report(const TrainedModel& model, const Dataset& dataset);
 

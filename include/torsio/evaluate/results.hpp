@@ -19,21 +19,21 @@ struct ResultRow {
   std::string variant = {};    ///< the settings, "schedule=support_m"; may be empty
   std::string input_set = {};  ///< name of the manifest's input set; may be empty
   Role split = Role::test;
-  std::string fold = {};                      ///< of a cross-validation; else empty
+  std::string fold = {};                      ///< fold of a cross-validation; else empty
   std::optional<std::string> recording = {};  ///< empty: the whole split together
   Score score = {};
-  double fit_seconds = kNotMeasured;  ///< not measured where the model came from a file
+  double fit_seconds = kNotMeasured;  ///< not measured for a model from a file
   std::size_t parameter_count = 0;
   std::string status = "ok";  ///< ok, failed, diverged
-  std::string reason = {};    ///< why it failed, or what to know about the row
+  std::string reason = {};    ///< why it failed, or a remark on the row
   bool leak = false;          ///< an input was computed from the target, or the target from it
 };
 
 struct Results {
   std::string target;
   std::string unit;
-  std::string label = {};                ///< what the split means
-  std::vector<std::string> inputs = {};  ///< of the first input set
+  std::string label = {};                ///< description of the split
+  std::vector<std::string> inputs = {};  ///< inputs of the first input set
   std::vector<std::pair<std::string, std::vector<std::string>>> input_sets = {};
   bool non_causal_zero = false;
   std::vector<ResultRow> rows = {};

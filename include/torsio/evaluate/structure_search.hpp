@@ -19,18 +19,18 @@ inline constexpr std::size_t kSearchFolds = 3;
 
 struct StructureSearch {
   std::vector<ModelChoice> winners;  ///< the best of each family, best family first
-  CrossValidation scores;            ///< of everything that was tried
+  CrossValidation scores;            ///< scores of all candidates
 };
 
-/// What a search tries: every choice of `model_choices(..., "all")`, linear systems, hysteresis and networks of
-/// springs and dashpots that are slower to fit, and of each the orders, sizes and structures that people
-/// vary first, one at a time.
+/// What a search tries: every choice of `model_choices(..., "all")`, linear systems, hysteresis and
+/// networks of springs and dashpots that are slower to fit, and of each the orders, sizes and
+/// structures that people vary first, one at a time.
 [[nodiscard]] std::vector<ModelChoice> search_candidates(
     const Dataset& dataset, const std::vector<std::string>& wanted_inputs);
 
-/// Structures chosen by cross-validation over the training records alone, so that held-out ones still
-/// choose nothing: of each family the one with the least mean RMSE over the folds. A candidate that fails in
-/// a fold is not chosen.
+/// Structures chosen by cross-validation over the training records alone, so that held-out ones
+/// still choose nothing: of each family the one with the least mean RMSE over the folds. A
+/// candidate that fails in a fold is not chosen.
 /// @throws UsageError as `cross_validate`, Cancelled.
 [[nodiscard]] StructureSearch search_structures(const Dataset& dataset,
                                                 const std::vector<ModelChoice>& candidates,

@@ -16,28 +16,28 @@
 
 namespace torsio {
 
-/// What this release writes; docs/model_file.md lists which release reads which.
+/// The version that this release writes; docs/model_file.md lists which release reads which.
 inline constexpr int kModelFormatVersion = 1;
 
-/// A larger file is refused before memory is taken for it.
+/// A larger file is refused before memory is allocated for it.
 inline constexpr std::size_t kMaxModelFileBytes = std::size_t{256} << 20;
 
-/// What a model file says about its model besides what is needed to run it. Nothing here depends on
+/// The description of a model in its file, which is not needed to run it. Nothing here depends on
 /// the clock or the machine: the same fit gives the same bytes.
 struct ModelCard {
-  std::string torsio_version;  ///< that wrote the file; `save_model` fills it in
+  std::string torsio_version;  ///< version that wrote the file; `save_model` sets it
   std::string fitted_as;       ///< the fitter's name, where families have several: "dgmm_paper"
-  std::map<std::string, std::string> options;  ///< of the fitter, as given
+  std::map<std::string, std::string> options;  ///< options of the fitter, as given
   std::uint64_t seed = 0;
   std::vector<Source> training_files;
   std::vector<ZeroRule> zeros;            ///< how the training records were zeroed
-  std::string held_out;                   ///< what `metrics` were measured on, in words
+  std::string held_out;                   ///< description of the samples of `metrics`
   std::map<std::string, double> metrics;  ///< in the target's unit: "rmse", "mad", ...
-  std::string device_serial;              ///< of the actuator that the model belongs to, or empty
+  std::string device_serial;  ///< serial number of the actuator that the model belongs to, or empty
   bool operator==(const ModelCard&) const = default;
 };
 
-/// A model and everything around it. Plain data.
+/// A model with its settings and card. Plain data.
 struct ModelFile {
   ModelCard card;
   EstimatorSettings settings;
@@ -56,20 +56,20 @@ struct ModelFile {
 [[nodiscard]] ModelFile parse_model(std::span<const std::byte> bytes, std::string_view place,
                                     std::string_view expected_serial = {});
 
-/// Writes a model file whole or not at all (`write_whole_file`). @throws Error also for a model
-/// that `load_model` would refuse.
+/// Writes a model file completely or not at all (`write_whole_file`). @throws Error also for a
+/// model that `load_model` would refuse.
 void save_model(const std::filesystem::path& path, const ModelFile& model);
 
 /// @throws Error as `parse_model`, or if the file cannot be read.
 [[nodiscard]] ModelFile load_model(const std::filesystem::path& path,
                                    std::string_view expected_serial = {});
 
-/// The estimator of a model, at the rate in its settings. Filters are re-discretised for any rate; a
-/// network with memory is not. @throws Error if settings and model do not fit together, or such a
-/// network would run at another rate than its own (0.1 % apart counts as the same).
+/// The estimator of a model, at the rate in its settings. Filters are re-discretised for any rate;
+/// a network with memory is not. @throws Error if settings and model do not fit together, or such a
+/// network would run at another rate than that of its training (0.1 % is tolerated).
 [[nodiscard]] Estimator make_estimator(const ModelFile& model);
 
-/// `load_model` and `make_estimator` in one: what a robot calls.
+/// `load_model` and `make_estimator` in one call, for the robot.
 [[nodiscard]] Estimator load_estimator(const std::filesystem::path& path,
                                        std::string_view expected_serial = {});
 

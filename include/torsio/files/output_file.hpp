@@ -6,22 +6,23 @@
 
 namespace torsio {
 
-/// A file that appears under its name whole or not at all.
+/// A file that is written completely or not at all.
 ///
 /// It is written under a temporary name in the same folder; `commit` syncs and renames it, so that
-/// the target holds either its old bytes or all new ones, after a power loss too. Destroyed without
-/// `commit`, it leaves nothing. A symbolic link stays one. A device or pipe is written straight.
+/// the target has either its old bytes or all new ones, also after a power loss. Without
+/// `commit` it leaves no file. A symbolic link remains a link. A device or pipe is written
+/// directly.
 class OutputFile {
  public:
   /// @throws Error (no such folder, no permission, the target is a directory).
   explicit OutputFile(const std::filesystem::path& path);
-  /// Written straight, too.
+  /// Is written directly, too.
   [[nodiscard]] static OutputFile standard_output();
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// @throws Error if the disk is full, or nobody reads the pipe any more.
+  /// @throws Error if the disk is full, or the pipe has no reader any more.
   void write(std::span<const std::byte> bytes);
   /// Call once, at the end. @throws Error; the target is then untouched.
   void commit();
@@ -31,7 +32,7 @@ class OutputFile {
   [[noreturn]] void refuse() const;
 
   std::filesystem::path place_;      ///< for messages
-  std::filesystem::path target_;     ///< what `temporary_` becomes
+  std::filesystem::path target_;     ///< final name of `temporary_`
   std::filesystem::path temporary_;  ///< empty: none to remove
   int descriptor_ = -1;
 };

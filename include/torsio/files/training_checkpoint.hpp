@@ -7,21 +7,22 @@
 
 namespace torsio {
 
-/// Where a long training stood when it was stopped: the next update is the one that would have come
-/// without the stop, to the last bit. Plain data.
+/// The state of a long training when it was stopped: the next update is identical to that of a
+/// training without the stop, to the last bit. Plain data.
 struct TrainingCheckpoint {
-  std::string recipe;  ///< data, settings and seed in words: another recipe cannot go on from here
+  /// Data, settings and seed as text: a training with another recipe cannot continue from here.
+  std::string recipe;
   std::size_t epoch = 0;       ///< whole epochs done
   std::size_t batch = 0;       ///< batches of the next epoch done
-  std::size_t updates = 0;     ///< of the weights, in all
+  std::size_t updates = 0;     ///< updates of the weights, in all
   double epoch_loss = 0.0;     ///< sum over the batches of the epoch begun
   std::size_t best_epoch = 0;  ///< counted from 1; 0: no epoch has ended yet
   double best_loss = 0.0;
   std::vector<float> weights;
   std::vector<float> mean;    ///< the optimiser's, of the gradient
-  std::vector<float> square;  ///< the optimiser's, of the gradient's square
+  std::vector<float> square;  ///< the optimiser's mean of the squared gradient
   std::vector<float> best;    ///< weights of the best epoch
-  // Of an ensemble, the members done before this one.
+  // In an ensemble, the members that were trained before this one.
   std::vector<float> finished;        ///< their weights, one after the other
   std::vector<double> finished_loss;  ///< their best losses
 
@@ -43,12 +44,12 @@ struct TrainingCheckpoint {
   bool operator==(const TrainingCheckpoint&) const = default;
 };
 
-/// Writes a checkpoint whole or not at all, as safetensors with the recipe for metadata.
+/// Writes a checkpoint completely or not at all, as safetensors with the recipe for metadata.
 void save_checkpoint(const std::filesystem::path& path, const TrainingCheckpoint& checkpoint);
 
 /// Reads one from an untrusted file.
-/// @throws Error naming the tensor: not a checkpoint, a tensor missing, unknown, of the wrong type or
-/// shape, or not finite.
+/// @throws Error naming the tensor: not a checkpoint, a tensor missing, unknown, of the wrong type
+/// or shape, or not finite.
 [[nodiscard]] TrainingCheckpoint load_checkpoint(const std::filesystem::path& path);
 
 }  // namespace torsio

@@ -11,10 +11,11 @@
 
 namespace torsio {
 
-/// A larger file of another program is refused: what it unfolds to in memory is many times its size.
+/// A larger file of another program is refused: its network in memory is many times larger than
+/// the file.
 inline constexpr std::size_t kMaxForeignBytes = std::size_t{64} << 20;
 
-/// What a network of another program does one after the other, in double so that stages may be
+/// The stages of another program's network in their order, in double so that stages may be
 /// multiplied into each other without loss.
 /// y_j = gain_j x_j + offset_j
 struct AffineStage {
@@ -44,9 +45,9 @@ using ForeignStage = std::variant<AffineStage, DenseStage, ActivationStage, Recu
 /// A network as another program wrote it.
 struct ForeignNetwork {
   std::string place;       ///< the file's name, for messages
-  std::size_t inputs = 0;  ///< of the first stage
+  std::size_t inputs = 0;  ///< inputs of the first stage
   std::vector<ForeignStage> stages = {};
-  /// Samples of the window that a graph with memory is fixed to, from the zero state; none if any.
+  /// Window length of a graph with memory that starts from the zero state; none: any length.
   std::optional<std::size_t> window = {};
   std::vector<std::string> notes = {};
   bool fold_biases = false;  ///< an LSTM's two biases into one

@@ -14,13 +14,13 @@
 
 namespace torsio {
 
-/// What a file of weights does not say about its network.
+/// Properties of a network that its file does not specify.
 struct ImportOptions {
-  FeatureSpec features;              ///< one expression an input of the network, in its order
-  std::string target = "torque_Nm";  ///< what the network tells
-  double sample_rate_Hz = 0.0;       ///< that the network was trained at
-  std::vector<double> input_scale;   ///< the network sees scale * input; empty: 1 each
-  double output_scale = 1.0;         ///< target = scale * what the network says
+  FeatureSpec features;              ///< one expression per input of the network, in its order
+  std::string target = "torque_Nm";  ///< channel that the network estimates
+  double sample_rate_Hz = 0.0;       ///< sample rate of the training
+  std::vector<double> input_scale;   ///< the network is given scale * input; empty: 1 each
+  double output_scale = 1.0;         ///< target = scale * output of the network
   std::optional<std::size_t> warm_up_samples;  ///< until a value is valid; none: the graph's window
   bool fold_biases = false;  ///< an LSTM's two biases into one: faster, not PyTorch's rounding
 };
@@ -36,16 +36,16 @@ struct ForeignFile {
 
 struct ImportedModel {
   ModelFile file;
-  std::vector<std::string> notes;  ///< what its user should know
+  std::vector<std::string> notes;  ///< remarks for the user
 };
 
-/// Stands for no limit in the ranges of inputs: beyond every quantity, and a range of this much on
-/// either side has a width that double can hold.
+/// Means no limit in the ranges of inputs: beyond every quantity, and a range of this size on
+/// either side has a width that double can represent.
 inline constexpr double kOpenRange = 1e300;
 
-/// A network of another program inside torsio's estimator. Range guard, linear fallback and error
-/// bar are taken from `guards` (all of its records, whatever their role). Without it the guard is open, the
-/// fallback says 0 and there is no error bar; a note says so.
+/// A network of another program in torsio's estimator. Range guard, linear fallback and standard
+/// deviation are computed from `guards` (all of its recordings, whatever their role). Without it
+/// the guard is open, the fallback is 0 and there is no error bar, which a note states.
 /// @throws Error if the network fits no family, or UsageError if the inputs are not as many as the
 /// network has, or a scale is not a finite number other than 0.
 [[nodiscard]] ImportedModel import_network(const ForeignNetwork& network, const Source& source,

@@ -12,8 +12,8 @@ namespace torsio {
 /// @param model the model file's name.
 [[nodiscard]] std::string adaptation_json(const AdaptedModel& adapted, const std::string& model);
 
-/// Frozen beside adapted: on the recordings that were learned from, as it ran, and on what was held
-/// out; then what was passed over and why.
+/// Frozen and adapted scores: on the recordings of the adaptation, as it ran, and on the held-out
+/// samples; then the skipped samples with reasons.
 [[nodiscard]] std::string adaptation_text(const AdaptedModel& adapted, const std::string& model);
 
 }  // namespace torsio

@@ -6,7 +6,7 @@
 
 namespace torsio {
 
-/// What an attribution is of.
+/// The subject of an attribution.
 struct AttributionSubject {
   std::string model;  ///< the model file's name
   std::string family;
@@ -15,11 +15,12 @@ struct AttributionSubject {
 };
 
 /// `{"model","family","target","unit","window_samples",...,"results":[{"input","mean_abs_shapley",
-/// "share","rmse_increase","rmse_increase_std"}],"explained":[...],"caveat"}`; ends with a line feed.
+/// "share","rmse_increase","rmse_increase_std"}],"explained":[...],"caveat"}`; ends with a line
+/// feed.
 [[nodiscard]] std::string attribution_json(const Attribution& attribution,
                                            const AttributionSubject& subject);
 
-/// One line an input, the most used first, then how it was found, and the caveat.
+/// One line per input in descending order, then the method and the caveat.
 [[nodiscard]] std::string attribution_text(const Attribution& attribution,
                                            const AttributionSubject& subject);
 

@@ -7,8 +7,8 @@
 
 namespace torsio {
 
-/// What is left over and what was found, for a person: correlations of the residuals, the parameters
-/// with standard errors (as far as the family names them).
+/// The report of a fit as text: correlations of the residuals, the parameters
+/// with standard errors (if the family names them).
 [[nodiscard]] std::string fit_report_text(const FitReport& report);
 
 /// `results_json` of the fitted model's scores with `fit_report` and `notes` beside the results.

@@ -6,7 +6,8 @@
 
 namespace torsio {
 
-/// The ranked tables of every held-out split as one page that needs nothing else. All names in it are escaped.
+/// The ranked tables of every held-out split as one page without external files. All names in it
+/// are escaped.
 [[nodiscard]] std::string results_html(const Results& results);
 
 }  // namespace torsio

@@ -8,9 +8,9 @@
 
 namespace torsio {
 
-/// Draws curves as braille dots, two by four a character, with axes; several curves share the
-/// canvas (their labels stand below, marked by which was drawn last on top). Non-finite points are
-/// skipped; no point gives an empty frame.
+/// Draws curves as braille dots, two by four per character, with axes; several curves share the
+/// canvas (their labels are printed below it, marked by the curve that was drawn last). Non-finite
+/// points are skipped; without a point the frame is empty.
 [[nodiscard]] std::string terminal_plot(const std::vector<Curve>& curves, const PlotLabels& labels,
                                         std::size_t columns = 64, std::size_t rows = 16);
 

@@ -7,7 +7,7 @@
 
 namespace torsio {
 
-/// What was asked, and a table of the models, each the mean over its seeds.
+/// The task, and a table of the models, each with its mean over the seeds.
 [[nodiscard]] std::string tracking_text(std::span<const TrackingRow> rows);
 
 /// A JSON object with every row; ends with a line feed.

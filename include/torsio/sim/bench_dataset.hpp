@@ -8,9 +8,9 @@
 
 namespace torsio {
 
-/// What paper 001 records before it fits a spring (specification 4.7): sweeps with the mass at
-/// different places on the lever to learn from (three; the paper prints no number), and one with
-/// another place and an inclined plane of motion to be judged on. Seeds are `seed`, `seed + 1`, ...
+/// The recordings of paper 001 for fitting a spring (specification 4.7): training sweeps with the
+/// mass at different places on the lever (three; the paper prints no number), and a test sweep with
+/// another place and an inclined plane of motion. Seeds are `seed`, `seed + 1`, ...
 /// @throws UsageError for an unknown actuator; Cancelled if `progress` asks to stop.
 [[nodiscard]] Dataset sweep_dataset(std::string_view actuator, std::uint64_t seed,
                                     const Progress& progress = {});

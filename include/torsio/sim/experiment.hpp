@@ -15,37 +15,38 @@
 
 namespace torsio {
 
-/// One bench run: which actuator, what is done to it, and the noise's seed.
+/// One bench run: actuator, experiment, and the seed of the noise.
 struct ExperimentSpec {
   std::string actuator = "dfki-50";  ///< as `data_sheet` takes it
   std::string experiment = "sweep";
   std::uint64_t seed = 1;
-  std::optional<double> duration_s = {};  ///< none: as long as the experiment's protocol is
+  std::optional<double> duration_s = {};  ///< none: that of the experiment's protocol
   std::optional<double> lever_m = {};     ///< none: the first of `sweep_protocol`, or locked
-  double inclination_rad = 0.0;           ///< of the lever's plane of motion from the vertical
-  // Of the excitation, whichever the experiment has (`ExperimentInfo::amplitude_unit`); none: its own.
+  double inclination_rad = 0.0;  ///< angle of the lever's plane of motion from the vertical
+  // Excitation; an experiment has one of the amplitudes (`ExperimentInfo::amplitude_unit`); none:
+  // its default.
   std::optional<double> torque_amplitude_Nm = {};
   std::optional<double> angle_amplitude_rad = {};
   std::optional<double> frequency_Hz = {};
-  bool is_impedance_zero = false;  ///< of the joint's controller; false: high
-  bool with_truth = false;         ///< add the `truth_*` channels, which no sensor sees
+  bool is_impedance_zero = false;  ///< impedance of the joint's controller is zero; false: high
+  bool with_truth = false;         ///< add the `truth_*` channels, which no sensor measures
   OperatingConditions conditions = {};
   FaultSchedule faults = {};
 };
 
 struct ExperimentInfo {
   std::string_view name;
-  std::string_view actuators;  ///< that have it
+  std::string_view actuators;  ///< actuators that have it
   std::string_view description;
-  std::string_view amplitude_unit = {};  ///< "Nm", "rad", or empty: it takes none
+  std::string_view amplitude_unit = {};  ///< "Nm", "rad", or empty: no amplitude
 };
 
-/// What can be done on the benches. A name may stand there for more than one family.
+/// The experiments of all benches. A name may be listed for more than one family.
 [[nodiscard]] std::vector<ExperimentInfo> experiments();
-/// Those of one actuator.
+/// The experiments of one actuator.
 [[nodiscard]] std::vector<ExperimentInfo> experiments(const DataSheet& sheet);
 
-/// How the sweeps of one actuator are made: the lever with its 9 kg mass goes to and fro between
+/// The sweeps of one actuator: the lever with its 9 kg mass moves back and forth between
 /// +-amplitude (specification 4.7). Levers of dfki-28, for which it has none, are ours: its
 /// torques reach the shares of the rating that those of the others do (0.2 to 0.55).
 struct SweepProtocol {
@@ -64,27 +65,27 @@ struct SweepProtocol {
 /// cell that is slower than the log is held between its samples, which `Channel::fresh` marks. Its
 /// torque rises with the twist. Equal specs give equal recordings.
 ///
-/// Faults act on what the bench's loop sees and on what is logged; truth is what it is. Where a
-/// sensor tells NaN, the loop goes on with that sensor's last number, as a drive does that drops
-/// invalid frames; the log has the NaN.
+/// Faults act on the sensor signals of the bench's loop and on the log; truth is not affected.
+/// Where a sensor gives NaN, the loop continues with that sensor's last number, as a drive that
+/// drops invalid frames; the log has the NaN.
 /// @throws UsageError for an unknown name, or a value that the experiment cannot take; Cancelled if
 /// `progress` asks to stop.
 [[nodiscard]] Recording simulate(const ExperimentSpec& spec, const Progress& progress = {});
-/// The same with an actuator of one's own: `spec.actuator` is not looked at.
+/// The same with another data sheet: `spec.actuator` is not used.
 [[nodiscard]] Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec,
                                  const Progress& progress = {});
 
-/// The twist [rad] of the actuator's elastic element as its sensors tell it: gear minus joint, the
+/// The twist [rad] of the actuator's elastic element as measured: gear minus joint, the
 /// coupling's own sensor, input minus joint, or the tube's two ends.
 /// @throws Error if the recording is of another family.
 [[nodiscard]] std::vector<double> measured_twist(const DataSheet& sheet,
                                                  const Recording& recording);
 
-/// What a simulation of the actuator must follow.
+/// The dynamics that a simulation of the actuator must resolve.
 struct PlantFigures {
   /// [Hz], the lower first: both ends free, no load on the joint, without damping.
   std::array<double, 2> natural_frequencies_Hz{};
-  double longest_step_s = 0.0;  ///< that its stiffest mode and its strongest damping allow
+  double longest_step_s = 0.0;  ///< limit from the stiffest mode and the strongest damping
 };
 [[nodiscard]] PlantFigures plant_figures(const DataSheet& sheet);
 

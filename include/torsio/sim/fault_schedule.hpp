@@ -10,33 +10,33 @@
 
 namespace torsio {
 
-/// What goes wrong. The first seven happen to sensors, the last two to the spring; drift happens to
-/// both sensors and parts.
+/// Kinds of faults. The first seven are faults of sensors, the last two of the spring; drift is a
+/// fault of both sensors and parts.
 enum class FaultKind : std::uint8_t {
-  freeze,  ///< delivers on, always the same value
-  jump,    ///< `amount` too much
-  drift,  ///< of a sensor: `amount` too much for each second since the start; of a part: its factor
-          ///< goes from 1 to `amount` in `over_s` and stays there
+  freeze,     ///< always the same value, marked as new
+  jump,       ///< `amount` is added
+  drift,      ///< sensor: `amount` per second since the start is added; part: its factor
+              ///< changes from 1 to `amount` in `over_s` and remains there
   sign_flip,  ///< the sign is wrong
-  quantised,  ///< nothing finer than `amount` is left
-  dropout,    ///< delivers nothing: the last value is held, and not fresh
-  nan,        ///< no number
-  broken,     ///< the spring's torque falls to the share `amount`, 0 for a spring in two pieces
+  quantised,  ///< resolution of `amount`
+  dropout,    ///< no new samples: the last value is held and not marked as new
+  nan,        ///< not a number
+  broken,     ///< the spring's torque falls to the share `amount`, 0 for a broken spring
   bottom,     ///< the spring's deflection meets a stop at `amount` radians, to either side
 };
 
-/// One thing that goes wrong, and when.
+/// One fault and its time.
 struct ScheduledFault {
-  /// A sensor, by the name of its logged channel ("gear_angle_rad"), or a part: "spring" (of
-  /// actuators with a gear behind their spring, "gear"), "friction", "torque-constant".
+  /// A sensor, by the name of its logged channel ("gear_angle_rad"), or a part: "spring" ("gear"
+  /// for actuators with a gear after their spring), "friction", "torque-constant".
   std::string what;
   FaultKind kind = FaultKind::freeze;
   double start_s = 0.0;
-  std::optional<double> duration_s = {};  ///< none: to the end; afterwards all is sound again
-  double amount = 0.0;                    ///< as the kind says; of a sensor in its channel's unit
-  double over_s = 0.0;                    ///< drift of a part
-  double stop_stiffness_Nm_rad = 0.0;     ///< bottom
-  std::string place = {};                 ///< where it was read, for messages
+  std::optional<double> duration_s = {};  ///< none: to the end; afterwards there is no fault
+  double amount = 0.0;                 ///< depends on the kind; for a sensor in its channel's unit
+  double over_s = 0.0;                 ///< drift of a part
+  double stop_stiffness_Nm_rad = 0.0;  ///< bottom
+  std::string place = {};              ///< where it was read, for messages
 };
 
 /// Plain data: what goes wrong in a run. Several at once combine: those of one sensor act in this

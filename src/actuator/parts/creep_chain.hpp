@@ -15,13 +15,13 @@ namespace torsio {
 ///
 /// It is the exact equivalent of a spring k₀ beside three Maxwell branches (kᵢ, pᵢ = 1 / Tᵢ): the
 /// zeros −σⱼ of their Z(s) = k₀ + Σ kᵢ s / (s + pᵢ) interlace the poles, k = Z(∞), dⱼ = Z′(−σⱼ),
-/// kⱼ = σⱼ dⱼ. Unlike the branches, the creep form keeps a provable energy book behind a nonlinear
+/// kⱼ = σⱼ dⱼ. Unlike the branches, the creep form has a provable energy balance with a nonlinear
 /// output, and can lose and regain contact. u is deflection [rad], xⱼ creep [rad], T torque [Nm].
 /// Source: specification 2.1 (a).
 class CreepChain {
  public:
   static constexpr std::size_t kElements = 3;
-  using Vector = std::array<double, kElements>;  ///< one number an element
+  using Vector = std::array<double, kElements>;  ///< one number per element
 
   /// @param stiffness_Nm_rad k₀, that of the relaxed chain
   /// @throws Error if a stiffness is not positive or the relaxation times do not fall strictly.

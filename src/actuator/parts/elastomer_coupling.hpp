@@ -10,15 +10,15 @@
 
 namespace torsio {
 
-/// A shaft coupling of elastomer lobes: linear viscoelasticity, a monotone output curve behind it,
-/// and dry inner friction.
+/// A shaft coupling of elastomer lobes: linear viscoelasticity, followed by a monotone output
+/// curve, and dry inner friction.
 ///
 ///     τ = c (g(T) + F),   g(T) = c₁ w + c₂ w² + c₃ w³,   w = T / c₁
 ///
-/// T is the torque of a CreepChain [Nm], F that of Maxwell-slip elements; g is held constant outside
-/// the range around 0 where it rises. What is stored,
-/// G(T)/k + Σ G(kⱼ xⱼ)/kⱼ with G = ∫ g, only ever loses against the work, Σ (g(T) − g(kⱼ xⱼ)) ẋⱼ,
-/// because g rises. Source: specification 2.1 (a), 4.3 and 4.7; paper 003, Eq. 3.
+/// T is the torque of a CreepChain [Nm], F that of Maxwell-slip elements; g is held constant
+/// outside the range around 0 where it rises. What is stored, G(T)/k + Σ G(kⱼ xⱼ)/kⱼ with G = ∫ g,
+/// only ever loses against the work, Σ (g(T) − g(kⱼ xⱼ)) ẋⱼ, because g rises. Source: specification
+/// 2.1 (a), 4.3 and 4.7; paper 003, Eq. 3.
 ///
 /// *Unbonded*, each direction is carried by lobes of their own, 1/1.4 as stiff, that can only be
 /// pressed: they lose contact where their torque would turn, creep back without load, and meet the
@@ -28,7 +28,7 @@ namespace torsio {
 class ElastomerCoupling {
  public:
   struct Parameters {
-    double stiffness_Nm_rad = 0.0;                      ///< of the relaxed coupling
+    double stiffness_Nm_rad = 0.0;                      ///< stiffness of the relaxed coupling
     MaxwellBranches<3>::Parameters branches;            ///< the slowest first
     std::array<double, 3> output_Nm = {1.0, 0.0, 0.0};  ///< c₁, c₂, c₃; c₃ < 0 or linear
     MaxwellSlip<3>::Parameters slip;                    ///< its limits constant: load_factor 0
@@ -115,7 +115,7 @@ class ElastomerCoupling {
   double torque_Nm_ = 0.0;
   double glue_ = 1.0;
   double glue_after_cycle_ = 1.0;
-  double last_side_ = 0.0;  ///< of the dead band
+  double last_side_ = 0.0;  ///< last side of the dead band
   int turns_ = 0;           ///< changes of side in this cycle
 };
 

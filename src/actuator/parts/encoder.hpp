@@ -17,13 +17,13 @@ class Encoder {
   struct Parameters {
     double bits = 19.0;
     double jitter_lsb = 0.5;  ///< σ
-    double zero_rad = 0.0;    ///< told too much
+    double zero_rad = 0.0;    ///< zero error
   };
 
   /// Draws o. @throws Error unless 1 ≤ bits ≤ 40 and the jitter is not negative.
   Encoder(const Parameters& parameters, Random& random);
 
-  /// @returns the angle [rad] as the encoder tells it
+  /// @returns the measured angle [rad]
   [[nodiscard]] double read(double angle_rad, Random& random) const noexcept {
     const double code = (angle_rad + offset_rad_) * inverse_lsb_ + 0.5;
     return std::floor(code + jitter_lsb_ * random.normal()) * lsb_rad_ - offset_rad_ + zero_rad_;

@@ -26,7 +26,7 @@ class Gear {
     double stiffness_Nm_rad = 0.0;            ///< K_h
     double damping_Nms_rad = 0.0;             ///< D_h
     double hysteresis_Nm = 0.0;               ///< half width of the torque loop
-    double break_away_rad = 1.0;              ///< of the hysteresis element
+    double break_away_rad = 1.0;              ///< break-away angle of the hysteresis element
   };
   struct Output {
     double torque_Nm = 0.0;        ///< on the gear's output
@@ -53,7 +53,7 @@ class Gear {
     return {torque_Nm, torque_Nm * motion.slope};
   }
 
-  /// Where the gear's output would stand without load, and its slope over the rotor angle.
+  /// The gear's output angle without load, and its slope over the rotor angle.
   struct Kinematics {
     double angle_rad = 0.0;  ///< θ_m / N + ε
     double slope = 0.0;      ///< 1 / N + ε′

@@ -7,7 +7,7 @@
 
 namespace torsio {
 
-/// A brushless motor behind a current loop, with its limits and its torque ripple.
+/// A brushless motor with a current loop, its limits and its torque ripple.
 ///
 ///     i̇ = (i_ref − i) / T_i,   |i_ref| ≤ i_max,   |R i_ref + k_e ω| ≤ U with k_e = k_t
 ///     τ = k_t i + r k_t i_max sin(n θ_m)

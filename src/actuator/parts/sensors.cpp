@@ -11,7 +11,7 @@ namespace {
 
 constexpr auto kTorqueSensor = "torque sensor";
 
-/// How many ticks a time is. @throws Error if it is no whole number of them.
+/// The number of ticks of a time. @throws Error if it is not an integer.
 std::size_t whole_ticks(double time_s, double tick_s, const std::string& what) {
   const double ticks = std::round(time_s / tick_s);
   require(std::abs(ticks * tick_s - time_s) < 1e-6 * tick_s, kTorqueSensor,

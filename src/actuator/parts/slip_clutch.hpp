@@ -15,9 +15,9 @@ namespace torsio {
 ///     sticks (ṡ = 0) until |F| > T_s; slips with |F| = T_k until the motion turns (F dx < 0)
 ///     T = F + c ẋ while it sticks, at most T_s;   T = F while it slips
 ///
-/// A cable that stretches no further dissipates nothing: c is without effect in slip. Standing
-/// still, a clutch that slipped goes on at T_k when moved on. Source: specification 4.4; c is
-/// assumed.
+/// A cable that is not stretched further dissipates nothing: c has no effect during slip. A clutch
+/// that stopped after slipping continues to slip at T_k when it is moved further. Source:
+/// specification 4.4; c is assumed.
 class SlipClutch {
  public:
   using Output = Gear::Output;
@@ -58,7 +58,7 @@ class SlipClutch {
     return {torque_Nm_, torque_Nm_ * inverse_ratio_};
   }
 
-  /// Where the middle body would stand without load and slip, and its slope over the rotor angle.
+  /// The angle of the middle body without load and slip, and its slope over the rotor angle.
   [[nodiscard]] Kinematics kinematics(double rotor_angle_rad) const noexcept TORSIO_REALTIME {
     return {rotor_angle_rad * inverse_ratio_, inverse_ratio_};
   }

@@ -13,7 +13,7 @@ class TorqueSensor {
  public:
   struct Parameters {
     double noise_Nm = 0.0;        ///< one standard deviation
-    double sample_rate_Hz = 0.0;  ///< of the sensor
+    double sample_rate_Hz = 0.0;  ///< sample rate of the sensor
     double latency_s = 0.0;       ///< from sampling to delivery
   };
   struct Reading {

@@ -241,7 +241,7 @@ AnyInverse inverse_of(const ModelFile& model) {
   if (!settings.zeroed_channels.empty())
     throw Error({.place = kPlace,
                  .expected = "a model that takes the channels as they are measured",
-                 .found = fmt::format("one that wants the zero of {}",
+                 .found = fmt::format("one that requires the zero of {}",
                                       fmt::join(settings.zeroed_channels, ", ")),
                  .advice = "Train it without zero rules: simulated encoders have none."});
   return AnyInverse::of(settings, estimator.model().parameters());

@@ -18,7 +18,7 @@ namespace torsio {
 namespace {
 
 constexpr double kSettling_s = 2.0;
-constexpr double kVisible = 0.02;  // of the reference's amplitude: a limit cycle that counts
+constexpr double kVisible = 0.02;  // smallest limit cycle, as a share of the reference's amplitude
 
 using Values = std::span<const double>;
 

@@ -7,16 +7,16 @@
 
 namespace torsio {
 
-/// The books of one run: what was put in, what is stored, what was lost.
+/// The energy balance of one run: supplied, stored and lost energy.
 ///
 ///     E = ½ Σ J ω² + ∫ τ_el dδ + ½ K φ² + Σ F²/2k + m g l (1 − cos q)
 ///     residual = E − E(0) − W_in + W_lost
 ///
-/// The residual is what came from nothing (positive) or vanished (negative): integration error
-/// alone. What a hysteretic element loses is its work minus what it stores, so that it is a check of
-/// its own for each: it must never fall, but for integration error and for what load-dependent slip
-/// elements keep: with k(load), F²/2k is not all that a later, stiffer or softer path can recover.
-/// Source: specification 4.6.
+/// The residual is energy that was created (positive) or has vanished (negative): integration error
+/// alone. The loss of a hysteretic element is its work minus its stored energy, which is a separate
+/// check for each element: it must not decrease, except for integration error and for energy in
+/// load-dependent slip elements: with k(load), F²/2k is not all that a later, stiffer or softer
+/// path can recover. Source: specification 4.6.
 class EnergyAudit {
  public:
   /// Opens the books at the plant's present state.

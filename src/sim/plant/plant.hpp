@@ -24,9 +24,9 @@ struct PlantCommand {
   bool is_motor_held = false;  ///< the rotor is clamped; the current has no effect
 };
 
-/// What hangs on the joint.
+/// The load of the joint.
 struct Load {
-  double inertia_kg_m2 = 0.0;       ///< added to the joint's own
+  double inertia_kg_m2 = 0.0;       ///< added to that of the joint
   double gravity_Nm = 0.0;          ///< m g l cos(inclination): resists with gravity_Nm sin(q)
   double external_torque_Nm = 0.0;  ///< on the joint, positive along its angle
   bool is_locked = false;           ///< the joint is clamped
@@ -40,11 +40,11 @@ struct Load {
 /// @throws Error if mass or length is negative or not finite.
 [[nodiscard]] Load lever(double mass_kg, double length_m, double inclination_rad = 0.0);
 
-/// What may wear or fail while a plant runs; the defaults are a sound one.
+/// Wear and faults of a plant while it runs; the defaults are a plant without faults.
 struct PlantCondition {
-  double friction_factor = 1.0;         ///< of the friction at rotor and middle body
-  double torque_constant_factor = 1.0;  ///< of k_t, unknown to the current loop
-  double second_stage_factor = 1.0;     ///< of the second stage's torque; 0: broken
+  double friction_factor = 1.0;         ///< factor of the friction at rotor and middle body
+  double torque_constant_factor = 1.0;  ///< factor of k_t that the current loop does not include
+  double second_stage_factor = 1.0;     ///< factor of the second stage's torque; 0: broken
   /// Where the second stage's twist meets a hard stop (a bottomed spring).
   double stop_twist_rad = std::numeric_limits<double>::infinity();
   double stop_stiffness_Nm_rad = 0.0;
@@ -63,8 +63,8 @@ struct PlantParameters {
   std::variant<Spring::Parameters, ElastomerCoupling::Parameters, RubberSpring::Parameters,
                Gear::Parameters>
       second;
-  LuGreFriction::Parameters bearing;   ///< of the joint, before the load cell
-  double joint_viscous_Nms_rad = 0.0;  ///< d, behind the load cell
+  LuGreFriction::Parameters bearing;   ///< bearing of the joint, before the load cell
+  double joint_viscous_Nms_rad = 0.0;  ///< d, after the load cell
   double rotor_inertia_kg_m2 = 0.0;
   double middle_inertia_kg_m2 = 0.0;
   double joint_inertia_kg_m2 = 0.0;
@@ -76,8 +76,9 @@ struct PlantParameters {
 [[nodiscard]] double total_ratio(const PlantParameters& parameters) noexcept;
 
 /// @returns the two natural frequencies [Hz], the lower first, of the plant itself: both ends free,
-/// no load on the joint, without damping. Springs are taken beyond their play and below their second
-/// stage, dry friction as absent, viscoelastic branches as glassy: nothing relaxes within a period.
+/// no load on the joint, without damping. Springs are taken beyond their play and below their
+/// second stage, dry friction as absent, viscoelastic branches as glassy: nothing relaxes within a
+/// period.
 [[nodiscard]] std::array<double, 2> natural_frequencies(const PlantParameters& parameters);
 
 struct PlantState {
@@ -93,14 +94,14 @@ struct PlantState {
 struct PlantTorques {
   double motor_Nm = 0.0;             ///< on the rotor, ripple included
   double rotor_friction_Nm = 0.0;    ///< against the rotor
-  double first_Nm = 0.0;             ///< of the first stage on the middle body
+  double first_Nm = 0.0;             ///< torque of the first stage on the middle body
   double first_on_rotor_Nm = 0.0;    ///< against the rotor
   double middle_friction_Nm = 0.0;   ///< against the middle body
-  double second_Nm = 0.0;            ///< of the second stage on the joint
+  double second_Nm = 0.0;            ///< torque of the second stage on the joint
   double second_on_middle_Nm = 0.0;  ///< against the middle body
   double bearing_Nm = 0.0;           ///< dry friction of the joint, against it
-  double joint_Nm = 0.0;             ///< what a load cell between joint and lever feels
-  double wall_Nm = 0.0;              ///< of the obstacle, against the joint
+  double joint_Nm = 0.0;             ///< torque at a load cell between joint and lever
+  double wall_Nm = 0.0;              ///< torque of the obstacle, against the joint
 };
 
 /// What a stage does to the bodies at its two ends.
@@ -148,8 +149,8 @@ class Plant {
   static constexpr double kDefaultStep_s = 1e-4;
   static constexpr std::size_t kWorkPorts = 11;
 
-  /// @param longest_step_s a longer step is divided into equal ones; none: `step_limit`, but at most
-  /// `kDefaultStep_s`
+  /// @param longest_step_s a longer step is divided into equal ones; none: `step_limit`, but at
+  /// most `kDefaultStep_s`
   /// @throws Error if an inertia is not positive, or the step is too long for the stiffest mode or
   /// the strongest damping (the message names which, and the limit).
   explicit Plant(const PlantParameters& parameters, double longest_step_s = 0.0);
@@ -164,16 +165,16 @@ class Plant {
 
   /// At rest at this joint angle, the stages and the motor current carrying the load, all friction
   /// relaxed.
-  /// @returns Fault::input_not_finite, and the plant stays as it is, if angle or load are not finite
-  /// or have no finite rest
+  /// @returns Fault::input_not_finite, and the plant stays as it is, if angle or load are not
+  /// finite or have no finite rest
   Fault reset(double joint_angle_rad = 0.0, const Load& load = {}) noexcept;
   /// In any state, without current, all friction relaxed.
   /// @returns Fault::input_not_finite, and the plant stays as it is, if it is not finite
   Fault reset(const PlantState& state) noexcept;
 
   /// Wear and failures from now on; `reset` leaves them.
-  /// @returns Fault::input_not_finite, and the condition stays as it is, if a factor is outside 0 to
-  /// 1000, the stop's twist negative, or its stiffness negative or above `stiffest_stop`
+  /// @returns Fault::input_not_finite, and the condition stays as it is, if a factor is outside 0
+  /// to 1000, the stop's twist negative, or its stiffness negative or above `stiffest_stop`
   Fault set_condition(const PlantCondition& condition) noexcept;
   [[nodiscard]] const PlantCondition& condition() const noexcept { return condition_; }
 

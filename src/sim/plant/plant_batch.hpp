@@ -19,10 +19,11 @@ class PlantLanes;
 /// The equations, their order and the division of long steps are those of Plant; the parameters may
 /// differ from plant to plant. What a plant does depends neither on the others nor on how many
 /// there are: its bits are the same in any batch on one instruction set. Against Plant, and between
-/// instruction sets, rounding differs: sine, exponential and hyperbolic tangent are Highway's, right
-/// to some 1e-15 of their range, and products are fused where the processor can. After a second of
-/// random commands states and torques are within 1e-12 of their range. Sines are right up to 4e8
-/// (rotor angle times ripple order); beyond it ripple and kinematic error are wrong, but finite.
+/// instruction sets, rounding differs: sine, exponential and hyperbolic tangent are Highway's,
+/// right to some 1e-15 of their range, and products are fused where the processor can. After a
+/// second of random commands states and torques are within 1e-12 of their range. Sines are right up
+/// to 4e8 (rotor angle times ripple order); beyond it ripple and kinematic error are wrong, but
+/// finite.
 class PlantBatch {
  public:
   /// All at rest at angle 0, unloaded.
@@ -30,8 +31,8 @@ class PlantBatch {
   /// and all or none of their elastomers bonded
   /// @param longest_step_s a longer step is divided into equal ones; none: the shortest of those
   /// that the plants would take on their own
-  /// @throws Error if there is no plant, if their kinds differ or this chain of stages has no kernel
-  /// (the message lists those that have), or as Plant does.
+  /// @throws Error if there is no plant, if their kinds differ or this chain of stages has no
+  /// kernel (the message lists those that have), or as Plant does.
   explicit PlantBatch(std::span<const PlantParameters> parameters, double longest_step_s = 0.0);
   PlantBatch(PlantBatch&& other) noexcept;
   PlantBatch& operator=(PlantBatch&& other) noexcept;
@@ -46,10 +47,11 @@ class PlantBatch {
 
   /// Advances all plants, each under its own command and load, which are held while a step longer
   /// than `longest_step` is divided.
-  /// @returns Fault::input_not_finite if a plant got what Plant refuses: `fault` tells which, they
-  /// stay as they are, and the others move. Fault::model_not_finite if there is none of these, but
-  /// one whose state is no longer finite: it is back at rest, as Plant's. A dt that Plant refuses is a fault of all of them. Spans
-  /// of another size than `size()` are Fault::input_count_wrong, and nothing moves.
+  /// @returns Fault::input_not_finite if a plant got inputs that Plant refuses: `fault` returns
+  /// which, they are not changed, and the others move. Fault::model_not_finite if there is none of
+  /// these, but one whose state is not finite any more: it is reset to rest, as in Plant. A dt that
+  /// Plant refuses is a fault of all of them. Spans of another size than `size()` are
+  /// Fault::input_count_wrong, and nothing moves.
   [[nodiscard]] Fault step(std::span<const PlantCommand> commands, std::span<const Load> loads,
                            double dt_s) noexcept TORSIO_REALTIME;
 

@@ -5,7 +5,8 @@
 
 #include "sim/plant/plant.hpp"
 
-// What a plant takes; else it stays as it is and says Fault::input_not_finite.
+// Checks of a plant's inputs; a plant with a refused input is not changed and has
+// Fault::input_not_finite.
 
 namespace torsio {
 
@@ -17,7 +18,8 @@ inline bool is_usable(const PlantCommand& command, const Load& load) noexcept {
                        load.wall_damping_Nms_rad);
 }
 
-/// Whether steps follow the obstacle: half a radian of its mode with the joint, half a time constant.
+/// Whether steps follow the obstacle: half a radian of its mode with the joint, half a time
+/// constant.
 inline bool is_soft_enough(const Load& load, double joint_inertia_kg_m2, double dt_s) noexcept {
   const double inertia_kg_m2 = joint_inertia_kg_m2 + load.inertia_kg_m2;
   return load.wall_stiffness_Nm_rad * dt_s * dt_s <= 0.25 * inertia_kg_m2 &&

@@ -15,7 +15,8 @@ class PlantLanes {
   /// @throws Error if the kinds differ, or no kernel steps this one.
   explicit PlantLanes(std::span<const PlantParameters> parameters);
 
-  /// Of all lanes: the last block's spare ones are filled too, and their plants stay at rest.
+  /// Number of all lanes: the spare lanes of the last block are filled, too; their plants remain at
+  /// rest.
   [[nodiscard]] std::size_t padded_size() const noexcept;
 
   void set_parts(std::size_t at, const Plant& plant) noexcept;
@@ -24,8 +25,8 @@ class PlantLanes {
   void start(std::size_t at, const Plant& plant) noexcept;
   void set_condition(std::size_t at, const PlantCondition& condition) noexcept;
 
-  /// Takes inputs, steps, and says in `faults` what it did not take, and whose state is no longer
-  /// finite.
+  /// Reads inputs, steps, and writes to `faults` the refused inputs and the plants whose state is
+  /// not finite any more.
   /// @returns whether there is no fault
   bool step(std::span<const PlantCommand> commands, std::span<const Load> loads, std::size_t steps,
             double dt_s, std::span<Fault> faults) noexcept;

@@ -125,7 +125,7 @@ Spring::Parameters stage_of(const SpringSheet& spring) {
   };
 }
 
-/// What is felt at the joint, brought to the gear's input.
+/// The friction at the joint, referred to the gear's input.
 LuGreFriction::Parameters friction_of(const FrictionSheet& friction, double ratio) {
   return {.coulomb_Nm = friction.coulomb_Nm.value / ratio,
           .load_factor = friction.load_factor.value / ratio,

@@ -19,7 +19,7 @@ struct alignas(64) Row {
 
 struct MotorRows {
   Row torque_constant, peak_A, supply_V, inverse_resistance, ripple_Nm, ripple_order;
-  Row decay;  ///< of the current over a step
+  Row decay;  ///< decay of the current over a step
   Row current_A, torque_Nm;
 };
 
@@ -52,12 +52,12 @@ struct LuGreSlipRows {
 /// What every stage leaves for its two bodies.
 struct StageRows {
   Row output_Nm, input_Nm;
-  Row twist_rad, slope;  ///< of this step, and dx / d(input angle)
+  Row twist_rad, slope;  ///< twist of this step, and dx / d(input angle)
 };
 
 struct GearRows : StageRows {
   Row inverse_ratio, stiffness, damping;
-  std::array<Row, 2> in_phase, quadrature;  ///< of the kinematic error
+  std::array<Row, 2> in_phase, quadrature;  ///< amplitudes of the kinematic error
   Row error_rad;                            ///< A₂ + A₄
   SlipRows<1> hysteresis;
 };

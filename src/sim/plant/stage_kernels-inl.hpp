@@ -1,8 +1,8 @@
 // The stages of the kernels of PlantBatch; included once for each instruction set.
 //
 // The equations are those of the classes in torsio/actuator/ and of Plant, on several plants at
-// once; a comment here says only what vectors add. Shortcuts are taken when all lanes allow them,
-// and change no bit of any lane.
+// once; comments here describe only the vectorisation. Shortcuts are taken when all lanes allow
+// them, and change no bit of any lane.
 
 #if defined(TORSIO_SIM_STAGE_KERNELS_INL_HPP) == defined(HWY_TARGET_TOGGLE)
 #ifdef TORSIO_SIM_STAGE_KERNELS_INL_HPP

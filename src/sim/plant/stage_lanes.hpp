@@ -206,7 +206,7 @@ void set_period(ElastomerRows<kBonded>& rows, Lane lane, const ElastomerCoupling
     lane.set(rows.transition[j], chain.transition()[j]);
 }
 
-// Where a plant starts: as it stands after Plant::reset.
+// The initial state of a plant is that after Plant::reset.
 
 template <std::size_t kElements>
 void start(SlipRows<kElements>& rows, Lane lane) noexcept {

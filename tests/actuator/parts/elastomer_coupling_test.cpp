@@ -16,7 +16,7 @@ namespace torsio {
 namespace {
 
 constexpr double kPerDeg = deg_from_rad(1.0);  // Nm/deg in Nm/rad
-constexpr double kGain = 1.87e-3;              // of paper 003, Eq. 3
+constexpr double kGain = 1.87e-3;              // paper 003, Eq. 3
 
 constexpr ElastomerCoupling::Parameters kBonded = {
     .stiffness_Nm_rad = 0.3829 * kPerDeg,
@@ -144,7 +144,7 @@ TEST(ElastomerCoupling, TakesWorkOnEveryClosedPathAndNeverGivesLossBack) {
     const double dt_s = std::pow(10.0, -5.0 + 3.0 * random.uniform());
     const WorkBook book = walk(coupling, path, dt_s, 3);
     EXPECT_GT(book.work_J, book.stored_J) << "path " << i << ", step " << dt_s;
-    // The trapezoids that count the work overrate what a lobe gives back as it lets go by up to
+    // The trapezoids overestimate the work that a lobe returns at its release by up to
     // k du^2 / 8; exactly, there is no gain.
     EXPECT_LE(book.largest_gain_J, 1e-6 * book.throughput_J) << "path " << i << ", step " << dt_s;
   }

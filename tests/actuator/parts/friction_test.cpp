@@ -74,8 +74,8 @@ class ClosedPath {
 };
 
 struct Taken {
-  double least_J = 0.0;  ///< the least that had been put in at any time, from a relaxed start
-  double deepest_fall_J = 0.0;  ///< of what was lost, below what it had reached
+  double least_J = 0.0;         ///< the lowest supplied energy at any time, from a relaxed start
+  double deepest_fall_J = 0.0;  ///< largest decrease of the loss below its earlier maximum
   double throughput_J = 0.0;
 };
 
@@ -111,8 +111,8 @@ Taken on_a_closed_path(const LuGreFriction::Parameters& parts, double largest_lo
   return taken;
 }
 
-// With a bristle whose stiffness follows load and speed a third of these paths give work, up to 13 %
-// of the throughput.
+// With a bristle whose stiffness follows load and speed a third of these paths give work, up to 13
+// % (share of the throughput).
 TEST(LuGreFriction, NeverGivesWorkHoweverSpeedAndLoadVary) {
   for (const DataSheet& sheet : data_sheets()) {
     const PlantParameters plant = plant_parameters(sheet);

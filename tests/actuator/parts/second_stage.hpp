@@ -30,10 +30,10 @@ inline std::vector<double> random_closed_path(double amplitude_rad, std::size_t 
 
 /// What a second stage did on a path that it entered relaxed.
 struct WorkBook {
-  double work_J = 0.0;           ///< put into the stage
-  double stored_J = 0.0;         ///< of it, at the end
+  double work_J = 0.0;           ///< supplied to the stage
+  double stored_J = 0.0;         ///< stored part at the end
   double throughput_J = 0.0;     ///< sum of the magnitudes of the work
-  double largest_gain_J = 0.0;   ///< the most that the friction's loss ever fell back
+  double largest_gain_J = 0.0;   ///< largest decrease of the friction's loss
   double friction_loss_J = 0.0;  ///< friction work less what the friction stores, at the end
 };
 

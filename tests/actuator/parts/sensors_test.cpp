@@ -23,7 +23,7 @@ TEST(Encoder, NineteenBitsAreThePrintedResolution) {
   EXPECT_NEAR(deg_from_rad(encoder.resolution()), 6.8665e-4, 5e-9);
 }
 
-TEST(Encoder, TellsWholeCodesOnly) {
+TEST(Encoder, GivesWholeCodesOnly) {
   Random random(2);
   const Encoder encoder({.bits = 19.0}, random);
   const double first = encoder.read(0.3, random);

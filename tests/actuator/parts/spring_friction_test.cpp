@@ -79,7 +79,7 @@ TYPED_TEST(SpringFrictionLaws, LoopIsAsWideAsTwiceTheLimit) {
 }
 
 struct Fall {
-  double deepest_J = 0.0;  ///< of work less F² / 2k, below what it had reached
+  double deepest_J = 0.0;  ///< largest decrease of work minus F² / 2k below its earlier maximum
   double lost_J = 0.0;     ///< at the end
   double max_stored_J = 0.0;
 };
@@ -113,10 +113,10 @@ TYPED_TEST(SpringFrictionLaws, LossNeverFallsUnderAConstantLimit) {
   }
 }
 
-// Where the limit follows the load, F² / 2k(load) is no exact storage function: on a stroke that
-// sticks while the load falls, k falls with it and F² / 2k seems to rise. It is no energy: what a
-// closed path takes is never negative. Measured: up to 0.7 % of the most that is stored (2.1e-5 J),
-// whatever the step.
+// If the limit follows the load, F² / 2k(load) is not an exact storage function: on a stroke that
+// sticks while the load falls, k falls with it and F² / 2k seems to rise. This is not energy: the
+// work of a closed path is never negative. Measured: up to 0.7 % of the largest stored energy
+// (2.1e-5 J), whatever the step.
 TYPED_TEST(SpringFrictionLaws, LossFallsByAShareOfWhatIsStoredWhereTheLimitFollowsTheLoad) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const Fall fall = fall_of_loss(friction_of<TypeParam>(1.5, 0.05), 500.0, seed);
@@ -201,8 +201,8 @@ TYPED_TEST(SpringFrictionLaws, ResetMakesARunRepeatable) {
   EXPECT_EQ(run(), first);
 }
 
-/// The forces after every tenth of a knee on a triangle up to 1.1 knees, down to -0.7 and up to 0.4,
-/// in steps of a tenth over `parts`.
+/// The forces after every tenth of a knee on a triangle up to 1.1 knees, down to -0.7 and up to
+/// 0.4, in steps of a tenth over `parts`.
 template <class Friction>
 std::vector<double> triangle(int parts, double load_Nm_rad) {
   auto friction = friction_of<Friction>(1.5, 0.1);

@@ -28,8 +28,8 @@ Spring spring_of(const DataSheet& sheet) {
 std::vector<Spring> variants_of(const DataSheet& sheet) {
   std::vector<Spring> springs;
   for (const std::string_view variant : sheet.variants) {
-    const DataSheet piece = data_sheet(fmt::format("{}:{}", sheet.name, variant));
-    auto parameters = std::get<Spring::Parameters>(plant_parameters(piece).second);
+    const DataSheet variant_sheet = data_sheet(fmt::format("{}:{}", sheet.name, variant));
+    auto parameters = std::get<Spring::Parameters>(plant_parameters(variant_sheet).second);
     parameters.viscosity_Nms_rad = 0.0;
     springs.emplace_back(parameters);
   }

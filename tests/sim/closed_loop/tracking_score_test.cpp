@@ -49,7 +49,7 @@ TEST(TrackingScore, MeasuresTheErrorAfterTwoSecondsWithAndWithoutTheLoadCell) {
   EXPECT_FALSE(score.overshoot);
 }
 
-TEST(TrackingScore, TellsTheLargestOvershootOfASetOfSteps) {
+TEST(TrackingScore, ReportsTheLargestOvershootOfASetOfSteps) {
   std::vector<double> wanted(6000, 4.0);
   std::vector<double> torque(6000, 4.0);
   torque[100] = 5.0;  // 1 of 4

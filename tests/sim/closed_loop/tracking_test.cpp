@@ -173,7 +173,7 @@ TEST(Track, MeasuresTheBandwidthThatTheGainsWereMadeFor) {
   EXPECT_GT(*fast, 1.3 * *slow);
 }
 
-TEST(Track, OfStepsTellsTheOvershoot) {
+TEST(Track, OfStepsReportsTheOvershoot) {
   const TrackingScore score = track(kSheet, short_spec(Kind::steps), line(), 1).score;
   ASSERT_TRUE(score.overshoot);
   EXPECT_LT(*score.overshoot, 0.5);
@@ -274,7 +274,7 @@ TEST(TrackingReport, HasTheFieldsOfItsSchemaAndNoNumbersOfARunThatFailed) {
   rows.back().reason = "why";
   const auto json = nlohmann::ordered_json::parse(tracking_json(rows));
   const auto& row = json.at("results").at(0);
-  auto field = row.begin();  // those of the schema, in its order; others follow
+  auto field = row.begin();  // the fields of the schema, in its order; others follow
   for (const char* key :
        {"actuator", "variant", "output", "reference", "amplitude_Nm", "model", "seed", "mad",
         "std_abs", "rmse", "mad_to_linear", "bandwidth_Hz", "limit_events", "status", "reason"})
@@ -289,8 +289,8 @@ TEST(TrackingReport, HasTheFieldsOfItsSchemaAndNoNumbersOfARunThatFailed) {
   EXPECT_NE(text.find("m, seed 1: failed: why"), std::string::npos) << text;
 }
 
-// Never down to -3 dB is the best that there is, down from the start the worst, and none is neither.
-TEST(TrackingReport, TellsABandwidthAboveTheSweepFromOneBelowItAndFromNone) {
+// Never down to -3 dB is the best result, down from the start the worst, and none is neither.
+TEST(TrackingReport, DistinguishesABandwidthAboveTheSweepBelowItAndNone) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   TrackingRow row;
   row.model = "m";

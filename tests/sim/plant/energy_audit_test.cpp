@@ -62,12 +62,13 @@ constexpr std::size_t kBearing = 4;
 constexpr std::size_t kFirst = 8;
 constexpr std::size_t kSecond = 9;
 
-/// What the books say after a long random drive.
+/// The energy balance after a long random drive.
 struct Books {
   double throughput_J = 0.0;
   double lost_J = 0.0;
   double largest_residual_J = 0.0;
-  double largest_gain_J = 0.0;  ///< of E − E(0) − W_in over what a second may create
+  double largest_gain_J =
+      0.0;  ///< largest increase of E − E(0) − W_in above that of integration errors in one second
   double stage_loss_J = 0.0;
   std::array<Falls, Plant::kWorkPorts> falls;
   Falls following;  ///< a load-following bristle that turns with the rotor
@@ -129,7 +130,7 @@ bool is_gear(const std::string& actuator) { return actuator.starts_with("harmoni
 // Measured, each in a millisecond and over the most that the element ever stores: bristles up to
 // 1.3e-4 (bearing of the unbonded elastomer, 2.5e-10 J), a load-following bristle up to 1.3e-2; the
 // hysteresis of gears, whose twist rate swings within a step, up to 0.44 (at most 1.9e-5 J);
-// load-dependent friction of springs up to 0.016 (3.7e-5 J), which is no step's error (see
+// load-dependent friction of springs up to 0.016 (3.7e-5 J), which is not an error of a step (see
 // spring_friction_test); viscoelastic couplings up to 4.4e-4 (5.6e-5 J). Residuals: up to 6e-5 of
 // the throughput (elastomer).
 TEST(EnergyAudit, BooksOfEveryActuatorCloseUnderARandomDrive) {

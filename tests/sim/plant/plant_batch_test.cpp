@@ -95,7 +95,7 @@ double largest_difference(const Track& a, const Track& b) {
   return worst;
 }
 
-/// A plant whose rotor stands in the middle of a stick-slip event at another step differs for good;
+/// A plant whose rotor is in the middle of a stick-slip event at another step differs permanently;
 /// none of these does within a second.
 constexpr double kTolerance = 1e-10;
 
@@ -273,7 +273,7 @@ TEST(PlantBatch, RefusesStepsAndCountsThatMeanNothing) {
   EXPECT_EQ(numbers(batch, 1), before);
 }
 
-/// What the constructor says about these plants.
+/// The constructor's error for these plants.
 ErrorReport refusal(const std::vector<PlantParameters>& parameters, double longest_step_s = 0.0) {
   try {
     PlantBatch(parameters, longest_step_s);

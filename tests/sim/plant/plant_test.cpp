@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kStep_s = 1e-4;
 
-/// A gear without losses and error behind a spring without friction: only its mode is left.
+/// A gear without losses and error with a spring without friction: only its mode is left.
 PlantParameters lossless(const DataSheet& sheet) {
   PlantParameters parts = plant_parameters(sheet);
   auto& gear = std::get<Gear::Parameters>(parts.first);

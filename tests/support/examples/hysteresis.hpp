@@ -23,7 +23,7 @@ inline MaxwellSlipModel example<MaxwellSlipModel>() {
   return MaxwellSlipModel(parameters);
 }
 
-/// The same said in plays: k_0 takes what the stops had, the weights turn.
+/// The same in play operators: k_0 includes the stops' stiffness, the weights change sign.
 template <>
 inline PrandtlIshlinskii example<PrandtlIshlinskii>() {
   PrandtlIshlinskii::Parameters parameters;

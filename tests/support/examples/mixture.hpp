@@ -8,7 +8,7 @@
 
 namespace torsio::test {
 
-/// A row of five Gaussians along 600 Nm/rad, and one behind them all.
+/// Five Gaussians along 600 Nm/rad, and a wide one over them.
 template <>
 inline Dgmm example<Dgmm>() {
   constexpr std::size_t kComponents = 6;

@@ -18,7 +18,7 @@ struct TorqueReference {
     random_walk,  ///< noise below 1 Hz, with the RMS of the chirp
     steps,        ///< A, -A, A/2, -A/2, each for 2 s
     sweep,        ///< a logarithmic sweep through the loop's bandwidth, see `frequency_sweep`
-    replay,       ///< of `recorded_Nm`
+    replay,       ///< replays `recorded_Nm`
   };
 
   Kind kind = Kind::chirp;
@@ -39,7 +39,7 @@ struct TorqueReference {
 /// What it asks for; a replay's is its largest.
 [[nodiscard]] double amplitude_of(const TorqueReference& reference, const DataSheet& sheet);
 
-/// Of `Kind::sweep`: 1 to 40 Hz.
+/// The sweep of `Kind::sweep`: 1 to 40 Hz.
 [[nodiscard]] LogSweep::Parameters frequency_sweep(double amplitude_Nm, double duration_s);
 
 }  // namespace torsio

@@ -35,22 +35,25 @@ struct TrackingSpec {
   FaultSchedule faults = {};
 };
 
-/// Whether it can be run. @throws UsageError if the actuator is not series-elastic, the reference out
-/// of its rating, the lever would tip over, or as `FaultInjector`; Error if the loop would be unstable.
+/// Checks a run. @throws UsageError if the actuator is not series-elastic, the reference exceeds
+/// its rating, the lever would tip over, or as `FaultInjector`; Error if the loop would be
+/// unstable.
 void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed);
 
 struct TrackingRun {
-  TrackingScore score;  ///< of a run that has not diverged
-  /// Where the response to `frequency_sweep` has fallen to -3 dB: 0 below the sweep, infinite above it; none
-  /// if not asked for, or if it diverged
+  TrackingScore score;  ///< valid if the run has not diverged
+  /// Where the response to `frequency_sweep` has fallen to -3 dB: 0 below the sweep, infinite above
+  /// it; none if not asked for, or if it diverged
   std::optional<double> bandwidth_Hz = {};
-  bool has_diverged = false;  ///< stopped: the joint turned round, or the torque left any bound
-  /// What the sensors told, what the loop made of it with each term, and the `truth_` channels.
+  bool has_diverged =
+      false;  ///< stopped: the joint made a full turn, or the torque exceeded every bound
+  /// Sensor signals, each term of the command, and the `truth_` channels.
   ///
   ///     command = proportional + integral + derivative + feed_forward + rate_feed_forward +
-  ///               friction + observer + handover + rest,   all `..._current_A`
+  ///               friction + observer + transfer + rest,   all `..._current_A`
   ///
-  /// where rest is what a limit cut, or what stands while a fault lets the command fade.
+  /// where rest is the part that a limit removed, or the rest of the command while a fault fades it
+  /// to 0.
   Recording record;
 };
 
@@ -63,8 +66,8 @@ struct TrackingRun {
                                 const Progress& progress = {});
 
 /// The inverse that a model file's model gives a loop at 1 kHz.
-/// @throws Error as `AnyInverse::of`, or if the model cannot run at that rate, or wants the zero of
-/// a channel that no one sets here.
+/// @throws Error as `AnyInverse::of`, or if the model cannot run at that rate, or requires the
+/// zero of a channel that no one sets here.
 [[nodiscard]] AnyInverse inverse_of(const ModelFile& model);
 
 /// What `track` calls the line of `sweep_line` where others are model files: a documented keyword
@@ -83,7 +86,7 @@ struct NamedInverse {
 /// One model, one run.
 struct TrackingRow {
   std::string actuator;
-  std::string variant;  ///< of the spring
+  std::string variant;  ///< variant of the spring
   JointOutput output = JointOutput::locked;
   std::string reference;
   double amplitude_Nm = 0.0;
@@ -96,8 +99,8 @@ struct TrackingRow {
   std::string reason = {};
 };
 
-/// `linear` and each of the models under every seed, in this order; a run that fails is a row that
-/// says why.
+/// `linear` and each of the models under every seed, in this order; a run that fails is a row with
+/// the reason.
 /// @throws as `check_tracking`, before the first run; Cancelled.
 [[nodiscard]] std::vector<TrackingRow> track_models(const DataSheet& sheet,
                                                     const TrackingSpec& spec,

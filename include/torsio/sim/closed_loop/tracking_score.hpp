@@ -16,15 +16,15 @@ struct TrackingScore {
   double rmse = 0.0;            ///< sqrt(mean e^2)
   double max_abs = 0.0;         ///< largest |e|
   double error_ratio = 0.0;     ///< MAD over the reference's amplitude
-  double load_cell_mad = 0.0;   ///< as `mad`, of the torque that the load cell tells: noisy, late
-  double load_cell_rmse = 0.0;  ///< as `rmse`, of the same
-  /// Largest of all steps from the start on, the first one from 0: how far the torque goes beyond, as
-  /// a share of the step. Steps only.
+  double load_cell_mad = 0.0;   ///< as `mad`, with the torque of the load cell: noise and delay
+  double load_cell_rmse = 0.0;  ///< as `rmse`, with the same torque
+  /// Largest of all steps from the start on, the first one from 0: how far the torque goes beyond,
+  /// as a share of the step. Steps only.
   std::optional<double> overshoot = {};
   std::optional<LimitCycle> limit_cycle = {};
-  std::size_t limit_events = 0;    ///< how often a limit began to cut
-  double limited_s = 0.0;          ///< for how long in all
-  std::size_t inverse_faults = 0;  ///< ticks in which the inverse told its line, not its model
+  std::size_t limit_events = 0;    ///< number of times that a limit became active
+  double limited_s = 0.0;          ///< total time of active limits
+  std::size_t inverse_faults = 0;  ///< steps on the linear fallback of the inverse
   std::size_t loop_faults = 0;     ///< ticks without a usable reference or measurement
 };
 
