@@ -28,7 +28,7 @@ struct CompareFlags {
   JsonOutput json;
 };
 
-void run(const CompareFlags& flags) {
+void run(CompareFlags& flags) {
   flags.data.check_outputs({flags.output, flags.report, flags.json.destination}, flags.test);
   require_model_file(flags.output);
   ProgressBar progress;

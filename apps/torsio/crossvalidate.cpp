@@ -45,7 +45,7 @@ std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
   return choices;
 }
 
-void run(const CrossValidateFlags& flags) {
+void run(CrossValidateFlags& flags) {
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   flags.data.check_outputs({flags.json.destination});
   const torsio::FoldScheme scheme{.folds = flags.folds,

@@ -32,9 +32,15 @@ struct DataFlags {
   [[nodiscard]] torsio::Dataset load_as_test(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
   /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that
-  /// are the same file, or whose folder does not exist.
+  /// are the same file, or whose folder does not exist. `load` and `load_as_test` compare them again
+  /// with the files that a manifest names.
   void check_outputs(const std::vector<std::string>& outputs,
-                     const std::vector<std::string>& more_inputs = {}) const;
+                     const std::vector<std::string>& more_inputs = {});
+
+ private:
+  void check_not_read(const std::vector<std::string>& files_read) const;
+
+  std::vector<std::string> outputs_;
 };
 
 inline constexpr std::uint64_t kDefaultSeed = 1;

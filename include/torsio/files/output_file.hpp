@@ -10,10 +10,17 @@ namespace torsio {
 ///
 /// It is written under a temporary name in the same folder; `commit` syncs and renames it, so that
 /// the target holds either its old bytes or all new ones, after a power loss too. Destroyed without
-/// `commit`, it leaves nothing. A symbolic link stays one. A device or pipe is written straight.
+/// `commit`, it leaves nothing. A symbolic link remains one, a replaced file keeps its mode. A device
+/// or pipe is written straight.
 class OutputFile {
  public:
-  /// @throws Error (no such folder, no permission, the target is a directory).
+  /// The file that `path` names: the end of its chain of symbolic links, which need not exist.
+  [[nodiscard]] static std::filesystem::path target_of(std::filesystem::path path);
+  /// Whether `target` is a file that no one may write. Its folder may allow to replace it all the
+  /// same, but its owner has protected it.
+  [[nodiscard]] static bool is_protected(const std::filesystem::path& target);
+
+  /// @throws Error (no such folder, no permission, the target is a directory or protected).
   explicit OutputFile(const std::filesystem::path& path);
   /// Written straight, too.
   [[nodiscard]] static OutputFile standard_output();
