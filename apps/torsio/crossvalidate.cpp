@@ -1,3 +1,6 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <map>
 #include <string>
@@ -84,7 +87,8 @@ void add_crossvalidate(CLI::App& app) {
           "--models", flags->models,
           "families with settings: linear,polynomial:degree=7:branch=true; all: every family "
           "but " +
-              families_beyond_all() + ", which are added by name: all,lstm")
+              fmt::format("{}", fmt::join(families_beyond_all(), ", ")) +
+              ", which are added by name: all,lstm")
       ->capture_default_str();
   verb->add_option("--set", flags->settings, "set an option of every model, option=value")
       ->allow_extra_args(false);

@@ -63,11 +63,11 @@ double angular_frequency_rad_s(const std::string& text, const char* option) {
   return 2.0 * std::numbers::pi * above_zero(torsio::si_quantity(text, "Hz", option), option);
 }
 
-std::string families_beyond_all() {
+std::vector<std::string_view> families_beyond_all() {
   std::vector<std::string_view> names;
   for (const torsio::FamilyInfo& family : torsio::families())
     if (family.only_if_named) names.push_back(family.name);
-  return fmt::format("{}", fmt::join(names, ", "));
+  return names;
 }
 
 bool has_all(const std::string& models) {

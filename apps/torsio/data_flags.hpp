@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/core/progress.hpp"
@@ -49,7 +50,7 @@ inline constexpr std::uint64_t kDefaultSeed = 1;
 /// @throws torsio::UsageError if it is not above 0.
 [[nodiscard]] double angular_frequency_rad_s(const std::string& text, const char* option);
 /// The families that `--models all` leaves out, for help and remarks.
-[[nodiscard]] std::string families_beyond_all();
+[[nodiscard]] std::vector<std::string_view> families_beyond_all();
 /// Whether `all` is in a list of models.
 [[nodiscard]] bool has_all(const std::string& models);
 /// `--seed`, for every verb that draws random numbers.
