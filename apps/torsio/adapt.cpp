@@ -46,7 +46,7 @@ torsio::Dataset load(const AdaptFlags& flags, const torsio::ModelFile& file,
   return dataset;
 }
 
-void run(const AdaptFlags& flags) {
+void run(AdaptFlags& flags) {
   std::vector<std::string> read = flags.test;
   read.push_back(flags.model);
   flags.data.check_outputs({flags.output, flags.json.destination}, read);

@@ -46,7 +46,7 @@ torsio::Dataset load(const AttributeFlags& flags, const std::string& target,
   return dataset;
 }
 
-void run(const AttributeFlags& flags) {
+void run(AttributeFlags& flags) {
   flags.data.check_outputs({flags.json.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   ProgressBar progress;

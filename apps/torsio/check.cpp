@@ -68,7 +68,7 @@ std::vector<torsio::Finding> findings_of(const CheckFlags& flags) {
   }
 }
 
-void run(const CheckFlags& flags) {
+void run(CheckFlags& flags) {
   flags.data.check_outputs({flags.json.destination}, flags.test);
   const std::vector<torsio::Finding> findings = findings_of(flags);
   const torsio::Verdict verdict = worst(findings);

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <optional>
 
@@ -28,7 +29,7 @@ struct CompareFlags {
   JsonOutput json;
 };
 
-void run(const CompareFlags& flags) {
+void run(CompareFlags& flags) {
   flags.data.check_outputs({flags.output, flags.report, flags.json.destination}, flags.test);
   require_model_file(flags.output);
   ProgressBar progress;
@@ -58,7 +59,10 @@ void run(const CompareFlags& flags) {
   if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
   if (flags.json.wants_tables()) print(comparison_text(comparison.results));
   if (has_all(flags.models))
-    remark("note: all leaves out " + families_beyond_all() + ": add them by name, as all,lstm");
+    remark(
+        fmt::format("note: all leaves out {} families, which --help lists: add them by name, as in "
+                    "all,lstm",
+                    families_beyond_all().size()));
   if (!flags.report.empty()) write_text(flags.report, torsio::results_html(comparison.results));
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, comparison.best->file);
@@ -83,7 +87,7 @@ void add_compare(CLI::App& app) {
           "--models", flags->models,
           "families with settings: linear,polynomial:degree=7:branch=true; all: every family "
           "but " +
-              families_beyond_all() +
+              fmt::format("{}", fmt::join(families_beyond_all(), ", ")) +
               ", which take longer or are for other data and are added by name: "
               "all,viscoelastic; search: orders and structures of each family by "
               "cross-validation within the training records, the best then compared: "

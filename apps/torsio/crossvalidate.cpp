@@ -1,3 +1,6 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <map>
 #include <string>
@@ -45,7 +48,7 @@ std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
   return choices;
 }
 
-void run(const CrossValidateFlags& flags) {
+void run(CrossValidateFlags& flags) {
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   flags.data.check_outputs({flags.json.destination});
   const torsio::FoldScheme scheme{.folds = flags.folds,
@@ -84,7 +87,8 @@ void add_crossvalidate(CLI::App& app) {
           "--models", flags->models,
           "families with settings: linear,polynomial:degree=7:branch=true; all: every family "
           "but " +
-              families_beyond_all() + ", which are added by name: all,lstm")
+              fmt::format("{}", fmt::join(families_beyond_all(), ", ")) +
+              ", which are added by name: all,lstm")
       ->capture_default_str();
   verb->add_option("--set", flags->settings, "set an option of every model, option=value")
       ->allow_extra_args(false);

@@ -63,11 +63,11 @@ double angular_frequency_rad_s(const std::string& text, const char* option) {
   return 2.0 * std::numbers::pi * above_zero(torsio::si_quantity(text, "Hz", option), option);
 }
 
-std::string families_beyond_all() {
+std::vector<std::string_view> families_beyond_all() {
   std::vector<std::string_view> names;
   for (const torsio::FamilyInfo& family : torsio::families())
     if (family.only_if_named) names.push_back(family.name);
-  return fmt::format("{}", fmt::join(names, ", "));
+  return names;
 }
 
 bool has_all(const std::string& models) {
@@ -118,9 +118,11 @@ torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
         {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
   const torsio::LoadOptions options = load_options(*this, progress);
   torsio::Dataset dataset = torsio::load_dataset(recordings, test, options);
+  check_not_read(dataset.files);
   dataset.initialise_samples = initialise;
   if (validation.empty()) return dataset;
   torsio::Dataset held_out = torsio::load_dataset({}, validation, options);
+  check_not_read(held_out.files);
   for (torsio::DatasetRecord& record : held_out.records) {
     for (torsio::Segment& segment : record.segments) segment.role = torsio::Role::validation;
     dataset.records.push_back(std::move(record));
@@ -136,6 +138,7 @@ torsio::Dataset DataFlags::load_as_test(const torsio::Progress& progress) const 
   torsio::LoadOptions options = load_options(*this, progress);
   options.role = torsio::Role::test;
   torsio::Dataset dataset = torsio::load_dataset(recordings, {}, options);
+  check_not_read(dataset.files);
   dataset.initialise_samples = initialise;
   return dataset;
 }
@@ -144,20 +147,24 @@ std::vector<std::string> DataFlags::wanted_inputs() const {
   return inputs.empty() ? std::vector<std::string>{} : torsio::split_inputs(inputs);
 }
 
+void DataFlags::check_not_read(const std::vector<std::string>& files_read) const {
+  for (const std::string& output : outputs_)
+    for (const std::string& file : files_read)
+      if (is_same_file(file, output))
+        throw torsio::UsageError({.place = output,
+                                  .problem = "this output would replace a file that is read",
+                                  .advice = "Give the output another name."});
+}
+
 void DataFlags::check_outputs(const std::vector<std::string>& outputs,
-                              const std::vector<std::string>& more_inputs) const {
-  std::vector<std::string> inputs_read = recordings;
-  inputs_read.insert(inputs_read.end(), more_inputs.begin(), more_inputs.end());
-  inputs_read.push_back(mapping);
+                              const std::vector<std::string>& more_inputs) {
+  outputs_ = outputs;
+  check_not_read(recordings);
+  check_not_read(more_inputs);
+  check_not_read({mapping});
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     if (outputs[i].empty()) continue;
     require_writable(outputs[i]);
-    for (const std::string& input : inputs_read) {
-      if (!is_same_file(input, outputs[i])) continue;
-      throw torsio::UsageError({.place = outputs[i],
-                                .problem = "this output would replace a file that is read",
-                                .advice = "Give the output another name."});
-    }
     for (std::size_t j = 0; j < i; ++j) {
       if (!is_same_file(outputs[j], outputs[i])) continue;
       throw torsio::UsageError({.place = outputs[i],

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/core/progress.hpp"
@@ -32,9 +33,15 @@ struct DataFlags {
   [[nodiscard]] torsio::Dataset load_as_test(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
   /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that
-  /// are the same file, or whose folder does not exist.
+  /// are the same file, or whose folder does not exist. `load` and `load_as_test` compare them again
+  /// with the files that a manifest names.
   void check_outputs(const std::vector<std::string>& outputs,
-                     const std::vector<std::string>& more_inputs = {}) const;
+                     const std::vector<std::string>& more_inputs = {});
+
+ private:
+  void check_not_read(const std::vector<std::string>& files_read) const;
+
+  std::vector<std::string> outputs_;
 };
 
 inline constexpr std::uint64_t kDefaultSeed = 1;
@@ -43,7 +50,7 @@ inline constexpr std::uint64_t kDefaultSeed = 1;
 /// @throws torsio::UsageError if it is not above 0.
 [[nodiscard]] double angular_frequency_rad_s(const std::string& text, const char* option);
 /// The families that `--models all` leaves out, for help and remarks.
-[[nodiscard]] std::string families_beyond_all();
+[[nodiscard]] std::vector<std::string_view> families_beyond_all();
 /// Whether `all` is in a list of models.
 [[nodiscard]] bool has_all(const std::string& models);
 /// `--seed`, for every verb that draws random numbers.

@@ -57,7 +57,7 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
       together.step_ns_p50, together.step_ns_p999, together.guarded_samples);
 }
 
-void run(const DemoFlags& flags) {
+void run(DemoFlags& flags) {
   flags.data.check_outputs({flags.output, flags.json.destination}, flags.test);
   require_model_file(flags.output);
   ProgressBar progress;

@@ -47,7 +47,7 @@ torsio::Recording prediction_recording(const torsio::Estimator& estimator,
   return result;
 }
 
-void run(const EvaluateFlags& flags) {
+void run(EvaluateFlags& flags) {
   flags.data.check_outputs({flags.predictions, flags.json.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   if (flags.data.recordings.empty()) {

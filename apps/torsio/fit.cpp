@@ -76,7 +76,7 @@ torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset
   }
 }
 
-void run(const FitFlags& flags) {
+void run(FitFlags& flags) {
   if (flags.list) return print(family_list());
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   std::vector<std::string> missing;

@@ -86,7 +86,7 @@ torsio::ImportOptions options_of(const ImportFlags& flags) {
           .fold_biases = flags.fold_biases};
 }
 
-void run(const ImportFlags& flags) {
+void run(ImportFlags& flags) {
   if (flags.data.inputs.empty() || flags.data.rate.empty() || flags.output.empty())
     throw torsio::UsageError({.place = "torsio import",
                               .expected = "--inputs, --rate and -o: the file does not specify the "

@@ -33,8 +33,7 @@ void require_writable(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code absent;
   // A link is followed, as the writing does.
-  const fs::path target =
-      fs::is_symlink(path, absent) ? fs::weakly_canonical(path, absent) : fs::path(path);
+  const fs::path target = torsio::OutputFile::target_of(path);
   const fs::path folder = target.parent_path();
   if (!folder.empty() && !fs::is_directory(folder, absent))
     throw torsio::UsageError({.place = path, .problem = "there is no folder " + folder.string()});
@@ -47,6 +46,11 @@ void require_writable(const std::string& path) {
   const std::string written = !is_replaced ? path : folder.empty() ? "." : folder.string();
   if (!is_standard_output(path) && ::access(written.c_str(), W_OK) != 0)
     throw torsio::UsageError({.place = path, .problem = "no permission to write to " + written});
+  if (torsio::OutputFile::is_protected(target))
+    throw torsio::UsageError(
+        {.place = path,
+         .problem = "the file is read-only",
+         .advice = "Give the output another name, or allow writing: chmod u+w."});
 }
 
 void require_model_file(const std::string& path) {

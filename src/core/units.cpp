@@ -1,5 +1,6 @@
 #include "torsio/core/units.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -86,6 +87,15 @@ const Unit* find_unit(std::string_view suffix) noexcept {
   return nullptr;
 }
 
+const Unit* find_written_unit(std::string_view text) noexcept {
+  const auto is_alike = [](char written, char in_suffix) {
+    return written == in_suffix || (written == '/' && in_suffix == '_');
+  };
+  for (const Unit& unit : kUnits)
+    if (std::ranges::equal(text, unit.suffix, is_alike)) return &unit;
+  return nullptr;
+}
+
 std::string known_unit_list() {
   std::string list;
   for (const Unit& unit : kUnits) {
@@ -121,7 +131,7 @@ double si_quantity(std::string_view text, std::string_view expected_si, std::str
   double number = 0.0;
   const auto [end, code] = std::from_chars(all.data(), all.data() + all.size(), number);
   const std::string_view suffix = trimmed(all.substr(static_cast<std::size_t>(end - all.data())));
-  const Unit* unit = suffix.empty() ? find_unit(expected_si) : find_unit(suffix);
+  const Unit* unit = suffix.empty() ? find_unit(expected_si) : find_written_unit(suffix);
   if (code != std::errc{} || unit == nullptr || unit->si_suffix != expected_si ||
       !std::isfinite(unit->si(number)))
     throw UsageError(

@@ -105,7 +105,7 @@ class Collector {
       throw UsageError({.place = "--rate",
                         .expected = "a positive number of Hz",
                         .found = fmt::format("{}", *options_.rate_Hz)});
-    if (options_.mapping) mapping_ = read_mapping(*options_.mapping);
+    if (options_.mapping) mapping_ = mapping_from(*options_.mapping);
     dataset_.target = options_.target;
   }
 
@@ -118,6 +118,7 @@ class Collector {
   }
 
   void add_manifest(Manifest manifest, std::optional<Role> role) {
+    dataset_.files.push_back(manifest.file);
     agree(dataset_.target, manifest.target, "target", manifest.file);
     agree(dataset_.label, manifest.label, "label", manifest.file);
     if (dataset_.input_sets.empty()) dataset_.input_sets = manifest.input_sets;
@@ -139,6 +140,7 @@ class Collector {
     if (dataset_.target.empty()) dataset_.target = kDefaultTarget;
     name_twins_by_path();
     for (const Planned& planned : logs_) {
+      dataset_.files.push_back(planned.log.path);
       const Mapping& mapping = planned.log.mapping;
       refuse_latency_of_inputs(mapping, dataset_.target);
       if (const auto leak = mapping.computed_from.find(dataset_.target);
@@ -208,12 +210,17 @@ class Collector {
                         .found = given});
   }
 
-  [[nodiscard]] Mapping mapping_of(const ManifestFile& entry, const Manifest& manifest) const {
+  [[nodiscard]] Mapping mapping_from(const std::string& path) {
+    dataset_.files.push_back(path);
+    return read_mapping(path);
+  }
+
+  [[nodiscard]] Mapping mapping_of(const ManifestFile& entry, const Manifest& manifest) {
     if (mapping_) return *mapping_;
     const auto& choice = entry.mapping ? entry.mapping : manifest.mapping;
     if (!choice) return {};
     if (choice->file.empty()) return choice->here;
-    return read_mapping(
+    return mapping_from(
         (std::filesystem::path(manifest.file).parent_path() / choice->file).string());
   }
 

@@ -21,15 +21,16 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
   yaml.allow_only({"from", "unit", "sign", "scale", "offset"});
   rule.from = yaml.at("from").text();
   if (const auto unit = yaml.find("unit")) {
-    rule.unit = unit->text();
-    if (find_unit(rule.unit) == nullptr) unit->refuse("a known unit: " + known_unit_list());
+    const Unit* const known = find_written_unit(unit->text());
+    if (known == nullptr) unit->refuse("a known unit: " + known_unit_list());
+    rule.unit = known->suffix;
   }
   if (const auto sign = yaml.find("sign")) {
     rule.sign = sign->number();
     if (std::abs(rule.sign) != 1.0) sign->refuse("1 or -1", "Use scale for other factors.");
   }
   if (const auto scale = yaml.find("scale")) {
-    rule.scale = scale->number();
+    rule.scale = scale->factor();
     if (rule.scale == 0.0) scale->refuse("a number other than 0");
   }
   if (const auto offset = yaml.find("offset"))

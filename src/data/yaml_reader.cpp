@@ -122,6 +122,17 @@ double YamlValue::number(std::string_view si_unit) const {
   return si_quantity(node_.Scalar(), si_unit, place());
 }
 
+double YamlValue::factor() const {
+  if (!node_.IsScalar()) refuse("a number or a fraction such as 1/150");
+  const std::string text = node_.Scalar();
+  const std::size_t slash = text.find('/');
+  if (slash == std::string::npos) return number();
+  const double numerator = si_quantity(text.substr(0, slash), "1", place());
+  const double denominator = si_quantity(text.substr(slash + 1), "1", place());
+  if (denominator == 0.0) refuse("a fraction whose denominator is not 0");
+  return numerator / denominator;
+}
+
 double YamlValue::positive_number(std::string_view si_unit) const {
   const double value = number(si_unit);
   if (!(value > 0.0)) refuse("a positive number");

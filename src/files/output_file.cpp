@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -39,6 +40,24 @@ OutputFile::OutputFile(fs::path place, int descriptor)
   if (descriptor_ < 0) refuse();
 }
 
+fs::path OutputFile::target_of(fs::path path) {
+  constexpr int kMaxLinks = 40;  // as the kernel
+  std::error_code code;
+  for (int k = 0; k < kMaxLinks && fs::is_symlink(path, code); ++k)
+    path = path.parent_path() / fs::read_symlink(path, code);
+  return path;
+}
+
+bool OutputFile::is_protected(const fs::path& target) {
+  std::error_code code;
+  const fs::file_status status = fs::status(target, code);
+  constexpr fs::perms kWrite =
+      fs::perms::owner_write | fs::perms::group_write | fs::perms::others_write;
+  // root may write every file, whatever its mode is.
+  return fs::is_regular_file(status) && ((status.permissions() & kWrite) == fs::perms::none ||
+                                         ::access(target.c_str(), W_OK) != 0);
+}
+
 OutputFile OutputFile::standard_output() { return {"standard output", ::dup(STDOUT_FILENO)}; }
 
 OutputFile::OutputFile(const fs::path& path) : place_(path) {
@@ -51,9 +70,16 @@ OutputFile::OutputFile(const fs::path& path) : place_(path) {
   } else if (fs::exists(status) && !fs::is_regular_file(status)) {
     descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
   } else {
-    target_ = fs::is_symlink(path, code) ? fs::weakly_canonical(path) : path;
+    target_ = target_of(path);
+    if (is_protected(target_)) {
+      errno = EACCES;
+      refuse();
+    }
     temporary_ = temporary_name(target_);
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (const fs::perms mode = fs::status(target_, code).permissions();
+        descriptor_ >= 0 && fs::exists(target_, code))
+      ::fchmod(descriptor_, static_cast<::mode_t>(mode));
   }
   if (descriptor_ < 0) refuse();
 }

@@ -39,21 +39,39 @@ Json report_json(const FitReport& report) {
           {"parameters", std::move(parameters)}};
 }
 
-/// The result of the correlations in one sentence.
+/// The result of the correlations in one sentence. With fewer than `kEnough` effective samples a
+/// correlation with an input has to exceed 0.47 to be significant (99 %), so that small ones prove
+/// nothing and the residuals are not called white.
 std::string verdict(const FitReport& report) {
-  // Long recordings make any correlation significant; correlated residuals show some by chance.
-  const double matters = std::max(0.1, 2.576 / std::sqrt(std::max(report.effective_samples, 1.0)));
+  constexpr double kEnough = 30.0;
+  constexpr double kMatters = 0.1;  // long recordings make any correlation significant
   constexpr double kChance = 0.05;  // share of the lags; one in a hundred is outside by chance
+  // Correlated residuals are correlated with some inputs by chance.
+  const double of_input =
+      std::max(kMatters, 2.576 / std::sqrt(std::max(report.effective_samples, 1.0)));
   std::vector<std::string> with;
-  for (const ResidualCorrelation& each : report.correlations)
-    if (std::abs(each.strongest) > matters && each.share_outside > kChance)
-      with.push_back(&each == report.correlations.data() ? "their past" : each.with);
-  if (with.empty()) return "the residuals are white and uncorrelated with the inputs\n";
-  return fmt::format(
-      "the residuals are correlated with {}: another model could reduce them{} "
-      "(docs/fit_report.md)\n",
-      fmt::join(with, ", "),
-      report.table.empty() ? "" : "; the standard errors below account for it");
+  for (const ResidualCorrelation& each : report.correlations) {
+    const bool is_past = &each == report.correlations.data();
+    if (std::abs(each.strongest) > (is_past ? kMatters : of_input) && each.share_outside > kChance)
+      with.push_back(is_past ? "their past" : each.with);
+  }
+  const bool is_enough = report.effective_samples >= kEnough;
+  if (with.empty() && is_enough)
+    return "the residuals are white and uncorrelated with the inputs\n";
+  std::string text;
+  if (!with.empty())
+    text = fmt::format(
+        "the residuals are correlated with {}: another model could reduce them{} "
+        "(docs/fit_report.md)\n",
+        fmt::join(with, ", "),
+        report.table.empty() ? "" : "; the standard errors below account for it");
+  if (!is_enough)
+    text += fmt::format(
+        "{:.0f} effective samples are too few to exclude a correlation with an input: record "
+        "longer "
+        "or more varied motions\n",
+        report.effective_samples);
+  return text;
 }
 
 }  // namespace

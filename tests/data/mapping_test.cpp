@@ -54,6 +54,23 @@ channels:
   EXPECT_FALSE(recording.has("cur_A"));
 }
 
+TEST(Mapping, TakesFractionsAndUnitsAsPeopleWriteThem) {
+  const Recording recording = read("t_s,motor,speed\n0,300,30\n1,600,60\n", R"(
+channels:
+  gear_angle_rad: {from: motor, unit: deg, scale: -1/150}
+  gear_speed_rad_s: {from: speed, unit: deg/s}
+)")[0];
+  EXPECT_DOUBLE_EQ(recording.channel("gear_angle_rad").values[1], -4.0 * kDeg);
+  EXPECT_DOUBLE_EQ(recording.channel("gear_speed_rad_s").values[0], 30.0 * kDeg);
+  for (const char* scale : {"1/0", "1/", "/150", "1/2/3", "one"})
+    EXPECT_THROW(
+        read("t_s,motor\n0,1\n1,2\n", std::string("channels: {gear_angle_rad: {from: motor, "
+                                                  "unit: deg, scale: '") +
+                                          scale + "'}}"),
+        Error)
+        << scale;
+}
+
 TEST(Mapping, DropsTextAndSplitsIntoRecords) {
   const auto recordings =
       read("t_s,x_m,run,note\n0,1,7,a\n1,2,7,b\n2,3,8,c\n3,4,8,d\n4,5,7,e\n5,6,7,f\n",

@@ -106,5 +106,18 @@ TEST(FitReportOf, ItsTextAndDocumentHaveWhatWasFound) {
   EXPECT_NE(document.find("\"a note\""), std::string::npos);
 }
 
+TEST(FitReportOf, FewIndependentSamplesAreNoReasonToCallResidualsWhite) {
+  FitReport report{.split = "train",
+                   .samples = 10000,
+                   .correlations = {{.with = "residual", .strongest = 1.0, .share_outside = 1.0},
+                                    {.with = "x", .strongest = 0.3, .share_outside = 1.0}},
+                   .table = {}};
+  report.effective_samples = 6.0;
+  const std::string text = fit_report_text(report);
+  EXPECT_EQ(text.find("white"), std::string::npos) << text;
+  EXPECT_NE(text.find("correlated with their past"), std::string::npos) << text;
+  EXPECT_NE(text.find("6 effective samples are too few"), std::string::npos) << text;
+}
+
 }  // namespace
 }  // namespace torsio

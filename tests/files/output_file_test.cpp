@@ -48,6 +48,37 @@ TEST(OutputFile, LeavesNothingWithoutCommit) {
   EXPECT_EQ(folder.files(), 0U);
 }
 
+TEST(OutputFile, WritesTheFileThatADanglingLinkNames) {
+  const TemporaryFolder folder;
+  std::filesystem::create_symlink("target", folder.path("link"));
+  OutputFile file(folder.path("link"));
+  write(file, "text");
+  file.commit();
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path("link")));
+  EXPECT_EQ(text_of(folder.path("target")), "text");
+}
+
+TEST(OutputFile, KeepsTheModeOfTheFileThatItReplaces) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a", "old");
+  constexpr auto kMode = std::filesystem::perms{0640};
+  std::filesystem::permissions(path, kMode);
+  OutputFile file(path);
+  write(file, "new");
+  file.commit();
+  EXPECT_EQ(text_of(path), "new");
+  EXPECT_EQ(std::filesystem::status(path).permissions(), kMode);
+}
+
+TEST(OutputFile, DoesNotReplaceAReadOnlyFile) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a", "old");
+  std::filesystem::permissions(path, std::filesystem::perms{0444});
+  EXPECT_THAT(error_message([&] { const OutputFile file(path); }), HasSubstr("Permission denied"));
+  EXPECT_EQ(text_of(path), "old");
+  EXPECT_EQ(folder.files(), 1U);
+}
+
 TEST(OutputFile, TwoOfOneNameDoNotMix) {
   const TemporaryFolder folder;
   OutputFile first(folder.path("a"));

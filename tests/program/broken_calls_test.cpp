@@ -84,6 +84,21 @@ TEST_F(BrokenCalls, OfImportLeaveTheirOutputAlone) {
   EXPECT_EQ(contents("m.safetensors"), "old");
 }
 
+TEST_F(BrokenCalls, WithAnOutputThatAManifestReadsLeaveTheRecordingAlone) {
+  const std::string csv = "t_s,gear_angle_rad,joint_angle_rad,torque_Nm\n0,0,0,0\n0.001,0,0,0\n";
+  folder_.file("sweep.csv", csv);
+  folder_.file("units.yaml", "{}\n");
+  folder_.file("bench.yaml", "mapping: units.yaml\nfiles:\n  - {file: sweep.csv, role: train}\n");
+  for (const char* output : {"sweep.csv", "./sweep.csv", "units.yaml"}) {
+    expect_error(torsio("fit bench.yaml --model linear -o " + std::string(output)), kCallWasWrong,
+                 "would replace a file that is read");
+    expect_error(torsio("check bench.yaml --json " + std::string(output)), kCallWasWrong,
+                 "would replace a file that is read");
+  }
+  EXPECT_EQ(contents("sweep.csv"), csv);
+  EXPECT_EQ(contents("units.yaml"), "{}\n");
+}
+
 TEST_F(BrokenCalls, WithASeedThatIsNoneAreRefusedByEveryVerb) {
   for (const char* seed : {"-1", "18446744073709551616", "1.5", "one"})
     for (const char* call :

@@ -23,6 +23,8 @@ struct Unit {
 
 /// The unit with that suffix, or null.
 [[nodiscard]] const Unit* find_unit(std::string_view suffix) noexcept;
+/// The same for a unit as people write it: "deg/s" besides "deg_s".
+[[nodiscard]] const Unit* find_written_unit(std::string_view text) noexcept;
 
 /// A comma-separated list of the suffixes, for error messages and help.
 [[nodiscard]] std::string known_unit_list();

@@ -48,6 +48,9 @@ struct Dataset {
   /// Description of the split, printed with its scores: "interpolation within one cycle".
   std::string label;
 
+  /// Paths of the recordings, manifests and mappings that were read for it.
+  std::vector<std::string> files;
+
   [[nodiscard]] double sample_rate_Hz() const;  ///< @throws Error if empty
   [[nodiscard]] bool has_role(Role role) const noexcept;
   /// @throws Error if the records differ in sample rate or lack the target.

@@ -10,11 +10,17 @@ namespace torsio {
 ///
 /// It is written under a temporary name in the same folder; `commit` syncs and renames it, so that
 /// the target has either its old bytes or all new ones, also after a power loss. Without
-/// `commit` it leaves no file. A symbolic link remains a link. A device or pipe is written
-/// directly.
+/// `commit` it leaves no file. A symbolic link remains a link, and a replaced file keeps its mode. A
+/// device or pipe is written directly.
 class OutputFile {
  public:
-  /// @throws Error (no such folder, no permission, the target is a directory).
+  /// The file that `path` names: the end of its chain of symbolic links, which need not exist.
+  [[nodiscard]] static std::filesystem::path target_of(std::filesystem::path path);
+  /// Whether `target` is a file that no one may write. Its folder may allow to replace it all the
+  /// same, but its owner has protected it.
+  [[nodiscard]] static bool is_protected(const std::filesystem::path& target);
+
+  /// @throws Error (no such folder, no permission, the target is a directory or protected).
   explicit OutputFile(const std::filesystem::path& path);
   /// Is written directly, too.
   [[nodiscard]] static OutputFile standard_output();
