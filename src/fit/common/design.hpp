@@ -15,9 +15,10 @@ namespace torsio {
 
 /// A model that is linear in its coefficients, before they are fitted.
 struct Design {
-  Matrix columns;                  ///< samples x coefficients; zero where a term is left out
-  std::vector<double> target;      ///< one per sample
-  std::vector<std::string> terms;  ///< what a column is, for messages; empty: left out on purpose
+  Matrix columns;              ///< samples x coefficients; zero where a term is left out
+  std::vector<double> target;  ///< one per sample
+  std::vector<std::string>
+      terms;  ///< name of each column, for messages; empty: left out on purpose
 };
 
 /// Which samples each row of coefficients is fitted to: all of them, or those at each distinct
@@ -30,8 +31,8 @@ struct Groups {
 
 /// @param schedule expression of the scheduling input; empty: one group.
 /// @param features samples x inputs, as `data` has them.
-/// @throws UsageError if no input is called that, Error if it has less than 2 or more than 64
-/// distinct values.
+/// @throws UsageError if no input has that name, Error if it has less than 2 or more than 64
+///          distinct values.
 [[nodiscard]] Groups groups_by(const std::string& schedule, const TrainingData& data,
                                const Matrix& features);
 
@@ -54,8 +55,8 @@ inline constexpr std::size_t kSamplesPerTerm = 5;
 [[nodiscard]] std::vector<double> rows_of(const std::vector<double>& values,
                                           std::span<const std::size_t> samples);
 
-/// Whether input j gets a linear term: it does unless it schedules or is a rate that the family was
-/// not asked to include.
+/// Whether input j gets a linear term: it does unless it is the scheduling input or a rate that the
+/// family's options do not include.
 [[nodiscard]] bool has_slope(const TrainingData& data, std::size_t input, const Groups& groups,
                              bool rates);
 

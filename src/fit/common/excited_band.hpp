@@ -14,8 +14,8 @@ struct ExcitedBand {
 };
 [[nodiscard]] ExcitedBand excited_band(const TrainingData& data);
 
-/// "below the 0.05 to 4 Hz that the records excite, which see only its tail" of what relaxes at a rate
-/// more than an octave outside; else nothing.
+/// A note on a relaxation at a rate more than an octave outside of the band: "below the 0.05 to 4
+/// Hz that the records excite, which see only its tail"; else nothing.
 [[nodiscard]] std::string outside_of(const ExcitedBand& band, double rate_1_s);
 
 }  // namespace torsio

@@ -7,7 +7,7 @@
 
 namespace torsio {
 
-/// The values of a channel that a model takes, all of them finite.
+/// The values of a channel that a model uses, all of them finite.
 /// @throws Error with the time of the first that is not, and what to do about it.
 [[nodiscard]] const std::vector<double>& finite_input(const Recording& recording,
                                                       const std::string& channel);

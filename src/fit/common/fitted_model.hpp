@@ -13,7 +13,7 @@
 
 namespace torsio {
 
-/// What a family's fitter gives, as the table of families gives it.
+/// The result of a family's fitter in the form of the table of families.
 template <class Family>
 FittedModel fitted_model(Fitted<Family> fitted) {
   return {Family(std::move(fitted.parameters)), std::move(fitted.notes), std::move(fitted.table),
@@ -30,7 +30,7 @@ struct OptionsOfFitter<Result (*)(const TrainingData&, const Own&, Rest...)> {
   using Type = Own;
 };
 
-/// "fitting linear", of fitters that are done before they could report more.
+/// Progress text "fitting linear" for fitters that report no progress of their own.
 template <class Family>
 void report_start(const Progress& progress, const Fitted<Family>* /*result*/) {
   report_progress(progress, 0.0, "fitting " + std::string(Family::kFamily));

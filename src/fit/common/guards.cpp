@@ -33,7 +33,7 @@ std::vector<Residual> residuals(AnyModel& model, const TrainingData& data) {
   return all;
 }
 
-/// Where the region that ends before `end` ends, above all of its outputs but the last.
+/// Upper end of the region that ends before `end`, above all of its outputs but the last.
 double edge_at(const std::vector<Residual>& sorted, std::size_t end) {
   if (end == sorted.size()) return sorted.back().value;
   if (sorted[end].value < sorted.back().value) return sorted[end].value;
@@ -52,7 +52,8 @@ void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
   }
 }
 
-/// To a root mean square of `rmse` over its regions, which hold about equally many samples.
+/// Scales the table to a root mean square of `rmse` over its regions, which have about equally many
+/// samples.
 void widen_to(ResidualTable& table, double rmse) {
   double sum = 0.0;
   for (const double std_dev : table.std_dev) sum += std_dev * std_dev;
@@ -121,7 +122,7 @@ ResidualTable residual_table(AnyModel model, const TrainingData& data) {
     for (std::size_t n = begin; n < end; ++n) square_sum += all[n].error * all[n].error;
     const double rms = std::sqrt(square_sum / static_cast<double>(end - begin));
     table.edges.push_back(edge_at(all, end));
-    // Never 0, which would claim certainty: a model may meet its training data exactly.
+    // Never 0, which would mean certainty: a model may fit its training data exactly.
     table.std_dev.push_back(std::max(rms, std::numeric_limits<double>::min()));
     begin = end;
     if (begin == all.size()) break;

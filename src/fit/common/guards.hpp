@@ -22,9 +22,9 @@ inline constexpr std::size_t kResidualsPerRegion = 50;
 inline constexpr std::size_t kMaxResidualRegions = 16;
 
 /// Root mean square of the model's residuals by region of its own output: up to 16 regions of equal
-/// sample count, at least 50 samples each. It is the spread about 0, not about the region's mean: a
-/// model that is biased there is wrong by that too. Each sequence runs through the model from a
-/// reset, as in the loop. Empty where there are fewer than 50 samples.
+/// sample count, at least 50 samples each. It is the spread about 0, not about the region's mean,
+/// so that a bias of the model is included. Each sequence runs through the model from a reset, as
+/// in the loop. Empty where there are fewer than 50 samples.
 [[nodiscard]] ResidualTable residual_table(AnyModel model, const TrainingData& data);
 
 /// The estimator settings around a fitted model in its file. The residual table is from

@@ -41,7 +41,7 @@ bool is_computable(const Dataset& dataset, const std::vector<ChannelDefinition>&
   });
 }
 
-/// A name must mean the same in every record.
+/// A name must have the same definition in every record.
 void refuse_conflicts(const Dataset& dataset) {
   std::map<std::string, std::pair<std::string, std::string>> met;  // name: expression, record
   for (const DatasetRecord& record : dataset.records)
@@ -100,7 +100,7 @@ std::vector<ChannelDefinition> needed_definitions(const std::vector<ChannelDefin
 }
 
 /// Whether target = slope * input + offset to one part in 10^9 of the variance, over all fresh
-/// samples: no sensor is that good.
+/// samples: no sensor is that accurate.
 bool is_straight_line(const Dataset& dataset, const std::string& input) {
   double n = 0.0;
   double mean_x = 0.0;
@@ -130,9 +130,9 @@ bool is_straight_line(const Dataset& dataset, const std::string& input) {
 }
 
 /// Whether the inputs together give the target in the same way: each source of a difference of two
-/// sensors is innocent alone.
+/// sensors alone is not a leak.
 bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
-  constexpr std::size_t kEnough = 2000;  // samples a record
+  constexpr std::size_t kEnough = 2000;  // samples per record
   constexpr double kUnexplained = 1e-9;
   std::vector<double> rows;
   std::vector<double> measured;
@@ -172,7 +172,7 @@ bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
   return missed < kUnexplained * total;
 }
 
-/// Runs `parse`; here it is the caller who wrote the expressions.
+/// Runs `parse` for expressions that the caller wrote.
 template <class Parse>
 auto as_asked(const Parse& parse) {
   try {

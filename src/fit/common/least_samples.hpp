@@ -8,10 +8,10 @@
 
 namespace torsio {
 
-/// Below this, spreads and errors of a flexible model mean nothing.
+/// With fewer samples, spreads and errors of a flexible model are meaningless.
 inline constexpr std::size_t kLeastSamples = 10;
 
-/// @throws Error for fewer samples that may be learned from.
+/// @throws Error if there are fewer usable samples.
 inline void require_samples(const TrainingData& data) {
   if (data.usable_samples() >= kLeastSamples) return;
   throw Error({.problem = "too few training samples",

@@ -40,7 +40,7 @@ using NineNumbers = std::array<double, 9>;
 [[nodiscard]] std::string option_text(const std::vector<std::size_t>& value);    ///< "50-20-10"
 [[nodiscard]] std::string option_text(const std::optional<NineNumbers>& value);  ///< empty: ""
 
-/// Each @throws UsageError for text that an `Options` accepts as text and the field does not.
+/// Each @throws UsageError for text that `Options` accepts as text but the field does not.
 void read_option(std::string_view text, const OptionInfo& stated, bool& value);
 void read_option(std::string_view text, const OptionInfo& stated, double& value);
 void read_option(std::string_view text, const OptionInfo& stated, std::size_t& value);
@@ -124,7 +124,8 @@ template <class Own>
   return table.options;
 }
 
-/// An options struct filled from what the user set. @throws UsageError if a text is none of its field.
+/// An options struct with the user's settings. @throws UsageError if a text is not valid for its
+/// field.
 template <class Own>
 [[nodiscard]] Own filled(const Options& given) {
   Own own;

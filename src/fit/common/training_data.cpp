@@ -50,7 +50,7 @@ Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::
   return sequence;
 }
 
-/// Features that are not finite may be why nothing is left to learn from.
+/// Features that are not finite may be the reason why no usable sample is left.
 void refuse_if_not_finite(const TrainingData& data) {
   for (const Sequence& sequence : data.sequences) {
     const auto& values = sequence.features.values;

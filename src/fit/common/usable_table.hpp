@@ -7,7 +7,7 @@
 
 namespace torsio {
 
-/// The usable samples of all sequences under each other, for families without memory.
+/// The usable samples of all sequences in one table, for families without memory.
 struct Table {
   Matrix features;
   std::vector<double> target;

@@ -30,7 +30,7 @@ void require_usable(const TrainingData& data, const NarxLags& lags) {
        .advice = "Take fewer lags, or give longer records."});
 }
 
-/// The regressors of the records, those to learn from, and what a fit makes of them.
+/// The regressors of the records for training, and the fit's results for them.
 void check_memory(const TrainingData& data, const NarxLags& lags) {
   double samples = 0.0;
   for (const Sequence& sequence : data.sequences)

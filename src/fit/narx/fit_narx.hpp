@@ -35,11 +35,11 @@ struct NarxLags {
   }
 };
 
-/// What f learns from in the place of its past outputs.
+/// What f is trained with in place of its past outputs.
 enum class NarxTraining : std::uint8_t {
-  one_step,  ///< the measured ones: quick, and blind to how errors grow
-  noise,     ///< the measured ones with noise, so that f learns to forget errors
-  free_run,  ///< its own, round after round; the round with the least error in free run is kept
+  one_step,  ///< the measured ones: fast, but the growth of errors is not considered
+  noise,     ///< the measured ones with noise, so that errors decay
+  free_run,  ///< its own, in several rounds; the round with the least error in free run is kept
 };
 
 inline constexpr std::array<std::string_view, 3> kNarxTrainings{"one_step", "noise", "free_run"};
@@ -84,10 +84,10 @@ struct NarxOptions {
 [[nodiscard]] TrainingData narx_data(const TrainingData& data, const NarxLags& lags,
                                      const std::vector<std::vector<double>>* outputs = nullptr);
 
-/// What makes one static family dynamic.
+/// The functions that make one static family dynamic.
 struct NarxInner {
   std::function<FittedModel(const TrainingData&, const FitContext&)> fit;
-  /// f and the rest of a `Narx`'s parameters (those of its own fields) -> the model.
+  /// Combines f and the rest of a `Narx`'s parameters (those of its own fields) to the model.
   std::function<AnyModel(const AnyModel& f, const Narx<Linear>::Parameters& rest)> wrap;
 };
 
@@ -111,8 +111,8 @@ struct ArxOptions {
   }
 };
 
-/// A linear NARX model (ARX) by least squares one step ahead, refined by Ceres so that its free run
-/// misses least (output error):
+/// A linear NARX model (ARX) by least squares one step ahead, refined by Ceres for the least error
+/// in free run (output error):
 ///
 ///     min_θ Σ (ŷ_k(θ) − y_k)²,   dŷ_k/dθ = φ_k + Σ_i a_i dŷ_{k−i}/dθ
 ///

@@ -31,7 +31,7 @@ using NarxPolynomial = Narx<MultivariatePolynomial>;
 
 constexpr double kAsGood = 1.02;
 
-/// What a regressor is.
+/// The kind of a regressor.
 struct Regressor {
   bool is_output = false;
   std::size_t input = 0;

@@ -98,7 +98,7 @@ class FreeRun {
     return value;
   }
 
-  /// @param without this factor.
+  /// @param without factor that is left out.
   static double product(const At& at, const Monomial& term, std::size_t without) {
     double result = 1.0;
     for (std::size_t k = 0; k < term.size(); ++k)
@@ -115,7 +115,7 @@ class FreeRun {
 };
 
 void check_memory(const NarxTerms& f, const TrainingData& data) {
-  constexpr double kTables = 3.0;  // slopes, and what Ceres makes of them
+  constexpr double kTables = 3.0;  // slopes, and copies in Ceres
   double samples = 0.0;
   for (const Sequence& sequence : data.sequences)
     samples += static_cast<double>(sequence.target.size());

@@ -12,16 +12,16 @@
 namespace torsio {
 
 /// The right side of a NARX model that is linear in its coefficients: theta_j times products of
-/// regressors r_i / s_i. A line is of this kind, too.
+/// regressors r_i / s_i. A linear model is of this kind, too.
 struct NarxTerms {
   std::vector<Monomial> terms;
-  std::vector<double> scales;  ///< s, one a regressor
+  std::vector<double> scales;  ///< s, one per regressor
   std::vector<double> coefficients;
 };
 
 struct Refined {
   std::vector<double> coefficients;
-  std::string report;  ///< how the search ended, in words
+  std::string report;  ///< how the search ended, as text
 };
 
 /// The coefficients of least error in free run, from the measured start of every sequence, by Ceres:

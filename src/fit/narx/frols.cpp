@@ -98,11 +98,11 @@ class Columns {
   std::vector<double> scales_;
 };
 
-/// Inner products of an orthonormal basis with all candidates and with y: all that a choice needs.
+/// Inner products of an orthonormal basis with all candidates and with y: sufficient for a choice.
 struct Products {
-  std::vector<std::vector<double>> with_candidates;  ///< one list a direction
+  std::vector<std::vector<double>> with_candidates;  ///< one list per direction
   std::vector<double> with_target;
-  std::vector<std::size_t> chosen;  ///< that the directions were made of
+  std::vector<std::size_t> chosen;  ///< terms from which the directions were made
 };
 
 /// A rotation in the plane of a direction and the next one.
@@ -122,8 +122,8 @@ struct Rotation {
   }
 };
 
-/// Turns the basis so that only the last direction needs the term at `place`, which leaves.
-/// @returns what the last direction gave to y.
+/// Rotates the basis so that only the last direction needs the term at `place`, which is removed.
+/// @returns the part of y that the last direction explained.
 double take_out(Products& products, std::size_t place, std::vector<Rotation>& rotations) {
   auto& rows = products.with_candidates;
   auto& z = products.with_target;
@@ -150,7 +150,7 @@ struct Placed {
   double reduction;   ///< reduction of y.y
 };
 
-/// The chosen terms, the one first that explains most of what those before it have left.
+/// The chosen terms, sorted by the share of the remaining variance that they explain.
 std::vector<Placed> in_order(const Products& products) {
   const std::size_t count = products.chosen.size();
   std::vector<std::vector<double>> left(count, std::vector<double>(count));  // in the basis
@@ -200,7 +200,7 @@ class Search {
   [[nodiscard]] const std::vector<double>& scales() const noexcept { return columns_.scales(); }
   [[nodiscard]] std::size_t candidate_count() const noexcept { return candidates_.list.size(); }
 
-  /// Adds the best candidate. @returns false if none is of use.
+  /// Adds the best candidate. @returns false if no candidate is useful.
   bool extend() {
     while (true) {
       const Choice best = best_candidate(products_);
@@ -209,9 +209,10 @@ class Search {
     }
   }
 
-  /// Exchanges terms until none would be.
+  /// Exchanges terms until no exchange is useful.
   void exchange() {
-    // Every exchange explains more, so this ends by itself; the limit is for what rounding may do.
+    // Every exchange explains more, so this ends without a limit; the limit is for effects of
+    // rounding.
     const std::size_t count = products_.chosen.size();
     std::size_t left = 10 * count;
     std::size_t place = 0;
@@ -297,7 +298,7 @@ class Search {
   /// @returns false, and never proposes it again, if it is not as new as its products indicated.
   bool add(std::size_t candidate) {
     detail::AlignedVector<double> q = columns_.product(candidates_.monomial(candidate));
-    for (int twice = 0; twice < 2; ++twice) {  // once leaves a trace in near-dependent ones
+    for (int twice = 0; twice < 2; ++twice) {  // once is not exact for near-dependent ones
       for (const detail::AlignedVector<double>& direction : directions_) {
         const double along = dot(direction, q);
         for (std::size_t n = 0; n < q.size(); ++n) q[n] -= along * direction[n];

@@ -15,11 +15,11 @@ using Monomial = std::vector<std::size_t>;
 struct FrolsOptions {
   std::size_t degree = 3;  ///< highest degree of the candidates
   std::size_t terms = 8;   ///< largest number of terms
-  /// Swaps a chosen term for another candidate wherever that explains more.
+  /// Exchanges a chosen term for another candidate wherever that explains more.
   bool exchange = true;
 };
 
-/// The terms of one size, the one first that explains most of what those before it have left.
+/// The terms of one size, sorted by the share of the remaining variance that they explain.
 struct ChosenTerms {
   std::vector<Monomial> terms;
   std::vector<double> coefficients;      ///< least squares, of the scaled regressors' monomials
@@ -28,18 +28,18 @@ struct ChosenTerms {
 
 struct Frols {
   std::vector<double> scales;      ///< s_i: largest magnitude of each regressor, 1 if that is 0
-  std::size_t candidates = 0;      ///< monomials that there were to choose from
+  std::size_t candidates = 0;      ///< number of monomials to choose from
   std::vector<ChosenTerms> sizes;  ///< with 1, 2, ... terms
 };
 
-/// How many monomials of so many inputs have at most that degree, the constant among them; the
-/// largest std::size_t where that is more than one holds.
+/// The number of monomials of so many inputs with at most that degree, the constant included; the
+/// largest std::size_t on overflow.
 [[nodiscard]] std::size_t monomial_count(std::size_t inputs, std::size_t degree) noexcept;
 
 inline constexpr std::size_t kMaxCandidates = 100'000;
 inline constexpr std::size_t kMaxTerms = 100;
 
-/// @throws UsageError, with the degree that would do, if there are more than `kMaxCandidates`.
+/// @throws UsageError with the largest possible degree if there are more than `kMaxCandidates`.
 void check_candidates(std::size_t inputs, std::size_t degree);
 
 /// Chooses monomials of the scaled regressors by forward regression with orthogonal least squares:

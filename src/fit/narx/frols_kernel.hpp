@@ -5,7 +5,7 @@
 
 namespace torsio::frols_kernel {
 
-/// Samples of a block: a multiple of every vector's length.
+/// Samples per block: a multiple of every vector's length.
 inline constexpr std::size_t kBlock = 128;
 
 /// A candidate as its parent times one more regressor.

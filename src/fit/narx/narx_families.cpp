@@ -21,8 +21,8 @@
 namespace torsio {
 namespace {
 
-/// The families that f may be of, as `narx_families` is given them: a row's fitter is a plain function,
-/// so it cannot hold the fitter of f itself.
+/// The families of f, as given to `narx_families`: a row's fitter is a plain function, so it cannot
+/// contain the fitter of f itself.
 std::vector<FamilyInfo>& inner_families() {
   static std::vector<FamilyInfo> families;
   return families;
@@ -69,7 +69,7 @@ FittedModel narx_variational(const TrainingData& data, const Options& options,
   return narx_by<ParametricGp>(kVariational, data, options, context);
 }
 
-/// The difference equation in words.
+/// The difference equation as text.
 ParameterDescription describe_equation(const AnyParameters& parameters,
                                        const EstimatorSettings& settings) {
   return {.lines = {equation_of(parameters.get<Narx<MultivariatePolynomial>::Parameters>(),

@@ -7,7 +7,7 @@
 
 namespace torsio {
 
-/// `arx`, and what `narx_` makes of static families.
+/// `arx`, and the `narx_` variants of static families.
 /// @param known the static ones. Call once: the list points to options that it keeps.
 [[nodiscard]] std::vector<FamilyInfo> narx_families(std::span<const FamilyInfo> known);
 

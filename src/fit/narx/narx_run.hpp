@@ -14,7 +14,7 @@
 
 namespace torsio {
 
-using OutputLists = std::vector<std::vector<double>>;  // one a sequence
+using OutputLists = std::vector<std::vector<double>>;  // one per sequence
 
 inline constexpr std::size_t kCorrected = 50;  // measured samples that a simulation starts from
 
@@ -27,12 +27,12 @@ struct TargetSpread {
 };
 [[nodiscard]] TargetSpread spread_of(const TrainingData& data);
 
-/// Everything of a NARX model but f.
+/// The parameters of a NARX model except f.
 /// @throws Error if the target is constant.
 [[nodiscard]] Narx<Linear>::Parameters narx_frame(const TrainingData& data, const NarxLags& lags,
                                                   double range, const TargetSpread& spread);
 
-/// f in such a frame.
+/// Combines f with such parameters.
 template <class M>
 [[nodiscard]] typename Narx<M>::Parameters framed(typename M::Parameters f,
                                                   const Narx<Linear>::Parameters& frame) {
