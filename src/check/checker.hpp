@@ -110,8 +110,8 @@ class Checker {
   static constexpr double kInputJumpShare = 0.05;
   static constexpr double kSameMoment_s = 0.05;
   static constexpr double kRestShare = 0.02;  ///< share of the first input's range
-  static constexpr double kFollows = 0.8;           ///< correlation
-  static constexpr double kOneMotion = 0.99;        ///< correlation
+  static constexpr double kFollows = 0.8;     ///< correlation
+  static constexpr double kOneMotion = 0.99;  ///< correlation
   static constexpr double kNarrow = 0.5;
   static constexpr double kSlopeRatio = 5.0;
   static constexpr double kLongestDelay_s = 0.1;

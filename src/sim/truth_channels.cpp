@@ -44,7 +44,7 @@ class TruthWriter {
   void write_each(std::string_view part, std::string_view what, Array (*values)(const Plant&)) {
     for (std::size_t i = 0; i < std::tuple_size_v<Array>; ++i) {
       add(part, fmt::format(fmt::runtime(what), i + 1),
-           [=](const BenchTruth& truth) { return values(truth.plant)[i]; });
+          [=](const BenchTruth& truth) { return values(truth.plant)[i]; });
     }
   }
   std::vector<TruthChannel> channels() && { return std::move(channels_); }
@@ -60,32 +60,30 @@ const Stage& second(const Plant& plant) {
 
 void write_stages(TruthWriter& to, const PartNames& names) {
   to.add(names.second, "torque_Nm",
-          [](const BenchTruth& t) { return t.plant.torques().second_Nm; });
+         [](const BenchTruth& t) { return t.plant.torques().second_Nm; });
   to.add(names.second, "friction_Nm",
-          [](const BenchTruth& t) { return t.plant.second_friction_torque(); });
+         [](const BenchTruth& t) { return t.plant.second_friction_torque(); });
   to.add(names.second, "deflection_rad",
-          [](const BenchTruth& t) { return t.plant.second_twist(); });
+         [](const BenchTruth& t) { return t.plant.second_twist(); });
   to.add(names.first, "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().first_Nm; });
   to.add(names.first, "friction_Nm",
-          [](const BenchTruth& t) { return t.plant.first_friction_torque(); });
+         [](const BenchTruth& t) { return t.plant.first_friction_torque(); });
   to.add(names.first, "deflection_rad", [](const BenchTruth& t) { return t.plant.first_twist(); });
 }
 
 void write_bodies(TruthWriter& to, const PartNames& names) {
   to.add("motor", "torque_Nm", [](const BenchTruth& t) { return t.plant.torques().motor_Nm; });
   to.add("motor", "current_A", [](const BenchTruth& t) { return t.plant.current(); });
-  to.add("motor", "angle_rad",
-          [](const BenchTruth& t) { return t.plant.state().rotor_angle_rad; });
+  to.add("motor", "angle_rad", [](const BenchTruth& t) { return t.plant.state().rotor_angle_rad; });
   to.add("motor", "speed_rad_s",
-          [](const BenchTruth& t) { return t.plant.state().rotor_speed_rad_s; });
+         [](const BenchTruth& t) { return t.plant.state().rotor_speed_rad_s; });
   to.add(names.middle, "angle_rad",
-          [](const BenchTruth& t) { return t.plant.state().middle_angle_rad; });
+         [](const BenchTruth& t) { return t.plant.state().middle_angle_rad; });
   to.add(names.middle, "speed_rad_s",
-          [](const BenchTruth& t) { return t.plant.state().middle_speed_rad_s; });
-  to.add("joint", "angle_rad",
-          [](const BenchTruth& t) { return t.plant.state().joint_angle_rad; });
+         [](const BenchTruth& t) { return t.plant.state().middle_speed_rad_s; });
+  to.add("joint", "angle_rad", [](const BenchTruth& t) { return t.plant.state().joint_angle_rad; });
   to.add("joint", "speed_rad_s",
-          [](const BenchTruth& t) { return t.plant.state().joint_speed_rad_s; });
+         [](const BenchTruth& t) { return t.plant.state().joint_speed_rad_s; });
 }
 
 /// The friction of a body against the frame, and its share that is in the bristle.
@@ -96,7 +94,7 @@ void write_friction(TruthWriter& to, std::string_view place, const LuGreFriction
   to.add(place, "friction_Nm", [=](const BenchTruth& t) { return t.plant.torques().*friction; });
   if (parts.coulomb_Nm == 0.0) return;
   to.add(place, "bristle_Nm",
-          [=](const BenchTruth& t) { return (t.plant.*block)().bristle_torque(); });
+         [=](const BenchTruth& t) { return (t.plant.*block)().bristle_torque(); });
 }
 
 void write_frictions(TruthWriter& to, const PartNames& names, const PlantParameters& parts) {
@@ -113,7 +111,7 @@ void write_clutch(TruthWriter& to) {
   };
   to.add("clutch", "slip_rad", [=](const BenchTruth& t) { return clutch(t).slip(); });
   to.add("clutch", "is_slipping_1",
-          [=](const BenchTruth& t) { return clutch(t).is_slipping() ? 1.0 : 0.0; });
+         [=](const BenchTruth& t) { return clutch(t).is_slipping() ? 1.0 : 0.0; });
 }
 
 void write_coupling(TruthWriter& to, bool is_bonded) {
@@ -131,7 +129,7 @@ void write_coupling(TruthWriter& to, bool is_bonded) {
       "coupling", "slip{}_Nm",
       +[](const Plant& p) { return second<ElastomerCoupling>(p).slip().forces(); });
   to.add("coupling", "glue_1",
-          [](const BenchTruth& t) { return second<ElastomerCoupling>(t.plant).glue(); });
+         [](const BenchTruth& t) { return second<ElastomerCoupling>(t.plant).glue(); });
 }
 
 void write_rubber(TruthWriter& to) {

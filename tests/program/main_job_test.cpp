@@ -358,7 +358,7 @@ TEST_F(MainJob, ImportsANetworkOfAnotherProgram) {
                            "joint_angle_rad, rate(joint_angle_rad)\" ";
   const Outcome import = torsio(call + "-o joint.safetensors --json model.json");
   ASSERT_EQ(import.exit_code, 0) << import.err;
-  EXPECT_NE(import.err.find("no range is guarded"), std::string::npos) << import.err;
+  EXPECT_NE(import.err.find("there is no range guard"), std::string::npos) << import.err;
   const auto model = nlohmann::json::parse(contents("model.json"));
   EXPECT_EQ(model.at("sample_rate_Hz"), 100.0);
   EXPECT_EQ(model.at("parameters").at("scaling.target_scale").at(0), 20.0);
@@ -368,7 +368,7 @@ TEST_F(MainJob, ImportsANetworkOfAnotherProgram) {
   const Outcome guarded =
       torsio(call + "--guards a.csv -o guarded.safetensors --json guarded.json");
   ASSERT_EQ(guarded.exit_code, 0) << guarded.err;
-  EXPECT_EQ(guarded.err.find("no range is guarded"), std::string::npos) << guarded.err;
+  EXPECT_EQ(guarded.err.find("there is no range guard"), std::string::npos) << guarded.err;
   const double highest =
       nlohmann::json::parse(contents("guarded.json")).at("inputs").at(0).at("highest");
   EXPECT_GT(highest, 0.01);

@@ -56,7 +56,8 @@ TEST_F(TrackVerb, WarnsOfAModelOfAnotherActuator) {
 }
 
 TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
-  expect_error(torsio("track --output out.csv"), kCallWasWrong, "Results go to --json FILE");
+  expect_error(torsio("track --output out.csv"), kCallWasWrong,
+               "Results are written with --json FILE");
   expect_error(torsio("track --record run.tsr"), kCallWasWrong, "a file that ends in .csv or .gz");
   expect_error(torsio("track --model a.safetensors --model a.safetensors"), kCallWasWrong,
                "a.safetensors is given twice");
