@@ -22,9 +22,9 @@ torsio::JointSample read_joint(int tick) {
 int run(const char* model_file) {
   // readme-begin
   torsio::TorqueEstimator estimator(
-      torsio::load_estimator(model_file));  // may throw: configure first
+      torsio::load_estimator(model_file));  // may throw: call it before the loop
   // Trained on records with a `zero:`? estimator.set_zero("gear_angle_rad", angle_at_rest_rad);
-  const torsio::DenormalsOff denormals_off;  // once a real-time thread
+  const torsio::DenormalsOff denormals_off;  // once per real-time thread
   estimator.reset();
   torsio::Fault last = torsio::Fault::none;
   for (int tick = 0; tick < 2000; ++tick) {

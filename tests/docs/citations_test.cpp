@@ -21,9 +21,9 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 
 const std::filesystem::path kRoot = TORSIO_SOURCE;
-constexpr std::array kPlaces = {"src",   "studies",   "include",     "apps",
-                                "tests", "docs",      "examples",    "benchmarks",
-                                "tools", "README.md", "CHANGELOG.md"};
+constexpr std::array kPlaces = {"src",   "studies",   "include",      "apps",
+                                "tests", "docs",      "examples",     "benchmarks",
+                                "tools", "README.md", "CHANGELOG.md", "CONTRIBUTING.md"};
 constexpr std::array kEndings = {".hpp", ".cpp", ".h", ".c", ".md", ".txt", ".cmake", ".py", ""};
 
 bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
