@@ -162,7 +162,7 @@ std::string data_folder(const Manifest& manifest) {
   throw Error({.place = manifest.file + " (root)",
                .problem = "the data are not here",
                .expected = "one of these folders: " + joined(manifest.roots),
-               .advice = "A variable in ${...} counts only where it is set:  export "
+               .advice = "A variable in ${...} is used only if it is set:  export "
                          "TORSIO_DATA=/folder/of/the/data"});
 }
 

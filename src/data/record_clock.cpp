@@ -89,7 +89,7 @@ void refuse_lost(const Stamps& stamps) {
        .expected = fmt::format("an interval near {:.6g} s", stamps.report.stamp_step_s),
        .found = fmt::format("{:.6g} s", stamps.values_s[loss.first] - before_s),
        .advice = gap > kLongestGapIntervals
-                     ? "Cut the log there into two files: the gap is too long to draw a line over."
+                     ? "Cut the log there into two files: the gap is too long for interpolation."
                      : fmt::format("Fill it with straight lines, in a mapping:  clock: {{resample: "
                                    "{:.6g}Hz}}",
                                    rate_of_steps(stamps))});

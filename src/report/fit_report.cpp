@@ -67,10 +67,10 @@ std::string verdict(const FitReport& report) {
         report.table.empty() ? "" : "; the standard errors below account for it");
   if (!is_enough)
     text += fmt::format(
-        "{:.0f} effective samples are too few to exclude a correlation with an input: record "
-        "longer "
-        "or more varied motions\n",
-        report.effective_samples);
+        "effective sample size {:.0f}: correlations with inputs below {:.2f} cannot be excluded; "
+        "record "
+        "longer or more varied motions\n",
+        report.effective_samples, std::min(of_input, 1.0));
   return text;
 }
 

@@ -60,7 +60,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
     {.info = {.name = "human-torque",
               .actuators = kActuators,
               .description =
-                  "a hand pushes the output to and fro, about +-20 Nm at 0.4 Hz, against "
+                  "a hand pushes the output back and forth, about +-20 Nm at 0.4 Hz, against "
                   "the impedance controller",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::harmonic_drive,

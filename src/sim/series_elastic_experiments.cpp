@@ -113,11 +113,10 @@ BenchProgram random_walk(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 constexpr auto kTable = std::to_array<ExperimentEntry>({
-    {.info =
-         {.name = "sweep",
-          .actuators = kActuators,
-          .description =
-              "a lever with 9 kg is moved to and fro at 10 deg/s, +-170 deg (dfki-28: +-60 deg)"},
+    {.info = {.name = "sweep",
+              .actuators = kActuators,
+              .description = "a lever with 9 kg is moved back and forth at 10 deg/s, +-170 deg "
+                             "(dfki-28: +-60 deg)"},
      .has_lever = true,
      .program = sweep},
     {.info = {.name = "static-cycle",

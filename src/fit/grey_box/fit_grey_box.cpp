@@ -115,10 +115,11 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
     const double without = rms_of(scored, nullptr);
     const double with = rms_of(scored, &trial);
     const bool is_kept = with < kWorthwhile * without;
-    fitted.notes.push_back(fmt::format(
-        "a network on what is left over: {:.4g} instead of {:.4g} on a fifth of the data "
-        "that it did not see: {}",
-        with, without, is_kept ? "kept" : "left out"));
+    fitted.notes.push_back(
+        fmt::format("a network for the residual was {}: RMSE on a held-out fifth of the data "
+                    "{:.4g} with it, {:.4g} "
+                    "without",
+                    is_kept ? "added" : "not added", with, without));
     if (!is_kept) return;
     fitted.held_out_rmse *= with / without;
   }

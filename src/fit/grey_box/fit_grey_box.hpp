@@ -43,9 +43,10 @@ struct GreyBoxOptions {
            .help = "learned on what the terms leave over; auto: mlp if it lowers the error on data "
                    "that it did not see",
            .choices = kResidualNames});
-    visit(self.bound, {.name = "bound",
-                       .maximum = 1e6,
-                       .help = "of the residual, in root mean squares of what is left over"});
+    visit(self.bound,
+          {.name = "bound",
+           .maximum = 1e6,
+           .help = "limit of the residual model, in root mean squares of the residual"});
   }
 };
 
