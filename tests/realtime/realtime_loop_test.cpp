@@ -167,13 +167,13 @@ TEST(RealtimeLoop, RunsOnItsOwnThreadByTheMonotonicClock) {
   RealtimeLoop loop(modest());
   EXPECT_THROW((void)loop.wait(), Error);
   std::atomic<std::int64_t> index{-1};
+  MonotonicClock clock;
+  const std::int64_t began_ns = clock.now_ns();
   loop.start([&index](const Tick& tick) noexcept {
     index = tick.index;
     return true;
   });
   EXPECT_THROW(loop.start([](const Tick&) noexcept { return false; }), Error);
-  MonotonicClock clock;
-  const std::int64_t began_ns = clock.now_ns();
   while (index < 20) clock.sleep_until(clock.now_ns() + kPeriodInNs);
   EXPECT_GE(clock.now_ns() - began_ns, 19 * kPeriodInNs);
   loop.request_stop();
