@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <optional>
 
@@ -40,8 +39,7 @@ void run(CompareFlags& flags) {
     const auto candidates = torsio::search_candidates(dataset, flags.data.wanted_inputs());
     remark(fmt::format(
         "search: {} structures, each fitted on {} folds, then the best of each family: at least {} "
-        "fits, "
-        "many of them slow. Ctrl-C stops it; --models with fewer families is quicker.",
+        "fits, many of them slow. Ctrl-C stops it; --models with fewer families is quicker.",
         candidates.size(), torsio::kSearchFolds, candidates.size() * torsio::kSearchFolds));
     search = torsio::search_structures(dataset, candidates, flags.seed, flags.allow_leak,
                                        progress.listener());
@@ -83,16 +81,10 @@ void add_compare(CLI::App& app) {
   flags->data.add_target_and_inputs(*verb);
   verb->add_option("--test", flags->test, "held-out recordings, on which the models are ranked");
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
-  verb->add_option(
-          "--models", flags->models,
-          "families with settings: linear,polynomial:degree=7:branch=true; all: every family "
-          "but " +
-              fmt::format("{}", fmt::join(families_beyond_all(), ", ")) +
-              ", which take longer or are for other data and are added by name: "
-              "all,viscoelastic; search: orders and structures of each family by "
-              "cross-validation within the training records, the best then compared: "
-              "minutes to hours")
-      ->capture_default_str();
+  add_models(*verb, flags->models,
+             ", which take longer or are for other data and are added by name: all,viscoelastic; "
+             "search: orders and structures of each family by cross-validation within the training "
+             "records, the best then compared: minutes to hours");
   verb->add_option("-o,--output", flags->output, "write the best model to this file");
   verb->add_option("--report", flags->report, "write the tables as an HTML page");
   add_seed(*verb, flags->seed, "seed of the random number generators");

@@ -1,6 +1,3 @@
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <map>
 #include <string>
@@ -83,13 +80,7 @@ void add_crossvalidate(CLI::App& app) {
   flags->data.add_mapping(*verb);
   flags->data.add_initialise(*verb);
   flags->data.add_target_and_inputs(*verb);
-  verb->add_option(
-          "--models", flags->models,
-          "families with settings: linear,polynomial:degree=7:branch=true; all: every family "
-          "but " +
-              fmt::format("{}", fmt::join(families_beyond_all(), ", ")) +
-              ", which are added by name: all,lstm")
-      ->capture_default_str();
+  add_models(*verb, flags->models, ", which are added by name: all,lstm");
   verb->add_option("--set", flags->settings, "set an option of every model, option=value")
       ->allow_extra_args(false);
   CLI::Option* folds =

@@ -70,6 +70,15 @@ std::vector<std::string_view> families_beyond_all() {
   return names;
 }
 
+void add_models(CLI::App& verb, std::string& models, std::string_view more) {
+  verb.add_option(
+          "--models", models,
+          fmt::format("families with settings: linear,polynomial:degree=7:branch=true; all: "
+                      "every family but {}{}",
+                      fmt::join(families_beyond_all(), ", "), more))
+      ->capture_default_str();
+}
+
 bool has_all(const std::string& models) {
   const std::vector<std::string> each = torsio::split_inputs(models);
   return std::ranges::find(each, "all") != each.end();
@@ -110,19 +119,29 @@ void DataFlags::add_initialise(CLI::App& verb) {
       ->capture_default_str();
 }
 
-torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
-                                const std::vector<std::string>& test,
-                                const torsio::Progress& progress) const {
+void DataFlags::require_recordings() const {
   if (recordings.empty())
     throw torsio::UsageError(
         {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
-  const torsio::LoadOptions options = load_options(*this, progress);
-  torsio::Dataset dataset = torsio::load_dataset(recordings, test, options);
+}
+
+torsio::Dataset DataFlags::read(const std::vector<std::string>& files,
+                                const std::vector<std::string>& test,
+                                const torsio::LoadOptions& options) const {
+  torsio::Dataset dataset = torsio::load_dataset(files, test, options);
   check_not_read(dataset.files);
   dataset.initialise_samples = initialise;
+  return dataset;
+}
+
+torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
+                                const std::vector<std::string>& test,
+                                const torsio::Progress& progress) const {
+  require_recordings();
+  const torsio::LoadOptions options = load_options(*this, progress);
+  torsio::Dataset dataset = read(recordings, test, options);
   if (validation.empty()) return dataset;
-  torsio::Dataset held_out = torsio::load_dataset({}, validation, options);
-  check_not_read(held_out.files);
+  torsio::Dataset held_out = read({}, validation, options);
   for (torsio::DatasetRecord& record : held_out.records) {
     for (torsio::Segment& segment : record.segments) segment.role = torsio::Role::validation;
     dataset.records.push_back(std::move(record));
@@ -132,15 +151,10 @@ torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
 }
 
 torsio::Dataset DataFlags::load_as_test(const torsio::Progress& progress) const {
-  if (recordings.empty())
-    throw torsio::UsageError(
-        {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
+  require_recordings();
   torsio::LoadOptions options = load_options(*this, progress);
   options.role = torsio::Role::test;
-  torsio::Dataset dataset = torsio::load_dataset(recordings, {}, options);
-  check_not_read(dataset.files);
-  dataset.initialise_samples = initialise;
-  return dataset;
+  return read(recordings, {}, options);
 }
 
 std::vector<std::string> DataFlags::wanted_inputs() const {

@@ -10,6 +10,7 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
+#include "torsio/data/load.hpp"
 
 /// The flags of every verb that reads recordings.
 struct DataFlags {
@@ -39,6 +40,10 @@ struct DataFlags {
                      const std::vector<std::string>& more_inputs = {});
 
  private:
+  void require_recordings() const;
+  [[nodiscard]] torsio::Dataset read(const std::vector<std::string>& files,
+                                     const std::vector<std::string>& test,
+                                     const torsio::LoadOptions& options) const;
   void check_not_read(const std::vector<std::string>& files_read) const;
 
   std::vector<std::string> outputs_;
@@ -49,8 +54,10 @@ inline constexpr std::uint64_t kDefaultSeed = 1;
 /// A frequency of a loop in Hz or rad/s ("8Hz", "50rad_s"), in rad/s.
 /// @throws torsio::UsageError if it is not above 0.
 [[nodiscard]] double angular_frequency_rad_s(const std::string& text, const char* option);
-/// The families that `--models all` leaves out, for help and remarks.
+/// The families that `--models all` leaves out.
 [[nodiscard]] std::vector<std::string_view> families_beyond_all();
+/// `--models`, for every verb that fits several families. `more` completes the sentence on `all`.
+void add_models(CLI::App& verb, std::string& models, std::string_view more);
 /// Whether `all` is in a list of models.
 [[nodiscard]] bool has_all(const std::string& models);
 /// `--seed`, for every verb that draws random numbers.

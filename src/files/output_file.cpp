@@ -77,9 +77,8 @@ OutputFile::OutputFile(const fs::path& path) : place_(path) {
     }
     temporary_ = temporary_name(target_);
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (const fs::perms mode = fs::status(target_, code).permissions();
-        descriptor_ >= 0 && fs::exists(target_, code))
-      ::fchmod(descriptor_, static_cast<::mode_t>(mode));
+    if (descriptor_ >= 0 && fs::exists(status))
+      ::fchmod(descriptor_, static_cast<::mode_t>(status.permissions()));
   }
   if (descriptor_ < 0) refuse();
 }
