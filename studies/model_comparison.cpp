@@ -107,19 +107,16 @@ void run_case(StudyRows& rows, const ComparisonPlan& plan, const ComparisonCase&
 }  // namespace
 
 Study model_comparison(const StudyOptions& options, const Progress& progress) {
-  Study study{
-      .protocol =
-          "every family on every simulated actuator and on the real recordings with a torque, in "
-          "free run. dfki: three sweeps, tested on a fourth lever in an inclined plane (new "
-          "lever); "
-          "torque chirps of 0.8 and 0.3 of the rating, output locked, tested on noise of 0.25 "
-          "(random walk), both at the load cell's 125 Hz, its latency taken off. elastomer: "
-          "triangles of 0.4 to 4 Hz. "
-          "rubber-clutch: sines, tested on "
-          "multisines. harmonic-drive: pushes of 10 and 20 Nm, high and zero impedance, tested on "
-          "15 Nm. Real ones: docs/model_comparison.md",
-      .unit = "Nm",
-      .options = options};
+  Study study{.protocol =
+                  "every family on every simulated actuator and on the real recordings with a "
+                  "torque, in free run. dfki: three sweeps, tested on a fourth lever in an "
+                  "inclined plane (new lever); torque chirps of 0.8 and 0.3 of the rating, output "
+                  "locked, tested on noise of 0.25 (random walk), both at the load cell's 125 Hz, "
+                  "its latency taken off. elastomer: triangles of 0.4 to 4 Hz. rubber-clutch: "
+                  "sines, tested on multisines. harmonic-drive: pushes of 10 and 20 Nm, high and "
+                  "zero impedance, tested on 15 Nm. Real ones: docs/model_comparison.md",
+              .unit = "Nm",
+              .options = options};
   std::vector<ComparisonPlan> plans = simulated_plans(options.is_quick);
   if (!options.is_quick) std::ranges::move(recorded_plans(), std::back_inserter(plans));
   StudyRows rows;

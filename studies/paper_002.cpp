@@ -234,8 +234,7 @@ Study sensor_models_002(const StudyOptions& options, const Progress& progress) {
   Study study = study_of(
       "trained on the grid of sines, 0.05 to 1 Hz and 4 to 9 deg, tested in free run on other "
       "multisines from rest, scored after 4 s; no measured torque is fed back; input: twist of "
-      "cable "
-      "and rubber, 50 Hz",
+      "cable and rubber, 50 Hz",
       options, candidates);
   StudyRows rows(kPublishedSensorModels);
   const std::size_t multisines = options.is_quick ? 2 : 8;
@@ -270,9 +269,8 @@ Study collision_002(const StudyOptions& options, const Progress& progress) {
   return beyond_slip(
       study_of(
           "trained on the grid of sines; tested at 10 deg/s beyond slip (slip, ours: not in the "
-          "paper) "
-          "and in a driven link's collision with a wall (collision; the paper drops a mass on a "
-          "sensor with a fixed input), until the clutch first slips and after it",
+          "paper) and in a driven link's collision with a wall (collision; the paper drops a mass "
+          "on a sensor with a fixed input), until the clutch first slips and after it",
           options, few_candidates(options.is_quick)),
       {"slip", "collision"}, progress);
 }

@@ -235,8 +235,7 @@ std::string text_of(const LoopTable& table, const std::string& unit) {
 std::string text_of(const ComparisonTable& table, const std::string& unit) {
   return fmt::format(
       "\n{}\n{}/ best: RMSE over the lowest of the condition; {}in 1 sd %, in 2 sd %: samples "
-      "whose "
-      "error is at most one, two error bars (calibrated: 68 and 95)\n",
+      "whose error is at most one, two error bars (calibrated: 68 and 95)\n",
       verdict_text(table, unit), table_text(table, unit), kPercentOfMax);
 }
 

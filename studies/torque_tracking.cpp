@@ -232,14 +232,11 @@ Study torque_tracking_000(const StudyOptions& options, const Progress& progress)
   Study study{
       .protocol =
           "deflection control (50 rad/s) through the inverse of a model; trained on three sweeps, "
-          "or "
-          "also on chirps of 1.1 (free: 0.9), 0.5 and 0.25 times the amplitude under the linear "
+          "or also on chirps of 1.1 (free: 0.9), 0.5 and 0.25 times the amplitude under the linear "
           "controller (+ torque mode); tested on the chirp and on noise with its RMS, where the "
-          "rating "
-          "and the 0.8 m lever of a free output allow it; errors of the torque without sensor "
-          "noise; fed forward and observed: with the rate of the reference torque fed forward and "
-          "a "
-          "disturbance observer of 8 Hz, trained also on such noise (+ walks)",
+          "rating and the 0.8 m lever of a free output allow it; errors of the torque without "
+          "sensor noise; fed forward and observed: with the rate of the reference torque fed "
+          "forward and a disturbance observer of 8 Hz, trained also on such noise (+ walks)",
       .unit = "Nm",
       .options = options};
   const std::span<const Task> tasks = std::span(kTasks).first(options.is_quick ? 1 : kTasks.size());

@@ -66,8 +66,7 @@ void run(AdaptFlags& flags) {
   if (held_out.adapted.rmse > held_out.frozen.rmse)
     remark(
         "warning: on the held-out samples the adapted weights are worse than the frozen ones; try "
-        "a "
-        "smaller step_size (initial_covariance for rls), or comparison_s as long as a cycle");
+        "a smaller step_size (initial_covariance for rls), or comparison_s as long as a cycle");
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, adapted.file);  // last: untouched unless all else succeeded
   remark(flags.output + " written");

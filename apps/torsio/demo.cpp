@@ -51,8 +51,7 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
   return fmt::format(
       "\nbest model {} saved to {}, loaded back, {} samples streamed through it:\n"
       "RMSE {:.3f}, {:.0f} ns per step (99.9 %: {:.0f} ns), {} samples outside the training range "
-      "or "
-      "faulty\n",
+      "or faulty\n",
       best.file.card.fitted_as, flags.output, together.metrics.samples, together.metrics.rmse,
       together.step_ns_p50, together.step_ns_p999, together.guarded_samples);
 }

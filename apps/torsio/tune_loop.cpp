@@ -89,8 +89,7 @@ std::string passivity_text(const torsio::Passivity& passive) {
           : std::string("not passive, even at low frequencies;\n");
   return below + fmt::format(
                      "least real part of the impedance {:.3g} Nms/rad at {:.4g} Hz: unstable in "
-                     "contact with "
-                     "some\nenvironments, not with all\n",
+                     "contact with some\nenvironments, not with all\n",
                      passive.least_Nms_rad, passive.least_rad_s / kTurn);
 }
 

@@ -53,8 +53,7 @@ void Checker::check_constant() {
       add(Verdict::fail, "constant channels", recording.name(),
           fmt::format("{} never changes from {:g}", channel.name, channel.values.front()),
           "Check that the sensor is connected. If it is a condition of the recording, list it "
-          "under "
-          "conditions: in a manifest.");
+          "under conditions: in a manifest.");
     });
     for (std::size_t r = 0; r < pairs_.size(); ++r)
       for (const std::string& name : channels_)

@@ -248,8 +248,7 @@ void Checker::check_change() {
                             spec_.inputs.front(), dataset_.target, change->offset,
                             unit_label(dataset_.target), when),
           "Check for a zero that slipped or drifted and for a part that broke or crept. A model "
-          "would "
-          "learn the mean of before and after.");
+          "would learn the mean of before and after.");
     }
   });
 }

@@ -44,9 +44,8 @@ double rate_of_steps(const Stamps& stamps) {
 std::string remedies(const Stamps& stamps) {
   return fmt::format(
       "If the samples were taken evenly and only the stamps are coarse, write in a mapping  clock: "
-      "{{rebuild: true}}\n  If they were taken unevenly, write  clock: {{resample: {:.6g}Hz}} "
-      " "
-      "or another rate.",
+      "{{rebuild: true}}\n  If they were taken unevenly, write  clock: {{resample: {:.6g}Hz}}  or "
+      "another rate.",
       rate_of_steps(stamps));
 }
 

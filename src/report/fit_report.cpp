@@ -68,8 +68,7 @@ std::string verdict(const FitReport& report) {
   if (!is_enough)
     text += fmt::format(
         "effective sample size {:.0f}: correlations with inputs below {:.2f} cannot be excluded; "
-        "record "
-        "longer or more varied motions\n",
+        "record longer or more varied motions\n",
         report.effective_samples, std::min(of_input, 1.0));
   return text;
 }

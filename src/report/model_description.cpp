@@ -136,8 +136,7 @@ std::string zero_line(const EstimatorSettings& settings) {
   if (settings.zeroed_channels.empty()) return {};
   return fmt::format(
       "requires the zero of {}: set_zero(channel, value) before the loop, the mapping's zero: on "
-      "files; "
-      "without it every step is zero_not_set\n",
+      "files; without it every step is zero_not_set\n",
       fmt::join(settings.zeroed_channels, ", "));
 }
 

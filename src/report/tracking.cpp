@@ -137,12 +137,11 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
     for (const std::string& remark : means.remarks) remarks += remark + "\n";
   }
   return fmt::format(
-      "{} ({}), output {}, {} of {:.4g} Nm, {} run{} per model\n{}{}"
-      "errors: of the joint's torque without noise, without the first 2 s; limits: number of limit "
-      "events;\nfallback: steps on the linear fallback; cycles: runs with a limit cycle;\n"
+      "{} ({}), output {}, {} of {:.4g} Nm, {} run{} per model\n{}{}errors: of the joint's torque "
+      "without noise, without the first 2 s; limits: number of limit events;\nfallback: steps on "
+      "the linear fallback; cycles: runs with a limit cycle;\n"
       "-3 dB Hz: frequency at which the response to a sweep has fallen to 0.71, - if it has not, "
-      "or "
-      "never was above\n",
+      "or never was above\n",
       first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,
       rows.size() / models.size(), rows.size() == models.size() ? "" : "s", table.text(), remarks);
 }

@@ -111,8 +111,7 @@ class ShapeSearch {
   [[nodiscard]] std::string note(const WienerShape& shape) const {
     return fmt::format(
         "{}: the smallest of {} structures within 1 % of the least error on held-out blocks, "
-        "{:.4g} "
-        "in the target's unit{}",
+        "{:.4g} in the target's unit{}",
         text_of(shape), tried_, error_,
         failed_ == 0 ? "" : fmt::format("; {} did not converge and were passed over", failed_));
   }

@@ -95,8 +95,7 @@ std::string recipe_of(std::string_view family, const TrainingNetwork& network,
                           static_cast<int>(layer.activation));
   return fmt::format(
       "{} [{}], window {} burn_in {} last_only {}, epochs {} batch {} learning_rate {} optimiser "
-      "{} "
-      "weight_decay {} clip {} schedule {} patience {}, seed {}, data {:016x}",
+      "{} weight_decay {} clip {} schedule {} patience {}, seed {}, data {:016x}",
       family, layers, set.steps, set.burn_in, set.last_only, training.epochs, training.batch,
       training.learning_rate, static_cast<int>(training.optimiser), training.weight_decay,
       training.clip, static_cast<int>(training.schedule), training.patience, seed,

@@ -304,10 +304,8 @@ std::string continuous_warning(const Sections& sections, double sample_period_s)
   const double image = 2.0 / sample_period_s * (*worst - 1.0) / (*worst + 1.0);
   return fmt::format(
       "the pole {:.4g} is real and negative: it turns over from sample to sample, which no "
-      "continuous "
-      "system does. Tustin makes {:.4g} rad/s of it, beyond Nyquist ({:.4g} rad/s): an artefact, "
-      "not "
-      "a time constant",
+      "continuous system does. Tustin makes {:.4g} rad/s of it, beyond Nyquist ({:.4g} rad/s): an "
+      "artefact, not a time constant",
       *worst, image, std::numbers::pi / sample_period_s);
 }
 
