@@ -53,7 +53,7 @@ void run(AttributeFlags& flags) {
   const torsio::Dataset dataset = load(flags, file.settings.target, progress.listener());
   warn_of_missing_zeros(file, dataset);
   // Refuses a sample rate that the model cannot run at.
-  (void)torsio::estimator_at(file, dataset.sample_rate_Hz());
+  (void)torsio::make_estimator(file, dataset.sample_rate_Hz());
   torsio::AttributionOptions options = flags.options;
   options.window_samples = window_samples(flags, dataset.sample_rate_Hz());
   const torsio::AnyModel model(file.parameters);

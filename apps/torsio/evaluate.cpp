@@ -69,7 +69,7 @@ void run(EvaluateFlags& flags) {
   const torsio::Results results = torsio::evaluate_model(file, dataset, progress.listener());
   warn_of_another_unit(file, dataset);
   if (!flags.predictions.empty()) {
-    const torsio::Estimator estimator = torsio::estimator_at(file, dataset.sample_rate_Hz());
+    const torsio::Estimator estimator = torsio::make_estimator(file, dataset.sample_rate_Hz());
     torsio::write_csv(prediction_recording(estimator, dataset.records.front().recording,
                                            dataset.target, dataset.initialise_samples),
                       flags.predictions);
@@ -91,7 +91,8 @@ void add_evaluate(CLI::App& app) {
       "Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv\n"
       "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "
       "count,\n"
-      "3 warming up, 4 zero not set, 5 outside the training range, 6 model not finite, 7 diverged");
+      "3 warming up, 4 zero not set, 5 outside the training range, 6 recovering, 7 wrong rate,\n"
+      "8 model not finite, 9 diverged (docs/estimator.md)");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
   flags->data.add_mapping(*verb);

@@ -71,11 +71,11 @@ std::vector<std::string> without_torque(std::vector<std::string> raw_inputs) {
 }  // namespace
 
 ModelInverse::ModelInverse(EstimatorSettings settings, AnyModel model, double max_departure)
-    : core_(checked(std::move(settings), model), model.input_count()),
+    : core_(checked(std::move(settings), model), model),
       model_(std::move(model)),
       inputs_(core_.raw_inputs(), core_.settings().target),
       max_departure_rad_(departure_rad(core_.settings(), max_departure)),
-      is_stepped_(model_.traits().has_memory),
+      is_stepped_(core_.model_has_memory()),
       asked_(model_.input_count()) {
   reset();
 }
@@ -104,6 +104,10 @@ Estimate ModelInverse::guarded(double torque_Nm, Features features) noexcept {
   Estimate answer = {.value = line_rad};
   if (!core_.is_settled()) {
     answer.fault = Fault::warming_up;
+    return answer;
+  }
+  if (core_.is_recovering(torque_Nm)) {
+    answer.fault = Fault::recovering;
     return answer;
   }
   const Estimate estimate = model_.invert(torque_Nm, features);
@@ -136,10 +140,13 @@ Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcep
             .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};
   if (input.restarted) model_.reset();
   const bool has_state = !model_.state().empty();
-  if (is_stepped_ && !has_state) store(input.features);
-  Estimate answer = guarded(torque_Nm, input.features);
+  const bool is_jump = input.for_model.empty();
+  if (is_stepped_ && !has_state && !is_jump) store(input.for_model);
+  Estimate answer = is_jump ? Estimate{.value = on_the_line(torque_Nm, input.features),
+                                       .fault = Fault::outside_training_range}
+                            : guarded(torque_Nm, input.features);
   zero_rad_ = sample.spring_deflection_rad() - input.features.front();
-  if (has_state) {
+  if (has_state && !is_jump) {
     // What the loop makes of the answer is not known yet: the memory goes there in the next step.
     std::ranges::copy(input.features, asked_.begin());
     follows_answer_ = answer.fault != Fault::warming_up;

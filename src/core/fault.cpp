@@ -10,6 +10,8 @@ std::string_view name(Fault fault) noexcept {
     case Fault::warming_up: return "warming_up";
     case Fault::zero_not_set: return "zero_not_set";
     case Fault::outside_training_range: return "outside_training_range";
+    case Fault::recovering: return "recovering";
+    case Fault::wrong_rate: return "wrong_rate";
     case Fault::model_not_finite: return "model_not_finite";
     case Fault::diverged: return "diverged";
   }

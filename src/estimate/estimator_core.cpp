@@ -88,6 +88,18 @@ void check_residuals(const ResidualTable& residuals) {
            "a number, at least 0, or NaN for none", fmt::format("{}", *bad));
 }
 
+void check_disturbances(const DisturbanceGuards& guards, std::size_t raw_inputs) {
+  check_count("guards.disturbances.largest_step", guards.largest_step.empty() ? 0 : raw_inputs,
+              guards.largest_step.size());
+  for (std::size_t i = 0; i < guards.largest_step.size(); ++i)
+    if (!is_error_bar(guards.largest_step[i]) || std::isnan(guards.largest_step[i]))
+      refuse(fmt::format("guards.disturbances.largest_step[{}]", i), "a finite number, at least 0",
+             fmt::format("{}", guards.largest_step[i]));
+  if (!is_error_bar(guards.warm_up_s))
+    refuse("guards.disturbances.warm_up_s", "a number, at least 0, or NaN for none",
+           fmt::format("{}", guards.warm_up_s));
+}
+
 void check_settings(const EstimatorSettings& settings, std::size_t model_input_count) {
   const std::vector<std::string>& inputs = settings.features.inputs;
   if (inputs.size() != model_input_count)
@@ -111,7 +123,8 @@ void check_zeroed(const std::vector<std::string>& channels,
 
 }  // namespace
 
-EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input_count)
+EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input_count,
+                             const std::function<ModelMemory(const InputRanges&)>& memory)
     : settings_(std::move(settings)),
       pipeline_(settings_.features, settings_.sample_rate_Hz),
       unset_zeros_(settings_.zeroed_channels),
@@ -130,6 +143,15 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
     check_finite("guards.ranges with margin",
                  std::array{low - slack - border, high + slack + border});
   }
+  check_disturbances(settings_.disturbances, raw_inputs().size());
+  memory_error_ = MemoryError(memory({ranges.lowest, ranges.highest}),
+                              ranges_.front().highest - ranges_.front().lowest,
+                              1.0 / settings_.sample_rate_Hz, settings_.disturbances.warm_up_s);
+  has_memory_ = !memory_error_.memory().is_empty();
+  depends_on_rate_ = has_memory_ || pipeline_.settling_samples() > 0;
+  resets_model_ = !memory_error_.memory().is_declared || !has_memory_;
+  previous_raw_.resize(raw_inputs().size());
+  limited_.resize(model_input_count);
 }
 
 void EstimatorCore::set_zero(std::string_view channel, double value) {
@@ -142,55 +164,128 @@ void EstimatorCore::reset() noexcept {
   missed_ = 0;
   poisoned_ = false;
   last_value_ = 0.0;
+  needs_reset_ = false;
+  has_run_ = false;
+  in_jump_ = false;
+  has_previous_ = false;
+  is_wrong_rate_ = false;
+  memory_error_.reset();
 }
 
 EstimatorCore::Conditioned EstimatorCore::miss(Fault fault) noexcept {
-  if (missed_ <= longest_gap_) ++missed_;
-  return {.features = {}, .fault = fault};
+  ++missed_;
+  return {.features = {}, .fault = fault, .for_model = {}};
+}
+
+void EstimatorCore::interrupt(double ticks, double share) noexcept {
+  if (!has_run_) return;  // a model that has not run yet starts at rest
+  memory_error_.interrupt(ticks, share);
+  if (share == 1.0) needs_reset_ = resets_model_;
+}
+
+bool EstimatorCore::has_jumped(std::span<const double> raw) noexcept {
+  const std::vector<double>& largest = settings_.disturbances.largest_step;
+  const double ticks = static_cast<double>(missed_) + 1.0;
+  bool jumped = false;
+  if (has_previous_)
+    for (std::size_t i = 0; i < largest.size(); ++i)
+      jumped |= std::abs(raw[i] - previous_raw_[i]) > kJumpFactor * ticks * largest[i];
+  std::ranges::copy(raw, previous_raw_.begin());
+  has_previous_ = true;
+  return jumped;
 }
 
 EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw) noexcept {
   if (raw.size() != raw_inputs().size()) return miss(Fault::input_count_wrong);
   if (!all_finite(raw)) return miss(Fault::input_not_finite);
-  const bool restarted = poisoned_ || missed_ > longest_gap_;
-  if (restarted) pipeline_.reset();
+  const bool jumped = has_jumped(raw);
+  const bool is_gap = missed_ > longest_gap_;
+  if (is_gap) interrupt(static_cast<double>(missed_), 1.0);
+  if (poisoned_ || is_gap || jumped) pipeline_.reset();
   const Features features = pipeline_.step(raw);
   // Finite inputs can still overflow a product or leave a root's domain; differences and lags hold
   // such a value for some ticks, so the next usable tick starts afresh.
   poisoned_ = !all_finite(features);
-  if (poisoned_) return miss(Fault::input_not_finite);
+  if (poisoned_) {
+    interrupt(1.0, 1.0);
+    return miss(Fault::input_not_finite);
+  }
   missed_ = 0;
-  return {.features = features, .restarted = restarted};
+  Conditioned input{.features = features, .for_model = features, .excursion = excursion(features)};
+  in_jump_ = jumped || is_wrong_rate_ || (in_jump_ && input.excursion > 1.0);
+  if (in_jump_ || input.excursion > 1.0) limit_for_model(input);
+  if (input.for_model.empty()) return input;
+  if (input.excursion <= 1.0) memory_error_.follow(features[0]);
+  input.restarted = needs_reset_;
+  needs_reset_ = false;
+  has_run_ = true;
+  return input;
+}
+
+// A model without memory is stepped with what there is. The memory of another one receives nothing
+// after a jump, which a sensor error can cause; after a continuous excursion it receives the limited
+// features, so that it misses no more than what the first input travelled beyond its border.
+void EstimatorCore::limit_for_model(Conditioned& input) noexcept {
+  // Without the largest steps of the training, every excursion may be a jump, unless a missing zero
+  // explains it.
+  in_jump_ = in_jump_ || (settings_.disturbances.largest_step.empty() && unset_zeros_.empty());
+  poisoned_ = in_jump_;
+  if (in_jump_) {
+    interrupt(1.0, 1.0);
+    if (has_memory_) input.for_model = {};
+    if (input.excursion <= 1.0) input.excursion = std::numeric_limits<double>::infinity();
+    return;
+  }
+  if (!has_memory_) return;
+  for (std::size_t i = 0; i < limited_.size(); ++i)
+    limited_[i] = std::clamp(input.features[i], ranges_[i].lowest - ranges_[i].border,
+                             ranges_[i].highest + ranges_[i].border);
+  input.for_model = limited_;
+  const double width = ranges_.front().highest - ranges_.front().lowest;
+  const double missed = std::abs(input.features[0] - limited_[0]);
+  interrupt(1.0, std::min(1.0, missed / width));
+}
+
+bool EstimatorCore::is_recovering(double value) const noexcept {
+  if (memory_error_.is_zero()) return false;
+  return !(memory_error_.bound() <= residual_std_at(value));  // also without an error bar
 }
 
 Estimate EstimatorCore::held(Fault fault) const noexcept {
   return {.value = last_value_, .fault = fault};
 }
 
-Estimate EstimatorCore::apply_guards(Features features, const Estimate& raw_estimate) noexcept {
-  const double weight = excursion(features);
-  const bool inside = weight <= 1.0;
+Estimate EstimatorCore::apply_guards(const Conditioned& input,
+                                     const Estimate& raw_estimate) noexcept {
+  const Features features = input.features;
+  const bool inside = input.excursion <= 1.0;
+  const Estimate model = model_part(raw_estimate);
   Estimate out;
-  if (!is_settled()) {
-    out.fault = Fault::warming_up;
+  if (is_wrong_rate_) {
+    out.fault = Fault::wrong_rate;
   } else if (!inside) {
     out.fault = Fault::outside_training_range;
+  } else if (!is_settled()) {
+    out.fault = Fault::warming_up;
   } else if (raw_estimate.fault != Fault::none) {
     out.fault = raw_estimate.fault;
   } else if (!std::isfinite(raw_estimate.value)) {
     out.fault = Fault::model_not_finite;
+  } else if (!memory_error_.is_zero() && !(memory_error_.bound() <= model.std_dev)) {
+    out.fault = Fault::recovering;
   }
   if (out.fault == Fault::none) {
-    out = weight > 0.0 ? blended(features, raw_estimate, weight) : model_part(raw_estimate);
+    out = input.excursion > 0.0 ? blended(features, model, input.excursion) : model;
+    if (!memory_error_.is_zero()) out.std_dev = std::hypot(out.std_dev, memory_error_.bound());
   } else {
     out.value = fallback_value(features);
     // The fallback's residuals are evidence only where it was fitted.
-    if (inside) out.std_dev = evidence(settings_.fallback.residual_std);
+    if (inside && !is_wrong_rate_) out.std_dev = evidence(settings_.fallback.residual_std);
   }
   out.novelty = raw_estimate.novelty;
   if (!unset_zeros_.empty()) {
     // With an unknown zero, the range of a channel cannot be checked.
-    if (out.fault != Fault::warming_up) out.fault = Fault::zero_not_set;
+    out.fault = is_settled() ? Fault::zero_not_set : Fault::warming_up;
     out.std_dev = kNotMeasured;
   }
   last_value_ = out.value;
@@ -213,9 +308,8 @@ Estimate EstimatorCore::model_part(const Estimate& raw_estimate) const noexcept 
           .std_dev = std::isnan(own) ? residual_std_at(raw_estimate.value) : own};
 }
 
-Estimate EstimatorCore::blended(Features features, const Estimate& raw_estimate,
+Estimate EstimatorCore::blended(Features features, const Estimate& model,
                                 double weight) const noexcept {
-  const Estimate model = model_part(raw_estimate);
   const double fallback = fallback_value(features);
   // The second moment about the mean of a draw from the model with probability 1 - w, else from
   // the fallback: the two variances, and how far the two disagree.

@@ -154,7 +154,7 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
                          const AdaptationSettings& settings, const Progress& progress) {
   dataset.check();
   refuse_seen_test_records(dataset);
-  const Estimator frozen = estimator_at(model, dataset.sample_rate_Hz());
+  const Estimator frozen = make_estimator(model, dataset.sample_rate_Hz());
   AdaptiveEstimator adaptive(frozen.settings(), model.parameters, settings);
   require_role(dataset, Role::train, "adapt to", "Name recordings to adapt to.");
   require_role(dataset, Role::test, "score on", "Name held-out recordings with --test.");
@@ -185,7 +185,7 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
   if (!residuals.std_dev.empty()) adapted.file.settings.residuals = std::move(residuals);
   const SplitScore before =
       evaluate(frozen, dataset, Role::test, part_of(progress, parts - 2, parts, "frozen"));
-  const SplitScore after = evaluate(estimator_at(adapted.file, dataset.sample_rate_Hz()), dataset,
+  const SplitScore after = evaluate(make_estimator(adapted.file, dataset.sample_rate_Hz()), dataset,
                                     Role::test, part_of(progress, parts - 1, parts, "adapted"));
   if (after.together.metrics.samples == 0)
     throw Error({.problem = "no held-out sample could be scored",

@@ -153,17 +153,11 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
   return comparison;
 }
 
-Estimator estimator_at(const ModelFile& file, double sample_rate_Hz) {
-  ModelFile resampled = file;
-  resampled.settings.sample_rate_Hz = sample_rate_Hz;
-  return make_estimator(resampled);
-}
-
 Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Progress& progress) {
   dataset.check();
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
-  const Estimator estimator = estimator_at(file, dataset.sample_rate_Hz());
+  const Estimator estimator = make_estimator(file, dataset.sample_rate_Hz());
   results.rows = rows_for(file, estimator, dataset, kRoles, progress);
   return results;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -17,9 +18,10 @@ namespace {
 
 constexpr const char* kCardKey = "torsio";
 
-/// Error bars may be NaN: no evidence.
-bool is_error_bar(std::string_view path) {
-  return path == "fallback.residual_std" || path == "residuals.std_dev";
+/// Error bars and warm-up times may be NaN: no evidence.
+bool may_be_nan(std::string_view path) {
+  return path == "fallback.residual_std" || path == "residuals.std_dev" ||
+         path == "guards.disturbances.warm_up_s";
 }
 
 const std::string& card_text(const Safetensors& contents, std::string_view place) {
@@ -73,9 +75,9 @@ void check_sample_rate(const AnyModel& model, double rate_Hz) {
 }
 
 /// Checks what only the estimator itself can: that settings and model fit together.
-Estimator make_estimator_at(const ModelFile& model, std::string_view place) {
+Estimator make_estimator_at(const ModelFile& model, double sample_rate_Hz, std::string_view place) {
   try {
-    return make_estimator(model);
+    return make_estimator(model, sample_rate_Hz);
   } catch (const Error& error) {
     ErrorReport report = error.report();
     report.place =
@@ -90,11 +92,13 @@ ModelFile read_model(std::span<const std::byte> bytes, std::string_view place,
   ModelFile model = model_of_card(card_text(contents, place), fmt::format("{}: card", place));
   check_serial(model.card, place, expected_serial);
   with_own_type(model.parameters, [&](auto& parameters) {
-    take_leaves(contents, "model", place, parameters, is_error_bar);
+    take_leaves(contents, "model", place, parameters, may_be_nan);
   });
-  take_leaves(contents, "guards.ranges", place, model.settings.ranges, is_error_bar);
-  take_leaves(contents, "fallback", place, model.settings.fallback, is_error_bar);
-  take_leaves(contents, "residuals", place, model.settings.residuals, is_error_bar);
+  take_leaves(contents, "guards.ranges", place, model.settings.ranges, may_be_nan);
+  if (has_tensors_of(contents, "guards.disturbances"))  // files of older builds have none
+    take_leaves(contents, "guards.disturbances", place, model.settings.disturbances, may_be_nan);
+  take_leaves(contents, "fallback", place, model.settings.fallback, may_be_nan);
+  take_leaves(contents, "residuals", place, model.settings.residuals, may_be_nan);
   check_nothing_left(contents, place, model.parameters.family());
   return model;
 }
@@ -107,6 +111,7 @@ std::vector<std::byte> model_bytes(const ModelFile& model) {
   with_own_type(model.parameters,
                 [&](const auto& parameters) { put_leaves(contents, "model", parameters); });
   put_leaves(contents, "guards.ranges", model.settings.ranges);
+  put_leaves(contents, "guards.disturbances", model.settings.disturbances);
   put_leaves(contents, "fallback", model.settings.fallback);
   put_leaves(contents, "residuals", model.settings.residuals);
   return safetensors_bytes(contents);
@@ -115,7 +120,7 @@ std::vector<std::byte> model_bytes(const ModelFile& model) {
 ModelFile parse_model(std::span<const std::byte> bytes, std::string_view place,
                       std::string_view expected_serial) {
   ModelFile model = read_model(bytes, place, expected_serial);
-  (void)make_estimator_at(model, place);
+  (void)make_estimator_at(model, model.settings.sample_rate_Hz, place);
   return model;
 }
 
@@ -137,10 +142,27 @@ Estimator make_estimator(const ModelFile& model) {
   return {model.settings, AnyModel(model.parameters.at_sample_period(1.0 / rate_Hz))};
 }
 
-Estimator load_estimator(const std::filesystem::path& path, std::string_view expected_serial) {
+Estimator make_estimator(const ModelFile& model, double sample_rate_Hz) {
+  ModelFile resampled = model;
+  // In a longer period an input moves further; in a shorter one its noise is the same.
+  const double ratio = model.settings.sample_rate_Hz / sample_rate_Hz;
+  const double longer = std::isfinite(ratio) ? std::max(1.0, ratio) : 1.0;
+  for (double& step : resampled.settings.disturbances.largest_step) step *= longer;
+  resampled.settings.sample_rate_Hz = sample_rate_Hz;
+  return make_estimator(resampled);
+}
+
+Estimator load_estimator(const std::filesystem::path& path, const EstimatorOptions& options) {
+  const double rate_Hz = options.rate_Hz;
+  if (!std::isnan(rate_Hz) && !(std::isfinite(rate_Hz) && rate_Hz > 0.0))
+    throw UsageError({.place = "load_estimator: rate_Hz",
+                      .expected = "a positive number, or NaN for the rate in the file",
+                      .found = fmt::format("{}", rate_Hz)});
   const std::string place = path.string();
   const auto bytes = read_whole_file(path, kMaxModelFileBytes);
-  return make_estimator_at(read_model(bytes, place, expected_serial), place);
+  const ModelFile model = read_model(bytes, place, options.serial);
+  return make_estimator_at(model, std::isnan(rate_Hz) ? model.settings.sample_rate_Hz : rate_Hz,
+                           place);
 }
 
 }  // namespace torsio

@@ -38,6 +38,7 @@ std::size_t AnyModel::input_count() const noexcept { return held_->input_count()
 std::size_t AnyModel::parameter_count() const noexcept { return held_->parameter_count(); }
 double AnyModel::sample_period() const noexcept { return held_->sample_period(); }
 bool AnyModel::is_rediscretised() const noexcept { return held_->is_rediscretised(); }
+ModelMemory AnyModel::memory(const InputRanges& ranges) const { return held_->memory(ranges); }
 void AnyModel::reset() noexcept { held_->reset(); }
 Estimate AnyModel::step(Features features) noexcept { return held_->step(features); }
 bool AnyModel::feeds_back() const noexcept { return held_->feeds_back(); }

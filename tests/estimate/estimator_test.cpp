@@ -271,6 +271,104 @@ TEST(Estimator, JumpsNotEvenWhereAFeatureWasConstantInTraining) {
   }
 }
 
+/// Adds up its inputs: a memory that never ends.
+class Summing : public Scripted {
+ public:
+  using Scripted::Scripted;
+  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+    return {.slips = {{.gain = 1.0, .travel = 0.5}}};
+  }
+  void reset() noexcept { sum_ = 0.0; }
+  Estimate step(Features features) noexcept {
+    sum_ += features[0];
+    return {.value = sum_, .std_dev = 0.1};
+  }
+
+ private:
+  double sum_ = 0.0;
+};
+
+EstimatorSettings with_steps(double largest_step) {
+  EstimatorSettings guarded = settings();
+  guarded.disturbances.largest_step = {largest_step};
+  return guarded;
+}
+
+TEST(Estimator, AJumpDoesNotEnterTheMemoryOfTheModel) {
+  BasicEstimator<Summing> estimator(with_steps(0.1), Summing(Scripted::Parameters{}));
+  ASSERT_EQ(estimator.step({{0.25}}).value, 0.25);
+  for (const double jump : {-0.9, 1e6}) {
+    const Estimate jumped = estimator.step({{jump}});
+    EXPECT_EQ(jumped.fault, Fault::outside_training_range);
+    EXPECT_TRUE(std::isnan(jumped.std_dev));
+    EXPECT_EQ(estimator.step({{0.0}}).fault, Fault::outside_training_range) << "it jumps back";
+  }
+  EXPECT_EQ(estimator.step({{0.0}}).fault, Fault::recovering);
+  // 0.5 of travel erases what was missed.
+  for (const double x : {0.1, 0.2, 0.1, 0.0, -0.1, -0.2}) estimator.step({{x}});
+  EXPECT_EQ(estimator.step({{-0.3}}).fault, Fault::none);
+  EXPECT_NEAR(estimator.step({{-0.2}}).value, 0.25 + 0.1 - 0.3 - 0.2, 1e-12);
+}
+
+TEST(Estimator, AContinuousExcursionEntersTheMemoryOnlyUpToTheBorder) {
+  BasicEstimator<Summing> estimator(with_steps(0.5), Summing(Scripted::Parameters{}));
+  estimator.step({{0.9}});
+  const Estimate outside = estimator.step({{1.5}});
+  EXPECT_EQ(outside.fault, Fault::outside_training_range);
+  EXPECT_DOUBLE_EQ(outside.value, 0.5 + 7.0 * 1.5);
+  const Estimate back = estimator.step({{1.0}});
+  EXPECT_EQ(back.fault, Fault::recovering) << "0.4 beyond the border";
+  for (const double x : {0.9, 0.8, 0.7}) estimator.step({{x}});
+  const Estimate inside = estimator.step({{0.6}});
+  EXPECT_EQ(inside.fault, Fault::none);
+  EXPECT_NEAR(inside.value, 0.9 + 1.1 + 1.0 + 0.9 + 0.8 + 0.7 + 0.6, 1e-5);
+  EXPECT_NEAR(inside.std_dev, 0.1, 1e-6);
+}
+
+TEST(Estimator, AModelWithoutDeclaredMemoryIsResetAndWarmsUpAfterAJump) {
+  struct Hidden : Summing {
+    using Summing::Summing;
+    [[nodiscard]] static ModelMemory memory(const InputRanges& /*ranges*/) {
+      return {.is_declared = false};
+    }
+  };
+  EstimatorSettings guarded = with_steps(0.1);
+  guarded.disturbances.warm_up_s = 0.003;
+  BasicEstimator<Hidden> estimator(guarded, Hidden(Scripted::Parameters{}));
+  estimator.step({{0.25}});
+  estimator.step({{5.0}});
+  estimator.step({{0.25}});
+  for (const Fault expected : {Fault::recovering, Fault::recovering, Fault::none})
+    EXPECT_EQ(estimator.step({{0.25}}).fault, expected);
+  EXPECT_EQ(estimator.step({{0.25}}).value, 1.0) << "it was reset";
+  guarded.disturbances.warm_up_s = kNaN;
+  BasicEstimator<Hidden> unknown(guarded, Hidden(Scripted::Parameters{}));
+  unknown.step({{0.25}});
+  unknown.step({{5.0}});
+  for (int n = 0; n < 100000; ++n) unknown.step({{0.25}});
+  EXPECT_EQ(unknown.step({{0.25}}).fault, Fault::recovering);
+  unknown.reset();
+  EXPECT_EQ(unknown.step({{0.25}}).fault, Fault::none);
+}
+
+TEST(Estimator, AShortGapAllowsALargerStep) {
+  BasicEstimator<Summing> estimator(with_steps(0.1), Summing(Scripted::Parameters{}));
+  estimator.step({{0.0}});
+  for (int i = 0; i < 3; ++i) estimator.step({{kNaN}});
+  EXPECT_EQ(estimator.step({{0.7}}).fault, Fault::none) << "0.2 in each of four periods";
+  EXPECT_EQ(estimator.step({{0.0}}).fault, Fault::outside_training_range);
+}
+
+TEST(Estimator, RefusesDisturbanceGuardsThatDoNotFit) {
+  EstimatorSettings bad = settings();
+  bad.disturbances.largest_step = {0.1, 0.2};
+  EXPECT_THAT(refusal(bad), HasSubstr("guards.disturbances.largest_step"));
+  bad.disturbances.largest_step = {-0.1};
+  EXPECT_THAT(refusal(bad), HasSubstr("guards.disturbances.largest_step[0]"));
+  bad.disturbances = {.largest_step = {}, .warm_up_s = -1.0};
+  EXPECT_THAT(refusal(bad), HasSubstr("guards.disturbances.warm_up_s"));
+}
+
 TEST(Estimator, ReturnsTheFallbackWhenTheModelFails) {
   for (const double bad : {kNaN, kInfinity, -kInfinity}) {
     ScriptedEstimator estimator = with_output({.value = bad, .std_dev = 0.1});

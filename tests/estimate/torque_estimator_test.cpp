@@ -3,8 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "support/error_message.hpp"
 #include "support/examples/linear.hpp"
@@ -76,6 +80,43 @@ TEST(TorqueEstimator, RefusesAModelOfSomethingElse) {
       }),
       HasSubstr("expected a model whose target is a torque in Nm, found the target "
                 "'force_N'"));
+}
+
+/// Steps at a period of `period_s`, every tenth of which may be later by `late_s`. @returns the faults
+std::vector<Fault> faults_at(TorqueEstimator torque, double period_s, double late_s = 0.0) {
+  std::vector<Fault> faults;
+  double t_s = 0.0;
+  for (int n = 0; n < 200; ++n) {
+    t_s += period_s + (n % 10 == 9 ? late_s : 0.0);
+    faults.push_back(
+        torque.step({.t_s = t_s, .gear_angle_rad = 0.1, .joint_angle_rad = 0.05}).fault);
+  }
+  return faults;
+}
+
+const FeatureSpec kFiltered{.inputs = {"gear_angle_rad", "lowpass(joint_angle_rad, 100Hz)"},
+                            .definitions = {}};
+
+TEST(TorqueEstimator, ReportsALoopThatDoesNotRunAtItsSampleRate) {
+  for (const double period_s : {1e-2, 1.3e-3, 0.7e-3, 1e-4, 0.0}) {
+    const std::vector<Fault> faults = faults_at(TorqueEstimator(estimator(kFiltered)), period_s);
+    EXPECT_EQ(faults.back(), Fault::wrong_rate) << period_s;
+    EXPECT_EQ(std::ranges::count(std::span(faults).first(17), Fault::wrong_rate), 0)
+        << "no verdict before more than 16 periods";
+  }
+}
+
+TEST(TorqueEstimator, SingleLateTicksAndSmallDifferencesAreNoFault) {
+  for (const double period_s : {1.0e-3, 1.15e-3, 0.85e-3})
+    EXPECT_EQ(faults_at(TorqueEstimator(estimator(kFiltered)), period_s).back(), Fault::none);
+  EXPECT_EQ(faults_at(TorqueEstimator(estimator(kFiltered)), 1.0e-3, 5.0e-3).back(), Fault::none);
+}
+
+TEST(TorqueEstimator, DoesNotCheckTheRateWithoutTimeStampsOrWhereNothingDependsOnIt) {
+  const double kNaN = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(faults_at(TorqueEstimator(estimator(kFiltered)), kNaN).back(), Fault::none);
+  const FeatureSpec present{.inputs = {"gear_angle_rad", "joint_angle_rad"}, .definitions = {}};
+  EXPECT_EQ(faults_at(TorqueEstimator(estimator(present)), 1e-2).back(), Fault::none);
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ TEST(AdaptModel, ScoresAreThoseOfTheFilesThatItNames) {
   EXPECT_EQ(dump(loaded.parameters), dump(adapted.file.parameters));
   EXPECT_NE(dump(loaded.parameters), dump(bench_model().parameters));
   const auto rmse_of = [&](const ModelFile& file) {
-    return evaluate(estimator_at(file, dataset.sample_rate_Hz()), dataset, Role::test)
+    return evaluate(make_estimator(file, dataset.sample_rate_Hz()), dataset, Role::test)
         .together.metrics.rmse;
   };
   ASSERT_EQ(adapted.held_out.size(), 2U);

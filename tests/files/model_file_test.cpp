@@ -119,10 +119,11 @@ TEST(ModelFile, NamesTheResidualOfAGreyBoxByItsFamily) {
 TEST(ModelFile, IsBoundToItsDevice) {
   const TemporaryFolder folder;
   save_model(folder.path("elbow.safetensors"), example_model_file(example<Linear>()));
-  EXPECT_NO_THROW((void)load_estimator(folder.path("elbow.safetensors"), "elbow-7"));
-  EXPECT_THAT(
-      error_message([&] { (void)load_estimator(folder.path("elbow.safetensors"), "knee-1"); }),
-      HasSubstr("elbow.safetensors: device_serial: expected 'knee-1', found 'elbow-7'"));
+  EXPECT_NO_THROW((void)load_estimator(folder.path("elbow.safetensors"), {.serial = "elbow-7"}));
+  EXPECT_THAT(error_message([&] {
+                (void)load_estimator(folder.path("elbow.safetensors"), {.serial = "knee-1"});
+              }),
+              HasSubstr("elbow.safetensors: device_serial: expected 'knee-1', found 'elbow-7'"));
   ModelFile without_serial = example_model_file(example<Linear>());
   without_serial.card.device_serial = "";
   EXPECT_THAT(error_message([&] { (void)parse_model(model_bytes(without_serial), "m", "knee-1"); }),

@@ -26,7 +26,6 @@ TYPED_TEST(AnyModelOfEvery, BehavesAsTheFamilyInIt) {
   EXPECT_EQ(any.family(), TypeParam::kFamily);
   EXPECT_EQ(any.input_count(), model.input_count());
   EXPECT_EQ(any.parameter_count(), model.parameter_count());
-  EXPECT_EQ(any.traits().has_memory, detail::traits_of<TypeParam>().has_memory);
   EXPECT_EQ(any.feeds_back(), FeedsBack<TypeParam>);
   EXPECT_EQ(any.can_invert(), Invertible<TypeParam>);
   EXPECT_EQ(any.state().empty(), !HasState<TypeParam>);

@@ -26,27 +26,33 @@ namespace torsio {
 ///
 /// - `input_count_wrong`, `input_not_finite`: the tick cannot be used and nothing is stepped; the
 ///   last value from usable inputs (0 if none), without error bar.
-/// - `warming_up`: filters have not settled since `reset()` or a long gap; linear fallback.
+/// - `wrong_rate`: see `set_wrong_rate`; linear fallback, without error bar.
 /// - `zero_not_set`: a channel in `settings().zeroed_channels` had its zero taken from each record
 ///   in training, and `set_zero` was not called for it. The value is what it would be otherwise,
 ///   off by the slope times that zero, without error bar. It has priority over the range,
 ///   because the position of a channel without a zero is unknown.
-/// - `outside_training_range`: a feature is beyond the border; linear fallback, without error bar:
-///   there is no evidence.
+/// - `outside_training_range`: a feature is beyond the border, or a raw input has changed by more than
+///   `kJumpFactor` times its largest step in training; linear fallback, without error bar: there is
+///   no evidence.
+/// - `warming_up`: filters have not settled since `reset()`, a long gap or a jump; linear fallback.
+/// - `recovering`: inputs that the memory of the model has not received can still change its output by
+///   more than its error bar (`MemoryError`); linear fallback.
 /// - a fault that the model reported, or `model_not_finite` (the model is then reset); linear
 ///   fallback.
 ///
 /// If the fallback overflows, the last value is held. After a gap of at most `kLongestGapSeconds`
 /// (never less than one tick) filters and model continue as if the missing ticks did not exist, so
-/// a plain `rate(x)` shows the whole step over the gap in one tick; after a longer gap they restart
-/// and warm up. A model without an error bar of its own gets that of the residual table.
+/// a plain `rate(x)` shows the whole step over the gap in one tick; after a longer gap the filters
+/// restart and warm up, and the model recovers. A model with memory is not stepped after a jump until
+/// the features are inside their ranges, and in an excursion without a jump it is stepped with the
+/// features limited to their ranges and borders. A model without an error bar of its own gets that of the residual table.
 template <Model M>
 class BasicEstimator {
  public:
   /// @throws Error if settings and model do not fit together or a number in the settings is not
   /// finite.
   BasicEstimator(EstimatorSettings settings, M model)
-      : core_(std::move(settings), model.input_count()), model_(std::move(model)) {
+      : core_(std::move(settings), model), model_(std::move(model)) {
     reset();
   }
 
@@ -76,14 +82,21 @@ class BasicEstimator {
   /// Whether filters and differentiators have settled, so that the model's value is used.
   [[nodiscard]] bool is_settled() const noexcept { return core_.is_settled(); }
 
+  /// From now on the ticks do not come at the sample rate (or do again): `Fault::wrong_rate`, unless
+  /// neither the features nor the model depend on past samples.
+  void set_wrong_rate(bool is_wrong) noexcept TORSIO_REALTIME { core_.set_wrong_rate(is_wrong); }
+
   /// @param raw one value for each of `raw_inputs()`; NaN for one that was not measured.
   Estimate step(std::span<const double> raw) noexcept TORSIO_REALTIME {
     const detail::EstimatorCore::Conditioned input = core_.condition(raw);
     if (input.fault != Fault::none) return core_.held(input.fault);
+    if (input.for_model.empty()) return core_.apply_guards(input, {});
     if (input.restarted) model_.reset();
-    const Estimate raw_estimate = model_.step(input.features);
+    const Estimate raw_estimate = model_.step(input.for_model);
     if (!std::isfinite(raw_estimate.value)) model_.reset();
-    return core_.apply_guards(input.features, raw_estimate);
+    if (!std::isfinite(raw_estimate.value) || raw_estimate.fault == Fault::model_not_finite)
+      core_.lose_memory();
+    return core_.apply_guards(input, raw_estimate);
   }
 
   /// A measurement of the last step's target, for a model that feeds its output back: free run

@@ -1,13 +1,16 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
+#include "torsio/estimate/memory_error.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
@@ -17,19 +20,30 @@ namespace torsio::detail {
 /// one they continue as if its ticks did not exist.
 inline constexpr double kLongestGapSeconds = 0.01;
 
+/// A raw input that changes in one tick by more than this multiple of its largest change in training
+/// has jumped.
+inline constexpr double kJumpFactor = 2.0;
+
 /// The part of an estimator that does not depend on the family of its model: from raw channels to
 /// features, and the guards that decide whether the model's output may be used.
 class EstimatorCore {
  public:
   /// @throws Error if the settings contradict each other or the model, or a number in them is not
   /// finite.
-  EstimatorCore(EstimatorSettings settings, std::size_t model_input_count);
+  template <Model M>
+  EstimatorCore(EstimatorSettings settings, const M& model)
+      : EstimatorCore(std::move(settings), model.input_count(),
+                      [&model](const InputRanges& ranges) { return memory_of(model, ranges); }) {}
 
   /// One tick's raw channels after the pipeline.
   struct Conditioned {
     Features features;          ///< empty where `fault` is not none
     Fault fault = Fault::none;  ///< none, input_count_wrong or input_not_finite
-    bool restarted = false;     ///< the pipeline was reset: the model's memory is invalid too
+    bool restarted = false;     ///< the model is to be reset before it is stepped
+    /// What the model is to be stepped with: the features, limited to their ranges and borders. Empty:
+    /// the model is not to be stepped.
+    Features for_model;
+    double excursion = 0.0;  ///< see `excursion`; infinite in a tick that must not be used
   };
 
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return settings_; }
@@ -50,8 +64,21 @@ class EstimatorCore {
   /// How far the worst feature has left its range, in widths of its border: 0 inside, above 1
   /// beyond the border.
   [[nodiscard]] double excursion(Features features) const noexcept TORSIO_REALTIME;
-  /// Applies the guards to `raw_estimate`, the model's output for `features`.
-  Estimate apply_guards(Features features, const Estimate& raw_estimate) noexcept TORSIO_REALTIME;
+  /// Applies the guards to `raw_estimate`, the model's output for these features; where they are not
+  /// for the model, any.
+  Estimate apply_guards(const Conditioned& input,
+                        const Estimate& raw_estimate) noexcept TORSIO_REALTIME;
+  /// The model was reset because its output was not finite.
+  void lose_memory() noexcept TORSIO_REALTIME { memory_error_.lose(); }
+  /// The bound of the error that is caused by inputs that the model's memory did not receive.
+  [[nodiscard]] double memory_error() const noexcept { return memory_error_.bound(); }
+  /// Whether that error may exceed the error bar of the model at `value`.
+  [[nodiscard]] bool is_recovering(double value) const noexcept TORSIO_REALTIME;
+  [[nodiscard]] bool model_has_memory() const noexcept { return has_memory_; }
+  /// The ticks do not come at the sample rate, until this is called with false.
+  void set_wrong_rate(bool is_wrong) noexcept TORSIO_REALTIME {
+    is_wrong_rate_ = is_wrong && depends_on_rate_;
+  }
 
  private:
   struct Range {
@@ -60,13 +87,23 @@ class EstimatorCore {
     double border = 0.0;  ///< width, on either side, of the transition to the fallback
   };
 
+  EstimatorCore(EstimatorSettings settings, std::size_t model_input_count,
+                const std::function<ModelMemory(const InputRanges&)>& memory);
+
   [[nodiscard]] Estimate model_part(const Estimate& raw_estimate) const noexcept;
-  /// Blends `raw_estimate` with the fallback, whose share is `weight` in 0..1.
-  [[nodiscard]] Estimate blended(Features features, const Estimate& raw_estimate,
+  /// Blends the model's part with the fallback, whose share is `weight` in 0..1.
+  [[nodiscard]] Estimate blended(Features features, const Estimate& model,
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
   [[nodiscard]] double residual_std_at(double value) const noexcept;
   Conditioned miss(Fault fault) noexcept;
+  /// See `MemoryError::interrupt`.
+  void interrupt(double ticks, double share) noexcept;
+  /// Whether a raw input has changed faster than in training since the last tick, whose inputs are
+  /// replaced by these.
+  bool has_jumped(std::span<const double> raw) noexcept;
+  /// The features of a tick that leaves the ranges.
+  void limit_for_model(Conditioned& input) noexcept;
 
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
@@ -74,8 +111,19 @@ class EstimatorCore {
   std::vector<std::string> unset_zeros_;
   std::size_t longest_gap_;  ///< ticks
   std::size_t missed_ = 0;   ///< ticks in a row without usable input
-  bool poisoned_ = false;    ///< a feature was not finite: differences and lags still contain it
+  bool poisoned_ = false;    ///< filters, differences and lags contain a value that is not usable
   double last_value_ = 0.0;
+  bool has_memory_ = false;
+  bool resets_model_ = false;  ///< a memory that is not declared starts again after an interruption
+  bool depends_on_rate_ = false;
+  bool is_wrong_rate_ = false;
+  bool needs_reset_ = false;  ///< the model is to be reset in its next step
+  bool has_run_ = false;      ///< the model has been stepped since `reset()`
+  bool in_jump_ = false;      ///< since a jump, no tick has been inside the ranges
+  bool has_previous_ = false;
+  std::vector<double> previous_raw_;
+  std::vector<double> limited_;  ///< features
+  MemoryError memory_error_{{}, 0.0, 1.0, 0.0};
 };
 
 }  // namespace torsio::detail

@@ -53,6 +53,26 @@ struct ResidualTable {
   }
 };
 
+/// What an estimator uses to detect a jump of an input and to recover from unusable inputs.
+struct DisturbanceGuards {
+  /// Per raw input: largest change from one sample to the next in training, at least
+  /// `kSmallestStepShare` of its range there. Empty: not determined, jumps are not detected.
+  std::vector<double> largest_step = {};
+  /// Time after a reset until a model whose memory is not declared (`ModelMemory`) agrees with one
+  /// that was not reset. NaN: no such time was found.
+  double warm_up_s = kAssumedWarmUpSeconds;
+
+  static constexpr double kSmallestStepShare = 0.025;
+  /// The warm-up of models that were not fitted here (imported ones, files of older releases).
+  static constexpr double kAssumedWarmUpSeconds = 10.0;
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("largest_step", self.largest_step);
+    visit("warm_up_s", self.warm_up_s);
+  }
+};
+
 /// Everything around the model: the path from raw channels to features, and the guards. Plain data,
 /// stored in the model file.
 struct EstimatorSettings {
@@ -62,6 +82,7 @@ struct EstimatorSettings {
   std::vector<std::string> zeroed_channels;  ///< raw inputs whose zero was taken from each record:
                                              ///< `set_zero` at run time
   FeatureRanges ranges;
+  DisturbanceGuards disturbances = {};
   LinearFallback fallback;
   ResidualTable residuals;
 };

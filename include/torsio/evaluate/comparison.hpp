@@ -38,10 +38,6 @@ struct Comparison {
                                  std::uint64_t seed, bool allow_leak,
                                  const Progress& progress = {});
 
-/// The model's estimator at another sample rate: filters are re-discretised.
-/// @throws Error for a network with memory that was trained at another (`make_estimator`).
-[[nodiscard]] Estimator estimator_at(const ModelFile& file, double sample_rate_Hz);
-
 /// One model's rows on every role that the dataset has.
 [[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
                                      const Progress& progress = {});

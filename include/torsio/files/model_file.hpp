@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/core/not_measured.hpp"
 #include "torsio/core/provenance.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
@@ -64,13 +65,24 @@ void save_model(const std::filesystem::path& path, const ModelFile& model);
 [[nodiscard]] ModelFile load_model(const std::filesystem::path& path,
                                    std::string_view expected_serial = {});
 
-/// The estimator of a model, at the rate in its settings. Filters are re-discretised for any rate;
-/// a network with memory is not. @throws Error if settings and model do not fit together, or such a
-/// network would run at another rate than that of its training (0.1 % is tolerated).
+/// The estimator of a model, at the rate in its settings. Filters and continuous-time models are
+/// discretised for any rate; a discrete model with memory (a recurrent network, narx) is not.
+/// @throws Error if settings and model do not fit together, or such a model would run at another rate
+/// than that of its training (0.1 % is tolerated).
 [[nodiscard]] Estimator make_estimator(const ModelFile& model);
+/// The same at another sample rate.
+[[nodiscard]] Estimator make_estimator(const ModelFile& model, double sample_rate_Hz);
+
+/// The conditions under which a robot uses a model file.
+struct EstimatorOptions {
+  double rate_Hz = kNotMeasured;  ///< at which `step` will be called; NaN: the rate in the file
+  std::string serial =
+      {};  ///< serial number of the device; a model of another one is refused. Empty: any
+};
 
 /// `load_model` and `make_estimator` in one call, for the robot.
+/// @throws Error as both; UsageError if the rate is not a positive number.
 [[nodiscard]] Estimator load_estimator(const std::filesystem::path& path,
-                                       std::string_view expected_serial = {});
+                                       const EstimatorOptions& options = {});
 
 }  // namespace torsio

@@ -4,6 +4,7 @@
 
 #include "torsio/core/realtime.hpp"
 #include "torsio/model/any_model.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/model/network/last_layer_adapter.hpp"
 
@@ -32,6 +33,10 @@ class AdaptiveModel {
   [[nodiscard]] Parameters parameters() const;
   [[nodiscard]] std::size_t input_count() const noexcept { return network_.input_count(); }
   [[nodiscard]] std::size_t parameter_count() const noexcept { return network_.parameter_count(); }
+
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const {
+    return network_.memory(ranges);
+  }
 
   /// Resets the hidden state; the adapted weights are kept (`adapter().reset()` resets them).
   void reset() noexcept { network_.reset(); }

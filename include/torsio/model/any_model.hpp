@@ -10,6 +10,7 @@
 
 #include "torsio/core/error.hpp"
 #include "torsio/model/common/family_traits.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -92,6 +93,9 @@ class AnyModel {
   /// Whether `AnyParameters::at_sample_period` takes its parameters to another sample rate.
   [[nodiscard]] bool is_rediscretised() const noexcept;
 
+  /// As the family declares it; empty for a family that depends on the present inputs only.
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const;
+
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
@@ -135,6 +139,7 @@ class HeldModel {
   [[nodiscard]] virtual std::size_t parameter_count() const noexcept = 0;
   [[nodiscard]] virtual double sample_period() const noexcept = 0;
   [[nodiscard]] virtual bool is_rediscretised() const noexcept = 0;
+  [[nodiscard]] virtual ModelMemory memory(const InputRanges& ranges) const = 0;
   virtual void reset() noexcept = 0;
   virtual Estimate step(Features features) noexcept = 0;
   [[nodiscard]] virtual bool feeds_back() const noexcept = 0;
@@ -196,6 +201,9 @@ class HeldModelOf final : public HeldModel {
   }
   [[nodiscard]] bool is_rediscretised() const noexcept override { return Rediscretised<M>; }
 
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const override {
+    return memory_of(model_, ranges);
+  }
   void reset() noexcept override { model_.reset(); }
   Estimate step(Features features) noexcept override { return model_.step(features); }
 

@@ -9,6 +9,7 @@
 
 #include "fit/common/model_run.hpp"
 #include "fit/common/usable_table.hpp"
+#include "fit/common/warm_up.hpp"
 #include "numerics/least_squares.hpp"
 
 namespace torsio {
@@ -140,8 +141,11 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
   settings.ranges = feature_ranges(training);
   widen_for_physics(settings.ranges, model);
   settings.fallback = linear_fallback(training);
+  settings.disturbances.largest_step = training.largest_step;
   settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
   if (validation == nullptr) widen_to(settings.residuals, held_out_rmse);
+  if (!model.memory({settings.ranges.lowest, settings.ranges.highest}).is_declared)
+    settings.disturbances.warm_up_s = warm_up_s(model, training, settings.residuals);
   return settings;
 }
 

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "fit/common/finite_input.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/estimate/estimator_settings.hpp"
 
 namespace torsio {
 namespace {
@@ -50,6 +52,26 @@ Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::
   return sequence;
 }
 
+/// The part of the records that has `role`; see `DisturbanceGuards::largest_step`.
+double largest_step(const Dataset& dataset, const std::string& channel, Role role) {
+  double largest = 0.0;
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -lowest;
+  for (const DatasetRecord& record : dataset.records) {
+    if (!record.has_role(role)) continue;
+    const std::vector<double>& values = record.recording.channel(channel).values;
+    for (const Segment& segment : record.segments) {
+      if (segment.role != role) continue;
+      for (std::size_t n = segment.begin; n < segment.end; ++n) {
+        lowest = std::min(lowest, values[n]);
+        highest = std::max(highest, values[n]);
+        if (n > segment.begin) largest = std::max(largest, std::abs(values[n] - values[n - 1]));
+      }
+    }
+  }
+  return std::max(largest, DisturbanceGuards::kSmallestStepShare * (highest - lowest));
+}
+
 /// Features that are not finite may be the reason why no usable sample is left.
 void refuse_if_not_finite(const TrainingData& data) {
   for (const Sequence& sequence : data.sequences) {
@@ -85,6 +107,8 @@ TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role
   for (const DatasetRecord& record : dataset.records)
     if (record.has_role(role))
       data.sequences.push_back(run(record, pipeline, dataset.target, role));
+  for (const std::string& channel : pipeline.raw_inputs())
+    data.largest_step.push_back(largest_step(dataset, channel, role));
   if (data.usable_samples() == 0) {
     refuse_if_not_finite(data);
     std::size_t samples = 0;

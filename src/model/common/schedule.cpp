@@ -122,6 +122,13 @@ double ScheduledCoefficients::weighted_sum(const Position& at, std::size_t first
   return sum;
 }
 
+double ScheduledCoefficients::largest(std::size_t column) const noexcept {
+  double largest = 0.0;
+  for (std::size_t k = 0; k < schedule_.values.rows; ++k)
+    largest = std::max(largest, std::abs(schedule_.values(k, column)));
+  return largest;
+}
+
 std::size_t ScheduledCoefficients::fitted_count() const noexcept {
   std::size_t terms = 0;
   for (std::size_t j = 0; j < size(); ++j) {

@@ -73,6 +73,9 @@ class ScheduledCoefficients {
   [[nodiscard]] double weighted_sum(const Position& at, std::size_t first, Features features,
                                     std::size_t from = 0) const noexcept TORSIO_REALTIME;
 
+  /// Largest absolute value of a coefficient over the schedule.
+  [[nodiscard]] double largest(std::size_t column) const noexcept;
+
   /// Number of fitted parameters: a column that is zero at every knot has no term and is not
   /// counted.
   [[nodiscard]] std::size_t fitted_count() const noexcept;

@@ -141,6 +141,27 @@ std::size_t GreyBox::parameter_count() const noexcept {
          of_residual(residual_, [](const auto& model) { return model.parameter_count(); });
 }
 
+ModelMemory GreyBox::memory(const InputRanges& ranges) const {
+  const GreyBoxTerms::Structure& structure = parameters_.terms;
+  const std::size_t knots = structure.friction_knots.size();
+  ModelMemory memory;
+  double widest = 0.0;
+  for (std::size_t i = 0; i < structure.thresholds.size(); ++i) {
+    double weight = 0.0;
+    for (std::size_t k = 0; k < knots; ++k)
+      weight = std::max(weight, coefficients_.largest(structure.first_slip() + i * knots + k));
+    memory.slips.push_back({weight / structure.thresholds[i], 2.0 * structure.thresholds[i]});
+    widest = std::max(widest, structure.thresholds[i]);
+  }
+  if (parameters_.residual && widest > 0.0)
+    memory.slips.push_back({parameters_.residual->bound / widest, 2.0 * widest});
+  const double width = ranges.highest[0] - ranges.lowest[0];
+  for (std::size_t j = 0; j < structure.time_constants_s.size(); ++j)
+    memory.relaxations.push_back({width * coefficients_.largest(structure.first_relaxation() + j),
+                                  structure.time_constants_s[j]});
+  return memory;
+}
+
 Estimate GreyBox::step(Features features) noexcept {
   terms_.move(features[0]);
   const auto at = coefficients_.locate(features);

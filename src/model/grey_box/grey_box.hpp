@@ -14,6 +14,7 @@
 #include "model/hysteresis/slip_bank.hpp"
 #include "model/mixture/dgmm.hpp"
 #include "model/network/mlp.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -213,6 +214,9 @@ class GreyBox {
     if (parameters.terms.sample_period_s > 0.0) parameters.terms.sample_period_s = sample_period_s;
     return parameters;
   }
+
+  /// How past inputs influence the output; see `ModelMemory`.
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const;
 
   void reset() noexcept { terms_.reset(); }
   Estimate step(Features features) noexcept TORSIO_REALTIME;

@@ -65,6 +65,29 @@ std::size_t HammersteinWiener::parameter_count() const noexcept {
   return std::max(all, kFree + parameters_.sections.rows) - kFree - (parameters_.sections.rows - 1);
 }
 
+ModelMemory HammersteinWiener::memory(const InputRanges& ranges) const {
+  constexpr int kSamples = 200;
+  double lowest = parameters_.input(ranges.lowest[0]);
+  double highest = lowest;
+  double steepest = 0.0;
+  for (int i = 0; i <= kSamples; ++i) {
+    const double share = double{1} * i / kSamples;
+    const double w = parameters_.input(std::lerp(ranges.lowest[0], ranges.highest[0], share));
+    lowest = std::min(lowest, w);
+    highest = std::max(highest, w);
+    const double x = std::lerp(parameters_.lowest, parameters_.highest, share);
+    steepest = std::max(steepest, std::abs(parameters_.output.slope(x)));
+  }
+  ModelMemory memory;
+  for (const Mode& mode : modes(parameters_.sections)) {
+    const double radius = std::abs(mode.pole);
+    const double gain = steepest * (highest - lowest) * mode.residue / (1.0 - radius);
+    if (!std::isfinite(gain)) return {.is_declared = false};  // poles on top of each other
+    memory.relaxations.push_back({gain, -parameters_.sample_period_s / std::log(radius)});
+  }
+  return memory;
+}
+
 void HammersteinWiener::reset() noexcept {
   const Sections& g = parameters_.sections;
   double x = parameters_.input(parameters_.rest_input);

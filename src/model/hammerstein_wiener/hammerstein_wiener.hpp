@@ -8,6 +8,7 @@
 
 #include "model/hammerstein_wiener/static_curve.hpp"
 #include "model/hammerstein_wiener/transfer_function.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -73,6 +74,9 @@ class HammersteinWiener {
   [[nodiscard]] double sample_period() const noexcept {
     return parameters_.sample_period_s;
   }  ///< [s]
+
+  /// How past inputs influence the output; see `ModelMemory`.
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const;
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;

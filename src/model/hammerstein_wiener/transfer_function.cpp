@@ -182,6 +182,22 @@ std::vector<Complex> zeros(const Sections& sections) {
   return found;
 }
 
+std::vector<Mode> modes(const Sections& sections) {
+  const std::vector<Complex> all = poles(sections);
+  std::vector<Mode> modes;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (all[k] == 0.0) continue;
+    const Complex delay = 1.0 / all[k];
+    Complex residue = 1.0;
+    for (std::size_t i = 0; i < sections.rows; ++i)
+      residue *= sections(i, 0) + delay * (sections(i, 1) + delay * sections(i, 2));
+    for (std::size_t j = 0; j < all.size(); ++j)
+      if (j != k) residue /= 1.0 - all[j] * delay;
+    modes.push_back({all[k], std::abs(residue)});
+  }
+  return modes;
+}
+
 bool is_stable(const Sections& sections) noexcept {
   for (std::size_t i = 0; i < sections.rows; ++i) {
     const double a1 = sections(i, 3);

@@ -48,6 +48,13 @@ struct ContinuousTransfer {
 
 [[nodiscard]] std::vector<std::complex<double>> poles(const Sections& sections);
 [[nodiscard]] std::vector<std::complex<double>> zeros(const Sections& sections);
+/// A term r / (1 - p z^-1) of the partial fractions of G.
+struct Mode {
+  std::complex<double> pole;
+  double residue = 0.0;  ///< |r|; not finite where another pole has the same value
+};
+/// One for each pole that is not 0.
+[[nodiscard]] std::vector<Mode> modes(const Sections& sections);
 /// Whether all poles are inside the unit circle: |a2| < 1 and |a1| < 1 + a2 in each section, which is exact
 /// where roots next to each other are known to half their digits only.
 [[nodiscard]] bool is_stable(const Sections& sections) noexcept;

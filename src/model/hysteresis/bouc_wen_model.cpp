@@ -77,6 +77,13 @@ std::size_t BoucWenModel::parameter_count() const noexcept {
   return 6 + non_zero(parameters_.slopes);
 }
 
+ModelMemory BoucWenModel::memory(const InputRanges& /*ranges*/) const {
+  // From -z_max to 0 in z_max or less, from there to within 1 % of z_max in ln(100) / n.
+  constexpr double kTail = 4.605;
+  const double gain = (1.0 - parameters_.elastic_share) * parameters_.stiffness;
+  return {.slips = {{gain, (2.0 + kTail / parameters_.exponent) * largest_}}};
+}
+
 void BoucWenModel::reset() noexcept {
   increment_.reset();
   share_ = 0.0;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "model/hysteresis/increment.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -58,6 +59,9 @@ class BoucWenModel {
   [[nodiscard]] const Parameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.slopes.size(); }
   [[nodiscard]] std::size_t parameter_count() const noexcept;
+
+  /// How past inputs influence the output; see `ModelMemory`.
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const;
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;

@@ -32,4 +32,11 @@ Envelope::At Envelope::at(double x) const noexcept {
   return {value + slope * (z - inside), std::max(width, 0.0)};
 }
 
+double Envelope::widest(double lowest, double highest) const noexcept {
+  double widest = 0.0;
+  for (int i = 0; i <= kSamples; ++i)
+    widest = std::max(widest, at(std::lerp(lowest, highest, double{1} * i / kSamples)).half_width);
+  return widest;
+}
+
 }  // namespace torsio

@@ -40,6 +40,9 @@ struct Envelope {
     [[nodiscard]] double lower() const noexcept { return middle - half_width; }
   };
   [[nodiscard]] At at(double x) const noexcept;
+  /// Largest h of `kSamples` equally spaced x.
+  [[nodiscard]] double widest(double lowest, double highest) const noexcept;
+  static constexpr int kSamples = 200;
 };
 
 }  // namespace torsio

@@ -22,6 +22,14 @@ std::size_t ExponentialLoading::parameter_count() const noexcept {
          non_zero(parameters_.slopes);
 }
 
+ModelMemory ExponentialLoading::memory(const InputRanges& ranges) const {
+  // An offset has decayed to 1 % after ln(100) / b.
+  constexpr double kTail = 4.605;
+  const double travel = kTail / std::min(parameters_.rising_decay, parameters_.falling_decay);
+  const double widest = parameters_.curves.widest(ranges.lowest[0], ranges.highest[0]);
+  return {.slips = {{2.0 * widest / travel, travel}}};
+}
+
 void ExponentialLoading::reset() noexcept {
   increment_.reset();
   half_width_ = 0.0;

@@ -39,10 +39,11 @@ void check(const ImprovedPrandtlIshlinskii::Parameters& parameters) {
   require_finite(parameters.bends, kFamily, "bends");
 }
 
-/// From 0 outwards the slope of S changes by g_j at each knot.
-void require_rising(const ImprovedPrandtlIshlinskii::Parameters& parameters) {
+/// From 0 outwards the slope of S changes by g_j at each knot. @returns the largest slope
+double require_rising(const ImprovedPrandtlIshlinskii::Parameters& parameters) {
   double up = 1.0;
   double down = 1.0;
+  double steepest = 1.0;
   const std::size_t count = parameters.knots.size();
   for (std::size_t j = 0; j < count; ++j) {
     if (parameters.knots[j] > 0.0) up += parameters.bends[j];
@@ -50,7 +51,9 @@ void require_rising(const ImprovedPrandtlIshlinskii::Parameters& parameters) {
     require_parameter(up > 0.0 && down > 0.0, kFamily, "bends",
                       "a curve that rises everywhere, sums from 0 outwards above -1",
                       std::min(up, down) - 1.0);
+    steepest = std::max({steepest, up, down});
   }
+  return steepest;
 }
 
 }  // namespace
@@ -61,12 +64,23 @@ ImprovedPrandtlIshlinskii::ImprovedPrandtlIshlinskii(const Parameters& parameter
       limits_(parameters.thresholds),
       play_sum_(std::accumulate(parameters.weights.begin(), parameters.weights.end(), 0.0)) {
   check(parameters);
-  require_rising(parameters);
+  steepest_ = require_rising(parameters);
 }
 
 std::size_t ImprovedPrandtlIshlinskii::parameter_count() const noexcept {
   return 2 + non_zero(parameters_.slopes) + non_zero(parameters_.weights) +
          non_zero(parameters_.bends);
+}
+
+ModelMemory ImprovedPrandtlIshlinskii::memory(const InputRanges& ranges) const {
+  const std::size_t rate = parameters_.rate_feature;
+  const double fastest = std::max(std::abs(ranges.lowest[rate]), std::abs(ranges.highest[rate]));
+  const double scale = 1.0 + parameters_.rate_gain * fastest;
+  ModelMemory memory;
+  for (std::size_t i = 0; i < parameters_.weights.size(); ++i)
+    memory.slips.push_back(
+        {steepest_ * std::abs(parameters_.weights[i]), 2.0 * scale * parameters_.thresholds[i]});
+  return memory;
 }
 
 void ImprovedPrandtlIshlinskii::reset() noexcept {

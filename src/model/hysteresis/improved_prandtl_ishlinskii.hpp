@@ -7,6 +7,7 @@
 
 #include "model/hysteresis/increment.hpp"
 #include "model/hysteresis/slip_bank.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -58,6 +59,9 @@ class ImprovedPrandtlIshlinskii {
   /// b, beta, and all slopes, weights and bends that are not 0.
   [[nodiscard]] std::size_t parameter_count() const noexcept;
 
+  /// How past inputs influence the output; see `ModelMemory`.
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const;
+
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
@@ -79,6 +83,7 @@ class ImprovedPrandtlIshlinskii {
   Increment increment_;
   std::vector<double> limits_;  ///< thresholds of the present tick
   double play_sum_;             ///< sum of w_i
+  double steepest_ = 1.0;       ///< largest slope of S
 };
 
 }  // namespace torsio

@@ -33,6 +33,25 @@ std::size_t Backlash<kByRate>::parameter_count() const noexcept {
 }
 
 template <bool kByRate>
+ModelMemory Backlash<kByRate>::memory(const InputRanges& ranges) const {
+  const double low = ranges.lowest[0];
+  const double high = ranges.highest[0];
+  double scale = 1.0;
+  if (kByRate && parameters_.rate.gain > 0.0) {
+    const std::size_t rate = parameters_.rate.feature;
+    const double fastest = std::max(std::abs(ranges.lowest[rate]), std::abs(ranges.highest[rate]));
+    scale += parameters_.rate.gain * std::pow(fastest, parameters_.rate.exponent);
+  }
+  // t rises with k from one boundary to the other, which rises meanwhile with the middle's slope.
+  const double rise =
+      parameters_.boundaries.at(high).middle - parameters_.boundaries.at(low).middle;
+  const double width = 2.0 * scale * parameters_.boundaries.widest(low, high);
+  const double closing = parameters_.stiffness - scale * rise / (high - low);
+  const double travel = closing > 0.0 ? width / closing : high - low;
+  return {.slips = {{travel > 0.0 ? width / travel : 0.0, travel}}};
+}
+
+template <bool kByRate>
 void Backlash<kByRate>::reset() noexcept {
   increment_.reset();
   middle_ = 0.0;

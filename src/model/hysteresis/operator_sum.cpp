@@ -35,6 +35,15 @@ typename OperatorSum<Operator>::Parameters OperatorSum<Operator>::parameters() c
 }
 
 template <class Operator>
+ModelMemory OperatorSum<Operator>::memory(const InputRanges& /*ranges*/) const {
+  ModelMemory memory;
+  const std::size_t first = 1 + input_count();
+  for (std::size_t i = 0; i < stops_.size(); ++i)
+    memory.slips.push_back({coefficients_.largest(first + i), 2.0 * stops_.limit()[i]});
+  return memory;
+}
+
+template <class Operator>
 void OperatorSum<Operator>::reset() noexcept {
   stops_.reset();
   increment_.reset();

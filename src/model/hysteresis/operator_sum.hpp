@@ -8,6 +8,7 @@
 #include "model/common/schedule.hpp"
 #include "model/hysteresis/increment.hpp"
 #include "model/hysteresis/slip_bank.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -66,6 +67,9 @@ class OperatorSum {
   [[nodiscard]] std::size_t parameter_count() const noexcept {
     return coefficients_.fitted_count();
   }
+
+  /// How past inputs influence the output; see `ModelMemory`.
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const;
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;

@@ -92,6 +92,23 @@ Polynomial::Parameters Polynomial::parameters() const {
           .ranges = ranges_.schedule().values};
 }
 
+ModelMemory Polynomial::memory(const InputRanges& ranges) const {
+  if (!by_direction_) return {};
+  // The largest |P+ - P-| within the range, |z| <= 1.
+  const Matrix& values = coefficients_.schedule().values;
+  double apart = 0.0;
+  for (std::size_t i = 0; i <= degree_; ++i) {
+    double largest = 0.0;
+    for (std::size_t k = 0; k < values.rows; ++k)
+      largest = std::max(largest, std::abs(values(k, i) - values(k, degree_ + 1 + i)));
+    apart += largest;
+  }
+  // The direction is determined after a travel of the dead band, until which the bound is as large.
+  constexpr double kSmallestShare = 1e-3;
+  const double band = std::max(dead_band_, kSmallestShare * (ranges.highest[0] - ranges.lowest[0]));
+  return {.slips = {{apart / band, 2.0 * band}}};
+}
+
 Polynomial::Reach Polynomial::reach(const Position& at, std::size_t branch) const noexcept {
   return {(ranges_.coefficient(at, 2 * branch) - centre_) / half_range_,
           (ranges_.coefficient(at, 2 * branch + 1) - centre_) / half_range_};

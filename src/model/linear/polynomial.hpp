@@ -5,6 +5,7 @@
 
 #include "model/common/schedule.hpp"
 #include "model/linear/direction.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -70,6 +71,9 @@ class Polynomial {
   [[nodiscard]] std::size_t parameter_count() const noexcept {
     return coefficients_.fitted_count();
   }
+
+  /// How past inputs influence the output; see `ModelMemory`.
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const;
 
   void reset() noexcept { direction_.reset(); }
   Estimate step(Features features) noexcept TORSIO_REALTIME;

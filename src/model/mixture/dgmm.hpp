@@ -7,7 +7,6 @@
 #include "model/mixture/gaussian_mixture.hpp"
 #include "model/mixture/mixture_regression.hpp"
 #include "torsio/core/realtime.hpp"
-#include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -52,7 +51,6 @@ struct LinearClamp {
 class Dgmm {
  public:
   static constexpr std::string_view kFamily = "dgmm";
-  static constexpr FamilyTraits kTraits{.has_memory = false};
 
   struct Parameters {
     using Family = Dgmm;

@@ -10,6 +10,7 @@
 
 #include "core/joined_name.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -77,6 +78,11 @@ class Narx {
   [[nodiscard]] double sample_period() const noexcept {
     return parameters_.sample_period_s;
   }  ///< [s]
+
+  /// Not declared: the state has no form that gives a bound.
+  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+    return {.is_declared = false};
+  }
 
   void reset() noexcept { reset(parameters_.start); }
   /// As if the output had long been this.

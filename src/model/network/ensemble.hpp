@@ -12,6 +12,7 @@
 #include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -82,6 +83,10 @@ class Ensemble {
     requires requires(const M& member) { member.sample_period(); }
   {
     return members_.front().sample_period();
+  }
+
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const {
+    return detail::memory_of(members_.front(), ranges);
   }
 
   void reset() noexcept {

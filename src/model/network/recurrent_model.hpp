@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "model/network/recurrent_network.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/model/network/network_layers.hpp"
 
@@ -40,6 +41,11 @@ class RecurrentModel {
   [[nodiscard]] double sample_period() const noexcept {
     return parameters_.sample_period_s;
   }  ///< [s]
+
+  /// Not declared: the state has no form that gives a bound.
+  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+    return {.is_declared = false};
+  }
 
   /// To the zero state.
   void reset() noexcept { network_.reset(0); }

@@ -9,6 +9,7 @@
 #include "model/second_order/sampled_time.hpp"
 #include "signal/causal_polynomial.hpp"
 #include "torsio/model/common/family_traits.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -72,6 +73,11 @@ class DynamicBoucWen {
   [[nodiscard]] std::size_t input_count() const noexcept { return parameters_.gains.size(); }
   [[nodiscard]] std::size_t parameter_count() const noexcept { return 6 + input_count(); }
   [[nodiscard]] double sample_period() const noexcept { return parameters_.time.sample_period_s; }
+
+  /// Not declared: the state has no form that gives a bound.
+  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+    return {.is_declared = false};
+  }
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;

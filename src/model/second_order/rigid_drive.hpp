@@ -10,6 +10,7 @@
 #include "model/second_order/sampled_time.hpp"
 #include "signal/causal_polynomial.hpp"
 #include "torsio/model/common/family_traits.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -83,6 +84,11 @@ class RigidDrive {
   /// Those that a fit may choose: not the first gain.
   [[nodiscard]] std::size_t parameter_count() const noexcept;
   [[nodiscard]] double sample_period() const noexcept { return parameters_.time.sample_period_s; }
+
+  /// Not declared: the state has no form that gives a bound.
+  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+    return {.is_declared = false};
+  }
 
   void reset() noexcept;
   Estimate step(Features features) noexcept TORSIO_REALTIME;

@@ -43,6 +43,14 @@ Viscoelastic::Viscoelastic(Parameters parameters)
   reset();
 }
 
+ModelMemory Viscoelastic::memory(const InputRanges& ranges) const {
+  const double width = ranges.highest[0] - ranges.lowest[0];
+  ModelMemory memory;
+  for (const RelaxationBranch& branch : spectrum_.branches)
+    memory.relaxations.push_back({width * branch.stiffness, 1.0 / branch.rate_1_s});
+  return memory;
+}
+
 void Viscoelastic::reset() noexcept {
   std::ranges::fill(torque_, 0.0);
   is_started_ = false;

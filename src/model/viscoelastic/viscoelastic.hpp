@@ -7,6 +7,7 @@
 
 #include "model/viscoelastic/spring_dashpot_network.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -61,6 +62,9 @@ class Viscoelastic {
     return parameters;
   }
   [[nodiscard]] const RelaxationSpectrum& spectrum() const noexcept { return spectrum_; }
+
+  /// How past inputs influence the output; see `ModelMemory`.
+  [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const;
 
   void reset() noexcept;
   /// Where numbers are too large for a double the model returns to rest and outputs its offset,

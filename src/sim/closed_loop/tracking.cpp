@@ -236,7 +236,7 @@ TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, const AnyI
 }
 
 AnyInverse inverse_of(const ModelFile& model) {
-  const Estimator estimator = estimator_at(model, kBenchRate_Hz);
+  const Estimator estimator = make_estimator(model, kBenchRate_Hz);
   const EstimatorSettings& settings = estimator.settings();
   if (!settings.zeroed_channels.empty())
     throw Error({.place = kPlace,

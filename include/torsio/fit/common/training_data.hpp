@@ -36,6 +36,8 @@ struct TrainingData {
   std::string target;
   double sample_rate_Hz = 0.0;
   std::vector<Sequence> sequences = {};
+  /// Per raw input of the pipeline, see `DisturbanceGuards::largest_step`.
+  std::vector<double> largest_step = {};
 
   [[nodiscard]] std::size_t input_count() const noexcept { return inputs.size(); }
   [[nodiscard]] std::size_t usable_samples() const noexcept;

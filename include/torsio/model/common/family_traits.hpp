@@ -19,8 +19,6 @@ struct FamilyTraits {
   /// The output is an integral of the input. The error of its first samples is that of a drift that
   /// has hardly begun, so it does not show how uncertain the start is.
   bool integrates = false;
-  /// The model depends on past inputs, so that a loop that uses its inverse must step it as well.
-  bool has_memory = true;
 };
 
 namespace detail {

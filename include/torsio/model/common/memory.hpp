@@ -1,0 +1,63 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace torsio {
+
+/// The ranges of a model's inputs in training, in the order of its inputs.
+struct InputRanges {
+  std::span<const double> lowest;
+  std::span<const double> highest;
+};
+
+/// A part of a model's memory that decays with time.
+struct Relaxation {
+  double gain =
+      0.0;  ///< largest contribution to the output for inputs within their ranges, target's unit
+  double time_constant_s = 0.0;
+};
+
+/// A part of a model's memory that depends on the travel of the first input: a stop or play operator.
+struct SlipMemory {
+  double gain =
+      0.0;  ///< error of the output per travel that is unknown, target's unit over the input's
+  double travel = 0.0;  ///< the history is erased when the input has covered a range of this width
+};
+
+/// What the output of a model depends on besides the present inputs. The estimator computes from it
+/// how large the error of the output can be after some inputs could not be used.
+struct ModelMemory {
+  std::vector<Relaxation> relaxations = {};
+  std::vector<SlipMemory> slips = {};
+  /// False: the memory has another form (a hidden state, fed-back outputs). After unusable inputs the
+  /// model is reset and runs for the warm-up time that its fit has measured.
+  bool is_declared = true;
+
+  [[nodiscard]] bool is_empty() const noexcept {
+    return is_declared && relaxations.empty() && slips.empty();
+  }
+};
+
+/// A model that depends on past inputs; one without this member depends on the present ones only.
+template <class M>
+concept HasMemory = requires(const M& model, const InputRanges& ranges) {
+  { model.memory(ranges) } -> std::same_as<ModelMemory>;
+};
+
+namespace detail {
+
+template <class M>
+[[nodiscard]] ModelMemory memory_of(const M& model, const InputRanges& ranges) {
+  if constexpr (HasMemory<M>) {
+    return model.memory(ranges);
+  } else {
+    return {};
+  }
+}
+
+}  // namespace detail
+
+}  // namespace torsio

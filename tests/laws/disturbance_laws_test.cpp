@@ -1,0 +1,189 @@
+// Laws of an estimator around every family after inputs that it must not use.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iostream>
+#include <limits>
+#include <numbers>
+#include <string_view>
+#include <vector>
+
+#include "fit/common/guards.hpp"
+#include "support/bench_dataset.hpp"
+#include "support/every_family.hpp"
+#include "support/example_models.hpp"
+#include "torsio/core/random.hpp"
+#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+namespace torsio::test {
+namespace {
+
+constexpr double kSeconds = 8.0;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+const FeatureSpec kFeatures{.inputs = {"spring_deflection_rad", "rate(spring_deflection_rad)"},
+                            .definitions = {}};
+
+/// The examples' own sample rate, or 1 kHz.
+template <class M>
+double rate_Hz(const M& model) {
+  if constexpr (HasSamplePeriod<M>) return 1.0 / model.sample_period();
+  return 1000.0;
+}
+
+/// A deflection of up to +-0.1 rad; `shift_s` selects another part of it.
+std::vector<double> deflection(double rate_Hz, double shift_s) {
+  std::vector<double> values(static_cast<std::size_t>(kSeconds * rate_Hz));
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    const double t_s = shift_s + static_cast<double>(n) / rate_Hz;
+    values[n] = 0.065 * std::sin(5.0 * t_s) + 0.035 * std::sin(8.3 * t_s + 1.0);
+  }
+  return values;
+}
+
+/// Guards from a record that the model made itself, with 1 % of noise.
+template <class M>
+Estimator guarded(const M& model) {
+  Dataset dataset;
+  for (const double shift_s : {0.0, 20.0, 40.0}) {
+    M fresh = model;
+    fresh.reset();
+    Channel x{"spring_deflection_rad", deflection(rate_Hz(model), shift_s)};
+    Channel y{"torque_Nm", std::vector<double>(x.values.size())};
+    FeaturePipeline pipeline(kFeatures, rate_Hz(model));
+    for (std::size_t n = 0; n < y.values.size(); ++n)
+      y.values[n] = fresh.step(pipeline.step({&x.values[n], 1})).value;
+    const auto [lowest, highest] = std::ranges::minmax(y.values);
+    Random random(7);
+    for (double& value : y.values) value += 0.01 * (highest - lowest) * random.normal();
+    Recording recording("bench", rate_Hz(model));
+    recording.add(std::move(x));
+    recording.add(std::move(y));
+    add_record(dataset, std::move(recording), Role::train);
+  }
+  const TrainingData training = training_data(dataset, kFeatures);
+  return {guarded_settings(kFeatures, training, AnyModel(model)), AnyModel(model)};
+}
+
+struct Disturbance {
+  std::string_view name;
+  double duration_s;                         ///< 0: one sample
+  double (*apply)(double x, std::size_t n);  ///< n samples after its beginning
+};
+
+// All of them leave the range or the largest step of the training.
+constexpr Disturbance kDisturbances[] = {
+    {"one sample of 2 pi", 0.0, [](double, std::size_t) { return 2.0 * std::numbers::pi; }},
+    {"one sample of 1e4", 0.0, [](double, std::size_t) { return 1e4; }},
+    {"one sample of -1e6", 0.0, [](double, std::size_t) { return -1e6; }},
+    {"one sample at the other end", 0.0,
+     [](double x, std::size_t) { return std::copysign(0.09, -x); }},
+    {"1 rad off for 0.1 s", 0.1, [](double x, std::size_t) { return x + 1.0; }},
+    {"-1 rad off for 1 s", 1.0, [](double x, std::size_t) { return x - 1.0; }},
+    {"spikes for 1 s", 1.0,
+     [](double x, std::size_t n) { return n % 50 == 0 ? 2.0 * std::numbers::pi : x; }},
+    {"missing for 1 s", 1.0, [](double, std::size_t) { return kNaN; }},
+};
+constexpr double kOnsets_s[] = {1.0, 1.7, 2.3, 3.1};
+
+std::vector<Estimate> run(Estimator estimator, const std::vector<double>& x) {
+  std::vector<Estimate> estimates;
+  for (const double each : x) estimates.push_back(estimator.step({&each, 1}));
+  return estimates;
+}
+
+std::vector<double> disturbed(std::vector<double> x, double rate_Hz, double onset_s,
+                              const Disturbance& disturbance) {
+  const auto begin = static_cast<std::size_t>(onset_s * rate_Hz);
+  const auto samples =
+      std::max<std::size_t>(1, static_cast<std::size_t>(disturbance.duration_s * rate_Hz));
+  for (std::size_t n = begin; n < begin + samples; ++n) x[n] = disturbance.apply(x[n], n - begin);
+  return x;
+}
+
+template <class M>
+class DisturbanceLaws : public testing::Test {
+ protected:
+  M model_ = example<M>();
+  Estimator estimator_ = guarded(model_);
+  std::vector<double> x_ = deflection(rate_Hz(model_), 60.0);
+};
+
+TYPED_TEST_SUITE(DisturbanceLaws, EveryFamily, ModelName);
+
+TYPED_TEST(DisturbanceLaws, WhereThereIsNoFaultTheValueIsThatOfTheUndisturbedRun) {
+  const std::vector<Estimate> expected = run(this->estimator_, this->x_);
+  const auto [lowest, highest] = std::ranges::minmax(expected, {}, &Estimate::value);
+  const double width = highest.value - lowest.value;
+  for (const Disturbance& disturbance : kDisturbances) {
+    for (const double onset_s : kOnsets_s) {
+      const std::vector<Estimate> found =
+          run(this->estimator_, disturbed(this->x_, rate_Hz(this->model_), onset_s, disturbance));
+      double worst = 0.0;  // in error bars
+      for (std::size_t n = 0; n < found.size(); ++n) {
+        ASSERT_TRUE(std::isfinite(found[n].value));
+        if (found[n].fault != Fault::none || expected[n].fault != Fault::none) continue;
+        worst = std::max(worst, std::abs(found[n].value - expected[n].value) / found[n].std_dev);
+        ASSERT_GE(found[n].value, lowest.value - width);
+        ASSERT_LE(found[n].value, highest.value + width);
+      }
+      EXPECT_LE(worst, 3.0) << disturbance.name << " at " << onset_s << " s";
+    }
+  }
+}
+
+TYPED_TEST(DisturbanceLaws, TheFaultEndsOnceTheMemoryHasRecovered) {
+  const std::vector<Estimate> found =
+      run(this->estimator_, disturbed(this->x_, rate_Hz(this->model_), 1.0, kDisturbances[0]));
+  // The position of a drive is an integral of its force: what was missed is missing for ever.
+  // Of others the fit may find no time after which two of their runs agree.
+  const bool forgets = TypeParam::kFamily != RigidDrive::kFamily &&
+                       !std::isnan(this->estimator_.settings().disturbances.warm_up_s);
+  EXPECT_EQ(found.back().fault, forgets ? Fault::none : Fault::recovering);
+}
+
+TYPED_TEST(DisturbanceLaws, ADependenceOnPastInputsIsDeclared) {
+  if (!AnyModel(this->model_)
+           .memory({.lowest = std::vector{-0.1, -0.4}, .highest = std::vector{0.1, 0.4}})
+           .is_empty())
+    return;
+  TypeParam fresh = this->model_;
+  TypeParam used = this->model_;
+  fresh.reset();
+  used.reset();
+  const Matrix features = example_features(200, this->model_.input_count());
+  for (std::size_t n = 0; n + 1 < features.rows; ++n) used.step(features.row(n));
+  EXPECT_EQ(used.step(features.row(199)).value, fresh.step(features.row(199)).value);
+}
+
+// Nothing can detect a disturbance that a sound joint could have made, so there is no limit to test.
+TYPED_TEST(DisturbanceLaws, PrintsTheErrorAfterADisturbanceWithinTheRange) {
+  const std::vector<Estimate> expected = run(this->estimator_, this->x_);
+  std::vector<double> x = this->x_;
+  const double rate = rate_Hz(this->model_);
+  const auto begin = static_cast<std::size_t>(2.0 * rate);
+  const auto samples = static_cast<std::size_t>(rate);
+  for (std::size_t n = begin; n < begin + samples; ++n) {
+    const double share = static_cast<double>(n - begin) / static_cast<double>(samples);
+    x[n] *= 1.0 - 0.4 * std::pow(std::sin(std::numbers::pi * share), 2.0);
+  }
+  const std::vector<Estimate> found = run(this->estimator_, x);
+  double worst = 0.0;
+  double late = 0.0;
+  for (std::size_t n = begin + samples; n < found.size(); ++n) {
+    if (found[n].fault != Fault::none || expected[n].fault != Fault::none) continue;
+    const double error = std::abs(found[n].value - expected[n].value) / found[n].std_dev;
+    worst = std::max(worst, error);
+    if (n > begin + 2 * samples) late = std::max(late, error);
+  }
+  std::cout << "[ error    ] " << TypeParam::kFamily << ": " << worst
+            << " error bars after 1 s of an input that was up to 40 % too small, " << late
+            << " one second later\n";
+}
+
+}  // namespace
+}  // namespace torsio::test
