@@ -95,6 +95,9 @@ void check_disturbances(const DisturbanceGuards& guards, std::size_t raw_inputs)
     if (!is_error_bar(guards.largest_step[i]) || std::isnan(guards.largest_step[i]))
       refuse(fmt::format("guards.disturbances.largest_step[{}]", i), "a finite number, at least 0",
              fmt::format("{}", guards.largest_step[i]));
+  if (!is_error_bar(guards.largest_travel))
+    refuse("guards.disturbances.largest_travel", "a number, at least 0, or NaN for none",
+           fmt::format("{}", guards.largest_travel));
   if (!is_error_bar(guards.warm_up_s))
     refuse("guards.disturbances.warm_up_s", "a number, at least 0, or NaN for none",
            fmt::format("{}", guards.warm_up_s));
@@ -166,6 +169,7 @@ void EstimatorCore::reset() noexcept {
   last_value_ = 0.0;
   needs_reset_ = false;
   has_run_ = false;
+  excluded_ticks_ = 0.0;
   in_jump_ = false;
   has_previous_ = false;
   is_wrong_rate_ = false;
@@ -177,10 +181,14 @@ EstimatorCore::Conditioned EstimatorCore::miss(Fault fault) noexcept {
   return {.features = {}, .fault = fault, .for_model = {}};
 }
 
-void EstimatorCore::interrupt(double ticks, double share) noexcept {
+void EstimatorCore::interrupt(double ticks) noexcept {
   if (!has_run_) return;  // a model that has not run yet starts at rest
-  memory_error_.interrupt(ticks, share);
-  if (share == 1.0) needs_reset_ = resets_model_;
+  excluded_ticks_ += ticks;
+  // As far as the first input can have moved to and fro meanwhile. NaN: anywhere.
+  const double travel = kJumpFactor * settings_.disturbances.largest_travel * excluded_ticks_;
+  const double width = ranges_.front().highest - ranges_.front().lowest;
+  memory_error_.interrupt(ticks, travel < width ? travel / width : 1.0);
+  needs_reset_ = resets_model_;
 }
 
 bool EstimatorCore::has_jumped(std::span<const double> raw) noexcept {
@@ -200,14 +208,14 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   if (!all_finite(raw)) return miss(Fault::input_not_finite);
   const bool jumped = has_jumped(raw);
   const bool is_gap = missed_ > longest_gap_;
-  if (is_gap) interrupt(static_cast<double>(missed_), 1.0);
+  if (is_gap) interrupt(static_cast<double>(missed_));
   if (poisoned_ || is_gap || jumped) pipeline_.reset();
   const Features features = pipeline_.step(raw);
   // Finite inputs can still overflow a product or leave a root's domain; differences and lags hold
   // such a value for some ticks, so the next usable tick starts afresh.
   poisoned_ = !all_finite(features);
   if (poisoned_) {
-    interrupt(1.0, 1.0);
+    interrupt(1.0);
     return miss(Fault::input_not_finite);
   }
   missed_ = 0;
@@ -215,6 +223,7 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   in_jump_ = jumped || is_wrong_rate_ || (in_jump_ && input.excursion > 1.0);
   if (in_jump_ || input.excursion > 1.0) limit_for_model(input);
   if (input.for_model.empty()) return input;
+  excluded_ticks_ = 0.0;
   if (input.excursion <= 1.0) memory_error_.follow(features[0]);
   input.restarted = needs_reset_;
   needs_reset_ = false;
@@ -231,7 +240,7 @@ void EstimatorCore::limit_for_model(Conditioned& input) noexcept {
   in_jump_ = in_jump_ || (settings_.disturbances.largest_step.empty() && unset_zeros_.empty());
   poisoned_ = in_jump_;
   if (in_jump_) {
-    interrupt(1.0, 1.0);
+    interrupt(1.0);
     if (has_memory_) input.for_model = {};
     if (input.excursion <= 1.0) input.excursion = std::numeric_limits<double>::infinity();
     return;
@@ -243,7 +252,7 @@ void EstimatorCore::limit_for_model(Conditioned& input) noexcept {
   input.for_model = limited_;
   const double width = ranges_.front().highest - ranges_.front().lowest;
   const double missed = std::abs(input.features[0] - limited_[0]);
-  interrupt(1.0, std::min(1.0, missed / width));
+  if (has_run_) memory_error_.interrupt(1.0, std::min(1.0, missed / width));
 }
 
 bool EstimatorCore::is_recovering(double value) const noexcept {

@@ -33,6 +33,7 @@ MemoryError::MemoryError(ModelMemory memory, double width, double sample_period_
 
 void MemoryError::reset() noexcept {
   std::ranges::fill(share_, 0.0);
+  travel_before_ = 0.0;
   unknown_travel_ = 0.0;
   lowest_ = kInfinity;
   highest_ = -kInfinity;
@@ -46,8 +47,11 @@ void MemoryError::interrupt(double ticks, double share) noexcept {
     const double kept = ticks == 1.0 ? decay_[k] : std::pow(decay_[k], ticks);
     if (share_[k] < share) share_[k] = share - (share - share_[k]) * kept;
   }
-  const double covered = highest_ >= lowest_ ? highest_ - lowest_ : 0.0;
-  unknown_travel_ = std::min(width_, std::max(0.0, unknown_travel_ - covered) + share * width_);
+  if (highest_ >= lowest_) {  // usable ticks since the last interruption
+    travel_before_ = std::max(0.0, unknown_travel_ - (highest_ - lowest_));
+    unknown_travel_ = travel_before_;
+  }
+  unknown_travel_ = std::min(width_, std::max(unknown_travel_, travel_before_ + share * width_));
   lowest_ = kInfinity;
   highest_ = -kInfinity;
   ticks_left_ = warm_up_ticks_;
@@ -67,8 +71,7 @@ void MemoryError::advance(double first_input) noexcept {
   if (ticks_left_ > 0.0) ticks_left_ -= 1.0;
   update_bound();
   if (bound_ > negligible_) return;
-  bound_ = 0.0;
-  is_zero_ = true;
+  reset();
 }
 
 void MemoryError::update_bound() noexcept {

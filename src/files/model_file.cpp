@@ -18,10 +18,10 @@ namespace {
 
 constexpr const char* kCardKey = "torsio";
 
-/// Error bars and warm-up times may be NaN: no evidence.
+/// Error bars and what limits a recovery may be NaN: no evidence.
 bool may_be_nan(std::string_view path) {
   return path == "fallback.residual_std" || path == "residuals.std_dev" ||
-         path == "guards.disturbances.warm_up_s";
+         path == "guards.disturbances.warm_up_s" || path == "guards.disturbances.largest_travel";
 }
 
 const std::string& card_text(const Safetensors& contents, std::string_view place) {
@@ -148,6 +148,7 @@ Estimator make_estimator(const ModelFile& model, double sample_rate_Hz) {
   const double ratio = model.settings.sample_rate_Hz / sample_rate_Hz;
   const double longer = std::isfinite(ratio) ? std::max(1.0, ratio) : 1.0;
   for (double& step : resampled.settings.disturbances.largest_step) step *= longer;
+  resampled.settings.disturbances.largest_travel *= longer;
   resampled.settings.sample_rate_Hz = sample_rate_Hz;
   return make_estimator(resampled);
 }

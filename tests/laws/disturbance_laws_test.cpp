@@ -140,7 +140,7 @@ TYPED_TEST(DisturbanceLaws, TheFaultEndsOnceTheMemoryHasRecovered) {
   const std::vector<Estimate> found =
       run(this->estimator_, disturbed(this->x_, rate_Hz(this->model_), 1.0, kDisturbances[0]));
   // The position of a drive is an integral of its force: what was missed is missing for ever.
-  // Of others the fit may find no time after which two of their runs agree.
+  // With others the fit may find no time after which two of their runs agree.
   const bool forgets = TypeParam::kFamily != RigidDrive::kFamily &&
                        !std::isnan(this->estimator_.settings().disturbances.warm_up_s);
   EXPECT_EQ(found.back().fault, forgets ? Fault::none : Fault::recovering);

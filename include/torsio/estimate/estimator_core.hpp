@@ -97,8 +97,8 @@ class EstimatorCore {
   [[nodiscard]] double fallback_value(Features features) const noexcept;
   [[nodiscard]] double residual_std_at(double value) const noexcept;
   Conditioned miss(Fault fault) noexcept;
-  /// See `MemoryError::interrupt`.
-  void interrupt(double ticks, double share) noexcept;
+  /// The first input could not be used for so many ticks, the last ones of `excluded_ticks_`.
+  void interrupt(double ticks) noexcept;
   /// Whether a raw input has changed faster than in training since the last tick, whose inputs are
   /// replaced by these.
   bool has_jumped(std::span<const double> raw) noexcept;
@@ -117,9 +117,10 @@ class EstimatorCore {
   bool resets_model_ = false;  ///< a memory that is not declared starts again after an interruption
   bool depends_on_rate_ = false;
   bool is_wrong_rate_ = false;
-  bool needs_reset_ = false;  ///< the model is to be reset in its next step
-  bool has_run_ = false;      ///< the model has been stepped since `reset()`
-  bool in_jump_ = false;      ///< since a jump, no tick has been inside the ranges
+  bool needs_reset_ = false;     ///< the model is to be reset in its next step
+  bool has_run_ = false;         ///< the model has been stepped since `reset()`
+  bool in_jump_ = false;         ///< since a jump, no tick has been inside the ranges
+  double excluded_ticks_ = 0.0;  ///< in a row, whose inputs the model has not received
   bool has_previous_ = false;
   std::vector<double> previous_raw_;
   std::vector<double> limited_;  ///< features

@@ -58,6 +58,9 @@ struct DisturbanceGuards {
   /// Per raw input: largest change from one sample to the next in training, at least
   /// `kSmallestStepShare` of its range there. Empty: not determined, jumps are not detected.
   std::vector<double> largest_step = {};
+  /// Largest change of the first feature from one sample to the next in training. NaN: not
+  /// determined; while inputs are missing it may then be anywhere within its range.
+  double largest_travel = std::numeric_limits<double>::quiet_NaN();
   /// Time after a reset until a model whose memory is not declared (`ModelMemory`) agrees with one
   /// that was not reset. NaN: no such time was found.
   double warm_up_s = kAssumedWarmUpSeconds;
@@ -69,6 +72,7 @@ struct DisturbanceGuards {
   template <class Self, class Visit>
   static void visit_fields(Self& self, Visit&& visit) {
     visit("largest_step", self.largest_step);
+    visit("largest_travel", self.largest_travel);
     visit("warm_up_s", self.warm_up_s);
   }
 };

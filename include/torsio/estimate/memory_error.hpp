@@ -11,8 +11,8 @@ namespace torsio::detail {
 
 /// Bounds the error of a model's output that is caused by inputs that its memory did not receive,
 /// because they were missing or outside their range. The model is not stepped with such inputs. The
-/// first input is assumed to have remained within its range of width W meanwhile, or within the share
-/// s of it that a continuous excursion can explain.
+/// first input is assumed to have remained within its range of width W meanwhile, and to have moved
+/// away from its values before and after by no more than the share s of W.
 ///
 ///     relaxation: e = g u,  u <- s - (s - u) exp(-t / T) during t without inputs, u <- u exp(-t / T) with
 ///     slip:       e = g max(0, min(travel, W, U) - c),  U = s W, c the range covered since then
@@ -32,7 +32,8 @@ class MemoryError {
   [[nodiscard]] double bound() const noexcept { return bound_; }
 
   void reset() noexcept;
-  /// So many ticks passed without usable inputs. @param share s, 0 to 1
+  /// So many ticks passed without usable inputs. Successive calls without a usable tick between them
+  /// are one interruption. @param share s of the whole interruption, 0 to 1
   void interrupt(double ticks, double share = 1.0) noexcept TORSIO_REALTIME;
   /// The memory itself is lost: the model was reset because its output was not finite.
   void lose() noexcept TORSIO_REALTIME;
@@ -52,9 +53,10 @@ class MemoryError {
   std::vector<double> decay_;    ///< exp(-h / T)
   std::vector<double> share_;    ///< u
   double unknown_travel_ = 0.0;  ///< U
-  double lowest_ = 0.0;          ///< of the first input since the last interruption
+  double travel_before_ = 0.0;   ///< U less c at the beginning of this interruption
+  double lowest_ = 0.0;          ///< the first input since the last interruption
   double highest_ = 0.0;
-  double ticks_left_ = 0.0;  ///< of the warm-up
+  double ticks_left_ = 0.0;  ///< to the end of the warm-up
   double negligible_;        ///< a bound below this is 0
   double bound_ = 0.0;
   bool is_zero_ = true;

@@ -10,7 +10,7 @@ namespace torsio::detail {
 
 /// Whether a loop runs at the sample period that it was configured for, from the time stamps of its
 /// ticks: it does not where more than half of the last 32 periods are too long, or more than half too
-/// short, by more than `kTolerance`; so the median is off by as much. A single late tick is no error.
+/// short, by more than `kTolerance`; so the median is off by as much. A single late tick is not an error.
 class PeriodCheck {
  public:
   static constexpr double kTolerance = 0.2;  ///< share of the period

@@ -15,17 +15,18 @@ namespace torsio {
 namespace {
 
 /// The smallest error bar; NaN without one.
-double smallest_bar(const ResidualTable& residuals) {
+double smallest_std_dev(const ResidualTable& residuals) {
   double smallest = kNotMeasured;
-  for (const double std_dev : residuals.std_dev)
-    if (std_dev > 0.0) smallest = std::fmin(smallest, std_dev);
+  for (const double each : residuals.std_dev)
+    if (each > 0.0) smallest = std::fmin(smallest, each);
   return smallest;
 }
 
 /// Samples after a reset at `start` until the model agrees with `undisturbed`; none if it does not.
 std::optional<std::size_t> samples_to_agree(AnyModel model, const Sequence& sequence,
                                             std::span<const Estimate> undisturbed,
-                                            std::size_t start, std::size_t longest, double bar) {
+                                            std::size_t start, std::size_t longest,
+                                            double std_dev) {
   // Two runs of one model approach each other; once they have been this near for so long, the rest of
   // the sequence shows nothing new.
   constexpr double kNear = 0.05;
@@ -38,9 +39,9 @@ std::optional<std::size_t> samples_to_agree(AnyModel model, const Sequence& sequ
     if (!sequence.has_features(n)) continue;
     const Estimate estimate = model.step(sequence.features.row(n));
     const double distance = std::abs(estimate.value - undisturbed[n].value);
-    const bool agrees = distance <= bar && estimate.fault == undisturbed[n].fault;
+    const bool agrees = distance <= std_dev && estimate.fault == undisturbed[n].fault;
     if (!agrees) agreed_after = n + 1 - start;
-    near = distance <= kNear * bar ? near + 1 : 0;
+    near = distance <= kNear * std_dev ? near + 1 : 0;
     if (near == kNearSamples) return agreed_after;
   }
   // It has to agree for as long as it took, or the sequence is too short to show it.
@@ -51,8 +52,8 @@ std::optional<std::size_t> samples_to_agree(AnyModel model, const Sequence& sequ
 }  // namespace
 
 double warm_up_s(const AnyModel& model, const TrainingData& data, const ResidualTable& residuals) {
-  const double bar = smallest_bar(residuals);
-  if (std::isnan(bar)) return kNotMeasured;
+  const double std_dev = smallest_std_dev(residuals);
+  if (std::isnan(std_dev)) return kNotMeasured;
   std::size_t samples = 0;
   for (const Sequence& sequence : data.sequences) samples += sequence.features.rows;
   const std::size_t stride = std::max<std::size_t>(samples / kWarmUpStarts, 1);
@@ -66,7 +67,7 @@ double warm_up_s(const AnyModel& model, const TrainingData& data, const Residual
     // Not in the last quarter, where too little follows.
     const std::size_t last = 3 * (undisturbed.size() / 4);
     for (std::size_t n = (stride - passed % stride) % stride; n < last; n += stride) {
-      const auto took = samples_to_agree(model, sequence, undisturbed, n, longest, bar);
+      const auto took = samples_to_agree(model, sequence, undisturbed, n, longest, std_dev);
       if (!took) return kNotMeasured;
       slowest = std::max(slowest, *took);
       has_compared = true;
