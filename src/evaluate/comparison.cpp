@@ -202,7 +202,7 @@ void mark_divergence_in_training(std::vector<ResultRow>& rows) {
   }
   for (ResultRow& row : rows) {
     row.status = "diverged";
-    row.reason = "on its own training data " + reason;
+    row.reason = "on its own training data: " + reason;
   }
 }
 

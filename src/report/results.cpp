@@ -176,8 +176,9 @@ std::string ranking_note(const Ranking& ranking) {
         "Errors are on the other {:.1f} %; torsio check shows which inputs leave the range of the "
         "training data.\n",
         100.0 * guarded, 100.0 * (1.0 - guarded));
-  return fmt::format("errors on the {:.1f} % of the samples that no guard replaced in any model\n",
-                     100.0 * (1.0 - guarded));
+  return fmt::format(
+      "errors on {} of {} samples; in the others a guard replaced a model by its linear fallback\n",
+      ranking.common_samples, ranking.scored_samples);
 }
 
 std::string ranked_table(const Results& results, Role split) {

@@ -65,7 +65,7 @@ TEST(Compare, RanksOnTheSamplesThatNoRankedModelGuarded) {
   EXPECT_EQ(heat.score.guarded_samples, 4000U - kHotFrom);
   // Over all samples the fallback of a guard would win.
   EXPECT_LT(heat.score.metrics.rmse, friction.score.metrics.rmse);
-  EXPECT_LT(friction.score.common.rmse, 0.5 * heat.score.common.rmse);
+  EXPECT_LT(friction.score.common.rmse, 0.6 * heat.score.common.rmse);
   ASSERT_TRUE(comparison.best);
   EXPECT_EQ(comparison.best->file.card.fitted_as, "linear_coulomb");
 
@@ -155,7 +155,7 @@ TEST(Divergence, InTrainingMarksAllRowsOfTheModel) {
   for (const ResultRow& row : twice) {
     EXPECT_EQ(row.status, "diverged");
     EXPECT_EQ(row.reason,
-              "on its own training data the error is 2 times the standard deviation of the target");
+              "on its own training data: the error is 2 times the standard deviation of the target");
   }
   std::vector<ResultRow> free_run = rows_with(80.0, "diverged");
   mark_divergence_in_training(free_run);

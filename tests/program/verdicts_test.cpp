@@ -48,6 +48,28 @@ TEST_F(Verdicts, CompareStatesTheShareOfTheRankedSamples) {
   expect_in(compare.out, "in 1 sd %  in 2 sd %");
 }
 
+TEST_F(Verdicts, AModelThatDivergesOnItsTrainingDataIsNotWritten) {
+  simulate("dfki-50 chirp --amplitude 5Nm --duration 40s --seed 1 -o a.csv");
+  simulate("dfki-50 chirp --amplitude 4.5Nm --duration 40s --seed 2 -o b.csv");
+  folder_.file("m.safetensors", "precious");
+  const std::string inputs = " --inputs spring_deflection_rad ";
+  const Outcome fit =
+      torsio("fit a.csv --model arx --set refine=false -o m.safetensors --json m.json" + inputs);
+  EXPECT_EQ(fit.exit_code, 1);
+  expect_in(fit.err, "arx: diverged on its own training data: free run left the output's range");
+  EXPECT_EQ(contents("m.safetensors"), "precious");
+  const auto rows = nlohmann::json::parse(contents("m.json")).at("results");
+  EXPECT_EQ(rows.at(0).at("status"), "diverged");
+
+  const std::string models = " --models linear,arx:refine=false";
+  const Outcome compare = torsio("compare a.csv --test b.csv" + models + inputs);
+  EXPECT_EQ(compare.exit_code, 0) << compare.err;
+  expect_in(compare.out, "not in the ranking:\n  arx[refine=false]: diverged: on its own training");
+  const Outcome folds = torsio("crossvalidate a.csv b.csv --by record" + models + inputs);
+  EXPECT_EQ(folds.exit_code, 0) << folds.err;
+  expect_in(folds.out, "arx[refine=false]: diverged in 2 of 2 folds; a: on its own training data");
+}
+
 TEST_F(Verdicts, RepeatWhatCheckFails) {
   simulate("dfki-50 sweep --duration 40s --lever 0.24m --seed 1 -o a.csv");
   simulate("dfki-50 sweep --duration 40s --lever 0.17m --seed 2 -o b.csv");
@@ -93,14 +115,6 @@ TEST_F(Verdicts, SuggestTheChannelThatIsMeant) {
   suggests("crossvalidate a.csv --models linear --by recrod", "record");
   folder_.file("wrong.yaml", "channels: {torque_Nm: {from: torqe_Nm}}\n");
   suggests(fit + "--mapping wrong.yaml", "torque_Nm");
-}
-
-TEST_F(Verdicts, CompareCountsTheFamiliesThatAllLeavesOut) {
-  simulate("dfki-50 sweep --duration 40s --lever 0.24m --seed 1 -o a.csv");
-  simulate("dfki-50 sweep --duration 40s --lever 0.17m --seed 2 -o b.csv");
-  const Outcome compare = torsio("compare a.csv --test b.csv");
-  expect_in(compare.err, "families, which --help lists");
-  EXPECT_EQ(compare.err.find("narx_mlp"), std::string::npos) << compare.err;
 }
 
 }  // namespace
