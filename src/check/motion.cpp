@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kHalfWindow_s = 0.05;
 constexpr double kOutermost = 0.01;  // share of the samples on either side
-constexpr double kAtRest = 0.05;     // of the RMS speed
+constexpr double kAtRest = 0.05;     // share of the RMS speed
 
 double quantile(const std::vector<double>& sorted, double share) {
   return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];

@@ -8,7 +8,7 @@
 #include "torsio/evaluate/results.hpp"
 
 // The samples on which models can be compared. Where a guard acts, its linear fallback replaces the
-// model; it is nearly the same for all families, and an error there says nothing about the model.
+// model; it is nearly the same for all families, and an error there is that of the fallback.
 namespace torsio {
 
 /// Scores models on the samples that none of them guarded (`Score::common` of their rows), unless

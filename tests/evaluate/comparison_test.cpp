@@ -56,7 +56,7 @@ const ResultRow& test_row(const Results& results, const std::string& family) {
 }
 
 TEST(Compare, RanksOnTheSamplesThatNoRankedModelGuarded) {
-  constexpr std::size_t kHotFrom = 2400;  // of 4000
+  constexpr std::size_t kHotFrom = 2400;
   const Dataset dataset = heated_bench(kHotFrom);
   const Comparison comparison = compare(dataset, friction_and_heat(dataset), 1, false);
   const ResultRow& friction = test_row(comparison.results, "linear_coulomb");
@@ -154,8 +154,9 @@ TEST(Divergence, InTrainingMarksAllRowsOfTheModel) {
   mark_divergence_in_training(twice);
   for (const ResultRow& row : twice) {
     EXPECT_EQ(row.status, "diverged");
-    EXPECT_EQ(row.reason,
-              "on its own training data: the error is 2 times the standard deviation of the target");
+    EXPECT_EQ(
+        row.reason,
+        "on its own training data: the error is 2 times the standard deviation of the target");
   }
   std::vector<ResultRow> free_run = rows_with(80.0, "diverged");
   mark_divergence_in_training(free_run);

@@ -30,7 +30,7 @@ struct OtherMotion {
   std::string recording;
   std::string nearest;
   Motion held_out;
-  Motion trained;  ///< of `nearest`
+  Motion trained;  ///< motion of `nearest`
 
   /// "0.2 times the amplitude, 3.1 times the speed": the quantities that differ.
   [[nodiscard]] std::string text() const;
