@@ -3,12 +3,14 @@
 #include <optional>
 
 #include "data_flags.hpp"
+#include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/structure_search.hpp"
+#include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/cross_validation.hpp"
 #include "torsio/report/html.hpp"
 #include "torsio/report/results.hpp"
@@ -34,6 +36,9 @@ void run(CompareFlags& flags) {
   ProgressBar progress;
   const torsio::Dataset dataset =
       flags.data.load(flags.validation, flags.test, progress.listener());
+  const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+  warn_of_failed_checks(dataset, features);
+  warn_of_other_motions(dataset, features);
   std::optional<torsio::StructureSearch> search;
   if (flags.models == torsio::kSearch) {
     const auto candidates = torsio::search_candidates(dataset, flags.data.wanted_inputs());
@@ -54,14 +59,18 @@ void run(CompareFlags& flags) {
       torsio::compare(dataset, choices, flags.seed, flags.allow_leak, progress.listener());
   flags.json.write(search ? torsio::search_json(comparison.results, search->scores)
                           : torsio::results_json(comparison.results));
-  if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
   if (flags.json.wants_tables()) print(comparison_text(comparison.results));
+  for (const torsio::Ranking& ranking : comparison.results.rankings)
+    if (const std::string note = torsio::ranking_note(ranking);
+        !flags.json.wants_tables() && !note.empty())
+      remark(std::string(torsio::name(ranking.split)) + ": " + note);
   if (has_all(flags.models))
     remark(
         fmt::format("note: all leaves out {} families, which --help lists: add them by name, as in "
                     "all,lstm",
                     families_beyond_all().size()));
   if (!flags.report.empty()) write_text(flags.report, torsio::results_html(comparison.results));
+  if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, comparison.best->file);
   remark("best model (" + comparison.best->file.card.fitted_as + ") written to " + flags.output);

@@ -4,12 +4,14 @@
 #include <utility>
 
 #include "data_flags.hpp"
+#include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/comparison.hpp"
+#include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
 #include "torsio/report/cross_validation.hpp"
 #include "verbs.hpp"
@@ -45,6 +47,17 @@ std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
   return choices;
 }
 
+/// Compares the motion of what each fold holds out with that of the rest.
+void warn_of_other_motions_in_folds(torsio::Dataset dataset, const torsio::FeatureSpec& features,
+                                    const torsio::FoldScheme& scheme, std::uint64_t seed) {
+  torsio::FoldPlan plan = torsio::plan_folds(dataset, scheme, seed);
+  for (torsio::Fold& fold : plan.folds) {
+    for (std::size_t i = 0; i < dataset.records.size(); ++i)
+      dataset.records[i].segments = std::move(fold.segments[i]);
+    warn_of_other_motions(dataset, features, fold.name + ": ");
+  }
+}
+
 void run(CrossValidateFlags& flags) {
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   flags.data.check_outputs({flags.json.destination});
@@ -54,13 +67,17 @@ void run(CrossValidateFlags& flags) {
   ProgressBar progress;
   torsio::Dataset dataset = flags.data.load({}, {}, progress.listener());
   const auto choices = choices_of(flags, settings, dataset);
+  const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+  warn_of_failed_checks(dataset, features);
+  warn_of_other_motions_in_folds(dataset, features, scheme, flags.seed);
   const torsio::CrossValidation validation = torsio::cross_validate(
       std::move(dataset), choices, scheme, flags.seed, flags.allow_leak, progress.listener());
   flags.json.write(torsio::cross_validation_json(validation));
-  if (std::ranges::none_of(validation.ranking,
-                           [](const torsio::FoldSummary& summary) { return summary.folds > 0; }))
-    throw torsio::Error({.problem = first_failure(validation.results)});
   if (flags.json.wants_tables()) print(cross_validation_text(validation));
+  if (std::ranges::none_of(validation.ranking,
+                           [](const torsio::FoldSummary& summary) { return summary.folds > 0; }) ||
+      !validation.ranked().is_possible())
+    throw torsio::Error({.problem = first_failure(validation.results)});
 }
 
 }  // namespace

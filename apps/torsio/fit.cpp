@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "data_flags.hpp"
+#include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "report_text.hpp"
@@ -76,6 +77,15 @@ torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset
   }
 }
 
+/// @param on_training the model's scores on all of its training data.
+void refuse_diverged(const torsio::ResultRow& on_training) {
+  if (on_training.status != "diverged") return;
+  throw torsio::Error({.place = on_training.family,
+                       .problem = "diverged " + on_training.reason + "; no model was written",
+                       .advice = "Run torsio check on the recordings, or choose other inputs, "
+                                 "settings (--set) or another --model."});
+}
+
 void run(FitFlags& flags) {
   if (flags.list) return print(family_list());
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
@@ -94,15 +104,17 @@ void run(FitFlags& flags) {
   const torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   (void)torsio::refuse_leak(dataset, features, flags.allow_leak);
+  warn_of_failed_checks(dataset, features);
   const torsio::ModelChoice choice{flags.family, settings, "", features};
   torsio::TrainedModel trained = train(flags, dataset, choice, progress.listener());
   trained.file.card.device_serial = flags.device_serial;
-  const torsio::Results results =
-      torsio::evaluate_model(trained.file, dataset, progress.listener());
+  torsio::Results results = torsio::evaluate_model(trained.file, dataset, progress.listener());
+  torsio::mark_divergence_in_training(results.rows);
   torsio::note_held_out_scores(trained.file.card, results.rows);
   const torsio::FitReport report = torsio::fit_report(trained, dataset);
   if (flags.json.wants_tables()) print(evaluation_text(results) + torsio::fit_report_text(report));
   flags.json.write(torsio::fit_json(results, report, trained.notes));
+  refuse_diverged(results.rows.front());
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   if (flags.resume) std::filesystem::remove(flags.checkpoint());
   for (const std::string& note : trained.notes) remark("note: " + note);

@@ -9,6 +9,7 @@
 
 #include "output.hpp"
 #include "torsio/check/check.hpp"
+#include "torsio/check/motion.hpp"
 
 namespace {
 
@@ -49,6 +50,25 @@ void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse
                   "model of {} does: was it "
                   "trained on another actuator?",
                   torque_Nm, model, ratio, sheet.name));
+}
+
+void warn_of_failed_checks(const torsio::Dataset& dataset, const torsio::FeatureSpec& features) {
+  for (const torsio::Finding& finding : torsio::check_dataset(dataset, features))
+    if (finding.verdict == torsio::Verdict::fail)
+      remark(
+          fmt::format("warning: torsio check: FAIL {}: {}{}; run it on these recordings for "
+                      "advice",
+                      finding.check, finding.recording.empty() ? "" : finding.recording + ": ",
+                      finding.message));
+}
+
+void warn_of_other_motions(const torsio::Dataset& dataset, const torsio::FeatureSpec& features,
+                           const std::string& place) {
+  for (const torsio::OtherMotion& other : torsio::other_motions(dataset, features))
+    remark(
+        fmt::format("warning: {}{} moves {} in another way than every training recording, with "
+                    "{} of {}: its errors and error bars are those of another kind of motion",
+                    place, other.recording, features.inputs.front(), other.text(), other.nearest));
 }
 
 void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Dataset& dataset) {

@@ -7,6 +7,13 @@
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
 
+/// Repeats what `torsio check` reports as FAIL about these recordings, one line each.
+void warn_of_failed_checks(const torsio::Dataset& dataset, const torsio::FeatureSpec& features);
+/// Warns of held-out recordings whose motion is of another kind than that of every training
+/// recording (`other_motions`).
+/// @param place the fold that holds them out, "fold 2: "; may be empty
+void warn_of_other_motions(const torsio::Dataset& dataset, const torsio::FeatureSpec& features,
+                           const std::string& place = {});
 /// Warns of recordings that the model was trained on: a score on them is not a held-out score.
 void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Dataset& dataset);
 /// Warns of channels that the model expects with their zero removed, but a recording has as

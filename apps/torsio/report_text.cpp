@@ -29,6 +29,19 @@ std::string percent(double share) {
   return std::isfinite(share) ? fmt::format("{:.1f}", 100.0 * share) : "-";
 }
 
+std::string order_and_note(const torsio::Ranking& ranking) {
+  return (ranking.is_possible() ? "best first\n" : "not ranked\n") + torsio::ranking_note(ranking);
+}
+
+/// "4", or "2 of 4" if a guard replaced the models in the others.
+std::string folds_shown(const torsio::CrossValidation& validation) {
+  const auto& rankings = validation.results.rankings;
+  const auto ranked = std::ranges::count_if(rankings, &torsio::Ranking::is_possible);
+  const bool is_all = ranked == std::ssize(rankings) || !validation.ranked().is_possible();
+  return is_all ? fmt::format("{}", rankings.size())
+                : fmt::format("{} of {}", ranked, rankings.size());
+}
+
 }  // namespace
 
 std::string comparison_text(const torsio::Results& results) {
@@ -37,8 +50,10 @@ std::string comparison_text(const torsio::Results& results) {
     const bool has_rows = std::ranges::any_of(
         results.rows, [&](const torsio::ResultRow& row) { return row.split == role; });
     if (!has_rows) continue;
-    text += fmt::format("\nheld-out ({}) errors in {}, free run, best first\n{}",
-                        torsio::name(role), results.unit, torsio::ranked_table(results, role));
+    const auto ranking = std::ranges::find(results.rankings, role, &torsio::Ranking::split);
+    text +=
+        fmt::format("\nheld-out ({}) errors in {}, free run, {}{}", torsio::name(role),
+                    results.unit, order_and_note(*ranking), torsio::ranked_table(results, role));
   }
   return text;
 }
@@ -46,9 +61,8 @@ std::string comparison_text(const torsio::Results& results) {
 std::string cross_validation_text(const torsio::CrossValidation& validation) {
   return heading(validation.results) +
          fmt::format(
-             "\nheld-out errors in {}, free run, mean +- standard deviation over {} folds, "
-             "best first\n{}",
-             validation.results.unit, validation.plan.folds.size(),
+             "\nheld-out errors in {}, free run, mean +- standard deviation over {} folds, {}{}",
+             validation.results.unit, folds_shown(validation), order_and_note(validation.ranked()),
              torsio::cross_validation_table(validation));
 }
 
@@ -80,6 +94,10 @@ std::string evaluation_text(const torsio::Results& results) {
 }
 
 std::string first_failure(const torsio::Results& results) {
+  if (std::ranges::any_of(results.rows,
+                          [](const torsio::ResultRow& row) { return row.status == "ok"; }))
+    return "no model can be ranked: guards replaced the models by their linear fallback in more "
+           "than half of the samples";
   for (const torsio::ResultRow& row : results.rows)
     if (row.status != "ok") return "no model could be fitted; " + row.family + ": " + row.reason;
   return "no model could be scored";

@@ -4,10 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <set>
+#include <utility>
 
+#include "evaluate/common_samples.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -93,6 +97,23 @@ const ResultRow* whole_split(const std::vector<ResultRow>& rows, Role role) {
   return nullptr;
 }
 
+/// The first of the ranking, with a card that states its scores; none without a ranking.
+std::optional<TrainedModel> best_of(std::vector<ScoredModel>& models, Role chosen_on) {
+  const auto error_of = [chosen_on](const ScoredModel& model) {
+    const ResultRow* row = whole_split(model.rows, chosen_on);
+    return row == nullptr || row->score.common.samples == 0
+               ? std::numeric_limits<double>::infinity()
+               : row->score.common.rmse;
+  };
+  const auto best = std::ranges::min_element(models, {}, error_of);
+  if (best == models.end() || !std::isfinite(error_of(*best))) return std::nullopt;
+  ModelCard& card = best->trained->file.card;
+  note_held_out_scores(card, best->rows);
+  if (chosen_on == Role::test)
+    card.held_out += fmt::format("; this score selected the model among {}", models.size());
+  return std::move(best->trained);
+}
+
 }  // namespace
 
 std::vector<ModelChoice> model_choices(const Dataset& dataset, std::string_view models,
@@ -130,26 +151,21 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
              "Name held-out recordings with --test, or give them `role: test` in a manifest."});
   Comparison comparison{.results = empty_results(dataset), .best = {}};
   Results& results = comparison.results;
-  const Role chosen_on = dataset.has_role(Role::validation) ? Role::validation : Role::test;
-  double best_rmse = std::numeric_limits<double>::infinity();
   InputSets input_sets(dataset, allow_leak);
+  std::vector<ScoredModel> models;
   for (std::size_t i = 0; i < choices.size(); ++i) {
     const ModelChoice& choice = choices[i];
     note_inputs(results, choice);
     const Progress part = part_of(progress, i, choices.size(), choice.family);
-    ScoredModel scored = fit_and_score(dataset, input_sets, choice, seed, kRoles, part);
-    const ResultRow* scored_row = whole_split(scored.rows, chosen_on);
-    if (scored_row != nullptr && scored_row->score.metrics.rmse < best_rmse) {
-      best_rmse = scored_row->score.metrics.rmse;
-      ModelCard& card = scored.trained->file.card;
-      note_held_out_scores(card, scored.rows);
-      if (chosen_on == Role::test)
-        card.held_out += fmt::format("; this score selected the model among {}", choices.size());
-      comparison.best = std::move(scored.trained);
-    }
-    std::ranges::move(scored.rows, std::back_inserter(results.rows));
+    models.push_back(fit_and_score(dataset, input_sets, choice, seed, kRoles, part));
   }
   forget_only_set(results);
+  for (const Role role : {Role::validation, Role::test})
+    if (dataset.has_role(role))
+      results.rankings.push_back(rank_on_common_samples(dataset, role, models));
+  comparison.best =
+      best_of(models, dataset.has_role(Role::validation) ? Role::validation : Role::test);
+  for (ScoredModel& model : models) std::ranges::move(model.rows, std::back_inserter(results.rows));
   return comparison;
 }
 
@@ -158,8 +174,30 @@ Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Prog
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
   const Estimator estimator = make_estimator(file, dataset.sample_rate_Hz());
-  results.rows = rows_for(file, estimator, dataset, kRoles, progress);
+  for (const Role role : kRoles)
+    if (dataset.has_role(role))
+      std::ranges::move(rows_of(file, role, evaluate(estimator, dataset, role, progress)),
+                        std::back_inserter(results.rows));
   return results;
+}
+
+void mark_divergence_in_training(std::vector<ResultRow>& rows) {
+  const auto trained = std::ranges::find(rows, Role::train, &ResultRow::split);
+  if (trained == rows.end()) return;
+  constexpr double kTwiceTheStdDev = -100.0;  // fit %
+  std::string reason;
+  if (trained->status == "diverged") {
+    reason = trained->reason;
+  } else if (trained->score.metrics.fit_percent < kTwiceTheStdDev) {
+    reason = fmt::format("the error is {:.3g} times the standard deviation of the target",
+                         1.0 - 0.01 * trained->score.metrics.fit_percent);
+  } else {
+    return;
+  }
+  for (ResultRow& row : rows) {
+    row.status = "diverged";
+    row.reason = "on its own training data: " + reason;
+  }
 }
 
 void note_held_out_scores(ModelCard& card, const std::vector<ResultRow>& rows) {

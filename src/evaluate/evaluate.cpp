@@ -7,9 +7,11 @@
 #include <cmath>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "core/report_progress.hpp"
 #include "evaluate/initial_state.hpp"
+#include "evaluate/measured_samples.hpp"
 #include "fit/common/finite_input.hpp"
 #include "model/second_order/rigid_drive.hpp"
 #include "numerics/metrics_accumulator.hpp"
@@ -71,6 +73,22 @@ struct Coverage {
   }
 };
 
+bool is_scored(const Prediction& prediction, std::size_t sample) {
+  return prediction.estimates[sample].fault != Fault::warming_up &&
+         sample >= prediction.initialised;
+}
+
+/// Appends the measured samples of a segment.
+void append(MeasuredEstimates& estimates, const Prediction& prediction, const Channel& target,
+            const Segment& segment) {
+  for (std::size_t i = segment.begin; i < segment.end; ++i) {
+    if (!is_measured(target, i)) continue;
+    const bool scored = is_scored(prediction, i);
+    estimates.values.push_back(scored ? prediction.estimates[i].value : kNotMeasured);
+    estimates.guarded.push_back(scored && prediction.estimates[i].fault != Fault::none);
+  }
+}
+
 /// Adds up one recording's, or a whole split's, samples.
 struct Tally {
   MetricsAccumulator metrics;
@@ -90,13 +108,14 @@ struct Tally {
     for (std::size_t i = segment.begin; i < segment.end; ++i) {
       const Estimate& estimate = prediction.estimates[i];
       step_ns.push_back(prediction.step_ns[i]);
-      if (!target.is_fresh(i) || !std::isfinite(target.values[i])) continue;
-      if (estimate.fault == Fault::warming_up || i < prediction.initialised) {
+      if (!is_measured(target, i)) continue;
+      if (!is_scored(prediction, i)) {
         ++initialised;
         continue;
       }
       if (estimate.fault != Fault::none) ++guarded;
-      if (estimate.fault == Fault::diverged) ++diverged;
+      if (estimate.fault == Fault::diverged || estimate.fault == Fault::model_not_finite)
+        ++diverged;
       metrics.add(estimate.value, target.values[i]);
       coverage.add(estimate, target.values[i]);
     }
@@ -108,6 +127,7 @@ struct Tally {
             .initialised_samples = initialised,
             .guarded_samples = guarded,
             .diverged_samples = diverged,
+            .common = {},
             .within_std_dev = coverage.share(coverage.within),
             .within_2_std_dev = coverage.share(coverage.within_2),
             .step_ns_p50 = quantile(step_ns, 0.5),
@@ -138,7 +158,7 @@ std::size_t start_with(Estimator& estimator,
   const Channel& target = *corrections.target;
   std::size_t samples = 0;
   for (std::size_t left = corrections.most; samples < target.values.size() && left > 0; ++samples)
-    if (target.is_fresh(samples) && std::isfinite(target.values[samples])) --left;
+    if (is_measured(target, samples)) --left;
   const EstimatorSettings& settings = estimator.settings();
   FeaturePipeline pipeline(settings.features, settings.sample_rate_Hz);
   Matrix features(samples, pipeline.feature_count());
@@ -176,9 +196,7 @@ Prediction predict(Estimator estimator, const Recording& recording,
     const auto start = Clock::now();
     prediction.estimates[i] = estimator.step(raw);
     prediction.step_ns[i] = std::max(0.0, nanoseconds(Clock::now() - start) - clock_cost);
-    if (left == 0 || !corrections.target->is_fresh(i) ||
-        !std::isfinite(corrections.target->values[i]))
-      continue;
+    if (left == 0 || !is_measured(*corrections.target, i)) continue;
     estimator.correct(corrections.target->values[i]);
     prediction.initialised = i + 1;
     --left;
@@ -203,14 +221,16 @@ SplitScore evaluate(const Estimator& estimator, const Dataset& dataset, Role rol
     if (estimator.model().feeds_back())
       one_step = predict(estimator, record.recording, {&target, record.recording.size()});
     Tally own;
+    MeasuredEstimates estimates;
     for (const Segment& segment : record.segments) {
       if (segment.role != role) continue;
+      append(estimates, prediction, target, segment);
       for (Tally* tally : {&own, &together}) {
         tally->add(prediction, target, segment);
         if (one_step) tally->add_one_step(*one_step, target, segment);
       }
     }
-    split.recordings.push_back({record.recording.name(), own.score()});
+    split.recordings.push_back({record.recording.name(), own.score(), std::move(estimates)});
   }
   split.together = together.score();
   return split;

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/evaluate.hpp"
 #include "torsio/fit/common/inputs.hpp"
 
@@ -76,15 +79,25 @@ ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets, const M
   try {
     scored.trained =
         train_model(dataset, input_sets.data_of(choice.features), choice, seed, progress);
-    scored.rows = rows_for(scored.trained->file, make_estimator(scored.trained->file), dataset,
-                           roles, progress);
+    const Estimator estimator = make_estimator(scored.trained->file);
+    for (const Role role : roles) {
+      if (!dataset.has_role(role)) continue;
+      SplitScore scores = evaluate(estimator, dataset, role, progress);
+      std::ranges::move(rows_of(scored.trained->file, role, scores),
+                        std::back_inserter(scored.rows));
+      if (role == Role::train) continue;
+      scored.estimates.push_back({.role = role, .recordings = {}});
+      for (SplitScore::OfRecording& of_recording : scores.recordings)
+        scored.estimates.back().recordings.push_back(std::move(of_recording.estimates));
+    }
+    mark_divergence_in_training(scored.rows);
     for (ResultRow& row : scored.rows) row.fit_seconds = scored.trained->fit_seconds;
   } catch (const Cancelled&) {
     throw;
   } catch (const UsageError&) {
     throw;  // a wrong setting; a fit that fails on these data throws another Error
   } catch (const Error& error) {
-    scored = {.trained = {}, .rows = {failed_row(choice, error)}};
+    scored = {.trained = {}, .rows = {failed_row(choice, error)}, .estimates = {}};
   }
   for (ResultRow& row : scored.rows) {
     row.variant = choice.variant();
@@ -94,18 +107,11 @@ ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets, const M
   return scored;
 }
 
-std::vector<ResultRow> rows_for(const ModelFile& file, const Estimator& estimator,
-                                const Dataset& dataset, std::span<const Role> roles,
-                                const Progress& progress) {
-  std::vector<ResultRow> rows;
-  for (const Role role : roles) {
-    if (!dataset.has_role(role)) continue;
-    const SplitScore scores = evaluate(estimator, dataset, role, progress);
-    rows.push_back(row_for(file, role, scores.together));
-    for (const auto& of_recording : scores.recordings) {
-      rows.push_back(row_for(file, role, of_recording.score));
-      rows.back().recording = of_recording.recording;
-    }
+std::vector<ResultRow> rows_of(const ModelFile& file, Role role, const SplitScore& scores) {
+  std::vector<ResultRow> rows{row_for(file, role, scores.together)};
+  for (const SplitScore::OfRecording& of_recording : scores.recordings) {
+    rows.push_back(row_for(file, role, of_recording.score));
+    rows.back().recording = of_recording.recording;
   }
   return rows;
 }

@@ -39,20 +39,26 @@ class InputSets {
 };
 
 struct ScoredModel {
+  /// The estimates on the recordings of a held-out role, in the order of their rows.
+  struct OfRole {
+    Role role;
+    std::vector<MeasuredEstimates> recordings;
+  };
   std::optional<TrainedModel> trained;  ///< none if the fit failed
   std::vector<ResultRow> rows;
+  std::vector<OfRole> estimates = {};
 };
 
-/// Trains a choice and scores it on `roles`. A fit that fails is one row with the reason.
+/// Trains a choice and scores it on `roles`, of which train is one. A fit that fails is one row with
+/// the reason; a model that diverges on its training data has the status `diverged` in all rows.
 /// @throws UsageError for a wrong setting or a leak that is not allowed, Cancelled.
 [[nodiscard]] ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets,
                                         const ModelChoice& choice, std::uint64_t seed,
                                         std::span<const Role> roles, const Progress& progress);
 
-/// The rows of one model: on each role, on each recording and on all of the role together.
-[[nodiscard]] std::vector<ResultRow> rows_for(const ModelFile& file, const Estimator& estimator,
-                                              const Dataset& dataset, std::span<const Role> roles,
-                                              const Progress& progress);
+/// The rows of one model on one role: on all of the role together, then on each recording.
+[[nodiscard]] std::vector<ResultRow> rows_of(const ModelFile& file, Role role,
+                                             const SplitScore& scores);
 
 /// Results without rows.
 [[nodiscard]] Results empty_results(const Dataset& dataset);

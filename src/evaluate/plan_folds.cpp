@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/evaluate/cross_validation.hpp"
@@ -171,14 +172,20 @@ std::vector<std::string> conditions_of(const Dataset& dataset) {
 FoldPlan leave_one_condition_out(const Dataset& dataset, const std::vector<std::size_t>& records,
                                  const std::string& condition) {
   const std::vector<std::string> known = conditions_of(dataset);
-  if (std::ranges::find(known, condition) == known.end())
+  if (std::ranges::find(known, condition) == known.end()) {
+    std::vector<std::string> names = known;
+    names.emplace_back(kByRecord);
+    const std::string nearest = did_you_mean(condition, names);
     throw UsageError(
         {.place = "--by",
          .expected = known.empty()
                          ? "record; no channel is constant in every recording"
                          : fmt::format("record, or a condition: {}", fmt::join(known, ", ")),
          .found = '"' + condition + '"',
-         .advice = "A manifest gives recordings conditions: conditions: {support_mm: 20}."});
+         .advice = nearest.empty()
+                       ? "A manifest gives recordings conditions: conditions: {support_mm: 20}."
+                       : nearest});
+  }
   const auto value_of = [&](const DatasetRecord& record) {
     return record.recording.channel(condition).values.front();
   };

@@ -37,7 +37,7 @@ StructureSearch search_structures(const Dataset& dataset,
                                                   seed, allow_leak, progress)};
   std::set<std::string> chosen;
   for (const FoldSummary& summary : search.scores.ranking) {
-    if (summary.failed_folds > 0 || summary.folds == 0) continue;
+    if (summary.failed_folds > 0 || summary.ranked_folds == 0) continue;
     if (!chosen.insert(summary.family).second) continue;
     search.winners.push_back(*std::ranges::find_if(candidates, [&](const ModelChoice& choice) {
       return choice.family == summary.family && choice.variant() == summary.variant &&

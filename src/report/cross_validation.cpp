@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <array>
 #include <cmath>
 
 #include "report/result_parts.hpp"
@@ -30,12 +31,19 @@ Json summary_json(const FoldSummary& summary) {
   add("mad", summary.mad);
   add("max_abs", summary.max_abs);
   add("fit_percent", summary.fit_percent);
+  json["ranked_folds"] = summary.ranked_folds;
+  add("common_rmse", summary.common_rmse);
+  add("common_mad", summary.common_mad);
+  add("common_max_abs", summary.common_max_abs);
+  add("common_fit_percent", summary.common_fit_percent);
   json["worst_fold"] = text_or_null(summary.worst_fold);
   json["guarded_share"] = json_number(summary.guarded_share);
+  json["within_std_dev"] = json_number(summary.within_std_dev);
+  json["within_2_std_dev"] = json_number(summary.within_2_std_dev);
   json["step_ns_p50"] = json_number(summary.step_ns_p50);
   json["fit_seconds"] = json_number(summary.fit_seconds);
   json["parameter_count"] = summary.parameter_count;
-  json["status"] = summary.failed_folds == 0 ? "ok" : "failed";
+  json["status"] = summary.status;
   json["reason"] = text_or_null(summary.reason);
   if (summary.leak) json["leak"] = true;
   return json;
@@ -43,10 +51,16 @@ Json summary_json(const FoldSummary& summary) {
 
 void add_folds_and_summary(Json& document, const CrossValidation& validation) {
   document["folds"] = Json::array();
-  for (const Fold& fold : validation.plan.folds)
+  for (std::size_t k = 0; k < validation.plan.folds.size(); ++k) {
+    const Fold& fold = validation.plan.folds[k];
+    const Ranking& ranking = validation.results.rankings[k];
     document["folds"].push_back({{"name", fold.name},
                                  {"recordings", fold.recordings},
-                                 {"held_out_samples", fold.held_out_samples}});
+                                 {"held_out_samples", fold.held_out_samples},
+                                 {"scored_samples", ranking.scored_samples},
+                                 {"common_samples", ranking.common_samples},
+                                 {"is_ranked", ranking.is_possible()}});
+  }
   document["summary"] = Json::array();
   for (const FoldSummary& summary : validation.ranking)
     document["summary"].push_back(summary_json(summary));
@@ -58,18 +72,37 @@ std::string mean_and_spread(const FoldStatistic& statistic) {
              : error_text(statistic.mean);
 }
 
-std::string held_out_list(const FoldPlan& plan) {
+std::string held_out_list(const CrossValidation& validation) {
   std::string text;
-  for (const Fold& fold : plan.folds)
-    text += fmt::format("  {}: {} samples of {}\n", fold.name, fold.held_out_samples,
+  for (std::size_t k = 0; k < validation.plan.folds.size(); ++k) {
+    const Fold& fold = validation.plan.folds[k];
+    const Ranking& ranking = validation.results.rankings[k];
+    text += fmt::format("  {}: {} samples of {}", fold.name, fold.held_out_samples,
                         fmt::join(fold.recordings, ", "));
+    if (ranking.common_samples < ranking.scored_samples)
+      text += fmt::format("; a guard replaced models in {} % of them{}",
+                          percent_text(ranking.guarded_share()),
+                          ranking.is_possible() ? "" : ", not in the ranking");
+    text += "\n";
+  }
   return text;
+}
+
+/// Why a model is not in the ranking; empty if it is, or if no ranking is possible.
+std::string reason_outside_ranking(const FoldSummary& summary, bool is_possible) {
+  if (summary.failed_folds > 0)
+    return fmt::format("{} in {} of {} folds; {}", summary.status, summary.failed_folds,
+                       summary.folds + summary.failed_folds, summary.reason);
+  if (!is_possible || summary.ranked_folds > 0) return {};
+  return fmt::format("guarded: in more than half of a fold that is ranked ({} % of all samples)",
+                     percent_text(summary.guarded_share));
 }
 
 }  // namespace
 
 std::string cross_validation_json(const CrossValidation& validation) {
   Json document = results_document(validation.results);
+  document.erase("rankings");  // `folds` has them
   add_folds_and_summary(document, validation);
   return json_text(document);
 }
@@ -86,25 +119,31 @@ std::string cross_validation_table(const CrossValidation& validation) {
   TextTable table;
   table.header({"model"});
   if (has_sets) table.header({"inputs"});
-  table.header({"RMSE", "MAD", "max|e|", "fit %", "guard %", "worst fold", "step ns", "fit s",
-                "parameters"});
-  std::string failures;
+  table.header({"RMSE", "MAD", "max|e|", "fit %", "guard %", "in 1 sd %", "in 2 sd %", "worst fold",
+                "step ns", "fit s", "parameters"});
+  const bool is_possible = validation.ranked().is_possible();
+  std::string others;
   for (const FoldSummary& summary : validation.ranking) {
     std::string label = model_label(summary.family, summary.variant);
-    if (summary.failed_folds > 0) {
-      failures +=
-          fmt::format("  {}{}: failed in {} of {} folds; {}\n", label,
-                      summary.input_set.empty() ? "" : " (" + summary.input_set + ")",
-                      summary.failed_folds, summary.folds + summary.failed_folds, summary.reason);
+    const std::string reason = reason_outside_ranking(summary, is_possible);
+    if (!reason.empty()) {
+      others +=
+          fmt::format("  {}{}: {}\n", label,
+                      summary.input_set.empty() ? "" : " (" + summary.input_set + ")", reason);
       continue;
     }
     if (summary.leak) label += " (leak!)";
     std::vector<std::string> cells{std::move(label)};
     if (has_sets) cells.push_back(summary.input_set);
-    for (const FoldStatistic& statistic : {summary.rmse, summary.mad, summary.max_abs})
+    for (const FoldStatistic& statistic :
+         is_possible ? std::array{summary.common_rmse, summary.common_mad, summary.common_max_abs}
+                     : std::array{summary.rmse, summary.mad, summary.max_abs})
       cells.push_back(mean_and_spread(statistic));
-    cells.push_back(fmt::format("{:.1f}", summary.fit_percent.mean));
-    cells.push_back(fmt::format("{:.1f}", 100.0 * summary.guarded_share));
+    cells.push_back(fmt::format(
+        "{:.1f}", is_possible ? summary.common_fit_percent.mean : summary.fit_percent.mean));
+    cells.push_back(percent_text(summary.guarded_share));
+    cells.push_back(percent_text(summary.within_std_dev));
+    cells.push_back(percent_text(summary.within_2_std_dev));
     cells.push_back(summary.worst_fold);
     cells.push_back(fmt::format("{:.0f}", summary.step_ns_p50));
     cells.push_back(seconds_text(summary.fit_seconds));
@@ -112,8 +151,8 @@ std::string cross_validation_table(const CrossValidation& validation) {
     table.row(std::move(cells));
   }
   std::string text = table.text();
-  if (!failures.empty()) text += "not in the ranking:\n" + failures;
-  return text + "held out by\n" + held_out_list(validation.plan);
+  if (!others.empty()) text += "not in the ranking:\n" + others;
+  return text + "held out by\n" + held_out_list(validation);
 }
 
 }  // namespace torsio

@@ -39,8 +39,12 @@ std::string results_html(const Results& results) {
     const bool has_rows =
         std::ranges::any_of(results.rows, [&](const ResultRow& row) { return row.split == role; });
     if (!has_rows) continue;
-    page += fmt::format("<h2>{} records, errors in {}, free run</h2>\n<pre>{}</pre>\n", name(role),
-                        markup_text(results.unit), markup_text(ranked_table(results, role)));
+    page += fmt::format("<h2>{} records, errors in {}, free run</h2>\n", name(role),
+                        markup_text(results.unit));
+    for (const Ranking& ranking : results.rankings)
+      if (const std::string note = ranking_note(ranking); ranking.split == role && !note.empty())
+        page += fmt::format("<p><strong>{}</strong></p>\n", markup_text(note));
+    page += fmt::format("<pre>{}</pre>\n", markup_text(ranked_table(results, role)));
   }
   return page + fmt::format("<p>torsio {}</p>\n</body></html>\n", kVersion);
 }

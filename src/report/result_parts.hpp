@@ -21,5 +21,7 @@ namespace torsio {
 /// more decimals.
 [[nodiscard]] std::string error_text(double value, double smallest = 1.0);
 [[nodiscard]] std::string seconds_text(double seconds);
+/// A share as a percentage with one decimal; "-" if it was not measured.
+[[nodiscard]] std::string percent_text(double share);
 
 }  // namespace torsio

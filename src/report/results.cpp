@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "report/result_parts.hpp"
 #include "torsio/report/json_text.hpp"
@@ -42,6 +43,12 @@ Json row_json(const ResultRow& row, const Metrics& metrics, std::string_view mod
   if (mode == kFreeRun) {
     json["within_std_dev"] = json_number(row.score.within_std_dev);
     json["within_2_std_dev"] = json_number(row.score.within_2_std_dev);
+    const Metrics& common = row.score.common;
+    json["common_samples"] = common.samples;
+    json["common_rmse"] = json_number(common.rmse);
+    json["common_mad"] = json_number(common.mad);
+    json["common_max_abs"] = json_number(common.max_abs);
+    json["common_fit_percent"] = json_number(common.fit_percent);
   }
   if (!row.fold.empty()) json["fold"] = row.fold;
   if (row.leak) json["leak"] = true;
@@ -66,22 +73,36 @@ std::vector<std::string> recordings_of(const Results& results, Role split) {
   return names;
 }
 
-/// The rows of a whole split, best first, failed ones last.
-std::vector<const ResultRow*> ranking(const Results& results, Role split) {
-  std::vector<const ResultRow*> ranked;
+/// The errors that the table shows.
+const Metrics& shown(const ResultRow& row) {
+  return row.score.common.samples > 0 ? row.score.common : row.score.metrics;
+}
+
+/// The rows of a whole split: the ranked ones, best first, then the others in their order.
+std::vector<const ResultRow*> in_order(const Results& results, Role split) {
+  std::vector<const ResultRow*> rows;
   for (const ResultRow& row : results.rows)
-    if (row.split == split && !row.recording) ranked.push_back(&row);
-  std::ranges::stable_sort(ranked, [](const ResultRow* a, const ResultRow* b) {
-    if ((a->status == "ok") != (b->status == "ok")) return a->status == "ok";
-    return a->score.metrics.rmse < b->score.metrics.rmse;
+    if (row.split == split && !row.recording) rows.push_back(&row);
+  std::ranges::stable_sort(rows, {}, [](const ResultRow* row) {
+    return row->score.common.samples > 0 ? row->score.common.rmse
+                                         : std::numeric_limits<double>::infinity();
   });
-  return ranked;
+  return rows;
+}
+
+/// Why a model is not in a possible ranking; empty if it is.
+std::string reason_outside_ranking(const Results& results, const ResultRow& row) {
+  if (row.status != "ok") return row.status + ": " + row.reason;
+  const bool is_possible = std::ranges::any_of(results.rankings, [&](const Ranking& ranking) {
+    return ranking.split == row.split && ranking.is_possible();
+  });
+  return is_possible && row.score.common.samples == 0 ? "guarded: " + row.reason : std::string();
 }
 
 double rmse_on(const Results& results, const ResultRow& model, const std::string& recording) {
   for (const ResultRow& row : results.rows)
     if (row.split == model.split && row.recording == recording && is_same_model(row, model))
-      return row.score.metrics.rmse;
+      return shown(row).rmse;
   return kNotMeasured;
 }
 
@@ -101,6 +122,10 @@ std::string error_text(double value, double smallest) {
   return std::abs(value) < 1e6 ? fmt::format("{:.3f}", value) : fmt::format("{:.3g}", value);
 }
 
+std::string percent_text(double share) {
+  return std::isfinite(share) ? fmt::format("{:.1f}", 100.0 * share) : "-";
+}
+
 std::string seconds_text(double seconds) {
   if (std::isnan(seconds)) return "-";
   return seconds < 0.01 ? "<0.01" : fmt::format("{:.2f}", seconds);
@@ -114,6 +139,12 @@ Json results_document(const Results& results) {
     document["input_sets"] = std::move(sets);
   }
   if (!results.label.empty()) document["label"] = results.label;
+  if (!results.rankings.empty()) document["rankings"] = Json::array();
+  for (const Ranking& ranking : results.rankings)
+    document["rankings"].push_back({{"split", name(ranking.split)},
+                                    {"scored_samples", ranking.scored_samples},
+                                    {"common_samples", ranking.common_samples},
+                                    {"is_ranked", ranking.is_possible()}});
   document["results"] = Json::array();
   for (const ResultRow& row : results.rows) {
     const auto add = [&](const Metrics& metrics, std::string_view mode) {
@@ -127,39 +158,64 @@ Json results_document(const Results& results) {
 
 std::string results_json(const Results& results) { return json_text(results_document(results)); }
 
+std::string ranking_note(const Ranking& ranking) {
+  constexpr double kCannotBeIgnored = 0.1;
+  if (ranking.common_samples == ranking.scored_samples) return {};
+  const double guarded = ranking.guarded_share();
+  if (!ranking.is_possible())
+    return fmt::format(
+        "NO RANKING: in {:.1f} % of the samples a guard replaced the models by their linear "
+        "fallback.\n"
+        "Errors are on all samples, in the order of the call: they show the fallback, not the "
+        "models.\n"
+        "Record training data of that range (torsio check shows it), or test inside it.\n",
+        100.0 * guarded);
+  if (guarded > kCannotBeIgnored)
+    return fmt::format(
+        "WARNING: in {:.1f} % of the samples a guard replaced models by their linear fallback.\n"
+        "Errors are on the other {:.1f} %; torsio check shows which inputs leave the range of the "
+        "training data.\n",
+        100.0 * guarded, 100.0 * (1.0 - guarded));
+  return fmt::format(
+      "errors on {} of {} samples; in the others a guard replaced a model by its linear fallback\n",
+      ranking.common_samples, ranking.scored_samples);
+}
+
 std::string ranked_table(const Results& results, Role split) {
   const std::vector<std::string> recordings = recordings_of(results, split);
   const bool has_sets = results.input_sets.size() > 1;
   TextTable table;
   table.header({"model"});
   if (has_sets) table.header({"inputs"});
-  table.header({"RMSE", "MAD", "max|e|", "fit %", "guard %"});
+  table.header({"RMSE", "MAD", "max|e|", "fit %", "guard %", "in 1 sd %", "in 2 sd %"});
   const bool has_one_step = std::ranges::any_of(
       results.rows, [](const ResultRow& row) { return row.score.one_step.samples > 0; });
   if (has_one_step) table.header({"1 step"});
   for (const std::string& recording : recordings) table.header({"RMSE " + recording});
   table.header({"step ns", "p99.9", "fit s", "parameters"});
 
-  std::string failures;
-  const auto ranked = ranking(results, split);
+  std::string others;
+  std::vector<const ResultRow*> rows = in_order(results, split);
+  std::erase_if(rows, [&](const ResultRow* row) {
+    const std::string reason = reason_outside_ranking(results, *row);
+    if (reason.empty()) return false;
+    others += fmt::format("  {}{}: {}\n", model_label(row->family, row->variant),
+                          row->input_set.empty() ? "" : " (" + row->input_set + ")", reason);
+    return true;
+  });
   double smallest = 1.0;
-  for (const ResultRow* row : ranked)
-    if (row->status == "ok") smallest = std::min(smallest, row->score.metrics.rmse);
-  for (const ResultRow* row : ranked) {
-    if (row->status != "ok") {
-      failures += fmt::format("  {}{}: {}: {}\n", model_label(row->family, row->variant),
-                              row->input_set.empty() ? "" : " (" + row->input_set + ")",
-                              row->status, row->reason);
-      continue;
-    }
-    const Metrics& metrics = row->score.metrics;
+  for (const ResultRow* row : rows) smallest = std::min(smallest, shown(*row).rmse);
+  for (const ResultRow* row : rows) {
+    const Metrics& metrics = shown(*row);
     std::vector<std::string> cells{model_label(row->family, row->variant)};
     if (has_sets) cells.push_back(row->input_set);
     for (const double value : {metrics.rmse, metrics.mad, metrics.max_abs})
       cells.push_back(error_text(value, smallest));
     cells.push_back(fmt::format("{:.1f}", metrics.fit_percent));
-    cells.push_back(fmt::format("{:.1f}", 100.0 * static_cast<double>(row->score.guarded_samples) /
-                                              static_cast<double>(metrics.samples)));
+    cells.push_back(percent_text(static_cast<double>(row->score.guarded_samples) /
+                                 static_cast<double>(row->score.metrics.samples)));
+    cells.push_back(percent_text(row->score.within_std_dev));
+    cells.push_back(percent_text(row->score.within_2_std_dev));
     if (has_one_step)
       cells.push_back(
           row->score.one_step.samples > 0 ? error_text(row->score.one_step.rmse, smallest) : "");
@@ -173,7 +229,7 @@ std::string ranked_table(const Results& results, Role split) {
     table.row(std::move(cells));
   }
   std::string text = table.text();
-  if (!failures.empty()) text += "not in the ranking:\n" + failures;
+  if (!others.empty()) text += "not in the ranking:\n" + others;
   return text;
 }
 

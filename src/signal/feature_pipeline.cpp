@@ -11,6 +11,7 @@
 
 #include "signal/expression_graph.hpp"
 #include "signal/expression_parser.hpp"
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/differentiator.hpp"
 #include "torsio/signal/lowpass.hpp"
@@ -219,7 +220,8 @@ void FeaturePipeline::set_zero(std::string_view channel, double value) {
   if (found == names.end())
     throw UsageError({.place = "set_zero",
                       .expected = fmt::format("one of {}", fmt::join(names, ", ")),
-                      .found = fmt::format("'{}'", channel)});
+                      .found = fmt::format("'{}'", channel),
+                      .advice = did_you_mean(channel, names)});
   if (!std::isfinite(value))
     throw UsageError({.place = fmt::format("set_zero of {}", channel),
                       .expected = "a finite value",

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <string>
 #include <vector>
@@ -223,8 +224,10 @@ TEST(CrossValidate, RanksEveryFamilyAndIsDeterministic) {
     EXPECT_EQ(one.ranking[i].rmse.mean, two.ranking[i].rmse.mean);
     EXPECT_EQ(one.ranking[i].folds, 5U) << one.ranking[i].family << one.ranking[i].reason;
   }
-  EXPECT_TRUE(std::ranges::is_sorted(one.ranking, {},
-                                     [](const FoldSummary& summary) { return summary.rmse.mean; }));
+  EXPECT_TRUE(std::ranges::is_sorted(one.ranking, {}, [](const FoldSummary& summary) {
+    return summary.ranked_folds > 0 ? summary.common_rmse.mean
+                                    : std::numeric_limits<double>::infinity();
+  }));
 }
 
 TEST(CrossValidate, MakesAFailedFitARowAndRanksTheModelLast) {
@@ -244,6 +247,33 @@ TEST(CrossValidate, MakesAFailedFitARowAndRanksTheModelLast) {
   EXPECT_EQ(failed.folds, 2U);
   EXPECT_EQ(failed.reason.substr(0, 10), "record 0: ");
   EXPECT_EQ(validation.ranking.front().failed_folds, 0U);
+}
+
+TEST(CrossValidate, RanksOnTheFoldsInWhichTheModelsRan) {
+  Dataset dataset = records(4);
+  for (std::size_t i = 0; i < 4; ++i)  // the first and the last value are outside the others'
+    dataset.records[i].recording.add_condition("support_m", 0.01 * static_cast<double>(i));
+  const FeatureSpec features = resolve_inputs(dataset, {"spring_deflection_rad", "support_m"});
+  const CrossValidation validation = cross_validate(
+      dataset, {{.family = "linear", .features = features}}, {.by = "support_m"}, 1, false);
+  const auto& rankings = validation.results.rankings;
+  ASSERT_EQ(rankings.size(), 4U);
+  EXPECT_FALSE(rankings[0].is_possible());
+  EXPECT_TRUE(rankings[1].is_possible());
+  EXPECT_TRUE(rankings[2].is_possible());
+  EXPECT_FALSE(rankings[3].is_possible());
+  const FoldSummary& summary = validation.ranking.front();
+  EXPECT_EQ(summary.folds, 4U);
+  // Records of 1000, 1100, 1200 and 1300 samples: 2300 of 4600.
+  EXPECT_EQ(validation.ranked().common_samples, 2300U);
+  EXPECT_TRUE(validation.ranked().is_possible()) << "half of the samples";
+  EXPECT_EQ(summary.ranked_folds, 2U);
+  const std::vector<ResultRow>& rows = validation.results.rows;
+  EXPECT_NEAR(summary.common_rmse.mean,
+              0.5 * (rows[2].score.common.rmse + rows[4].score.common.rmse), 1e-12);
+  EXPECT_EQ(rows[2].score.common.rmse, rows[2].score.metrics.rmse);
+  EXPECT_GT(summary.rmse.mean, 0.0);
+  EXPECT_GT(summary.within_2_std_dev, summary.within_std_dev);
 }
 
 TEST(CrossValidate, RefusesALeakAndStopsWhenAskedTo) {

@@ -55,6 +55,8 @@ TEST_F(MainJob, RanksEveryFamilyOnHeldOutRecords) {
   ASSERT_EQ(compare.exit_code, 0) << compare.err;
   for (const char* family : {"linear ", "linear_coulomb", "polynomial", "dgmm ", "dgmm_paper"})
     EXPECT_NE(compare.out.find(family), std::string::npos) << compare.out;
+  EXPECT_NE(compare.err.find("families, which --help lists"), std::string::npos) << compare.err;
+  EXPECT_EQ(compare.err.find("narx_mlp"), std::string::npos) << "a list: " << compare.err;
   EXPECT_EQ(torsio("evaluate best.safetensors b.csv").exit_code, 0);
 }
 

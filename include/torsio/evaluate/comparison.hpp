@@ -25,13 +25,15 @@ namespace torsio {
 
 struct Comparison {
   Results results;
-  /// Lowest RMSE on the validation recordings, or on the test recordings if there are no others:
-  /// its card then states that its score was also used to select it. None if every fit failed.
+  /// First in the ranking on the validation recordings, or on the test recordings if there are no
+  /// others: its card then states that its score was also used to select it. None if every fit
+  /// failed or no ranking is possible.
   std::optional<TrainedModel> best;
 };
 
 /// Trains every choice on the training recordings and scores it on the other roles. A fit that
-/// fails is a row with the reason.
+/// fails is a row with the reason. Models are ranked by the RMSE on the samples that no ranked model
+/// guarded (`Score::common`).
 /// @throws UsageError if there are no test recordings, an input is a leak and `allow_leak` is not
 /// set, or a setting names an input that does not exist.
 [[nodiscard]] Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choices,
@@ -41,6 +43,11 @@ struct Comparison {
 /// One model's rows on every role that the dataset has.
 [[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
                                      const Progress& progress = {});
+
+/// Gives all rows the status `diverged` if the model diverges in free run on its own training data or
+/// if its error there is above twice the standard deviation of the target: twice that of a constant.
+/// @param rows of one model, the rows of role train those of its training data.
+void mark_divergence_in_training(std::vector<ResultRow>& rows);
 
 /// Writes a model's scores on all test recordings (validation, if there are no test recordings) to
 /// its card, with a description of the samples. Without held-out recordings nothing changes.

@@ -67,27 +67,42 @@ struct FoldSummary {
   bool leak = false;
   std::size_t folds = 0;  ///< folds in the statistics
   std::size_t failed_folds = 0;
-  std::string reason = {};  ///< reason of the first failure
-  std::string worst_fold = {};
+  std::string status = "ok";    ///< status of the first failure: failed, diverged
+  std::string reason = {};      ///< reason of the first failure
+  std::string worst_fold = {};  ///< by `common_rmse`, else by `rmse`
   FoldStatistic rmse = {};
   FoldStatistic mad = {};
   FoldStatistic max_abs = {};
   FoldStatistic fit_percent = {};
+  /// The folds in which a ranking is possible; over them the `common_` statistics are those of
+  /// `Score::common`. 0 folds: not ranked.
+  std::size_t ranked_folds = 0;
+  FoldStatistic common_rmse = {};
+  FoldStatistic common_mad = {};
+  FoldStatistic common_max_abs = {};
+  FoldStatistic common_fit_percent = {};
   double guarded_share = kNotMeasured;  ///< share of all scored samples
-  double step_ns_p50 = kNotMeasured;    ///< mean over the folds
-  double fit_seconds = kNotMeasured;    ///< all folds together
-  std::size_t parameter_count = 0;      ///< parameters of the largest model
+  /// `Score::within_std_dev` and `within_2_std_dev` over the scored samples of all folds.
+  double within_std_dev = kNotMeasured;
+  double within_2_std_dev = kNotMeasured;
+  double step_ns_p50 = kNotMeasured;  ///< mean over the folds
+  double fit_seconds = kNotMeasured;  ///< all folds together
+  std::size_t parameter_count = 0;    ///< parameters of the largest model
 };
 
 struct CrossValidation {
   /// A row for each model and fold, and for each recording of it, with `fold` set and the split
   /// `validation`: these scores are used for the selection. A fit that failed is a row with the
-  /// reason.
+  /// reason. `rankings` has one for each fold.
   Results results;
   FoldPlan plan;  ///< without segments
-  /// Lowest mean RMSE first; models that failed in a fold come last, since their mean is over other
-  /// folds.
+  /// Lowest mean `common_rmse` first; models that failed in a fold come last, since their mean is
+  /// over other folds, and so do those that a guard replaced in more than half of a fold in which
+  /// other models ran. In the order of the choices if no ranking is possible.
   std::vector<FoldSummary> ranking;
+
+  /// The samples of all folds in which a ranking is possible, among all scored samples.
+  [[nodiscard]] Ranking ranked() const noexcept;
 };
 
 /// Trains every choice on each fold's rest, as `compare` does, and scores it in free run on the

@@ -20,7 +20,10 @@ struct Score {
   Metrics one_step = {};  ///< one-step-ahead errors of a model with feedback; else 0 samples
   std::size_t initialised_samples = 0;  ///< not scored: filters not settled
   std::size_t guarded_samples = 0;      ///< scored, but with the fallback of a guard
-  std::size_t diverged_samples = 0;     ///< guarded samples at which the model diverged
+  std::size_t diverged_samples = 0;     ///< guarded samples at which the model diverged or was NaN
+  /// On the samples that no model of the ranking guarded (`compare`, `cross_validate`); 0 samples:
+  /// not ranked.
+  Metrics common = {};
   /// Shares of the scored samples whose error is at most one, or two, of their error bars;
   /// NaN if none had one. A calibrated Gaussian error bar gives 0.683 and 0.954.
   double within_std_dev = kNotMeasured;
@@ -52,11 +55,19 @@ struct Corrections {
 [[nodiscard]] Prediction predict(Estimator estimator, const Recording& recording,
                                  const Corrections& corrections = {});
 
+/// One model at the measured samples of a recording: those of its segments of one role at which the
+/// target is new and finite. They are the same samples for every model.
+struct MeasuredEstimates {
+  std::vector<double> values;  ///< NaN: not scored, filters not settled
+  std::vector<bool> guarded;   ///< scored, but with the fallback of a guard
+};
+
 /// Scores of each recording that has segments of `role`, and of all of them together.
 struct SplitScore {
   struct OfRecording {
     std::string recording;
     Score score;
+    MeasuredEstimates estimates;
   };
   std::vector<OfRecording> recordings;
   Score together;

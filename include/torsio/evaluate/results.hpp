@@ -29,6 +29,23 @@ struct ResultRow {
   bool leak = false;          ///< an input was computed from the target, or the target from it
 };
 
+/// The samples on which the models of one split are ranked: those that no ranked model guarded. A
+/// guard replaces a model by its linear fallback, so that errors there are none of the model.
+struct Ranking {
+  Role split = Role::test;
+  std::size_t scored_samples = 0;  ///< scored by at least one of the models
+  std::size_t common_samples = 0;  ///< scored, and guarded in no ranked model
+
+  /// Share of the scored samples that a guard excludes; NaN if none were scored.
+  [[nodiscard]] double guarded_share() const noexcept {
+    return 1.0 - static_cast<double>(common_samples) / static_cast<double>(scored_samples);
+  }
+  /// A ranking on less than half of the samples would rank what the guards do.
+  [[nodiscard]] bool is_possible() const noexcept {
+    return common_samples > 0 && 2 * common_samples >= scored_samples;
+  }
+};
+
 struct Results {
   std::string target;
   std::string unit;
@@ -37,6 +54,7 @@ struct Results {
   std::vector<std::pair<std::string, std::vector<std::string>>> input_sets = {};
   bool non_causal_zero = false;
   std::vector<ResultRow> rows = {};
+  std::vector<Ranking> rankings = {};  ///< one for each held-out split; empty: nothing was compared
 };
 
 }  // namespace torsio

@@ -29,8 +29,8 @@ struct StructureSearch {
     const Dataset& dataset, const std::vector<std::string>& wanted_inputs);
 
 /// Structures chosen by cross-validation over the training records alone, so that held-out ones
-/// still choose nothing: of each family the one with the least mean RMSE over the folds. A
-/// candidate that fails in a fold is not chosen.
+/// still choose nothing: of each family the first in the ranking of `cross_validate`. A candidate
+/// that is not ranked is not chosen.
 /// @throws UsageError as `cross_validate`, Cancelled.
 [[nodiscard]] StructureSearch search_structures(const Dataset& dataset,
                                                 const std::vector<ModelChoice>& candidates,

@@ -1,12 +1,14 @@
 #include "fit/common/design.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <map>
 
 #include "numerics/least_squares.hpp"
 #include "numerics/nnls.hpp"
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -17,12 +19,15 @@ constexpr std::size_t kMaxKnots = 64;
 std::size_t input_named(const std::string& expression, const TrainingData& data) {
   const auto input = std::ranges::find(data.inputs, expression, &InputInfo::expression);
   if (input != data.inputs.end()) return static_cast<std::size_t>(input - data.inputs.begin());
-  std::string list;
-  for (const InputInfo& each : data.inputs) list += (list.empty() ? "" : ", ") + each.expression;
-  throw UsageError({.place = "option schedule",
-                    .expected = "one of the model's inputs (" + list + ")",
-                    .found = '"' + expression + '"',
-                    .advice = "Add it to --inputs: the model requires it at run time."});
+  std::vector<std::string> names;
+  for (const InputInfo& each : data.inputs) names.push_back(each.expression);
+  const std::string nearest = did_you_mean(expression, names);
+  throw UsageError(
+      {.place = "option schedule",
+       .expected = fmt::format("one of the model's inputs ({})", fmt::join(names, ", ")),
+       .found = '"' + expression + '"',
+       .advice =
+           nearest.empty() ? "Add it to --inputs: the model requires it at run time." : nearest});
 }
 
 struct Dropped {

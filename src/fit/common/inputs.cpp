@@ -11,6 +11,7 @@
 
 #include "data/canonical_channels.hpp"
 #include "numerics/least_squares.hpp"
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 
@@ -172,6 +173,20 @@ bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
   return missed < kUnexplained * total;
 }
 
+[[noreturn]] void refuse_missing(const Recording& recording, const std::string& channel,
+                                 const std::vector<ChannelDefinition>& definitions) {
+  std::vector<std::string> names = channel_names(recording);
+  const std::string found = fmt::format("{}", fmt::join(names, ", "));
+  for (const ChannelDefinition& definition : definitions) names.push_back(definition.name);
+  const std::string nearest = did_you_mean(channel, names);
+  throw UsageError({.place = recording.name(),
+                    .expected = "the channel " + channel + ", which an input needs",
+                    .found = found,
+                    .advice = nearest.empty()
+                                  ? "Choose other --inputs, or bring the channel in with --mapping."
+                                  : nearest});
+}
+
 /// Runs `parse` for expressions that the caller wrote.
 template <class Parse>
 auto as_asked(const Parse& parse) {
@@ -208,12 +223,7 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
       as_asked([&] { return FeaturePipeline(spec, dataset.sample_rate_Hz()); });
   for (const std::string& channel : pipeline.raw_inputs())
     for (const DatasetRecord& record : dataset.records)
-      if (!record.recording.has(channel))
-        throw UsageError(
-            {.place = record.recording.name(),
-             .expected = "the channel " + channel + ", which an input needs",
-             .found = fmt::format("{}", fmt::join(channel_names(record.recording), ", ")),
-             .advice = "Choose other --inputs, or bring the channel in with --mapping."});
+      if (!record.recording.has(channel)) refuse_missing(record.recording, channel, definitions);
   if (std::ranges::find(pipeline.raw_inputs(), dataset.target) != pipeline.raw_inputs().end())
     throw UsageError(
         {.problem = "the target " + dataset.target + " is among the inputs of the model",
