@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "data_flags.hpp"
+#include "interrupt.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "report_text.hpp"
@@ -63,6 +64,7 @@ torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset
   }
   bool is_kept = false;
   context.keep = [&](const torsio::TrainingCheckpoint& reached) {
+    lift_interrupt_deadline();  // a large network takes its time to be written
     torsio::save_checkpoint(flags.checkpoint(), reached);
     is_kept = true;
   };

@@ -103,7 +103,7 @@ std::string cross_validation_table(const CrossValidation& validation) {
     if (has_sets) cells.push_back(summary.input_set);
     for (const FoldStatistic& statistic : {summary.rmse, summary.mad, summary.max_abs})
       cells.push_back(mean_and_spread(statistic));
-    cells.push_back(fmt::format("{:.1f}", summary.fit_percent.mean));
+    cells.push_back(fixed_text(summary.fit_percent.mean, 1));
     cells.push_back(fmt::format("{:.1f}", 100.0 * summary.guarded_share));
     cells.push_back(summary.worst_fold);
     cells.push_back(fmt::format("{:.0f}", summary.step_ns_p50));
