@@ -12,6 +12,7 @@
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/report/terminal_plot.hpp"
+#include "torsio/report/text_table.hpp"
 #include "torsio/sim/bench_dataset.hpp"
 #include "verbs.hpp"
 
@@ -50,10 +51,11 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
   const torsio::Score& together = score.together;
   return fmt::format(
       "\nbest model {} saved to {}, loaded back, {} samples streamed through it:\n"
-      "RMSE {:.3f}, {:.0f} ns per step (99.9 %: {:.0f} ns), {} samples outside the training range "
+      "RMSE {}, {:.0f} ns per step (99.9 %: {:.0f} ns), {} samples outside the training range "
       "or faulty\n",
-      best.file.card.fitted_as, flags.output, together.metrics.samples, together.metrics.rmse,
-      together.step_ns_p50, together.step_ns_p999, together.guarded_samples);
+      best.file.card.fitted_as, flags.output, together.metrics.samples,
+      torsio::fixed_text(together.metrics.rmse, 3), together.step_ns_p50, together.step_ns_p999,
+      together.guarded_samples);
 }
 
 void run(DemoFlags& flags) {

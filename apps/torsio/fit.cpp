@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "data_flags.hpp"
+#include "interrupt.hpp"
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
@@ -64,6 +65,7 @@ torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset
   }
   bool is_kept = false;
   context.keep = [&](const torsio::TrainingCheckpoint& reached) {
+    lift_interrupt_deadline();  // a large network takes its time to be written
     torsio::save_checkpoint(flags.checkpoint(), reached);
     is_kept = true;
   };

@@ -94,10 +94,10 @@ void run(ImportFlags& flags) {
                               .advice = kExample});
   flags.data.check_outputs({flags.output, flags.json.destination}, {flags.file});
   require_model_file(flags.output);
-  const torsio::ForeignFile file = torsio::read_foreign_file(flags.file);
+  ProgressBar progress;
+  const torsio::ForeignFile file = torsio::read_foreign_file(flags.file, progress.listener());
   const torsio::ForeignNetwork network =
       is_json(file.bytes) ? read_weights(flags, file) : read_graph(flags, file);
-  ProgressBar progress;
   std::optional<torsio::Dataset> guards;
   if (!flags.data.recordings.empty()) guards = flags.data.load({}, {}, progress.listener());
   torsio::ImportedModel imported =

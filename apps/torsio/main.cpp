@@ -6,6 +6,7 @@
 #include <new>
 #include <string>
 
+#include "blas_threads.hpp"
 #include "interrupt.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
@@ -57,11 +58,13 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  limit_blas_threads(argv);
   try {
     return run(argc, argv);
   } catch (const torsio::UsageError& error) {
     return complain(error.what(), kCallWasWrong);
   } catch (const torsio::Error& error) {
+    lift_interrupt_deadline();
     (void)complain(error.what(), kWorkFailed);
     if (is_interrupted()) end_as_interrupted();
     return kWorkFailed;

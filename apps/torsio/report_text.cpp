@@ -26,7 +26,7 @@ std::string heading(const torsio::Results& results) {
 }
 
 std::string percent(double share) {
-  return std::isfinite(share) ? fmt::format("{:.1f}", 100.0 * share) : "-";
+  return std::isfinite(share) ? torsio::fixed_text(100.0 * share, 1) : "-";
 }
 
 std::string order_and_note(const torsio::Ranking& ranking) {
@@ -76,14 +76,14 @@ std::string evaluation_text(const torsio::Results& results) {
     return row.score.metrics.rmse < kTooSmallForFourPlaces;
   });
   const auto error = [&](double value) {
-    return is_small ? fmt::format("{:.3g}", value) : fmt::format("{:.4f}", value);
+    return is_small ? fmt::format("{:.3g}", value) : torsio::fixed_text(value, 4);
   };
   for (const torsio::ResultRow& row : results.rows) {
     const torsio::Metrics& metrics = row.score.metrics;
     std::string split(torsio::name(row.split));
     if (row.recording) split = "  " + *row.recording;
     table.row({split, error(metrics.rmse), error(metrics.mad), error(metrics.max_abs),
-               fmt::format("{:.1f}", metrics.fit_percent), fmt::format("{}", metrics.samples),
+               torsio::fixed_text(metrics.fit_percent, 1), fmt::format("{}", metrics.samples),
                fmt::format("{}", row.score.guarded_samples), percent(row.score.within_std_dev),
                percent(row.score.within_2_std_dev), fmt::format("{:.0f}", row.score.step_ns_p50),
                fmt::format("{:.0f}", row.score.step_ns_p999)});

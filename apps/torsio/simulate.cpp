@@ -127,7 +127,8 @@ torsio::OperatingConditions conditions(const SimulateFlags& flags) {
   return of;
 }
 
-torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
+torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags,
+                                       const torsio::Progress& progress) {
   torsio::ExperimentSpec spec{.actuator = flags.actuator,
                               .experiment = flags.experiment,
                               .seed = flags.seed,
@@ -147,7 +148,8 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags) {
   spec.is_impedance_zero = flags.impedance == "zero";
   spec.conditions = conditions(flags);
   if (!flags.faults.empty())
-    spec.faults = torsio::read_fault_schedule(flags.faults, torsio::data_sheet(flags.actuator));
+    spec.faults =
+        torsio::read_fault_schedule(flags.faults, torsio::data_sheet(flags.actuator), progress);
   return spec;
 }
 
@@ -252,10 +254,10 @@ void run(const SimulateFlags& flags) {
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
   DataFlags().check_outputs({flags.output, flags.json.destination, flags.plot}, {flags.faults});
   require_ending("--plot", flags.plot, {".svg"});
-  const torsio::ExperimentSpec spec = experiment_spec(flags);
   ProgressBar progress;
+  const torsio::ExperimentSpec spec = experiment_spec(flags, progress.listener());
   const torsio::Recording recording = torsio::simulate(spec, progress.listener());
-  torsio::write_csv(recording, flags.output);
+  torsio::write_csv(recording, flags.output, progress.listener());
   if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, recording));
   flags.json.write(torsio::json_text(recording_json(flags, spec, recording)));
   remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),

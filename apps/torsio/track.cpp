@@ -56,7 +56,7 @@ void check_replayed(const std::string& file, const torsio::TorqueReference& refe
                             .found = fmt::format("{}", *gap)});
 }
 
-torsio::TorqueReference reference_of(const TrackFlags& flags) {
+torsio::TorqueReference reference_of(const TrackFlags& flags, const torsio::Progress& progress) {
   torsio::TorqueReference reference{.kind = torsio::find_reference(flags.reference)};
   const bool is_replay = reference.kind == torsio::TorqueReference::Kind::replay;
   if (is_replay == flags.replayed.empty())
@@ -64,7 +64,10 @@ torsio::TorqueReference reference_of(const TrackFlags& flags) {
                               .expected = "a recording, with --reference replay",
                               .advice = "Give both or neither."});
   if (is_replay) {
-    const std::vector<torsio::Recording> recordings = torsio::load_recordings(flags.replayed);
+    torsio::LoadOptions options;
+    options.progress = progress;
+    const std::vector<torsio::Recording> recordings =
+        torsio::load_recordings(flags.replayed, options);
     if (recordings.size() != 1)
       throw torsio::UsageError({.place = "--replay",
                                 .expected = "one recording",
@@ -80,10 +83,11 @@ torsio::TorqueReference reference_of(const TrackFlags& flags) {
   return reference;
 }
 
-torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& sheet) {
+torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& sheet,
+                             const torsio::Progress& progress) {
   torsio::TrackingSpec spec{
       .output = flags.output == "free" ? torsio::JointOutput::free : torsio::JointOutput::locked,
-      .reference = reference_of(flags),
+      .reference = reference_of(flags, progress),
       .damping = above_zero(flags.damping, "--damping"),
       .feeds_rate_forward = flags.feeds_rate_forward};
   if (!flags.lever.empty()) {
@@ -103,7 +107,8 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
   if (!flags.observer.empty())
     spec.observer_cutoff_Hz =
         above_zero(torsio::si_quantity(flags.observer, "Hz", "--observer"), "--observer");
-  if (!flags.faults.empty()) spec.faults = torsio::read_fault_schedule(flags.faults, sheet);
+  if (!flags.faults.empty())
+    spec.faults = torsio::read_fault_schedule(flags.faults, sheet, progress);
   return spec;
 }
 
@@ -153,11 +158,11 @@ std::string refuse_output(const std::string& text) {
 void run(const TrackFlags& flags) {
   check(flags);
   const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
-  const torsio::TrackingSpec spec = spec_of(flags, sheet);
+  ProgressBar progress;
+  const torsio::TrackingSpec spec = spec_of(flags, sheet, progress.listener());
   const std::vector<torsio::NamedInverse> models = inverses_of(flags);
   torsio::check_tracking(sheet, spec,
                          flags.seed);  // before the sweeps for the linear model are run
-  ProgressBar progress;
   const torsio::LinearInverse linear = torsio::sweep_line(sheet, kDefaultSeed, progress.listener());
   for (const torsio::NamedInverse& model : models)
     warn_of_another_spring(model.name, model.inverse, linear, sheet,

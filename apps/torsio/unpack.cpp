@@ -4,6 +4,7 @@
 
 #include "data_flags.hpp"
 #include "output.hpp"
+#include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/recording_blocks.hpp"
@@ -53,7 +54,8 @@ void run(const UnpackFlags& flags) {
   const torsio::RecordingBlocks blocks = torsio::read_recording_blocks(flags.recording);
   if (blocks.frames == 0)
     throw torsio::Error({.place = flags.recording, .problem = "no block with frames was sealed"});
-  torsio::write_csv(blocks.recording, flags.output);
+  ProgressBar progress;
+  torsio::write_csv(blocks.recording, flags.output, progress.listener());
   remark(text_of(blocks, flags));
   flags.json.write(json_of(blocks));
 }

@@ -236,7 +236,7 @@ std::string Checker::jump_text(const Recording& recording, const std::string& na
   return fmt::format("{} jumps by {:.3g} at t = {:.4g} s, {} anywhere else", name, jump.height,
                      recording.time_s(jump.sample),
                      jump.next_height > 0.0
-                         ? fmt::format("{:.0f} times more than", jump.height / jump.next_height)
+                         ? fmt::format("{:.4g} times more than", jump.height / jump.next_height)
                          : "and does not move");
 }
 

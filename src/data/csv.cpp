@@ -218,8 +218,21 @@ CsvTable parse(ByteSource& source, const std::string& name, const CsvOptions& op
   check_skipped(header, options, place);
   TableParser parser(table, header, options);
   std::string_view line;
-  while (lines.next(line, options.limits.line_bytes))
-    if (!is_comment_or_blank(line)) parser.add(line, lines.number());
+  std::size_t gap_bytes = 0;
+  while (lines.next(line, options.limits.line_bytes)) {
+    if (!is_comment_or_blank(line)) {
+      parser.add(line, lines.number());
+      gap_bytes = 0;
+      continue;
+    }
+    gap_bytes += line.size() + 1;
+    if (gap_bytes > options.limits.gap_bytes)
+      throw Error({.place = fmt::format("{}: line {}", name, lines.number()),
+                   .expected = "a row of numbers",
+                   .found = fmt::format("more than {} bytes of blank lines and comments",
+                                        options.limits.gap_bytes),
+                   .advice = "Remove them:  grep -Ev '^(#|$)' LOG.csv > SHORT.csv"});
+  }
   if (parser.rows() == 0)
     throw Error({.place = name,
                  .problem = "no samples",

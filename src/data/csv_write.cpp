@@ -2,6 +2,7 @@
 #include <set>
 #include <string>
 
+#include "core/report_progress.hpp"
 #include "data/csv_table.hpp"
 #include "text_sink.hpp"
 #include "torsio/core/error.hpp"
@@ -36,7 +37,8 @@ std::string freshness_column(std::string_view channel_name) {
   return std::string(parts ? parts->quantity : channel_name) + "_fresh_1";
 }
 
-void write_csv(const Recording& recording, const std::string& path) {
+void write_csv(const Recording& recording, const std::string& path, const Progress& progress) {
+  constexpr std::size_t kRowsPerReport = 8192;
   check_writable(recording);
   OutputFile file = path == "-" ? OutputFile::standard_output() : OutputFile(path);
   TextSink text(file, path.ends_with(".gz"));
@@ -50,6 +52,9 @@ void write_csv(const Recording& recording, const std::string& path) {
   }
   text.add("\n");
   for (std::size_t i = 0; i < recording.size(); ++i) {
+    if (i % kRowsPerReport == 0)
+      report_progress(progress, static_cast<double>(i) / static_cast<double>(recording.size()),
+                      "writing");
     text.add(recording.time_s(i));
     for (const Channel& channel : recording.channels()) {
       text.add(",");

@@ -112,7 +112,7 @@ class Collector {
   /// With a role, all of it takes that role.
   void add(const std::string& path, std::optional<Role> role = {}) {
     if (is_manifest(path))
-      add_manifest(read_manifest(path), role);
+      add_manifest(read_manifest(path, options_.progress), role);
     else
       add_log(path, role);
   }
@@ -212,7 +212,7 @@ class Collector {
 
   [[nodiscard]] Mapping mapping_from(const std::string& path) {
     dataset_.files.push_back(path);
-    return read_mapping(path);
+    return read_mapping(path, options_.progress);
   }
 
   [[nodiscard]] Mapping mapping_of(const ManifestFile& entry, const Manifest& manifest) {

@@ -144,7 +144,9 @@ std::optional<std::string> expanded(std::string text) {
 
 }  // namespace
 
-Manifest read_manifest(const std::string& path) { return manifest_from(YamlValue::read(path)); }
+Manifest read_manifest(const std::string& path, const Progress& progress) {
+  return manifest_from(YamlValue::read(path, progress));
+}
 
 Manifest parse_manifest(std::string_view text, const std::string& name) {
   return manifest_from(YamlValue::parse(text, name));

@@ -133,7 +133,9 @@ Mapping mapping_from(const YamlValue& yaml) {
   return mapping;
 }
 
-Mapping read_mapping(const std::string& path) { return mapping_from(YamlValue::read(path)); }
+Mapping read_mapping(const std::string& path, const Progress& progress) {
+  return mapping_from(YamlValue::read(path, progress));
+}
 
 Mapping parse_mapping(std::string_view text, const std::string& name) {
   return mapping_from(YamlValue::parse(text, name));

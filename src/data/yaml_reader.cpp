@@ -32,8 +32,8 @@ YamlValue YamlValue::parse(std::string_view text, const std::string& file) {
   }
 }
 
-YamlValue YamlValue::read(const std::string& path) {
-  const auto source = open_bytes(path);
+YamlValue YamlValue::read(const std::string& path, const Progress& progress) {
+  const auto source = open_bytes(path, progress);
   std::string text(kLongestFile + 1, '\0');
   std::size_t size = 0;
   while (size < text.size()) {

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "torsio/core/progress.hpp"
+
 namespace torsio {
 
 /// A YAML value with its place, so that every message names file, line and key.
@@ -17,7 +19,7 @@ class YamlValue {
  public:
   /// @throws Error if the text is not YAML or too large.
   static YamlValue parse(std::string_view text, const std::string& file);
-  static YamlValue read(const std::string& path);
+  static YamlValue read(const std::string& path, const Progress& progress = {});
 
   [[nodiscard]] std::string place() const;
   [[nodiscard]] const std::string& file() const noexcept { return file_; }

@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <set>
+#include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/error.hpp"
@@ -13,47 +14,88 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kDeepest = 8;
+constexpr std::size_t kDeepest = 8;
+
+/// Builds the document event by event. The parser of the library accepts deep nesting and keys that
+/// come twice, and with a callback it searches the parent's entries after each object.
+class DocumentBuilder final : public nlohmann::json_sax<json> {
+ public:
+  explicit DocumentBuilder(std::string_view place) : place_(place) {}
+
+  [[nodiscard]] json take() { return std::move(document_); }
+
+  bool null() override { return add(nullptr); }
+  bool boolean(bool value) override { return add(value); }
+  bool number_integer(number_integer_t value) override { return add(value); }
+  bool number_unsigned(number_unsigned_t value) override { return add(value); }
+  bool number_float(number_float_t value, const string_t& /*text*/) override { return add(value); }
+  bool string(string_t& value) override { return add(std::move(value)); }
+  bool binary(binary_t& value) override { return add(std::move(value)); }
+  bool start_object(std::size_t /*size*/) override { return open(json::object()); }
+  bool start_array(std::size_t /*size*/) override { return open(json::array()); }
+  bool end_object() override { return close(); }
+  bool end_array() override { return close(); }
+
+  bool key(string_t& name) override {
+    const auto [at, is_new] = open_.back()->get_ref<json::object_t&>().emplace(name, nullptr);
+    if (!is_new)
+      throw Error({.place = std::string(place_),
+                   .expected = "each key once",
+                   .found = json(name).dump() + " twice"});
+    next_ = &at->second;
+    return true;
+  }
+
+  bool parse_error(std::size_t byte, const std::string& /*token*/,
+                   const nlohmann::detail::exception& error) override {
+    if (dynamic_cast<const json::out_of_range*>(&error) != nullptr)
+      throw Error({.place = std::string(place_),
+                   .expected = "numbers that a double can hold",
+                   .found = "a larger one"});
+    throw Error({.place = std::string(place_),
+                 .expected = "JSON",
+                 .found = fmt::format("something else at byte {}", byte),
+                 .advice = "The file is damaged: copy it again or fit the model again."});
+  }
+
+ private:
+  /// The place of the next value: the whole, a key's value or the end of a list.
+  json& next() {
+    if (open_.empty()) return document_;
+    if (open_.back()->is_object()) return *next_;
+    return open_.back()->emplace_back();
+  }
+  bool add(json value) {
+    next() = std::move(value);
+    return true;
+  }
+  bool open(json value) {
+    if (open_.size() >= kDeepest)
+      throw Error({.place = std::string(place_),
+                   .expected = fmt::format("at most {} levels of nesting", kDeepest),
+                   .found = "more"});
+    json& at = next();
+    at = std::move(value);
+    open_.push_back(&at);  // remains where it is: its parent gets no other value before its end
+    return true;
+  }
+  bool close() {
+    open_.pop_back();
+    return true;
+  }
+
+  std::string_view place_;
+  json document_;
+  std::vector<json*> open_;
+  json* next_ = nullptr;
+};
 
 }  // namespace
 
 json parse_json(std::string_view text, std::string_view place) {
-  std::vector<std::set<std::string>> open_keys;  // keys of every object and array around the cursor
-  // The library accepts deep nesting and keys that come twice without an error.
-  const auto check = [&](int depth, json::parse_event_t event, const json& parsed) {
-    switch (event) {
-      case json::parse_event_t::object_start:
-      case json::parse_event_t::array_start:
-        if (depth >= kDeepest)
-          throw Error({.place = std::string(place),
-                       .expected = fmt::format("at most {} levels of nesting", kDeepest),
-                       .found = "more"});
-        open_keys.emplace_back();
-        break;
-      case json::parse_event_t::object_end:
-      case json::parse_event_t::array_end: open_keys.pop_back(); break;
-      case json::parse_event_t::key:
-        if (!open_keys.back().insert(parsed.get<std::string>()).second)
-          throw Error({.place = std::string(place),
-                       .expected = "each key once",
-                       .found = parsed.dump() + " twice"});
-        break;
-      case json::parse_event_t::value: break;
-    }
-    return true;
-  };
-  try {
-    return json::parse(text, check);
-  } catch (const json::parse_error& error) {
-    throw Error({.place = std::string(place),
-                 .expected = "JSON",
-                 .found = fmt::format("something else at byte {}", error.byte),
-                 .advice = "The file is damaged: copy it again or fit the model again."});
-  } catch (const json::out_of_range&) {
-    throw Error({.place = std::string(place),
-                 .expected = "numbers that a double can hold",
-                 .found = "a larger one"});
-  }
+  DocumentBuilder builder(place);
+  (void)json::sax_parse(text, &builder);
+  return builder.take();
 }
 
 }  // namespace torsio

@@ -5,8 +5,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <climits>
+#include <cstdint>
+#include <cstring>
 #include <system_error>
 #include <utility>
 
@@ -22,6 +26,48 @@ fs::path temporary_name(const fs::path& target) {
   return target.parent_path() /
          fmt::format(".{}.{}-{}.tmp", target.filename().string(), ::getpid(), count++);
 }
+
+/// The names of the temporary files, where a signal handler can read them: it may neither allocate
+/// nor lock, and it may interrupt any line. More files than places are not removed by it.
+class UnfinishedFiles {
+ public:
+  void add(const fs::path& name) noexcept {
+    const std::size_t size = std::strlen(name.c_str()) + 1;
+    for (Place& place : places_) {
+      State expected = State::free;
+      if (size > place.name.size() ||
+          !place.state.compare_exchange_strong(expected, State::changing))
+        continue;
+      std::memcpy(place.name.data(), name.c_str(), size);
+      place.state = State::named;
+      return;
+    }
+  }
+  void drop(const fs::path& name) noexcept {
+    for (Place& place : places_) {
+      if (place.state != State::named || std::strcmp(place.name.data(), name.c_str()) != 0)
+        continue;
+      place.state = State::free;
+      return;
+    }
+  }
+  void remove() noexcept {
+    for (Place& place : places_)
+      if (place.state == State::named) ::unlink(place.name.data());
+  }
+
+ private:
+  enum class State : std::uint8_t { free, changing, named };
+  struct Place {
+    std::atomic<State> state{State::free};
+    std::array<char, PATH_MAX> name{};
+  };
+  static_assert(std::atomic<State>::is_always_lock_free);
+
+  std::array<Place, 8> places_;
+};
+
+constinit UnfinishedFiles unfinished;
 
 /// Writes the folder's entry of the new name to storage. Not every file system can; the data is
 /// safe already.
@@ -68,7 +114,9 @@ OutputFile::OutputFile(const fs::path& path) : place_(path) {
   if (path == "/dev/stdout") {
     descriptor_ = ::dup(STDOUT_FILENO);  // opened anew, a file would begin at its start
   } else if (fs::exists(status) && !fs::is_regular_file(status)) {
-    descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    do {  // a pipe without a reader waits for one
+      descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    } while (descriptor_ < 0 && errno == EINTR);
   } else {
     target_ = target_of(path);
     if (is_protected(target_)) {
@@ -76,17 +124,25 @@ OutputFile::OutputFile(const fs::path& path) : place_(path) {
       refuse();
     }
     temporary_ = temporary_name(target_);
+    unfinished.add(temporary_);
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (descriptor_ >= 0 && fs::exists(status))
       ::fchmod(descriptor_, static_cast<::mode_t>(status.permissions()));
   }
-  if (descriptor_ < 0) refuse();
+  if (descriptor_ < 0) {
+    unfinished.drop(temporary_);
+    refuse();
+  }
 }
 
 OutputFile::~OutputFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
-  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  if (temporary_.empty()) return;
+  ::unlink(temporary_.c_str());
+  unfinished.drop(temporary_);
 }
+
+void OutputFile::remove_unfinished() noexcept { unfinished.remove(); }
 
 void OutputFile::refuse() const {
   const int code = errno;
@@ -109,6 +165,7 @@ void OutputFile::commit() {
   if (::close(std::exchange(descriptor_, -1)) != 0) refuse();
   if (!renames) return;
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) refuse();
+  unfinished.drop(temporary_);
   temporary_.clear();
   sync_folder(target_.parent_path());
 }

@@ -98,8 +98,8 @@ ModelCard card_of(const ImportOptions& options, const Source& source) {
 
 }  // namespace
 
-ForeignFile read_foreign_file(const std::string& path) {
-  const std::unique_ptr<ByteSource> source = open_bytes(path);
+ForeignFile read_foreign_file(const std::string& path, const Progress& progress) {
+  const std::unique_ptr<ByteSource> source = open_bytes(path, progress);
   ForeignFile file;
   std::array<char, kChunk> chunk{};
   while (const std::size_t size = source->read(chunk.data(), chunk.size())) {

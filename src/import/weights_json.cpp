@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -12,8 +13,10 @@
 #include <utility>
 #include <vector>
 
+#include "data/names.hpp"
 #include "files/json_text.hpp"
 #include "files/safetensors.hpp"
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -58,6 +61,15 @@ using Tensors = std::map<std::string, Weights, NaturalOrder>;
                .advice = std::move(advice)});
 }
 
+/// A misspelt key would otherwise be a missing one, or ignored.
+void refuse_unknown_keys(const json& object, std::span<const std::string_view> known,
+                         const std::string& place) {
+  for (const auto& [key, value] : object.items())
+    if (std::ranges::find(known, key) == known.end())
+      refuse(place, fmt::format("only the keys {}", fmt::join(known, ", ")),
+             fmt::format("'{}'", printable(key)), did_you_mean(key, known));
+}
+
 std::vector<std::size_t> shape_of(const json& tensor, const std::string& place) {
   const auto shape = tensor.find("shape");
   if (shape == tensor.end() || !shape->is_array() || shape->size() > 8)
@@ -73,6 +85,8 @@ std::vector<std::size_t> shape_of(const json& tensor, const std::string& place) 
 
 Weights weights_of(const json& tensor, const std::string& place) {
   if (!tensor.is_object()) refuse(place, R"({"shape": [...], "data": [...]})", tensor.type_name());
+  constexpr std::array<std::string_view, 2> kKeys{"shape", "data"};
+  refuse_unknown_keys(tensor, kKeys, place);
   Weights weights{shape_of(tensor, place), {}};
   const auto data = tensor.find("data");
   if (data == tensor.end() || !data->is_array())
@@ -96,6 +110,8 @@ Weights weights_of(const json& tensor, const std::string& place) {
 }
 
 Tensors tensors_of(const json& document, const std::string& place) {
+  constexpr std::array<std::string_view, 2> kKeys{"tensors", "arch"};  // arch: a remark
+  if (document.is_object()) refuse_unknown_keys(document, kKeys, place);
   const auto list = document.is_object() ? document.find("tensors") : document.end();
   if (list == document.end() || !list->is_object())
     refuse(place, R"({"tensors": {name: {"shape": [...], "data": [...]}}})", "something else");
@@ -141,11 +157,13 @@ class WeightReader {
       refuse(at(name), fmt::format("shape [{}]", length), shape_text(weights->shape));
     return weights->values;
   }
-  /// @returns the part before `suffix` of the first name that ends in it
-  [[nodiscard]] std::optional<std::string> prefix_of(std::string_view suffix) const {
+  [[nodiscard]] bool has(const std::string& name) const { return tensors_.contains(name); }
+  /// @returns the parts before `suffix` of the names that end in it, in their order
+  [[nodiscard]] std::vector<std::string> prefixes_of(std::string_view suffix) const {
+    std::vector<std::string> prefixes;
     for (const auto& [name, weights] : tensors_)
-      if (name.ends_with(suffix)) return name.substr(0, name.size() - suffix.size());
-    return std::nullopt;
+      if (name.ends_with(suffix)) prefixes.push_back(name.substr(0, name.size() - suffix.size()));
+    return prefixes;
   }
   [[nodiscard]] const std::vector<std::string>& taken_as_zero() const { return taken_as_zero_; }
   void refuse_the_rest() const {
@@ -175,14 +193,14 @@ void check_columns(const Matrix& matrix, std::size_t expected, const std::string
 
 /// The layers of the one recurrent module, if there is one.
 void read_recurrent(WeightReader& reader, std::vector<ForeignStage>& stages) {
-  const std::optional<std::string> prefix = reader.prefix_of("weight_ih_l0");
-  if (!prefix) return;
+  const std::vector<std::string> prefixes = reader.prefixes_of("weight_ih_l0");
+  if (prefixes.empty()) return;
   std::size_t width = 0;
-  for (std::size_t k = 0; k == 0 || reader.prefix_of(fmt::format("weight_ih_l{}", k)) == prefix;
-       ++k) {
+  for (std::size_t k = 0;; ++k) {
     const auto name = [&](const char* tensor) {
-      return fmt::format("{}{}_l{}", *prefix, tensor, k);
+      return fmt::format("{}{}_l{}", prefixes.front(), tensor, k);
     };
+    if (!reader.has(name("weight_ih"))) return;
     RecurrentStage stage;
     stage.input_weights = reader.matrix(name("weight_ih"));
     stage.recurrent_weights = reader.matrix(name("weight_hh"));
@@ -207,19 +225,19 @@ void read_dense(WeightReader& reader, std::optional<Activation> activation,
   std::optional<std::size_t> width;
   if (!stages.empty()) width = std::get<RecurrentStage>(stages.back()).recurrent_weights.columns;
   bool is_first = true;
-  while (const auto prefix = reader.prefix_of("weight")) {
+  for (const std::string& prefix : reader.prefixes_of("weight")) {
     if (!is_first) {
       if (!activation)
-        throw UsageError({.place = reader.at(*prefix + "weight"),
+        throw UsageError({.place = reader.at(prefix + "weight"),
                           .expected = "--activation: the function between the dense layers",
                           .found = "none, and the names of the tensors do not contain it"});
       stages.emplace_back(ActivationStage{*activation});
     }
     is_first = false;
-    DenseStage stage{reader.matrix(*prefix + "weight"), {}};
-    if (width) check_columns(stage.weights, *width, reader.at(*prefix + "weight"));
+    DenseStage stage{reader.matrix(prefix + "weight"), {}};
+    if (width) check_columns(stage.weights, *width, reader.at(prefix + "weight"));
     width = stage.weights.rows;
-    stage.bias = reader.bias(*prefix + "bias", stage.weights.rows);
+    stage.bias = reader.bias(prefix + "bias", stage.weights.rows);
     stages.emplace_back(std::move(stage));
   }
 }

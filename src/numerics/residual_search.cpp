@@ -90,29 +90,44 @@ class Residuals : public ceres::CostFunction {
   std::size_t parameters_;
 };
 
-/// Reports each iteration to `Progress`; its exceptions are thrown again after Ceres has returned.
+/// Reports each iteration to `Progress`, and each evaluation, of which an iteration has many; its
+/// exceptions are thrown again after Ceres has returned.
 class Reporter : public ceres::IterationCallback {
  public:
   explicit Reporter(const SearchOptions& options) : options_(options) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& at) override {
-    try {
-      report_progress(
-          options_.progress,
-          static_cast<double>(at.iteration) /
-              static_cast<double>(std::max<std::size_t>(options_.max_iterations, 1)),
-          fmt::format("iteration {}, error {:.4g}", at.iteration, std::sqrt(2.0 * at.cost)));
-    } catch (...) {
-      thrown_ = std::current_exception();
-      return ceres::SOLVER_ABORT;
-    }
-    return ceres::SOLVER_CONTINUE;
+    share_ = static_cast<double>(at.iteration) /
+             static_cast<double>(std::max<std::size_t>(options_.max_iterations, 1));
+    doing_ = fmt::format("iteration {}, error {:.4g}", at.iteration, std::sqrt(2.0 * at.cost));
+    return continues() ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
+  }
+  /// The same problem, which can no longer be evaluated once the listener asks to stop.
+  [[nodiscard]] ResidualProblem reported(ResidualProblem problem) {
+    problem.evaluate = [this, evaluate = std::move(problem.evaluate)](std::span<const double> theta,
+                                                                      std::span<double> residuals,
+                                                                      std::span<double> jacobian) {
+      return continues() && evaluate(theta, residuals, jacobian);
+    };
+    return problem;
   }
   void rethrow() const {
     if (thrown_) std::rethrow_exception(thrown_);
   }
 
  private:
+  bool continues() {
+    if (thrown_) return false;
+    try {
+      report_progress(options_.progress, share_, doing_);
+    } catch (...) {
+      thrown_ = std::current_exception();
+    }
+    return !thrown_;
+  }
+
   const SearchOptions& options_;
+  double share_ = 0.0;
+  std::string doing_ = "iteration 0";
   std::exception_ptr thrown_;
 };
 
@@ -171,15 +186,19 @@ class SilentCeres {
 };
 
 /// Nothing if r cannot be computed at the start.
-std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<double> theta,
+std::optional<SearchResult> search(const ResidualProblem& unreported, std::vector<double> theta,
                                    const SearchOptions& options) {
+  Reporter reporter(options);
+  const ResidualProblem problem = reporter.reported(unreported);
   ceres::Problem ceres_problem;
   ceres_problem.AddResidualBlock(
       new Residuals(problem, theta.size(), options.typical),  // the problem owns it
       nullptr, theta.data());
   set_bounds(ceres_problem, theta, options);
   std::vector<double> residuals(problem.residuals);
-  if (!evaluate(problem, theta, options.typical, residuals, {})) return std::nullopt;
+  const bool can_start = evaluate(problem, theta, options.typical, residuals, {});
+  reporter.rethrow();
+  if (!can_start) return std::nullopt;
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::DENSE_QR;
   settings.max_num_iterations = static_cast<int>(options.max_iterations);
@@ -187,7 +206,6 @@ std::optional<SearchResult> search(const ResidualProblem& problem, std::vector<d
   settings.parameter_tolerance = 1e-10;
   settings.num_threads = 1;
   settings.logging_type = ceres::SILENT;
-  Reporter reporter(options);
   settings.callbacks.push_back(&reporter);
   ceres::Solver::Summary summary;
   const SilentCeres silent;

@@ -44,7 +44,9 @@ void add_rows(TextTable& table, const std::string& samples,
     const double change = 100.0 * (score.adapted.rmse / score.frozen.rmse - 1.0);
     table.row({samples, score.recording.empty() ? "all" : score.recording,
                error_text(score.frozen.rmse), error_text(score.adapted.rmse),
-               std::isfinite(change) ? fmt::format("{:+.1f}", change) : "-",
+               std::isfinite(change)
+                   ? fmt::format("{}{}", std::signbit(change) ? "" : "+", fixed_text(change, 1))
+                   : "-",
                error_text(score.frozen.mad), error_text(score.adapted.mad),
                fmt::format("{}", score.adapted.samples)});
   }

@@ -21,7 +21,7 @@ std::vector<InputAttribution> by_use(std::vector<InputAttribution> inputs) {
 }
 
 std::string share_text(double share) {
-  return std::isfinite(share) ? fmt::format("{:.1f}", 100.0 * share) : "-";
+  return std::isfinite(share) ? fixed_text(100.0 * share, 1) : "-";
 }
 
 std::string increase_text(const InputAttribution& input) {

@@ -139,8 +139,8 @@ std::string cross_validation_table(const CrossValidation& validation) {
          is_possible ? std::array{summary.common_rmse, summary.common_mad, summary.common_max_abs}
                      : std::array{summary.rmse, summary.mad, summary.max_abs})
       cells.push_back(mean_and_spread(statistic));
-    cells.push_back(fmt::format(
-        "{:.1f}", is_possible ? summary.common_fit_percent.mean : summary.fit_percent.mean));
+    cells.push_back(
+        fixed_text(is_possible ? summary.common_fit_percent.mean : summary.fit_percent.mean, 1));
     cells.push_back(percent_text(summary.guarded_share));
     cells.push_back(percent_text(summary.within_std_dev));
     cells.push_back(percent_text(summary.within_2_std_dev));

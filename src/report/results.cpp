@@ -119,7 +119,7 @@ std::string model_label(std::string_view family, std::string_view variant) {
 std::string error_text(double value, double smallest) {
   constexpr double kTooSmallForThreePlaces = 0.005;
   if (smallest < kTooSmallForThreePlaces && value != 0.0) return fmt::format("{:.3g}", value);
-  return std::abs(value) < 1e6 ? fmt::format("{:.3f}", value) : fmt::format("{:.3g}", value);
+  return fixed_text(value, 3);
 }
 
 std::string percent_text(double share) {
@@ -211,7 +211,7 @@ std::string ranked_table(const Results& results, Role split) {
     if (has_sets) cells.push_back(row->input_set);
     for (const double value : {metrics.rmse, metrics.mad, metrics.max_abs})
       cells.push_back(error_text(value, smallest));
-    cells.push_back(fmt::format("{:.1f}", metrics.fit_percent));
+    cells.push_back(fixed_text(metrics.fit_percent, 1));
     cells.push_back(percent_text(static_cast<double>(row->score.guarded_samples) /
                                  static_cast<double>(row->score.metrics.samples)));
     cells.push_back(percent_text(row->score.within_std_dev));

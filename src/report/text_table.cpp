@@ -3,10 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
 namespace torsio {
+
+std::string fixed_text(double value, int decimals) {
+  constexpr double kReadable = 1e6;
+  return std::abs(value) < kReadable ? fmt::format("{:.{}f}", value, decimals)
+                                     : fmt::format("{:.3g}", value);
+}
 
 void TextTable::header(const std::vector<std::string>& cells) {
   header_.insert(header_.end(), cells.begin(), cells.end());

@@ -23,8 +23,11 @@ std::string_view name(JointOutput output) {
 }
 
 /// "-" if there is no run.
-std::string text(const RunningMean& of, const char* format = "{:.4g}") {
-  return of.count() == 0 ? std::string("-") : fmt::format(fmt::runtime(format), of.mean());
+std::string text(const RunningMean& of) {
+  return of.count() == 0 ? std::string("-") : fmt::format("{:.4g}", of.mean());
+}
+std::string text(const RunningMean& of, int decimals) {
+  return of.count() == 0 ? std::string("-") : fixed_text(of.mean(), decimals);
 }
 
 /// Empty for fewer than two runs.
@@ -130,10 +133,9 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
   std::string remarks;
   for (const auto& [model, means] : models) {
     table.row({model, text(means.mad), spread(means.mad), text(means.std_abs), text(means.rmse),
-               text(means.to_linear, "{:.3f}"), text(means.error_ratio, "{:.3f}"),
-               text(means.bandwidth, "{:.2f}"), text(means.limit_events, "{:.0f}"),
-               text(means.faults, "{:.0f}"), fmt::format("{}", means.cycles),
-               text(means.overshoot, "{:.2f}")});
+               text(means.to_linear, 3), text(means.error_ratio, 3), text(means.bandwidth, 2),
+               text(means.limit_events, 0), text(means.faults, 0), fmt::format("{}", means.cycles),
+               text(means.overshoot, 2)});
     for (const std::string& remark : means.remarks) remarks += remark + "\n";
   }
   return fmt::format(

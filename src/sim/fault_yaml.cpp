@@ -96,6 +96,8 @@ template <class Read>
 FaultSchedule as_usage(const DataSheet& sheet, const Read& read) {
   try {
     return schedule_from(read(), sheet);
+  } catch (const Cancelled&) {
+    throw;
   } catch (const Error& error) {
     throw UsageError(error.report());
   }
@@ -103,8 +105,9 @@ FaultSchedule as_usage(const DataSheet& sheet, const Read& read) {
 
 }  // namespace
 
-FaultSchedule read_fault_schedule(const std::string& path, const DataSheet& sheet) {
-  return as_usage(sheet, [&] { return YamlValue::read(path); });
+FaultSchedule read_fault_schedule(const std::string& path, const DataSheet& sheet,
+                                  const Progress& progress) {
+  return as_usage(sheet, [&] { return YamlValue::read(path, progress); });
 }
 
 FaultSchedule parse_fault_schedule(std::string_view text, const std::string& name,

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "data/csv_table.hpp"
+#include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
@@ -159,6 +160,26 @@ TEST(Csv, EveryNumberIsRoundedCorrectly) {
 TEST(Csv, NumbersBeyondTheRangeOfDoublesBecomeZeroOrAreRefused) {
   EXPECT_EQ(parse_csv("a_1\n1e-999\n", "a.csv").columns[0].values[0], 0.0);
   EXPECT_THROW(parse_csv("a_1\n1e999\n", "a.csv"), std::exception);
+}
+
+TEST(Csv, EndsAtALongStretchWithoutSamples) {
+  const CsvOptions options{.limits = {.gap_bytes = 1000}};
+  const auto with_gap = [&](const std::string& line, std::size_t lines) {
+    std::string text = "a_1\n1\n";
+    for (std::size_t n = 0; n < lines; ++n) text += line + "\n";
+    return text + "2\n";
+  };
+  // Below the limit as often as one likes.
+  EXPECT_EQ(parse_csv(with_gap("", 900) + with_gap("# note", 100).substr(4), "a.csv", options)
+                .columns[0]
+                .values,
+            (std::vector<double>{1, 2, 1, 2}));
+  for (const char* line : {"", "\r", "# note"}) {
+    const std::string message =
+        test::error_message([&] { (void)parse_csv(with_gap(line, 1001), "a.csv", options); });
+    EXPECT_TRUE(message.starts_with("a.csv: line ")) << message;
+    EXPECT_NE(message.find("more than 1000 bytes of blank lines"), std::string::npos) << message;
+  }
 }
 
 Recording example(std::size_t samples) {

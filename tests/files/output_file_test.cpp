@@ -48,6 +48,20 @@ TEST(OutputFile, LeavesNothingWithoutCommit) {
   EXPECT_EQ(folder.files(), 0U);
 }
 
+TEST(OutputFile, CanBeRemovedFromASignalHandler) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a", "old");
+  OutputFile committed(folder.path("b"));
+  committed.commit();
+  OutputFile unfinished(path);
+  OutputFile other(folder.path("c"));
+  write(unfinished, "half");
+  EXPECT_EQ(folder.files(), 4U);
+  OutputFile::remove_unfinished();
+  EXPECT_EQ(folder.files(), 2U);
+  EXPECT_EQ(text_of(path), "old");
+}
+
 TEST(OutputFile, WritesTheFileThatADanglingLinkNames) {
   const TemporaryFolder folder;
   std::filesystem::create_symlink("target", folder.path("link"));

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <string>
 
 #include "import/network_parameters.hpp"
@@ -89,6 +91,40 @@ TEST(WeightsJson, RefusesWhatItCannotMean) {
                       tensor("m.weight_hh_l0", "2, 2", "1, 2, 3, 4") + "}}"),
               HasSubstr("4 H x H of an LSTM or 3 H x H of a GRU"));
   EXPECT_THAT(refusal(small_lstm(tensor("o.weight", "1, 1", "2"))), HasSubstr("--activation"));
+}
+
+TEST(WeightsJson, NamesTheNearestOfAnUnknownKey) {
+  EXPECT_THAT(refusal(R"({"tensor": {}})"),
+              AllOf(HasSubstr("net.json: expected only the keys tensors, arch"),
+                    HasSubstr("found 'tensor'"), HasSubstr("Did you mean 'tensors'?")));
+  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "dats": [1]}}})"),
+              AllOf(HasSubstr("/tensors/a.weight: expected only the keys shape, data"),
+                    HasSubstr("Did you mean 'data'?")));
+  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "data": [1], "scale": 2}}})"),
+              HasSubstr("found 'scale'"));
+  const ForeignNetwork network =
+      parse(R"({"arch": "one layer", "tensors": {)" + tensor("a.weight", "1, 1", "1") + "}}");
+  EXPECT_EQ(network.inputs, 1U);
+}
+
+/// Seconds to parse a file of so many dense layers of one number.
+double seconds_of(std::size_t layers) {
+  std::string text = R"({"tensors": {)";
+  for (std::size_t k = 0; k < layers; ++k)
+    text += tensor(fmt::format("{}.weight", k), "1, 1", "1") + "," +
+            tensor(fmt::format("{}.bias", k), "1", "0") + ",";
+  text.back() = '}';
+  text += '}';
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(parse(text, Activation::tanh).stages.size(), 2 * layers - 1);
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+TEST(WeightsJson, TakesTimeInProportionToTheNumberOfTensors) {
+  // Proportional: a factor of 16 and that of the maps' logarithm. Quadratic: 256.
+  double least = seconds_of(1000);
+  for (int k = 0; k < 4; ++k) least = std::min(least, seconds_of(1000));
+  EXPECT_LT(seconds_of(16000), 80.0 * least);
 }
 
 TEST(WeightsJson, RefusesTwoOutputsAndWeightsBeyondFloat) {

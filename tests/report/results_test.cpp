@@ -40,6 +40,20 @@ TEST(ResultsJson, WritesWhatIsNotANumberAsNull) {
   EXPECT_EQ(json.at("results").at(0).at("reason"), "too few samples");
 }
 
+TEST(RankedTable, HasReadableNumbersOfAnySize) {
+  Results results{.target = "torque_Nm", .unit = "Nm"};
+  ResultRow row{.family = "linear", .split = Role::test, .status = "ok"};
+  for (const double size : {1e-300, 1.0, 1e300}) {
+    row.score.metrics = {.rmse = size, .mad = size, .max_abs = size, .fit_percent = -size};
+    row.score.metrics.samples = 10;
+    results.rows.push_back(row);
+  }
+  const std::string table = ranked_table(results, Role::test);
+  for (std::size_t begin = 0; begin < table.size(); begin = table.find('\n', begin) + 1)
+    EXPECT_LT(table.find('\n', begin) - begin, 120U) << table;
+  EXPECT_NE(table.find("-1e+300"), std::string::npos) << table;
+}
+
 TEST(Compare, KeepsTheModelOfTheLowestTestError) {
   const Comparison comparison = small_comparison();
   ASSERT_TRUE(comparison.best);

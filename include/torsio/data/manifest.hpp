@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/data/mapping.hpp"
 
@@ -50,8 +51,8 @@ struct Manifest {
   std::vector<ManifestFile> files;
 };
 
-/// @throws Error naming file, line, key, the known keys and the nearest one.
-[[nodiscard]] Manifest read_manifest(const std::string& path);
+/// @throws Error naming file, line, key, the known keys and the nearest one; Cancelled.
+[[nodiscard]] Manifest read_manifest(const std::string& path, const Progress& progress = {});
 [[nodiscard]] Manifest parse_manifest(std::string_view text, const std::string& name);
 
 /// The folder of the manifest's files: the first of `roots` that exists, after `${VARIABLE}` is

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
@@ -51,8 +52,8 @@ struct Mapping {
   std::map<std::string, std::vector<std::string>> computed_from;
 };
 
-/// @throws Error naming file, line, key, the known keys and the nearest one.
-[[nodiscard]] Mapping read_mapping(const std::string& path);
+/// @throws Error naming file, line, key, the known keys and the nearest one; Cancelled.
+[[nodiscard]] Mapping read_mapping(const std::string& path, const Progress& progress = {});
 [[nodiscard]] Mapping parse_mapping(std::string_view text, const std::string& name);
 
 /// Evaluates the definitions over the recording and adds them as channels. Where a channel that one

@@ -19,6 +19,9 @@ class OutputFile {
   /// Whether `target` is a file that no one may write. Its folder may allow to replace it all the
   /// same, but its owner has protected it.
   [[nodiscard]] static bool is_protected(const std::filesystem::path& target);
+  /// Removes the temporary files of all that are neither committed nor destroyed: for the handler of
+  /// a signal that ends the program. Async-signal-safe.
+  static void remove_unfinished() noexcept;
 
   /// @throws Error (no such folder, no permission, the target is a directory or protected).
   explicit OutputFile(const std::filesystem::path& path);

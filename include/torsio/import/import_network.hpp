@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "torsio/core/progress.hpp"
 #include "torsio/core/provenance.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
@@ -31,8 +32,8 @@ struct ForeignFile {
   Source source;
 };
 
-/// @throws Error if the file cannot be read or is larger than `kMaxForeignBytes`.
-[[nodiscard]] ForeignFile read_foreign_file(const std::string& path);
+/// @throws Error if the file cannot be read or is larger than `kMaxForeignBytes`; Cancelled.
+[[nodiscard]] ForeignFile read_foreign_file(const std::string& path, const Progress& progress = {});
 
 struct ImportedModel {
   ModelFile file;

@@ -5,6 +5,9 @@
 
 namespace torsio {
 
+/// A cell with so many decimals below 1e6, else with three significant digits: 1e300 has 301 digits.
+[[nodiscard]] std::string fixed_text(double value, int decimals);
+
 /// A table for the terminal: columns of numbers to the right (but never the first), of words to the left.
 class TextTable {
  public:

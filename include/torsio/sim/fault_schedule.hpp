@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/progress.hpp"
 
 namespace torsio {
 
@@ -56,8 +57,10 @@ struct FaultSchedule {
 ///       - {sensor: gear_angle_rad, fault: freeze, at: 5s, for: 2s}
 ///       - {part: friction, fault: drift, to: 1.3, over: 60s, at: 0s}
 ///
-/// @throws UsageError naming file, line, what was expected (with the known names) and found.
-[[nodiscard]] FaultSchedule read_fault_schedule(const std::string& path, const DataSheet& sheet);
+/// @throws UsageError naming file, line, what was expected (with the known names) and found;
+/// Cancelled.
+[[nodiscard]] FaultSchedule read_fault_schedule(const std::string& path, const DataSheet& sheet,
+                                                const Progress& progress = {});
 [[nodiscard]] FaultSchedule parse_fault_schedule(std::string_view text, const std::string& name,
                                                  const DataSheet& sheet);
 

@@ -19,6 +19,7 @@
 #include "fit/gaussian_process/kernel_search.hpp"
 #include "fit/gaussian_process/parametric_gp_trainer.hpp"
 #include "fit/gaussian_process/sparse_posterior.hpp"
+#include "numerics/shared_progress.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/model/any_model.hpp"
 
@@ -176,18 +177,13 @@ class Learner {
 
 void descend(Descent& descent, const Table& table, const ParametricGpOptions& options,
              Random& random, const FitContext& context) {
-  constexpr std::size_t kReportEvery = 500;
   Learner learner(descent, options, table.target.size());
   std::vector<std::size_t> batch(std::max<std::size_t>(1, options.batch));
-  std::size_t next_report = 0;
   std::size_t next_widening = kWidenEvery;
   for (std::size_t done = 0; done < options.updates; done += batch.size()) {
-    if (done >= next_report) {
-      report_progress(context.progress,
-                      0.9 * static_cast<double>(done) / static_cast<double>(options.updates),
-                      "learning");
-      next_report = done + kReportEvery;
-    }
+    report_progress(context.progress,
+                    0.9 * static_cast<double>(done) / static_cast<double>(options.updates),
+                    "learning");
     batch.resize(std::min(batch.size(), options.updates - done));
     for (std::size_t& n : batch) n = random.below(table.target.size());
     if (!learner.learn(table, batch)) {
@@ -336,7 +332,7 @@ Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data, const Parametri
   const Table table = standardised(scaling, split.training);
 
   Matrix centres = cluster_centres(thinned(table, kMaxClustered, random).features,
-                                   options.inducing_points, random);
+                                   options.inducing_points, random, context.progress);
   if (!options.kernel_plain)
     expression = started(std::move(expression), options.mode, median_distance(centres, random));
   const Kernel kernel(expression, data.input_count());
@@ -350,10 +346,10 @@ Fitted<ParametricGp> fit_parametric_gp(const TrainingData& data, const Parametri
     notes.push_back(std::move(note));
   if (!options.refit) return {std::move(parameters), std::move(notes)};
   report_progress(context.progress, 0.9, "fitting at once");
-  ParametricGp::Parameters refitted =
-      with_posterior(parameters, sparse_posterior(descent.trainer.kernel(), centres,
-                                                  descent.trainer.noise_variance(), table.features,
-                                                  table.target, SparseNoise::fitc));
+  ParametricGp::Parameters refitted = with_posterior(
+      parameters, sparse_posterior(descent.trainer.kernel(), centres,
+                                   descent.trainer.noise_variance(), table.features, table.target,
+                                   SparseNoise::fitc, share_of(context.progress, 0.9, 1.0)));
   const auto error_of = [&](const ParametricGp::Parameters& of) {
     return context.error_of ? context.error_of(ParametricGp(of)) : rmse_of(of, split.evaluation);
   };
@@ -380,7 +376,8 @@ Fitted<ParametricGp> fit_variational_gp(const TrainingData& data,
   const NetworkScaling scaling = scaling_of(table);
   table = standardised(scaling, std::move(table));
   const Table part = thinned(table, options.samples, random);
-  const Matrix points = cluster_centres(part.features, options.inducing_points, random);
+  const Matrix points =
+      cluster_centres(part.features, options.inducing_points, random, context.progress);
   set_start(expression, median_distance(points, random));
   Kernel kernel(expression, data.input_count());
 
@@ -393,8 +390,9 @@ Fitted<ParametricGp> fit_variational_gp(const TrainingData& data,
   kernel.set_log_parameters(std::span(found.at).first(kernel.parameter_count()));
   const double noise_variance = std::exp(found.at.back());
   report_progress(context.progress, 0.9, "taking in all samples");
-  SparsePosterior posterior = sparse_posterior(kernel, points, noise_variance, table.features,
-                                               table.target, SparseNoise::variational);
+  SparsePosterior posterior =
+      sparse_posterior(kernel, points, noise_variance, table.features, table.target,
+                       SparseNoise::variational, share_of(context.progress, 0.9, 1.0));
   notes.push_back(fmt::format(
       "kernel {}; noise {:.3g} (inputs and target standardised); bound of ln p(y) {:.6g} over {} "
       "of {} samples, {} points",

@@ -7,14 +7,18 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <string_view>
 #include <utility>
 
+#include "core/report_progress.hpp"
 #include "fit/common/usable_table.hpp"
 #include "signal/fit_normaliser.hpp"
 #include "torsio/signal/normaliser.hpp"
 
 namespace torsio {
 namespace {
+
+constexpr std::string_view kClustering = "clustering the samples";
 
 double square_distance(std::span<const double> a, std::span<const double> b) {
   double sum = 0.0;
@@ -35,11 +39,13 @@ std::size_t drawn(const std::vector<double>& weights, double total, Random& rand
   return last;
 }
 
-Matrix spread_centres(const Matrix& points, std::size_t clusters, Random& random) {
+Matrix spread_centres(const Matrix& points, std::size_t clusters, Random& random,
+                      const Progress& progress) {
   Matrix centres(clusters, points.columns);
   std::vector<double> nearest(points.rows, std::numeric_limits<double>::infinity());
   std::size_t chosen = random.below(points.rows);
   for (std::size_t k = 0; k < clusters; ++k) {
+    report_progress(progress, 0.0, kClustering);
     std::ranges::copy(points.row(chosen), centres.row(k).begin());
     for (std::size_t n = 0; n < points.rows; ++n)
       nearest[n] = std::min(nearest[n], square_distance(points.row(n), centres.row(k)));
@@ -154,11 +160,14 @@ void set_start(KernelExpression& kernel, double distance) {
   }
 }
 
-Matrix cluster_centres(const Matrix& points, std::size_t clusters, Random& random) {
+Matrix cluster_centres(const Matrix& points, std::size_t clusters, Random& random,
+                       const Progress& progress) {
   constexpr int kRounds = 30;
-  Matrix centres = spread_centres(points, clusters, random);
-  for (int round = 0; round < kRounds; ++round)
+  Matrix centres = spread_centres(points, clusters, random, progress);
+  for (int round = 0; round < kRounds; ++round) {
+    report_progress(progress, 0.0, kClustering);
     if (!move_centres(centres, points)) break;
+  }
   return centres;
 }
 

@@ -8,6 +8,7 @@
 #include "fit/common/usable_table.hpp"
 #include "model/gaussian_process/kernel.hpp"
 #include "torsio/core/matrix.hpp"
+#include "torsio/core/progress.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/network/network_layers.hpp"
@@ -38,7 +39,8 @@ void set_start(KernelExpression& kernel, double distance);
 
 /// k-means from k-means++ (Arthur and Vassilvitskii 2007), at most 30 rounds. Fewer centres come back
 /// where fewer points differ.
-[[nodiscard]] Matrix cluster_centres(const Matrix& points, std::size_t clusters, Random& random);
+[[nodiscard]] Matrix cluster_centres(const Matrix& points, std::size_t clusters, Random& random,
+                                     const Progress& progress = {});
 
 /// "input support_m is constant in the training data", for each that is.
 [[nodiscard]] std::vector<std::string> constant_inputs(const TrainingData& data,

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/report_progress.hpp"
 #include "model/gaussian_process/covariance.hpp"
 #include "model/gaussian_process/parametric_gp.hpp"
 
@@ -51,7 +52,7 @@ MatrixXd identity(Index size) { return MatrixXd::Identity(size, size); }
 
 SparsePosterior sparse_posterior(const Kernel& kernel, const Matrix& points, double noise_variance,
                                  const Matrix& features, std::span<const double> target,
-                                 SparseNoise noise) {
+                                 SparseNoise noise, const Progress& progress) {
   MatrixXd lower;
   if (lower_factor(kernel, points, lower) < 0.0) refuse_covariance(ParametricGp::kFamily);
   const auto triangle = std::as_const(lower).triangularView<Eigen::Lower>();
@@ -61,6 +62,8 @@ SparsePosterior sparse_posterior(const Kernel& kernel, const Matrix& points, dou
   MatrixXd b = identity(size);
   VectorXd projected = VectorXd::Zero(size);
   for (std::size_t begin = 0; begin < features.rows; begin += kChunk) {
+    report_progress(progress, static_cast<double>(begin) / static_cast<double>(features.rows),
+                    "taking in all samples");
     const std::size_t count = std::min(kChunk, features.rows - begin);
     MatrixXd white(size, static_cast<Index>(count));
     fill_columns(kernel, packed, features, begin, white);

@@ -7,6 +7,7 @@
 
 #include "model/gaussian_process/kernel.hpp"
 #include "torsio/core/matrix.hpp"
+#include "torsio/core/progress.hpp"
 
 namespace torsio {
 
@@ -22,10 +23,11 @@ struct SparsePosterior {
 
 enum class SparseNoise { fitc, variational };
 
-/// @throws Error if K has no factor.
+/// @throws Error if K has no factor, Cancelled.
 [[nodiscard]] SparsePosterior sparse_posterior(const Kernel& kernel, const Matrix& points,
                                                double noise_variance, const Matrix& features,
-                                               std::span<const double> target, SparseNoise noise);
+                                               std::span<const double> target, SparseNoise noise,
+                                               const Progress& progress = {});
 
 /// Minus Titsias' collapsed bound over some samples, and its gradient.
 class CollapsedBound {

@@ -9,6 +9,7 @@
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <mutex>
 #include <numeric>
 
 #include "core/report_progress.hpp"
@@ -139,13 +140,19 @@ SpreadChoice choose_spread(const Matrix& samples, const TrainingData& data,
                                 kDefaultSpread)};
   std::array<FoldErrors, kSpreads.size()> errors;
   std::string scores;
+  std::mutex reporting;
   for (std::size_t k = 0; k < kSpreads.size(); ++k) {
-    report_progress(progress, static_cast<double>(k) / static_cast<double>(kSpreads.size()),
-                    "choosing the spread");
+    // Of the fits, too: one of them with many iterations takes hours.
+    const Progress within = [&, k](double /*of_one_fit*/, std::string_view /*doing*/) {
+      const std::scoped_lock lock(reporting);
+      report_progress(progress, static_cast<double>(k) / static_cast<double>(kSpreads.size()),
+                      "choosing the spread");
+      return true;
+    };
     errors[k].resize(folds.size());
     for_each_chunk(folds.size(), threads, [&, k](std::size_t fold) {
       errors[k][fold] =
-          mean_square_error(Dgmm(fit(folds[fold].kept, kSpreads[k])), folds[fold].left_out);
+          mean_square_error(Dgmm(fit(folds[fold].kept, kSpreads[k], within)), folds[fold].left_out);
     });
     scores +=
         fmt::format("{}{}: {:.4g}", k == 0 ? "" : ", ", kSpreads[k], std::sqrt(mean_of(errors[k])));

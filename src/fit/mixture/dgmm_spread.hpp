@@ -21,8 +21,10 @@ struct SpreadChoice {
   std::string note;  ///< what was chosen and why, with the scores
 };
 
-/// Joint samples (target, then inputs) -> a mixture of that spread. Called from several threads.
-using FitWithSpread = std::function<Dgmm::Parameters(const Matrix& samples, double spread)>;
+/// Joint samples (target, then inputs) -> a mixture of that spread. Called from several threads; the
+/// progress may be, too.
+using FitWithSpread =
+    std::function<Dgmm::Parameters(const Matrix& samples, double spread, const Progress& progress)>;
 
 /// Leaves one record out at a time (a single record: every fifth of 50 blocks) and takes the spread
 /// with the least error on what was left out, mean square of the records' RMSE. Two rules keep the

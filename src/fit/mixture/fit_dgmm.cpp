@@ -257,10 +257,10 @@ Fitted<Dgmm> fit_dgmm(const TrainingData& data, const DgmmOptions& options,
   Fitted<Dgmm> fitted;
   double spread = options.online.initial_spread;
   if (std::isnan(spread)) {
-    const FitWithSpread fit = [&](const Matrix& part, double candidate) {
+    const FitWithSpread fit = [&](const Matrix& part, double candidate, const Progress& within) {
       DgmmOptions one = with_spread(options, candidate);
       one.threads = 1;
-      return fit_samples(part, data, one, {}).parameters;
+      return fit_samples(part, data, one, within).parameters;
     };
     SpreadChoice choice = choose_spread(samples, data, fit, options.threads, progress);
     spread = choice.spread;

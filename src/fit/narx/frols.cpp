@@ -54,6 +54,12 @@ CandidateList candidates_of(std::size_t inputs, std::size_t degree) {
   return candidates;
 }
 
+int exponent_of_largest(std::span<const double> values) {
+  double largest = 0.0;
+  for (const double value : values) largest = std::max(largest, std::abs(value));
+  return largest > 0.0 && std::isfinite(largest) ? std::ilogb(largest) : 0;
+}
+
 double dot(const detail::AlignedVector<double>& a, const detail::AlignedVector<double>& b) {
   return kernel_kernels::dot(a.data(), b.data(), a.size());
 }
@@ -190,8 +196,10 @@ class Search {
         target_(columns_.size(), 0.0),
         scratch_(candidates_.parents * kBlock),
         squares_(candidates_.list.size(), 0.0),
-        is_useless_(candidates_.list.size(), 0) {
+        is_useless_(candidates_.list.size(), 0),
+        target_exponent_(exponent_of_largest(target)) {
     std::ranges::copy(target, target_.begin());
+    for (double& value : target_) value = std::ldexp(value, -target_exponent_);
     target_square_ = dot(target_, target_);
     target_products_ = products_with(target_, &squares_);
   }
@@ -204,7 +212,7 @@ class Search {
   bool extend() {
     while (true) {
       const Choice best = best_candidate(products_);
-      if (best.reduction < kNothing * target_square_) return false;
+      if (!(best.reduction > kNothing * target_square_)) return false;
       if (add(best.candidate)) return true;
     }
   }
@@ -292,6 +300,7 @@ class Search {
         theta[s] -= row[products_.chosen[t]] * theta[t];
       theta[s] /= row[products_.chosen[s]];
     }
+    for (double& coefficient : theta) coefficient = std::ldexp(coefficient, target_exponent_);
     return theta;
   }
 
@@ -341,6 +350,7 @@ class Search {
   std::vector<double> squares_;          ///< phi . phi
   std::vector<double> target_products_;  ///< phi . y
   std::vector<std::uint8_t> is_useless_;
+  int target_exponent_ = 0;  ///< y is divided by two to this power: squares of 1e-160 would be 0
   std::vector<detail::AlignedVector<double>> directions_;  ///< q
   Products products_;
 };

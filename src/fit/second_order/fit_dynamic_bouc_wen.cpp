@@ -62,7 +62,8 @@ void evaluate(Oscillator& oscillator, const TrainingData& data, Parameters with)
   oscillator.miss = 1.0 - output_target * output_target / (output_output * target_target);
 }
 
-Oscillator best_oscillator(const TrainingData& data, const Parameters& with) {
+Oscillator best_oscillator(const TrainingData& data, const Parameters& with,
+                           const Progress& progress) {
   constexpr int kRates = 60;
   const double slowest = 2.0 * std::numbers::pi * data.sample_rate_Hz / 4000.0;
   const double fastest = 2.5 * data.sample_rate_Hz * static_cast<double>(with.time.substeps);
@@ -72,6 +73,7 @@ Oscillator best_oscillator(const TrainingData& data, const Parameters& with) {
       Oscillator oscillator{
           .rate_per_s = slowest * std::pow(fastest / slowest, static_cast<double>(i) / kRates),
           .damping_ratio = damping_ratio};
+      report_progress(progress, 0.0, "finding a mass on a spring");
       evaluate(oscillator, data, with);
       if (oscillator.miss < best.miss) best = oscillator;
     }
@@ -187,7 +189,7 @@ Fitted<DynamicBoucWen> fit_dynamic_bouc_wen(const TrainingData& data,
                              .input_order = options.input_order},
                     .lowest = stops.lowest,
                     .highest = stops.highest};
-  linear = of(best_oscillator(data, linear), linear);
+  linear = of(best_oscillator(data, linear, progress), linear);
   const double largest = largest_target(data);
   SimulationFitOptions search{.first_horizon = options.first_horizon,
                               .max_iterations = options.iterations,

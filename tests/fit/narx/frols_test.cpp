@@ -53,6 +53,25 @@ TEST(Frols, FindsTheTermsOfAPolynomialAmidNoise) {
               UnorderedElementsAre(Monomial{}, Monomial{1}, Monomial{0, 2}, Monomial{1, 1, 3}));
 }
 
+TEST(Frols, FindsTheSameTermsOfATargetWhoseSquaresAreZero) {
+  const Matrix x = normal(3000, 5, 1);
+  const std::vector<double> y = known(x, 0.3);
+  constexpr int kExponent = -700;  // about 1e-211
+  std::vector<double> tiny = y;
+  for (double& value : tiny) value = std::ldexp(value, kExponent);
+  const FrolsOptions options{.degree = 3, .terms = 6};
+  const Frols expected = frols(x, y, options);
+  const Frols found = frols(x, tiny, options);
+  ASSERT_EQ(found.sizes.size(), expected.sizes.size());
+  for (std::size_t size = 0; size < found.sizes.size(); ++size) {
+    EXPECT_EQ(found.sizes[size].terms, expected.sizes[size].terms);
+    EXPECT_EQ(found.sizes[size].error_reductions, expected.sizes[size].error_reductions);
+    for (std::size_t t = 0; t <= size; ++t)
+      EXPECT_EQ(found.sizes[size].coefficients[t],
+                std::ldexp(expected.sizes[size].coefficients[t], kExponent));
+  }
+}
+
 TEST(Frols, EndsWithoutNoiseAtTheLastTermThatIsThere) {
   const Matrix x = normal(500, 4, 2);
   const Frols found = frols(x, known(x, 0.0), {.degree = 3, .terms = 20});
