@@ -15,7 +15,7 @@ namespace torsio {
 [[nodiscard]] double warm_up_s(const AnyModel& model, const TrainingData& data,
                                const ResidualTable& residuals);
 inline constexpr int kWarmUpStarts = 60;
-inline constexpr double kWarmUpSafety = 2.0;
+inline constexpr double kWarmUpSafety = 4.0;
 inline constexpr double kLongestWarmUpSeconds = 10.0;
 
 }  // namespace torsio
