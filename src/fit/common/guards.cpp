@@ -53,16 +53,6 @@ void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
   }
 }
 
-double largest_travel(const TrainingData& data) {
-  double largest = 0.0;
-  for (const Sequence& sequence : data.sequences)
-    for (std::size_t n = 1; n < sequence.features.rows; ++n)
-      if (sequence.use[n] != 0 && sequence.use[n - 1] != 0)
-        largest =
-            std::max(largest, std::abs(sequence.features(n, 0) - sequence.features(n - 1, 0)));
-  return largest;
-}
-
 /// Scales the table to a root mean square of `rmse` over its regions, which have about equally many
 /// samples.
 void widen_to(ResidualTable& table, double rmse) {
@@ -152,7 +142,7 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
   widen_for_physics(settings.ranges, model);
   settings.fallback = linear_fallback(training);
   settings.disturbances.largest_step = training.largest_step;
-  settings.disturbances.largest_travel = largest_travel(training);
+  settings.disturbances.largest_travel = training.largest_travel;
   settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
   if (validation == nullptr) widen_to(settings.residuals, held_out_rmse);
   if (!model.memory({settings.ranges.lowest, settings.ranges.highest}).is_declared)

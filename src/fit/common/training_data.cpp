@@ -72,6 +72,17 @@ double largest_step(const Dataset& dataset, const std::string& channel, Role rol
   return std::max(largest, DisturbanceGuards::kSmallestStepShare * (highest - lowest));
 }
 
+/// The largest change of the first feature from one sample to the next within `role`.
+double largest_travel(const DatasetRecord& record, const Sequence& sequence, Role role) {
+  double largest = 0.0;
+  for (const Segment& segment : record.segments)
+    for (std::size_t n = segment.begin + 1; segment.role == role && n < segment.end; ++n) {
+      const double travel = std::abs(sequence.features(n, 0) - sequence.features(n - 1, 0));
+      if (std::isfinite(travel)) largest = std::max(largest, travel);
+    }
+  return largest;
+}
+
 /// Features that are not finite may be the reason why no usable sample is left.
 void refuse_if_not_finite(const TrainingData& data) {
   for (const Sequence& sequence : data.sequences) {
@@ -104,9 +115,12 @@ TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role
   data.sample_rate_Hz = dataset.sample_rate_Hz();
   for (std::size_t j = 0; j < pipeline.feature_count(); ++j)
     data.inputs.push_back({spec.inputs[j], pipeline.is_rate(j)});
-  for (const DatasetRecord& record : dataset.records)
-    if (record.has_role(role))
-      data.sequences.push_back(run(record, pipeline, dataset.target, role));
+  for (const DatasetRecord& record : dataset.records) {
+    if (!record.has_role(role)) continue;
+    data.sequences.push_back(run(record, pipeline, dataset.target, role));
+    data.largest_travel =
+        std::fmax(data.largest_travel, largest_travel(record, data.sequences.back(), role));
+  }
   for (const std::string& channel : pipeline.raw_inputs())
     data.largest_step.push_back(largest_step(dataset, channel, role));
   if (data.usable_samples() == 0) {

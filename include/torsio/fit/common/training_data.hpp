@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "torsio/core/matrix.hpp"
+#include "torsio/core/not_measured.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
@@ -38,6 +39,7 @@ struct TrainingData {
   std::vector<Sequence> sequences = {};
   /// Per raw input of the pipeline, see `DisturbanceGuards::largest_step`.
   std::vector<double> largest_step = {};
+  double largest_travel = kNotMeasured;  ///< see `DisturbanceGuards::largest_travel`
 
   [[nodiscard]] std::size_t input_count() const noexcept { return inputs.size(); }
   [[nodiscard]] std::size_t usable_samples() const noexcept;
