@@ -136,6 +136,10 @@ TEST(Evaluate, KnowsThatTheZerosOfRecordingsWereSubtracted) {
   EXPECT_EQ(model.file.settings.zeroed_channels, std::vector<std::string>{"joint_angle_rad"})
       << "the target has no zero at run time";
   Estimator estimator = make_estimator(model.file);
+  EXPECT_NE(test::error_message([&] {
+              estimator.set_zero("joint_angel_rad", 0.7);
+            }).find("Did you mean 'joint_angle_rad'?"),
+            std::string::npos);
   estimator.set_zero("joint_angle_rad", 0.7);  // the robot's own
   const SplitScore score = evaluate(estimator, dataset, Role::test);
   EXPECT_EQ(score.together.guarded_samples, plain.together.guarded_samples);
