@@ -57,6 +57,12 @@ std::string training_mapping(const Dataset& dataset, std::vector<std::string>& n
   return {};
 }
 
+void note_left_out(const TrainingData& data, std::vector<std::string>& notes) {
+  for (const LeftOut& left_out : data.left_out)
+    notes.push_back("not used, for it is far outside all other values of its channel: " +
+                    left_out.text());
+}
+
 ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Options& options,
                    std::uint64_t seed) {
   ModelCard card;
@@ -128,6 +134,8 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   ModelCard card = card_for(dataset, choice, options, context.seed);
   std::vector<std::string> notes;
   card.mapping = training_mapping(dataset, notes);
+  note_left_out(data.training, notes);
+  if (data.validation) note_left_out(*data.validation, notes);
   const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
   refuse_zeros_after_an_inverse(data.training, pipeline, card.zeros);
   if (context.validation == nullptr && data.validation) context.validation = &*data.validation;
