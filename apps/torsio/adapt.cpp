@@ -39,6 +39,7 @@ torsio::Dataset load(const AdaptFlags& flags, const torsio::ModelFile& file,
                      const torsio::Progress& progress) {
   DataFlags data = flags.data;
   data.target = file.settings.target;
+  data.use_model_mapping(file.card.mapping, flags.model);
   torsio::Dataset dataset = data.load({}, flags.test, progress);
   if (!dataset.has_role(torsio::Role::test))
     torsio::hold_out_ends(dataset, flags.held_out,
@@ -89,7 +90,7 @@ void add_adapt(CLI::App& app) {
       settings_list());
   verb->add_option("MODEL", flags->model, "model file of an mlp, lstm or gru")->required();
   flags->data.add_recordings(*verb, "recordings to adapt to, in this order, or a manifest");
-  flags->data.add_mapping(*verb);
+  flags->data.add_model_mapping(*verb);
   CLI::Option* test =
       verb->add_option("--test", flags->test, "recordings that are used for the scores only");
   verb->add_option("--held-out", flags->held_out,

@@ -35,10 +35,11 @@ std::size_t window_samples(const AttributeFlags& flags, double sample_rate_Hz) {
 }
 
 /// All recordings, whatever their roles in a manifest.
-torsio::Dataset load(const AttributeFlags& flags, const std::string& target,
+torsio::Dataset load(const AttributeFlags& flags, const torsio::ModelFile& file,
                      const torsio::Progress& progress) {
   DataFlags data = flags.data;
-  data.target = target;
+  data.target = file.settings.target;
+  data.use_model_mapping(file.card.mapping, flags.model);
   torsio::Dataset dataset = data.load_as_test(progress);
   for (torsio::DatasetRecord& record : dataset.records)
     record.segments = torsio::whole_record(record.recording.size(), torsio::Role::test);
@@ -50,7 +51,7 @@ void run(AttributeFlags& flags) {
   flags.data.check_outputs({flags.json.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   ProgressBar progress;
-  const torsio::Dataset dataset = load(flags, file.settings.target, progress.listener());
+  const torsio::Dataset dataset = load(flags, file, progress.listener());
   warn_of_missing_zeros(file, dataset);
   // Refuses a sample rate that the model cannot run at.
   (void)torsio::make_estimator(file, dataset.sample_rate_Hz());
@@ -86,7 +87,7 @@ void add_attribute(CLI::App& app) {
       "stops it.");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   flags->data.add_recordings(*verb, "recordings on which the model is evaluated, or a manifest");
-  flags->data.add_mapping(*verb);
+  flags->data.add_model_mapping(*verb);
   verb->add_option("--windows", flags->options.windows, "samples (or windows) that are explained")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

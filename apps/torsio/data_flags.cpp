@@ -21,14 +21,8 @@
 
 namespace {
 
-torsio::LoadOptions load_options(const DataFlags& flags, const torsio::Progress& progress) {
-  torsio::LoadOptions options;
-  options.progress = progress;
-  if (!flags.mapping.empty()) options.mapping = flags.mapping;
-  if (!flags.rate.empty()) options.rate_Hz = torsio::si_quantity(flags.rate, "Hz", "--rate");
-  options.target = flags.target;
-  return options;
-}
+/// `--mapping` of a verb with a model file: the columns as they are named.
+constexpr const char* kNoMapping = "none";
 
 /// Whether both paths are the same file, or both are standard output. Devices and
 /// pipes may be given more than once.
@@ -101,6 +95,17 @@ void DataFlags::add_recordings(CLI::App& verb, const char* help) {
 void DataFlags::add_mapping(CLI::App& verb) {
   verb.add_option("--mapping", mapping,
                   "YAML file that renames and converts the columns of a foreign log");
+  add_rate(verb);
+}
+
+void DataFlags::add_model_mapping(CLI::App& verb) {
+  verb.add_option("--mapping", mapping,
+                  "YAML file that renames and converts the columns of a foreign log (default: the "
+                  "mapping that the model was trained with; none: the columns as they are named)");
+  add_rate(verb);
+}
+
+void DataFlags::add_rate(CLI::App& verb) {
   verb.add_option("--rate", rate, "resample to this rate, or the rate of a log without a clock");
 }
 
@@ -125,20 +130,70 @@ void DataFlags::require_recordings() const {
         {.place = "REC", .expected = "at least one recording or manifest", .found = "none"});
 }
 
+void DataFlags::use_model_mapping(const std::string& text, const std::string& model) {
+  model_mapping_place_ = model + ": mapping";
+  if (mapping == kNoMapping) {
+    mapping.clear();
+  } else if (mapping.empty()) {
+    model_mapping_ = text;
+  }
+}
+
+torsio::LoadOptions DataFlags::load_options(const torsio::Progress& progress) const {
+  torsio::LoadOptions options;
+  options.progress = progress;
+  if (!mapping.empty()) options.mapping = mapping;
+  options.default_mapping = model_mapping_;
+  options.default_mapping_place = model_mapping_place_;
+  if (!rate.empty()) options.rate_Hz = torsio::si_quantity(rate, "Hz", "--rate");
+  options.target = target;
+  return options;
+}
+
+void DataFlags::remark_on_mapping(const torsio::Dataset& dataset) const {
+  if (model_mapping_.empty()) return;
+  if (std::ranges::any_of(dataset.records, [&](const torsio::DatasetRecord& record) {
+        return record.recording.mapping == model_mapping_;
+      }))
+    remark("recordings are read with the mapping that the model was trained with (" +
+           model_mapping_place_ + ")");
+}
+
+template <class Load>
+torsio::Dataset DataFlags::checked(const Load& load) const {
+  try {
+    torsio::Dataset dataset = load();
+    check_not_read(dataset.files);
+    dataset.initialise_samples = initialise;
+    remark_on_mapping(dataset);
+    return dataset;
+  } catch (const torsio::Error& error) {
+    torsio::ErrorReport report = error.report();
+    if (model_mapping_.empty() || !report.place.starts_with(model_mapping_place_)) throw;
+    report.advice +=
+        "The model was trained with this mapping; --mapping FILE gives another one, --mapping none "
+        "reads the columns as they are named.";
+    throw torsio::Error(std::move(report));
+  }
+}
+
 torsio::Dataset DataFlags::read(const std::vector<std::string>& files,
                                 const std::vector<std::string>& test,
                                 const torsio::LoadOptions& options) const {
-  torsio::Dataset dataset = torsio::load_dataset(files, test, options);
-  check_not_read(dataset.files);
-  dataset.initialise_samples = initialise;
-  return dataset;
+  return checked([&] { return torsio::load_dataset(files, test, options); });
+}
+
+torsio::Dataset DataFlags::load_inputs(const std::vector<std::string>& inputs,
+                                       const torsio::Progress& progress) const {
+  require_recordings();
+  return checked([&] { return torsio::load_inputs(recordings, inputs, load_options(progress)); });
 }
 
 torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
                                 const std::vector<std::string>& test,
                                 const torsio::Progress& progress) const {
   require_recordings();
-  const torsio::LoadOptions options = load_options(*this, progress);
+  const torsio::LoadOptions options = load_options(progress);
   torsio::Dataset dataset = read(recordings, test, options);
   if (validation.empty()) return dataset;
   torsio::Dataset held_out = read({}, validation, options);
@@ -152,7 +207,7 @@ torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,
 
 torsio::Dataset DataFlags::load_as_test(const torsio::Progress& progress) const {
   require_recordings();
-  torsio::LoadOptions options = load_options(*this, progress);
+  torsio::LoadOptions options = load_options(progress);
   options.role = torsio::Role::test;
   return read(recordings, {}, options);
 }

@@ -23,8 +23,16 @@ struct DataFlags {
 
   void add_recordings(CLI::App& verb, const char* help);
   void add_mapping(CLI::App& verb);
+  /// `add_mapping` for a verb that is given a model file (`use_model_mapping`).
+  void add_model_mapping(CLI::App& verb);
   void add_target_and_inputs(CLI::App& verb);
   void add_initialise(CLI::App& verb);
+
+  /// Recordings are read with the mapping that the model was trained with, unless `--mapping` or a
+  /// manifest gives another; `--mapping none`: without.
+  /// @param text `ModelCard::mapping`
+  /// @param model path of the model file, for messages
+  void use_model_mapping(const std::string& text, const std::string& model);
 
   /// The recordings as training data, further ones with other roles.
   [[nodiscard]] torsio::Dataset load(const std::vector<std::string>& validation,
@@ -32,6 +40,10 @@ struct DataFlags {
                                      const torsio::Progress& progress) const;
   /// The recordings as test data, except where a manifest gives roles.
   [[nodiscard]] torsio::Dataset load_as_test(const torsio::Progress& progress) const;
+  /// The recordings for a model with these raw inputs; other channels may be missing.
+  [[nodiscard]] torsio::Dataset load_inputs(const std::vector<std::string>& inputs,
+                                            const torsio::Progress& progress) const;
+  [[nodiscard]] torsio::LoadOptions load_options(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
   /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that
   /// are the same file, or whose folder does not exist. `load` and `load_as_test` compare them again
@@ -40,13 +52,21 @@ struct DataFlags {
                      const std::vector<std::string>& more_inputs = {});
 
  private:
+  void add_rate(CLI::App& verb);
   void require_recordings() const;
   [[nodiscard]] torsio::Dataset read(const std::vector<std::string>& files,
                                      const std::vector<std::string>& test,
                                      const torsio::LoadOptions& options) const;
   void check_not_read(const std::vector<std::string>& files_read) const;
 
+  void remark_on_mapping(const torsio::Dataset& dataset) const;
+  /// Loads, and compares the outputs with the files that were read.
+  template <class Load>
+  [[nodiscard]] torsio::Dataset checked(const Load& load) const;
+
   std::vector<std::string> outputs_;
+  std::string model_mapping_;        ///< text
+  std::string model_mapping_place_;  ///< "joint.safetensors: mapping"
 };
 
 inline constexpr std::uint64_t kDefaultSeed = 1;

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <string>
+#include <utility>
 
 #include "data_flags.hpp"
 #include "model_doubts.hpp"
@@ -47,16 +49,34 @@ torsio::Recording prediction_recording(const torsio::Estimator& estimator,
   return result;
 }
 
+/// Without recordings they would be ignored.
+void require_no_flags_of_recordings(const EvaluateFlags& flags) {
+  for (const auto& [flag, value] : {std::pair{"--predictions", flags.predictions},
+                                    {"--mapping", flags.data.mapping},
+                                    {"--rate", flags.data.rate}})
+    if (!value.empty())
+      throw torsio::UsageError(
+          {.place = flag,
+           .expected = "a recording that it refers to",
+           .found = "none",
+           .advice = "Name the recording after the model: torsio evaluate " + flags.model +
+                     " log.csv. Without one, the description of the model is shown."});
+}
+
 void run(EvaluateFlags& flags) {
   flags.data.check_outputs({flags.predictions, flags.json.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   if (flags.data.recordings.empty()) {
-    if (flags.json.wants_tables()) print(torsio::model_description(file));
-    flags.json.write(torsio::model_description_json(file));
+    require_no_flags_of_recordings(flags);
+    ProgressBar progress;
+    const torsio::SlowCycle cycle = torsio::slow_cycle(file, progress.listener());
+    if (flags.json.wants_tables()) print(torsio::model_description(file, cycle));
+    flags.json.write(torsio::model_description_json(file, cycle));
     return;
   }
   DataFlags data = flags.data;
   data.target = file.settings.target;
+  data.use_model_mapping(file.card.mapping, flags.model);
   ProgressBar progress;
   const torsio::Dataset dataset = data.load_as_test(progress.listener());
   if (!flags.predictions.empty() && dataset.records.size() != 1)
@@ -86,7 +106,9 @@ void run(EvaluateFlags& flags) {
 void add_evaluate(CLI::App& app) {
   auto flags = std::make_shared<EvaluateFlags>();
   CLI::App* verb = app.add_subcommand(
-      "evaluate", "score a model file on recordings; without recordings, show its description");
+      "evaluate",
+      "score a model file on recordings; without recordings, show its description, stiffness, loop "
+      "width and friction");
   verb->footer(
       "Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv\n"
       "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "
@@ -95,7 +117,7 @@ void add_evaluate(CLI::App& app) {
       "8 model not finite, 9 diverged (docs/estimator.md)");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
-  flags->data.add_mapping(*verb);
+  flags->data.add_model_mapping(*verb);
   flags->data.add_initialise(*verb);
   verb->add_option("--predictions", flags->predictions,
                    "write target, estimate, error bar and fault of one recording as CSV");

@@ -105,8 +105,9 @@ void run(ImportFlags& flags) {
   imported.file.card.device_serial = flags.device_serial;
   const torsio::ModelFile model =
       torsio::parse_model(torsio::model_bytes(imported.file), flags.output);
-  if (flags.json.wants_tables()) print(torsio::model_description(model));
-  flags.json.write(torsio::model_description_json(model));
+  const torsio::SlowCycle cycle = torsio::slow_cycle(model, progress.listener());
+  if (flags.json.wants_tables()) print(torsio::model_description(model, cycle));
+  flags.json.write(torsio::model_description_json(model, cycle));
   torsio::save_model(flags.output, imported.file);  // last: untouched unless all else succeeded
   for (const std::string& note : imported.notes) remark("note: " + note);
   remark(flags.output + " written");

@@ -38,11 +38,18 @@ struct TrackFlags {
   std::string observer;
   bool feeds_rate_forward = false;
   std::vector<std::string> models;
+  DataFlags data;  ///< of the replayed recording
   std::string faults;
   std::string record;
   std::uint64_t seed = kDefaultSeed;
   std::size_t seeds = 1;
   JsonOutput json;
+};
+
+/// A model file and its path.
+struct NamedModel {
+  std::string path;
+  torsio::ModelFile file;
 };
 
 void check_replayed(const std::string& file, const torsio::TorqueReference& reference) {
@@ -56,7 +63,33 @@ void check_replayed(const std::string& file, const torsio::TorqueReference& refe
                             .found = fmt::format("{}", *gap)});
 }
 
-torsio::TorqueReference reference_of(const TrackFlags& flags, const torsio::Progress& progress) {
+/// The replayed recording is read with the mapping of the models, if they have one.
+std::vector<torsio::DatasetRecord> replayed_records(const TrackFlags& flags,
+                                                    const std::vector<NamedModel>& models,
+                                                    const torsio::Progress& progress) {
+  DataFlags data = flags.data;
+  data.recordings = {flags.replayed};
+  const NamedModel* mapped = nullptr;
+  for (const NamedModel& model : models) {
+    if (model.file.card.mapping.empty()) continue;
+    if (mapped != nullptr && mapped->file.card.mapping != model.file.card.mapping &&
+        data.mapping.empty())
+      throw torsio::UsageError({.place = "--replay",
+                                .problem = "the models were trained with different mappings",
+                                .found = mapped->path + " and " + model.path,
+                                .advice = "Give the mapping of the recording: --mapping FILE, or "
+                                          "none."});
+    mapped = &model;
+  }
+  if (mapped != nullptr)
+    data.use_model_mapping(mapped->file.card.mapping, mapped->path);
+  else
+    data.use_model_mapping({}, {});
+  return data.load_inputs({"torque_Nm"}, progress).records;
+}
+
+torsio::TorqueReference reference_of(const TrackFlags& flags, const std::vector<NamedModel>& models,
+                                     const torsio::Progress& progress) {
   torsio::TorqueReference reference{.kind = torsio::find_reference(flags.reference)};
   const bool is_replay = reference.kind == torsio::TorqueReference::Kind::replay;
   if (is_replay == flags.replayed.empty())
@@ -64,16 +97,14 @@ torsio::TorqueReference reference_of(const TrackFlags& flags, const torsio::Prog
                               .expected = "a recording, with --reference replay",
                               .advice = "Give both or neither."});
   if (is_replay) {
-    torsio::LoadOptions options;
-    options.progress = progress;
-    const std::vector<torsio::Recording> recordings =
-        torsio::load_recordings(flags.replayed, options);
-    if (recordings.size() != 1)
+    const std::vector<torsio::DatasetRecord> records = replayed_records(flags, models, progress);
+    if (records.size() != 1)
       throw torsio::UsageError({.place = "--replay",
                                 .expected = "one recording",
-                                .found = fmt::format("{}", recordings.size())});
-    reference.recorded_Nm = recordings.front().channel("torque_Nm").values;
-    reference.recorded_Hz = recordings.front().sample_rate_Hz();
+                                .found = fmt::format("{}", records.size())});
+    const torsio::Recording& recording = records.front().recording;
+    reference.recorded_Nm = recording.channel("torque_Nm").values;
+    reference.recorded_Hz = recording.sample_rate_Hz();
     check_replayed(flags.replayed, reference);
   }
   if (!flags.amplitude.empty())
@@ -83,11 +114,11 @@ torsio::TorqueReference reference_of(const TrackFlags& flags, const torsio::Prog
   return reference;
 }
 
-torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& sheet,
-                             const torsio::Progress& progress) {
+torsio::TrackingSpec spec_of(const TrackFlags& flags, const std::vector<NamedModel>& models,
+                             const torsio::DataSheet& sheet, const torsio::Progress& progress) {
   torsio::TrackingSpec spec{
       .output = flags.output == "free" ? torsio::JointOutput::free : torsio::JointOutput::locked,
-      .reference = reference_of(flags, progress),
+      .reference = reference_of(flags, models, progress),
       .damping = above_zero(flags.damping, "--damping"),
       .feeds_rate_forward = flags.feeds_rate_forward};
   if (!flags.lever.empty()) {
@@ -112,27 +143,33 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const torsio::DataSheet& s
   return spec;
 }
 
-std::vector<torsio::NamedInverse> inverses_of(const TrackFlags& flags) {
-  std::vector<torsio::NamedInverse> models;
-  for (const std::string& path : flags.models) {
-    if (path == torsio::kSweepLineName) continue;  // always run in addition to the models
-    const torsio::ModelFile file = torsio::load_model(path);
+std::vector<NamedModel> load_models(const TrackFlags& flags) {
+  std::vector<NamedModel> models;
+  for (const std::string& path : flags.models)
+    if (path != torsio::kSweepLineName)  // always run in addition to the models
+      models.push_back({path, torsio::load_model(path)});
+  return models;
+}
+
+std::vector<torsio::NamedInverse> inverses_of(const std::vector<NamedModel>& models) {
+  std::vector<torsio::NamedInverse> inverses;
+  for (const auto& [path, file] : models) {
     try {
-      models.push_back({path, torsio::inverse_of(file)});
+      inverses.push_back({path, torsio::inverse_of(file)});
     } catch (const torsio::Error& error) {
       torsio::ErrorReport report = error.report();
       report.place = fmt::format("{}: {}", path, report.place);
       throw torsio::UsageError(std::move(report));
     }
   }
-  return models;
+  return inverses;
 }
 
-void check(const TrackFlags& flags) {
+void check(TrackFlags& flags) {
   std::vector<std::string> read = flags.models;
   read.push_back(flags.faults);
   read.push_back(flags.replayed);
-  DataFlags().check_outputs({flags.record, flags.json.destination}, read);
+  flags.data.check_outputs({flags.record, flags.json.destination}, read);
   if (flags.seeds < 1 || flags.seeds > kMaxSeeds)
     throw torsio::UsageError({.place = "--seeds",
                               .expected = fmt::format("1 to {}", kMaxSeeds),
@@ -155,12 +192,13 @@ std::string refuse_output(const std::string& text) {
          "'. Results are written with --json FILE, the loop's signals with --record FILE.csv";
 }
 
-void run(const TrackFlags& flags) {
+void run(TrackFlags& flags) {
   check(flags);
   const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
   ProgressBar progress;
-  const torsio::TrackingSpec spec = spec_of(flags, sheet, progress.listener());
-  const std::vector<torsio::NamedInverse> models = inverses_of(flags);
+  const std::vector<NamedModel> files = load_models(flags);
+  const torsio::TrackingSpec spec = spec_of(flags, files, sheet, progress.listener());
+  const std::vector<torsio::NamedInverse> models = inverses_of(files);
   torsio::check_tracking(sheet, spec,
                          flags.seed);  // before the sweeps for the linear model are run
   const torsio::LinearInverse linear = torsio::sweep_line(sheet, kDefaultSeed, progress.listener());
@@ -211,6 +249,7 @@ void add_track(CLI::App& app) {
   verb->add_option("--reference", flags->reference, "chirp, random-walk, steps, sweep, replay")
       ->capture_default_str();
   verb->add_option("--replay", flags->replayed, "recording whose torque_Nm is the reference");
+  flags->data.add_model_mapping(*verb);
   verb->add_option("--amplitude", flags->amplitude, "amplitude of the torque: 20Nm");
   verb->add_option("--duration", flags->duration, "duration of the reference: 30s");
   verb->add_option("--model", flags->models, "model file, or linear; may be given more than once");

@@ -13,8 +13,10 @@
 #include "data/csv_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "data/names.hpp"
+#include "data/needed_definitions.hpp"
 #include "data/whole_samples.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/manifest.hpp"
 #include "torsio/data/mapping.hpp"
@@ -36,6 +38,29 @@ struct Log {
   Mapping mapping = {};
   double rate_Hz = 0.0;  ///< 0: its own
 };
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+/// Removes what a log does not need: definitions, and rules for channels that it does not have.
+void keep_needed(Mapping& mapping, const CsvTable& table, std::vector<std::string> needed) {
+  needed.insert(needed.end(), {"t_s", "time_s"});
+  mapping.derive = needed_definitions(mapping.derive, needed);
+  std::vector<std::string> left = needed;
+  for (const CsvColumn& column : table.columns)
+    if (const auto name = split_channel_name(column.name)) left.push_back(name->si());
+  std::erase_if(mapping.channels, [&](const ChannelRule& rule) {
+    const auto name = split_channel_name(rule.name);
+    const bool is_there = table.find(rule.from) != nullptr;
+    if (is_there && name) left.push_back(name->si());
+    return !is_there && name && !contains(needed, name->si());
+  });
+  const auto is_missing = [&](const std::string& channel) { return !contains(left, channel); };
+  std::erase_if(mapping.hold, is_missing);
+  std::erase_if(mapping.zero, [&](const ZeroRule& rule) { return is_missing(rule.channel); });
+  std::erase_if(mapping.latency, [&](const LatencyRule& rule) { return is_missing(rule.channel); });
+}
 
 /// A shift into the past looks ahead: harmless for a target that is only compared with, impossible
 /// for an input at run time.
@@ -62,17 +87,23 @@ void derive_target(Recording& recording, const std::string& target) {
   }
 }
 
-std::vector<Recording> load(const Log& log, const std::string& target, const Progress& progress) {
+/// @param needed the channels that suffice; empty: all of the mapping, and the target
+std::vector<Recording> load(const Log& log, const std::string& target,
+                            const std::vector<std::string>& needed, const Progress& progress) {
   const CsvTable table = read_csv(log.path, {.skip = log.mapping.drop, .progress = progress});
+  Mapping mapping = log.mapping;
+  if (!needed.empty()) keep_needed(mapping, table, needed);
   std::vector<Recording> recordings =
-      measured_recordings(table, log.mapping, log.rate_Hz, log.entry.name);
+      measured_recordings(table, mapping, log.rate_Hz, log.entry.name);
+  const std::string text = mapping_text(log.mapping);
   for (Recording& recording : recordings) {
     if (log.rate_Hz > 0.0 && recording.sample_rate_Hz() != log.rate_Hz)
       recording = resample(recording, log.rate_Hz);
     for (const auto& [name, value] : log.entry.conditions) recording.add_condition(name, value);
-    add_derived(recording, log.mapping.derive);
-    derive_target(recording, target);
+    add_derived(recording, mapping.derive);
+    if (needed.empty()) derive_target(recording, target);
     recording.source.file = log.entry.file;
+    recording.mapping = text;
   }
   return recordings;
 }
@@ -106,6 +137,8 @@ class Collector {
                         .expected = "a positive number of Hz",
                         .found = fmt::format("{}", *options_.rate_Hz)});
     if (options_.mapping) mapping_ = mapping_from(*options_.mapping);
+    if (!options_.default_mapping.empty())
+      default_mapping_ = parse_mapping(options_.default_mapping, options_.default_mapping_place);
     dataset_.target = options_.target;
   }
 
@@ -135,7 +168,8 @@ class Collector {
     }
   }
 
-  Dataset finish() {
+  /// @param needed as in `load`
+  Dataset finish(const std::vector<std::string>& needed = {}) {
     refuse_twins();
     if (dataset_.target.empty()) dataset_.target = kDefaultTarget;
     name_twins_by_path();
@@ -146,7 +180,7 @@ class Collector {
       if (const auto leak = mapping.computed_from.find(dataset_.target);
           leak != mapping.computed_from.end())
         leaks_.insert(leak->second.begin(), leak->second.end());
-      for (Recording& recording : load(planned.log, dataset_.target, options_.progress)) {
+      for (Recording& recording : load(planned.log, dataset_.target, needed, options_.progress)) {
         auto segments =
             segments_of(recording, planned.log.entry, planned.split_of_all, options_.role);
         dataset_.records.push_back(
@@ -164,7 +198,7 @@ class Collector {
   };
 
   void add_log(const std::string& path, std::optional<Role> role) {
-    Planned planned{.log = {.path = path, .mapping = mapping_.value_or(Mapping{})}};
+    Planned planned{.log = {.path = path, .mapping = mapping_.value_or(default_mapping_)}};
     planned.log.entry.file = path;
     planned.log.entry.role = role;
     planned.log.rate_Hz = options_.rate_Hz.value_or(0.0);
@@ -218,7 +252,7 @@ class Collector {
   [[nodiscard]] Mapping mapping_of(const ManifestFile& entry, const Manifest& manifest) {
     if (mapping_) return *mapping_;
     const auto& choice = entry.mapping ? entry.mapping : manifest.mapping;
-    if (!choice) return {};
+    if (!choice) return default_mapping_;
     if (choice->file.empty()) return choice->here;
     return mapping_from(
         (std::filesystem::path(manifest.file).parent_path() / choice->file).string());
@@ -226,6 +260,7 @@ class Collector {
 
   LoadOptions options_;
   std::optional<Mapping> mapping_;
+  Mapping default_mapping_;
   std::vector<Planned> logs_;
   std::set<std::string> leaks_;
   Dataset dataset_;
@@ -250,6 +285,13 @@ Dataset load_dataset(const std::vector<std::string>& train_files,
   Dataset dataset = collector.finish();
   dataset.check();
   return dataset;
+}
+
+Dataset load_inputs(const std::vector<std::string>& files, const std::vector<std::string>& channels,
+                    const LoadOptions& options) {
+  Collector collector(options);
+  for (const std::string& path : files) collector.add(path);
+  return collector.finish(channels);
 }
 
 Dataset load_manifest(const Manifest& manifest, const LoadOptions& options) {

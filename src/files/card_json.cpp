@@ -31,6 +31,10 @@ class CardObject {
   [[nodiscard]] std::string text(const char* key) const {
     return text_of(member(key), place_of(key));
   }
+  /// Empty where there is none: a file of an earlier release.
+  [[nodiscard]] std::string optional_text(const char* key) const {
+    return object_.contains(key) ? text(key) : std::string();
+  }
   [[nodiscard]] double number(const char* key) const {
     return number_of(member(key), place_of(key));
   }
@@ -175,6 +179,7 @@ std::string card_json(const ModelFile& model) {
     return ordered_json{
         {"channel", zero.channel}, {"first_s", zero.first_s}, {"mid_range", zero.mid_range}};
   });
+  if (!card.mapping.empty()) json_card["mapping"] = card.mapping;
   json_card["training_files"] = list_of(card.training_files, [](const Source& source) {
     return ordered_json{{"file", source.file}, {"sha256", source.sha256}};
   });
@@ -215,6 +220,7 @@ ModelFile model_of_card(std::string_view text, const std::string& place) {
                               return ZeroRule{zero.text("channel"), zero.number("first_s"),
                                               zero.boolean("mid_range")};
                             }),
+      .mapping = card.optional_text("mapping"),
       .held_out = card.text("held_out"),
       .metrics = card.number_map("metrics"),
       .device_serial = card.text("device_serial")};

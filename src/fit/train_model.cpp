@@ -45,6 +45,24 @@ std::vector<ZeroRule> training_zeros(const Dataset& dataset) {
   return first == nullptr ? std::vector<ZeroRule>{} : first->zeros;
 }
 
+/// The mapping that all training records were read with; none if they differ.
+std::string training_mapping(const Dataset& dataset, std::vector<std::string>& notes) {
+  std::set<std::string> mappings;
+  for (const DatasetRecord& record : dataset.records)
+    if (record.has_role(Role::train)) mappings.insert(record.recording.mapping);
+  if (mappings.size() == 1) return *mappings.begin();
+  notes.emplace_back(
+      "the training recordings were read with different mappings, so the model file contains "
+      "none: give --mapping with later recordings");
+  return {};
+}
+
+void note_left_out(const TrainingData& data, std::vector<std::string>& notes) {
+  for (const LeftOut& left_out : data.left_out)
+    notes.push_back("not used, for it is far outside all other values of its channel: " +
+                    left_out.text());
+}
+
 ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Options& options,
                    std::uint64_t seed) {
   ModelCard card;
@@ -114,6 +132,10 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
   const FamilyInfo& family = find_family(choice.family);
   const Options options(family.options, choice.options);
   ModelCard card = card_for(dataset, choice, options, context.seed);
+  std::vector<std::string> notes;
+  card.mapping = training_mapping(dataset, notes);
+  note_left_out(data.training, notes);
+  if (data.validation) note_left_out(*data.validation, notes);
   const FeaturePipeline pipeline(choice.features, data.training.sample_rate_Hz);
   refuse_zeros_after_an_inverse(data.training, pipeline, card.zeros);
   if (context.validation == nullptr && data.validation) context.validation = &*data.validation;
@@ -131,6 +153,7 @@ TrainedModel train(const Dataset& dataset, const LearningData& data, const Model
       .notes = std::move(fitted.notes),
       .table = std::move(fitted.table),
       .fit_seconds = fit_time.count()};
+  trained.notes.insert(trained.notes.begin(), notes.begin(), notes.end());
   for (const ZeroRule& zero : trained.file.card.zeros)
     if (std::ranges::find(pipeline.raw_inputs(), zero.channel) != pipeline.raw_inputs().end())
       trained.file.settings.zeroed_channels.push_back(zero.channel);

@@ -3,17 +3,20 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string_view>
 #include <vector>
 
 #include "files/known_families.hpp"
 #include "model/common/parameters.hpp"
+#include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/fit/families.hpp"
-#include "torsio/import/import_network.hpp"
 #include "torsio/model/network/network_layers.hpp"
 #include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
@@ -69,11 +72,19 @@ std::string_view list_element(std::string_view name) {
                                                                          : std::string_view();
 }
 
+/// The name of a field without the signs of a programming language: "layers 0".
+std::string in_words(std::string_view field) {
+  std::string words(field);
+  for (char& letter : words)
+    if (letter == '_' || letter == '.') letter = ' ';
+  return words;
+}
+
 /// The names of a list's fields without their numbers.
 std::string outline(const Leaf& leaf) {
   const std::string field = leaf.name.substr(leaf.name.rfind('.') + 1);
   if (field == "activation") return std::string(name(static_cast<Activation>(leaf.values.front())));
-  return fmt::format("{} {}", field, leaf.shape);
+  return fmt::format("{} {}", in_words(field), leaf.shape);
 }
 
 /// One line per number or table; one line per element of a list (a layer of a network).
@@ -85,11 +96,12 @@ std::string parameter_lines(const std::vector<Leaf>& leaves) {
     if (!element.empty() && element == last) {
       lines.back().append(", ").append(outline(leaf));
     } else if (!element.empty()) {
-      lines.push_back(fmt::format("{}: {}", element, outline(leaf)));
+      lines.push_back(fmt::format("{}: {}", in_words(element), outline(leaf)));
     } else if (leaf.values.size() <= kReadable) {
-      lines.push_back(fmt::format("{} = {:.6g}", leaf.name, fmt::join(leaf.values, ", ")));
+      lines.push_back(
+          fmt::format("{} = {:.6g}", in_words(leaf.name), fmt::join(leaf.values, ", ")));
     } else {
-      lines.push_back(fmt::format("{}: {} numbers", leaf.name, leaf.shape));
+      lines.push_back(fmt::format("{}: {} numbers", in_words(leaf.name), leaf.shape));
     }
     last = element;
   }
@@ -132,6 +144,117 @@ std::string range_table(const EstimatorSettings& settings) {
                                    : "");
 }
 
+/// The scores of the card by the names that the tables use, with their unit.
+std::string score_line(const ModelFile& model) {
+  if (model.card.metrics.empty()) return {};
+  struct Score {
+    std::string_view key;
+    std::string_view title;
+    bool has_unit = true;
+  };
+  constexpr auto kScores = std::to_array<Score>({{"rmse", "RMSE"},
+                                                 {"mad", "MAD"},
+                                                 {"std_abs", "standard deviation of |e|"},
+                                                 {"max_abs", "max|e|"},
+                                                 {"fit_percent", "fit %", false}});
+  const std::string unit = unit_label(model.settings.target);
+  std::string text;
+  for (const auto& [key, value] : model.card.metrics) {
+    const auto* const known = std::ranges::find(kScores, key, &Score::key);
+    const std::string title = known == kScores.end() ? in_words(key) : std::string(known->title);
+    const bool has_unit = known != kScores.end() && known->has_unit && !unit.empty();
+    text += fmt::format("{}{} {:.4g}{}", text.empty() ? "" : ", ", title, value,
+                        has_unit ? fmt::format(" {}", unit) : "");
+  }
+  return fmt::format("errors on {}: {}\n", model.card.held_out, text);
+}
+
+std::string adaptation_lines(const ModelCard& card) {
+  constexpr std::string_view kAdaptation = "adaptation.";
+  std::string text;
+  for (const auto& [option, value] : card.options)
+    if (option.starts_with(kAdaptation))
+      text += fmt::format("{}{} {}", text.empty() ? "adapted with " : ", ",
+                          in_words(option.substr(kAdaptation.size())), value);
+  return text.empty() ? text : text + "\n";
+}
+
+std::string mapping_lines(const ModelCard& card) {
+  if (card.mapping.empty()) return {};
+  std::string text = "recordings are read with this mapping, unless --mapping gives another:\n";
+  std::istringstream lines(card.mapping);
+  for (std::string line; std::getline(lines, line);) text += fmt::format("  {}\n", line);
+  return text;
+}
+
+std::string cycle_text(const SlowCycle& cycle) {
+  if (!cycle.reason.empty())
+    return fmt::format("stiffness, loop width and friction cannot be determined: {}\n",
+                       cycle.reason);
+  std::string held;
+  for (const auto& [channel, value] : cycle.held)
+    held += fmt::format(", {} = {:.4g}", channel, value);
+  const std::string at_zero =
+      std::isnan(cycle.width_at_zero_Nm)
+          ? std::string()
+          : fmt::format("{:.4g} Nm at zero deflection, ", cycle.width_at_zero_Nm);
+  TextTable table;
+  table.header({"deflection rad", "torque Nm", "stiffness Nm/rad", "loop width Nm", "friction Nm"});
+  for (const SlowCycle::Point& point : cycle.points)
+    table.row({fmt::format("{:.4g}", point.deflection_rad), fmt::format("{:.4g}", point.torque_Nm),
+               fmt::format("{:.4g}", point.stiffness_Nm_rad),
+               fmt::format("{:.4g}", point.loop_width_Nm),
+               fmt::format("{:.4g}", point.friction_Nm)});
+  return fmt::format(
+      "slow cycle of the model: a triangle of {:g} s over the trained deflections, {:.4g} to "
+      "{:.4g} rad, joint at rest{}\n"
+      "stiffness {:.4g} Nm/rad (line through the mean of both directions)\n"
+      "loop width {}at most {:.4g} Nm (at {:.4g} rad)\n"
+      "friction {:.4g} Nm (half of the mean loop width)\n{}",
+      cycle.period_s, cycle.lowest_rad, cycle.highest_rad, held, cycle.stiffness_Nm_rad, at_zero,
+      cycle.largest_width_Nm, cycle.largest_width_at_rad, cycle.friction_Nm, table.text());
+}
+
+nlohmann::ordered_json cycle_json(const SlowCycle& cycle) {
+  using Json = nlohmann::ordered_json;
+  if (!cycle.reason.empty()) return {{"status", "undetermined"}, {"reason", cycle.reason}};
+  Json points = Json::array();
+  for (const SlowCycle::Point& point : cycle.points)
+    points.push_back({{"deflection_rad", point.deflection_rad},
+                      {"torque_Nm", point.torque_Nm},
+                      {"stiffness_Nm_rad", point.stiffness_Nm_rad},
+                      {"loop_width_Nm", point.loop_width_Nm},
+                      {"friction_Nm", point.friction_Nm}});
+  Json held = Json::object();
+  for (const auto& [channel, value] : cycle.held) held[channel] = value;
+  return {{"status", "ok"},
+          {"reason", nullptr},
+          {"period_s", cycle.period_s},
+          {"lowest_rad", cycle.lowest_rad},
+          {"highest_rad", cycle.highest_rad},
+          {"held", held},
+          {"stiffness_Nm_rad", cycle.stiffness_Nm_rad},
+          {"loop_width_at_zero_Nm", json_number(cycle.width_at_zero_Nm)},
+          {"largest_loop_width_Nm", cycle.largest_width_Nm},
+          {"largest_loop_width_at_rad", cycle.largest_width_at_rad},
+          {"friction_Nm", cycle.friction_Nm},
+          {"points", points}};
+}
+
+/// The coefficients with their units, or the parameters as the model file names them.
+std::string parameter_text(const ModelFile& model) {
+  const ParameterDescription description = description_of(model);
+  if (!description.coefficients.empty() && description.coefficients.size() <= kReadable)
+    return coefficient_table(description.coefficients);
+  std::vector<Leaf> leaves = leaves_of(model);
+  std::erase_if(leaves, [&](const Leaf& leaf) {
+    return !description.covered.empty() && leaf.name.starts_with(description.covered);
+  });
+  std::string text;
+  for (const std::string& line : description.lines) text += fmt::format("{}\n", line);
+  return text + parameter_lines(leaves);
+}
+
 std::string zero_line(const EstimatorSettings& settings) {
   if (settings.zeroed_channels.empty()) return {};
   return fmt::format(
@@ -148,7 +271,7 @@ std::string family_of(const ModelFile& model) {
 
 }  // namespace
 
-std::string model_description(const ModelFile& model) {
+std::string model_description(const ModelFile& model, const SlowCycle& cycle) {
   const EstimatorSettings& settings = model.settings;
   std::string text =
       fmt::format("{} for {} at {:g} Hz, {} numbers, by torsio {}\n", family_of(model),
@@ -159,31 +282,17 @@ std::string model_description(const ModelFile& model) {
   for (const Source& source : model.card.training_files)
     text += fmt::format("trained on {}{}\n", source.file,
                         source.sha256.empty() ? "" : fmt::format(", sha256 {}", source.sha256));
-  for (const auto& [option, value] : model.card.options)
-    if (option.starts_with("adaptation.")) text += fmt::format("{} {}\n", option, value);
-  if (!model.card.metrics.empty()) {
-    text += fmt::format("errors on {}:", model.card.held_out);
-    for (const auto& [name, value] : model.card.metrics)
-      text += fmt::format(" {} {:.4g}", name, value);
-    text += "\n";
-  }
+  text += adaptation_lines(model.card);
+  text += score_line(model);
   text += zero_line(settings);
+  text += mapping_lines(model.card);
   text += fmt::format("\n{}", range_table(settings));
   for (const ChannelDefinition& definition : settings.features.definitions)
     text += fmt::format("{} = {}\n", definition.name, definition.expression);
-  const ParameterDescription description = description_of(model);
-  if (!description.coefficients.empty() && description.coefficients.size() <= kReadable)
-    return text + "\n" + coefficient_table(description.coefficients);
-  std::vector<Leaf> leaves = leaves_of(model);
-  std::erase_if(leaves, [&](const Leaf& leaf) {
-    return !description.covered.empty() && leaf.name.starts_with(description.covered);
-  });
-  text += "\n";
-  for (const std::string& line : description.lines) text += line + "\n";
-  return text + parameter_lines(leaves);
+  return text + "\n" + parameter_text(model) + "\n" + cycle_text(cycle);
 }
 
-std::string model_description_json(const ModelFile& model) {
+std::string model_description_json(const ModelFile& model, const SlowCycle& cycle) {
   using Json = nlohmann::ordered_json;
   Json document{{"family", family_of(model)},
                 {"target", model.settings.target},
@@ -191,6 +300,7 @@ std::string model_description_json(const ModelFile& model) {
                 {"device_serial", model.card.device_serial},
                 {"inputs", Json::array()},
                 {"trained_on", Json::array()},
+                {"mapping", text_or_null(model.card.mapping)},
                 {"options", model.card.options},
                 {"held_out", model.card.held_out},
                 {"metrics", model.card.metrics},
@@ -202,6 +312,7 @@ std::string model_description_json(const ModelFile& model) {
   for (const Source& source : model.card.training_files)
     document["trained_on"].push_back({{"file", source.file}, {"sha256", source.sha256}});
   for (const Leaf& leaf : leaves_of(model)) document["parameters"][leaf.name] = leaf.values;
+  document["slow_cycle"] = cycle_json(cycle);
   return json_text(document);
 }
 

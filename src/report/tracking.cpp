@@ -1,12 +1,14 @@
 #include "torsio/report/tracking.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "core/running_mean.hpp"
@@ -77,6 +79,106 @@ struct ModelMeans {
 
 Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
+std::string window_of(const FaultDetection& fault) {
+  return fault.end_s ? fmt::format("{:g} to {:g} s", fault.start_s, *fault.end_s)
+                     : fmt::format("from {:g} s", fault.start_s);
+}
+
+/// One injected fault over the runs of one model.
+struct FaultTally {
+  std::string what;
+  std::string window;
+  std::size_t runs = 0;
+  std::size_t detected = 0;
+  double latest_s = 0.0;  ///< from the start of the fault to its detection
+  std::set<std::string> names;
+  std::optional<double> largest_Nm = {};
+  std::optional<double> sound_Nm = {};
+
+  void add(const FaultDetection& fault) {
+    ++runs;
+    if (fault.detected_s) {
+      ++detected;
+      latest_s = std::max(latest_s, *fault.detected_s - fault.start_s);
+      names.emplace(name(fault.detected_as));
+    }
+    if (fault.largest_unreported_error_Nm)
+      largest_Nm = std::max(largest_Nm.value_or(0.0), *fault.largest_unreported_error_Nm);
+    if (fault.error_without_fault_Nm)
+      sound_Nm = std::max(sound_Nm.value_or(0.0), *fault.error_without_fault_Nm);
+  }
+};
+
+/// By model, in the order of the rows, and by fault, in the order of the schedule.
+std::vector<std::pair<std::string, std::vector<FaultTally>>> fault_tallies(
+    std::span<const TrackingRow> rows) {
+  std::vector<std::pair<std::string, std::vector<FaultTally>>> models;
+  for (const TrackingRow& row : rows) {
+    auto model = std::ranges::find(models, row.model, [](const auto& each) { return each.first; });
+    if (model == models.end()) model = models.insert(model, {row.model, {}});
+    for (const FaultDetection& fault : row.faults) {
+      auto& tallies = model->second;
+      const std::string window = window_of(fault);
+      auto tally = std::ranges::find_if(tallies, [&](const FaultTally& each) {
+        return each.what == fault.what && each.window == window;
+      });
+      if (tally == tallies.end())
+        tally = tallies.insert(tally, {.what = fault.what, .window = window, .names = {}});
+      tally->add(fault);
+    }
+  }
+  return models;
+}
+
+std::string newtonmetres(const std::optional<double>& value) {
+  return value ? fmt::format("{:.3g}", *value) : "-";
+}
+
+/// A table of the injected faults, and a line for each that was not reported in every run.
+std::string fault_text(std::span<const TrackingRow> rows) {
+  TextTable table;
+  table.header(
+      {"injected fault", "time", "model", "reported in", "after s", "as", "max|e|", "without it"});
+  std::string undetected;
+  bool has_rows = false;
+  for (const auto& [model, faults] : fault_tallies(rows)) {
+    for (const FaultTally& fault : faults) {
+      has_rows = true;
+      table.row({fault.what, fault.window, model,
+                 fmt::format("{} of {}", fault.detected, fault.runs),
+                 fault.detected > 0 ? fmt::format("{:.3g}", fault.latest_s) : "-",
+                 fault.detected > 0 ? fmt::format("{}", fmt::join(fault.names, ", ")) : "-",
+                 newtonmetres(fault.largest_Nm), newtonmetres(fault.sound_Nm)});
+      if (fault.detected < fault.runs)
+        undetected += fmt::format(
+            "UNDETECTED: {} reports no fault in {} of {} runs with {} ({}); error up to {} Nm, "
+            "without the injected fault {} Nm\n",
+            model, fault.runs - fault.detected, fault.runs, fault.what, fault.window,
+            newtonmetres(fault.largest_Nm), newtonmetres(fault.sound_Nm));
+    }
+  }
+  if (!has_rows) return {};
+  return fmt::format(
+      "\n{}max|e|: largest error in Nm within the time of the fault while no fault was reported; "
+      "without it: of the\nsame run without injected faults; after s: the latest of all runs\n{}",
+      table.text(), undetected);
+}
+
+Json faults_json(const std::vector<FaultDetection>& faults) {
+  Json list = Json::array();
+  for (const FaultDetection& fault : faults)
+    list.push_back(
+        {{"fault", fault.what},
+         {"start_s", fault.start_s},
+         {"end_s", optional(fault.end_s)},
+         {"detected", fault.detected_s.has_value()},
+         {"detected_s", optional(fault.detected_s)},
+         {"detected_as", fault.detected_s ? Json(name(fault.detected_as)) : Json(nullptr)},
+         {"largest_unreported_error_Nm", optional(fault.largest_unreported_error_Nm)},
+         {"error_without_fault_Nm", optional(fault.error_without_fault_Nm)}});
+  return list;
+}
+
 Json row_json(const TrackingRow& row) {
   const TrackingScore& score = row.score;
   const bool has_score = row.status == "ok";
@@ -110,7 +212,8 @@ Json row_json(const TrackingRow& row) {
                                                {"amplitude_Nm", score.limit_cycle->amplitude}}
                                         : Json(nullptr)},
       {"inverse_faults", count(score.inverse_faults)},
-      {"loop_faults", count(score.loop_faults)}};
+      {"loop_faults", count(score.loop_faults)},
+      {"faults", faults_json(row.faults)}};
 }
 
 }  // namespace
@@ -138,7 +241,7 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
                text(means.overshoot, 2)});
     for (const std::string& remark : means.remarks) remarks += remark + "\n";
   }
-  return fmt::format(
+  const std::string summary = fmt::format(
       "{} ({}), output {}, {} of {:.4g} Nm, {} run{} per model\n{}{}errors: of the joint's torque "
       "without noise, without the first 2 s; limits: number of limit events;\nfallback: steps on "
       "the linear fallback; cycles: runs with a limit cycle;\n"
@@ -146,6 +249,7 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
       "or never was above\n",
       first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,
       rows.size() / models.size(), rows.size() == models.size() ? "" : "s", table.text(), remarks);
+  return summary + fault_text(rows);
 }
 
 std::string tracking_json(std::span<const TrackingRow> rows) {

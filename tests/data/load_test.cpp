@@ -9,7 +9,9 @@
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 #include "torsio/data/manifest.hpp"
+#include "torsio/data/mapping.hpp"
 
 namespace torsio {
 namespace {
@@ -54,6 +56,62 @@ TEST(LoadDataset, FilesOfOneNameStayApart) {
   const Dataset dataset = load_dataset({a}, {b});
   EXPECT_EQ(dataset.records[0].recording.name(), a);
   EXPECT_EQ(dataset.records[1].recording.name(), b);
+}
+
+/// A foreign log and the mapping that reads it.
+constexpr const char* kForeign = "time,enc,cell,note\n0,1,5,0\n1,2,6,0\n2,4,7,0\n";
+constexpr const char* kForeignMapping = R"(
+channels:
+  t_s: {from: time, unit: ms}
+  joint_angle_rad: {from: enc, unit: deg}
+  torque_Nm: cell
+drop: [note]
+latency: {torque_Nm: 1ms}
+zero: [{channel: torque_Nm, first: 1ms}, {channel: joint_angle_rad, first: 1ms}]
+derive: {half_torque_Nm: 0.5 * torque_Nm}
+)";
+
+TEST(LoadInputs, NeedsNeitherTheTargetNorItsColumns) {
+  const TemporaryFolder folder;
+  const std::string log = folder.file("log.csv", "time,enc\n0,1\n1,2\n2,4\n");
+  const std::string mapping = folder.file("map.yaml", kForeignMapping);
+  EXPECT_NE(test::error_message([&] {
+              (void)load_dataset({log}, {}, {.mapping = mapping});
+            }).find("has no column 'cell'"),
+            std::string::npos);
+  const Dataset dataset =
+      load_inputs({log}, {"joint_angle_rad"}, {.mapping = mapping, .target = "torque_Nm"});
+  const Recording& recording = dataset.records.at(0).recording;
+  ASSERT_EQ(recording.channels().size(), 1U);
+  EXPECT_DOUBLE_EQ(recording.channel("joint_angle_rad").values[2], rad_from_deg(3.0));
+  EXPECT_EQ(recording.zeros.size(), 1U);
+  EXPECT_EQ(dataset.files, (std::vector<std::string>{mapping, log}));
+  // What the model needs must be there.
+  EXPECT_NE(test::error_message([&] {
+              (void)load_inputs({log}, {"torque_Nm"}, {.mapping = mapping, .target = "torque_Nm"});
+            }).find("has no column 'cell'"),
+            std::string::npos);
+}
+
+TEST(LoadDataset, ADefaultMappingIsForLogsWithoutOne) {
+  const TemporaryFolder folder;
+  const std::string log = folder.file("log.csv", kForeign);
+  const std::string text = mapping_text(parse_mapping(kForeignMapping, "map.yaml"));
+  const LoadOptions options{.default_mapping = text, .default_mapping_place = "m: mapping"};
+  const Dataset by_default = load_dataset({log}, {}, options);
+  EXPECT_TRUE(by_default.records.at(0).recording.has("half_torque_Nm"));
+  EXPECT_EQ(by_default.records.at(0).recording.mapping, text);
+  const std::string own = "{drop: [note, time, enc], rate: 1kHz, channels: {torque_mNm: cell}}";
+  const std::string manifest = folder.file("set.yaml", "mapping: " + own + "\nfiles: [log.csv]\n");
+  const Recording mapped = load_dataset({manifest}, {}, options).records.at(0).recording;
+  EXPECT_DOUBLE_EQ(mapped.channel("torque_Nm").values[0], 0.005);
+  EXPECT_EQ(mapped.mapping, mapping_text(parse_mapping(own, "own")));
+  const std::string given = folder.file("own.yaml", own);
+  LoadOptions with_own = options;
+  with_own.mapping = given;
+  EXPECT_DOUBLE_EQ(
+      load_dataset({log}, {}, with_own).records.at(0).recording.channel("torque_Nm").values[0],
+      0.005);
 }
 
 constexpr const char* kManifest = R"(

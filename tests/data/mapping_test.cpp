@@ -86,6 +86,55 @@ TEST(Mapping, DropsTextAndSplitsIntoRecords) {
   EXPECT_EQ(kept[0].name(), "log[run=8]");
 }
 
+TEST(MappingText, ReadsBackToTheSameMapping) {
+  const std::string yaml = R"(
+channels:
+  t_s: {from: stamp, unit: ms}
+  joint_angle_deg: {from: "Pos: [raw], 'x'", unit: deg, sign: -1, offset: 90deg}
+  gear_angle_rad: {from: "#motor", unit: deg, scale: 1/150}
+  torque_Nm: "true"
+drop: [note, "~"]
+split_by: run
+keep: [8]
+clock: {rebuild: true, max_stray_steps: 3}
+rate: 2kHz
+zero:
+  - {channel: joint_angle_rad, first: 0.1s}
+  - {channel: gear_angle_rad, mid_range: true}
+hold: [torque_Nm]
+latency: {torque_Nm: 2ms}
+derive: {spring_deflection_rad: "gear_angle_rad - joint_angle_rad"}
+computed_from: {torque_Nm: [iq_A]}
+)";
+  const Mapping mapping = parse_mapping(yaml, "map.yaml");
+  const std::string text = mapping_text(mapping);
+  const Mapping again = parse_mapping(text, "card");
+  EXPECT_EQ(mapping_text(again), text);
+  ASSERT_EQ(again.channels.size(), 4U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(again.channels[i].name, mapping.channels[i].name);
+    EXPECT_EQ(again.channels[i].from, mapping.channels[i].from);
+    EXPECT_EQ(again.channels[i].unit, mapping.channels[i].unit);
+    EXPECT_EQ(again.channels[i].sign, mapping.channels[i].sign);
+    EXPECT_EQ(again.channels[i].scale, mapping.channels[i].scale);
+    EXPECT_EQ(again.channels[i].offset, mapping.channels[i].offset);
+  }
+  EXPECT_EQ(again.drop, mapping.drop);
+  EXPECT_EQ(again.split_by, "run");
+  EXPECT_EQ(again.keep, std::vector<double>{}) << "which records of one log were used";
+  EXPECT_TRUE(again.clock.rebuild);
+  EXPECT_EQ(again.clock.max_stray_steps, 3.0);
+  EXPECT_EQ(again.rate_Hz, 2000.0);
+  EXPECT_EQ(again.zero, mapping.zero);
+  EXPECT_EQ(again.hold, mapping.hold);
+  EXPECT_EQ(again.latency.at(0).latency_s, 0.002);
+  EXPECT_EQ(again.derive, mapping.derive);
+  EXPECT_EQ(again.computed_from, mapping.computed_from);
+  EXPECT_EQ(mapping_text(Mapping{}), "");
+  EXPECT_EQ(mapping_text(parse_mapping("{clock: {resample: 400Hz}}", "m")),
+            "clock: {resample: 400}\n");
+}
+
 TEST(Mapping, ALogWithoutAClockTakesTheGivenRate) {
   EXPECT_EQ(read("x_m\n1\n2\n", "rate: 2kHz")[0].sample_rate_Hz(), 2000.0);
   EXPECT_EQ(read("x_m\n1\n2\n", "{}", 50.0)[0].sample_rate_Hz(), 50.0);

@@ -70,6 +70,16 @@ TEST(ModelFile, KeepsItsCard) {
   EXPECT_EQ(loaded.settings.zeroed_channels, saved.settings.zeroed_channels);
 }
 
+TEST(ModelFile, KeepsTheMappingAndReadsFilesWithoutOne) {
+  ModelFile saved = example_model_file(example<Linear>());
+  const std::vector<std::byte> without = model_bytes(saved);
+  EXPECT_EQ(parse_model(without, "m").card.mapping, "");
+  const std::string_view text(reinterpret_cast<const char*>(without.data()), without.size());
+  EXPECT_EQ(text.find("mapping"), std::string_view::npos) << "the bytes of earlier releases";
+  saved.card.mapping = "channels:\n  torque_Nm: {from: \"tau, raw\"}\n";
+  EXPECT_EQ(parse_model(model_bytes(saved), "m").card.mapping, saved.card.mapping);
+}
+
 TEST(ModelFile, KeepsWhatHasNoEvidenceAsNaN) {
   ModelFile model = example_model_file(example<Linear>());
   model.card.metrics["rmse"] = kNotMeasured;

@@ -33,6 +33,7 @@ const JsonCase kCases[] = {
     {"Compare", kTwoRecords, "compare a.csv --test b.csv --models linear"},
     {"CrossValidate", kRecord, "crossvalidate a.csv --models linear"},
     {"Demo", kTwoRecords, "demo a.csv --test b.csv --models linear"},
+    {"Estimate", kModel, "estimate m.safetensors a.csv"},
     {"Evaluate", kModel, "evaluate m.safetensors a.csv"},
     {"EvaluateAModelAlone", kModel, "evaluate m.safetensors"},
     {"Fit", kRecord, "fit a.csv --model linear -o m.safetensors"},

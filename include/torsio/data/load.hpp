@@ -13,6 +13,9 @@ namespace torsio {
 /// Options of a user, in addition to the files.
 struct LoadOptions {
   std::optional<std::string> mapping;  ///< file; replaces the mapping of a manifest
+  /// `mapping_text`, for the logs that have no other mapping; empty: none.
+  std::string default_mapping = {};
+  std::string default_mapping_place = {};  ///< where it comes from, for messages
   /// All records are brought to this rate; it is also the clock of a log that has none.
   std::optional<double> rate_Hz;
   std::string target;  ///< empty: the manifest's, else torque_Nm
@@ -33,6 +36,14 @@ struct LoadOptions {
 [[nodiscard]] Dataset load_dataset(const std::vector<std::string>& train_files,
                                    const std::vector<std::string>& test_files,
                                    const LoadOptions& options = {});
+
+/// The recordings of files or manifests for a model that is given `channels` alone: other channels,
+/// the target among them, may be missing, and so may the columns of a mapping that are read for
+/// them. The sample rates may differ.
+/// @throws Error as `load_recordings`.
+[[nodiscard]] Dataset load_inputs(const std::vector<std::string>& files,
+                                  const std::vector<std::string>& channels,
+                                  const LoadOptions& options = {});
 
 /// The dataset of a manifest that was not read from a file.
 [[nodiscard]] Dataset load_manifest(const Manifest& manifest, const LoadOptions& options = {});

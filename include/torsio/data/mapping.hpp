@@ -56,6 +56,10 @@ struct Mapping {
 [[nodiscard]] Mapping read_mapping(const std::string& path, const Progress& progress = {});
 [[nodiscard]] Mapping parse_mapping(std::string_view text, const std::string& name);
 
+/// The mapping as YAML that `parse_mapping` reads back, without its file and without `keep`, which
+/// selects records of one log. Empty if nothing else is set.
+[[nodiscard]] std::string mapping_text(const Mapping& mapping);
+
 /// Evaluates the definitions over the recording and adds them as channels. Where a channel that one
 /// uses is NaN, so is the result, as long as the expression has no memory.
 /// @throws Error if a channel is missing, or is NaN and goes into a filter, difference or lag.

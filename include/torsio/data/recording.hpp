@@ -60,6 +60,7 @@ class Recording {
   /// back to measured ones.
   std::vector<ChannelDefinition> definitions;
   std::vector<ZeroRule> zeros;  ///< already applied to the values
+  std::string mapping;  ///< `mapping_text` of the mapping that it was read with; empty: none
 
  private:
   std::string name_;

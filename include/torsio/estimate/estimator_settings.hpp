@@ -9,6 +9,10 @@
 
 namespace torsio {
 
+/// Means no limit in the ranges of inputs: beyond every quantity, and a range of this size on
+/// either side has a width that double can represent.
+inline constexpr double kOpenRange = 1e300;
+
 /// The range of each feature in the training data.
 struct FeatureRanges {
   std::vector<double> lowest;

@@ -31,7 +31,9 @@ struct ModelCard {
   std::map<std::string, std::string> options;  ///< options of the fitter, as given
   std::uint64_t seed = 0;
   std::vector<Source> training_files;
-  std::vector<ZeroRule> zeros;            ///< how the training records were zeroed
+  std::vector<ZeroRule> zeros;  ///< how the training records were zeroed
+  /// The mapping of the training records as text (`mapping_text`); empty: none, or several.
+  std::string mapping = {};
   std::string held_out;                   ///< description of the samples of `metrics`
   std::map<std::string, double> metrics;  ///< in the target's unit: "rmse", "mad", ...
   std::string device_serial;  ///< serial number of the actuator that the model belongs to, or empty

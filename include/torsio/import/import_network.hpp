@@ -40,10 +40,6 @@ struct ImportedModel {
   std::vector<std::string> notes;  ///< remarks for the user
 };
 
-/// Means no limit in the ranges of inputs: beyond every quantity, and a range of this size on
-/// either side has a width that double can represent.
-inline constexpr double kOpenRange = 1e300;
-
 /// A network of another program in torsio's estimator. Range guard, linear fallback and standard
 /// deviation are computed from `guards` (all of its recordings, whatever their role). Without it
 /// the guard is open, the fallback is 0 and there is no error bar, which a note states.

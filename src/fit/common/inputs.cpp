@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <utility>
 
 #include "data/canonical_channels.hpp"
+#include "data/needed_definitions.hpp"
 #include "numerics/least_squares.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
@@ -78,26 +80,6 @@ std::vector<std::string> channel_names(const Recording& recording) {
   std::vector<std::string> names;
   for (const Channel& channel : recording.channels()) names.push_back(channel.name);
   return names;
-}
-
-/// Keeps the definitions that `inputs` reach, directly or through another definition.
-std::vector<ChannelDefinition> needed_definitions(const std::vector<ChannelDefinition>& definitions,
-                                                  const std::vector<std::string>& inputs) {
-  std::vector<std::string> wanted;
-  for (const std::string& input : inputs)
-    std::ranges::copy(channels_of(input), std::back_inserter(wanted));
-  for (std::size_t i = 0; i < wanted.size(); ++i)
-    for (const ChannelDefinition& definition : definitions)
-      if (definition.name == wanted[i])
-        for (std::string& channel : channels_of(definition.expression))
-          if (std::ranges::find(wanted, channel) == wanted.end())
-            wanted.push_back(std::move(channel));
-  std::vector<ChannelDefinition> needed;
-  std::ranges::copy_if(definitions, std::back_inserter(needed),
-                       [&](const ChannelDefinition& definition) {
-                         return std::ranges::find(wanted, definition.name) != wanted.end();
-                       });
-  return needed;
 }
 
 /// Whether target = slope * input + offset to one part in 10^9 of the variance, over all fresh
@@ -217,7 +199,10 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
                           "Name the model's inputs with --inputs, or bring the deflection in with "
                           "--mapping: derive or rename it there."});
   FeatureSpec spec = as_asked([&] {
-    return FeatureSpec{inputs, needed_definitions(definitions, inputs)};
+    std::vector<std::string> channels;
+    for (const std::string& input : inputs)
+      std::ranges::copy(channels_of(input), std::back_inserter(channels));
+    return FeatureSpec{inputs, needed_definitions(definitions, channels)};
   });
   const FeaturePipeline pipeline =
       as_asked([&] { return FeaturePipeline(spec, dataset.sample_rate_Hz()); });

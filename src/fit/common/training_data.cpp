@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "fit/common/finite_input.hpp"
+#include "fit/common/outliers.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 
 namespace torsio {
@@ -22,30 +25,83 @@ std::vector<std::uint8_t> role_mask(const DatasetRecord& record, Role role) {
   return mask;
 }
 
-std::vector<const std::vector<double>*> raw_channels(const Recording& recording,
-                                                     const FeaturePipeline& pipeline) {
-  std::vector<const std::vector<double>*> channels;
+/// Limits of the channel over all samples of the role.
+OutlierLimits limits_of(const Dataset& dataset, const std::string& channel, Role role) {
+  std::vector<double> values;
+  for (const DatasetRecord& record : dataset.records) {
+    if (!record.has_role(role)) continue;
+    const Channel& measured = record.recording.channel(channel);
+    for (const Segment& segment : record.segments)
+      for (std::size_t n = segment.begin; segment.role == role && n < segment.end; ++n)
+        if (measured.is_fresh(n) && std::isfinite(measured.values[n]))
+          values.push_back(measured.values[n]);
+  }
+  return outlier_limits(values);
+}
+
+using ChannelLimits = std::map<std::string, OutlierLimits>;
+
+ChannelLimits channel_limits(const Dataset& dataset, const FeaturePipeline& pipeline, Role role) {
+  ChannelLimits limits{{dataset.target, limits_of(dataset, dataset.target, role)}};
   for (const std::string& input : pipeline.raw_inputs())
-    channels.push_back(&finite_input(recording, input));
-  return channels;
+    limits.try_emplace(input, limits_of(dataset, input, role));
+  return limits;
+}
+
+void note_left_out(std::vector<LeftOut>& left_out, const Recording& recording, std::size_t sample,
+                   const std::string& channel, double value) {
+  left_out.push_back({.file = recording.source.file,
+                      .recording = recording.name(),
+                      .sample = sample,
+                      .time_s = recording.time_s(sample),
+                      .channel = channel,
+                      .value = value});
+}
+
+/// The values of a raw input, with the last value before them instead of its outliers, whose
+/// samples are not used.
+std::vector<double> raw_channel(const Recording& recording, const std::string& input,
+                                const OutlierLimits& limits, std::vector<std::uint8_t>& use,
+                                std::vector<LeftOut>& left_out) {
+  std::vector<double> values = finite_input(recording, input);
+  const auto is_sound = [&](double value) { return limits.contain(value); };
+  const auto first = std::ranges::find_if(values, is_sound);
+  double last = first == values.end() ? 0.0 : *first;
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    if (is_sound(values[n])) {
+      last = values[n];
+      continue;
+    }
+    if (use[n] != 0) note_left_out(left_out, recording, n, input, values[n]);
+    values[n] = last;
+    use[n] = 0;
+  }
+  return values;
 }
 
 Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::string& target,
-             Role role) {
+             Role role, const ChannelLimits& limits, std::vector<LeftOut>& left_out) {
   const Recording& recording = record.recording;
-  const std::vector<const std::vector<double>*> channels = raw_channels(recording, pipeline);
   const Channel& measured = recording.channel(target);
   Sequence sequence{.recording = recording.name(),
                     .features = Matrix(recording.size(), pipeline.feature_count()),
                     .target = measured.values,
                     .use = role_mask(record, role)};
+  for (std::size_t n = 0; n < recording.size(); ++n) {
+    if (limits.at(target).contain(measured.values[n])) continue;
+    if (sequence.use[n] != 0 && measured.is_fresh(n))
+      note_left_out(left_out, recording, n, target, measured.values[n]);
+    sequence.target[n] = kNotMeasured;
+  }
+  std::vector<std::vector<double>> channels;
+  for (const std::string& input : pipeline.raw_inputs())
+    channels.push_back(raw_channel(recording, input, limits.at(input), sequence.use, left_out));
   std::vector<double> raw(channels.size());
   pipeline.reset();
   for (std::size_t n = 0; n < recording.size(); ++n) {
-    std::ranges::transform(channels, raw.begin(),
-                           [n](const auto* channel) { return (*channel)[n]; });
+    std::ranges::transform(channels, raw.begin(), [n](const auto& channel) { return channel[n]; });
     std::ranges::copy(pipeline.step(raw), sequence.features.row(n).begin());
-    if (!pipeline.is_settled() || !measured.is_fresh(n) || !std::isfinite(measured.values[n]) ||
+    if (!pipeline.is_settled() || !measured.is_fresh(n) || !std::isfinite(sequence.target[n]) ||
         !sequence.has_features(n))
       sequence.use[n] = 0;
   }
@@ -53,7 +109,8 @@ Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::
 }
 
 /// The part of the records that has `role`; see `DisturbanceGuards::largest_step`.
-double largest_step(const Dataset& dataset, const std::string& channel, Role role) {
+double largest_step(const Dataset& dataset, const std::string& channel, Role role,
+                    const OutlierLimits& limits) {
   double largest = 0.0;
   double lowest = std::numeric_limits<double>::infinity();
   double highest = -lowest;
@@ -63,9 +120,11 @@ double largest_step(const Dataset& dataset, const std::string& channel, Role rol
     for (const Segment& segment : record.segments) {
       if (segment.role != role) continue;
       for (std::size_t n = segment.begin; n < segment.end; ++n) {
+        if (!limits.contain(values[n])) continue;
         lowest = std::min(lowest, values[n]);
         highest = std::max(highest, values[n]);
-        if (n > segment.begin) largest = std::max(largest, std::abs(values[n] - values[n - 1]));
+        if (n > segment.begin && limits.contain(values[n - 1]))
+          largest = std::max(largest, std::abs(values[n] - values[n - 1]));
       }
     }
   }
@@ -103,6 +162,12 @@ void refuse_if_not_finite(const TrainingData& data) {
 
 }  // namespace
 
+std::string LeftOut::text() const {
+  return fmt::format("{}, sample {} (t = {:.6g} s): {} = {:.6g}",
+                     file.empty() || recording.find('[') != std::string::npos ? recording : file,
+                     sample, time_s, channel, value);
+}
+
 bool Sequence::has_features(std::size_t sample) const {
   return std::ranges::all_of(features.row(sample),
                              [](double value) { return std::isfinite(value); });
@@ -115,14 +180,15 @@ TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role
   data.sample_rate_Hz = dataset.sample_rate_Hz();
   for (std::size_t j = 0; j < pipeline.feature_count(); ++j)
     data.inputs.push_back({spec.inputs[j], pipeline.is_rate(j)});
+  const ChannelLimits limits = channel_limits(dataset, pipeline, role);
   for (const DatasetRecord& record : dataset.records) {
     if (!record.has_role(role)) continue;
-    data.sequences.push_back(run(record, pipeline, dataset.target, role));
+    data.sequences.push_back(run(record, pipeline, dataset.target, role, limits, data.left_out));
     data.largest_travel =
         std::fmax(data.largest_travel, largest_travel(record, data.sequences.back(), role));
   }
   for (const std::string& channel : pipeline.raw_inputs())
-    data.largest_step.push_back(largest_step(dataset, channel, role));
+    data.largest_step.push_back(largest_step(dataset, channel, role, limits.at(channel)));
   if (data.usable_samples() == 0) {
     refuse_if_not_finite(data);
     std::size_t samples = 0;

@@ -176,6 +176,14 @@ std::optional<double> measured_bandwidth(const DataSheet& sheet, TrackingSpec sp
                    frequency_sweep(amplitude_Nm, kSweep_s), kBenchRate_Hz);
 }
 
+Recording run_without_faults(const DataSheet& sheet, TrackingSpec spec, const AnyInverse& inverse,
+                             std::uint64_t seed, const Progress& progress) {
+  spec.faults = {};
+  Loop loop(sheet, spec, inverse, seed);
+  (void)loop.run(progress);
+  return std::move(loop).finish();
+}
+
 TrackingRow row_of(const DataSheet& sheet, const TrackingSpec& spec, const std::string& model,
                    std::uint64_t seed) {
   return {.actuator = sheet.serial ? fmt::format("{}#{:02}", sheet.name, *sheet.serial)
@@ -194,6 +202,7 @@ void run_into(TrackingRow& row, const DataSheet& sheet, const TrackingSpec& spec
     const TrackingRun run = track(sheet, spec, inverse, row.seed, progress);
     row.score = run.score;
     row.bandwidth_Hz = run.bandwidth_Hz;
+    row.faults = run.faults;
     if (!run.has_diverged) return;
     row.status = "diverged";
     row.reason = fmt::format("stopped after {:.3g} s",
@@ -227,6 +236,9 @@ TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, const AnyI
   Loop loop(sheet, spec, inverse, seed);
   const bool has_held = loop.run(progress);
   TrackingRun done{.score = {}, .has_diverged = !has_held, .record = std::move(loop).finish()};
+  if (!spec.faults.faults.empty())
+    done.faults = fault_detections(spec.faults, sheet, done.record,
+                                   run_without_faults(sheet, spec, inverse, seed, progress));
   if (!has_held) return done;
   done.score = tracking_score(done.record, amplitude_of(spec.reference, sheet),
                               spec.reference.kind == TorqueReference::Kind::steps);

@@ -5,11 +5,15 @@
 #include <cmath>
 #include <string>
 
+#include "fit/common/guards.hpp"
 #include "fit/common/model_run.hpp"
 #include "fit/common/usable_table.hpp"
 #include "model/linear/linear.hpp"
+#include "support/bench_dataset.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/train_model.hpp"
 
 namespace torsio {
 namespace {
@@ -51,6 +55,58 @@ TEST(TrainingData, HasFeaturesTargetsAndWhatTheInputsAre) {
   EXPECT_EQ(sequence.features(4, 0), 16.0);
   EXPECT_DOUBLE_EQ(sequence.features(4, 1), 700.0);
   EXPECT_EQ(sequence.target[4], 40.0);
+}
+
+/// The bench with absurd values of the gear angle and the torque in its first record.
+Dataset with_absurd_values() {
+  Dataset dataset = test::bench_dataset();
+  const Recording sound = dataset.records[0].recording;
+  Recording spoiled("spoiled", sound.sample_rate_Hz());
+  spoiled.source.file = "spoiled.csv";
+  for (Channel channel : sound.channels()) {
+    if (channel.name == "gear_angle_rad") channel.values[1200] = 1e12;
+    if (channel.name == "torque_Nm") channel.values[2000] = -1e12;
+    spoiled.add(std::move(channel));
+  }
+  dataset.records[0].recording = std::move(spoiled);
+  return dataset;
+}
+
+TEST(TrainingData, TakesAbsurdValuesAsNotMeasured) {
+  const Dataset sound = test::bench_dataset();
+  const Dataset spoiled = with_absurd_values();
+  const FeatureSpec spec = resolve_inputs(sound, {});
+  const TrainingData expected = training_data(sound, spec);
+  const TrainingData data = training_data(spoiled, spec);
+  EXPECT_TRUE(expected.left_out.empty());
+  ASSERT_EQ(data.left_out.size(), 2U);
+  EXPECT_EQ(data.left_out[0].text(), "spoiled.csv, sample 2000 (t = 2 s): torque_Nm = -1e+12");
+  EXPECT_EQ(data.left_out[1].text(),
+            "spoiled.csv, sample 1200 (t = 1.2 s): gear_angle_rad = 1e+12");
+  EXPECT_EQ(data.usable_samples(), expected.usable_samples() - 2);
+  EXPECT_EQ(data.sequences[0].use[1200], 0);
+  EXPECT_EQ(data.sequences[0].use[2000], 0);
+  EXPECT_TRUE(std::isnan(data.sequences[0].target[2000]));
+  // The guards are those of the sound records: the filters have not seen 1e12.
+  const FeatureRanges ranges = feature_ranges(data);
+  const FeatureRanges right = feature_ranges(expected);
+  for (std::size_t j = 0; j < data.input_count(); ++j) {
+    const double width = right.highest[j] - right.lowest[j];
+    EXPECT_NEAR(ranges.lowest[j], right.lowest[j], 0.02 * width);
+    EXPECT_NEAR(ranges.highest[j], right.highest[j], 0.02 * width);
+  }
+}
+
+TEST(TrainModel, AnAbsurdValueNeitherWidensTheGuardNorSpoilsTheFit) {
+  const Dataset sound = test::bench_dataset();
+  const ModelChoice choice{.family = "linear_coulomb", .features = resolve_inputs(sound, {})};
+  const TrainedModel expected = train_model(sound, choice, 1);
+  const TrainedModel model = train_model(with_absurd_values(), choice, 1);
+  EXPECT_LT(model.file.settings.ranges.highest[0], 0.1);
+  EXPECT_NEAR(model.file.settings.fallback.slope[0], expected.file.settings.fallback.slope[0], 1.0);
+  ASSERT_EQ(model.notes.size(), expected.notes.size() + 2);
+  EXPECT_NE(model.notes[0].find("spoiled.csv, sample 2000 (t = 2 s): torque_Nm"),
+            std::string::npos);
 }
 
 TEST(TrainingData, UsesOnlyItsRoleButFiltersRunThrough) {

@@ -14,6 +14,7 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/sim/closed_loop/fault_detection.hpp"
 #include "torsio/sim/closed_loop/reference.hpp"
 #include "torsio/sim/closed_loop/tracking_score.hpp"
 #include "torsio/sim/fault_schedule.hpp"
@@ -47,6 +48,8 @@ struct TrackingRun {
   std::optional<double> bandwidth_Hz = {};
   bool has_diverged =
       false;  ///< stopped: the joint made a full turn, or the torque exceeded every bound
+  /// If faults are scheduled: one entry for each, compared with a run without them.
+  std::vector<FaultDetection> faults = {};
   /// Sensor signals, each term of the command, and the `truth_` channels.
   ///
   ///     command = proportional + integral + derivative + feed_forward + rate_feed_forward +
@@ -95,6 +98,7 @@ struct TrackingRow {
   TrackingScore score = {};
   std::optional<double> mad_to_linear = {};  ///< MAD over that of the linear inverse, same seed
   std::optional<double> bandwidth_Hz = {};   ///< as `TrackingRun`'s
+  std::vector<FaultDetection> faults = {};   ///< as `TrackingRun`'s
   std::string status = "ok";                 ///< "diverged", "failed"
   std::string reason = {};
 };
