@@ -38,7 +38,7 @@ struct TrackFlags {
   std::string observer;
   bool feeds_rate_forward = false;
   std::vector<std::string> models;
-  DataFlags data;  ///< of the replayed recording
+  DataFlags data;  ///< options for the replayed recording
   std::string faults;
   std::string record;
   std::uint64_t seed = kDefaultSeed;

@@ -52,7 +52,7 @@ std::string estimates_text(const std::vector<EstimateSummary>& summaries,
   TextTable table;
   table.header({"recording", "samples"});
   for (const Fault fault : faults) table.header({in_words(fault) + " %"});
-  table.header({"lowest", "highest", "largest bar"});
+  table.header({"lowest", "highest", "largest error bar"});
   std::string remarks;
   for (const EstimateSummary& summary : summaries) {
     std::vector<std::string> row{summary.recording, fmt::format("{}", summary.samples)};

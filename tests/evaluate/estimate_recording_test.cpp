@@ -61,11 +61,11 @@ TEST(EstimateRecording, EqualsThePredictionAndNeedsNoTarget) {
   const EstimatedRecording estimated = estimate_recording(make_estimator(file), log);
   const Prediction predicted = predict(make_estimator(file), measured);
   const auto& value = estimated.channels.channel("estimated_torque_Nm").values;
-  const auto& bar = estimated.channels.channel("torque_std_dev_Nm").values;
+  const auto& std_dev = estimated.channels.channel("torque_std_dev_Nm").values;
   ASSERT_EQ(value.size(), predicted.estimates.size());
   for (std::size_t n = 0; n < value.size(); ++n) {
     ASSERT_EQ(value[n], predicted.estimates[n].value) << n;
-    ASSERT_EQ(std::isnan(bar[n]), std::isnan(predicted.estimates[n].std_dev)) << n;
+    ASSERT_EQ(std::isnan(std_dev[n]), std::isnan(predicted.estimates[n].std_dev)) << n;
     ASSERT_EQ(estimated.faults[n], predicted.estimates[n].fault) << n;
   }
 }

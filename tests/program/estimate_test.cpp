@@ -41,7 +41,7 @@ TEST_F(EstimateVerb, GivesTheTorqueOfALogWithoutATorqueChannel) {
   const Outcome outcome = torsio("estimate m.safetensors log.csv -o out.csv --json out.json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("no fault %"), std::string::npos) << outcome.out;
-  EXPECT_NE(outcome.out.find("largest bar"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("largest error bar"), std::string::npos) << outcome.out;
   const std::string csv = contents("out.csv");
   EXPECT_EQ(csv.substr(0, csv.find('\n')),
             "t_s,gear_angle_rad,joint_angle_rad,estimated_torque_Nm,torque_std_dev_Nm,fault,"

@@ -22,8 +22,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr auto kMostAfterTheSignal = milliseconds(2000);
-constexpr auto kMostToStart = std::chrono::seconds(60);  // with sanitizers on a busy machine
+constexpr auto kMaxAfterTheSignal = milliseconds(2000);
+constexpr auto kMaxToStart = std::chrono::seconds(60);  // with sanitizers on a busy machine
 
 struct Job {
   std::string_view name;
@@ -181,14 +181,14 @@ TEST_P(Interruption, EndsTheProgramWithinTwoSeconds) {
   const auto files = [this] { return shell("ls -A").out; };
   const std::string before = files();
   start(job.arguments);
-  const auto latest = Clock::now() + kMostToStart;
+  const auto latest = Clock::now() + kMaxToStart;
   while (!catches(signal.number) && Clock::now() < latest)
     ASSERT_FALSE(ends_within(milliseconds(0))) << contents("err.txt");
   ASSERT_FALSE(ends_within(job.before_the_signal))
       << "the job was over before the signal: " << contents("err.txt");
 
   ASSERT_EQ(::kill(child_, signal.number), 0);
-  ASSERT_TRUE(ends_within(kMostAfterTheSignal));
+  ASSERT_TRUE(ends_within(kMaxAfterTheSignal));
   EXPECT_TRUE(WIFSIGNALED(status_)) << "exit code " << WEXITSTATUS(status_);
   EXPECT_EQ(WTERMSIG(status_), signal.number);
   EXPECT_NE(contents("err.txt").find("stopped on request"), std::string::npos)

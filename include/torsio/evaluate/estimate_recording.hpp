@@ -14,8 +14,8 @@ namespace torsio {
 
 /// The estimates of a recording, whose target need not be measured.
 struct EstimatedRecording {
-  /// On the clock of the recording: the raw inputs, the estimate ("estimated_torque_Nm"), its error
-  /// bar ("torque_std_dev_Nm") and its novelty ("novelty_1", NaN for a model without one).
+  /// On the clock of the recording: the raw inputs, the estimate ("estimated_torque_Nm"), the error bar
+  /// ("torque_std_dev_Nm") and the novelty ("novelty_1", NaN for a model without one).
   Recording channels;
   std::vector<Fault> faults;  ///< one for each sample
 };
@@ -38,7 +38,7 @@ struct EstimateSummary {
   double sample_rate_Hz = 0.0;
   std::size_t samples = 0;
   std::vector<OfFault> faults;  ///< those that occurred, `none` first where it did
-  /// Of the samples without a fault, in the target's unit; NaN if there is none.
+  /// The extremes over the samples without a fault, in the target's unit; NaN if there is none.
   double lowest = kNotMeasured;
   double highest = kNotMeasured;
   double largest_std_dev = kNotMeasured;

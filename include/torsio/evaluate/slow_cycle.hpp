@@ -27,11 +27,11 @@ struct SlowCycle {
   };
 
   std::string reason;     ///< why it cannot be determined; then nothing below is set
-  double period_s = 0.0;  ///< of the triangle
+  double period_s = 0.0;  ///< period of the triangle
   double lowest_rad = 0.0;
   double highest_rad = 0.0;
   std::vector<std::pair<std::string, double>> held;  ///< other raw inputs, and their constant value
-  double stiffness_Nm_rad = 0.0;                     ///< of the least-squares line through m
+  double stiffness_Nm_rad = 0.0;                     ///< slope of the least-squares line through m
   double width_at_zero_Nm = kNotMeasured;            ///< NaN where the range does not contain 0
   double largest_width_Nm = 0.0;
   double largest_width_at_rad = 0.0;
@@ -40,7 +40,7 @@ struct SlowCycle {
 };
 
 /// Runs the model through three cycles of the deflection. "Cannot be determined" (`reason`): the
-/// target is no torque, no input is the deflection, its range is not known, an input depends on a
+/// target is not a torque, no input is the deflection, its range is not known, an input depends on a
 /// channel that a cycle does not determine, or the model reports a fault in the cycle.
 /// @throws Cancelled.
 [[nodiscard]] SlowCycle slow_cycle(const ModelFile& model, const Progress& progress = {});

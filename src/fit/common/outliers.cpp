@@ -56,7 +56,7 @@ OutlierLimits outlier_limits(std::vector<double>& values) {
   if (values.size() < kFewestForOutliers) return {};
   const auto samples = static_cast<double>(values.size());
   const auto most = std::clamp<std::size_t>(static_cast<std::size_t>(kShareOfOutliers * samples), 1,
-                                            kMostOutliers);
+                                            kMaxOutliers);
   const std::size_t outside = static_cast<std::size_t>(kShareOutside * samples) + 1;
   const std::vector<double> lowest = first(values, outside, std::less<>());
   const std::vector<double> highest = first(values, outside, std::greater<>());

@@ -9,7 +9,7 @@ namespace torsio {
 /// A channel has outliers from this many samples on.
 inline constexpr std::size_t kFewestForOutliers = 1000;
 /// At most this many, and at most this share of the samples (but one in any case).
-inline constexpr std::size_t kMostOutliers = 10;
+inline constexpr std::size_t kMaxOutliers = 10;
 inline constexpr double kShareOfOutliers = 1e-4;
 /// An outlier is outside the range of 99.9 % of the samples, stretched by this factor about its
 /// middle.

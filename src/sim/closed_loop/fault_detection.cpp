@@ -27,7 +27,7 @@ class Signals {
     return static_cast<Fault>(
         static_cast<int>(inverse_[tick] != 0.0 ? inverse_[tick] : loop_[tick]));
   }
-  /// Of the ticks [begin, end) without a reported fault.
+  /// Over the ticks [begin, end) without a reported fault.
   [[nodiscard]] std::optional<double> largest_unreported_error_Nm(std::size_t begin,
                                                                   std::size_t end) const {
     std::optional<double> largest;

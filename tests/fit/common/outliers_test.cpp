@@ -46,7 +46,7 @@ TEST(OutlierLimits, AreWithinTheNumberAndTheShare) {
     for (std::size_t k = 0; k < most; ++k) values[100 + 7 * k] = k % 2 == 0 ? 1e6 : -1e6;
     EXPECT_EQ(outliers(values), most) << samples;
     values[90] = 1e6;
-    EXPECT_LE(outliers(values), most) << samples << ": what is more frequent is data";
+    EXPECT_LE(outliers(values), most) << samples << ": more frequent values are data";
   }
 }
 
