@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "torsio/core/units.hpp"
@@ -47,6 +48,14 @@ FaultSchedule jump_at(double start_s, std::optional<double> duration_s = {}) {
                       .amount = rad_from_deg(2.0)}}};
 }
 
+TrackingSpec spec_of(double duration_s, FaultSchedule faults) {
+  TrackingSpec spec;
+  spec.reference.duration_s = duration_s;
+  spec.measures_bandwidth = false;
+  spec.faults = std::move(faults);
+  return spec;
+}
+
 TEST(FaultDetections, HaveTheTimeOfDetectionAndTheErrorUntilThen) {
   const auto found = fault_detections(jump_at(3.0, 4.0), kSheet, run_of(33.0, 40, {50, 51, 90}),
                                       run_of(1.0, 0, {}));
@@ -84,9 +93,7 @@ TEST(FaultDetections, AFaultThatIsReportedWithoutTheInjectedOneIsNoDetection) {
 
 // The case of the docs: a jump of an encoder that the range of the deflection contains.
 TEST(Track, ReportsThatAnEncoderJumpWasNotDetected) {
-  const TrackingSpec spec{.reference = {.kind = TorqueReference::Kind::chirp, .duration_s = 8.0},
-                          .measures_bandwidth = false,
-                          .faults = jump_at(4.0)};
+  const TrackingSpec spec = spec_of(8.0, jump_at(4.0));
   const std::array<std::uint64_t, 2> seeds{1, 2};
   const auto rows = track_models(kSheet, spec, LinearInverse(600.0), {}, seeds);
   ASSERT_EQ(rows.size(), 2U);
@@ -105,8 +112,7 @@ TEST(Track, ReportsThatAnEncoderJumpWasNotDetected) {
 }
 
 TEST(Track, ReportsWhenANaNWasDetected) {
-  TrackingSpec spec{.reference = {.kind = TorqueReference::Kind::chirp, .duration_s = 6.0},
-                    .measures_bandwidth = false};
+  TrackingSpec spec = spec_of(6.0, {});
   spec.faults.faults = {
       {.what = "gear_angle_rad", .kind = FaultKind::nan, .start_s = 4.0, .duration_s = 0.02}};
   const std::array<std::uint64_t, 1> seeds{1};
