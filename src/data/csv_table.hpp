@@ -41,7 +41,7 @@ struct CsvTable {
 struct CsvLimits {
   std::size_t header_bytes = std::size_t{64} << 10;  ///< the header line must end within these
   std::size_t line_bytes = std::size_t{1} << 20;
-  std::size_t gap_bytes = std::size_t{16} << 20;  ///< consecutive blank lines and comments
+  std::size_t gap_bytes = std::size_t{16} << 20;  ///< one stretch of blank lines and comments
   std::size_t values = std::size_t{256} << 20;    ///< cells of numbers: 2 GiB of memory
 };
 

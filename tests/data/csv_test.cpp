@@ -169,7 +169,7 @@ TEST(Csv, EndsAtALongStretchWithoutSamples) {
     for (std::size_t n = 0; n < lines; ++n) text += line + "\n";
     return text + "2\n";
   };
-  // Any number of times below the limit.
+  // Shorter stretches may be repeated.
   EXPECT_EQ(parse_csv(with_gap("", 900) + with_gap("# note", 100).substr(4), "a.csv", options)
                 .columns[0]
                 .values,

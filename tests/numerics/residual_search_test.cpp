@@ -95,6 +95,24 @@ TEST(ResidualSearch, CancellingComesThrough) {
   EXPECT_THROW((void)minimise_squares(rosenbrock(true), {-1.2, 1.0}, stopped), Cancelled);
 }
 
+TEST(ResidualSearch, EndsWithinAnIterationWhenAskedTo) {
+  // One derivative of 50 parameters takes 100 evaluations.
+  constexpr std::size_t kParameters = 50;
+  std::size_t evaluations = 0;
+  const ResidualProblem problem{
+      .residuals = kParameters,
+      .evaluate = [&](std::span<const double> x, std::span<double> r, std::span<double>) {
+        ++evaluations;
+        for (std::size_t n = 0; n < r.size(); ++n) r[n] = std::exp(x[n]) - 2.0;
+        return true;
+      }};
+  const SearchOptions stopped{
+      .progress = [&](double, std::string_view) { return evaluations < 20; }};
+  EXPECT_THROW((void)minimise_squares(problem, std::vector<double>(kParameters), stopped),
+               Cancelled);
+  EXPECT_EQ(evaluations, 20U);
+}
+
 TEST(ParameterUncertaintyOf, StandardErrorsAreThoseOfLinearRegression) {
   // y = a on 100 samples with residuals of +-0.5: s / sqrt(n).
   const ResidualProblem problem{

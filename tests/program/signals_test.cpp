@@ -22,8 +22,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr auto kMaxAfterTheSignal = milliseconds(2000);
-constexpr auto kMaxToStart = std::chrono::seconds(60);  // with sanitizers on a busy machine
+constexpr auto kMaxUntilTheEnd = milliseconds(2000);
+constexpr auto kMaxUntilTheStart = std::chrono::seconds(60);  // with sanitizers on a busy machine
 
 struct Job {
   std::string_view name;
@@ -45,7 +45,7 @@ constexpr std::array kJobs{
     Job{"import_of_a_pipe", "import pipe --inputs a_rad --rate 100Hz -o out"},
     Job{"track_of_a_replayed_pipe", "track --reference replay --replay pipe --json out"},
     Job{"simulate_into_a_pipe", "simulate dfki-50 sweep --duration 1s -o pipe"},
-    Job{"simulate_for_a_day", "simulate dfki-50 sweep --duration 86400s -o out"},
+    Job{"simulate_for_hours", "simulate dfki-50 sweep --duration 36000s -o out"},
     Job{"unpack_of_a_sparse_file", "unpack sparse.tsr -o out"},
     Job{"compare_of_all", "compare a.csv --test b.csv --models all --json out"},
     Job{"crossvalidate_of_all", "crossvalidate a.csv b.csv --models all --json out"},
@@ -55,7 +55,7 @@ constexpr std::array kJobs{
     Job{"adapt", "adapt m.safetensors a.csv --method rls --set forgetting=0.999 -o out",
         milliseconds(300),
         "fit a.csv --model mlp --set layers=3000 --set epochs=1 -o m.safetensors"},
-    Job{"track_for_hours", "track --duration 10000s --json out"},
+    Job{"track_for_an_hour", "track --duration 3600s --json out"},
     Job{"reproduce", "reproduce 001-models --json out"},
     Job{"fit_of_arx", "fit a.csv --model arx --set input_lags=500 --set output_lags=500 -o out"},
     Job{"fit_of_parametric_gp",
@@ -178,17 +178,18 @@ TEST_P(Interruption, EndsTheProgramWithinTwoSeconds) {
   if (job.first != nullptr) {
     ASSERT_EQ(torsio(job.first).exit_code, 0) << contents("err.txt");
   }
-  const auto files = [this] { return shell("ls -A").out; };
+  // A stopped fit of a network leaves its checkpoint.
+  const auto files = [this] { return shell("ls -A --ignore='*.checkpoint'").out; };
   const std::string before = files();
   start(job.arguments);
-  const auto latest = Clock::now() + kMaxToStart;
+  const auto latest = Clock::now() + kMaxUntilTheStart;
   while (!catches(signal.number) && Clock::now() < latest)
     ASSERT_FALSE(ends_within(milliseconds(0))) << contents("err.txt");
   ASSERT_FALSE(ends_within(job.before_the_signal))
       << "the job was over before the signal: " << contents("err.txt");
 
   ASSERT_EQ(::kill(child_, signal.number), 0);
-  ASSERT_TRUE(ends_within(kMaxAfterTheSignal));
+  ASSERT_TRUE(ends_within(kMaxUntilTheEnd));
   EXPECT_TRUE(WIFSIGNALED(status_)) << "exit code " << WEXITSTATUS(status_);
   EXPECT_EQ(WTERMSIG(status_), signal.number);
   EXPECT_NE(contents("err.txt").find("stopped on request"), std::string::npos)

@@ -142,7 +142,7 @@ SpreadChoice choose_spread(const Matrix& samples, const TrainingData& data,
   std::string scores;
   std::mutex reporting;
   for (std::size_t k = 0; k < kSpreads.size(); ++k) {
-    // In the fits, too: one of them with many iterations takes hours.
+    // The fits ask as well: one of them with many iterations takes hours.
     const Progress within = [&, k](double /*of_one_fit*/, std::string_view /*doing*/) {
       const std::scoped_lock lock(reporting);
       report_progress(progress, static_cast<double>(k) / static_cast<double>(kSpreads.size()),

@@ -262,6 +262,18 @@ TEST(FitDgmm, StopsWhenAsked) {
   EXPECT_THROW(static_cast<void>(fit_dgmm_paper(sweeps(100, 1), {}, stop)), Cancelled);
 }
 
+TEST(FitDgmm, CanBeStoppedInEveryIterationOfTheSearchForItsSpread) {
+  constexpr std::size_t kIterations = 20;
+  constexpr std::size_t kFits = 6 * 5;  // spreads, folds
+  std::size_t calls = 0;
+  const Progress count = [&](double, std::string_view doing) {
+    if (doing == "choosing the spread") ++calls;
+    return true;
+  };
+  static_cast<void>(fit_dgmm(sweeps(1000, 1), {.em_iterations = kIterations}, count));
+  EXPECT_GE(calls, kFits * kIterations);
+}
+
 TEST(FitDgmmPaper, ItsCovariancesAreFixedAndIsotropic) {
   const GaussianMixture mixture =
       fit_dgmm_paper(sweeps(2000, 1), {.components = 50}).parameters.mixture;
