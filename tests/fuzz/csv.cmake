@@ -1,1 +1,1 @@
-torsio_fuzzer(csv torsio::lab)
+torsio_fuzzer(csv torsio_readers)

@@ -1,1 +1,1 @@
-torsio_fuzzer(fault_schedule torsio::lab)
+torsio_fuzzer(fault_schedule torsio_readers)

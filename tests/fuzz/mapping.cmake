@@ -1,1 +1,1 @@
-torsio_fuzzer(mapping torsio::lab)
+torsio_fuzzer(mapping torsio_readers)

@@ -1,1 +1,1 @@
-torsio_fuzzer(recording_blocks torsio::lab)
+torsio_fuzzer(recording_blocks torsio_readers)

@@ -1,1 +1,1 @@
-torsio_fuzzer(weights_json torsio::lab)
+torsio_fuzzer(weights_json torsio_readers)
