@@ -183,10 +183,10 @@ torsio::Dataset DataFlags::read(const std::vector<std::string>& files,
   return checked([&] { return torsio::load_dataset(files, test, options); });
 }
 
-torsio::Dataset DataFlags::load_inputs(const std::vector<std::string>& inputs,
+torsio::Dataset DataFlags::load_inputs(const std::vector<std::string>& channels,
                                        const torsio::Progress& progress) const {
   require_recordings();
-  return checked([&] { return torsio::load_inputs(recordings, inputs, load_options(progress)); });
+  return checked([&] { return torsio::load_inputs(recordings, channels, load_options(progress)); });
 }
 
 torsio::Dataset DataFlags::load(const std::vector<std::string>& validation,

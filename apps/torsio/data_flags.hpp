@@ -41,7 +41,7 @@ struct DataFlags {
   /// The recordings as test data, except where a manifest gives roles.
   [[nodiscard]] torsio::Dataset load_as_test(const torsio::Progress& progress) const;
   /// The recordings for a model with these raw inputs; other channels may be missing.
-  [[nodiscard]] torsio::Dataset load_inputs(const std::vector<std::string>& inputs,
+  [[nodiscard]] torsio::Dataset load_inputs(const std::vector<std::string>& channels,
                                             const torsio::Progress& progress) const;
   [[nodiscard]] torsio::LoadOptions load_options(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;

@@ -338,7 +338,7 @@ TEST_F(BrokenCalls, OnAnEndlessPipeStopEarly) {
   EXPECT_NE(outcome.err.find("standard input"), std::string::npos) << outcome.err;
 }
 
-TEST_F(BrokenCalls, EndAtBlankLinesWithoutEndBehindAHeader) {
+TEST_F(BrokenCalls, EndAtAGapWithoutSamples) {
   const Outcome outcome = shell("{ echo t_s,torque_Nm; yes ''; } | timeout 30 {torsio} check - ");
   EXPECT_EQ(outcome.exit_code, kWorkFailed) << "124: it read on";
   EXPECT_NE(outcome.err.find("blank lines and comments"), std::string::npos) << outcome.err;
