@@ -23,7 +23,7 @@ int run(const char* model_file) {
   // readme-begin
   torsio::TorqueEstimator estimator(
       torsio::load_estimator(model_file));  // may throw: call it before the loop
-  // If the mapping of the training data has zero rules: estimator.set_zero("gear_angle_rad", rest_rad);
+  // If the mapping of the training data subtracts a zero: estimator.set_zero("gear_angle_rad", rest_rad);
   const torsio::DenormalsOff denormals_off;  // once per real-time thread
   estimator.reset();
   torsio::Fault last = torsio::Fault::none;

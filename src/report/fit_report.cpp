@@ -67,8 +67,7 @@ std::string verdict(const FitReport& report) {
         report.table.empty() ? "" : "; the standard errors below account for it");
   if (!is_enough)
     text += fmt::format(
-        "effective sample size {:.0f}: too few to exclude a correlation with an input of up to "
-        "{:.2f}; "
+        "effective sample size {:.0f}: too small to exclude input correlations of up to {:.2f}; "
         "record longer or more varied motions\n",
         report.effective_samples, std::min(of_input, 1.0));
   return text;

@@ -71,16 +71,22 @@ zero: [{channel: torque_Nm, first: 1ms}, {channel: joint_angle_rad, first: 1ms}]
 derive: {half_torque_Nm: 0.5 * torque_Nm}
 )";
 
+LoadOptions mapped_by(const std::string& mapping, const std::string& target = {}) {
+  LoadOptions options;
+  options.mapping = mapping;
+  options.target = target;
+  return options;
+}
+
 TEST(LoadInputs, NeedsNeitherTheTargetNorItsColumns) {
   const TemporaryFolder folder;
   const std::string log = folder.file("log.csv", "time,enc\n0,1\n1,2\n2,4\n");
   const std::string mapping = folder.file("map.yaml", kForeignMapping);
   EXPECT_NE(test::error_message([&] {
-              (void)load_dataset({log}, {}, {.mapping = mapping});
+              (void)load_dataset({log}, {}, mapped_by(mapping));
             }).find("has no column 'cell'"),
             std::string::npos);
-  const Dataset dataset =
-      load_inputs({log}, {"joint_angle_rad"}, {.mapping = mapping, .target = "torque_Nm"});
+  const Dataset dataset = load_inputs({log}, {"joint_angle_rad"}, mapped_by(mapping, "torque_Nm"));
   const Recording& recording = dataset.records.at(0).recording;
   ASSERT_EQ(recording.channels().size(), 1U);
   EXPECT_DOUBLE_EQ(recording.channel("joint_angle_rad").values[2], rad_from_deg(3.0));
@@ -88,7 +94,7 @@ TEST(LoadInputs, NeedsNeitherTheTargetNorItsColumns) {
   EXPECT_EQ(dataset.files, (std::vector<std::string>{mapping, log}));
   // What the model needs must be there.
   EXPECT_NE(test::error_message([&] {
-              (void)load_inputs({log}, {"torque_Nm"}, {.mapping = mapping, .target = "torque_Nm"});
+              (void)load_inputs({log}, {"torque_Nm"}, mapped_by(mapping, "torque_Nm"));
             }).find("has no column 'cell'"),
             std::string::npos);
 }
@@ -97,7 +103,9 @@ TEST(LoadDataset, ADefaultMappingIsForLogsWithoutOne) {
   const TemporaryFolder folder;
   const std::string log = folder.file("log.csv", kForeign);
   const std::string text = mapping_text(parse_mapping(kForeignMapping, "map.yaml"));
-  const LoadOptions options{.default_mapping = text, .default_mapping_place = "m: mapping"};
+  LoadOptions options;
+  options.default_mapping = text;
+  options.default_mapping_place = "m: mapping";
   const Dataset by_default = load_dataset({log}, {}, options);
   EXPECT_TRUE(by_default.records.at(0).recording.has("half_torque_Nm"));
   EXPECT_EQ(by_default.records.at(0).recording.mapping, text);

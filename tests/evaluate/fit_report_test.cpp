@@ -117,8 +117,7 @@ TEST(FitReportOf, FewIndependentSamplesAreNoReasonToCallResidualsWhite) {
   EXPECT_EQ(text.find("white"), std::string::npos) << text;
   EXPECT_NE(text.find("correlated with their past"), std::string::npos) << text;
   EXPECT_NE(
-      text.find(
-          "effective sample size 6: too few to exclude a correlation with an input of up to 1.00"),
+      text.find("effective sample size 6: too small to exclude input correlations of up to 1.00"),
       std::string::npos)
       << text;
 }
