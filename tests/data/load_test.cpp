@@ -80,7 +80,7 @@ LoadOptions mapped_by(const std::string& mapping, const std::string& target = {}
 
 TEST(LoadInputs, NeedsNeitherTheTargetNorItsColumns) {
   const TemporaryFolder folder;
-  const std::string log = folder.file("log.csv", "time,enc\n0,1\n1,2\n2,4\n");
+  const std::string log = folder.file("log.csv", "time,enc,note\n0,1,0\n1,2,0\n2,4,0\n");
   const std::string mapping = folder.file("map.yaml", kForeignMapping);
   EXPECT_NE(test::error_message([&] {
               (void)load_dataset({log}, {}, mapped_by(mapping));

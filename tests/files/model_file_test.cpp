@@ -97,12 +97,13 @@ TEST(ModelFile, NamesItsTensorsAfterTheFields) {
   std::vector<std::string> names;
   for (const auto& [name, tensor] : contents.tensors) names.push_back(name);
   EXPECT_THAT(names,
-              testing::ElementsAre("fallback.intercept", "fallback.residual_std", "fallback.slope",
-                                   "guards.ranges.highest", "guards.ranges.lowest",
-                                   "guards.ranges.margin", "model.coefficients.feature",
-                                   "model.coefficients.knots", "model.coefficients.scheduled",
-                                   "model.coefficients.values", "model.rate_feature",
-                                   "model.rate_scale", "residuals.edges", "residuals.std_dev"));
+              testing::ElementsAre(
+                  "fallback.intercept", "fallback.residual_std", "fallback.slope",
+                  "guards.disturbances.largest_step", "guards.disturbances.largest_travel",
+                  "guards.disturbances.warm_up_s", "guards.ranges.highest", "guards.ranges.lowest",
+                  "guards.ranges.margin", "model.coefficients.feature", "model.coefficients.knots",
+                  "model.coefficients.scheduled", "model.coefficients.values", "model.rate_feature",
+                  "model.rate_scale", "residuals.edges", "residuals.std_dev"));
   EXPECT_EQ(contents.tensors.at("model.coefficients.values").shape,
             (std::vector<std::size_t>{3, 4}));
   EXPECT_EQ(contents.tensors.at("model.rate_scale").shape, std::vector<std::size_t>{});

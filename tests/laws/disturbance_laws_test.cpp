@@ -75,13 +75,14 @@ struct Disturbance {
   double (*apply)(double x, std::size_t n);  ///< n samples after its beginning
 };
 
+constexpr std::string_view kWithinTheRange = "one sample at the other end";
+
 // All of them leave the range or the largest step of the training.
 constexpr Disturbance kDisturbances[] = {
     {"one sample of 2 pi", 0.0, [](double, std::size_t) { return 2.0 * std::numbers::pi; }},
     {"one sample of 1e4", 0.0, [](double, std::size_t) { return 1e4; }},
     {"one sample of -1e6", 0.0, [](double, std::size_t) { return -1e6; }},
-    {"one sample at the other end", 0.0,
-     [](double x, std::size_t) { return std::copysign(0.09, -x); }},
+    {kWithinTheRange, 0.0, [](double x, std::size_t) { return std::copysign(0.09, -x); }},
     {"1 rad off for 0.1 s", 0.1, [](double x, std::size_t) { return x + 1.0; }},
     {"-1 rad off for 1 s", 1.0, [](double x, std::size_t) { return x - 1.0; }},
     {"spikes for 1 s", 1.0,
@@ -120,6 +121,8 @@ TYPED_TEST(DisturbanceLaws, WhereThereIsNoFaultTheValueIsThatOfTheUndisturbedRun
   const auto [lowest, highest] = std::ranges::minmax(expected, {}, &Estimate::value);
   const double width = highest.value - lowest.value;
   for (const Disturbance& disturbance : kDisturbances) {
+    // A force may jump within its range.
+    if (!detail::traits_of<TypeParam>().is_spring && disturbance.name == kWithinTheRange) continue;
     for (const double onset_s : kOnsets_s) {
       const std::vector<Estimate> found =
           run(this->estimator_, disturbed(this->x_, rate_Hz(this->model_), onset_s, disturbance));

@@ -50,8 +50,8 @@ TEST_F(MainJob, GoesFromARecordingToADeployedModel) {
 
 TEST_F(MainJob, StatesWhichAbsurdValuesTheFitDidNotUse) {
   record();
-  shell("awk -F, -v OFS=, 'NR == 5002 { $2 = 1e12 } 1' a.csv >glitch.csv");
-  const std::string header = shell("head -1 glitch.csv | cut -d, -f2 | tr -d '\\n'").out;
+  shell("awk -F, -v OFS=, 'NR == 5002 { $3 = 1e12 } 1' a.csv >glitch.csv");
+  const std::string header = shell("head -1 glitch.csv | cut -d, -f3 | tr -d '\\n'").out;
   const Outcome fit = torsio("fit glitch.csv --model linear -o joint.safetensors");
   ASSERT_EQ(fit.exit_code, 0) << fit.err;
   EXPECT_NE(fit.err.find("glitch.csv, sample 5000 (t = 5 s): " + header + " = 1e+12"),
@@ -94,7 +94,9 @@ TEST_F(MainJob, SearchesStructuresWithinTheTrainingRecords) {
     const bool is_ok = row.at("status") == "ok";
     EXPECT_TRUE(is_ranked || !is_ok) << "a failure is ranked before " << row;
     is_ranked = is_ok;
-    if (is_ok) winner.emplace(row.at("family"), row.at("variant").dump());
+    // What a guard replaced in most of a fold is not ranked.
+    if (is_ok && row.at("ranked_folds") > 0)
+      winner.emplace(row.at("family"), row.at("variant").dump());
   }
   // No input is a rate: its fit fails in each fold with this reason and is not compared.
   EXPECT_FALSE(winner.contains("linear_coulomb"));
@@ -173,8 +175,7 @@ TEST_F(MainJob, AdaptsANetworkToAnotherJoint) {
   const Outcome evaluate = torsio("evaluate third.safetensors third.csv");
   EXPECT_EQ(evaluate.exit_code, 0) << evaluate.err;
   EXPECT_NE(evaluate.err.find("was trained on third"), std::string::npos) << evaluate.err;
-  EXPECT_NE(torsio("evaluate third.safetensors").out.find("adapted with method nlms"),
-            std::string::npos);
+  EXPECT_NE(torsio("evaluate third.safetensors").out.find("adapted with "), std::string::npos);
   EXPECT_EQ(adapt.err.find("worse than the frozen"), std::string::npos) << adapt.err;
   EXPECT_NE(torsio("adapt joint.safetensors first.csv --set step_size=1.9")
                 .err.find("worse than the frozen"),

@@ -141,7 +141,8 @@ EstimatorSettings guarded_settings(const FeatureSpec& features, const TrainingDa
   settings.ranges = feature_ranges(training);
   widen_for_physics(settings.ranges, model);
   settings.fallback = linear_fallback(training);
-  settings.disturbances.largest_step = training.largest_step;
+  // A force may be switched; the deflection of a spring cannot jump.
+  if (model.traits().is_spring) settings.disturbances.largest_step = training.largest_step;
   settings.disturbances.largest_travel = training.largest_travel;
   settings.residuals = residual_table(model, validation != nullptr ? *validation : training);
   if (validation == nullptr) widen_to(settings.residuals, held_out_rmse);
