@@ -211,7 +211,7 @@ EstimatorSettings inverse_settings(std::size_t inputs) {
   settings.zeroed_channels.clear();
   settings.ranges = {.lowest = {-0.03, -10.0}, .highest = {0.03, 10.0}, .margin = 0.1};
   settings.fallback = {.slope = {573.0, 0.0}, .residual_std = 1.5};
-  settings.disturbances.largest_step = {1.0, 1.0};
+  settings.disturbances = {.largest_step = {1.0, 1.0}, .largest_travel = 1e-3};
   if (inputs == 3) {
     settings.features.inputs.emplace_back("lowpass(rate(joint_angle_rad), 10Hz)");
     settings.ranges.lowest.push_back(-1.0);
