@@ -190,7 +190,7 @@ TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {
       std::same_as<TypeParam, Polynomial> || std::same_as<TypeParam, HammersteinWiener>;
   EXPECT_EQ(in_border, kEndsEarlier ? Fault::outside_training_range : Fault::none);
   seen.insert(faults.begin(), faults.begin() + static_cast<std::ptrdiff_t>(at));
-  seen.erase(Fault::recovering);  // of a model with memory, after the gap
+  seen.erase(Fault::recovering);  // only models with memory recover after the gap
   EXPECT_EQ(seen,
             (std::set{Fault::none, Fault::input_not_finite, Fault::input_count_wrong,
                       Fault::warming_up, Fault::zero_not_set, Fault::outside_training_range}));
