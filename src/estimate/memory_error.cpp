@@ -18,7 +18,6 @@ constexpr double kNegligible = 1e-4;
 MemoryError::MemoryError(ModelMemory memory, double width, double sample_period_s, double warm_up_s)
     : memory_(std::move(memory)),
       width_(width),
-      sample_period_s_(sample_period_s),
       warm_up_ticks_(std::ceil(warm_up_s / sample_period_s)),
       share_(memory_.relaxations.size()) {
   double largest = 0.0;

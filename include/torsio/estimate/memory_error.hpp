@@ -48,7 +48,6 @@ class MemoryError {
 
   ModelMemory memory_;
   double width_;
-  double sample_period_s_;
   double warm_up_ticks_;         ///< NaN: without end
   std::vector<double> decay_;    ///< exp(-h / T)
   std::vector<double> share_;    ///< u
