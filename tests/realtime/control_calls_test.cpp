@@ -282,6 +282,7 @@ TEST(ControlCalls, OfTorqueControllerWithAGreyBoxAndItsResidualAreNone) {
 
 TEST(ControlCalls, OfTorqueControllerWithANetworkAreNone) {
   EstimatorSettings settings = inverse_settings(2);
+  settings.disturbances = {};
   settings.target = "spring_deflection_rad";
   settings.features.inputs.front() = "torque_Nm";
   settings.ranges = {.lowest = {-20.0, -10.0}, .highest = {20.0, 10.0}, .margin = 0.1};
