@@ -43,7 +43,6 @@ struct DataFlags {
   /// The recordings for a model with these raw inputs; other channels may be missing.
   [[nodiscard]] torsio::Dataset load_inputs(const std::vector<std::string>& channels,
                                             const torsio::Progress& progress) const;
-  [[nodiscard]] torsio::LoadOptions load_options(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
   /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that
   /// are the same file, or whose folder does not exist. `load` and `load_as_test` compare them again
@@ -54,6 +53,7 @@ struct DataFlags {
  private:
   void add_rate(CLI::App& verb);
   void require_recordings() const;
+  [[nodiscard]] torsio::LoadOptions load_options(const torsio::Progress& progress) const;
   [[nodiscard]] torsio::Dataset read(const std::vector<std::string>& files,
                                      const std::vector<std::string>& test,
                                      const torsio::LoadOptions& options) const;

@@ -7,7 +7,6 @@
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/estimates.hpp"

@@ -8,9 +8,9 @@
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/evaluate/comparison.hpp"
+#include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/model_description.hpp"
 #include "torsio/report/results.hpp"
@@ -31,10 +31,8 @@ torsio::Recording prediction_recording(const torsio::Estimator& estimator,
                                        const std::string& target, std::size_t initialise) {
   const torsio::Prediction prediction =
       torsio::predict(estimator, recording, {&recording.channel(target), initialise});
-  const torsio::ChannelName parts = *torsio::split_channel_name(target);
-  const std::string unit = "_" + std::string(parts.unit->si_suffix);
-  torsio::Channel estimate{"estimated_" + target, {}};
-  torsio::Channel std_dev{std::string(parts.quantity) + "_std_dev" + unit, {}};
+  torsio::Channel estimate{torsio::estimate_channel(target), {}};
+  torsio::Channel std_dev{torsio::error_bar_channel(target), {}};
   torsio::Channel fault{"fault_1", {}};
   for (const torsio::Estimate& output : prediction.estimates) {
     estimate.values.push_back(output.value);

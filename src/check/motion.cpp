@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "check/signal_pair.hpp"
+#include "numerics/quantile.hpp"
 #include "torsio/fit/common/inputs.hpp"
 
 namespace torsio {
@@ -17,10 +18,6 @@ namespace {
 constexpr double kHalfWindow_s = 0.05;
 constexpr double kOutermost = 0.01;  // share of the samples on either side
 constexpr double kAtRest = 0.05;     // share of the RMS speed
-
-double quantile(const std::vector<double>& sorted, double share) {
-  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
-}
 
 double rms(const std::vector<double>& values, double about = 0.0) {
   double sum = 0.0;
@@ -70,7 +67,6 @@ Motion motion_of(const DatasetRecord& record, Role role, const FeatureSpec& spec
   motion.rest_share = static_cast<double>(std::ranges::count_if(
                           speeds, [&](double v) { return v < kAtRest * motion.rms_speed; })) /
                       static_cast<double>(speeds.size());
-  std::ranges::sort(values);
   motion.amplitude = 0.5 * (quantile(values, 1.0 - kOutermost) - quantile(values, kOutermost));
   return motion;
 }

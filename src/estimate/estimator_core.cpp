@@ -147,8 +147,9 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
                  std::array{low - slack - border, high + slack + border});
   }
   check_disturbances(settings_.disturbances, raw_inputs().size());
-  memory_error_ = MemoryError(memory({ranges.lowest, ranges.highest}),
-                              ranges_.front().highest - ranges_.front().lowest,
+  first_width_ = ranges_.front().highest - ranges_.front().lowest;
+  assumes_jumps_ = settings_.disturbances.largest_step.empty();
+  memory_error_ = MemoryError(memory({ranges.lowest, ranges.highest}), first_width_,
                               1.0 / settings_.sample_rate_Hz, settings_.disturbances.warm_up_s);
   has_memory_ = !memory_error_.memory().is_empty();
   depends_on_rate_ = has_memory_ || pipeline_.settling_samples() > 0;
@@ -186,8 +187,7 @@ void EstimatorCore::interrupt(double ticks) noexcept {
   excluded_ticks_ += ticks;
   // As far as the first input can have moved to and fro meanwhile. NaN: anywhere.
   const double travel = kJumpFactor * settings_.disturbances.largest_travel * excluded_ticks_;
-  const double width = ranges_.front().highest - ranges_.front().lowest;
-  memory_error_.interrupt(ticks, travel < width ? travel / width : 1.0);
+  memory_error_.interrupt(ticks, travel < first_width_ ? travel / first_width_ : 1.0);
   needs_reset_ = resets_model_;
 }
 
@@ -220,8 +220,15 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   }
   missed_ = 0;
   Conditioned input{.features = features, .for_model = features, .excursion = excursion(features)};
-  in_jump_ = jumped || is_wrong_rate_ || (in_jump_ && input.excursion > 1.0);
-  if (in_jump_ || input.excursion > 1.0) limit_for_model(input);
+  const bool is_outside = input.excursion > 1.0;
+  // An unknown zero explains an excursion without a jump.
+  const bool may_have_jumped = in_jump_ || (assumes_jumps_ && unset_zeros_.empty());
+  in_jump_ = jumped || is_wrong_rate_ || (is_outside && may_have_jumped);
+  if (in_jump_) {
+    exclude(input);
+  } else if (is_outside && has_memory_) {
+    limit(input);
+  }
   if (input.for_model.empty()) return input;
   excluded_ticks_ = 0.0;
   if (input.excursion <= 1.0) memory_error_.follow(features[0]);
@@ -231,33 +238,23 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   return input;
 }
 
-// A model without memory is stepped with what there is. The memory of another one receives nothing
-// after a jump, which a sensor error can cause; after a continuous excursion it receives the limited
-// features, so that it misses no more than what the first input travelled beyond its border.
-void EstimatorCore::limit_for_model(Conditioned& input) noexcept {
-  // Without the largest steps of the training, every excursion may be a jump, unless a missing zero
-  // explains it.
-  in_jump_ = in_jump_ || (settings_.disturbances.largest_step.empty() && unset_zeros_.empty());
-  poisoned_ = in_jump_;
-  if (in_jump_) {
-    interrupt(1.0);
-    if (has_memory_) input.for_model = {};
-    if (input.excursion <= 1.0) input.excursion = std::numeric_limits<double>::infinity();
-    return;
-  }
-  if (!has_memory_) return;
+// A jump can be a sensor error: no memory receives it. A model without one is stepped all the same.
+void EstimatorCore::exclude(Conditioned& input) noexcept {
+  poisoned_ = true;
+  interrupt(1.0);
+  if (has_memory_) input.for_model = {};
+  if (input.excursion <= 1.0) input.excursion = std::numeric_limits<double>::infinity();
+}
+
+// A continuous excursion is a motion: the memory misses no more than what the first input travelled
+// beyond its border.
+void EstimatorCore::limit(Conditioned& input) noexcept {
   for (std::size_t i = 0; i < limited_.size(); ++i)
     limited_[i] = std::clamp(input.features[i], ranges_[i].lowest - ranges_[i].border,
                              ranges_[i].highest + ranges_[i].border);
   input.for_model = limited_;
-  const double width = ranges_.front().highest - ranges_.front().lowest;
   const double missed = std::abs(input.features[0] - limited_[0]);
-  if (has_run_) memory_error_.interrupt(1.0, std::min(1.0, missed / width));
-}
-
-bool EstimatorCore::is_recovering(double value) const noexcept {
-  if (memory_error_.is_zero()) return false;
-  return !(memory_error_.bound() <= residual_std_at(value));  // also without an error bar
+  if (has_run_) memory_error_.interrupt(1.0, std::min(1.0, missed / first_width_));
 }
 
 Estimate EstimatorCore::held(Fault fault) const noexcept {
@@ -280,7 +277,7 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
     out.fault = raw_estimate.fault;
   } else if (!std::isfinite(raw_estimate.value)) {
     out.fault = Fault::model_not_finite;
-  } else if (!memory_error_.is_zero() && !(memory_error_.bound() <= model.std_dev)) {
+  } else if (memory_error_.may_exceed(model.std_dev)) {
     out.fault = Fault::recovering;
   }
   if (out.fault == Fault::none) {

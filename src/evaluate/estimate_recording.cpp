@@ -19,13 +19,6 @@ namespace {
 constexpr std::size_t kSamplesPerReport = 1000;
 constexpr const char* kNovelty = "novelty_1";
 
-std::string estimate_channel(const std::string& target) { return "estimated_" + target; }
-
-std::string std_dev_channel(const std::string& target) {
-  const ChannelName parts = *split_channel_name(target);
-  return std::string(parts.quantity) + "_std_dev_" + std::string(parts.unit->si_suffix);
-}
-
 /// A text as a cell of a CSV file (RFC 4180).
 std::string cell(std::string_view text) {
   if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
@@ -57,6 +50,13 @@ void check_equal_channels(const std::vector<EstimatedRecording>& recordings) {
 
 }  // namespace
 
+std::string estimate_channel(const std::string& target) { return "estimated_" + target; }
+
+std::string error_bar_channel(const std::string& target) {
+  const ChannelName parts = *split_channel_name(target);
+  return std::string(parts.quantity) + "_std_dev_" + std::string(parts.unit->si_suffix);
+}
+
 EstimatedRecording estimate_recording(Estimator estimator, const Recording& recording,
                                       const Progress& progress) {
   const EstimatorSettings& settings = estimator.settings();
@@ -73,7 +73,7 @@ EstimatedRecording estimate_recording(Estimator estimator, const Recording& reco
   }
   const std::size_t samples = recording.size();
   Channel value{.name = estimate_channel(settings.target), .values = {}};
-  Channel std_dev{.name = std_dev_channel(settings.target), .values = {}};
+  Channel std_dev{.name = error_bar_channel(settings.target), .values = {}};
   Channel novelty{.name = kNovelty, .values = {}};
   for (Channel* channel : {&value, &std_dev, &novelty}) channel->values.reserve(samples);
   result.faults.reserve(samples);
@@ -109,7 +109,7 @@ EstimateSummary summary_of(const EstimatedRecording& estimated, const std::strin
                           .samples = estimated.faults.size(),
                           .faults = {}};
   const auto& value = estimated.channels.channel(estimate_channel(target)).values;
-  const auto& std_dev = estimated.channels.channel(std_dev_channel(target)).values;
+  const auto& std_dev = estimated.channels.channel(error_bar_channel(target)).values;
   std::map<Fault, std::size_t> counts;
   for (std::size_t n = 0; n < estimated.faults.size(); ++n) {
     ++counts[estimated.faults[n]];
@@ -139,6 +139,7 @@ void write_estimates(const std::vector<EstimatedRecording>& recordings, const st
   for (const auto& [recording, faults] : recordings) {
     const std::string name_cell = cell(recording.name());
     std::vector<const std::vector<double>*> values;
+    values.reserve(columns.size());
     for (const std::string& column : columns) values.push_back(&recording.channel(column).values);
     for (std::size_t n = 0; n < recording.size(); ++n) {
       text.add(recording.time_s(n));

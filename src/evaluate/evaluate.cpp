@@ -15,6 +15,7 @@
 #include "fit/common/finite_input.hpp"
 #include "model/second_order/rigid_drive.hpp"
 #include "numerics/metrics_accumulator.hpp"
+#include "numerics/quantile.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -37,14 +38,6 @@ double clock_cost_ns() {
     return least;
   }();
   return cost;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return kNotMeasured;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
 }
 
 std::vector<const std::vector<double>*> raw_channels(const Estimator& estimator,

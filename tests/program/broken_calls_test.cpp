@@ -10,8 +10,6 @@
 namespace torsio::test {
 namespace {
 
-constexpr int kWorkFailed = 1;
-constexpr int kCallWasWrong = 2;
 constexpr int kInterrupted = 128 + SIGINT;
 
 class BrokenCalls : public Program {

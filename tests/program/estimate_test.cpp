@@ -6,9 +6,6 @@
 namespace torsio::test {
 namespace {
 
-constexpr int kWorkFailed = 1;
-constexpr int kCallWasWrong = 2;
-
 class EstimateVerb : public Program {
  protected:
   /// a.csv, the model m.safetensors, and log.csv without the torque.

@@ -12,6 +12,9 @@
 
 namespace torsio::test {
 
+inline constexpr int kWorkFailed = 1;
+inline constexpr int kCallWasWrong = 2;
+
 /// What one call of the program did.
 struct Outcome {
   int exit_code = -1;

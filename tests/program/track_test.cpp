@@ -6,9 +6,6 @@
 namespace torsio::test {
 namespace {
 
-constexpr int kWorkFailed = 1;
-constexpr int kCallWasWrong = 2;
-
 class TrackVerb : public Program {
  protected:
   static void expect_error(const Outcome& outcome, int exit_code, const std::string& text) {

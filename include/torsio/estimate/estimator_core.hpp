@@ -70,10 +70,11 @@ class EstimatorCore {
                         const Estimate& raw_estimate) noexcept TORSIO_REALTIME;
   /// The model was reset because its output was not finite.
   void lose_memory() noexcept TORSIO_REALTIME { memory_error_.lose(); }
-  /// The bound of the error that is caused by inputs that the model's memory did not receive.
-  [[nodiscard]] double memory_error() const noexcept { return memory_error_.bound(); }
-  /// Whether that error may exceed the error bar of the model at `value`.
-  [[nodiscard]] bool is_recovering(double value) const noexcept TORSIO_REALTIME;
+  /// Whether the error that is caused by inputs that the model's memory did not receive may exceed the
+  /// error bar at `value`.
+  [[nodiscard]] bool is_recovering(double value) const noexcept TORSIO_REALTIME {
+    return memory_error_.may_exceed(residual_std_at(value));
+  }
   [[nodiscard]] bool model_has_memory() const noexcept { return has_memory_; }
   /// The ticks do not come at the sample rate, until this is called with false.
   void set_wrong_rate(bool is_wrong) noexcept TORSIO_REALTIME {
@@ -102,12 +103,15 @@ class EstimatorCore {
   /// Whether a raw input has changed faster than in training since the last tick, whose inputs are
   /// replaced by these.
   bool has_jumped(std::span<const double> raw) noexcept;
-  /// The features of a tick that leaves the ranges.
-  void limit_for_model(Conditioned& input) noexcept;
+  /// What the model receives in a tick after a jump, and in one of a continuous excursion.
+  void exclude(Conditioned& input) noexcept;
+  void limit(Conditioned& input) noexcept;
 
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
-  std::vector<Range> ranges_;  ///< per feature, tolerance included
+  std::vector<Range> ranges_;   ///< per feature, tolerance included
+  double first_width_ = 0.0;    ///< of the range of the first feature
+  bool assumes_jumps_ = false;  ///< the largest steps of the training are not known
   std::vector<std::string> unset_zeros_;
   std::size_t longest_gap_;  ///< ticks
   std::size_t missed_ = 0;   ///< ticks in a row without usable input

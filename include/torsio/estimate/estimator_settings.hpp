@@ -60,7 +60,8 @@ struct ResidualTable {
 /// What an estimator uses to detect a jump of an input and to recover from unusable inputs.
 struct DisturbanceGuards {
   /// Per raw input: largest change from one sample to the next in training, at least
-  /// `kSmallestStepShare` of its range there. Empty: not determined, jumps are not detected.
+  /// `kSmallestStepShare` of its range there. Empty: not determined; a jump within the ranges is then
+  /// not detected, and every excursion beyond them counts as one.
   std::vector<double> largest_step = {};
   /// Largest change of the first feature from one sample to the next in training. NaN: not
   /// determined; while inputs are missing it may then be anywhere within its range.

@@ -30,6 +30,10 @@ class MemoryError {
   [[nodiscard]] bool is_zero() const noexcept { return is_zero_; }
   /// The bound [target's unit]; infinity where there is none.
   [[nodiscard]] double bound() const noexcept { return bound_; }
+  /// Whether the error may be larger than this error bar; NaN, an unknown one, counts as 0.
+  [[nodiscard]] bool may_exceed(double error_bar) const noexcept {
+    return !is_zero_ && !(bound_ <= error_bar);
+  }
 
   void reset() noexcept;
   /// So many ticks passed without usable inputs. Successive calls without a usable tick between them

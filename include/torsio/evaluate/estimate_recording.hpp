@@ -14,11 +14,15 @@ namespace torsio {
 
 /// The estimates of a recording, whose target need not be measured.
 struct EstimatedRecording {
-  /// On the clock of the recording: the raw inputs, the estimate ("estimated_torque_Nm"), the error bar
-  /// ("torque_std_dev_Nm") and the novelty ("novelty_1", NaN for a model without one).
+  /// On the clock of the recording: the raw inputs, the estimate ("estimated_torque_Nm"), the error
+  /// bar ("torque_std_dev_Nm") and the novelty ("novelty_1", NaN for a model without one).
   Recording channels;
   std::vector<Fault> faults;  ///< one for each sample
 };
+
+/// The names of these two channels for a target such as "torque_Nm".
+[[nodiscard]] std::string estimate_channel(const std::string& target);
+[[nodiscard]] std::string error_bar_channel(const std::string& target);
 
 /// Streams the recording through the estimator from `reset()`, as a loop would. A raw input that is
 /// NaN in a sample is the fault `input_not_finite` there. The zeros of the recording are already
@@ -50,7 +54,8 @@ struct EstimateSummary {
                                          const std::string& target);
 
 /// Writes `t_s`, every channel (not the novelty of a model without one) and, by their names, the
-/// faults; the name of the recording is the last column. "-" is standard output; a file appears under its name only when it is complete.
+/// faults; the name of the recording is the last column. "-" is standard output; a file appears under
+/// its name only when it is complete.
 /// @throws Error if it cannot be written, or the recordings differ in their channels.
 void write_estimates(const std::vector<EstimatedRecording>& recordings, const std::string& path);
 

@@ -77,9 +77,10 @@ void save_model(const std::filesystem::path& path, const ModelFile& model);
 
 /// The conditions under which a robot uses a model file.
 struct EstimatorOptions {
-  double rate_Hz = kNotMeasured;  ///< at which `step` will be called; NaN: the rate in the file
-  std::string serial =
-      {};  ///< serial number of the device; a model of another one is refused. Empty: any
+  /// At which `step` will be called. NaN: the rate in the file.
+  double rate_Hz = kNotMeasured;
+  /// Serial number of the device; a model of another one is refused. Empty: any.
+  std::string serial = {};
 };
 
 /// `load_model` and `make_estimator` in one call, for the robot.

@@ -155,7 +155,7 @@ ModelMemory GreyBox::memory(const InputRanges& ranges) const {
   }
   if (parameters_.residual && widest > 0.0)
     memory.slips.push_back({parameters_.residual->bound / widest, 2.0 * widest});
-  const double width = ranges.highest[0] - ranges.lowest[0];
+  const double width = ranges.width(0);
   for (std::size_t j = 0; j < structure.time_constants_s.size(); ++j)
     memory.relaxations.push_back({width * coefficients_.largest(structure.first_relaxation() + j),
                                   structure.time_constants_s[j]});

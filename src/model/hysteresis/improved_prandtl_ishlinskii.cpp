@@ -74,7 +74,7 @@ std::size_t ImprovedPrandtlIshlinskii::parameter_count() const noexcept {
 
 ModelMemory ImprovedPrandtlIshlinskii::memory(const InputRanges& ranges) const {
   const std::size_t rate = parameters_.rate_feature;
-  const double fastest = std::max(std::abs(ranges.lowest[rate]), std::abs(ranges.highest[rate]));
+  const double fastest = ranges.largest_magnitude(rate);
   const double scale = 1.0 + parameters_.rate_gain * fastest;
   ModelMemory memory;
   for (std::size_t i = 0; i < parameters_.weights.size(); ++i)

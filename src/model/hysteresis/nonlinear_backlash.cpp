@@ -39,7 +39,7 @@ ModelMemory Backlash<kByRate>::memory(const InputRanges& ranges) const {
   double scale = 1.0;
   if (kByRate && parameters_.rate.gain > 0.0) {
     const std::size_t rate = parameters_.rate.feature;
-    const double fastest = std::max(std::abs(ranges.lowest[rate]), std::abs(ranges.highest[rate]));
+    const double fastest = ranges.largest_magnitude(rate);
     scale += parameters_.rate.gain * std::pow(fastest, parameters_.rate.exponent);
   }
   // t rises with k from one boundary to the other, which rises meanwhile with the middle's slope.

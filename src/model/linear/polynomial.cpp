@@ -105,7 +105,7 @@ ModelMemory Polynomial::memory(const InputRanges& ranges) const {
   }
   // The direction is determined after a travel of the dead band, until which the bound is as large.
   constexpr double kSmallestShare = 1e-3;
-  const double band = std::max(dead_band_, kSmallestShare * (ranges.highest[0] - ranges.lowest[0]));
+  const double band = std::max(dead_band_, kSmallestShare * ranges.width(0));
   return {.slips = {{apart / band, 2.0 * band}}};
 }
 

@@ -80,7 +80,7 @@ class Narx {
   }  ///< [s]
 
   /// Not declared: the state has no form that gives a bound.
-  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+  [[nodiscard]] static ModelMemory memory(const InputRanges& /*ranges*/) {
     return {.is_declared = false};
   }
 

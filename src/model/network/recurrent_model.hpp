@@ -43,7 +43,7 @@ class RecurrentModel {
   }  ///< [s]
 
   /// Not declared: the state has no form that gives a bound.
-  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+  [[nodiscard]] static ModelMemory memory(const InputRanges& /*ranges*/) {
     return {.is_declared = false};
   }
 

@@ -75,7 +75,7 @@ class DynamicBoucWen {
   [[nodiscard]] double sample_period() const noexcept { return parameters_.time.sample_period_s; }
 
   /// Not declared: the state has no form that gives a bound.
-  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+  [[nodiscard]] static ModelMemory memory(const InputRanges& /*ranges*/) {
     return {.is_declared = false};
   }
 

@@ -86,7 +86,7 @@ class RigidDrive {
   [[nodiscard]] double sample_period() const noexcept { return parameters_.time.sample_period_s; }
 
   /// Not declared: the state has no form that gives a bound.
-  [[nodiscard]] ModelMemory memory(const InputRanges& /*ranges*/) const {
+  [[nodiscard]] static ModelMemory memory(const InputRanges& /*ranges*/) {
     return {.is_declared = false};
   }
 

@@ -44,7 +44,7 @@ Viscoelastic::Viscoelastic(Parameters parameters)
 }
 
 ModelMemory Viscoelastic::memory(const InputRanges& ranges) const {
-  const double width = ranges.highest[0] - ranges.lowest[0];
+  const double width = ranges.width(0);
   ModelMemory memory;
   for (const RelaxationBranch& branch : spectrum_.branches)
     memory.relaxations.push_back({width * branch.stiffness, 1.0 / branch.rate_1_s});

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <span>
@@ -11,20 +13,28 @@ namespace torsio {
 struct InputRanges {
   std::span<const double> lowest;
   std::span<const double> highest;
+
+  [[nodiscard]] double width(std::size_t input) const noexcept {
+    return highest[input] - lowest[input];
+  }
+  [[nodiscard]] double largest_magnitude(std::size_t input) const noexcept {
+    return std::max(std::abs(lowest[input]), std::abs(highest[input]));
+  }
 };
 
 /// A part of a model's memory that decays with time.
 struct Relaxation {
-  double gain =
-      0.0;  ///< largest contribution to the output for inputs within their ranges, target's unit
+  /// Largest contribution to the output for inputs within their ranges [target's unit].
+  double gain = 0.0;
   double time_constant_s = 0.0;
 };
 
 /// A part of a model's memory that depends on the travel of the first input: a stop or play operator.
 struct SlipMemory {
-  double gain =
-      0.0;  ///< error of the output per travel that is unknown, target's unit over the input's
-  double travel = 0.0;  ///< the history is erased when the input has covered a range of this width
+  /// Error of the output per travel that is unknown [target's unit over the input's].
+  double gain = 0.0;
+  /// The history is erased when the input has covered a range of this width.
+  double travel = 0.0;
 };
 
 /// What the output of a model depends on besides the present inputs. The estimator computes from it
