@@ -2,15 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <unsupported/Eigen/MatrixFunctions>
 #include <utility>
 
 #include "control/loop_design.hpp"
 #include "core/checks.hpp"
+#include "core/matrix_functions.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"
 
@@ -87,7 +87,7 @@ LinearSystem LinearSystem::held(const Matrices& continuous, double sample_rate_H
   const RowMajor exponent = joined(eigen(continuous.a), eigen(continuous.b), zeros(inputs, states),
                                    zeros(inputs, inputs)) /
                             sample_rate_Hz;
-  const RowMajor both = exponent.exp();
+  const RowMajor both = matrix_exponential(exponent);
   return LinearSystem({table(both.topLeftCorner(states, states)),
                        table(both.topRightCorner(states, inputs)), continuous.c, continuous.d},
                       sample_rate_Hz);
@@ -143,7 +143,7 @@ std::complex<double> LinearSystem::response(double frequency_rad_s, std::size_t 
 
 double LinearSystem::spectral_radius() const {
   if (order() == 0) return 0.0;
-  return RowMajor(eigen(matrices_.a)).eigenvalues().cwiseAbs().maxCoeff();
+  return eigenvalues(eigen(matrices_.a)).cwiseAbs().maxCoeff();
 }
 
 LinearSystem LinearSystem::closed() const {

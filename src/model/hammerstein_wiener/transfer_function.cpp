@@ -2,15 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <unsupported/Eigen/MatrixFunctions>
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/matrix_functions.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -119,8 +119,7 @@ std::vector<Complex> polynomial_roots(std::span<const double> highest_first) {
   companion.diagonal(-1).setOnes();
   for (Eigen::Index k = 0; k < n; ++k)
     companion(0, k) = -highest_first[static_cast<std::size_t>(k) + 1] / highest_first.front();
-  const Eigen::VectorXcd values =
-      Eigen::EigenSolver<Eigen::MatrixXd>(companion, false).eigenvalues();
+  const Eigen::VectorXcd values = eigenvalues(companion);
   roots.insert(roots.end(), values.begin(), values.end());
   return roots;
 }
@@ -288,7 +287,7 @@ DiscreteTransfer first_order_hold(const ContinuousTransfer& transfer, double sam
   }
   if (n > 0) system(0, n) = sample_period_s;
   system(n, n + 1) = 1.0;
-  const Eigen::MatrixXd step = system.exp();
+  const Eigen::MatrixXd step = matrix_exponential(system);
   const Eigen::MatrixXd a = step.topLeftCorner(n, n);
   const Eigen::VectorXd rise = step.block(0, n + 1, n, 1);
   const Eigen::VectorXd held = step.block(0, n, n, 1) - rise;
