@@ -17,6 +17,13 @@ if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
     "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV)")
 endif()
 
+# torsio_precompile(<target> <headers>...)
+function(torsio_precompile target)
+  if(TORSIO_PRECOMPILE_HEADERS)
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+  endif()
+endfunction()
+
 # torsio_folder(<target> <folder> HEADERS a.hpp ... SOURCES a.cpp ...): one folder of one library.
 # Headers are named relative to include/torsio/<folder>, sources relative to src/<folder>.
 function(torsio_folder target folder)
