@@ -87,6 +87,24 @@ void derive_target(Recording& recording, const std::string& target) {
   }
 }
 
+/// A source need not be recorded, but one that is must not be missed because of its spelling.
+void check_computed_from(const Mapping& mapping, const Recording& recording) {
+  std::vector<std::string> names;
+  for (const Channel& channel : recording.channels()) names.push_back(channel.name);
+  const auto check = [&](const std::string& name, const std::string& key) {
+    const std::string advice = recording.has(name) ? "" : did_you_mean(name, names);
+    if (advice.empty()) return;
+    throw Error({.place = mapping.file + ": " + key,
+                 .problem = fmt::format("{} has no channel '{}'", recording.name(), name),
+                 .found = "the channels " + joined(names),
+                 .advice = advice + " If it was not recorded, remove it here."});
+  };
+  for (const auto& [target, sources] : mapping.computed_from) {
+    check(target, "computed_from");
+    for (const std::string& source : sources) check(source, "computed_from." + target);
+  }
+}
+
 /// @param needed the channels that suffice; empty: all of the mapping, and the target
 std::vector<Recording> load(const Log& log, const std::string& target,
                             const std::vector<std::string>& needed, const Progress& progress) {
@@ -101,7 +119,10 @@ std::vector<Recording> load(const Log& log, const std::string& target,
       recording = resample(recording, log.rate_Hz);
     for (const auto& [name, value] : log.entry.conditions) recording.add_condition(name, value);
     add_derived(recording, mapping.derive);
-    if (needed.empty()) derive_target(recording, target);
+    if (needed.empty()) {
+      derive_target(recording, target);
+      check_computed_from(mapping, recording);
+    }
     recording.source.file = log.entry.file;
     recording.mapping = text;
   }

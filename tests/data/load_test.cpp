@@ -261,6 +261,23 @@ TEST_F(Manifests, ARootMayStandInAnEnvironmentVariable) {
   EXPECT_TRUE(std::filesystem::equivalent(data_folder(manifest), folder_.path("logs")));
 }
 
+TEST(LoadDataset, RefusesAMisspeltSourceOfTheTarget) {
+  const TemporaryFolder folder;
+  const std::string log = folder.file("a.csv", "t_s,iq_A,torque_Nm\n0,1,2\n0.1,2,4\n0.2,3,6\n");
+  const auto load = [&](const std::string& computed_from) {
+    const std::string manifest = folder.file(
+        "set.yaml", "{files: [a.csv], mapping: {computed_from: {" + computed_from + "}}}");
+    return load_dataset({manifest}, {}).target_computed_from;
+  };
+  EXPECT_EQ(load("torque_Nm: [iq_A]"), std::vector<std::string>{"iq_A"});
+  EXPECT_EQ(load("torque_Nm: [strain_1]"), std::vector<std::string>{"strain_1"});
+  const std::string of_source = test::error_message([&] { load("torque_Nm: [iqq_A]"); });
+  EXPECT_NE(of_source.find("computed_from.torque_Nm"), std::string::npos) << of_source;
+  EXPECT_NE(of_source.find("Did you mean 'iq_A'?"), std::string::npos) << of_source;
+  const std::string of_target = test::error_message([&] { load("torqe_Nm: [iq_A]"); });
+  EXPECT_NE(of_target.find("Did you mean 'torque_Nm'?"), std::string::npos) << of_target;
+}
+
 TEST_F(Manifests, ThatDisagreeAreRefused) {
   const std::string force = folder_.file("force.yaml", "{target: force_N, files: [logs/a.csv]}");
   EXPECT_THROW(static_cast<void>(load_dataset({manifest_, force}, {})), UsageError);

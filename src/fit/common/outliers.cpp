@@ -60,8 +60,8 @@ OutlierLimits outlier_limits(std::vector<double>& values) {
   const std::size_t outside = static_cast<std::size_t>(kShareOutside * samples) + 1;
   const std::vector<double> lowest = first(values, outside, std::less<>());
   const std::vector<double> highest = first(values, outside, std::greater<>());
-  const Range range = shortest_range(lowest, highest);
-  if (!(range.width > 0.0)) return {};
+  Range range = shortest_range(lowest, highest);
+  if (!(range.width > 0.0)) range.width = std::max(1.0, std::abs(range.middle));
   const bool lower_first = range.middle - lowest.front() > highest.front() - range.middle;
   Side below = side_of(lowest, range, lower_first ? most : 0);
   const Side above = side_of(highest, range, most - below.outliers);

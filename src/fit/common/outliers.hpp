@@ -32,7 +32,7 @@ struct OutlierLimits {
 /// and whose distance from the next smaller excursion is at least w: an excursion that passes
 /// through the values between is a motion. They are at most 10 and at most 0.01 % of the samples
 /// (but one is possible from 1000 samples on), the most distant first; what is too frequent for
-/// that is data. There are none if w = 0: then nothing shows what a large value is. Ours.
+/// that is data. For a channel that is constant, w is its magnitude, at least 1 SI unit. Ours.
 /// @param values all of them finite; their order is changed
 [[nodiscard]] OutlierLimits outlier_limits(std::vector<double>& values);
 

@@ -76,10 +76,17 @@ TEST(OutlierLimits, TheMostDistantComeFirst) {
   EXPECT_TRUE(limits.contain(-20.0));
 }
 
-TEST(OutlierLimits, AConstantChannelHasNoScale) {
+TEST(OutlierLimits, AConstantChannelIsMeasuredAgainstItsMagnitudeOrOneUnit) {
   std::vector<double> values(5000, 0.3);
-  values[100] = 0.4;
+  values[100] = 2.0;
   EXPECT_EQ(outliers(values), 0U);
+  values[100] = 1e12;
+  EXPECT_EQ(outliers(values), 1U);
+  std::vector<double> temperatures(5000, 300.0);
+  temperatures[100] = 350.0;
+  EXPECT_EQ(outliers(temperatures), 0U);
+  temperatures[100] = -273.0 * 4.0;
+  EXPECT_EQ(outliers(temperatures), 1U);
   EXPECT_EQ(outliers({}), 0U);
 }
 
