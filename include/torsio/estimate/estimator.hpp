@@ -93,9 +93,9 @@ class BasicEstimator {
     if (input.for_model.empty()) return core_.apply_guards(input, {});
     if (input.restarted) model_.reset();
     const Estimate raw_estimate = model_.step(input.for_model);
-    if (!std::isfinite(raw_estimate.value)) model_.reset();
-    if (!std::isfinite(raw_estimate.value) || raw_estimate.fault == Fault::model_not_finite)
-      core_.lose_memory();
+    const bool is_finite = std::isfinite(raw_estimate.value);
+    if (!is_finite) model_.reset();
+    if (!is_finite || raw_estimate.fault == Fault::model_not_finite) core_.lose_memory();
     return core_.apply_guards(input, raw_estimate);
   }
 

@@ -91,13 +91,13 @@ class EstimatorCore {
   EstimatorCore(EstimatorSettings settings, std::size_t model_input_count,
                 const std::function<ModelMemory(const InputRanges&)>& memory);
 
-  [[nodiscard]] Estimate model_part(const Estimate& raw_estimate) const noexcept;
-  /// Blends the model's part with the fallback, whose share is `weight` in 0..1.
-  [[nodiscard]] Estimate blended(Features features, const Estimate& model,
+  /// The error bar of the model's output: its own, or that of its region.
+  [[nodiscard]] double model_std_dev(const Estimate& raw_estimate) const noexcept;
+  /// Blends the model's value with the fallback, whose share is `weight` in 0..1.
+  [[nodiscard]] Estimate blended(Features features, double value, double std_dev,
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
   [[nodiscard]] double residual_std_at(double value) const noexcept;
-  Conditioned miss(Fault fault) noexcept;
   /// The first input could not be used for so many ticks, the last ones of `excluded_ticks_`.
   void interrupt(double ticks) noexcept;
   /// Whether a raw input has changed faster than in training since the last tick, whose inputs are
@@ -121,13 +121,13 @@ class EstimatorCore {
   bool resets_model_ = false;  ///< a memory that is not declared starts again after an interruption
   bool depends_on_rate_ = false;
   bool is_wrong_rate_ = false;
-  bool needs_reset_ = false;     ///< the model is to be reset in its next step
-  bool has_run_ = false;         ///< the model has been stepped since `reset()`
-  bool in_jump_ = false;         ///< since a jump, no tick has been inside the ranges
-  double excluded_ticks_ = 0.0;  ///< in a row, whose inputs the model has not received
-  bool has_previous_ = false;
-  std::vector<double> previous_raw_;
-  std::vector<double> limited_;  ///< features
+  bool needs_reset_ = false;          ///< the model is to be reset in its next step
+  bool has_run_ = false;              ///< the model has been stepped since `reset()`
+  bool in_jump_ = false;              ///< since a jump, no tick has been inside the ranges
+  double excluded_ticks_ = 0.0;       ///< in a row, whose inputs the model has not received
+  std::vector<double> previous_raw_;  ///< of the last tick; NaN: none
+  std::vector<double> jump_limits_;   ///< the largest change of a raw input in a tick
+  std::vector<double> limited_;       ///< features
   MemoryError memory_error_{{}, 0.0, 1.0, 0.0};
 };
 
