@@ -17,11 +17,18 @@ if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
     "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV)")
 endif()
 
-# torsio_precompile(<target> <headers>...)
+# torsio_precompile(<target> <headers>...), or with REUSE_FROM <target> instead of headers
 function(torsio_precompile target)
-  if(TORSIO_PRECOMPILE_HEADERS)
+  if(NOT TORSIO_PRECOMPILE_HEADERS)
+    return()
+  endif()
+  if(ARGV1 STREQUAL REUSE_FROM)
+    target_precompile_headers(${target} ${ARGN})
+  else()
     target_precompile_headers(${target} PRIVATE ${ARGN})
   endif()
+  # g++ 12 forgets with them where the standard library suppresses these warnings.
+  target_compile_options(${target} PRIVATE -Wno-array-bounds -Wno-stringop-overflow -Wno-restrict)
 endfunction()
 
 # torsio_folder(<target> <folder> HEADERS a.hpp ... SOURCES a.cpp ...): one folder of one library.
