@@ -6,6 +6,8 @@
 #include "fit/mixture/online_mixture.hpp"
 #include "fitted_grey_box.hpp"
 #include "rows.hpp"
+#include "torsio/actuator/electrical_sheet.hpp"
+#include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/model_inverse.hpp"
@@ -99,6 +101,29 @@ Row cascade_step() {
         .current_A;
   });
   return {.value = seconds * 1e6, .unit = "us"};
+}
+
+/// Field-oriented current control of one motor, from phase currents to duties.
+Row current_loop_step() {
+  const ElectricalSheet sheet = electrical_sheet(data_sheet("dfki-50"));
+  CurrentController controller(
+      {.windings = {.resistance_Ohm = sheet.phase_resistance_Ohm.value,
+                    .inductance_H = sheet.phase_inductance_H.value,
+                    .torque_constant_Nm_A = data_sheet("dfki-50").motor.torque_constant_Nm_A.value,
+                    .pole_pairs = 5},
+       .peak_current_A = 10.0,
+       .trip_current_A = 15.0},
+      sheet.pwm_Hz.value);
+  const double seconds = seconds_a_tick([&](double t_s) {
+    const double angle_rad = 100.0 * t_s;
+    return controller
+        .step({0.0, 2.0}, {.phases_A = {0.5, -0.2, -0.3},
+                           .angle_rad = angle_rad,
+                           .speed_rad_s = 500.0,
+                           .supply_V = 48.0})
+        .duties.a;
+  });
+  return {.value = seconds * 1e9, .unit = "ns"};
 }
 
 Row impedance_step() {

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "rows.hpp"
@@ -32,10 +33,9 @@ void expect(Fault fault) {
   if (fault != Fault::none) throw std::runtime_error("a plant refuses its input");
 }
 
-double steps_per_second(const PlantParameters& parameters) {
+double steps_per_second(Plant plant) {
   const std::vector<PlantCommand> commands = commands_of_a_second();
   const Load load = lever(9.0, 0.4);
-  Plant plant(parameters);
   const double seconds = best_seconds([&] {
     for (const PlantCommand& command : commands) expect(plant.step(command, load, kStep_s));
   });
@@ -55,7 +55,7 @@ double floor_with_lanes(std::size_t lanes) {
 }
 
 Row single(const PlantParameters& parameters) {
-  return {.value = steps_per_second(parameters), .unit = "steps/s"};
+  return {.value = steps_per_second(Plant(parameters)), .unit = "steps/s"};
 }
 
 }  // namespace
@@ -82,6 +82,13 @@ Row simulate_single() {
   Row row = single(dfki_120());
   row.floor = floor_with_lanes(1);
   return row;
+}
+/// With windings, inverter and current control, in multiples of real time.
+Row simulate_electrical() {
+  const DataSheet sheet = data_sheet("dfki-120");
+  Plant plant(plant_parameters(sheet));
+  plant.use(electrical_parameters(sheet, 1));
+  return {.value = steps_per_second(std::move(plant)) * kStep_s, .unit = "x real time"};
 }
 Row simulate_single_bouc_wen() { return single(dfki_120("dfki-120:bouc-wen")); }
 Row simulate_single_lugre() { return single(dfki_120("dfki-120:lugre")); }

@@ -10,6 +10,7 @@
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
@@ -42,6 +43,7 @@ struct SimulateFlags {
   std::string plot;
   std::uint64_t seed = kDefaultSeed;
   bool with_truth = false;
+  bool is_electrical = false;
   bool list = false;
   JsonOutput json;
 };
@@ -87,10 +89,18 @@ std::string bench_list() {
          experiments.text();
 }
 
-std::string description(const torsio::DataSheet& sheet) {
+std::vector<torsio::SheetRow> sheet_rows(const torsio::DataSheet& sheet, bool is_electrical) {
+  std::vector<torsio::SheetRow> rows = torsio::describe(sheet);
+  if (!is_electrical) return rows;
+  for (torsio::SheetRow& row : torsio::describe(torsio::electrical_sheet(sheet)))
+    rows.push_back(std::move(row));
+  return rows;
+}
+
+std::string description(const torsio::DataSheet& sheet, bool is_electrical) {
   torsio::TextTable table;
   table.header({"parameter", "value", "unit", "origin"});
-  for (const torsio::SheetRow& row : torsio::describe(sheet))
+  for (const torsio::SheetRow& row : sheet_rows(sheet, is_electrical))
     table.row({row.name, fmt::format("{:.6g}", row.value.value), std::string(row.unit),
                std::string(1, static_cast<char>(row.value.origin))});
   const torsio::PlantFigures plant = torsio::plant_figures(sheet);
@@ -132,6 +142,7 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags,
   torsio::ExperimentSpec spec{.actuator = flags.actuator,
                               .experiment = flags.experiment,
                               .seed = flags.seed,
+                              .is_electrical = flags.is_electrical,
                               .with_truth = flags.with_truth};
   if (!flags.duration.empty())
     spec.duration_s = torsio::si_quantity(flags.duration, "s", "--duration");
@@ -168,7 +179,7 @@ Json list_json() {
   return document;
 }
 
-Json sheet_json(const torsio::DataSheet& sheet) {
+Json sheet_json(const torsio::DataSheet& sheet, bool is_electrical) {
   const torsio::PlantFigures plant = torsio::plant_figures(sheet);
   Json document{{"name", torsio::full_name(sheet)},
                 {"title", sheet.title},
@@ -179,7 +190,7 @@ Json sheet_json(const torsio::DataSheet& sheet) {
                 {"fault_sensors", torsio::fault_sensors(sheet)},
                 {"fault_parts", torsio::fault_parts(sheet)},
                 {"parameters", Json::array()}};
-  for (const torsio::SheetRow& row : torsio::describe(sheet))
+  for (const torsio::SheetRow& row : sheet_rows(sheet, is_electrical))
     document["parameters"].push_back(
         {{"name", row.name},
          {"value", row.value.value},
@@ -203,6 +214,7 @@ Json recording_json(const SimulateFlags& flags, const torsio::ExperimentSpec& sp
                 {"angle_amplitude_rad", optional(spec.angle_amplitude_rad)},
                 {"frequency_Hz", optional(spec.frequency_Hz)},
                 {"impedance", flags.impedance},
+                {"electrical", spec.is_electrical},
                 {"conditions",
                  {{"temperature_K", spec.conditions.temperature_K},
                   {"warm_up_K", spec.conditions.warm_up_K},
@@ -245,7 +257,8 @@ void run(const SimulateFlags& flags) {
     const torsio::OperatingConditions of = conditions(flags);
     torsio::check(of);
     const torsio::DataSheet sheet = torsio::aged(torsio::data_sheet(flags.describe), of.age);
-    return show(flags, description(sheet), sheet_json(sheet));
+    return show(flags, description(sheet, flags.is_electrical),
+                sheet_json(sheet, flags.is_electrical));
   }
   if (flags.actuator.empty() || flags.experiment.empty() || flags.output.empty())
     throw torsio::UsageError({.place = "torsio simulate",
@@ -300,6 +313,9 @@ void add_simulate(CLI::App& app) {
       "--age", flags->age,
       "0 (default) to 1: the used share of the service life; softer, more friction and play");
   add_seed(*verb, flags->seed, "seed of the sensors' noise and of random excitations");
+  verb->add_flag("--electrical", flags->is_electrical,
+                 "the motor has windings and field-oriented current control; phase and supply "
+                 "currents and the stator temperature are recorded. With --describe: its values");
   verb->add_flag("--truth", flags->with_truth, "add the truth_ channels, which no sensor measures");
   verb->add_option("--plot", flags->plot, "plot the torque over the deflection into an SVG file");
   verb->add_flag("--list", flags->list, "show actuators with their variants, and experiments");

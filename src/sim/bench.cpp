@@ -15,6 +15,7 @@ Bench::Bench(const DataSheet& sheet, const BenchRun& run, const BenchProgram& st
       plant_(plant_parameters(sheet)),
       sensors_(sheet, kBenchRate_Hz, run.seed),
       load_(start.start) {
+  if (run.is_electrical) plant_.use(electrical_parameters(sheet, run.seed));
   require_taken(plant_.reset(start.start_angle_rad, load_));
   require_taken(plant_.set_condition(condition()));
   sensors_.reset(load_cell_torque());

@@ -21,6 +21,7 @@ struct BenchRun {
   double duration_s = 0.0;
   std::uint64_t seed = 1;
   OperatingConditions conditions = {};
+  bool is_electrical = false;  ///< with `ElectricalDrive`
   const FaultSchedule& faults;
 };
 

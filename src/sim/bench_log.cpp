@@ -25,17 +25,17 @@ std::size_t whole_ticks_a_sample(double rate_Hz) {
 
 }  // namespace
 
-BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth)
+BenchLog::BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth, bool is_electrical)
     : rate_Hz_(sheet.sensors.log_rate_Hz.value), ticks_a_sample_(whole_ticks_a_sample(rate_Hz_)) {
   const std::size_t samples = ticks / ticks_a_sample_ + 1;
-  for (const SensedChannel& source : sensed_channels(sheet)) {
+  for (const SensedChannel& source : sensed_channels(sheet, is_electrical)) {
     Sensed& of = sensed_.emplace_back(
         Sensed{.source = source, .channel = {.name = std::string(source.name), .values = {}}});
     of.channel.values.reserve(samples);
     of.channel.fresh.reserve(samples);
   }
   if (!with_truth) return;
-  for (TruthChannel& source : truth_channels(sheet)) {
+  for (TruthChannel& source : truth_channels(sheet, is_electrical)) {
     Truth& of = truth_.emplace_back(Truth{.channel = {.name = std::move(source.name), .values = {}},
                                           .value = std::move(source.value)});
     of.channel.values.reserve(samples);

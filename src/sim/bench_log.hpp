@@ -18,7 +18,7 @@ namespace torsio {
 class BenchLog {
  public:
   /// @param ticks of the bench's loop in the whole run; a logger may be slower
-  BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth);
+  BenchLog(const DataSheet& sheet, std::size_t ticks, bool with_truth, bool is_electrical = false);
 
   /// Call at every tick.
   void add(const Measurement& measured, const BenchTruth& truth);

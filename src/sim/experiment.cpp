@@ -105,12 +105,13 @@ Recording simulate(const DataSheet& nominal, const ExperimentSpec& spec, const P
                .duration_s = duration_s,
                .seed = spec.seed,
                .conditions = spec.conditions,
+               .is_electrical = spec.is_electrical,
                .faults = spec.faults},
               program);
   const auto ticks = static_cast<std::size_t>(std::lround(duration_s * kBenchRate_Hz));
   const std::vector<SensedChannel> channels = sensed_channels(sheet);
   Measurement seen;
-  BenchLog log(sheet, ticks, spec.with_truth);
+  BenchLog log(sheet, ticks, spec.with_truth, spec.is_electrical);
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     if (tick % 1000 == 0) {
       report_progress(progress, static_cast<double>(tick) / static_cast<double>(ticks),

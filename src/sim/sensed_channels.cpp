@@ -15,6 +15,10 @@ SensedChannel motor_current(std::string_view name, double scale = 1.0) {
   return {name, &Measurement::motor_current_A, &Measurement::is_motor_current_fresh, scale};
 }
 
+SensedChannel drive_channel(std::string_view name, double Measurement::*value) {
+  return {name, value, &Measurement::is_drive_fresh};
+}
+
 constexpr SensedChannel kJointAngle{"joint_angle_rad", &Measurement::joint_angle_rad,
                                     &Measurement::is_joint_angle_fresh};
 constexpr SensedChannel kTwist{"spring_deflection_rad", &Measurement::twist_rad,
@@ -22,9 +26,7 @@ constexpr SensedChannel kTwist{"spring_deflection_rad", &Measurement::twist_rad,
 constexpr SensedChannel kTorque{"torque_Nm", &Measurement::torque_Nm,
                                 &Measurement::is_torque_fresh};
 
-}  // namespace
-
-std::vector<SensedChannel> sensed_channels(const DataSheet& sheet) {
+std::vector<SensedChannel> mechanical_channels(const DataSheet& sheet) {
   switch (sheet.family) {
     case ActuatorFamily::series_elastic: break;
     case ActuatorFamily::elastomer:
@@ -38,6 +40,19 @@ std::vector<SensedChannel> sensed_channels(const DataSheet& sheet) {
   }
   return {motor_angle("motor_angle_rad"), middle_angle("gear_angle_rad"), kJointAngle,
           motor_current("motor_current_A"), kTorque};
+}
+
+}  // namespace
+
+std::vector<SensedChannel> sensed_channels(const DataSheet& sheet, bool is_electrical) {
+  std::vector<SensedChannel> channels = mechanical_channels(sheet);
+  if (is_electrical)
+    channels.insert(channels.end() - 1,
+                    {drive_channel("phase_a_current_A", &Measurement::phase_a_current_A),
+                     drive_channel("phase_b_current_A", &Measurement::phase_b_current_A),
+                     drive_channel("supply_current_A", &Measurement::supply_current_A),
+                     drive_channel("stator_temperature_K", &Measurement::stator_temperature_K)});
+  return channels;
 }
 
 }  // namespace torsio

@@ -18,6 +18,8 @@ struct SensedChannel {
 };
 
 /// What the logger of this actuator writes down; the torque is the last.
-[[nodiscard]] std::vector<SensedChannel> sensed_channels(const DataSheet& sheet);
+/// @param is_electrical the plant has an electrical drive, whose sensors are logged as well
+[[nodiscard]] std::vector<SensedChannel> sensed_channels(const DataSheet& sheet,
+                                                         bool is_electrical = false);
 
 }  // namespace torsio

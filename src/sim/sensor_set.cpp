@@ -44,6 +44,13 @@ Measurement SensorSet::step(const Plant& plant, double torque_Nm) noexcept {
   measured.joint_angle_rad = joint_encoder_.read(state.joint_angle_rad, random_);
   if (twist_sensor_) measured.twist_rad = twist_sensor_->read(plant.second_twist(), random_);
   measured.motor_current_A = current_sensor_.read(plant.current(), random_);
+  if (const ElectricalDrive* drive = plant.electrical()) {
+    measured.motor_current_A = drive->command().current_A.q;
+    measured.phase_a_current_A = drive->measured_phases().a;
+    measured.phase_b_current_A = drive->measured_phases().b;
+    measured.supply_current_A = drive->supply_current_A();
+    measured.stator_temperature_K = drive->stator_K();
+  }
   const TorqueSensor::Reading cell = torque_sensor_.step(torque_Nm, random_);
   measured.torque_Nm = cell.torque_Nm;
   measured.is_torque_fresh = cell.is_fresh;

@@ -18,6 +18,11 @@ struct Measurement {
   double joint_angle_rad = 0.0;
   double twist_rad = 0.0;  ///< twist of the second stage, if it has a sensor
   double motor_current_A = 0.0;
+  // With an electrical drive: what its sensors measure.
+  double phase_a_current_A = 0.0;
+  double phase_b_current_A = 0.0;
+  double supply_current_A = 0.0;
+  double stator_temperature_K = 0.0;
   double torque_Nm = 0.0;  ///< load cell: held between its samples, delayed
   // Whether the sensor delivered at this tick; where not, its last value is held.
   bool is_motor_angle_fresh = true;
@@ -25,6 +30,7 @@ struct Measurement {
   bool is_joint_angle_fresh = true;
   bool is_twist_fresh = true;
   bool is_motor_current_fresh = true;
+  bool is_drive_fresh = true;
   bool is_torque_fresh = false;
 };
 

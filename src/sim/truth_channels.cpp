@@ -141,9 +141,16 @@ void write_rubber(TruthWriter& to) {
       +[](const Plant& p) { return second<RubberSpring>(p).slip().forces(); });
 }
 
+void write_drive(TruthWriter& to) {
+  to.add("d_axis", "current_A",
+         [](const BenchTruth& t) { return t.plant.electrical()->direct_current(); });
+  to.add("copper", "temperature_K",
+         [](const BenchTruth& t) { return t.plant.electrical()->copper_K(); });
+}
+
 }  // namespace
 
-std::vector<TruthChannel> truth_channels(const DataSheet& sheet) {
+std::vector<TruthChannel> truth_channels(const DataSheet& sheet, bool is_electrical) {
   const PartNames names = part_names(sheet.family);
   const PlantParameters parts = plant_parameters(sheet);
   TruthWriter to;
@@ -163,6 +170,7 @@ std::vector<TruthChannel> truth_channels(const DataSheet& sheet) {
           return std::get<MaxwellSlip<4>>(second<Spring>(p).friction()).forces();
         });
   }
+  if (is_electrical) write_drive(to);
   to.add("", "temperature_K", [](const BenchTruth& t) { return t.temperature_K; });
   return std::move(to).channels();
 }

@@ -23,6 +23,8 @@ struct TruthChannel {
 };
 
 /// Torques, motions and every internal state of this actuator (docs/actuators.md).
-[[nodiscard]] std::vector<TruthChannel> truth_channels(const DataSheet& sheet);
+/// @param is_electrical the plant has an electrical drive
+[[nodiscard]] std::vector<TruthChannel> truth_channels(const DataSheet& sheet,
+                                                       bool is_electrical = false);
 
 }  // namespace torsio

@@ -20,6 +20,7 @@
 #include "support/examples/network.hpp"
 #include "support/examples/viscoelastic.hpp"
 #include "support/system_calls.hpp"
+#include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/model_inverse.hpp"
@@ -100,6 +101,37 @@ TEST(ControlCalls, OfPidAreNone) {
                 if (n % 777 == 0) static_cast<void>(pid.set_gains({3.0, n % 2 == 0 ? 5.0 : -5.0}));
                 if (n % 77'777 == 0) pid.start(0.3);
                 if (!(std::abs(output.command) <= 1.0)) return false;
+              }
+              return faults > kLeastFaults;
+            }),
+            "");
+}
+
+TEST(ControlCalls, OfCurrentControllerAreNone) {
+  CurrentController controller({.windings = {.resistance_Ohm = 0.4,
+                                             .inductance_H = 0.5e-3,
+                                             .torque_constant_Nm_A = 0.104,
+                                             .pole_pairs = 5},
+                                .peak_current_A = 10.0,
+                                .trip_current_A = 20.0},
+                               30e3);
+  Spoiled reference(5.0, 4099);
+  Spoiled phase(2.0, 4111);
+  Spoiled angle(10.0, 4127);
+  Spoiled speed(1000.0, 4129);
+  EXPECT_EQ(besides_computing([&] {
+              int faults = 0;
+              for (int n = 0; n < kCycles; ++n) {
+                const double a = phase.next();
+                const CurrentController::Output output =
+                    controller.step({0.0, reference.next()}, {.phases_A = {a, 0.3, -a - 0.3},
+                                                              .angle_rad = angle.next(),
+                                                              .speed_rad_s = speed.next(),
+                                                              .supply_V = 48.0});
+                faults += output.fault != Fault::none ? 1 : 0;
+                for (const double duty : {output.duties.a, output.duties.b, output.duties.c})
+                  if (!(duty >= 0.0 && duty <= 1.0)) return false;
+                if (output.is_tripped) controller.reset();
               }
               return faults > kLeastFaults;
             }),

@@ -29,7 +29,10 @@ struct ExperimentSpec {
   std::optional<double> angle_amplitude_rad = {};
   std::optional<double> frequency_Hz = {};
   bool is_impedance_zero = false;  ///< impedance of the joint's controller is zero; false: high
-  bool with_truth = false;         ///< add the `truth_*` channels, which no sensor measures
+  /// The motor has windings, an inverter and field-oriented current control (`ElectricalSheet`)
+  /// instead of a lag; phase currents, supply current and stator temperature are logged as well.
+  bool is_electrical = false;
+  bool with_truth = false;  ///< add the `truth_*` channels, which no sensor measures
   OperatingConditions conditions = {};
   FaultSchedule faults = {};
 };

@@ -43,9 +43,13 @@ class Motor {
     reference_A =
         std::min(std::max(reference_A, -parameters_.peak_current_A), parameters_.peak_current_A);
     current_A_ = reference_A + (current_A_ - reference_A) * decay_;
-    const double smooth_Nm = parameters_.torque_constant_Nm_A * current_A_;
-    if (ripple_Nm_ == 0.0) return smooth_Nm;
-    return smooth_Nm + ripple_Nm_ * std::sin(parameters_.ripple_order * rotor_angle_rad);
+    return parameters_.torque_constant_Nm_A * current_A_ + ripple_torque(rotor_angle_rad);
+  }
+
+  /// @returns r k_t i_max sin(n θ_m) [Nm]
+  [[nodiscard]] double ripple_torque(double rotor_angle_rad) const noexcept TORSIO_REALTIME {
+    if (ripple_Nm_ == 0.0) return 0.0;
+    return ripple_Nm_ * std::sin(parameters_.ripple_order * rotor_angle_rad);
   }
 
   /// @returns i [A]

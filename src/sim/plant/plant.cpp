@@ -163,6 +163,7 @@ void Plant::start(const PlantState& state) noexcept {
   state_ = state;
   torques_ = {};
   motor_.reset();
+  if (electrical_) electrical_->reset();
   rotor_friction_.reset();
   middle_friction_.reset();
   detail::dispatch(first_, [&](auto& stage) {
@@ -192,7 +193,9 @@ Fault Plant::reset(double joint_angle_rad, const Load& load) noexcept {
   const double rotor_Nm = middle_Nm * detail::dispatch(first_, [&](const auto& stage) {
                             return kinematics(stage, rest.rotor_angle_rad).slope;
                           });
-  motor_.reset(rotor_Nm / parameters_.motor.torque_constant_Nm_A);
+  const double current_A = rotor_Nm / parameters_.motor.torque_constant_Nm_A;
+  motor_.reset(current_A);
+  if (electrical_) electrical_->reset(current_A, rest.rotor_angle_rad);
   torques_ = {.motor_Nm = rotor_Nm,
               .first_Nm = middle_Nm,
               .first_on_rotor_Nm = rotor_Nm,
@@ -218,8 +221,7 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
   PlantTorques& t = torques_;
   const double dt = dt_s_;
 
-  t.motor_Nm = condition_.torque_constant_factor *
-               motor_.step(command.current_A, s.rotor_angle_rad, s.rotor_speed_rad_s);
+  t.motor_Nm = condition_.torque_constant_factor * motor_torque(command.current_A);
   const StageTorques second = step_second();
   t.second_Nm = second.output_Nm;
   t.second_on_middle_Nm = second.input_Nm;
@@ -254,6 +256,12 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
   s.rotor_angle_rad += dt * s.rotor_speed_rad_s;
   s.middle_angle_rad += dt * s.middle_speed_rad_s;
   s.joint_angle_rad += dt * s.joint_speed_rad_s;
+}
+
+double Plant::motor_torque(double wanted_A) noexcept {
+  if (!electrical_) return motor_.step(wanted_A, state_.rotor_angle_rad, state_.rotor_speed_rad_s);
+  return motor_.ripple_torque(state_.rotor_angle_rad) +
+         electrical_->step(wanted_A, state_.rotor_angle_rad, state_.rotor_speed_rad_s, dt_s_);
 }
 
 StageTorques Plant::step_second() noexcept {

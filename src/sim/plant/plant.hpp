@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <variant>
 
 #include "actuator/parts/elastomer_coupling.hpp"
@@ -12,6 +13,7 @@
 #include "actuator/parts/rubber_spring.hpp"
 #include "actuator/parts/slip_clutch.hpp"
 #include "actuator/parts/spring.hpp"
+#include "sim/plant/electrical_drive.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
@@ -71,6 +73,9 @@ struct PlantParameters {
   double rated_torque_Nm = 0.0;  ///< up to which the stiffest mode is looked for
 };
 [[nodiscard]] PlantParameters plant_parameters(const DataSheet& sheet);
+/// @param seed of the noise of the current sensors
+[[nodiscard]] ElectricalDrive::Parameters electrical_parameters(const DataSheet& sheet,
+                                                                std::uint64_t seed);
 
 /// @returns turns of the rotor a turn of the joint
 [[nodiscard]] double total_ratio(const PlantParameters& parameters) noexcept;
@@ -178,6 +183,14 @@ class Plant {
   Fault set_condition(const PlantCondition& condition) noexcept;
   [[nodiscard]] const PlantCondition& condition() const noexcept { return condition_; }
 
+  /// From now on the motor is this one, with inverter and current control, instead of the lag of
+  /// `Motor`; without current until `reset`. @throws Error as `ElectricalDrive`.
+  void use(const ElectricalDrive::Parameters& electrical) { electrical_.emplace(electrical); }
+  /// @returns null unless `use` was called
+  [[nodiscard]] const ElectricalDrive* electrical() const noexcept {
+    return electrical_ ? &*electrical_ : nullptr;
+  }
+
   /// Advances the plant. A value that is not finite, a negative inertia, a wall whose stiffness or
   /// damping is negative or too large for the steps (half a radian of its mode with the joint, half
   /// a time constant), or a dt that is not positive or longer than 10^6 of the longest steps is
@@ -190,7 +203,9 @@ class Plant {
   [[nodiscard]] double longest_step() const noexcept { return longest_step_s_; }  ///< [s]
   [[nodiscard]] const PlantState& state() const noexcept { return state_; }
   [[nodiscard]] const PlantTorques& torques() const noexcept { return torques_; }
-  [[nodiscard]] double current() const noexcept { return motor_.current(); }  ///< [A]
+  [[nodiscard]] double current() const noexcept {
+    return electrical_ ? electrical_->current() : motor_.current();
+  }  ///< [A], that makes torque
   [[nodiscard]] const FirstStage& first() const noexcept { return first_; }
   [[nodiscard]] const SecondStage& second() const noexcept { return second_; }
   [[nodiscard]] const LuGreFriction& rotor_friction() const noexcept { return rotor_friction_; }
@@ -212,10 +227,12 @@ class Plant {
   void set_period(double dt_s) noexcept;
   void start(const PlantState& state) noexcept;
   void small_step(const PlantCommand& command, const Load& load) noexcept;
+  double motor_torque(double wanted_A) noexcept;
   StageTorques step_second() noexcept;
 
   PlantParameters parameters_;
   Motor motor_;
+  std::optional<ElectricalDrive> electrical_;
   LuGreFriction rotor_friction_;
   FirstStage first_;
   LuGreFriction middle_friction_;

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "sim/plant/plant.hpp"
+#include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/dispatch.hpp"
 
 namespace torsio {
@@ -175,6 +176,34 @@ std::array<double, 2> natural_frequencies(const PlantParameters& parameters) {
   const double high = 0.5 * (sum + std::sqrt(sum * sum - 4.0 * product));
   constexpr double kTurn = 2.0 * std::numbers::pi;
   return {std::sqrt(product / high) / kTurn, std::sqrt(high) / kTurn};
+}
+
+ElectricalDrive::Parameters electrical_parameters(const DataSheet& sheet, std::uint64_t seed) {
+  const ElectricalSheet parts = electrical_sheet(sheet);
+  const double gain_error = parts.current_gain_error.value;
+  return {.control = {.windings = {.resistance_Ohm = parts.phase_resistance_Ohm.value,
+                                   .inductance_H = parts.phase_inductance_H.value,
+                                   .torque_constant_Nm_A = sheet.motor.torque_constant_Nm_A.value,
+                                   .pole_pairs = static_cast<int>(parts.pole_pairs.value)},
+                      .bandwidth_rad_s = parts.bandwidth_rad_s.value,
+                      .peak_current_A =
+                          sheet.motor.peak_current_ratio.value * sheet.rating.current_A.value,
+                      .trip_current_A = parts.trip_current_A.value},
+          .pwm_Hz = parts.pwm_Hz.value,
+          .supply_V = sheet.motor.supply_V.value,
+          .sensors = {.offset_a_A = parts.current_offset_A.value,
+                      .offset_b_A = -parts.current_offset_A.value,
+                      .gain_error_a = gain_error,
+                      .gain_error_b = -gain_error,
+                      .noise_A = parts.current_noise_A.value},
+          .commutation_error_rad = parts.commutation_error_rad.value,
+          .thermal = {.copper_J_K = parts.copper_J_K.value,
+                      .stator_J_K = parts.stator_J_K.value,
+                      .copper_stator_K_W = parts.copper_stator_K_W.value,
+                      .stator_ambient_K_W = parts.stator_ambient_K_W.value},
+          .derating_begins_K = parts.derating_begins_K.value,
+          .derating_ends_K = parts.derating_ends_K.value,
+          .seed = seed};
 }
 
 PlantParameters plant_parameters(const DataSheet& sheet) {

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+
+namespace torsio {
+
+/// How the resistance of copper rises with its temperature, over its value at 20 degrees Celsius.
+inline constexpr double kCopperResistanceRise_1_K = 0.00393;
+
+/// The electrical and thermal side of an actuator's motor, SI. The papers print none of it but the
+/// 30 kHz of the modulation (001): the rest is assumed by the rules below, before any simulation.
+struct ElectricalSheet {
+  SheetValue pole_pairs;            ///< as the order of the torque ripple, six times this
+  SheetValue phase_resistance_Ohm;  ///< 2/3 of the sheet's: the same copper loss
+  SheetValue phase_inductance_H;    ///< resistance times 1 ms
+  SheetValue pwm_Hz;
+  SheetValue bandwidth_rad_s;        ///< of the current loop: 1 / the time constant of the sheet
+  SheetValue trip_current_A;         ///< 1.5 times the peak
+  SheetValue current_offset_A;       ///< of phase a; of b the negative: 0.2 % of the peak
+  SheetValue current_gain_error;     ///< of phase a; of b the negative
+  SheetValue current_noise_A;        ///< the sheet's
+  SheetValue commutation_error_rad;  ///< electrical: 1 degree
+  /// The rated current at 20 degrees Celsius around it warms the copper by 100 K. Of this, the step
+  /// from copper to stator is 30 % with a time constant of 10 s, that from the stator 600 s.
+  SheetValue copper_J_K;
+  SheetValue stator_J_K;
+  SheetValue copper_stator_K_W;
+  SheetValue stator_ambient_K_W;
+  SheetValue derating_begins_K;  ///< of the stator; 80 degrees Celsius
+  SheetValue derating_ends_K;    ///< no current any more; 100 degrees Celsius
+};
+
+[[nodiscard]] ElectricalSheet electrical_sheet(const DataSheet& sheet);
+
+/// Every number of the sheet, in the order above.
+[[nodiscard]] std::vector<SheetRow> describe(const ElectricalSheet& sheet);
+
+}  // namespace torsio

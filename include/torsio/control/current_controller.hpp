@@ -1,0 +1,119 @@
+#pragma once
+
+#include "torsio/control/drive.hpp"
+#include "torsio/control/three_phase.hpp"
+#include "torsio/core/fault.hpp"
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+/// The windings of a brushless motor with sinusoidal back-EMF and equal inductance in both axes.
+///
+///     v_d = R i_d + L di_d/dt − ω_e L i_q
+///     v_q = R i_q + L di_q/dt + ω_e L i_d + ω_e ψ,   ω_e = p ω,   τ = 3/2 p ψ i_q = k_t i_q
+///
+/// Source: standard (Leonhard, Control of Electrical Drives, 2001, chapter 10).
+struct Windings {
+  double resistance_Ohm = 0.0;        ///< R, of a phase
+  double inductance_H = 0.0;          ///< L, of a phase
+  double torque_constant_Nm_A = 0.0;  ///< k_t, torque at the rotor per amplitude of the phases
+  int pole_pairs = 1;                 ///< p
+
+  /// @returns ψ [Vs]
+  [[nodiscard]] double flux_Vs() const noexcept {
+    return torque_constant_Nm_A / (1.5 * pole_pairs);
+  }
+  /// @throws Error if a value is not positive and finite, or there are more than 100 pole pairs.
+  void check() const;
+};
+
+/// The windings that have the torque constant of a drive and its copper loss R i² at standstill: the
+/// drive's resistance is that of an equivalent motor with one winding, 3/2 of a phase's.
+/// @throws Error if a value is not positive.
+[[nodiscard]] Windings windings_of(const Drive& drive, double inductance_H, int pole_pairs);
+
+/// Field-oriented current control: PI control of both axes with decoupling, one step in each period
+/// T of the pulse-width modulation. It controls the torque of a motor, k_t i_q.
+///
+///     v_d = ω_c L e_d + I_d − ω_e L i_q,   v_q = ω_c L e_q + I_q + ω_e (L i_d + ψ),   İ = ω_c R e
+///
+/// The zero of each PI controller cancels the pole R / L, so that a current follows its reference
+/// with the time constant 1 / ω_c, in addition to the delay of 3/2 T: the voltage of a step is
+/// applied in the next period, until whose middle the rotor turns on by 3/2 ω_e T. The voltage is
+/// limited to U / √3, the largest amplitude of a sinusoidal phase voltage with common-mode injection.
+/// Its direction remains: beyond the speed at which the back-EMF reaches the limit, i_d becomes
+/// negative and weakens the field, whereas a limit of v_q alone would let a braking current grow
+/// without control. The integrals receive what was cut (back calculation with the time of the PI
+/// controller).
+///
+/// Paper 000 has "FPGA-based joint control" with phase currents, paper 001 prints a modulation of
+/// 30 kHz; none prints the current controller. The equations are standard (Leonhard, Control of
+/// Electrical Drives, 2001, chapter 12); limits and the behaviour with unusable measurements
+/// (`step`) are ours.
+class CurrentController {
+ public:
+  struct Settings {
+    Windings windings = {};
+    double bandwidth_rad_s = 2000.0;  ///< ω_c
+    double peak_current_A = 0.0;      ///< limit of the amplitude of the reference
+    /// A measured amplitude above this switches off until `reset`; it must exceed the peak current.
+    double trip_current_A = 0.0;
+  };
+
+  struct Measurement {
+    ThreePhase phases_A = {};
+    double angle_rad = 0.0;    ///< electrical, p times that of the rotor
+    double speed_rad_s = 0.0;  ///< electrical
+    double supply_V = 0.0;
+  };
+
+  struct Output {
+    ThreePhase duties = {0.5, 0.5, 0.5};  ///< share of the period in which the upper switch is on
+    bool is_on = false;                   ///< false: all switches are to be opened
+    bool is_tripped = false;              ///< a current was above `trip_current_A`
+    bool is_limited = false;              ///< reference or voltage
+    DirectQuadrature current_A = {};      ///< measured
+    DirectQuadrature voltage_V = {};      ///< after the limit
+    Fault fault = Fault::none;
+  };
+
+  /// @throws Error if a setting is not positive and finite, the trip current does not exceed the
+  /// peak current, or the bandwidth leaves a phase margin below 45 degrees with the delay of 3/2 T.
+  CurrentController(const Settings& settings, double pwm_Hz);
+
+  /// Integrals and trip are cleared.
+  void reset() noexcept;
+  /// The same, with the integrals that hold this current at standstill.
+  void start(const DirectQuadrature& current_A) noexcept;
+
+  /// A measurement or supply that cannot be used (not finite, supply not positive) is
+  /// `Fault::input_not_finite`: the last voltage is held for `kHeldPeriods` periods, then the
+  /// switches are opened and the integrals cleared. A reference that is not finite is the same fault;
+  /// the last valid one remains in use.
+  Output step(const DirectQuadrature& reference_A,
+              const Measurement& measured) noexcept TORSIO_REALTIME;
+
+  static constexpr int kHeldPeriods = 10;
+
+ private:
+  [[nodiscard]] Output hold() noexcept;
+  void modulate(Output& output, ElectricalAngle angle, double supply_V) const noexcept;
+
+  Settings settings_;
+  double period_s_;
+  double proportional_V_A_;  ///< ω_c L
+  double integral_V_A_;      ///< ω_c R T
+  double tracking_;          ///< T R / L: share of a cut voltage that the integral receives
+  double inductance_H_;
+  double flux_Vs_;
+  DirectQuadrature reference_A_;
+  DirectQuadrature integral_V_;
+  Output last_;
+  double last_angle_rad_ = 0.0;  ///< at which the last voltage is applied
+  double last_speed_rad_s_ = 0.0;
+  double last_supply_V_ = 0.0;
+  int missed_ = 0;
+  bool is_tripped_ = false;
+};
+
+}  // namespace torsio
