@@ -40,6 +40,19 @@ DirectQuadrature limited(DirectQuadrature axes, double longest) noexcept {
   return {axes.d * share, axes.q * share};
 }
 
+// The common-mode voltage that centres the phases between the rails leaves the largest amplitude.
+ThreePhase duties_of(const DirectQuadrature& voltage_V, ElectricalAngle angle,
+                     double supply_V) noexcept {
+  const ThreePhase phases = phases_of(voltage_V, angle);
+  const double common =
+      0.5 * (std::max({phases.a, phases.b, phases.c}) + std::min({phases.a, phases.b, phases.c}));
+  const double per_volt = 1.0 / supply_V;
+  const auto duty = [&](double phase) {
+    return std::clamp(0.5 + (phase - common) * per_volt, 0.0, 1.0);
+  };
+  return {duty(phases.a), duty(phases.b), duty(phases.c)};
+}
+
 }  // namespace
 
 void Windings::check() const {
@@ -88,7 +101,6 @@ CurrentController::CurrentController(const Settings& settings, double pwm_Hz)
 void CurrentController::reset() noexcept {
   reference_A_ = {};
   integral_V_ = {};
-  last_ = {};
   missed_ = kHeldPeriods;
   is_tripped_ = false;
 }
@@ -100,25 +112,32 @@ void CurrentController::start(const DirectQuadrature& current_A) noexcept {
   integral_V_ = {resistance_Ohm * current_A.d, resistance_Ohm * current_A.q};
 }
 
+// One variable is returned everywhere, so that it is never copied.
 CurrentController::Output CurrentController::step(const DirectQuadrature& reference_A,
                                                   const Measurement& measured) noexcept {
-  if (is_tripped_) return last_;
-  if (!is_usable(measured)) return hold();
-  missed_ = 0;
-  const bool is_reference_usable = is_finite(reference_A);
-  if (is_reference_usable) reference_A_ = reference_A;
-  const DirectQuadrature wanted_A = limited(reference_A_, settings_.peak_current_A);
-
+  Output output;
+  if (is_tripped_) {
+    output.is_tripped = true;
+    return output;
+  }
+  if (!is_usable(measured)) {
+    hold(output);
+    return output;
+  }
   const ElectricalAngle angle = ElectricalAngle::of(measured.angle_rad);
-  Output output{.is_on = true,
-                .current_A = rotor_axes(measured.phases_A, angle),
-                .fault = is_reference_usable ? Fault::none : Fault::input_not_finite};
-  const DirectQuadrature& current = output.current_A;
+  const DirectQuadrature current = rotor_axes(measured.phases_A, angle);
+  output.current_A = current;
   if (!(square_of(current) <= settings_.trip_current_A * settings_.trip_current_A)) {
     is_tripped_ = true;
-    last_ = {.is_tripped = true, .current_A = current};
-    return last_;
+    output.is_tripped = true;
+    return output;
   }
+  if (is_finite(reference_A)) {
+    reference_A_ = reference_A;
+  } else {
+    output.fault = Fault::input_not_finite;
+  }
+  const DirectQuadrature wanted_A = limited(reference_A_, settings_.peak_current_A);
   const double speed_rad_s = measured.speed_rad_s;
   const DirectQuadrature error{wanted_A.d - current.d, wanted_A.q - current.q};
   const DirectQuadrature voltage{
@@ -126,48 +145,42 @@ CurrentController::Output CurrentController::step(const DirectQuadrature& refere
       proportional_V_A_ * error.q + integral_V_.q +
           speed_rad_s * (inductance_H_ * current.d + flux_Vs_)};
   const double highest_V = measured.supply_V * std::numbers::inv_sqrt3;
-  if (!(square_of(voltage) <= kAbsurd * kAbsurd * highest_V * highest_V)) return hold();
-  output.voltage_V = limited(voltage, highest_V);
-  const DirectQuadrature cut{output.voltage_V.d - voltage.d, output.voltage_V.q - voltage.q};
-  integral_V_ = {std::clamp(integral_V_.d + integral_V_A_ * error.d + tracking_ * cut.d, -highest_V,
-                            highest_V),
-                 std::clamp(integral_V_.q + integral_V_A_ * error.q + tracking_ * cut.q, -highest_V,
-                            highest_V)};
+  if (!(square_of(voltage) <= kAbsurd * kAbsurd * highest_V * highest_V)) {
+    hold(output);
+    return output;
+  }
+  missed_ = 0;
+  voltage_V_ = limited(voltage, highest_V);
+  const DirectQuadrature cut{voltage_V_.d - voltage.d, voltage_V_.q - voltage.q};
+  const auto integrated = [&](double integral_V, double error_A, double cut_V) {
+    return std::clamp(integral_V + integral_V_A_ * error_A + tracking_ * cut_V, -highest_V,
+                      highest_V);
+  };
+  integral_V_ = {integrated(integral_V_.d, error.d, cut.d),
+                 integrated(integral_V_.q, error.q, cut.q)};
+  speed_rad_s_ = speed_rad_s;
+  supply_V_ = measured.supply_V;
+  const double ahead_rad = kDelayPeriods * speed_rad_s * period_s_;
+  angle_rad_ = measured.angle_rad + ahead_rad;
+  output.is_on = true;
   output.is_limited =
       cut.d != 0.0 || cut.q != 0.0 || wanted_A.d != reference_A_.d || wanted_A.q != reference_A_.q;
-  last_speed_rad_s_ = speed_rad_s;
-  last_supply_V_ = measured.supply_V;
-  const double ahead_rad = kDelayPeriods * speed_rad_s * period_s_;
-  last_angle_rad_ = measured.angle_rad + ahead_rad;
-  modulate(output, angle.turned_by(ahead_rad), measured.supply_V);
-  last_ = output;
+  output.voltage_V = voltage_V_;
+  output.duties = duties_of(voltage_V_, angle.turned_by(ahead_rad), supply_V_);
   return output;
 }
 
-CurrentController::Output CurrentController::hold() noexcept {
+void CurrentController::hold(Output& output) noexcept {
+  output.fault = Fault::input_not_finite;
   if (missed_ >= kHeldPeriods) {
     integral_V_ = {};
-    last_ = {.fault = Fault::input_not_finite};
-    return last_;
+    return;
   }
   ++missed_;
-  last_.fault = Fault::input_not_finite;
-  last_angle_rad_ += last_speed_rad_s_ * period_s_;
-  modulate(last_, ElectricalAngle::of(last_angle_rad_), last_supply_V_);
-  return last_;
-}
-
-// The common-mode voltage that centres the phases between the rails leaves the largest amplitude.
-void CurrentController::modulate(Output& output, ElectricalAngle angle,
-                                 double supply_V) const noexcept {
-  const ThreePhase phases = phases_of(output.voltage_V, angle);
-  const double common =
-      0.5 * (std::max({phases.a, phases.b, phases.c}) + std::min({phases.a, phases.b, phases.c}));
-  const double per_volt = 1.0 / supply_V;
-  const auto duty = [&](double phase) {
-    return std::clamp(0.5 + (phase - common) * per_volt, 0.0, 1.0);
-  };
-  output.duties = {duty(phases.a), duty(phases.b), duty(phases.c)};
+  angle_rad_ += speed_rad_s_ * period_s_;
+  output.is_on = true;
+  output.voltage_V = voltage_V_;
+  output.duties = duties_of(voltage_V_, ElectricalAngle::of(angle_rad_), supply_V_);
 }
 
 }  // namespace torsio

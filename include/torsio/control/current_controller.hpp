@@ -96,8 +96,7 @@ class CurrentController {
   static constexpr int kHeldPeriods = 10;
 
  private:
-  [[nodiscard]] Output hold() noexcept;
-  void modulate(Output& output, ElectricalAngle angle, double supply_V) const noexcept;
+  void hold(Output& output) noexcept;
 
   Settings settings_;
   double period_s_;
@@ -108,10 +107,11 @@ class CurrentController {
   double flux_Vs_;
   DirectQuadrature reference_A_;
   DirectQuadrature integral_V_;
-  Output last_;
-  double last_angle_rad_ = 0.0;  ///< at which the last voltage is applied
-  double last_speed_rad_s_ = 0.0;
-  double last_supply_V_ = 0.0;
+  // The last voltage, and what is needed to apply it again.
+  DirectQuadrature voltage_V_;
+  double angle_rad_ = 0.0;
+  double speed_rad_s_ = 0.0;
+  double supply_V_ = 0.0;
   int missed_ = 0;
   bool is_tripped_ = false;
 };
