@@ -11,7 +11,7 @@ namespace {
 constexpr double kElectricalTime_s = 1e-3;
 constexpr double kAmbient_K = 293.15;
 constexpr double kRise_K = 100.0;
-constexpr double kCopperShare = 0.3;  // of the rise, between copper and stator
+constexpr double kCopperShare = 0.3;  // share of the rise between copper and stator
 constexpr double kCopperTime_s = 10.0;
 constexpr double kStatorTime_s = 600.0;
 

@@ -25,7 +25,7 @@ ElectricalDrive::Parameters exact_drive(const DataSheet& sheet) {
 struct Comparison {
   double rms_Nm = 0.0;
   double difference_Nm = 0.0;
-  double residual_share = 0.0;  ///< of the energy audit, over the throughput
+  double residual_share = 0.0;  ///< residual of the energy audit over the throughput
 };
 
 /// One actuator with the lag of a current loop and once more with its electrical side, under the same
@@ -108,18 +108,18 @@ TEST(SimulateElectrical, LogsWhatTheDriveMeasures) {
   const auto& stator = recording.channel("stator_temperature_K").values;
   const auto& copper = recording.channel("truth_copper_temperature_K").values;
   double largest_A = 0.0;
-  double most_amplitude_A = 0.0;
+  double max_amplitude_A = 0.0;
   double supply_A = 0.0;
   for (std::size_t i = 0; i < motor.size(); ++i) {
     // The amplitude of three phases that add up to zero.
     const double amplitude_A = std::sqrt(4.0 / 3.0 * (a[i] * a[i] + a[i] * b[i] + b[i] * b[i]));
     EXPECT_GE(amplitude_A + 1e-9, std::abs(motor[i])) << i;
     largest_A = std::max(largest_A, std::abs(motor[i]));
-    most_amplitude_A = std::max(most_amplitude_A, amplitude_A);
+    max_amplitude_A = std::max(max_amplitude_A, amplitude_A);
     supply_A += supply[i] / static_cast<double>(motor.size());
   }
   EXPECT_GT(largest_A, 0.5);
-  EXPECT_LT(most_amplitude_A, 1.2 * largest_A);
+  EXPECT_LT(max_amplitude_A, 1.2 * largest_A);
   EXPECT_GT(supply_A, 0.0);
   EXPECT_GT(stator.back(), 293.15);
   EXPECT_GT(copper.back(), stator.back());

@@ -16,10 +16,10 @@ struct ElectricalSheet {
   SheetValue phase_resistance_Ohm;  ///< 2/3 of the sheet's: the same copper loss
   SheetValue phase_inductance_H;    ///< resistance times 1 ms
   SheetValue pwm_Hz;
-  SheetValue bandwidth_rad_s;        ///< of the current loop: 1 / the time constant of the sheet
+  SheetValue bandwidth_rad_s;        ///< current loop: 1 / the time constant of the sheet
   SheetValue trip_current_A;         ///< 1.5 times the peak
-  SheetValue current_offset_A;       ///< of phase a; of b the negative: 0.2 % of the peak
-  SheetValue current_gain_error;     ///< of phase a; of b the negative
+  SheetValue current_offset_A;       ///< phase a, its negative in b: 0.2 % of the peak
+  SheetValue current_gain_error;     ///< phase a, its negative in b: 0.5 %
   SheetValue current_noise_A;        ///< the sheet's
   SheetValue commutation_error_rad;  ///< electrical: 1 degree
   /// The rated current at 20 degrees Celsius around it warms the copper by 100 K. Of this, the step
@@ -28,7 +28,7 @@ struct ElectricalSheet {
   SheetValue stator_J_K;
   SheetValue copper_stator_K_W;
   SheetValue stator_ambient_K_W;
-  SheetValue derating_begins_K;  ///< of the stator; 80 degrees Celsius
+  SheetValue derating_begins_K;  ///< temperature of the stator: 80 degrees Celsius
   SheetValue derating_ends_K;    ///< no current any more; 100 degrees Celsius
 };
 

@@ -110,7 +110,7 @@ class EstimatorCore {
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
   std::vector<Range> ranges_;   ///< per feature, tolerance included
-  double first_width_ = 0.0;    ///< of the range of the first feature
+  double first_width_ = 0.0;    ///< width of the range of the first feature
   bool assumes_jumps_ = false;  ///< the largest steps of the training are not known
   std::vector<std::string> unset_zeros_;
   std::size_t longest_gap_;  ///< ticks
@@ -125,7 +125,7 @@ class EstimatorCore {
   bool has_run_ = false;              ///< the model has been stepped since `reset()`
   bool in_jump_ = false;              ///< since a jump, no tick has been inside the ranges
   double excluded_ticks_ = 0.0;       ///< in a row, whose inputs the model has not received
-  std::vector<double> previous_raw_;  ///< of the last tick; NaN: none
+  std::vector<double> previous_raw_;  ///< raw inputs of the last tick; NaN: none
   std::vector<double> jump_limits_;   ///< the largest change of a raw input in a tick
   std::vector<double> limited_;       ///< features
   MemoryError memory_error_{{}, 0.0, 1.0, 0.0};

@@ -14,8 +14,8 @@ namespace torsio {
 
 /// The estimates of a recording, whose target need not be measured.
 struct EstimatedRecording {
-  /// On the clock of the recording: the raw inputs, the estimate ("estimated_torque_Nm"), the error
-  /// bar ("torque_std_dev_Nm") and the novelty ("novelty_1", NaN for a model without one).
+  /// On the clock of the recording: the raw inputs, the estimate ("estimated_torque_Nm"), its
+  /// error bar ("torque_std_dev_Nm") and the novelty ("novelty_1", NaN for a model without one).
   Recording channels;
   std::vector<Fault> faults;  ///< one for each sample
 };

@@ -81,7 +81,7 @@ double ElectricalDrive::step(double wanted_A, double rotor_angle_rad, double rot
   if (std::isfinite(wanted_A)) wanted_A = std::clamp(wanted_A, -allowed_A, allowed_A);
   const double pairs = parameters_.control.windings.pole_pairs;
   const double speed_rad_s = pairs * rotor_speed_rad_s;
-  // Of a turn, since an angle after many turns has few digits left behind its point.
+  // The angle within one turn: after many turns few digits of a fraction would be left.
   double angle_rad = pairs * std::remainder(rotor_angle_rad, 2.0 * std::numbers::pi);
   const double shortest_s = 1e-9 / parameters_.pwm_Hz;
   double impulse_Nms = 0.0;

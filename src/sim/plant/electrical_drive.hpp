@@ -47,7 +47,7 @@ class ElectricalDrive {
     double commutation_error_rad = 0.0;  ///< ε, electrical: measured less true angle
     MotorThermal thermal = {};
     double ambient_K = 293.15;
-    double derating_begins_K = 0.0;  ///< of the stator (`TemperatureDerating`)
+    double derating_begins_K = 0.0;  ///< stator temperatures (`TemperatureDerating`)
     double derating_ends_K = 0.0;
     std::uint64_t seed = 1;
   };
@@ -58,8 +58,8 @@ class ElectricalDrive {
     double copper_J = 0.0;      ///< heat
   };
 
-  /// @throws Error if a setting of the controller is refused, or a parameter is not positive (errors
-  /// of the sensors: not finite).
+  /// @throws Error if a setting of the controller is refused, or a parameter is not positive (an
+  /// error of a sensor: not finite).
   explicit ElectricalDrive(const Parameters& parameters);
 
   /// This current i_q, and the voltage that holds it at standstill; the temperatures remain.
@@ -98,7 +98,7 @@ class ElectricalDrive {
   CurrentController::Output present_;  ///< applied in this period
   CurrentController::Output next_;
   ThreePhase measured_A_;
-  double left_s_ = 0.0;         ///< of this period
+  double left_s_ = 0.0;         ///< until the end of this period
   DirectQuadrature current_A_;  ///< after the last step
   double supply_current_A_ = 0.0;
   double copper_K_;

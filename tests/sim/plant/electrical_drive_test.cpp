@@ -65,7 +65,7 @@ TEST(MotorWindings, OneStepIsAsManySmallOnes) {
   EXPECT_NEAR(whole.current(0.0).q, divided.current(0.0).q, 1e-9);
 }
 
-TEST(MotorWindings, AtStandstillAVoltageMakesItsCurrent) {
+TEST(MotorWindings, AVoltageDrivesItsCurrentAtRest) {
   MotorWindings windings(parameters().control.windings);
   const auto command = duties(0.6, 0.45, 0.45);
   for (int n = 0; n < 300; ++n) (void)windings.step(command, 48.0, 0.0, 0.0, kPeriod_s);
