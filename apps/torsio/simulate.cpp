@@ -18,6 +18,7 @@
 #include "torsio/report/svg_plot.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/sim/experiment.hpp"
+#include "torsio/sim/sheet_file.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -40,6 +41,7 @@ struct SimulateFlags {
   std::string warm_up_time;
   std::string age;
   std::string describe;
+  std::string yaml;
   std::string plot;
   std::uint64_t seed = kDefaultSeed;
   bool with_truth = false;
@@ -57,11 +59,11 @@ std::vector<std::string_view> variants(const torsio::DataSheet& sheet) {
 
 /// What goes into a model of an actuator whose spring does not lie between `gear_angle_rad` and
 /// `joint_angle_rad`; empty: what every verb takes by itself.
-std::string inputs_for(std::string_view actuator, std::string_view variant) {
-  if (actuator == "rubber-clutch")
+std::string inputs_for(torsio::ActuatorFamily family, std::string_view variant) {
+  if (family == torsio::ActuatorFamily::rubber_clutch)
     return "input_angle_rad - joint_angle_rad, lowpass(rate(input_angle_rad - joint_angle_rad), "
            "10Hz)";
-  if (actuator != "harmonic-drive") return {};
+  if (family != torsio::ActuatorFamily::harmonic_drive) return {};
   // A rigid tube's twist cannot be measured: the twist of gear and tube is used instead.
   const std::string twist = variant == "rigid"
                                 ? "lowpass(motor_angle_rad / 2 - 51 * joint_angle_rad, 10Hz)"
@@ -77,7 +79,7 @@ std::string bench_list() {
                    std::string(sheet.title)});
   std::string inputs;
   for (const torsio::DataSheet& sheet : torsio::data_sheets())
-    if (const std::string named = inputs_for(sheet.name, sheet.variant); !named.empty())
+    if (const std::string named = inputs_for(sheet.family, sheet.variant); !named.empty())
       inputs += fmt::format("check and train {} with --inputs '{}'\n", sheet.name, named);
   torsio::TextTable experiments;
   experiments.header({"experiment", "actuators", "description"});
@@ -117,9 +119,8 @@ std::string description(const torsio::DataSheet& sheet, bool is_electrical) {
 
 /// Nm or rad, as the experiment has it. An unknown experiment, or one without amplitude, is refused
 /// where it is run, whatever the unit.
-std::string_view amplitude_unit(const SimulateFlags& flags) {
-  for (const torsio::ExperimentInfo& info :
-       torsio::experiments(torsio::data_sheet(flags.actuator))) {
+std::string_view amplitude_unit(const SimulateFlags& flags, const torsio::DataSheet& sheet) {
+  for (const torsio::ExperimentInfo& info : torsio::experiments(sheet)) {
     if (info.name == flags.experiment && !info.amplitude_unit.empty()) return info.amplitude_unit;
   }
   return "Nm";
@@ -137,10 +138,9 @@ torsio::OperatingConditions conditions(const SimulateFlags& flags) {
   return of;
 }
 
-torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags,
+torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags, const torsio::DataSheet& sheet,
                                        const torsio::Progress& progress) {
-  torsio::ExperimentSpec spec{.actuator = flags.actuator,
-                              .experiment = flags.experiment,
+  torsio::ExperimentSpec spec{.experiment = flags.experiment,
                               .seed = flags.seed,
                               .is_electrical = flags.is_electrical,
                               .with_truth = flags.with_truth};
@@ -150,7 +150,7 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags,
   if (!flags.inclination.empty())
     spec.inclination_rad = torsio::si_quantity(flags.inclination, "rad", "--inclination");
   if (!flags.amplitude.empty()) {
-    const std::string_view unit = amplitude_unit(flags);
+    const std::string_view unit = amplitude_unit(flags, sheet);
     (unit == "rad" ? spec.angle_amplitude_rad : spec.torque_amplitude_Nm) =
         torsio::si_quantity(flags.amplitude, unit, "--amplitude");
   }
@@ -159,8 +159,7 @@ torsio::ExperimentSpec experiment_spec(const SimulateFlags& flags,
   spec.is_impedance_zero = flags.impedance == "zero";
   spec.conditions = conditions(flags);
   if (!flags.faults.empty())
-    spec.faults =
-        torsio::read_fault_schedule(flags.faults, torsio::data_sheet(flags.actuator), progress);
+    spec.faults = torsio::read_fault_schedule(flags.faults, sheet, progress);
   return spec;
 }
 
@@ -232,9 +231,9 @@ Json recording_json(const SimulateFlags& flags, const torsio::ExperimentSpec& sp
 }
 
 /// The torque over the twist.
-std::string loop_picture(const SimulateFlags& flags, const torsio::Recording& recording) {
-  std::vector<double> twist_deg =
-      torsio::measured_twist(torsio::data_sheet(flags.actuator), recording);
+std::string loop_picture(const SimulateFlags& flags, const torsio::DataSheet& sheet,
+                         const torsio::Recording& recording) {
+  std::vector<double> twist_deg = torsio::measured_twist(sheet, recording);
   for (double& twist : twist_deg) twist = torsio::deg_from_rad(twist);
   return torsio::svg_plot({{"", twist_deg, recording.channel("torque_Nm").values}},
                           {"deflection [deg]", "torque [Nm]"},
@@ -247,36 +246,53 @@ void show(const SimulateFlags& flags, const std::string& text, const Json& docum
   flags.json.write(torsio::json_text(document));
 }
 
+/// The file of an actuator that is named by one; empty: none.
+std::string sheet_file(const std::string& actuator) {
+  return torsio::is_sheet_file(actuator) ? actuator : std::string();
+}
+
+void describe(const SimulateFlags& flags) {
+  if (!flags.actuator.empty())
+    throw torsio::UsageError({.place = "torsio simulate --describe",
+                              .expected = "one name and no simulation",
+                              .found = flags.actuator});
+  DataFlags().check_outputs({flags.json.destination, flags.yaml}, {sheet_file(flags.describe)});
+  require_ending("--yaml", flags.yaml, {".yaml", ".yml"});
+  const torsio::OperatingConditions of = conditions(flags);
+  torsio::check(of);
+  const torsio::DataSheet sheet = torsio::aged(torsio::find_data_sheet(flags.describe), of.age);
+  const JsonOutput yaml{flags.yaml};
+  if (yaml.wants_tables() && flags.json.wants_tables())
+    print(description(sheet, flags.is_electrical));
+  flags.json.write(torsio::json_text(sheet_json(sheet, flags.is_electrical)));
+  yaml.write(torsio::data_sheet_yaml(sheet));
+}
+
 void run(const SimulateFlags& flags) {
   if (flags.list) return show(flags, bench_list(), list_json());
-  if (!flags.describe.empty()) {
-    if (!flags.actuator.empty())
-      throw torsio::UsageError({.place = "torsio simulate --describe",
-                                .expected = "one name and no simulation",
-                                .found = flags.actuator});
-    const torsio::OperatingConditions of = conditions(flags);
-    torsio::check(of);
-    const torsio::DataSheet sheet = torsio::aged(torsio::data_sheet(flags.describe), of.age);
-    return show(flags, description(sheet, flags.is_electrical),
-                sheet_json(sheet, flags.is_electrical));
-  }
+  if (!flags.describe.empty()) return describe(flags);
+  if (!flags.yaml.empty())
+    throw torsio::UsageError({.place = "torsio simulate --yaml",
+                              .expected = "--describe NAME, whose data sheet is written",
+                              .advice = "Write a recording with -o FILE."});
   if (flags.actuator.empty() || flags.experiment.empty() || flags.output.empty())
     throw torsio::UsageError({.place = "torsio simulate",
                               .expected = "ACTUATOR EXPERIMENT -o FILE",
                               .advice = "torsio simulate --list shows all names; example: "
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
-  DataFlags().check_outputs({flags.output, flags.json.destination, flags.plot}, {flags.faults});
+  DataFlags().check_outputs({flags.output, flags.json.destination, flags.plot},
+                            {flags.faults, sheet_file(flags.actuator)});
   require_ending("--plot", flags.plot, {".svg"});
   ProgressBar progress;
-  const torsio::ExperimentSpec spec = experiment_spec(flags, progress.listener());
-  const torsio::Recording recording = torsio::simulate(spec, progress.listener());
+  const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());
+  const torsio::ExperimentSpec spec = experiment_spec(flags, sheet, progress.listener());
+  const torsio::Recording recording = torsio::simulate(sheet, spec, progress.listener());
   torsio::write_csv(recording, flags.output, progress.listener());
-  if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, recording));
+  if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, sheet, recording));
   flags.json.write(torsio::json_text(recording_json(flags, spec, recording)));
   remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),
                      recording.sample_rate_Hz()));
-  const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
-  if (const std::string inputs = inputs_for(sheet.name, sheet.variant); !inputs.empty())
+  if (const std::string inputs = inputs_for(sheet.family, sheet.variant); !inputs.empty())
     remark("check it and train on it with --inputs '" + inputs + "'");
 }
 
@@ -285,8 +301,14 @@ void run(const SimulateFlags& flags) {
 void add_simulate(CLI::App& app) {
   auto flags = std::make_shared<SimulateFlags>();
   CLI::App* verb = app.add_subcommand("simulate", "record an experiment on a simulated bench");
-  verb->footer("Example: torsio simulate dfki-50 sweep --lever 0.17m --seed 2 -o sweep.csv");
-  verb->add_option("ACTUATOR", flags->actuator, "--list shows the names");
+  verb->footer(
+      "Example: torsio simulate dfki-50 sweep --lever 0.17m --seed 2 -o sweep.csv\n"
+      "An actuator of your own:\n"
+      "  torsio simulate --describe dfki-50 --yaml my_joint.yaml\n"
+      "  (edit the values, or give the torque curve of the spring as a table: docs/actuators.md)\n"
+      "  torsio simulate my_joint.yaml sweep -o sweep.csv");
+  verb->add_option("ACTUATOR", flags->actuator,
+                   "--list shows the names; or a data sheet, FILE.yaml");
   verb->add_option("EXPERIMENT", flags->experiment, "--list shows the names");
   verb->add_option("-o,--output", flags->output,
                    "CSV file to write (packed if it ends in .gz), or - for standard output");
@@ -321,7 +343,10 @@ void add_simulate(CLI::App& app) {
   verb->add_flag("--list", flags->list, "show actuators with their variants, and experiments");
   verb->add_option(
       "--describe", flags->describe,
-      "show a data sheet: dfki-50, dfki-50:bouc-wen, dfki-50#03; with --age a worn one");
+      "show a data sheet: dfki-50, dfki-50:bouc-wen, dfki-50#03, FILE.yaml; with --age a worn one");
+  verb->add_option("--yaml", flags->yaml,
+                   "with --describe: write the data sheet as YAML to a file, or - for standard "
+                   "output; simulate and track take it as an actuator");
   verb->add_option("--json", flags->json.destination,
                    "write the description of the recording, or the list, as JSON to a file, or - "
                    "for standard output");

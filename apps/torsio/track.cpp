@@ -18,6 +18,8 @@
 #include "torsio/data/load.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
+#include "torsio/sim/sheet_file.hpp"
+#include "track_impedance.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -43,6 +45,7 @@ struct TrackFlags {
   std::string record;
   std::uint64_t seed = kDefaultSeed;
   std::size_t seeds = 1;
+  ImpedanceFlags impedance;
   JsonOutput json;
 };
 
@@ -169,6 +172,7 @@ void check(TrackFlags& flags) {
   std::vector<std::string> read = flags.models;
   read.push_back(flags.faults);
   read.push_back(flags.replayed);
+  if (torsio::is_sheet_file(flags.actuator)) read.push_back(flags.actuator);
   flags.data.check_outputs({flags.record, flags.json.destination}, read);
   if (flags.seeds < 1 || flags.seeds > kMaxSeeds)
     throw torsio::UsageError({.place = "--seeds",
@@ -192,10 +196,21 @@ std::string refuse_output(const std::string& text) {
          "'. Results are written with --json FILE, the loop's signals with --record FILE.csv";
 }
 
-void run(TrackFlags& flags) {
+void run(TrackFlags& flags, const CLI::App& verb) {
+  flags.impedance.check(verb);
+  const bool is_impedance = !flags.impedance.impedance.empty();
+  if (is_impedance && verb.get_option("--actuator")->count() == 0)
+    flags.actuator = "harmonic-drive";
   check(flags);
-  const torsio::DataSheet sheet = torsio::data_sheet(flags.actuator);
+  if (is_impedance)
+    return run_impedance(flags.impedance, {.actuator = flags.actuator,
+                                           .amplitude = flags.amplitude,
+                                           .duration = flags.duration,
+                                           .seed = flags.seed,
+                                           .record = flags.record,
+                                           .json = flags.json});
   ProgressBar progress;
+  const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());
   const std::vector<NamedModel> files = load_models(flags);
   const torsio::TrackingSpec spec = spec_of(flags, files, sheet, progress.listener());
   const std::vector<torsio::NamedInverse> models = inverses_of(files);
@@ -229,7 +244,8 @@ void run(TrackFlags& flags) {
 void add_track(CLI::App& app) {
   auto flags = std::make_shared<TrackFlags>();
   CLI::App* verb = app.add_subcommand(
-      "track", "close a torque loop on a simulated joint and measure its tracking error");
+      "track",
+      "close a torque or impedance loop on a simulated joint and measure what it achieves");
   verb->footer(
       "Example: torsio track --actuator dfki-120 --reference chirp --amplitude 20Nm \\\n"
       "           --model joint.safetensors --seeds 3\n"
@@ -237,8 +253,14 @@ void add_track(CLI::App& app) {
       "deflection\n"
       "comes from a linear model fitted to sweeps of this bench (\"linear\", always run) and from "
       "each\n"
-      "given model, which is inverted or was trained with --target spring_deflection_rad.");
-  verb->add_option("--actuator", flags->actuator, "dfki-28 to dfki-300, as NAME:VARIANT#SERIAL")
+      "given model, which is inverted or was trained with --target spring_deflection_rad.\n"
+      "\n"
+      "Example: torsio track --impedance 2000Nm_rad --impedance-damping 30Nms_rad\n"
+      "renders a stiffness and a damping at the output of harmonic-drive: the table compares the "
+      "wanted\n"
+      "with the rendered impedance from 0.1 to 10 Hz, and the forces of a hand follow.");
+  verb->add_option("--actuator", flags->actuator,
+                   "dfki-28 to dfki-300, as NAME:VARIANT#SERIAL, or a data sheet, FILE.yaml")
       ->capture_default_str();
   verb->add_option("--output", flags->output,
                    "output of the joint: locked, or free with a lever and 9 kg; not a file")
@@ -274,5 +296,6 @@ void add_track(CLI::App& app) {
                    "the only --model as CSV");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
-  verb->callback([flags] { run(*flags); });
+  flags->impedance.add(*verb);
+  verb->callback([flags, verb] { run(*flags, *verb); });
 }

@@ -17,6 +17,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
+#include "torsio/sim/sheet_file.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -50,7 +51,7 @@ struct Tuned {
 Tuned tuned(const TuneFlags& flags) {
   using torsio::JointOutput;
   torsio::DeflectionController::Settings settings{
-      .joint = torsio::series_elastic_joint(torsio::data_sheet(flags.actuator)),
+      .joint = torsio::series_elastic_joint(torsio::find_data_sheet(flags.actuator)),
       .bandwidth_rad_s = angular_frequency_rad_s(flags.bandwidth, "--bandwidth"),
       .damping = above_zero(flags.damping, "--damping")};
   if (!(flags.load_inertia_kg_m2 >= 0.0))
@@ -180,7 +181,8 @@ void add_tune_loop(CLI::App& app) {
       "From the data sheet: spring, drive, current loop, delay of one sample; without dry "
       "friction.\n"
       "Unstable gains are refused; the message gives the margin. torsio track closes the loop.");
-  verb->add_option("--actuator", flags->actuator, "torsio simulate --list shows the names")
+  verb->add_option("--actuator", flags->actuator,
+                   "torsio simulate --list shows the names; or a data sheet, FILE.yaml")
       ->capture_default_str();
   verb->add_option("--bandwidth", flags->bandwidth,
                    "natural frequency of the closed loop, in Hz or rad_s")

@@ -99,6 +99,10 @@ void visit_values(Sheet& of, const Visit& visit) {
   visit("spring_knee", "rad", of.knee_rad);
   visit("spring_static_ratio", "", of.static_ratio);
   visit("spring_stribeck", "rad/s", of.stribeck_rad_s);
+  for (std::size_t i = 0; i < of.curve.size(); ++i) {
+    visit(fmt::format("spring_curve_deflection_{}", i + 1), "rad", of.curve[i].deflection_rad);
+    visit(fmt::format("spring_curve_torque_{}", i + 1), "Nm", of.curve[i].torque_Nm);
+  }
 }
 
 template <SheetOf<ElastomerSheet> Sheet, class Visit>

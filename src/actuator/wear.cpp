@@ -24,6 +24,7 @@ class Ageing {
   void operator()(SpringSheet& spring) const {
     soften(spring.stiffness_Nm_rad);
     soften(spring.stage_stiffness_Nm_rad);
+    for (CurvePoint& point : spring.curve) soften(point.torque_Nm);
     rub(spring.friction_Nm);
     rub(spring.load_friction);
     rub(spring.break_away_rad);

@@ -22,27 +22,6 @@ double stiffness_of(const SpringSheet& spring) { return spring.stiffness_Nm_rad.
 double stiffness_of(const ElastomerSheet& coupling) { return coupling.stiffness_Nm_rad.value; }
 double stiffness_of(const RubberSheet& rubber) { return rubber.stiffness_Nm_rad.value; }
 
-struct Impedance {
-  const SeriesElasticJoint& joint;
-  const JointFeedback& feedback;
-
-  /// Re Z [Nms/rad]
-  [[nodiscard]] double real_at(double rad_s) const {
-    const Drive& drive = joint.drive;
-    const Complex s(0.0, rad_s);
-    const double period_s = 1.0 / feedback.deflection.sample_rate_Hz();
-    const Complex late = std::exp(-s * period_s);
-    const Complex current = late * (1.0 - late) /
-                            (s * period_s * (1.0 + s * drive.current_time_constant_s)) *
-                            drive.torque_per_current();
-    const Complex inner = s * (drive.inertia() * s + drive.viscous_Nms_rad) +
-                          current * s * feedback.speed.response(rad_s);
-    return (joint.stiffness_Nm_rad / s * (inner + current * feedback.joint.response(rad_s)) /
-            (inner + joint.stiffness_Nm_rad + current * feedback.deflection.response(rad_s)))
-        .real();
-  }
-};
-
 }  // namespace
 
 void SeriesElasticJoint::check() const {
@@ -115,18 +94,32 @@ void require_stable(std::string_view place, const LinearSystem& loop, JointOutpu
                .advice = "Take less bandwidth, smaller gains or a higher sample rate."});
 }
 
+std::complex<double> impedance(const SeriesElasticJoint& joint, const JointFeedback& feedback,
+                               double rad_s) {
+  const Drive& drive = joint.drive;
+  const Complex s(0.0, rad_s);
+  const double period_s = 1.0 / feedback.deflection.sample_rate_Hz();
+  const Complex late = std::exp(-s * period_s);
+  const Complex current = late * (1.0 - late) /
+                          (s * period_s * (1.0 + s * drive.current_time_constant_s)) *
+                          drive.torque_per_current();
+  const Complex inner = s * (drive.inertia() * s + drive.viscous_Nms_rad) +
+                        current * s * feedback.speed.response(rad_s);
+  return joint.stiffness_Nm_rad / s * (inner + current * feedback.joint.response(rad_s)) /
+         (inner + joint.stiffness_Nm_rad + current * feedback.deflection.response(rad_s));
+}
+
 Passivity passivity(const SeriesElasticJoint& joint, const JointFeedback& feedback) {
   joint.check();
   constexpr int kGrid = 1000;
   constexpr double kLowestShare = 1e-5;  // share of the Nyquist frequency
-  const Impedance impedance{joint, feedback};
   const double highest_rad_s = std::numbers::pi * feedback.deflection.sample_rate_Hz();
   Passivity found = {.passive_to_rad_s = highest_rad_s};
   double last_rad_s = 0.0;
   for (int n = 0; n <= kGrid; ++n) {
     const double rad_s =
         highest_rad_s * std::pow(kLowestShare, 1.0 - static_cast<double>(n) / kGrid);
-    const double real_Nms_rad = impedance.real_at(rad_s);
+    const double real_Nms_rad = impedance(joint, feedback, rad_s).real();
     if (!(real_Nms_rad >= 0.0) && found.passive_to_rad_s == highest_rad_s)
       found.passive_to_rad_s = last_rad_s;
     if (!(real_Nms_rad >= found.least_Nms_rad)) {

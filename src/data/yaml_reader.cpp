@@ -77,7 +77,10 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
 }
 
 void YamlValue::allow_only(std::initializer_list<std::string_view> keys) const {
-  const std::vector<std::string> known(keys.begin(), keys.end());
+  allow_only(std::vector<std::string>(keys.begin(), keys.end()));
+}
+
+void YamlValue::allow_only(std::span<const std::string> known) const {
   for (const auto& [key, value] : entries())
     if (std::ranges::find(known, key) == known.end())
       throw Error({.place = value.place(),

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -32,6 +33,7 @@ class YamlValue {
   [[nodiscard]] std::vector<std::pair<std::string, YamlValue>> entries() const;
   /// @throws Error for a key that is not listed, with the nearest one that is.
   void allow_only(std::initializer_list<std::string_view> keys) const;
+  void allow_only(std::span<const std::string> keys) const;
   [[nodiscard]] std::optional<YamlValue> find(std::string_view wanted) const;
   [[nodiscard]] YamlValue at(std::string_view key) const;  ///< @throws Error if missing
 

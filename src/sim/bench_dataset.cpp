@@ -1,6 +1,5 @@
 #include "torsio/sim/bench_dataset.hpp"
 
-#include <string>
 #include <utility>
 
 #include "torsio/sim/experiment.hpp"
@@ -8,11 +7,15 @@
 namespace torsio {
 
 Dataset sweep_dataset(std::string_view actuator, std::uint64_t seed, const Progress& progress) {
-  const SweepProtocol protocol = sweep_protocol(data_sheet(actuator));
+  return sweep_dataset(data_sheet(actuator), seed, progress);
+}
+
+Dataset sweep_dataset(const DataSheet& sheet, std::uint64_t seed, const Progress& progress) {
+  const SweepProtocol protocol = sweep_protocol(sheet);
   Dataset dataset;
   const auto record = [&](double lever_m, double inclination_rad, Role role) {
-    Recording sweep = simulate({.actuator = std::string(actuator),
-                                .experiment = "sweep",
+    Recording sweep = simulate(sheet,
+                               {.experiment = "sweep",
                                 .seed = seed + dataset.records.size(),
                                 .lever_m = lever_m,
                                 .inclination_rad = inclination_rad},

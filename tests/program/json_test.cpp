@@ -45,6 +45,7 @@ const JsonCase kCases[] = {
     {"SimulateDescribe", "", "simulate --describe dfki-50"},
     {"SimulateList", "", "simulate --list"},
     {"Track", "", "track --actuator dfki-50 --duration 5s"},
+    {"TrackImpedance", "", "track --impedance zero --duration 10s"},
     {"TuneLoop", "", "tune-loop --actuator dfki-50"},
     {"Unpack", TORSIO_EXAMPLES "/example_06_realtime_loop\n", "unpack run.tsr -o run.csv"},
 };

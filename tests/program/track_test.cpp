@@ -127,5 +127,43 @@ TEST_F(TrackVerb, TuneLoopProposesGainsWithTheirMarginsOrRefuses) {
   EXPECT_LT(observed.at("margins").at(0).at("phase_deg"), json.at("margins").at(0).at("phase_deg"));
 }
 
+TEST_F(TrackVerb, RendersAnImpedance) {
+  const std::string call = "track --impedance 2000Nm_rad --impedance-damping 30Nms_rad ";
+  const Outcome table = torsio(call + "--duration 10s --json run.json --record run.csv");
+  ASSERT_EQ(table.exit_code, 0) << table.err;
+  for (const char* word : {"harmonic-drive (stiff), impedance of 2000 Nm/rad and 30 Nms/rad",
+                           "passive up to", "rendered / linear", "force at 0.5 m"})
+    EXPECT_NE(table.out.find(word), std::string::npos) << word << " in: " << table.out;
+  const auto json = nlohmann::json::parse(contents("run.json"));
+  EXPECT_EQ(json.at("schema_version"), 1);
+  EXPECT_EQ(json.at("impedance"), "wanted");
+  EXPECT_NEAR(json.at("stiffness_Nm_rad"), 2000.0, 1e-9);
+  EXPECT_EQ(json.at("frequencies").at(0).at("frequency_Hz"), 0.1);
+  EXPECT_NEAR(json.at("frequencies").at(0).at("rendered").at("magnitude_Nm_rad"), 2000.0, 700.0);
+  EXPECT_NE(contents("run.csv").find("truth_joint_angle_rad"), std::string::npos);
+  EXPECT_EQ(torsio(call + "--duration 10s --json -").out, contents("run.json"));
+  EXPECT_EQ(
+      torsio("track --actuator harmonic-drive:soft --impedance zero --duration 10s").exit_code, 0);
+}
+
+TEST_F(TrackVerb, RefusesContradictionsOfTheImpedance) {
+  const auto refused = [this](const std::string& flags, const std::string& text) {
+    expect_error(torsio("track " + flags), kCallWasWrong, text);
+  };
+  refused("--impedance high --actuator dfki-120", "torsion tube before its harmonic drive");
+  refused("--impedance 1e6Nm_rad", "not passive up to 10 Hz");
+  refused("--impedance stiff", "--impedance: expected high, zero or a stiffness");
+  refused("--impedance 100Nm", "--impedance: expected high, zero or a stiffness");
+  refused("--impedance high --impedance-damping 1Nms_rad", "the gains of --impedance high");
+  refused("--impedance zero --torque-gain 1Nm_rad", "the gains of --impedance zero");
+  refused("--impedance-damping 1Nms_rad", "no impedance is controlled");
+  refused("--torque-gain 1Nm_rad", "no impedance is controlled");
+  for (const std::string flag :
+       {"--reference chirp", "--output free", "--lever 0.5m", "--model linear", "--bandwidth 8Hz",
+        "--damping 0.5", "--friction 0.5", "--observer 8Hz", "--feed-forward", "--seeds 2"})
+    refused("--impedance high " + flag,
+            flag.substr(0, flag.find(' ')) + ": it belongs to the torque loop");
+}
+
 }  // namespace
 }  // namespace torsio::test

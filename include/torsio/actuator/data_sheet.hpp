@@ -90,6 +90,12 @@ struct FrictionSheet {
 /// How the inner friction of a spring is modelled (specification 4.6).
 enum class SpringVariant { maxwell_slip, bouc_wen, lugre };
 
+/// A point of a measured or designed torque curve.
+struct CurvePoint {
+  SheetValue deflection_rad;
+  SheetValue torque_Nm;
+};
+
 struct SpringSheet {
   SpringVariant variant = SpringVariant::maxwell_slip;
   SheetValue stiffness_Nm_rad;
@@ -106,6 +112,10 @@ struct SpringSheet {
   SheetValue knee_rad = assumed(rad_from_deg(0.15));  ///< bouc-wen, lugre
   SheetValue static_ratio = assumed(1.15);            ///< lugre
   SheetValue stribeck_rad_s = assumed(0.05);          ///< lugre
+  /// The elastic curve as a table, in the order of the deflection. It replaces second stage, play
+  /// and asymmetry; the stiffness is then the nominal one, for the design of controllers and for
+  /// frequencies. Empty: none.
+  std::vector<CurvePoint> curve = {};
 };
 
 /// A shaft coupling of elastomer: branches from slow to fast.
@@ -170,8 +180,8 @@ enum class ActuatorFamily { series_elastic, elastomer, rubber_clutch, harmonic_d
 /// results of a method.
 struct DataSheet {
   ActuatorFamily family = ActuatorFamily::series_elastic;
-  std::string_view name;
-  std::string_view title;
+  std::string name;
+  std::string title;
   std::array<std::string_view, 3> variants = {};  ///< the first is the default; empty: no more
   std::string_view variant = {};                  ///< one of them
   std::optional<unsigned> serial = {};            ///< none: the nominal actuator

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <complex>
+
 #include "torsio/control/drive.hpp"
 #include "torsio/control/linear_system.hpp"
 
@@ -46,15 +48,19 @@ struct Passivity {
   double least_rad_s = 0.0;    ///< where that is
 };
 
-/// The driving-point impedance Z(jω) = −τ / q̇ of spring, drive and controller, swept up to the
+/// The driving-point impedance Z(jω) = −τ / q̇ [Nms/rad] of spring, drive and controller, below the
 /// Nyquist frequency. With H(s) = exp(−s T) (1 − exp(−s T)) / (s T (1 + T_i s)) N k_t of delay, hold
 /// and current loop (what a sampler folds back is left out):
 ///
 ///     Z = K / s · (J N² s² + b s + H (s C_θ̇ + C_q)) / (J N² s² + b s + K + H (C_δ + s C_θ̇))
 ///
-/// The joint's own inertia and friction are passive and not counted. Two passive systems in contact
-/// are stable; one that is not passive is unstable against some, not against all (Colgate & Hogan
-/// 1988).
+/// The joint's own inertia and friction, M s + d, are not included.
+[[nodiscard]] std::complex<double> impedance(const SeriesElasticJoint& joint,
+                                             const JointFeedback& feedback, double rad_s);
+
+/// Re Z of `impedance`, swept up to the Nyquist frequency. The joint's own inertia and friction are
+/// passive. Two passive systems in contact are stable; one that is not passive is unstable against
+/// some, not against all (Colgate & Hogan 1988).
 [[nodiscard]] Passivity passivity(const SeriesElasticJoint& joint, const JointFeedback& feedback);
 
 }  // namespace torsio

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 
@@ -13,6 +14,9 @@ namespace torsio {
 /// another place and an inclined plane of motion. Seeds are `seed`, `seed + 1`, ...
 /// @throws UsageError for an unknown actuator; Cancelled if `progress` asks to stop.
 [[nodiscard]] Dataset sweep_dataset(std::string_view actuator, std::uint64_t seed,
+                                    const Progress& progress = {});
+/// The same with a data sheet.
+[[nodiscard]] Dataset sweep_dataset(const DataSheet& sheet, std::uint64_t seed,
                                     const Progress& progress = {});
 
 }  // namespace torsio

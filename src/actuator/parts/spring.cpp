@@ -13,10 +13,16 @@ struct FrictionOf {
   SpringFriction operator()(const LuGreSlip::Parameters& of) const { return LuGreSlip(of); }
 };
 
+std::optional<TorqueTable> table_of(const std::vector<TorqueTable::Point>& points) {
+  if (points.empty()) return std::nullopt;
+  return TorqueTable(points);
+}
+
 }  // namespace
 
 Spring::Spring(const Parameters& parameters)
     : elastic_(parameters.elastic),
+      table_(table_of(parameters.table)),
       friction_(std::visit(FrictionOf{}, parameters.friction)),
       viscosity_Nms_rad_(parameters.viscosity_Nms_rad) {
   require_not_negative("spring", "viscosity_Nms_rad", parameters.viscosity_Nms_rad);
@@ -36,7 +42,8 @@ double Spring::friction_energy() const noexcept {
 }
 
 double Spring::steepest(double load_Nm) const noexcept {
-  return elastic_.steepest() + detail::dispatch(friction_, [=](const auto& friction) {
+  const double elastic_Nm_rad = table_ ? table_->steepest() : elastic_.steepest();
+  return elastic_Nm_rad + detail::dispatch(friction_, [=](const auto& friction) {
            return friction.stiffness(load_Nm);
          });
 }

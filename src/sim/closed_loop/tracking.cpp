@@ -260,7 +260,7 @@ AnyInverse inverse_of(const ModelFile& model) {
 }
 
 LinearInverse sweep_line(const DataSheet& sheet, std::uint64_t seed, const Progress& progress) {
-  const Dataset sweeps = sweep_dataset(full_name(sheet), seed, progress);
+  const Dataset sweeps = sweep_dataset(sheet, seed, progress);
   // Whatever the family, its fallback is the line; this family is the quickest to fit.
   const TrainedModel trained = train_model(
       sweeps, {.family = "linear", .features = resolve_inputs(sweeps, {"spring_deflection_rad"})},

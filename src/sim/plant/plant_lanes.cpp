@@ -85,6 +85,17 @@ void make_blocks(BlocksOf<Chains...>& blocks, std::size_t kernel, std::size_t pl
       ((at++ == kernel && (blocks = detail::AlignedVector<Chains>(count), true)) || ...));
 }
 
+void require_no_tables(std::span<const PlantParameters> parameters) {
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto* const spring = std::get_if<Spring::Parameters>(&parameters[i].second);
+    if (spring == nullptr || spring->table.empty()) continue;
+    throw Error({.place = kPlace,
+                 .expected = "springs without a table of their torque curve",
+                 .found = fmt::format("a table of {} points at plant {}", spring->table.size(), i),
+                 .advice = "step this plant with Plant"});
+  }
+}
+
 PlantBlocks blocks_for(std::span<const PlantParameters> parameters) {
   if (parameters.empty()) {
     throw Error(
@@ -92,6 +103,7 @@ PlantBlocks blocks_for(std::span<const PlantParameters> parameters) {
   }
   PlantBlocks blocks;
   const PlantParameters& first = parameters.front();
+  require_no_tables(parameters);
   const std::size_t kernel = kernel_of(blocks, first);
   for (std::size_t i = 1; i < parameters.size(); ++i) {
     if (kernel_of(blocks, parameters[i]) == kernel) continue;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <variant>
+#include <vector>
 
 #include "sim/plant/plant.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
@@ -113,6 +114,14 @@ decltype(Spring::Parameters::friction) friction_of(const SpringSheet& spring) {
                                     .break_away_rad = values(spring.break_away_rad)};
 }
 
+std::vector<TorqueTable::Point> table_of(const std::vector<CurvePoint>& curve) {
+  std::vector<TorqueTable::Point> points(curve.size());
+  std::ranges::transform(curve, points.begin(), [](const CurvePoint& of) -> TorqueTable::Point {
+    return {of.deflection_rad.value, of.torque_Nm.value};
+  });
+  return points;
+}
+
 Spring::Parameters stage_of(const SpringSheet& spring) {
   const double stage = spring.stage_rad.value;
   return {
@@ -121,6 +130,7 @@ Spring::Parameters stage_of(const SpringSheet& spring) {
                   .asymmetry = spring.asymmetry.value,
                   .stage_rad = stage > 0.0 ? stage : std::numeric_limits<double>::infinity(),
                   .stage_stiffness_Nm_rad = spring.stage_stiffness_Nm_rad.value},
+      .table = table_of(spring.curve),
       .friction = friction_of(spring),
       .viscosity_Nms_rad = spring.viscosity_Nms_rad.value,
   };

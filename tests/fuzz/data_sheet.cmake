@@ -1,0 +1,1 @@
+torsio_fuzzer(data_sheet torsio_readers)

@@ -1,0 +1,152 @@
+#include "torsio/sim/closed_loop/impedance_tracking.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "support/error_message.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/report/impedance_tracking.hpp"
+
+namespace torsio {
+namespace {
+
+using Kind = ImpedanceSpec::Kind;
+
+const ImpedanceSpec kSoft = {
+    .kind = Kind::wanted, .stiffness_Nm_rad = 1000.0, .damping_Nms_rad = 30.0, .duration_s = 10.0};
+
+/// Without dry friction, gear errors, torque ripple and noise, its gear ten times as stiff.
+DataSheet ideal() {
+  DataSheet sheet = data_sheet("harmonic-drive");
+  for (SheetValue* value :
+       {&sheet.friction.coulomb_Nm, &sheet.friction.load_factor, &sheet.motor.torque_ripple,
+        &sheet.joint.bearing_friction_Nm, &sheet.sensors.encoder_jitter_lsb})
+    *value = assumed(0.0);
+  auto& gear = std::get<GearSheet>(sheet.second);
+  gear.hysteresis_rad = gear.error_2_rad = assumed(0.0);
+  gear.stiffness_Nm_rad = assumed(1e6);
+  for (SheetValue* bits : {&sheet.sensors.motor_encoder_bits, &sheet.sensors.middle_encoder_bits,
+                           &sheet.sensors.joint_encoder_bits})
+    *bits = assumed(30.0);
+  return sheet;
+}
+
+const ImpedancePoint& at(const ImpedanceRun& run, double frequency_Hz) {
+  for (const ImpedancePoint& point : run.points)
+    if (point.frequency_Hz == frequency_Hz) return point;
+  throw std::out_of_range("no such frequency");
+}
+
+TEST(ImpedanceTracking, RendersTheLinearModelWithoutDryFriction) {
+  const ImpedanceRun run = track_impedance(ideal(), kSoft, 1);
+  ASSERT_EQ(run.points.size(), 11U);
+  for (const ImpedancePoint& point : run.points) {
+    const std::complex<double> ratio = point.rendered_Nm_rad / point.linear_Nm_rad;
+    EXPECT_NEAR(std::abs(ratio), 1.0, 0.03) << point.frequency_Hz;
+    EXPECT_NEAR(deg_from_rad(std::arg(ratio)), 0.0, 2.0) << point.frequency_Hz;
+  }
+  // K and D of the task where inertia does not matter.
+  EXPECT_NEAR(at(run, 0.1).rendered_Nm_rad.real(), 1000.0, 30.0);
+  EXPECT_DOUBLE_EQ(at(run, 0.5).wanted_Nm_rad.imag(), 30.0 * M_PI);
+  EXPECT_EQ(run.limited_share, 0.0);
+}
+
+TEST(ImpedanceTracking, TheLinearModelIsTheImpedanceOfTheTask) {
+  const ImpedanceRun run = track_impedance(ideal(), kSoft, 1);
+  const double rad_s = 2.0 * M_PI * 0.1;
+  // In series with the tube, in parallel with the viscous friction of the output and of the rotor.
+  const double tube_Nm_rad = 40.95 * 51.0 * 51.0;
+  const std::complex<double> linear = at(run, 0.1).linear_Nm_rad;
+  EXPECT_NEAR(linear.real(), 1.0 / (1.0 / 1000.0 + 1.0 / tube_Nm_rad), 5.0);
+  EXPECT_GT(linear.imag() / rad_s, 30.0);
+  EXPECT_GT(run.passive_to_Hz, ImpedanceRun::kPassiveTo_Hz);
+  EXPECT_NEAR(run.largest_passive_Nm_rad, 20694.0, 0.06 * 20694.0) << "docs/control.md";
+}
+
+TEST(ImpedanceTracking, HighIsStiffAndZeroGivesWay) {
+  const DataSheet sheet = data_sheet("harmonic-drive");
+  const ImpedanceRun high = track_impedance(sheet, {.kind = Kind::high, .duration_s = 20.0}, 1);
+  const ImpedanceRun zero = track_impedance(sheet, {.kind = Kind::zero, .duration_s = 20.0}, 1);
+  // N_h k K_pp K_tp / (K_tp + k / N_g)
+  EXPECT_NEAR(high.stiffness_Nm_rad, 51.0 * 40.95 * 75.0 / (5.0 + 40.95 / 2.0), 1e-6);
+  EXPECT_EQ(high.passive_to_Hz, 0.0) << "stable only with dry friction";
+  EXPECT_EQ(zero.stiffness_Nm_rad, 0.0);
+  EXPECT_GT(zero.passive_to_Hz, ImpedanceRun::kPassiveTo_Hz);
+  EXPECT_GT(std::abs(at(high, 0.1).rendered_Nm_rad), 5000.0);
+  EXPECT_LT(std::abs(at(zero, 0.1).rendered_Nm_rad), 100.0);
+  EXPECT_GT(zero.hand.joint_range_deg, 20.0 * high.hand.joint_range_deg);
+  EXPECT_GT(high.hand.rms_Nm, 1.5 * zero.hand.rms_Nm);
+  EXPECT_NEAR(high.hand.rms_N, 2.0 * high.hand.rms_Nm, 1e-9) << "at 0.5 m";
+  EXPECT_LE(high.hand.rms_Nm, high.hand.max_Nm);
+  EXPECT_GT(zero.hand.mean_power_W, 0.0) << "the joint takes energy, it does not give it";
+}
+
+// A hand against a wall of 1000 Nm/rad is a spring against a spring.
+TEST(ImpedanceTracking, TheHandMeetsTheWantedImpedance) {
+  const ImpedanceRun run = track_impedance(ideal(), kSoft, 1);
+  const HandForces& hand = run.hand;
+  const double share =
+      HandForces::kArmStiffness_Nm_rad / (HandForces::kArmStiffness_Nm_rad + 1000.0);
+  EXPECT_NEAR(hand.joint_range_deg, share * hand.hand_range_deg, 0.2 * share * hand.hand_range_deg);
+  EXPECT_LT(hand.rms_to_wanted_Nm, 0.15 * hand.rms_Nm);
+  EXPECT_TRUE(run.record.has("truth_joint_angle_rad"));
+  EXPECT_NEAR(static_cast<double>(run.record.size()) / run.record.sample_rate_Hz(), 10.0, 0.02);
+}
+
+TEST(ImpedanceTracking, EqualSeedsGiveEqualRuns) {
+  const DataSheet sheet = data_sheet("harmonic-drive:soft#04");
+  const ImpedanceRun once = track_impedance(sheet, kSoft, 5);
+  EXPECT_EQ(impedance_json(once), impedance_json(track_impedance(sheet, kSoft, 5)));
+  EXPECT_NE(impedance_json(once), impedance_json(track_impedance(sheet, kSoft, 6)));
+  EXPECT_EQ(once.actuator, "harmonic-drive#04");
+  EXPECT_EQ(once.variant, "soft");
+  const auto json = nlohmann::json::parse(impedance_json(once));
+  EXPECT_EQ(json.at("schema_version"), 1);
+  EXPECT_EQ(json.at("frequencies").size(), once.points.size());
+}
+
+TEST(ImpedanceTracking, WorksWithEveryTube) {
+  for (const char* tube : {"harmonic-drive", "harmonic-drive:soft", "harmonic-drive:rigid"}) {
+    const ImpedanceRun run = track_impedance(data_sheet(tube), kSoft, 2);
+    EXPECT_NEAR(std::abs(at(run, 0.2).rendered_Nm_rad), 1000.0, 400.0) << tube;
+  }
+}
+
+TEST(ImpedanceTracking, RefusesWhatIsNotPassiveOrNotAHarmonicDrive) {
+  const auto refusal = [](const char* actuator, const ImpedanceSpec& spec) {
+    return test::error_message(
+        [&] { static_cast<void>(track_impedance(data_sheet(actuator), spec, 1)); });
+  };
+  const auto expect = [](const std::string& message, const std::string& words) {
+    EXPECT_NE(message.find(words), std::string::npos) << words << " in: " << message;
+  };
+  expect(refusal("dfki-50", kSoft),
+         "torsion tube before its harmonic drive, harmonic-drive, found dfki-50");
+  const auto wanted = [](double stiffness_Nm_rad, double damping_Nms_rad, double gain_Nm_rad) {
+    return ImpedanceSpec{.kind = Kind::wanted,
+                         .stiffness_Nm_rad = stiffness_Nm_rad,
+                         .damping_Nms_rad = damping_Nms_rad,
+                         .torque_gain_Nm_rad = gain_Nm_rad};
+  };
+  const std::string stiff = refusal("harmonic-drive", wanted(12000.0, 0.0, 0.5));
+  expect(stiff, "not passive up to 10 Hz: expected at most 9");
+  expect(stiff, "found 12000 Nm/rad");
+  expect(refusal("harmonic-drive", wanted(1000.0, 0.0, 5.0)), "no stiffness is passive");
+  EXPECT_EQ(test::error_message([&] {
+              static_cast<void>(
+                  impedance_settings(data_sheet("harmonic-drive"), wanted(12000.0, 20.0, 0.5)));
+            }),
+            "")
+      << "damping extends the range";
+  expect(refusal("harmonic-drive", wanted(-1.0, 0.0, 0.5)), "0 Nm/rad or more, found -1");
+  expect(refusal("harmonic-drive", wanted(1.0, std::nan(""), 0.5)), "0 Nms/rad or more, found nan");
+  expect(refusal("harmonic-drive", wanted(1.0, 0.0, 0.0)), "above 0 Nm/rad, found 0");
+  expect(refusal("harmonic-drive", {.amplitude_Nm = 51.0}), "at most 50 Nm, found 51");
+  expect(refusal("harmonic-drive", {.duration_s = 1.0}), "10 to 3600 s, found 1");
+}
+
+}  // namespace
+}  // namespace torsio
