@@ -33,8 +33,8 @@ struct ImpedanceSpec {
 struct ImpedancePoint {
   double frequency_Hz = 0.0;
   std::complex<double> wanted_Nm_rad;  ///< K + jωD
-  /// Of the linear model without dry friction, with the inertia and viscous friction of the output:
-  /// jω Z + jω (jω M + d), see `impedance`.
+  /// Of the linear model without dry friction: jω Z + jω (jω M + d), see `impedance`. M is the
+  /// inertia of the output and, through the rigid gear, of the wave generator.
   std::complex<double> linear_Nm_rad;
   std::complex<double> rendered_Nm_rad;  ///< first harmonics of the simulated torque and angle
 };
