@@ -82,7 +82,11 @@ TEST(ImpedanceTracking, HighIsStiffAndZeroGivesWay) {
   EXPECT_GT(std::abs(at(high, 0.1).rendered_Nm_rad), 5000.0);
   EXPECT_LT(std::abs(at(zero, 0.1).rendered_Nm_rad), 100.0);
   EXPECT_GT(zero.hand.joint_range_deg, 20.0 * high.hand.joint_range_deg);
-  EXPECT_GT(high.hand.rms_Nm, 1.5 * zero.hand.rms_Nm);
+  // Against a wall the arm is deflected by the whole motion of the hand. Zero impedance does not
+  // make the torque small: inertia and friction of the drive remain.
+  const double wall_Nm =
+      HandForces::kArmStiffness_Nm_rad * rad_from_deg(0.5 * high.hand.hand_range_deg);
+  EXPECT_NEAR(high.hand.max_Nm, wall_Nm, 0.25 * wall_Nm);
   EXPECT_NEAR(high.hand.rms_N, 2.0 * high.hand.rms_Nm, 1e-9) << "at 0.5 m";
   EXPECT_LE(high.hand.rms_Nm, high.hand.max_Nm);
   EXPECT_GT(zero.hand.mean_power_W, 0.0) << "the joint takes energy, it does not give it";
