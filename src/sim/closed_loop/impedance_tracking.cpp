@@ -42,7 +42,7 @@ constexpr std::array kFrequencies_Hz = {0.1, 0.2, 0.4, 0.5, 0.8, 1.0, 2.0, 4.0, 
 struct Linear {
   SeriesElasticJoint joint;
   JointFeedback feedback;
-  double output_inertia_kg_m2;  ///< with the wave generator, behind the rigid gear
+  double output_inertia_kg_m2;  ///< with the wave generator, through the rigid gear
 
   Linear(const DataSheet& sheet, const TubeImpedance::Settings& settings)
       : joint(TubeImpedance::joint_of(settings)),
