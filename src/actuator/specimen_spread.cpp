@@ -42,7 +42,10 @@ void spread(SpringSheet& spring, const SpecimenDraws& specimen) noexcept {
   scale(spring.stiffness_Nm_rad, specimen.stiffness);
   scale(spring.stage_stiffness_Nm_rad, specimen.stiffness);
   scale(spring.friction_Nm, specimen.inner_friction);
-  for (CurvePoint& point : spring.curve) scale(point.torque_Nm, specimen.stiffness);
+  for (CurvePoint& point : spring.curve) {
+    scale(point.torque_Nm, specimen.stiffness);
+    scale(point.deflection_rad, 1.0);  // the table has one origin
+  }
   if (!spring.curve.empty()) return;  // play and asymmetry are a part of the curve
   scale(spring.half_gap_rad, specimen.backlash);
   shift(spring.asymmetry, specimen.asymmetry);

@@ -24,7 +24,10 @@ class Ageing {
   void operator()(SpringSheet& spring) const {
     soften(spring.stiffness_Nm_rad);
     soften(spring.stage_stiffness_Nm_rad);
-    for (CurvePoint& point : spring.curve) soften(point.torque_Nm);
+    for (CurvePoint& point : spring.curve) {
+      soften(point.torque_Nm);
+      scale(point.deflection_rad, 1.0);  // the table has one origin
+    }
     rub(spring.friction_Nm);
     rub(spring.load_friction);
     rub(spring.break_away_rad);

@@ -32,10 +32,10 @@ namespace {
 
 using namespace sheet_rules;
 
-constexpr double kLargest = 1e12;         // of any value, so that no product of them overflows
+constexpr double kLargest = 1e12;         // the largest value, so that no product of them overflows
 constexpr double kShortestStep_s = 1e-6;  // a thousand steps of the plant in one of the bench
-constexpr double kTrial_s = 0.02;         // of motion, before a sheet is accepted
-constexpr double kLowestRate_Hz = 0.01;   // of a sensor or a log
+constexpr double kTrial_s = 0.02;         // the motion that is tried before a sheet is accepted
+constexpr double kLowestRate_Hz = 0.01;   // the lowest rate of a sensor or a log
 constexpr std::size_t kLongestName = 64;
 constexpr unsigned kHighestSerial = 9999;
 
@@ -223,13 +223,13 @@ void read_curve(const YamlValue& yaml, const YamlValue& values, DataSheet& sheet
   auto& spring = std::get<SpringSheet>(sheet.second);
   for (SheetValue* replaced :
        {&spring.stage_rad, &spring.stage_stiffness_Nm_rad, &spring.half_gap_rad, &spring.asymmetry})
-    *replaced = derived(0.0);
+    *replaced = assumed(0.0);
   spring.curve = points_from(yaml, sheet);
   std::optional<TorqueTable> table;
   at_place(yaml.at("points").place(), [&] {
     table.emplace(std::get<Spring::Parameters>(plant_parameters(sheet).second).table);
   });
-  check_stiffness(values.at("spring_stiffness"), spring.stiffness_Nm_rad.value, *table);
+  check_stiffness(values.at("spring_stiffness").at("value"), spring.stiffness_Nm_rad.value, *table);
 }
 
 /// The built-in sheet of a family, for its stages and variants.

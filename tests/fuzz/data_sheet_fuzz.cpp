@@ -9,9 +9,8 @@
 #include "torsio/sim/sheet_file.hpp"
 
 /// Any text is a sheet from which a plant can be built and which its own YAML gives back, or an
-/// Error. Built-in sheets are also the beginning of the text, so that single lines are replaced: the
-/// first byte chooses one, and a key that is given twice is an Error, so the rest goes into a place
-/// of that sheet that the second byte chooses.
+/// Error. The first byte chooses a built-in sheet, in which the text replaces the line at the place
+/// that the second byte chooses; or none, and the text is the whole sheet.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size < 2) return 0;
   std::string text(reinterpret_cast<const char*>(data + 2), size - 2);

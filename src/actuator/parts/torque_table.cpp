@@ -61,7 +61,7 @@ TorqueTable::TorqueTable(const std::vector<Point>& points) {
       throw Error({.place = kPlace,
                    .expected = "a finite slope above 0",
                    .found = fmt::format("{} Nm/rad after point {}", slope_Nm_rad, at + 1)});
-    pieces_.push_back({points[at].deflection_rad, points[at].torque_Nm, slope_Nm_rad, energy_J});
+    segments_.push_back({points[at].deflection_rad, points[at].torque_Nm, slope_Nm_rad, energy_J});
     energy_J += 0.5 * width_rad * (points[at].torque_Nm + points[at + 1].torque_Nm);
     steepest_Nm_rad_ = std::max(steepest_Nm_rad_, slope_Nm_rad);
     flattest_Nm_rad_ = std::min(flattest_Nm_rad_, slope_Nm_rad);
@@ -71,29 +71,30 @@ TorqueTable::TorqueTable(const std::vector<Point>& points) {
 
 namespace {
 
-/// The piece of a value of one coordinate, which increases; the outermost ones beyond the points.
-template <class Pieces, class Coordinate>
-const auto& piece_at(const Pieces& pieces, double value, Coordinate coordinate) noexcept {
-  const auto after = std::ranges::upper_bound(pieces, value, {}, coordinate);
-  return after == pieces.begin() ? pieces.front() : *(after - 1);
+/// The segment of a value of one coordinate, which increases; the outermost ones beyond the points.
+template <class Segments, class Coordinate>
+const auto& segment_at(const Segments& segments, double value, Coordinate coordinate) noexcept {
+  const auto after = std::ranges::upper_bound(segments, value, {}, coordinate);
+  return after == segments.begin() ? segments.front() : *(after - 1);
 }
 
 }  // namespace
 
 double TorqueTable::torque(double deflection_rad) const noexcept {
-  const Piece& piece = piece_at(pieces_, deflection_rad, &Piece::deflection_rad);
-  return piece.torque_Nm + piece.slope_Nm_rad * (deflection_rad - piece.deflection_rad);
+  const Segment& segment = segment_at(segments_, deflection_rad, &Segment::deflection_rad);
+  return segment.torque_Nm + segment.slope_Nm_rad * (deflection_rad - segment.deflection_rad);
 }
 
 double TorqueTable::deflection(double torque_Nm) const noexcept {
-  const Piece& piece = piece_at(pieces_, torque_Nm, &Piece::torque_Nm);
-  return piece.deflection_rad + (torque_Nm - piece.torque_Nm) / piece.slope_Nm_rad;
+  const Segment& segment = segment_at(segments_, torque_Nm, &Segment::torque_Nm);
+  return segment.deflection_rad + (torque_Nm - segment.torque_Nm) / segment.slope_Nm_rad;
 }
 
 double TorqueTable::energy_from_first(double deflection_rad) const noexcept {
-  const Piece& piece = piece_at(pieces_, deflection_rad, &Piece::deflection_rad);
-  const double twist_rad = deflection_rad - piece.deflection_rad;
-  return piece.energy_J + twist_rad * (piece.torque_Nm + 0.5 * piece.slope_Nm_rad * twist_rad);
+  const Segment& segment = segment_at(segments_, deflection_rad, &Segment::deflection_rad);
+  const double twist_rad = deflection_rad - segment.deflection_rad;
+  return segment.energy_J +
+         twist_rad * (segment.torque_Nm + 0.5 * segment.slope_Nm_rad * twist_rad);
 }
 
 double TorqueTable::energy(double deflection_rad) const noexcept {

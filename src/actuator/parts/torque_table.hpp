@@ -9,7 +9,7 @@
 namespace torsio {
 
 /// A measured or designed torque curve of a spring: straight lines between points, continued beyond
-/// the outermost ones with the slope of the outermost piece.
+/// the outermost ones with the slope of the outermost segment.
 ///
 ///     τ = τ_i + k_i (δ − δ_i),   k_i = (τ_{i+1} − τ_i) / (δ_{i+1} − δ_i)
 ///
@@ -39,15 +39,15 @@ class TorqueTable {
   [[nodiscard]] double flattest() const noexcept { return flattest_Nm_rad_; }
 
  private:
-  struct Piece {
+  struct Segment {
     double deflection_rad = 0.0;
     double torque_Nm = 0.0;
     double slope_Nm_rad = 0.0;
-    double energy_J = 0.0;  ///< from the first point to the beginning of this piece
+    double energy_J = 0.0;  ///< from the first point to the beginning of this segment
   };
   [[nodiscard]] double energy_from_first(double deflection_rad) const noexcept;
 
-  std::vector<Piece> pieces_;
+  std::vector<Segment> segments_;
   double energy_at_zero_J_ = 0.0;
   double steepest_Nm_rad_ = 0.0;
   double flattest_Nm_rad_ = std::numeric_limits<double>::infinity();

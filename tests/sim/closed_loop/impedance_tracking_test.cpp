@@ -34,6 +34,11 @@ DataSheet ideal() {
   return sheet;
 }
 
+const ImpedanceRun& ideal_run() {
+  static const ImpedanceRun run = track_impedance(ideal(), kSoft, 1);
+  return run;
+}
+
 const ImpedancePoint& at(const ImpedanceRun& run, double frequency_Hz) {
   for (const ImpedancePoint& point : run.points)
     if (point.frequency_Hz == frequency_Hz) return point;
@@ -41,7 +46,7 @@ const ImpedancePoint& at(const ImpedanceRun& run, double frequency_Hz) {
 }
 
 TEST(ImpedanceTracking, RendersTheLinearModelWithoutDryFriction) {
-  const ImpedanceRun run = track_impedance(ideal(), kSoft, 1);
+  const ImpedanceRun& run = ideal_run();
   ASSERT_EQ(run.points.size(), 11U);
   for (const ImpedancePoint& point : run.points) {
     const std::complex<double> ratio = point.rendered_Nm_rad / point.linear_Nm_rad;
@@ -55,12 +60,11 @@ TEST(ImpedanceTracking, RendersTheLinearModelWithoutDryFriction) {
 }
 
 TEST(ImpedanceTracking, TheLinearModelIsTheImpedanceOfTheTask) {
-  const ImpedanceRun run = track_impedance(ideal(), kSoft, 1);
+  const ImpedanceRun& run = ideal_run();
   const double rad_s = 2.0 * M_PI * 0.1;
-  // In series with the tube, in parallel with the viscous friction of the output and of the rotor.
-  const double tube_Nm_rad = 40.95 * 51.0 * 51.0;
+  // In parallel with the viscous friction of the output and of the rotor.
   const std::complex<double> linear = at(run, 0.1).linear_Nm_rad;
-  EXPECT_NEAR(linear.real(), 1.0 / (1.0 / 1000.0 + 1.0 / tube_Nm_rad), 5.0);
+  EXPECT_NEAR(linear.real(), 1000.0, 5.0);
   EXPECT_GT(linear.imag() / rad_s, 30.0);
   EXPECT_GT(run.passive_to_Hz, ImpedanceRun::kPassiveTo_Hz);
   EXPECT_NEAR(run.largest_passive_Nm_rad, 20694.0, 0.06 * 20694.0) << "docs/control.md";
@@ -78,7 +82,11 @@ TEST(ImpedanceTracking, HighIsStiffAndZeroGivesWay) {
   EXPECT_GT(std::abs(at(high, 0.1).rendered_Nm_rad), 5000.0);
   EXPECT_LT(std::abs(at(zero, 0.1).rendered_Nm_rad), 100.0);
   EXPECT_GT(zero.hand.joint_range_deg, 20.0 * high.hand.joint_range_deg);
-  EXPECT_GT(high.hand.rms_Nm, 1.5 * zero.hand.rms_Nm);
+  // Against a wall the arm is deflected by the whole motion of the hand. Zero impedance does not
+  // make the torque small: inertia and friction of the drive remain.
+  const double wall_Nm =
+      HandForces::kArmStiffness_Nm_rad * rad_from_deg(0.5 * high.hand.hand_range_deg);
+  EXPECT_NEAR(high.hand.max_Nm, wall_Nm, 0.25 * wall_Nm);
   EXPECT_NEAR(high.hand.rms_N, 2.0 * high.hand.rms_Nm, 1e-9) << "at 0.5 m";
   EXPECT_LE(high.hand.rms_Nm, high.hand.max_Nm);
   EXPECT_GT(zero.hand.mean_power_W, 0.0) << "the joint takes energy, it does not give it";
@@ -86,7 +94,7 @@ TEST(ImpedanceTracking, HighIsStiffAndZeroGivesWay) {
 
 // A hand against a wall of 1000 Nm/rad is a spring against a spring.
 TEST(ImpedanceTracking, TheHandMeetsTheWantedImpedance) {
-  const ImpedanceRun run = track_impedance(ideal(), kSoft, 1);
+  const ImpedanceRun& run = ideal_run();
   const HandForces& hand = run.hand;
   const double share =
       HandForces::kArmStiffness_Nm_rad / (HandForces::kArmStiffness_Nm_rad + 1000.0);

@@ -17,7 +17,7 @@ namespace torsio {
 struct ImpedanceSpec {
   enum class Kind {
     high,    ///< the gains of paper 004, stable only with the dry friction of the gear
-    zero,    ///< those of its zero impedance
+    zero,    ///< the gains of its zero impedance
     wanted,  ///< the stiffness and damping below
   };
   Kind kind = Kind::high;
@@ -25,7 +25,7 @@ struct ImpedanceSpec {
   double damping_Nms_rad = 0.0;
   double torque_gain_Nm_rad = TubeImpedance::kZero.torque_Nm_rad;  ///< K_tp of `wanted`
   double amplitude_Nm = 20.0;  ///< amplitude of the sines at the output, up to 50
-  double duration_s = 60.0;    ///< of the motion of the hand, 10 to 3600
+  double duration_s = 60.0;    ///< duration of the motion of the hand, 10 to 3600
 };
 
 /// The impedance of the joint at one frequency as torque over angle, τ / q [Nm/rad]; divided by jω
@@ -33,8 +33,8 @@ struct ImpedanceSpec {
 struct ImpedancePoint {
   double frequency_Hz = 0.0;
   std::complex<double> wanted_Nm_rad;  ///< K + jωD
-  /// Of the linear model without dry friction, with the inertia and viscous friction of the output:
-  /// jω Z + jω (jω M + d), see `impedance`.
+  /// The linear model without dry friction: jω Z + jω (jω M + d), see `impedance`. M is the
+  /// inertia of the output and, through the rigid gear, of the wave generator.
   std::complex<double> linear_Nm_rad;
   std::complex<double> rendered_Nm_rad;  ///< first harmonics of the simulated torque and angle
 };
@@ -46,13 +46,13 @@ struct HandForces {
   double rms_N = 0.0;  ///< force at `kLever_m`
   double max_N = 0.0;
   double hand_range_deg = 0.0;   ///< range of the hand's motion
-  double joint_range_deg = 0.0;  ///< of the joint's
+  double joint_range_deg = 0.0;  ///< range of the motion of the joint
   double mean_power_W = 0.0;     ///< from the hand into the joint
   /// RMS of the torque less that of the wanted impedance at the same motion, K q + D q̇.
   double rms_to_wanted_Nm = 0.0;
 
   static constexpr double kLever_m = 0.5;
-  static constexpr double kAmplitude_rad = 0.2;  ///< of the hand's motion, which varies
+  static constexpr double kAmplitude_rad = 0.2;  ///< amplitude of the hand's motion, which varies
   static constexpr double kFrequency_Hz = 0.4;   ///< specification 4.5
   /// 300 N/m and 12 Ns/m at the lever: an arm that is neither relaxed nor stiff (assumed).
   static constexpr double kArmStiffness_Nm_rad = 75.0;
@@ -65,7 +65,7 @@ struct ImpedanceRun {
   ImpedanceSpec spec;
   std::uint64_t seed = 1;
   TubeImpedance::Gains gains;
-  double stiffness_Nm_rad = 0.0;  ///< of these gains at rest
+  double stiffness_Nm_rad = 0.0;  ///< stiffness of these gains at rest
   double damping_Nms_rad = 0.0;
   /// Frequency up to which the joint without dry friction is passive; 0 if it is unstable.
   double passive_to_Hz = 0.0;
@@ -74,7 +74,7 @@ struct ImpedanceRun {
   std::vector<ImpedancePoint> points = {};
   double limited_share = 0.0;  ///< share of all cycles in which the current was limited
   HandForces hand = {};
-  Recording record;  ///< of the motion of the hand, with the truth channels
+  Recording record;  ///< the motion of the hand, with the truth channels
 
   /// The range in which a wanted impedance must be passive: that of `points`, and of a person.
   static constexpr double kPassiveTo_Hz = 10.0;
