@@ -22,9 +22,11 @@ std::size_t bytes_of_values(const DataSheet& sheet) {
   std::size_t bytes = sizeof(sheet.rating) + sizeof(sheet.motor) + sizeof(sheet.friction) +
                       sizeof(sheet.middle_inertia_kg_m2) + sizeof(sheet.joint) +
                       sizeof(sheet.sensors);
-  const auto add = [&]<class Part>(const Part& /*part*/) {
+  const auto add = [&]<class Part>(const Part& part) {
+    std::size_t size = sizeof(Part);
+    if constexpr (requires { part.curve; }) size -= sizeof(part.curve);
     // The variant is stored before the values.
-    bytes += sizeof(Part) / sizeof(SheetValue) * sizeof(SheetValue);
+    bytes += size / sizeof(SheetValue) * sizeof(SheetValue);
   };
   std::visit(add, sheet.first);
   std::visit(add, sheet.second);
