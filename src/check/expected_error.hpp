@@ -1,0 +1,49 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "check/region_errors.hpp"
+
+namespace torsio {
+
+/// The squared error that is expected in every region, with or without strokes.
+///
+///     E(c) = E(k) a^2 exp(sum_d g_d n_d)
+///
+/// k is the nearest region with strokes, n_d the steps from k to c in direction d, g_d the growth
+/// per step, and a the ratio of the amplitudes where c has the larger one: a model of equal quality
+/// has an error in proportion to the amplitude.
+class ExpectedError {
+ public:
+  /// The regions whose errors are known, with their mean squares.
+  using Covered = std::map<RegionKey, double>;
+
+  explicit ExpectedError(const RegionErrors& errors);
+
+  [[nodiscard]] const Covered& covered() const noexcept { return covered_; }
+
+  struct Value {
+    double mean_square = 0.0;  ///< without a recording in this region
+    double afterwards = 0.0;   ///< with one
+    bool is_known = true;      ///< false: the distance includes a step whose growth is assumed
+    RegionKey nearest = {};
+  };
+  [[nodiscard]] Value at(const RegionKey& key, const Covered& covered) const;
+
+  /// What is known of the growth in each direction from one region to another, as clauses.
+  [[nodiscard]] std::vector<std::string> growth_texts(const RegionKey& from,
+                                                      const RegionKey& to) const;
+
+ private:
+  using Direction = RegionErrors::Direction;
+
+  [[nodiscard]] double per_step(Direction direction) const;
+
+  std::map<Direction, Growth> growths_;
+  Covered covered_;
+  Covered linear_;  ///< errors of the linear model
+};
+
+}  // namespace torsio
