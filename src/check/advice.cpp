@@ -26,6 +26,7 @@ namespace torsio {
 namespace {
 
 constexpr double kDeadBandShare = 0.03;  // of the range of the first input
+constexpr double kDeadBandCodes = 2.5;
 constexpr std::size_t kLeastStrokes = 10;
 constexpr std::size_t kMaxBlocks = 1000;
 constexpr std::size_t kMaxHalved = 12;  // regions with a learning curve of their own
@@ -150,7 +151,9 @@ class Adviser {
     }
     recorded_ = {.quantity = "input", .lowest = range.lowest, .highest = range.highest};
     for (const std::vector<double>& input : inputs)
-      strokes_.push_back(strokes_of(input, kDeadBandShare * range.width(), data_.sample_rate_Hz));
+      strokes_.push_back(strokes_of(
+          input, std::max(kDeadBandShare * range.width(), kDeadBandCodes * finest_step(input)),
+          data_.sample_rate_Hz));
   }
 
   void choose_range() {
@@ -249,7 +252,9 @@ class Adviser {
     if (const WantedRange* speed = wanted("speed"))
       speed_limit_ = speed->highest;
     else if (wanted("frequency") == nullptr)
-      speed_limit_ = kFasterThanRecorded * fastest_;
+      speed_limit_ = kFasterThanRecorded * fastest_ *
+                     std::max(1.0, (advice_.highest - advice_.lowest) /
+                                       (recorded_.highest - recorded_.lowest));
     for (int amplitude = first; amplitude <= last; ++amplitude)
       for (int frequency = slowest; frequency <= fastest; ++frequency)
         for (int centre = amplitude > 0 ? -1 : 0; centre <= (amplitude > 0 ? 1 : 0); ++centre) {

@@ -17,9 +17,12 @@ constexpr std::array kDirections{Direction::larger, Direction::smaller, Directio
                                  Direction::slower, Direction::off_centre};
 constexpr std::size_t kFewStrokes = 4;
 constexpr double kMaxGrowth = 12.0;
+// What one step shows is not extrapolated without bound: a further one at most doubles the error.
+constexpr double kFurtherStep = 1.386;
 // Assumed where nothing determines the growth, ln of the ratio of squared errors per step. Beyond
-// the largest amplitude the error grows with the amplitude: 2 ln 2.
-constexpr double kUnknownLarger = 1.386;
+// the range of the recordings a guard replaces the model, so that the error doubles: 2 ln 2.
+constexpr double kUnknownBeyond = 1.386;
+constexpr int kFewSteps = 2;  // farther away an error is assumed, too
 constexpr double kUnknownStep = 0.7;
 constexpr double kUnknownCentre = 0.35;
 constexpr double kWithinARegion = 0.5;  // steps from a recorded motion to another one in its region
@@ -49,7 +52,8 @@ const char* name(Direction direction) {
 
 }  // namespace
 
-ExpectedError::ExpectedError(const RegionErrors& errors) {
+ExpectedError::ExpectedError(const RegionErrors& errors)
+    : full_square_(std::pow(errors.linear_slope(), 2)) {
   for (const Direction direction : kDirections) growths_[direction] = errors.growth(direction);
   // The strokes of a recording resemble each other more than those of its use.
   double growth = 0.0;
@@ -67,7 +71,7 @@ ExpectedError::ExpectedError(const RegionErrors& errors) {
 double ExpectedError::per_step(Direction direction) const {
   const Growth& growth = growths_.at(direction);
   if (growth.is_known) return growth.per_step;
-  if (direction == Direction::larger) return kUnknownLarger;
+  if (direction == Direction::larger || direction == Direction::faster) return kUnknownBeyond;
   return direction == Direction::off_centre ? kUnknownCentre : kUnknownStep;
 }
 
@@ -86,19 +90,25 @@ ExpectedError::Value ExpectedError::at(const RegionKey& key, const Covered& cove
     bool leaves_range = false;
     for (const auto& [direction, count] : steps(known, key)) {
       if (count == 0) continue;
-      growth += per_step(direction) * count;
-      distance += (per_step(direction) + kNearest) * count;
-      value.is_known = value.is_known && growths_.at(direction).is_known;
+      const double step = per_step(direction);
+      growth += step + std::min(step, kFurtherStep) * (count - 1);
+      distance += (step + kNearest) * count;
+      value.is_known = value.is_known && growths_.at(direction).is_known && count <= kFewSteps;
       leaves_range =
           leaves_range || direction == Direction::larger || direction == Direction::faster;
-      if (direction == Direction::larger) value.afterwards *= std::exp2(2.0 * count);
     }
+    value.afterwards *= std::exp2(2.0 * (known.amplitude - key.amplitude));
     if (distance >= least) continue;
     least = distance;
     value.mean_square = value.afterwards * std::exp(std::min(growth, kMaxGrowth));
     // Beyond the range a guard replaces the model by the linear one.
     if (const auto linear = linear_.find(known); leaves_range && linear != linear_.end())
       value.mean_square = std::max(value.mean_square, linear->second * value.afterwards / error);
+    // No error is larger than the torque of the stroke itself, whose mean square is a third of its
+    // peak's.
+    value.mean_square = std::clamp(
+        value.mean_square, value.afterwards,
+        std::max(value.afterwards, full_square_ * std::exp2(-2.0 * key.amplitude) / 3.0));
     best = value;
   }
   return best;
@@ -113,9 +123,10 @@ std::vector<std::string> ExpectedError::growth_texts(const RegionKey& from,
     if (growth.is_known)
       texts.push_back(fmt::format(
           "{} strokes, left out of the training, had {:.2g} times the "
-          "RMSE{} ({} strokes)",
+          "RMSE{} ({} strokes){}",
           name(direction), std::sqrt(growth.largest.ratio),
-          growth.largest.is_clear ? "" : ", which is no clear difference", growth.largest.strokes));
+          growth.largest.is_clear ? "" : ", which is no clear difference", growth.largest.strokes,
+          count > kFewSteps ? ", but this region is farther away" : ""));
     else
       texts.push_back(
           fmt::format("how the error grows towards {} strokes cannot be determined; "

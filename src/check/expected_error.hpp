@@ -13,8 +13,9 @@ namespace torsio {
 ///     E(c) = E(k) a^2 exp(sum_d g_d n_d)
 ///
 /// k is the nearest region with strokes, n_d the steps from k to c in direction d, g_d the growth
-/// per step, and a the ratio of the amplitudes where c has the larger one: a model of equal quality
-/// has an error in proportion to the amplitude.
+/// per step (at most 2 ln 2 from the second on), and a the ratio of the amplitudes of c and k: a
+/// model of equal quality has an error in proportion to the amplitude. E is at most the mean square
+/// of the target itself.
 class ExpectedError {
  public:
   /// The regions whose errors are known, with their mean squares.
@@ -43,7 +44,8 @@ class ExpectedError {
 
   std::map<Direction, Growth> growths_;
   Covered covered_;
-  Covered linear_;  ///< errors of the linear model
+  Covered linear_;            ///< errors of the linear model
+  double full_square_ = 0.0;  ///< square of the target at the half range, by the linear model
 };
 
 }  // namespace torsio

@@ -128,7 +128,7 @@ std::string advice_text(const Advice& advice) {
         "expected RMSE with these recordings over the part of it that they "
         "determine: {:.3g} {}\n",
         advice.wanted_rmse, y_unit);
-  if (advice.proposals.empty())
+  if (advice.proposals.empty() && !advice.regions.empty())
     text += "no recording of a missing motion is expected to lower the error by 1 % or more\n";
   for (std::size_t i = 0; i < advice.proposals.size(); ++i) {
     const Proposal& proposal = advice.proposals[i];
