@@ -25,14 +25,14 @@
 namespace torsio {
 namespace {
 
-constexpr double kDeadBandShare = 0.03;  // of the range of the first input
+constexpr double kDeadBandShare = 0.03;  // share of the first input's range
 constexpr double kDeadBandCodes = 2.5;
 constexpr std::size_t kLeastStrokes = 10;
 constexpr std::size_t kMaxBlocks = 1000;
 constexpr std::size_t kMaxHalved = 12;  // regions with a learning curve of their own
 constexpr int kSmallerByDefault = 2;    // levels of amplitude below the largest
 constexpr double kFasterThanRecorded = 1.3;
-constexpr double kSideWeight = 0.5;        // of a region off the centre
+constexpr double kSideWeight = 0.5;        // the weight of a region off the centre
 constexpr double kWorthMentioning = 0.01;  // share of the RMSE
 constexpr double kClearGain = 0.05;
 constexpr std::size_t kMaxMotions = 4;
@@ -53,7 +53,7 @@ double rounded(double value) {
 
 std::string percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
 
-/// The standard deviation of the target's noise from second differences of neighbouring new samples;
+/// The standard deviation of the target's noise, from second differences of successive new samples;
 /// the median leaves out fast motion.
 double noise_of(const TrainingData& data) {
   std::vector<double> bends;
@@ -137,7 +137,7 @@ class Adviser {
     return count;
   }
 
-  // Reversals by noise or by single codes of an encoder are no strokes.
+  // Reversals by noise or by single codes of an encoder are not strokes.
   void find_strokes() {
     Extent range;
     std::vector<std::vector<double>> inputs;

@@ -21,7 +21,7 @@ constexpr double kSlack = 1e-9;
 struct Hole {
   double lowest = 0.0;
   double highest = 0.0;
-  bool is_beyond = false;  ///< of the recorded values, not between two of them
+  bool is_beyond = false;  ///< beyond the recorded values, not between two
 
   [[nodiscard]] double width() const { return highest - lowest; }
 };

@@ -125,7 +125,7 @@ std::vector<std::string> ExpectedError::growth_texts(const RegionKey& from,
           "{} strokes, left out of the training, had {:.2g} times the "
           "RMSE{} ({} strokes){}",
           name(direction), std::sqrt(growth.largest.ratio),
-          growth.largest.is_clear ? "" : ", which is no clear difference", growth.largest.strokes,
+          growth.largest.is_clear ? "" : ", not a clear difference", growth.largest.strokes,
           count > kFewSteps ? ", but this region is farther away" : ""));
     else
       texts.push_back(

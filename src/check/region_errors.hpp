@@ -60,7 +60,7 @@ struct ErrorRatio {
 struct Growth {
   bool is_known = false;
   double per_step = 0.0;    ///< ln of the ratio of squared errors, at least 0
-  ErrorRatio largest = {};  ///< of the experiment with the most strokes
+  ErrorRatio largest = {};  ///< the experiment with the most strokes
   RegionKey at = {};        ///< one of its regions
 };
 
@@ -119,7 +119,7 @@ class RegionErrors {
   const QuickModel& model_;
   std::vector<Block> blocks_;
   Progress progress_;
-  std::vector<std::size_t> rank_;  ///< of a block among those of its region
+  std::vector<std::size_t> rank_;  ///< number of a block among those of its region
   std::vector<double> with_;       ///< held-out squared error of each block
   std::map<RegionKey, Errors> held_out_;
   std::map<RegionKey, Errors> held_out_linear_;

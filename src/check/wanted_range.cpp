@@ -43,7 +43,7 @@ WantedRange parse_wanted(const std::string& text, const Dataset& dataset, const 
   const std::string range = text.substr(equals + 1);
   const std::string input_unit = unit_of(spec.inputs.front());
   std::string unit;
-  std::string written;  // of a bare number
+  std::string written;  // the unit of a bare number
   if (name == "input") {
     unit = input_unit;
   } else if (name == "frequency") {

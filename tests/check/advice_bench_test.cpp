@@ -1,5 +1,5 @@
-// On simulated benches the first proposal of the advice lowers the error on an independent test more
-// than the same recordings made once more. docs/what_to_record.md has the cases in which it does not.
+// On simulated benches the first proposal of the advice lowers the error on an independent test
+// more than the same recordings made once more; docs/what_to_record.md has cases where it does not.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,7 +24,7 @@ struct BenchCase {
   const char* name;
   const char* actuator;
   std::vector<test::TorqueTriangle> recorded;
-  double largest_Nm;  ///< of the intended use
+  double largest_Nm;  ///< torque of the intended use
   double lowest_Hz;
   double highest_Hz;
 };

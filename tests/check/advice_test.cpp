@@ -23,7 +23,7 @@ struct Motions {
   double frequency_Hz = 0.5;
   double duration_s = 60.0;
   double stiffening = 0.0;
-  double factor = 1.0;  ///< of the stiffness
+  double factor = 1.0;  ///< factor of the stiffness
   std::uint64_t seed = 1;
 };
 

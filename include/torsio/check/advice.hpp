@@ -40,8 +40,8 @@ struct Region {
   TriangleMotion motion;  ///< its middle
   std::size_t strokes = 0;
   double duration_s = 0.0;
-  double sample_share = 0.0;            ///< of the usable samples that belong to a region
-  double error_share = 0.0;             ///< of the squared held-out error of these
+  double sample_share = 0.0;            ///< share of the usable samples in regions
+  double error_share = 0.0;             ///< share of the squared held-out error
   double held_out_rmse = kNotMeasured;  ///< NaN for fewer than two strokes
   bool is_wanted = true;
 };
@@ -93,9 +93,9 @@ struct Advice {
 
 /// Divides the training recordings into strokes of the first input (from one reversal to the next)
 /// and these into regions of amplitude, frequency and centre. A quick model, linear in its
-/// parameters, is fitted hundreds of times: without a fifth of each region (held-out error), without
-/// the regions beyond some amplitude, frequency, centre or condition (how fast the error rises with
-/// the distance from what was trained), and with half of a region or of everything (learning curve).
+/// parameters, is fitted hundreds of times: without a fifth of each region (held-out error),
+/// without those beyond some amplitude, frequency, centre or condition (how fast the error rises with
+/// the distance from what was trained), with half of a region and with half of all (learning).
 /// From these follow the expected squared error in each region of the intended use and what a
 /// recording there would change; docs/what_to_record.md has the equations.
 ///

@@ -11,7 +11,7 @@ namespace torsio {
 /// The most severe verdict; PASS if there are no findings.
 [[nodiscard]] Verdict worst(const std::vector<Finding>& findings);
 
-/// `{"verdict","findings":[{"verdict","check","recording","message","advice"}]}`, with `advice` also
+/// `{"verdict","findings":[{"verdict","check","recording","message","advice"}]}`, with advice also
 /// `"advice":{"input","target","intended_use":{...},"proposals":[...],"regions":[...],
 /// "learning_curve":[...],...,"limits":[...],"undetermined":[...]}`; ends with a line feed.
 [[nodiscard]] std::string check_json(const std::vector<Finding>& findings,
