@@ -19,8 +19,8 @@ struct ConditionAdvice {
 };
 
 /// Which value of a condition is missing. Each value in turn is left out of the training; how fast
-/// the squared error on it grows, by the width of the hole that it leaves, gives the error expected in
-/// the gaps between the values and beyond them.
+/// the squared error on it grows, by the width of the hole that it leaves, gives the error expected
+/// in the gaps between the values and beyond them.
 /// @param wanted its range; null: that of the recordings
 [[nodiscard]] ConditionAdvice advise_on_condition(const ConditionValues& condition,
                                                   const WantedRange* wanted,

@@ -14,8 +14,8 @@ namespace torsio {
 ///
 /// k is the nearest region with strokes, n_d the steps from k to c in direction d, g_d the growth
 /// per step (at most 2 ln 2 from the second on), and a the ratio of the amplitudes of c and k: a
-/// model of equal quality has an error in proportion to the amplitude. E is at most the target's own
-/// mean square.
+/// model of equal quality has an error in proportion to the amplitude. E is at most the target's
+/// own mean square.
 class ExpectedError {
  public:
   /// The regions whose errors are known, with their mean squares.

@@ -12,8 +12,8 @@ struct Stroke {
   std::size_t end = 0;
   double lowest = 0.0;
   double highest = 0.0;
-  /// The frequency of the triangle wave that moves as fast as this stroke between 5 and 95 % of its travel: rests
-  /// at its ends do not count.
+  /// The frequency of the triangle wave that moves as fast as this stroke between 5 and 95 % of its
+  /// travel: rests at its ends do not count.
   double frequency_Hz = 0.0;
   /// Time in the outer 5 % of the travel beyond that of a sine.
   double hold_s = 0.0;

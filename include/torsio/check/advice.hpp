@@ -94,8 +94,8 @@ struct Advice {
 /// Divides the training recordings into strokes of the first input (from one reversal to the next)
 /// and these into regions of amplitude, frequency and centre. A quick model, linear in its
 /// parameters, is fitted hundreds of times: without a fifth of each region (held-out error),
-/// without those beyond some amplitude, frequency, centre or condition (how fast the error rises with
-/// the distance from what was trained), with half of a region and with half of all (learning).
+/// without those beyond some amplitude, frequency, centre or condition (how fast the error rises
+/// with the distance from what was trained), with half of a region and with half of all (learning).
 /// From these follow the expected squared error in each region of the intended use and what a
 /// recording there would change; docs/what_to_record.md has the equations.
 ///
