@@ -76,6 +76,11 @@ std::string reduction_text(const Proposal& proposal) {
              : "by how much it lowers the error cannot be determined from these recordings";
 }
 
+/// A centre that is nearly 0 is shown as 0.
+double shown_centre(const TriangleMotion& motion) {
+  return std::abs(motion.centre) < 0.05 * motion.amplitude ? 0.0 : motion.centre;
+}
+
 std::string regions_text(const Advice& advice) {
   const std::string x_unit = unit_label(advice.input);
   TextTable table;
@@ -84,7 +89,7 @@ std::string regions_text(const Advice& advice) {
   for (const Region& region : advice.regions)
     table.row(
         {fmt::format("+-{:.2g} {} about {:.2g} at {:.2g} Hz", region.motion.amplitude, x_unit,
-                     region.motion.centre, region.motion.frequency_Hz),
+                     shown_centre(region.motion), region.motion.frequency_Hz),
          fmt::format("{}", region.strokes), fixed_text(region.duration_s, 0),
          fixed_text(100.0 * region.sample_share, 1), fixed_text(100.0 * region.error_share, 1),
          std::isfinite(region.held_out_rmse) ? fmt::format("{:.3g}", region.held_out_rmse) : "-",
