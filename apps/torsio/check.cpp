@@ -3,15 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "torsio/check/advice.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
 #include "torsio/fit/common/inputs.hpp"
-#include "torsio/report/json_text.hpp"
+#include "torsio/report/check.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -19,14 +22,10 @@ namespace {
 struct CheckFlags {
   DataFlags data;
   std::vector<std::string> test;
+  bool advise = false;
+  std::vector<std::string> want;
   JsonOutput json;
 };
-
-torsio::Verdict worst(const std::vector<torsio::Finding>& findings) {
-  torsio::Verdict verdict = torsio::Verdict::pass;
-  for (const torsio::Finding& finding : findings) verdict = std::max(verdict, finding.verdict);
-  return verdict;
-}
 
 std::string text_of(const std::vector<torsio::Finding>& findings) {
   std::string text;
@@ -38,50 +37,63 @@ std::string text_of(const std::vector<torsio::Finding>& findings) {
   return text;
 }
 
-std::string json_of(const std::vector<torsio::Finding>& findings) {
-  nlohmann::ordered_json document{{"verdict", torsio::name(worst(findings))},
-                                  {"findings", nlohmann::ordered_json::array()}};
-  for (const torsio::Finding& finding : findings)
-    document["findings"].push_back(
-        {{"verdict", torsio::name(finding.verdict)},
-         {"check", finding.check},
-         {"recording", finding.recording.empty() ? nlohmann::ordered_json(nullptr)
-                                                 : nlohmann::ordered_json(finding.recording)},
-         {"message", finding.message},
-         {"advice", finding.advice}});
-  return torsio::json_text(document);
+struct Checked {
+  std::vector<torsio::Finding> findings;
+  std::optional<torsio::Advice> advice;
+};
+
+std::vector<torsio::WantedRange> wanted_of(const CheckFlags& flags, const torsio::Dataset& dataset,
+                                           const torsio::FeatureSpec& spec) {
+  std::vector<torsio::WantedRange> wanted;
+  for (const std::string& text : flags.want)
+    wanted.push_back(torsio::parse_wanted(text, dataset, spec));
+  return wanted;
 }
 
 /// A recording whose clock is not uniform cannot be read: that is a finding, too.
-std::vector<torsio::Finding> findings_of(const CheckFlags& flags) {
+Checked checked(const CheckFlags& flags) {
   try {
     ProgressBar progress;
     const torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
     const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
-    std::vector<torsio::Finding> findings{{torsio::Verdict::pass, "clock", "", "uniform", ""}};
-    std::ranges::move(torsio::check_dataset(dataset, spec), std::back_inserter(findings));
-    return findings;
+    const auto wanted = wanted_of(flags, dataset, spec);  // a wrong call before any work
+    Checked result{.findings = {{torsio::Verdict::pass, "clock", "", "uniform", ""}}, .advice = {}};
+    std::ranges::move(torsio::check_dataset(dataset, spec), std::back_inserter(result.findings));
+    if (flags.advise && torsio::worst(result.findings) != torsio::Verdict::fail)
+      result.advice = torsio::advise(dataset, spec, wanted, progress.listener());
+    return result;
   } catch (const torsio::ClockError& error) {
     const std::string_view message = error.what();
-    return {{torsio::Verdict::fail, "clock", "", std::string(message.substr(0, message.find('\n'))),
-             error.report().advice}};
+    return {
+        .findings = {{torsio::Verdict::fail, "clock", "",
+                      std::string(message.substr(0, message.find('\n'))), error.report().advice}},
+        .advice = {}};
   }
 }
 
 void run(CheckFlags& flags) {
+  if (!flags.want.empty() && !flags.advise)
+    throw torsio::UsageError({.place = "--want",
+                              .problem = "it states the intended use for --advise",
+                              .advice = "Add --advise."});
   flags.data.check_outputs({flags.json.destination}, flags.test);
-  const std::vector<torsio::Finding> findings = findings_of(flags);
-  const torsio::Verdict verdict = worst(findings);
-  if (flags.json.wants_tables())
-    print(text_of(findings) + fmt::format("{}: {}\n", torsio::name(verdict),
-                                          verdict == torsio::Verdict::fail
-                                              ? "fix this before training"
-                                          : verdict == torsio::Verdict::warn
-                                              ? "a model can be trained; read the warnings"
-                                              : "a model can be trained on this"));
-  flags.json.write(json_of(findings));
+  const Checked result = checked(flags);
+  const torsio::Verdict verdict = torsio::worst(result.findings);
+  if (flags.json.wants_tables()) {
+    print(text_of(result.findings) +
+          fmt::format("{}: {}\n", torsio::name(verdict),
+                      verdict == torsio::Verdict::fail   ? "fix this before training"
+                      : verdict == torsio::Verdict::warn ? "a model can be trained; read the "
+                                                           "warnings"
+                                                         : "a model can be trained on this"));
+    if (result.advice) print("\n" + torsio::advice_text(*result.advice));
+  }
+  flags.json.write(torsio::check_json(result.findings, result.advice ? &*result.advice : nullptr));
   if (verdict == torsio::Verdict::fail)
-    throw torsio::Error({.problem = "the recordings did not pass"});
+    throw torsio::Error({.problem = "the recordings did not pass",
+                         .advice = flags.advise ? "There is no advice on further recordings until "
+                                                  "they do: its errors would be those of the fault."
+                                                : ""});
 }
 
 }  // namespace
@@ -90,12 +102,25 @@ void add_check(CLI::App& app) {
   auto flags = std::make_shared<CheckFlags>();
   CLI::App* verb =
       app.add_subcommand("check", "check whether a model can be trained on recordings");
-  verb->footer("Example: torsio check sweep1.csv sweep2.csv --test other_lever.csv");
+  verb->footer(
+      "Example: torsio check sweep1.csv sweep2.csv --test other_lever.csv\n"
+      "         torsio check sweep*.csv --advise --want input=-5deg:5deg --want "
+      "frequency=0.05Hz:2Hz\n"
+      "--advise divides the recordings into strokes and fits a quick model with some of them left\n"
+      "out: docs/what_to_record.md.");
   flags->data.add_recordings(*verb, "recordings, or a manifest");
   flags->data.add_mapping(*verb);
   flags->data.add_target_and_inputs(*verb);
   verb->add_option("--test", flags->test,
                    "held-out recordings: are they inside the training range?");
+  verb->add_flag("--advise", flags->advise,
+                 "what to record next: the motion or condition whose absence costs most");
+  verb->add_option(
+          "--want", flags->want,
+          "range that the model is used in, QUANTITY=LOWEST:HIGHEST with input, frequency, "
+          "speed (of the first input) or a condition (default: the range of the "
+          "recordings)")
+      ->allow_extra_args(false);
   verb->add_option("--json", flags->json.destination,
                    "write the findings as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

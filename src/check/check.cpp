@@ -36,6 +36,7 @@ std::vector<Finding> Checker::run() {
   check_excitation();
   check_offsets();
   check_leak();
+  check_training();
   check_range();
   return std::move(findings_);
 }

@@ -95,6 +95,7 @@ class Checker {
   void check_excitation();
   void check_offsets();
   void check_leak();
+  void check_training();
   void check_range();
   [[nodiscard]] bool has_failed() const;
   static constexpr std::size_t kFewSamples = 100;

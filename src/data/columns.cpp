@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string_view>
@@ -25,9 +26,19 @@ std::string_view quantity_of(std::string_view column_name) {
   return parts ? parts->quantity : column_name;
 }
 
-std::vector<double> converted(std::vector<double> values, double scale, double offset) {
+/// scale * column + offset. @throws Error where that is too large for a number.
+std::vector<double> converted(const CsvColumn& column, const CsvTable& table, double scale,
+                              double offset) {
+  std::vector<double> values = column.values;
   if (scale == 1.0 && offset == 0.0) return values;  // keeps even the sign of a zero
   for (double& value : values) value = scale * value + offset;
+  for (std::size_t row = 0; row < values.size(); ++row)
+    if (std::isinf(values[row]))
+      throw Error({.place = table.place(row, column),
+                   .problem = "too large after its conversion to SI",
+                   .expected = "a finite number",
+                   .found = fmt::format("{:g} * {:g} + {:g}", scale, column.values[row], offset),
+                   .advice = "Check scale:, unit: and offset: of the mapping."});
   return values;
 }
 
@@ -54,7 +65,7 @@ TableChannel channel_from_rule(const ChannelRule& rule, const CsvTable& table,
                                        "('scale:').",
                                        unit->si_suffix, name->unit->si_suffix)});
   return {.channel = {.name = name->si(),
-                      .values = converted(column.values, scale * unit->scale,
+                      .values = converted(column, table, scale * unit->scale,
                                           scale * unit->offset + rule.offset)},
           .column = &column};
 }
@@ -73,7 +84,7 @@ TableChannel channel_from_column(const CsvColumn& column, const CsvTable& table)
                  .advice = advice_without_unit(column.name)});
   }
   return {.channel = {.name = name->si(),
-                      .values = converted(column.values, name->unit->scale, name->unit->offset)},
+                      .values = converted(column, table, name->unit->scale, name->unit->offset)},
           .column = &column};
 }
 

@@ -115,7 +115,8 @@ void advance(Channel& channel, std::size_t samples) {
   std::fill(channel.fresh.end() - by, channel.fresh.end(), std::uint8_t{0});
 }
 
-double zero_of(const Channel& channel, const ZeroRule& rule, double sample_rate_Hz) {
+double zero_of(const std::string& recording, const Channel& channel, const ZeroRule& rule,
+               double sample_rate_Hz) {
   const auto& values = channel.values;
   double sum = 0.0;
   double count = 0.0;
@@ -123,6 +124,12 @@ double zero_of(const Channel& channel, const ZeroRule& rule, double sample_rate_
   double highest = -HUGE_VAL;
   const double wanted =
       rule.mid_range ? HUGE_VAL : std::max(std::round(rule.first_s * sample_rate_Hz), 1.0);
+  if (!rule.mid_range && wanted > static_cast<double>(values.size()))
+    throw Error({.place = recording + ": zero of " + channel.name,
+                 .expected = fmt::format("at most the {:g} s of the recording",
+                                         static_cast<double>(values.size()) / sample_rate_Hz),
+                 .found = fmt::format("the first {:g} s", rule.first_s),
+                 .advice = "Give the time at rest before the motion begins, or mid_range: true."});
   for (std::size_t i = 0; i < values.size() && static_cast<double>(i) < wanted; ++i) {
     if (std::isnan(values[i])) continue;
     sum += values[i];
@@ -159,7 +166,7 @@ Recording recording_of(const CsvTable& table, TableChannels& columns, const Name
                           mapping.file + ": latency." + rule.channel));
   for (const ZeroRule& rule : mapping.zero) {
     Channel& channel = channel_of_rule(channels, rule.channel, mapping, "zero");
-    const double zero = zero_of(channel, rule, clock.sample_rate_Hz);
+    const double zero = zero_of(run.name, channel, rule, clock.sample_rate_Hz);
     for (double& value : channel.values) value -= zero;
   }
   Recording recording(run.name, clock.sample_rate_Hz, clock.start_s);

@@ -1,7 +1,6 @@
 #include "torsio/fit/train_model.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,7 +8,7 @@
 #include <utility>
 
 #include "fit/common/guards.hpp"
-#include "fit/common/usable_table.hpp"
+#include "fit/common/training_rules.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
@@ -17,33 +16,6 @@
 
 namespace torsio {
 namespace {
-
-std::set<std::string> zeroed_channels(const Recording& recording) {
-  std::set<std::string> channels;
-  for (const ZeroRule& zero : recording.zeros) channels.insert(zero.channel);
-  return channels;
-}
-
-/// The zeros of the training records: a model expects a channel zeroed or not, never both.
-std::vector<ZeroRule> training_zeros(const Dataset& dataset) {
-  const Recording* first = nullptr;
-  for (const DatasetRecord& record : dataset.records) {
-    if (!record.has_role(Role::train)) continue;
-    if (first == nullptr) first = &record.recording;
-    const auto expected = zeroed_channels(*first);
-    const auto found = zeroed_channels(record.recording);
-    if (found == expected) continue;
-    const auto list = [](const std::set<std::string>& channels) {
-      return channels.empty() ? std::string("none") : fmt::format("{}", fmt::join(channels, ", "));
-    };
-    throw Error({.place = record.recording.name() + ": zero",
-                 .problem = "the training recordings disagree about which channels are zeroed",
-                 .expected = list(expected) + ", as in " + first->name(),
-                 .found = list(found),
-                 .advice = "Give all of them the same zero: rules."});
-  }
-  return first == nullptr ? std::vector<ZeroRule>{} : first->zeros;
-}
 
 /// The mapping that all training records were read with; none if they differ.
 std::string training_mapping(const Dataset& dataset, std::vector<std::string>& notes) {
@@ -58,6 +30,8 @@ std::string training_mapping(const Dataset& dataset, std::vector<std::string>& n
 }
 
 void note_left_out(const TrainingData& data, std::vector<std::string>& notes) {
+  for (const std::string& recording : unused_recordings(data))
+    notes.push_back(recording + ": not used, for no sample of it can be used");
   for (const LeftOut& left_out : data.left_out)
     notes.push_back("not used, for it is far outside all other values of its channel: " +
                     left_out.text());
@@ -78,17 +52,6 @@ ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Opti
       card.training_files.push_back(std::move(source));
   }
   return card;
-}
-
-/// Nothing can be learned from a target that never changes, and every score of it would be 0 / 0.
-void refuse_constant_target(const TrainingData& data) {
-  const std::vector<double> target = usable_table(data).target;
-  const auto [lowest, highest] = std::ranges::minmax(target);
-  if (lowest < highest) return;
-  throw Error({.place = data.target,
-               .expected = "a target that changes",
-               .found = fmt::format("{} in every training sample", lowest),
-               .advice = "Is the sensor connected? torsio check reports details."});
 }
 
 /// An inverse's target is compared with the measured deflection, and its estimator does not receive
@@ -118,8 +81,9 @@ std::string ModelChoice::variant() const {
 }
 
 LearningData learning_data(const Dataset& dataset, const FeatureSpec& features) {
+  (void)training_zeros(dataset);
   LearningData data{.training = training_data(dataset, features), .validation = {}};
-  refuse_constant_target(data.training);
+  require_trainable(data.training);
   if (dataset.has_role(Role::validation))
     data.validation = training_data(dataset, features, Role::validation);
   return data;
@@ -174,11 +138,9 @@ TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std:
 
 TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                          const FitContext& context) {
-  // A wrong setting or records that disagree are reported before the data are run through the
-  // filters.
+  // A wrong setting is reported before the data are run through the filters.
   const FamilyInfo& family = find_family(choice.family);
   (void)Options(family.options, choice.options);
-  (void)training_zeros(dataset);
   if (context.resume != nullptr && !family.can_resume)
     throw UsageError(
         {.place = "--resume",

@@ -11,6 +11,7 @@
 
 #include "data/csv_table.hpp"
 #include "data/measured_recordings.hpp"
+#include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"
@@ -218,6 +219,24 @@ zero:
   ASSERT_EQ(recording.zeros.size(), 2U);
   EXPECT_EQ(recording.zeros[0].first_s, 2.0);
   EXPECT_TRUE(recording.zeros[1].mid_range);
+}
+
+TEST(Mapping, RefusesAZeroThatIsTakenOverMoreThanTheRecording) {
+  const std::string csv = "t_s,a_rad\n0,1\n1,3\n2,9\n";
+  EXPECT_NO_THROW(static_cast<void>(read(csv, "zero: [{channel: a_rad, first: 3s}]")));
+  const std::string message = test::error_message(
+      [&] { static_cast<void>(read(csv, "zero: [{channel: a_rad, first: 4s}]")); });
+  EXPECT_NE(message.find("log: zero of a_rad: expected at most the 3 s of the recording"),
+            std::string::npos)
+      << message;
+}
+
+TEST(Mapping, RefusesValuesThatAreInfiniteAfterTheirConversion) {
+  const std::string csv = "t_s,a_rad\n0,1\n1,3\n";
+  const std::string message = test::error_message(
+      [&] { static_cast<void>(read(csv, "channels: {a_rad: {from: a_rad, scale: 1e308}}")); });
+  EXPECT_NE(message.find("log.csv: line 3"), std::string::npos) << message;
+  EXPECT_NE(message.find("too large after its conversion to SI"), std::string::npos) << message;
 }
 
 TEST(Mapping, DerivesChannelsAndRemembersHow) {

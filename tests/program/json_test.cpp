@@ -30,6 +30,7 @@ const JsonCase kCases[] = {
     {"Adapt", kNetwork, "adapt m.safetensors a.csv"},
     {"Attribute", kModel, "attribute m.safetensors a.csv --windows 10"},
     {"Check", kRecord, "check a.csv"},
+    {"CheckWithAdvice", kRecord, "check a.csv --advise"},
     {"Compare", kTwoRecords, "compare a.csv --test b.csv --models linear"},
     {"CrossValidate", kRecord, "crossvalidate a.csv --models linear"},
     {"Demo", kTwoRecords, "demo a.csv --test b.csv --models linear"},

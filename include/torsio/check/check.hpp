@@ -28,7 +28,8 @@ struct Finding {
 /// inputs and at the target: values that are missing, constant or saturated; frozen sensors; coarse
 /// codes; units; gaps and slips; the delay and the sign between the first input and the target;
 /// their relation early and late in a record; reversals and speeds; offsets that differ between
-/// records; a target computed from an input; test data outside the training range. Every check
+/// records; a target computed from an input; what `train_model` refuses; test data
+/// outside the training range. Every check
 /// reports at least one finding, PASS ones included, in a fixed order.
 [[nodiscard]] std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec);
 

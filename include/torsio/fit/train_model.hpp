@@ -50,7 +50,8 @@ struct LearningData {
   TrainingData training;
   std::optional<TrainingData> validation;  ///< if any record has that role
 };
-/// @throws Error as `training_data`, or if the target never changes.
+/// @throws Error as `training_data`, if the training records disagree about which channels are
+/// zeroed, if the target or every input is constant, or if values are too large to be squared.
 [[nodiscard]] LearningData learning_data(const Dataset& dataset, const FeatureSpec& features);
 
 /// `train_model` for several models that share their inputs.

@@ -1,0 +1,115 @@
+#include "fit/common/training_rules.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+std::set<std::string> zeroed_channels(const Recording& recording) {
+  std::set<std::string> channels;
+  for (const ZeroRule& zero : recording.zeros) channels.insert(zero.channel);
+  return channels;
+}
+
+struct Range {
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -std::numeric_limits<double>::infinity();
+
+  [[nodiscard]] bool is_constant() const { return !(lowest < highest); }
+};
+
+/// The range of `value_of(sequence, sample)` over the usable samples.
+template <class Value>
+Range range_of(const TrainingData& data, const Value& value_of) {
+  Range range;
+  for (const Sequence& sequence : data.sequences)
+    for (std::size_t n = 0; n < sequence.target.size(); ++n) {
+      if (sequence.use[n] == 0) continue;
+      const double value = value_of(sequence, n);
+      range.lowest = std::min(range.lowest, value);
+      range.highest = std::max(range.highest, value);
+    }
+  return range;
+}
+
+void require_squares(const Range& range, const std::string& name) {
+  const double largest = std::max(std::abs(range.lowest), std::abs(range.highest));
+  if (largest > kLargestValue)
+    throw Error(
+        {.place = name,
+         .expected = fmt::format("values below {:g}, whose squares can be summed", kLargestValue),
+         .found = fmt::format("{:g}", largest),
+         .advice = "Check the unit and the scale of the column, or the expression."});
+  if (!range.is_constant() && range.highest - range.lowest < 1.0 / kLargestValue)
+    throw Error({.place = name,
+                 .expected = fmt::format("a range of at least {:g}, whose square is not 0",
+                                         1.0 / kLargestValue),
+                 .found = fmt::format("{:g}", range.highest - range.lowest),
+                 .advice = "Check the unit and the scale of the column, or the expression."});
+}
+
+}  // namespace
+
+std::vector<ZeroRule> training_zeros(const Dataset& dataset) {
+  const Recording* first = nullptr;
+  for (const DatasetRecord& record : dataset.records) {
+    if (!record.has_role(Role::train)) continue;
+    if (first == nullptr) first = &record.recording;
+    const auto expected = zeroed_channels(*first);
+    const auto found = zeroed_channels(record.recording);
+    if (found == expected) continue;
+    const auto list = [](const std::set<std::string>& channels) {
+      return channels.empty() ? std::string("none") : fmt::format("{}", fmt::join(channels, ", "));
+    };
+    throw Error({.place = record.recording.name() + ": zero",
+                 .problem = "the training recordings disagree about which channels are zeroed",
+                 .expected = list(expected) + ", as in " + first->name(),
+                 .found = list(found),
+                 .advice = "Give all of them the same zero: rules."});
+  }
+  return first == nullptr ? std::vector<ZeroRule>{} : first->zeros;
+}
+
+void require_trainable(const TrainingData& data) {
+  const Range target =
+      range_of(data, [](const Sequence& sequence, std::size_t n) { return sequence.target[n]; });
+  // Nothing can be learned from a target that never changes, and every score of it would be 0 / 0.
+  if (target.is_constant())
+    throw Error({.place = data.target,
+                 .expected = "a target that changes",
+                 .found = fmt::format("{} in every training sample", target.lowest),
+                 .advice = "Is the sensor connected? torsio check reports details."});
+  require_squares(target, data.target);
+  bool is_constant = true;
+  for (std::size_t j = 0; j < data.input_count(); ++j) {
+    const Range input = range_of(
+        data, [j](const Sequence& sequence, std::size_t n) { return sequence.features(n, j); });
+    require_squares(input, "input " + data.inputs[j].expression);
+    is_constant = is_constant && input.is_constant();
+  }
+  if (is_constant)
+    throw Error({.place = "input " + data.inputs.front().expression,
+                 .expected = "at least one input that changes",
+                 .found = "every input is constant over the training samples",
+                 .advice = "Check that the sensors are connected, and --inputs."});
+}
+
+std::vector<std::string> unused_recordings(const TrainingData& data) {
+  std::vector<std::string> names;
+  for (const Sequence& sequence : data.sequences)
+    if (std::ranges::none_of(sequence.use, [](std::uint8_t use) { return use != 0; }))
+      names.push_back(sequence.recording);
+  return names;
+}
+
+}  // namespace torsio

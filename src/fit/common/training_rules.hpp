@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "torsio/data/dataset.hpp"
+#include "torsio/data/recording.hpp"
+#include "torsio/fit/common/training_data.hpp"
+
+// The rules by which recordings are refused before a model is fitted. `train_model` applies them,
+// and `check_dataset` reports the same errors as findings.
+
+namespace torsio {
+
+/// Values beyond this have squares whose sum over a recording overflows; the sum of squares of
+/// smaller values than its inverse is 0.
+inline constexpr double kLargestValue = 1e140;
+
+/// The zeros of the training records: a model expects a channel zeroed or not, never both.
+/// @throws Error naming the recordings that disagree.
+[[nodiscard]] std::vector<ZeroRule> training_zeros(const Dataset& dataset);
+
+/// @throws Error if the target or every input is constant over the usable samples, or if the target
+/// or an input has values (or a range of values) that cannot be squared.
+void require_trainable(const TrainingData& data);
+
+/// The recordings of which no sample is usable, while others have some.
+[[nodiscard]] std::vector<std::string> unused_recordings(const TrainingData& data);
+
+}  // namespace torsio
