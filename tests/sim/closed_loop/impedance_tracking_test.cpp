@@ -140,7 +140,7 @@ TEST(ImpedanceTracking, RefusesWhatIsNotPassiveOrNotAHarmonicDrive) {
                          .torque_gain_Nm_rad = gain_Nm_rad};
   };
   const std::string stiff = refusal("harmonic-drive", wanted(12000.0, 0.0, 0.5));
-  expect(stiff, "not passive up to 10 Hz: expected at most 9");
+  expect(stiff, "not passive up to 10 Hz; expected at most 9");
   expect(stiff, "found 12000 Nm/rad");
   expect(refusal("harmonic-drive", wanted(1000.0, 0.0, 5.0)), "no stiffness is passive");
   EXPECT_EQ(test::error_message([&] {
