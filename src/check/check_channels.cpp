@@ -10,6 +10,23 @@
 
 namespace torsio {
 
+namespace {
+
+/// Means over the `half_window` samples before and after each; NaN where one of them is.
+std::vector<double> without_noise(const std::vector<double>& values, std::size_t half_window) {
+  std::vector<double> means(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t begin = i > half_window ? i - half_window : 0;
+    const std::size_t end = std::min(values.size(), i + half_window + 1);
+    double sum = 0.0;
+    for (std::size_t k = begin; k < end; ++k) sum += values[k];
+    means[i] = sum / static_cast<double>(end - begin);
+  }
+  return means;
+}
+
+}  // namespace
+
 // A locked output: compared with the deflection the channel does not move, and the torque follows
 // that deflection, which it would not do if a sensor were dead while its side moved.
 bool Checker::stands_still(std::size_t r, const std::string& name) const {
@@ -108,14 +125,15 @@ bool Checker::is_turn(std::size_t r, const Channel& channel, double extreme) con
   const std::vector<double>& values = channel.values;
   const Extent span = extent_of(values);
   std::vector<double> other;
-  double closest = kFollows;
+  double closest = kClearCorrelation;
   for (const Channel& each : others_of(r, channel.name)) {
     const double together = std::abs(correlation(values, each.values));
     if (together > closest) closest = together, other = bridged(each);
   }
   if (other.empty()) return false;
-  const double beyond =
-      std::max(kCodesAtATurn * finest_step(channel), kBeyondShare * span.width());
+  other = without_noise(other,
+                        static_cast<std::size_t>(kSpeedHalfWindow_s * dataset_.sample_rate_Hz()));
+  const double beyond = std::max(kCodesAtATurn * finest_step(channel), kBeyondShare * span.width());
   const double zone = kApproachShare * span.width();
   for (std::size_t begin = 0, end = 0; begin < values.size(); begin = end) {
     end = begin + 1;
@@ -184,7 +202,8 @@ bool Checker::is_stop_of_motion(const Channel& channel, const Rest& rest) {
 std::vector<Channel> Checker::others_of(std::size_t r, const std::string& name) const {
   std::vector<Channel> others;
   for (const std::string& each : channels_)
-    if (each != name) others.push_back(dataset_.records[r].recording.channel(each));
+    if (each != name && !stands_still(r, each))
+      others.push_back(dataset_.records[r].recording.channel(each));
   if (name == dataset_.target && sources_.size() > 1)
     others.push_back({.name = spec_.inputs.front(), .values = pairs_[r].input});
   return others;
@@ -248,8 +267,14 @@ void Checker::check_gaps() {
       for (const std::string& name : channels_) {
         const Channel& channel = recording.channel(name);
         if (is_condition(recording, name) || stands_still(r, name)) continue;
-        const std::vector<double> values = bridged(channel);
-        const Jump jump = largest_jump(values);
+        // Between the new samples of a slow sensor there is no jump.
+        const std::vector<double> whole = bridged(channel);
+        std::vector<std::size_t> samples;
+        std::vector<double> values;
+        for (std::size_t i = 0; i < whole.size(); ++i)
+          if (channel.is_fresh(i)) samples.push_back(i), values.push_back(whole[i]);
+        Jump jump = largest_jump(values);
+        if (!samples.empty()) jump.sample = samples[jump.sample];
         if (!stands_out(jump, values) || is_end_of_stall(r, jump.sample) ||
             is_sign_flip(r, name, jump) || is_spike(r, jump.sample) ||
             (spoiled_[r] != 0 && is_source(name)))

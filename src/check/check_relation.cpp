@@ -103,8 +103,7 @@ void Checker::check_sign_flips() {
       double code = 0.0;
       for (const std::string& source : sources_)
         code = std::max(code, finest_step(recording.channel(source)));
-      flips_[r] =
-          find_sign_flip(pairs_[r], code, finest_step(recording.channel(dataset_.target)));
+      flips_[r] = find_sign_flip(pairs_[r], code, finest_step(recording.channel(dataset_.target)));
     }
 }
 
@@ -138,9 +137,9 @@ void Checker::check_delay() {
 bool Checker::check_sides(std::size_t r) {
   if (order_of_difference(r) == 0) return false;
   const Recording& recording = dataset_.records[r].recording;
-  const auto sides = relate_sides(recording.channel(sources_[0]).values,
-                                  recording.channel(sources_[1]).values, pairs_[r].target,
-                                  recording.sample_rate_Hz());
+  const auto sides =
+      relate_sides(recording.channel(sources_[0]).values, recording.channel(sources_[1]).values,
+                   pairs_[r].target, recording.sample_rate_Hz());
   if (!sides || !has_late_side(*sides, recording.sample_rate_Hz())) return false;
   const bool is_first = sides->lateness_s > 0.0;
   add(Verdict::warn, "delay", recording.name(),
@@ -153,8 +152,9 @@ bool Checker::check_sides(std::size_t r) {
 void Checker::report_delay(std::size_t r, const Delay& delay) {
   add(Verdict::warn, "delay", dataset_.records[r].recording.name(),
       fmt::format("{} comes {:.1f} ms {} {} (unexplained {:.2g} % there, {:.2g} % without shift)",
-                  dataset_.target, 1e3 * std::abs(delay.lag_s), delay.lag_s > 0.0 ? "after" : "before",
-                  spec_.inputs.front(), 100.0 * delay.unexplained, 100.0 * delay.without_shift),
+                  dataset_.target, 1e3 * std::abs(delay.lag_s),
+                  delay.lag_s > 0.0 ? "after" : "before", spec_.inputs.front(),
+                  100.0 * delay.unexplained, 100.0 * delay.without_shift),
       delay.is_at_end     ? "The search ends there: check the loggers' clocks."
       : delay.lag_s > 0.0 ? fmt::format("Mapping line that removes it: latency: {{{}: {:.1f}ms}}",
                                         dataset_.target, 1e3 * delay.lag_s)
@@ -194,6 +194,12 @@ void Checker::check_sign() {
                     : fmt::format("Mapping: invert one of them with sign: -1 (channels: "
                                   "{{{}: {{from: ..., sign: -1}}}})",
                                   dataset_.target));
+          } else if (values[r] < kClearCorrelation && hardly_moves(r)) {
+            add(Verdict::warn, "excitation", recording,
+                fmt::format("{} hardly moves more than its noise: neither sign nor delay can be "
+                            "determined",
+                            spec_.inputs.front()),
+                "Record a motion that loads the spring.");
           } else if (values[r] < kClearCorrelation) {
             add(Verdict::warn, "sign", recording,
                 fmt::format("{} hardly follows {} (correlation {:.3f})", dataset_.target,
@@ -276,9 +282,8 @@ void Checker::check_change() {
           change->is_of_slope
               ? fmt::format("at equal {} the slope of {} changes to {:.2g} times, {}",
                             spec_.inputs.front(), dataset_.target, change->slope_ratio, when)
-              : fmt::format("at equal {} {} changes by {:.3g} {}, {}",
-                            spec_.inputs.front(), dataset_.target, change->offset,
-                            unit_label(dataset_.target), when),
+              : fmt::format("at equal {} {} changes by {:.3g} {}, {}", spec_.inputs.front(),
+                            dataset_.target, change->offset, unit_label(dataset_.target), when),
           "Check for a zero that slipped or drifted and for a part that broke or crept. A model "
           "would learn the mean of before and after.");
     }

@@ -20,9 +20,8 @@ double Checker::range_in_use(std::size_t r, const std::string& name) const {
 }
 
 bool Checker::is_spike(std::size_t r, std::size_t sample) const {
-  return std::ranges::any_of(spikes_[r], [&](std::size_t spike) {
-    return sample == spike || sample == spike + 1;
-  });
+  return std::ranges::any_of(
+      spikes_[r], [&](std::size_t spike) { return sample == spike || sample == spike + 1; });
 }
 
 // Two columns that were interchanged: a torque sensor after the spring follows the deflection
@@ -62,7 +61,7 @@ void Checker::check_columns() {
 bool Checker::may_be_target(const Recording& recording, const Channel& channel) const {
   const auto parts = split_channel_name(channel.name);
   const std::string_view unit = parts ? parts->unit->si_suffix : std::string_view();
-  return (unit == "_Nm" || unit == "_N" || unit == "_A") &&
+  return (unit == "Nm" || unit == "N" || unit == "A") &&
          std::ranges::find(channels_, channel.name) == channels_.end() &&
          !channel.name.starts_with(kTruthPrefix) && !is_condition(recording, channel.name) &&
          std::ranges::find(dataset_.target_computed_from, channel.name) ==
@@ -93,16 +92,33 @@ void Checker::check_noise_of(std::size_t r, const Channel& channel, double range
         "Check cables and supply. Cut that part out.");
     return;
   }
-  std::vector<double> sigma = course.sigma;
-  const auto middle = sigma.begin() + static_cast<std::ptrdiff_t>(sigma.size() / 2);
-  std::ranges::nth_element(sigma, middle);
   // Where nothing moves, noise is all there is.
-  if (!is_clear(r) || *middle < kNoiseShare * 0.25 * range || *middle < finest_step(channel))
+  const double usual = usual_noise(course);
+  if (channel.name != dataset_.target || !is_clear(r) ||
+      usual < std::max(kNoiseShare * range, finest_step(channel)))
     return;
   add(Verdict::warn, "noise", recording.name(),
-      fmt::format("{} has noise of {:.3g} {}, {:.2g} % of its range", channel.name, *middle,
-                  unit_label(channel.name), 100.0 * *middle / range),
+      fmt::format("{} has noise of {:.3g} {}, {:.2g} % of its range", channel.name, usual,
+                  unit_label(channel.name), 100.0 * usual / range),
       "Check cables and shielding. The error of a model cannot be measured below the noise.");
+}
+
+/// Whether the standard deviation of the first input is less than ten times its noise.
+bool Checker::hardly_moves(std::size_t r) const {
+  const Channel input{.name = spec_.inputs.front(), .values = pairs_[r].input};
+  const NoiseCourse course = noise_course(input, dataset_.sample_rate_Hz());
+  if (course.sigma.empty()) return false;
+  double mean = 0.0;
+  double square = 0.0;
+  double count = 0.0;
+  for (const double value : input.values) {
+    if (!is_finite(value)) continue;
+    count += 1.0;
+    const double step = value - mean;
+    mean += step / count;
+    square += step * (value - mean);
+  }
+  return square < count * std::pow(kMotionOverNoise * usual_noise(course), 2);
 }
 
 void Checker::check_spikes() {
@@ -132,42 +148,48 @@ void Checker::check_repeats() {
       std::vector<const Channel*> channels;
       for (const std::string& name : channels_)
         if (!is_condition(recording, name)) channels.push_back(&recording.channel(name));
-      const auto rows = std::max(kRepeatRows, static_cast<std::size_t>(std::round(
-                                                  kRepeat_s * recording.sample_rate_Hz())));
+      const auto rows =
+          std::max(kRepeatRows,
+                   static_cast<std::size_t>(std::round(kRepeat_s * recording.sample_rate_Hz())));
       const auto repeat = find_repeat(channels, rows);
       if (!repeat) continue;
       add(Verdict::warn, "repeats", recording.name(),
-          fmt::format("the rows from t = {:.4g} s on occur again from t = {:.4g} s on, for {:.3g} s",
-                      recording.time_s(repeat->first), recording.time_s(repeat->again),
-                      static_cast<double>(repeat->length) / recording.sample_rate_Hz()),
+          fmt::format(
+              "the rows from t = {:.4g} s on occur again from t = {:.4g} s on, for {:.3g} s",
+              recording.time_s(repeat->first), recording.time_s(repeat->again),
+              static_cast<double>(repeat->length) / recording.sample_rate_Hz()),
           "No sensor repeats its noise: check the logger for a buffer that was written twice, and "
           "cut the second one out.");
     }
   });
 }
 
-// Rows that are missing while the stamps are even: every channel jumps at the same moment.
+// Rows that are missing while the stamps are even: every channel jumps by what it passes through in
+// the same time. Currents may jump.
 void Checker::check_cut(std::size_t r) {
   const Recording& recording = dataset_.records[r].recording;
   std::vector<const Channel*> channels;
   std::vector<double> codes;
   for (const Channel& channel : recording.channels()) {
-    if (is_condition(recording, channel.name) || channel.name.starts_with(kTruthPrefix)) continue;
+    const auto parts = split_channel_name(channel.name);
+    if (is_condition(recording, channel.name) || channel.name.starts_with(kTruthPrefix) || !parts ||
+        parts->unit->si_suffix == "A" || parts->unit->si_suffix == "V")
+      continue;
     channels.push_back(&channel);
     codes.push_back(finest_step(channel));
   }
   const auto cut = find_cut(channels, codes);
-  if (!cut || is_spike(r, *cut)) return;
+  if (!cut || is_spike(r, cut->sample)) return;
   add(Verdict::warn, "gaps", recording.name(),
-      fmt::format("several channels jump together at t = {:.4g} s, and nowhere else",
-                  recording.time_s(*cut)),
+      fmt::format("several channels jump together at t = {:.4g} s, as if {:.2g} s were missing",
+                  recording.time_s(cut->sample), cut->rows / recording.sample_rate_Hz()),
       "Rows are missing although the stamps are even. Cut the recording in two there.");
 }
 
-// A wrong unit of both angles, or a column that is no angle.
+// A wrong unit of both angles, or a column that contains another quantity.
 void Checker::check_twist(std::size_t r) {
   const auto parts = split_channel_name(sources_.front());
-  if (!parts || parts->unit->si_suffix != "_rad") return;
+  if (!parts || parts->unit->si_suffix != "rad") return;
   if (order_of_difference(r) == 0 && spec_.inputs.front() != "spring_deflection_rad") return;
   std::vector<double> sorted;
   std::ranges::copy_if(pairs_[r].input, std::back_inserter(sorted), is_finite);
@@ -191,9 +213,8 @@ void Checker::check_scale(std::size_t r) {
   const Recording& recording = dataset_.records[r].recording;
   const std::string& first = sources_[0];
   const std::string& second = sources_[1];
-  const auto sides = relate_sides(recording.channel(first).values,
-                                  recording.channel(second).values, pairs_[r].target,
-                                  recording.sample_rate_Hz());
+  const auto sides = relate_sides(recording.channel(first).values, recording.channel(second).values,
+                                  pairs_[r].target, recording.sample_rate_Hz());
   if (!sides || !has_wrong_scale(*sides)) return;
   spoiled_[r] = 1;
   add(Verdict::fail, "units", recording.name(),

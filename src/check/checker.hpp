@@ -79,6 +79,7 @@ class Checker {
   void check_noise();
   void check_noise_of(std::size_t r, const Channel& channel, double range);
   void check_spikes();
+  [[nodiscard]] bool hardly_moves(std::size_t r) const;
   void check_repeats();
   void check_cut(std::size_t r);
   [[nodiscard]] double range_in_use(std::size_t r, const std::string& name) const;
@@ -138,16 +139,17 @@ class Checker {
   static constexpr double kOffsetShare = 0.05;
   static constexpr double kGainChange = 0.12;
   static constexpr double kClearDelay_s = 0.03;
-  static constexpr double kLinesLeave = 0.5;  ///< share of what one common curve does not explain
-  static constexpr double kBeyondShare = 0.02;    ///< share of the range
-  static constexpr double kApproachShare = 0.2;   ///< share of the range
-  static constexpr double kStepShare = 0.005;     ///< share of the range
-  static constexpr double kNoiseShare = 0.1;      ///< share of the standard deviation
-  static constexpr double kBurstShare = 0.01;     ///< share of the range
-  static constexpr double kSpikeShare = 0.05;     ///< share of the range
+  static constexpr double kLinesLeave = 0.5;    ///< share of what one common curve does not explain
+  static constexpr double kBeyondShare = 0.06;  ///< share of the range
+  static constexpr double kApproachShare = 0.2;  ///< share of the range
+  static constexpr double kStepShare = 0.005;    ///< share of the range
+  static constexpr double kNoiseShare = 0.025;   ///< share of the range
+  static constexpr double kMotionOverNoise = 10.0;
+  static constexpr double kBurstShare = 0.01;  ///< share of the range
+  static constexpr double kSpikeShare = 0.05;  ///< share of the range
   static constexpr double kRepeat_s = 0.25;
   static constexpr std::size_t kRepeatRows = 50;
-  static constexpr double kOuter = 0.01;  ///< share of the samples on either side
+  static constexpr double kOuter = 0.01;          ///< share of the samples on either side
   static constexpr double kOtherExplained = 0.3;  ///< share of what is unexplained of the target
   static constexpr double kWellExplained = 0.02;  ///< share of the variance
 

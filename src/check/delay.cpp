@@ -13,14 +13,19 @@ constexpr double kLongest_s = 0.6;
 constexpr double kCoarseStep_s = 2e-3;
 constexpr std::size_t kFewSamples = 200;
 constexpr double kExplainsLittle = 0.2;  ///< share of the variance: there is no delay to find
-constexpr double kLateShare = 0.87;      ///< of what is unexplained without shift
+constexpr double kLateShare = 0.87;      ///< share of the rest without shift
+constexpr double kClearLag_s = 0.02;
+constexpr double kRise = 0.15;
+constexpr double kMaxRise = 20.0;
 constexpr double kEarlyShare = 0.4;
 constexpr double kEarlyRest = 0.01;
 constexpr double kShortest_s = 8e-3;
 constexpr double kSpeedHalfWindow_s = 0.02;
-constexpr double kScaleShare = 0.2;
+constexpr double kScaleShare = 0.1;
+constexpr double kScaleRest = 2e-3;  ///< a torque that changed its gain leaves more
 constexpr double kSideShare = 0.4;
 constexpr double kSmallScale = 0.01;
+constexpr double kInverted = -0.5;  ///< an angle that does not move, or has the wrong sign
 constexpr double kFar = 5.0;
 constexpr double kSome = 1.5;
 constexpr double kSmallRest = 0.2;
@@ -32,6 +37,14 @@ std::pair<std::size_t, std::size_t> finite_part(const std::vector<double>& value
   while (begin < end && !is_finite(values[begin])) ++begin;
   while (end > begin && !is_finite(values[end - 1])) --end;
   return {begin, end};
+}
+
+/// Share that a delay leaves of what is unexplained without shift, at most: the error without shift
+/// grows with the square of the delay, so that a long one must explain more. The valley of a slow
+/// motion is flat, and its lowest point a matter of chance.
+double greatest_share(double lag_s) {
+  const double lags = std::abs(lag_s) / kClearLag_s;
+  return std::min(kLateShare, 1.0 / (1.0 + kRise * std::min(lags * lags, kMaxRise)));
 }
 
 double shortest_lag_s(double sample_rate_Hz) { return std::max(kShortest_s, 1.5 / sample_rate_Hz); }
@@ -90,12 +103,14 @@ std::optional<Delay> estimate_delay(const Pair& pair, double sample_rate_Hz) {
 
 bool is_late(const Delay& delay, double sample_rate_Hz) {
   return delay.unexplained <= kExplainsLittle && delay.lag_s >= shortest_lag_s(sample_rate_Hz) &&
-         delay.unexplained <= kLateShare * delay.without_shift;
+         delay.unexplained <= greatest_share(delay.lag_s) * delay.without_shift;
 }
 
 bool is_early(const Delay& delay, double sample_rate_Hz) {
   return delay.lag_s <= -shortest_lag_s(sample_rate_Hz) && !delay.is_at_end &&
-         delay.unexplained <= kEarlyRest && delay.unexplained <= kEarlyShare * delay.without_shift;
+         delay.unexplained <= kEarlyRest &&
+         delay.unexplained <=
+             std::min(kEarlyShare, greatest_share(delay.lag_s)) * delay.without_shift;
 }
 
 std::optional<TwoSides> relate_sides(const std::vector<double>& first,
@@ -136,8 +151,8 @@ std::optional<TwoSides> relate_sides(const std::vector<double>& first,
 }
 
 bool has_wrong_scale(const TwoSides& sides) {
-  return sides.travel >= kFar && sides.unexplained <= kSmallRest &&
-         std::abs(sides.excess) >= kSmallScale &&
+  return sides.travel >= kFar && sides.unexplained <= kScaleRest &&
+         std::abs(sides.excess) >= kSmallScale && sides.excess > kInverted &&
          sides.unexplained <= kScaleShare * sides.without_excess;
 }
 

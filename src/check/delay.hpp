@@ -15,7 +15,7 @@ struct Delay {
   /// The shortest lag that would be reported: a slow motion has nearly the same torque before and
   /// after it. Infinite if none would.
   double shortest_s = 0.0;
-  bool is_at_end = false;  ///< of the search
+  bool is_at_end = false;  ///< the search ends at this lag
 };
 
 /// Lags up to 0.6 s are searched. Empty if there are too few samples.

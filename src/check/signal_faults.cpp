@@ -23,20 +23,15 @@ constexpr double kNeighboursAgree = 0.3;  ///< share of the spike's height
 constexpr std::size_t kHashedRows = 16;
 constexpr std::size_t kFewDistinctRows = 20;
 constexpr double kCutQuantile = 0.999;
-constexpr double kOverQuantile = 4.0;
+constexpr double kOverQuantile = 3.0;
 constexpr std::size_t kCutNeighbourhood = 8;
-
-/// Indices of the samples that are new and finite.
-std::vector<std::size_t> new_samples(const Channel& channel) {
-  std::vector<std::size_t> samples;
-  for (std::size_t i = 0; i < channel.values.size(); ++i)
-    if (channel.is_fresh(i) && is_finite(channel.values[i])) samples.push_back(i);
-  return samples;
-}
+constexpr std::size_t kFewSteps = 100;
+constexpr double kFewRows = 8.0;
+constexpr double kAgree = 1.5;
 
 double quantile(std::vector<double> values, double share) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(
-                                       share * static_cast<double>(values.size() - 1));
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::ranges::nth_element(values, at);
   return *at;
 }
@@ -46,21 +41,61 @@ std::uint64_t mixed(std::uint64_t hash, std::uint64_t value) {
   return hash ^ (hash >> 29);
 }
 
-/// How far each step is from the mean of the speeds before and after it.
-std::vector<double> excess_steps(const Channel& channel) {
+/// The steps of a channel, compared with its speeds before and after them.
+struct Steps {
+  std::vector<double> excess;  ///< step minus the mean of both speeds, over its usual size
+  std::vector<double> rows;    ///< step over that mean: the time that it takes
+};
+
+std::optional<Steps> steps_of(const Channel& channel, double code) {
   const std::vector<std::size_t> samples = new_samples(channel);
-  std::vector<double> excess(channel.values.size(), 0.0);
+  const std::size_t size = channel.values.size();
+  Steps steps{std::vector<double>(size, 0.0), std::vector<double>(size, 0.0)};
   const auto value = [&](std::size_t k) { return channel.values[samples[k]]; };
+  const double rows_of_a_step = static_cast<double>(size) / static_cast<double>(samples.size());
   constexpr std::size_t kSlope = 4;
+  std::vector<double> moving;
   for (std::size_t k = kSlope + 1; k + kSlope < samples.size(); ++k) {
     const double before = (value(k - 1) - value(k - 1 - kSlope)) / kSlope;
     const double after = (value(k + kSlope) - value(k)) / kSlope;
-    excess[samples[k]] = std::abs(value(k) - value(k - 1) - 0.5 * (before + after));
+    const double step = value(k) - value(k - 1);
+    const double speed = 0.5 * (before + after);
+    steps.excess[samples[k]] = std::abs(step - speed);
+    steps.rows[samples[k]] = speed != 0.0 ? rows_of_a_step * step / speed : 0.0;
+    if (step != speed) moving.push_back(std::abs(step - speed));
   }
-  return excess;
+  if (moving.size() < kFewSteps) return {};
+  const double usual = quantile(std::move(moving), kCutQuantile) + code;
+  for (double& each : steps.excess) each /= usual;
+  return steps;
+}
+
+/// The number of rows on which two channels that jump near a sample agree; 0 if none do.
+double missing_rows(const std::vector<Steps>& channels, std::size_t sample) {
+  std::vector<double> rows;
+  for (const Steps& steps : channels) {
+    // A held channel shows the cut at its next new sample.
+    const std::size_t end = std::min(steps.excess.size(), sample + kCutNeighbourhood + 1);
+    std::size_t highest = sample;
+    for (std::size_t i = sample; i < end; ++i)
+      if (steps.excess[i] > steps.excess[highest]) highest = i;
+    if (steps.excess[highest] > kOverQuantile) rows.push_back(steps.rows[highest]);
+  }
+  std::ranges::sort(rows);
+  for (std::size_t k = 1; k < rows.size(); ++k)
+    if (rows[k - 1] >= kFewRows && rows[k] <= kAgree * rows[k - 1])
+      return std::sqrt(rows[k - 1] * rows[k]);
+  return 0.0;
 }
 
 }  // namespace
+
+std::vector<std::size_t> new_samples(const Channel& channel) {
+  std::vector<std::size_t> samples;
+  for (std::size_t i = 0; i < channel.values.size(); ++i)
+    if (channel.is_fresh(i) && is_finite(channel.values[i])) samples.push_back(i);
+  return samples;
+}
 
 NoiseCourse noise_course(const Channel& channel, double sample_rate_Hz) {
   NoiseCourse course;
@@ -83,6 +118,10 @@ NoiseCourse noise_course(const Channel& channel, double sample_rate_Hz) {
   }
   course.samples.push_back(channel.values.size());
   return course;
+}
+
+double usual_noise(const NoiseCourse& course) {
+  return course.sigma.empty() ? 0.0 : quantile(course.sigma, 0.5);
 }
 
 std::optional<Burst> find_burst(const NoiseCourse& course, double sample_rate_Hz, double least) {
@@ -136,7 +175,7 @@ std::optional<RepeatedBlock> find_repeat(const std::vector<const Channel*>& chan
   for (const Channel* channel : channels)
     for (std::size_t i = 0; i < rows; ++i)
       row[i] = mixed(row[i], std::bit_cast<std::uint64_t>(channel->values[i]));
-  std::unordered_map<std::uint64_t, std::size_t> first;  // of the blocks before
+  std::unordered_map<std::uint64_t, std::size_t> first;  // rows where the blocks begin
   RepeatedBlock longest;
   for (std::size_t i = 0; i + kHashedRows <= rows; ++i) {
     std::uint64_t block = 0;
@@ -164,34 +203,29 @@ std::optional<RepeatedBlock> find_repeat(const std::vector<const Channel*>& chan
   return longest.length >= shortest ? std::optional(longest) : std::nullopt;
 }
 
-std::optional<std::size_t> find_cut(const std::vector<const Channel*>& channels,
-                                    const std::vector<double>& codes) {
-  if (channels.empty()) return {};
-  const std::size_t rows = channels.front()->values.size();
-  std::vector<std::vector<double>> heights;
-  for (std::size_t c = 0; c < channels.size(); ++c) {
-    std::vector<double> excess = excess_steps(*channels[c]);
-    std::vector<double> moving;
-    for (const double each : excess)
-      if (each > 0.0) moving.push_back(each);
-    if (moving.size() < 100) continue;
-    const double usual = quantile(std::move(moving), kCutQuantile) + codes[c];
-    for (double& each : excess) each /= usual;
-    heights.push_back(std::move(excess));
-  }
-  // A held channel shows the cut at its next new sample.
-  const auto is_high = [&](const std::vector<double>& height, std::size_t i) {
-    for (std::size_t k = i; k < std::min(rows, i + kCutNeighbourhood + 1); ++k)
-      if (height[k] > kOverQuantile) return true;
-    return false;
-  };
-  std::optional<std::size_t> cut;
+std::optional<Cut> find_cut(const std::vector<const Channel*>& channels,
+                            const std::vector<double>& codes) {
+  std::vector<Steps> jumps;
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    if (auto steps = steps_of(*channels[c], codes[c])) jumps.push_back(*std::move(steps));
+  std::optional<Cut> cut;
+  const std::size_t rows = jumps.size() < 2 ? 0 : channels.front()->values.size();
   for (std::size_t i = 0; i < rows; ++i) {
-    if (std::ranges::count_if(heights, [&](const auto& h) { return h[i] > kOverQuantile; }) == 0 ||
-        std::ranges::count_if(heights, [&](const auto& h) { return is_high(h, i); }) < 2)
+    if (std::ranges::none_of(jumps, [&](const Steps& s) { return s.excess[i] > kOverQuantile; }))
       continue;
-    if (cut && i > *cut + 2 * kCutNeighbourhood) return {};  // it occurs often: the motion is so
-    if (!cut) cut = i;
+    const double missing = missing_rows(jumps, i);
+    if (missing == 0.0) continue;
+    if (cut && i > cut->sample + 2 * kCutNeighbourhood) return {};  // the motion is like that
+    if (cut) continue;
+    // The speed after an earlier sample contains the jump, too.
+    const auto height = [&](std::size_t k) {
+      double highest = 0.0;
+      for (const Steps& steps : jumps) highest = std::max(highest, steps.excess[k]);
+      return highest;
+    };
+    cut = Cut{.sample = i, .rows = missing};
+    for (std::size_t k = i; k < std::min(rows, i + kCutNeighbourhood); ++k)
+      if (height(k) > height(cut->sample)) cut->sample = k;
   }
   return cut;
 }

@@ -8,13 +8,19 @@
 
 namespace torsio {
 
+/// Indices of the samples that are new and finite.
+[[nodiscard]] std::vector<std::size_t> new_samples(const Channel& channel);
+
 /// Standard deviation of the white noise of a channel in successive windows, from third
 /// differences of new samples: sigma^2 = mean((d3 x)^2) / 20. A motion has small ones.
 struct NoiseCourse {
-  std::vector<double> sigma;         ///< of each window
-  std::vector<std::size_t> samples;  ///< at which the windows begin; one more than windows
+  std::vector<double> sigma;         ///< one for each window
+  std::vector<std::size_t> samples;  ///< where the windows begin, and the end of the last one
 };
 [[nodiscard]] NoiseCourse noise_course(const Channel& channel, double sample_rate_Hz);
+
+/// The median over the windows.
+[[nodiscard]] double usual_noise(const NoiseCourse& course);
 
 /// Successive windows of at least 0.3 s whose noise is far above that of nine tenths of the others.
 struct Burst {
@@ -41,10 +47,15 @@ struct RepeatedBlock {
 [[nodiscard]] std::optional<RepeatedBlock> find_repeat(const std::vector<const Channel*>& channels,
                                                        std::size_t shortest);
 
-/// The sample before which rows are missing: at least two channels jump there at the same time, by
-/// far more than their speeds before and after explain, and nowhere else.
+/// Rows that are missing before a sample.
+struct Cut {
+  std::size_t sample = 0;
+  double rows = 0.0;  ///< about how many
+};
+/// At least two channels jump at the same moment, by what they pass through in the same number of
+/// rows at their speeds there; nowhere else.
 /// @param codes resolution of each channel
-[[nodiscard]] std::optional<std::size_t> find_cut(const std::vector<const Channel*>& channels,
-                                                  const std::vector<double>& codes);
+[[nodiscard]] std::optional<Cut> find_cut(const std::vector<const Channel*>& channels,
+                                          const std::vector<double>& codes);
 
 }  // namespace torsio

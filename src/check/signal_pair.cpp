@@ -14,6 +14,21 @@ constexpr std::size_t kJumpNeighbourhood = 3;
 constexpr double kReversalShare = 0.05;
 constexpr double kRestShare = 0.05;
 
+/// Standard deviation of white noise, from the median of third differences.
+double white_noise(const std::vector<double>& values) {
+  constexpr double kMedianOverSigma = 0.6745;
+  std::vector<double> thirds;
+  for (std::size_t i = 3; i < values.size(); ++i)
+    if (const double third =
+            std::abs(values[i] - 3.0 * values[i - 1] + 3.0 * values[i - 2] - values[i - 3]);
+        is_finite(third))
+      thirds.push_back(third);
+  if (thirds.empty()) return 0.0;
+  const auto middle = thirds.begin() + static_cast<std::ptrdiff_t>(thirds.size() / 2);
+  std::ranges::nth_element(thirds, middle);
+  return *middle / (kMedianOverSigma * std::sqrt(20.0));
+}
+
 }  // namespace
 
 Extent extent_of(const std::vector<double>& values) {
@@ -112,7 +127,10 @@ bool is_odd_one_out(const Rest& rest, const std::vector<Rest>& rests, const Chan
   constexpr double kLittle = 0.02;  // share of the other's range
   constexpr double kTogether = 0.9;
   constexpr double kFewCodes = 5.0;
-  const double moved = share_moved(other, rest);
+  constexpr double kNoiseRange = 6.0;  // over the standard deviation, in hundreds of samples
+  const double whole = extent_of(other.values).width();
+  const double moved = share_moved(other, rest) -
+                       (whole > 0.0 ? kNoiseRange * white_noise(other.values) / whole : 0.0);
   return moved >= kLittle &&
          moved * extent_of(channel.values).width() >= kFewCodes * finest_step(channel) &&
          std::abs(correlation(channel.values, other.values)) >= kTogether &&

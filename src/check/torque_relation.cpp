@@ -18,11 +18,13 @@ constexpr double kShortestPart = 0.05;  ///< share of the recording
 constexpr double kFlipShare = 0.05;     ///< share of the ranges that each part passes through
 constexpr double kFlipCodes = 5.0;
 constexpr std::size_t kCandidates = 80;
-constexpr std::size_t kFewReversals = 2;
+constexpr std::size_t kFewReversals = 3;
 constexpr std::size_t kFewSamples = 200;
 constexpr double kChangeLeaves = 0.25;  ///< share of what is unexplained without the change
 constexpr double kOffsetShare = 0.05;   ///< share of the torque's range
 constexpr double kSlopeChange = 0.12;
+constexpr double kSmallRest = 0.01;  ///< share of the torque's variance
+constexpr std::size_t kManyReversals = 5;
 constexpr double kPartShare = 0.2;  ///< share of the input's range that each part passes through
 
 /// Running sums of one part of a record.
@@ -52,25 +54,35 @@ std::pair<double, double> passed(const Pair& pair, std::size_t begin, std::size_
   return {input.width(), target.width()};
 }
 
-/// Whether the input passes through a good part of its range and reverses, before and after.
-bool is_excited(const std::vector<double>& input, std::size_t begin, std::size_t end,
-                double width) {
-  const std::vector<double> part(input.begin() + static_cast<std::ptrdiff_t>(begin),
-                                 input.begin() + static_cast<std::ptrdiff_t>(end));
-  return extent_of(part).width() > kPartShare * width && count_reversals(part) > 0;
+/// Whether input and target pass through a good part of their ranges in [begin, end), and the input
+/// reverses there.
+bool is_excited(const Pair& pair, std::size_t begin, std::size_t end, double input_width,
+                double target_width) {
+  const auto [input, target] = passed(pair, begin, end);
+  const std::vector<double> part(pair.input.begin() + static_cast<std::ptrdiff_t>(begin),
+                                 pair.input.begin() + static_cast<std::ptrdiff_t>(end));
+  return input > kPartShare * input_width && target > kPartShare * target_width &&
+         count_reversals(part) > 0;
 }
 
 /// What one course over time (0 early, 1 late) of offset and slope explains of a rest.
 struct Explained {
-  double share = 1.0;  ///< of the variance of the rest that remains
+  double share = 1.0;  ///< share of the variance of the rest that remains
   double offset = 0.0;
   double slope = 0.0;  ///< per unit of the scaled input
+  double mean = 0.0;   ///< mean value of the course
 };
 
 class Course {
  public:
   Course(const Eigen::MatrixXd& columns, const Eigen::VectorXd& target)
-      : columns_(columns), z_(columns.col(1)), rest_(columns_.residual(target)) {}
+      : columns_(columns),
+        z_(columns.col(1)),
+        rest_(columns_.residual(target)),
+        unexplained_(share_of_variance(rest_, target)) {}
+
+  /// Share of the variance of the target that a fit without a change leaves.
+  [[nodiscard]] double unexplained() const { return unexplained_; }
 
   [[nodiscard]] Explained explained_by(const Eigen::VectorXd& course) const {
     Eigen::MatrixXd extra(rest_.size(), 2);
@@ -82,13 +94,15 @@ class Course {
     const Eigen::Vector2d solution = normal.inverse() * moment;
     const double all = rest_.squaredNorm();
     if (!(all > 0.0)) return {};
-    return {std::max(0.0, 1.0 - solution.dot(moment) / all), solution(0), solution(1)};
+    return {std::max(0.0, 1.0 - solution.dot(moment) / all), solution(0), solution(1),
+            course.mean()};
   }
 
  private:
   FixedColumns columns_;
   Eigen::VectorXd z_;
   Eigen::VectorXd rest_;
+  double unexplained_ = 1.0;
 };
 
 double median_of(std::vector<double> values) {
@@ -97,7 +111,7 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// Slope of the straight line through target over z.
+/// Slope of the target over z, by least squares.
 double slope_over(const Eigen::VectorXd& z, const Eigen::VectorXd& target) {
   const Eigen::VectorXd varying = z.array() - z.mean();
   const double variance = varying.squaredNorm();
@@ -131,8 +145,8 @@ std::optional<SignFlip> find_sign_flip(const Pair& pair, double input_code, doub
       std::max(kFlipShare * extent_of(pair.input).width(), kFlipCodes * input_code);
   const double target_least =
       std::max(kFlipShare * extent_of(pair.target).width(), kFlipCodes * target_code);
-  for (const auto& [begin, end] : {std::pair<std::size_t, std::size_t>{0, flip.sample},
-                                   {flip.sample, pair.input.size()}}) {
+  for (const auto& [begin, end] :
+       {std::pair<std::size_t, std::size_t>{0, flip.sample}, {flip.sample, pair.input.size()}}) {
     const auto [input, target] = passed(pair, begin, end);
     if (!(input >= input_least) || !(target >= target_least)) return {};
   }
@@ -140,8 +154,8 @@ std::optional<SignFlip> find_sign_flip(const Pair& pair, double input_code, doub
 }
 
 std::optional<RelationChange> find_relation_change(const Pair& pair) {
-  if (correlation(pair.input, pair.target) < kClearCorrelation ||
-      count_reversals(pair.input) < kFewReversals)
+  const std::size_t reversals = count_reversals(pair.input);
+  if (correlation(pair.input, pair.target) < kClearCorrelation || reversals < kFewReversals)
     return {};
   std::vector<double> known = pair.input;
   for (std::size_t i = 0; i < known.size(); ++i)
@@ -151,17 +165,20 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
   const Eigen::MatrixXd columns = hysteresis_columns(pair.input, samples);
   const Eigen::VectorXd target = at_samples(pair.target, samples);
   const Course course(columns, target);
-  std::vector<double> input;
-  for (const std::size_t i : samples) input.push_back(pair.input[i]);
-  const double width = extent_of(input).width();
+  Pair coarse;
+  for (const std::size_t i : samples)
+    coarse.input.push_back(pair.input[i]), coarse.target.push_back(pair.target[i]);
+  const std::size_t size = coarse.input.size();
+  const auto [input_width, target_width] = passed(coarse, 0, size);
   Eigen::VectorXd late(target.size());
   for (Eigen::Index i = 0; i < late.size(); ++i)
     late(i) = static_cast<double>(i) / static_cast<double>(late.size());
   Explained best = course.explained_by(late);
   RelationChange change{.is_gradual = true};
   for (std::size_t k = 1; k < kCandidates; ++k) {
-    const std::size_t split = input.size() * k / kCandidates;
-    if (!is_excited(input, 0, split, width) || !is_excited(input, split, input.size(), width))
+    const std::size_t split = size * k / kCandidates;
+    if (!is_excited(coarse, 0, split, input_width, target_width) ||
+        !is_excited(coarse, split, size, input_width, target_width))
       continue;
     for (Eigen::Index i = 0; i < late.size(); ++i)
       late(i) = i < static_cast<Eigen::Index>(split) ? 0.0 : 1.0;
@@ -169,15 +186,17 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
     if (explained.share < best.share)
       best = explained, change = {.is_gradual = false, .sample = samples[split]};
   }
-  if (best.share > kChangeLeaves) return {};
+  // A motion that hardly repeats has another torque on each stroke: then the rest must vanish.
+  const double rest = best.share * course.unexplained();
+  if (best.share > kChangeLeaves || (rest > kSmallRest && reversals < kManyReversals)) return {};
   change.offset = best.offset;
-  // The fit without a change has the mean slope of early and late.
-  const double mean = slope_over(columns.col(1), target);
-  const double early = mean - 0.5 * best.slope;
-  const double late_slope = mean + 0.5 * best.slope;
+  // The slope without a change is the mean of early and late, each as long as it lasts.
+  const double early = slope_over(columns.col(1), target) - best.mean * best.slope;
+  const double late_slope = early + best.slope;
   change.slope_ratio = early > 0.0 && late_slope > 0.0 ? late_slope / early : 1.0;
   const double by_slope = std::abs(change.slope_ratio - 1.0) / kSlopeChange;
-  const double by_offset = std::abs(change.offset) / (kOffsetShare * extent_of(pair.target).width());
+  const double by_offset =
+      std::abs(change.offset) / (kOffsetShare * extent_of(pair.target).width());
   change.is_of_slope = by_slope > by_offset;
   return std::max(by_slope, by_offset) >= 1.0 ? std::optional(change) : std::nullopt;
 }
@@ -227,11 +246,11 @@ std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
   const double slope = slope_over(columns.col(1), target);
   std::vector<RecordLine> lines;
   for (std::size_t r = 0; r < pairs.size(); ++r)
-    lines.push_back({.offset = offsets[r] - usual_offset +
-                               (slopes[r] - usual_slope) * parts[r].col(1).mean(),
-                     .slope = slope != 0.0 ? 1.0 + (slopes[r] - usual_slope) / slope : 1.0,
-                     .unexplained = with_lines,
-                     .without_lines = without_lines});
+    lines.push_back(
+        {.offset = offsets[r] - usual_offset + (slopes[r] - usual_slope) * parts[r].col(1).mean(),
+         .slope = slope != 0.0 ? 1.0 + (slopes[r] - usual_slope) / slope : 1.0,
+         .unexplained = with_lines,
+         .without_lines = without_lines});
   return lines;
 }
 

@@ -42,10 +42,10 @@ struct RelationChange {
 [[nodiscard]] std::optional<RelationChange> find_relation_change(const Pair& pair);
 
 /// Offset and slope of the torque of each recording at common inputs: all recordings are fitted by
-/// one static curve with hysteresis, and by a straight line for each.
+/// one static curve with hysteresis, and by an offset and a slope for each.
 struct RecordLine {
-  double offset = 0.0;  ///< over its inputs, minus that of the usual (median) recording
-  double slope = 1.0;   ///< over that of the usual recording
+  double offset = 0.0;         ///< over its inputs, minus that of the usual (median) recording
+  double slope = 1.0;          ///< over that of the usual recording
   double unexplained = 1.0;    ///< share of the variance of all targets
   double without_lines = 1.0;  ///< the same for the common curve alone
 };

@@ -50,8 +50,8 @@ Recording hysteretic(double frequency_Hz, double slip_Nm, double elastic_rad, st
 TEST(CheckDelay, DoesNotTakeHysteresisForADelay) {
   for (const double elastic_rad : {0.004, 0.02, 0.05}) {
     const auto findings = findings_of(alone(hysteretic(0.5, 3.0, elastic_rad, 0)));
-    EXPECT_EQ(verdict_of(findings, "delay"), Verdict::pass)
-        << elastic_rad << '\n' << text_of(findings);
+    EXPECT_EQ(verdict_of(findings, "delay"), Verdict::pass) << elastic_rad << '\n'
+                                                            << text_of(findings);
   }
 }
 
@@ -81,9 +81,7 @@ TEST(CheckDelay, CannotBeDeterminedFromASlowMotion) {
       << first_of(findings, "delay").message;
 }
 
-Recording sweep() {
-  return simulate({.actuator = "dfki-28", .experiment = "sweep", .seed = 3});
-}
+Recording sweep() { return simulate({.actuator = "dfki-28", .experiment = "sweep", .seed = 3}); }
 
 TEST(CheckDelay, OfOneOfTwoAnglesIsReportedWithItsName) {
   for (const std::string name : {"gear_angle_rad", "joint_angle_rad"}) {
@@ -105,8 +103,7 @@ TEST(CheckUnits, FailOnAWrongGearRatio) {
         for (double& value : channel.values) value *= 1.1;
       })));
   ASSERT_EQ(verdict_of(findings, "units"), Verdict::fail);
-  EXPECT_NE(first_of(findings, "units").message.find("gear_angle_rad moves 1.1"),
-            std::string::npos)
+  EXPECT_NE(first_of(findings, "units").message.find("gear_angle_rad moves 1.1"), std::string::npos)
       << first_of(findings, "units").message;
 }
 
@@ -139,8 +136,8 @@ TEST(CheckColumns, WarnWhereTheCurrentFollowsTheDeflectionMoreCloselyThanTheTorq
 
 TEST(CheckSign, IgnoresAPartThatHardlyMoves) {
   // At the end the joint is held: within a thousandth of the range friction reverses the relation.
-  Recording recording = with_channel(
-      bench_recording("held", {.noise_Nm = 0.0}), "torque_Nm", [](Channel& channel) {
+  Recording recording =
+      with_channel(bench_recording("held", {.noise_Nm = 0.0}), "torque_Nm", [](Channel& channel) {
         for (std::size_t i = 3000; i < 4000; ++i) {
           const double phase = 0.02 * static_cast<double>(i - 3000);
           channel.values[i] = channel.values[3000] - 0.02 * std::sin(phase);
@@ -159,7 +156,9 @@ TEST(CheckSign, IgnoresAPartThatHardlyMoves) {
 }
 
 TEST(CheckChange, IsFoundForAGainThatChangesByAThird) {
-  const auto findings = findings_of(alone(with_channel(sweep(), "torque_Nm", [](Channel& channel) {
+  const Recording sound = simulate({.actuator = "dfki-50", .experiment = "sweep", .seed = 3});
+  EXPECT_EQ(verdict_of(findings_of(alone(sound)), "change"), Verdict::pass);
+  const auto findings = findings_of(alone(with_channel(sound, "torque_Nm", [](Channel& channel) {
     for (std::size_t i = channel.values.size() / 2; i < channel.values.size(); ++i)
       channel.values[i] *= 1.3;
   })));
@@ -168,8 +167,8 @@ TEST(CheckChange, IsFoundForAGainThatChangesByAThird) {
 
 TEST(CheckChange, IsNotReportedForRelaxationAtRest) {
   for (const char* variant : {"elastomer", "elastomer:unbonded"}) {
-    const auto findings = findings_of(
-        alone(simulate({.actuator = variant, .experiment = "hold", .seed = 101})));
+    const auto findings =
+        findings_of(alone(simulate({.actuator = variant, .experiment = "hold", .seed = 101})));
     EXPECT_EQ(verdict_of(findings, "change"), Verdict::pass) << variant << text_of(findings);
   }
 }
@@ -183,8 +182,7 @@ Recording softening(const std::string& name, double middle_rad, double offset_Nm
   for (std::size_t n = 0; n < 8000; ++n) {
     const double x = middle_rad + 0.03 * std::sin(3e-3 * static_cast<double>(n));
     deflection.values.push_back(x);
-    torque.values.push_back(gain * 20.0 * std::tanh(x / 0.03) + offset_Nm +
-                            0.02 * random.normal());
+    torque.values.push_back(gain * 20.0 * std::tanh(x / 0.03) + offset_Nm + 0.02 * random.normal());
   }
   Recording recording(name, 1000.0);
   recording.add(std::move(deflection));
@@ -209,8 +207,7 @@ TEST(CheckOffsets, NameTheRecordWithAnotherGain) {
   const auto findings = compared(softening("third", 0.01, 0.0, 1.3));
   ASSERT_EQ(verdict_of(findings, "offsets"), Verdict::warn);
   EXPECT_EQ(first_of(findings, "offsets").recording, "third");
-  EXPECT_NE(first_of(findings, "offsets").message.find("times as steeply"), std::string::npos)
-      << first_of(findings, "offsets").message;
+  EXPECT_NE(text_of(findings).find("times as steeply"), std::string::npos) << text_of(findings);
 }
 
 TEST(CheckOffsets, FailWhereAZeroIsFurtherAwayThanTheTorqueReaches) {

@@ -47,7 +47,7 @@ TEST(CheckSignals, MeasureTheCodesOfAnEncoderBeforeItWasResampled) {
       "coarse", 8000, [](double t_s) { return rounded(0.011 * triangle(t_s), 1e-3); },
       [](double t_s) { return 5.0 * triangle(t_s); });
   const Recording even = resample(raw, 737.0);
-  EXPECT_DOUBLE_EQ(even.channel("spring_deflection_rad").step_before_resampling, 1e-3);
+  EXPECT_NEAR(even.channel("spring_deflection_rad").step_before_resampling, 1e-3, 1e-9);
   const auto findings = findings_of(alone(even));
   ASSERT_EQ(verdict_of(findings, "resolution"), Verdict::warn);
   EXPECT_NE(first_of(findings, "resolution").message.find("only 22 such steps"), std::string::npos)
@@ -86,8 +86,8 @@ TEST(CheckSignals, ReportNeitherAStallNorALimitWhereFrictionHoldsTheJointAtATurn
 
 TEST(CheckSignals, StillReportALimitThatHidesTheRestOfTheMotion) {
   Recording recording = with_dwell(0.0);
-  const auto findings = findings_of(
-      alone(with_channel(recording, "spring_deflection_rad", [](Channel& channel) {
+  const auto findings =
+      findings_of(alone(with_channel(recording, "spring_deflection_rad", [](Channel& channel) {
         for (double& value : channel.values) value = std::min(value, 0.04);
       })));
   EXPECT_EQ(verdict_of(findings, "saturation"), Verdict::warn);
@@ -149,8 +149,7 @@ TEST(CheckSignals, WarnOfSingleSamplesFarFromTheirNeighbours) {
 Recording with_rows(const std::function<void(std::vector<double>&)>& change) {
   Recording recording = noisy_bench();
   for (const std::string name : {"gear_angle_rad", "joint_angle_rad", "torque_Nm"})
-    recording =
-        with_channel(recording, name, [&](Channel& channel) { change(channel.values); });
+    recording = with_channel(recording, name, [&](Channel& channel) { change(channel.values); });
   return recording;
 }
 
