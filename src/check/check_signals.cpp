@@ -46,7 +46,6 @@ void Checker::check_columns() {
         if (!other.allFinite()) continue;
         const double left = columns.unexplained(other);
         if (left > kWellExplained || left > kOtherExplained * own) continue;
-        spoiled_[r] = 1;
         add(Verdict::warn, "columns", recording.name(),
             fmt::format("{} follows {} more closely than {} does ({:.2g} and {:.2g} % unexplained)",
                         channel.name, spec_.inputs.front(), dataset_.target, 100.0 * left,
@@ -197,7 +196,7 @@ void Checker::check_twist(std::size_t r) {
   std::ranges::sort(sorted);
   const auto outer = static_cast<std::size_t>(kOuter * static_cast<double>(sorted.size()));
   const double width = sorted[sorted.size() - 1 - outer] - sorted[outer];
-  if (width < std::numbers::pi) return;
+  if (width < kWidestTwist_rad) return;
   spoiled_[r] = 1;
   add(Verdict::warn, "units", dataset_.records[r].recording.name(),
       fmt::format("{} ranges through {:.3g} rad, {:.2g} turns", spec_.inputs.front(), width,

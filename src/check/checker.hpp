@@ -149,6 +149,7 @@ class Checker {
   static constexpr double kSpikeShare = 0.05;  ///< share of the range
   static constexpr double kRepeat_s = 0.25;
   static constexpr std::size_t kRepeatRows = 50;
+  static constexpr double kWidestTwist_rad = 1.5;
   static constexpr double kOuter = 0.01;          ///< share of the samples on either side
   static constexpr double kOtherExplained = 0.3;  ///< share of what is unexplained of the target
   static constexpr double kWellExplained = 0.02;  ///< share of the variance

@@ -16,7 +16,8 @@ constexpr double kExplainsLittle = 0.2;  ///< share of the variance: there is no
 constexpr double kLateShare = 0.87;      ///< share of the rest without shift
 constexpr double kClearLag_s = 0.02;
 constexpr double kRise = 0.15;
-constexpr double kMaxRise = 20.0;
+constexpr double kMaxRise = 8.0;
+constexpr double kLongestLead_s = 0.1;
 constexpr double kEarlyShare = 0.4;
 constexpr double kEarlyRest = 0.01;
 constexpr double kShortest_s = 8e-3;
@@ -107,7 +108,7 @@ bool is_late(const Delay& delay, double sample_rate_Hz) {
 }
 
 bool is_early(const Delay& delay, double sample_rate_Hz) {
-  return delay.lag_s <= -shortest_lag_s(sample_rate_Hz) && !delay.is_at_end &&
+  return delay.lag_s <= -shortest_lag_s(sample_rate_Hz) && delay.lag_s >= -kLongestLead_s &&
          delay.unexplained <= kEarlyRest &&
          delay.unexplained <=
              std::min(kEarlyShare, greatest_share(delay.lag_s)) * delay.without_shift;

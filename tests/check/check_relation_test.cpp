@@ -107,7 +107,7 @@ TEST(CheckUnits, FailOnAWrongGearRatio) {
       << first_of(findings, "units").message;
 }
 
-TEST(CheckUnits, WarnOfADeflectionOfMoreThanHalfATurn) {
+TEST(CheckUnits, WarnOfADeflectionOfMoreThanOneAndAHalfRadians) {
   Recording degrees = sweep();
   for (const std::string name : {"gear_angle_rad", "joint_angle_rad"})
     degrees = with_channel(degrees, name, [](Channel& channel) {
