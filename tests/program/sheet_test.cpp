@@ -4,8 +4,6 @@
 namespace torsio::test {
 namespace {
 
-constexpr int kCallWasWrong = 2;
-
 class SheetFiles : public Program {
  protected:
   static void expect_refusal(const Outcome& outcome, const std::string& text) {
