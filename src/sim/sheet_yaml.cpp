@@ -235,6 +235,7 @@ void read_curve(const YamlValue& yaml, const YamlValue& values, DataSheet& sheet
 /// The built-in sheet of a family, for its stages and variants.
 DataSheet family_from(const YamlValue& yaml) {
   std::vector<std::string> names;
+  names.reserve(kFamilies.size());
   for (const auto& [name, family] : kFamilies) names.emplace_back(name);
   const std::string text = chosen(yaml, names);
   const auto* const family =
