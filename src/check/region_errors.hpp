@@ -20,7 +20,7 @@ struct RegionKey {
   int amplitude = 0;  ///< 0: from the half range down to half of it, 1: down to a quarter, ...
   int frequency = 0;  ///< a factor of 3 each
   int centre = 0;     ///< -1, 0, 1: below, about and above the middle of the range
-  auto operator<=>(const RegionKey&) const = default;
+  auto operator<=>(const RegionKey&) const = default;  // NOLINT(modernize-use-nullptr): clang 14
 };
 
 inline constexpr int kSmallestAmplitude = 4;
