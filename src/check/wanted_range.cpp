@@ -78,7 +78,7 @@ WantedRange parse_wanted(const std::string& text, const Dataset& dataset, const 
     throw UsageError({.place = std::string(kPlace) + " " + name,
                       .expected = "a range LOWEST:HIGHEST",
                       .found = range});
-  const WantedRange wanted{
+  WantedRange wanted{
       .quantity = name,
       .lowest = colon == std::string::npos ? 0.0 : number(range.substr(0, colon)),
       .highest = number(colon == std::string::npos ? range : range.substr(colon + 1))};
