@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "data/canonical_channels.hpp"
+#include "data/channel_names.hpp"
 #include "data/csv_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "data/names.hpp"
@@ -89,8 +90,7 @@ void derive_target(Recording& recording, const std::string& target) {
 
 /// A source need not be recorded, but one that is must not be missed because of its spelling.
 void check_computed_from(const Mapping& mapping, const Recording& recording) {
-  std::vector<std::string> names;
-  for (const Channel& channel : recording.channels()) names.push_back(channel.name);
+  const std::vector<std::string> names = channel_names(recording.channels());
   const auto check = [&](const std::string& name, const std::string& key) {
     const std::string advice = recording.has(name) ? "" : did_you_mean(name, names);
     if (advice.empty()) return;

@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "data/channel_names.hpp"
 #include "data/columns.hpp"
 #include "data/csv_table.hpp"
 #include "data/measured_recordings.hpp"
@@ -81,9 +82,7 @@ Channel& channel_of_rule(std::vector<Channel>& channels, const std::string& name
                          const Mapping& mapping, const std::string& key) {
   const auto at = std::ranges::find(channels, name, &Channel::name);
   if (at != channels.end()) return *at;
-  std::vector<std::string> names;
-  names.reserve(channels.size());
-  for (const Channel& channel : channels) names.push_back(channel.name);
+  const std::vector<std::string> names = channel_names(channels);
   const bool is_derived =
       std::ranges::find(mapping.derive, name, &ChannelDefinition::name) != mapping.derive.end();
   throw Error({.place = mapping.file + ": " + key,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "data/channel_names.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -27,8 +28,7 @@ bool Recording::has(std::string_view channel) const noexcept {
 const Channel& Recording::channel(std::string_view name) const {
   const auto at = std::ranges::find(channels_, name, &Channel::name);
   if (at != channels_.end()) return *at;
-  std::vector<std::string> names;
-  for (const Channel& channel : channels_) names.push_back(channel.name);
+  const std::vector<std::string> names = channel_names(channels_);
   throw Error({.place = name_,
                .problem = fmt::format("there is no channel '{}'", name),
                .found = "the channels " + joined(names),

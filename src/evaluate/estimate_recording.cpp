@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/report_progress.hpp"
+#include "data/channel_names.hpp"
 #include "data/text_sink.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/realtime.hpp"
@@ -27,12 +28,6 @@ std::string cell(std::string_view text) {
   return quoted + "\"";
 }
 
-std::vector<std::string> names_of(const Recording& recording) {
-  std::vector<std::string> names;
-  for (const Channel& channel : recording.channels()) names.push_back(channel.name);
-  return names;
-}
-
 bool has_novelty(const std::vector<EstimatedRecording>& recordings) {
   return std::ranges::any_of(recordings, [](const EstimatedRecording& each) {
     return std::ranges::any_of(each.channels.channel(kNovelty).values,
@@ -42,7 +37,8 @@ bool has_novelty(const std::vector<EstimatedRecording>& recordings) {
 
 void check_equal_channels(const std::vector<EstimatedRecording>& recordings) {
   for (const EstimatedRecording& each : recordings)
-    if (names_of(each.channels) != names_of(recordings.front().channels))
+    if (channel_names(each.channels.channels()) !=
+        channel_names(recordings.front().channels.channels()))
       throw Error(
           {.place = each.channels.name(),
            .problem = "its channels differ from those of " + recordings.front().channels.name()});
@@ -128,7 +124,7 @@ void write_estimates(const std::vector<EstimatedRecording>& recordings, const st
   check_equal_channels(recordings);
   OutputFile file = path == "-" ? OutputFile::standard_output() : OutputFile(path);
   TextSink text(file, path.ends_with(".gz"));
-  std::vector<std::string> columns = names_of(recordings.front().channels);
+  std::vector<std::string> columns = channel_names(recordings.front().channels.channels());
   if (!has_novelty(recordings)) std::erase(columns, kNovelty);
   text.add("t_s");
   for (const std::string& column : columns) {

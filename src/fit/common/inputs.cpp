@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "data/canonical_channels.hpp"
+#include "data/channel_names.hpp"
 #include "data/needed_definitions.hpp"
 #include "numerics/least_squares.hpp"
 #include "torsio/core/did_you_mean.hpp"
@@ -74,12 +75,6 @@ std::vector<ChannelDefinition> known_definitions(const Dataset& dataset) {
         is_computable(dataset, definitions, channel.expression))
       definitions.push_back({std::string(channel.name), std::string(channel.expression)});
   return definitions;
-}
-
-std::vector<std::string> channel_names(const Recording& recording) {
-  std::vector<std::string> names;
-  for (const Channel& channel : recording.channels()) names.push_back(channel.name);
-  return names;
 }
 
 /// Whether target = slope * input + offset to one part in 10^9 of the variance, over all fresh
@@ -157,7 +152,7 @@ bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
 
 [[noreturn]] void refuse_missing(const Recording& recording, const std::string& channel,
                                  const std::vector<ChannelDefinition>& definitions) {
-  std::vector<std::string> names = channel_names(recording);
+  std::vector<std::string> names = channel_names(recording.channels());
   const std::string found = fmt::format("{}", fmt::join(names, ", "));
   for (const ChannelDefinition& definition : definitions) names.push_back(definition.name);
   const std::string nearest = did_you_mean(channel, names);
@@ -194,7 +189,7 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
   if (inputs.empty())
     throw UsageError({.place = first.name(),
                       .expected = "spring_deflection_rad, or gear_angle_rad and joint_angle_rad",
-                      .found = fmt::format("{}", fmt::join(channel_names(first), ", ")),
+                      .found = fmt::format("{}", fmt::join(channel_names(first.channels()), ", ")),
                       .advice =
                           "Name the model's inputs with --inputs, or bring the deflection in with "
                           "--mapping: derive or rename it there."});

@@ -35,7 +35,7 @@ class MotorWindings {
     if (resistance_Ohm > 0.0) windings_.resistance_Ohm = resistance_Ohm;
   }
 
-  /// @param duties share of the step in which the upper switch of each phase is on
+  /// @param command duties of the switches, and whether they are on
   /// @param angle_rad electrical, at the beginning of the step
   /// @param speed_rad_s electrical
   Step step(const CurrentController::Output& command, double supply_V, double angle_rad,
