@@ -47,7 +47,8 @@ Loop loop_of(JointMode mode) noexcept {
     case JointMode::position: return Loop::velocity;
     case JointMode::torque:
     case JointMode::impedance: return Loop::torque;
-    case JointMode::current: break;
+    case JointMode::current:
+    case JointMode::deflection: break;
   }
   return Loop::none;
 }
@@ -60,6 +61,13 @@ Loop loop_of(JointMode mode) noexcept {
 }
 
 }  // namespace
+
+bool is_finite(const JointReference& reference) noexcept {
+  return std::isfinite(reference.position_rad + reference.velocity_rad_s +
+                       reference.acceleration_rad_s2 + reference.torque_Nm + reference.current_A +
+                       reference.stiffness_Nm_rad + reference.damping_Nms_rad +
+                       reference.deflection_rad);
+}
 
 JointCascade::Gains JointCascade::gains_for(const Drive& drive, double bandwidth_rad_s) {
   const double speed_gain = drive.inertia() * bandwidth_rad_s / drive.torque_per_current();
@@ -118,6 +126,13 @@ void JointCascade::check_limits() const {
                fmt::format("more than {:.4g} rad, twice the margin for the load, between them",
                            2.0 * margin_rad_),
                fmt::format("{:.4g} to {:.4g} rad", limits.lowest_rad, limits.highest_rad));
+  const Drive& drive = settings_.drive;
+  const double reached_rad_s = drive.supply_V / (drive.torque_constant_Nm_A * drive.ratio);
+  if (!(limits.speed_rad_s < reached_rad_s))
+    contradict("the supply is below the back-EMF at the speed limit",
+               fmt::format("a speed below {:.4g} rad/s with {:.4g} V, or a higher supply",
+                           reached_rad_s, drive.supply_V),
+               fmt::format("{:.4g} rad/s", limits.speed_rad_s));
   const double largest_rad_s2 =
       settings_.drive.peak_current_A / (amperes_per_Nm_ * settings_.drive.inertia());
   const double needed_A_s =
@@ -180,6 +195,16 @@ void JointCascade::enter(JointMode mode) noexcept {
   is_switching_ = true;
 }
 
+void JointCascade::track(double applied_A) noexcept {
+  if (!std::isfinite(applied_A)) return;
+  const Loop active = loop_of(reference_.mode);
+  if (active != Loop::none && !is_switching_) {
+    Pid& loop = active == Loop::torque ? torque_ : velocity_;
+    loop.track(loop.command() + applied_A - current_A_);
+  }
+  current_A_ = applied_A;
+}
+
 JointCascade::Output JointCascade::fade() noexcept {
   velocity_.reset();
   torque_.reset();
@@ -196,11 +221,8 @@ JointCascade::Output JointCascade::fade() noexcept {
 JointCascade::Output JointCascade::step(const JointReference& reference,
                                         const JointState& measured) noexcept {
   Output output;
-  const bool is_finite =
-      std::isfinite(reference.position_rad + reference.velocity_rad_s +
-                    reference.acceleration_rad_s2 + reference.torque_Nm + reference.current_A +
-                    reference.stiffness_Nm_rad + reference.damping_Nms_rad);
-  const bool is_accepted = is_finite && is_usable(reference);
+  const bool is_number = is_finite(reference);
+  const bool is_accepted = is_number && is_usable(reference);
   if (is_accepted) {
     enter(reference.mode);
     reference_ = reference;
@@ -215,7 +237,7 @@ JointCascade::Output JointCascade::step(const JointReference& reference,
       thermal_.step(current_A_);
       output.current_A = current_A_;
       output.thermal_load = thermal_.load();
-      if (!is_finite) output.fault = Fault::input_not_finite;
+      if (!is_number) output.fault = Fault::input_not_finite;
     } else {
       output = fade();
     }
@@ -242,7 +264,8 @@ double JointCascade::wanted_current(const JointState& measured, const Bounds& sp
   Pid::Output loop;
   output.feed_forward_A = wanted.current_A;
   switch (wanted.mode) {
-    case JointMode::current: break;
+    case JointMode::current:
+    case JointMode::deflection: break;
     case JointMode::velocity:
     case JointMode::position: {
       const double position_error_rad =
@@ -335,6 +358,7 @@ std::string_view name(JointMode mode) noexcept {
     case position: return "position";
     case torque: return "torque";
     case impedance: return "impedance";
+    case deflection: return "deflection";
   }
   return "unknown";
 }

@@ -12,9 +12,16 @@ namespace {
 constexpr auto kPlace = "torque controller";
 constexpr double kTransfer_s = 0.1;  // as that of the deflection controller
 
+bool acts_on_speed(const TorqueLoopCore::Settings& settings) {
+  return settings.deflection.actuation == DeflectionController::Actuation::velocity;
+}
+
 TorqueLoopCore::Settings checked(const TorqueLoopCore::Settings& settings) {
-  if (settings.deflection.actuation != DeflectionController::Actuation::current)
-    throw Error({.place = kPlace, .expected = "a deflection controller that acts on the current"});
+  if (acts_on_speed(settings) && (settings.observer_cutoff_Hz || settings.feeds_rate_forward))
+    throw Error({.place = kPlace,
+                 .problem = "the deflection controller acts on the speed",
+                 .expected = "no disturbance observer and no feed-forward of the rate",
+                 .advice = "Leave both out, or let it act on the current."});
   require(settings.largest_torque_Nm > 0.0, kPlace, "largest_torque_Nm > 0",
           settings.largest_torque_Nm);
   if (settings.friction) {
@@ -60,7 +67,8 @@ void TorqueLoopCore::reset() noexcept {
   wanted_Nm_ = 0.0;
   is_refused_ = false;
   is_returning_ = false;
-  applied_A_ = 0.0;
+  added_A_ = 0.0;
+  applied_ = 0.0;
 }
 
 double TorqueLoopCore::accept(double wanted_Nm) noexcept {
@@ -78,17 +86,19 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
       std::isfinite(deflection_rad) && (!observer_ || std::isfinite(sample.motor_angle_rad));
   const DeflectionController::Output loop =
       deflection_.step(wanted_rad.value, is_measured ? deflection_rad : kNotMeasured);
-  Output output = {.current_A = loop.command,
-                   .wanted_torque_Nm = wanted_Nm_,
+  Output output = {.wanted_torque_Nm = wanted_Nm_,
                    .wanted_deflection_rad = loop.wanted_deflection_rad,
-                   .proportional_A = loop.proportional,
-                   .integral_A = loop.integral,
-                   .derivative_A = loop.derivative,
-                   .feed_forward_A = loop.feed_forward,
-                   .transfer_A = loop.transfer,
                    .is_limited = loop.is_limited,
                    .inverse = wanted_rad.fault,
                    .fault = is_refused_ ? Fault::input_not_finite : loop.fault};
+  const bool is_speed = acts_on_speed(settings_);
+  if (!is_speed) {
+    output.proportional_A = loop.proportional;
+    output.integral_A = loop.integral;
+    output.derivative_A = loop.derivative;
+    output.feed_forward_A = loop.feed_forward;
+    output.transfer_A = loop.transfer;
+  }
   const double rate_rad_s =
       wanted_rate_.step(wanted_Nm_) / settings_.deflection.joint.stiffness_Nm_rad;
   if (loop.is_fading) return fade(output);
@@ -99,23 +109,32 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
   if (settings_.feeds_rate_forward)
     output.rate_feed_forward_A = deflection_.gains().derivative * rate_rad_s;
   if (observer_)
-    output.observer_A = observer_->step(applied_A_, sample.motor_angle_rad, deflection_rad);
+    output.observer_A = observer_->step(applied_, sample.motor_angle_rad, deflection_rad);
   const double terms_A = output.rate_feed_forward_A + output.friction_A + output.observer_A;
   // The loop itself continues from the current that was applied; the other terms fade in.
   if (is_returning_) transfer_.add(-terms_A);
   is_returning_ = false;
   const double fading_A = transfer_.step();
   output.transfer_A += fading_A;
-  const double added_A = terms_A + fading_A;
-  const double all_A = loop.command + added_A;
+  added_A_ = terms_A + fading_A;
+  const double all_A = is_speed ? added_A_ : loop.command + added_A_;
   if (!std::isfinite(all_A)) return fade(output);
   output.current_A = std::clamp(all_A, -drive.peak_current_A, drive.peak_current_A);
-  if (output.current_A != all_A) {
-    output.is_limited = true;
-    deflection_.track(output.current_A - added_A);
+  output.is_limited = output.is_limited || output.current_A != all_A;
+  if (is_speed) {
+    output.speed_rad_s = loop.command;
+    applied_ = loop.command;
+    return output;
   }
-  applied_A_ = output.current_A;
+  if (output.current_A != all_A) deflection_.track(output.current_A - added_A_);
+  applied_ = output.current_A;
   return output;
+}
+
+void TorqueLoopCore::track(double applied) noexcept {
+  if (!std::isfinite(applied)) return;
+  applied_ = applied;
+  deflection_.track(acts_on_speed(settings_) ? applied : applied - added_A_);
 }
 
 // The whole current fades, not the deflection controller's part of it.
@@ -123,8 +142,10 @@ TorqueLoopCore::Output TorqueLoopCore::fade(Output output) noexcept {
   if (observer_) observer_->reset();
   transfer_.reset();
   is_returning_ = true;
-  applied_A_ = deflection_.fade(applied_A_);
-  return {.current_A = applied_A_,
+  applied_ = deflection_.fade(applied_);
+  const bool is_speed = acts_on_speed(settings_);
+  return {.current_A = is_speed ? 0.0 : applied_,
+          .speed_rad_s = is_speed ? applied_ : 0.0,
           .wanted_torque_Nm = output.wanted_torque_Nm,
           .wanted_deflection_rad = output.wanted_deflection_rad,
           .inverse = output.inverse,

@@ -16,6 +16,7 @@
 #include "support/examples/linear.hpp"
 #include "support/examples/mixture.hpp"
 #include "support/examples/network.hpp"
+#include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/any_estimator.hpp"
@@ -411,9 +412,20 @@ TEST(TorqueController, RefusesWhatItCannotDo) {
   EXPECT_NE(refusal([](auto& s) { s.observer_cutoff_Hz = 600.0; }), "");
   EXPECT_NE(refusal([](auto& s) { s.largest_torque_Nm = kNaN; }), "");
   EXPECT_NE(refusal([](auto& s) { s.friction = FrictionCompensation{.share = 1.5}; }), "");
-  EXPECT_NE(
-      refusal([](auto& s) { s.deflection.actuation = DeflectionController::Actuation::velocity; }),
-      "");
+  const auto acts_on_speed = [](TorqueLoopCore::Settings& s) {
+    s.deflection.actuation = DeflectionController::Actuation::velocity;
+    s.deflection.bandwidth_rad_s = 25.0;
+    s.deflection.speed_loop = JointCascade::gains_for(s.deflection.joint.drive, 100.0).velocity;
+  };
+  EXPECT_EQ(refusal(acts_on_speed), "");
+  EXPECT_NE(refusal([&](auto& s) {
+              acts_on_speed(s), s.observer_cutoff_Hz = 5.0;
+            }).find("acts on the speed"),
+            std::string::npos);
+  EXPECT_NE(refusal([&](auto& s) {
+              acts_on_speed(s), s.feeds_rate_forward = true;
+            }).find("acts on the speed"),
+            std::string::npos);
   EXPECT_NE(test::error_message([] { return LinearInverse(0.0); }), "");
 }
 

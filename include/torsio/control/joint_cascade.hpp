@@ -16,7 +16,8 @@
 
 namespace torsio {
 
-enum class JointMode : std::uint8_t { current, velocity, position, torque, impedance };
+/// `deflection` is a mode of `JointController`; a `JointCascade` rejects it.
+enum class JointMode : std::uint8_t { current, velocity, position, torque, impedance, deflection };
 
 /// The reference of a joint in one tick. A mode ignores the fields that are not listed for it, but
 /// every number must be finite: a reference is accepted as a whole or rejected.
@@ -29,7 +30,11 @@ struct JointReference {
   double current_A = 0.0;            ///< current; feed-forward in every other mode
   double stiffness_Nm_rad = 0.0;     ///< impedance, >= 0
   double damping_Nms_rad = 0.0;      ///< impedance, >= 0
+  double deflection_rad = 0.0;       ///< deflection
 };
+
+/// Whether every number is finite.
+[[nodiscard]] bool is_finite(const JointReference& reference) noexcept;
 
 /// What a joint measures: angle and speed of the side that the motor moves (rotor over ratio), and
 /// the torque that loads the motor (the spring's).
@@ -130,7 +135,7 @@ class JointCascade {
 
   /// @throws Error if the drive is impossible, a gain negative, or if the limits contradict each
   /// other: no space between them and their margins, no current left to brake with, a rate
-  /// limit that is slower than the override.
+  /// limit that is slower than the override, a speed that the supply does not reach.
   JointCascade(const Settings& settings, double sample_rate_Hz);
 
   /// Clears the memory: no current, mode `current` with 0 A; the temperature of the winding is
@@ -142,6 +147,13 @@ class JointCascade {
   /// is that fault too: the current fades to 0 with `fault_decay_s`, and continues from there when
   /// measurements return.
   Output step(const JointReference& reference, const JointState& measured) noexcept TORSIO_REALTIME;
+
+  /// The current that was applied in place of that of the last step: no integral winds up, and the
+  /// next transfer continues from it. Not finite: changes nothing.
+  void track(double applied_A) noexcept TORSIO_REALTIME;
+  /// The next current continues from the last one, as after a change of mode: for a controller
+  /// before this one whose own mode changes.
+  void continue_from_last() noexcept TORSIO_REALTIME { is_switching_ = true; }
 
   /// All at once, from the next step on, without a jump.
   /// @returns false, and all are kept, if one is negative or not finite

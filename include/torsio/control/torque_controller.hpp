@@ -41,9 +41,10 @@ class TorqueLoopCore {
 
   struct Output {
     double current_A = 0.0;
+    double speed_rad_s = 0.0;            ///< with `Actuation::velocity`, in addition to the current
     double wanted_torque_Nm = 0.0;       ///< after its limit
     double wanted_deflection_rad = 0.0;  ///< output of the inverse, after its limit
-    double proportional_A = 0.0;
+    double proportional_A = 0.0;         ///< this and the next three: 0 with `Actuation::velocity`
     double integral_A = 0.0;
     double derivative_A = 0.0;
     double feed_forward_A = 0.0;
@@ -56,14 +57,18 @@ class TorqueLoopCore {
     Fault fault = Fault::none;    ///< a reference or a measurement could not be used
   };
 
-  /// @throws Error as `DeflectionController`, if it does not act on current, if a setting is out of
-  /// range, or if the loop with the observer is unstable (with the margin).
+  /// @throws Error as `DeflectionController`, if a setting is out of range, if the loop with the
+  /// observer is unstable (with the margin), or for an observer or a feed-forward of the rate if the
+  /// deflection controller acts on the speed.
   TorqueLoopCore(const Settings& settings, double sample_rate_Hz);
 
   void reset() noexcept;
   /// The torque for the inverse: finite, and within the limit.
   double accept(double wanted_Nm) noexcept TORSIO_REALTIME;
   Output step(const Estimate& wanted_rad, const JointSample& sample) noexcept TORSIO_REALTIME;
+  /// The current (speed) that was applied in place of that of the last step, where a limit after
+  /// the controller cut it: the integral does not wind up. Not finite: changes nothing.
+  void track(double applied) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const DeflectionController& deflection() const noexcept { return deflection_; }
   [[nodiscard]] DeflectionController& deflection() noexcept { return deflection_; }
@@ -84,7 +89,8 @@ class TorqueLoopCore {
   double wanted_Nm_ = 0.0;
   bool is_refused_ = false;
   bool is_returning_ = false;  ///< from a fault
-  double applied_A_ = 0.0;
+  double added_A_ = 0.0;       ///< in the last step to the current of the deflection controller
+  double applied_ = 0.0;       ///< current [A], or speed [rad/s]
 };
 
 /// Torque through the spring: inverse model of the spring, deflection control, and optionally friction

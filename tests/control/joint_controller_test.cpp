@@ -1,0 +1,289 @@
+#include "torsio/control/joint_controller.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "spring_joint.hpp"
+#include "support/error_message.hpp"
+#include "torsio/core/random.hpp"
+
+namespace torsio {
+namespace {
+
+using test::SpringJoint;
+using Actuation = DeflectionController::Actuation;
+using Controller = JointController<LinearInverse>;
+
+constexpr double kRate_Hz = 1000.0;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kActuators[] = {"dfki-28",  "dfki-50",   "dfki-120",
+                                      "dfki-300", "elastomer", "rubber-clutch"};
+
+/// The spring's largest torque is half of what the rated current makes.
+Controller::Settings settings_of(const char* actuator, Actuation actuation = Actuation::current) {
+  const DataSheet sheet = data_sheet(actuator);
+  const SeriesElasticJoint joint = series_elastic_joint(sheet);
+  const double rated_Nm = joint.drive.rated_current_A * joint.drive.torque_per_current();
+  // The velocity loop has to be faster than the deflection loop around it.
+  const double spring_rad_s = std::sqrt(joint.stiffness_Nm_rad / joint.drive.inertia());
+  const double bandwidth_rad_s = actuation == Actuation::velocity ? 25.0 : 50.0;
+  return {.torque = {.deflection = {.joint = joint,
+                                    .actuation = actuation,
+                                    .bandwidth_rad_s =
+                                        actuation == Actuation::velocity
+                                            ? bandwidth_rad_s
+                                            : std::max(bandwidth_rad_s, 1.2 * spring_rad_s)},
+                     .largest_torque_Nm = 0.3 * rated_Nm},
+          .limits = {.lowest_rad = -0.3,
+                     .highest_rad = 0.3,
+                     .speed_rad_s = 0.12 * joint.drive.supply_V /
+                                    (joint.drive.torque_constant_Nm_A * joint.drive.ratio),
+                     .max_unmeasured_load_Nm = 0.05 * rated_Nm,
+                     .max_measured_load_Nm = 0.6 * rated_Nm}};
+}
+
+Controller controller_of(const Controller::Settings& settings) {
+  return {LinearInverse(settings.torque.deflection.joint.stiffness_Nm_rad), settings, kRate_Hz};
+}
+
+const Drive& drive_of(const Controller::Settings& settings) {
+  return settings.torque.deflection.joint.drive;
+}
+
+JointSample sample_of(const SpringJoint& joint, const Drive& drive) {
+  return {.motor_angle_rad = joint.angle_rad() * drive.ratio,
+          .gear_angle_rad = joint.angle_rad(),
+          .joint_angle_rad = joint.joint_rad()};
+}
+
+Controller::Output run(Controller& controller, SpringJoint& joint, const Drive& drive,
+                       const JointReference& reference, int ticks) {
+  Controller::Output output;
+  for (int n = 0; n < ticks; ++n) {
+    output = controller.step(reference, sample_of(joint, drive));
+    joint.step(output.current_A, 1.0 / kRate_Hz);
+  }
+  return output;
+}
+
+TEST(JointController, FollowsTorqueAndDeflectionThroughEitherLoop) {
+  for (const char* actuator : kActuators)
+    for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
+      const auto settings = settings_of(actuator, actuation);
+      const double torque_Nm = 0.5 * settings.torque.largest_torque_Nm;
+      for (const JointMode mode : {JointMode::torque, JointMode::deflection}) {
+        Controller controller = controller_of(settings);
+        SpringJoint joint(settings.torque.deflection.joint, JointOutput::locked);
+        const double wanted_rad = std::min(
+            torque_Nm / settings.torque.deflection.joint.stiffness_Nm_rad, rad_from_deg(8.0));
+        const double wanted_Nm = wanted_rad * settings.torque.deflection.joint.stiffness_Nm_rad;
+        run(controller, joint, drive_of(settings),
+            {.mode = mode, .torque_Nm = wanted_Nm, .deflection_rad = wanted_rad}, 6000);
+        EXPECT_NEAR(joint.torque_Nm(), wanted_Nm, 1e-3 * wanted_Nm)
+            << actuator << ' ' << name(mode)
+            << (actuation == Actuation::current ? " current" : " velocity");
+      }
+    }
+}
+
+TEST(JointController, RendersAnImpedanceAtTheMotorSide) {
+  const auto settings = settings_of("dfki-50");
+  Controller controller = controller_of(settings);
+  SpringJoint joint(settings.torque.deflection.joint, JointOutput::locked);
+  const JointReference reference = {
+      .mode = JointMode::impedance, .position_rad = 0.2, .stiffness_Nm_rad = 40.0};
+  run(controller, joint, drive_of(settings), reference, 5000);
+  EXPECT_NEAR(joint.torque_Nm(), 40.0 * (0.2 - joint.angle_rad()), 1e-3);
+}
+
+// Paper 000, section 4: the limits are kept without a stop of the system, and let go.
+TEST(JointController, StaysAtALimitInSpringModesAndLetsGoAtOnce) {
+  for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
+    auto settings = settings_of("dfki-50", actuation);
+    settings.limits.lowest_rad = -0.2;
+    settings.limits.highest_rad = 0.2;
+    for (const JointMode mode : {JointMode::torque, JointMode::deflection}) {
+      Controller controller = controller_of(settings);
+      // Free: a torque accelerates the joint until the motor side is at its limit.
+      SpringJoint joint(settings.torque.deflection.joint, JointOutput::free);
+      const JointReference push = {.mode = mode, .torque_Nm = 10.0, .deflection_rad = 0.02};
+      const auto held = run(controller, joint, drive_of(settings), push, 60'000);
+      EXPECT_EQ(held.limit, JointCascade::Limit::position);
+      EXPECT_NEAR(joint.angle_rad(), 0.2 - controller.core().cascade().position_margin(), 5e-3);
+      // Nothing has wound up: the torque of the other sign begins at once.
+      const JointReference back = {.mode = mode, .torque_Nm = -10.0, .deflection_rad = -0.02};
+      const auto freed = run(controller, joint, drive_of(settings), back, 30);
+      EXPECT_NE(freed.limit, JointCascade::Limit::position);
+      EXPECT_LT(joint.torque_Nm(), -1.5) << name(mode);
+    }
+  }
+}
+
+TEST(JointController, FadesWithoutAMeasurementAndKeepsTheLastReference) {
+  for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
+    const auto settings = settings_of("dfki-50", actuation);
+    Controller controller = controller_of(settings);
+    SpringJoint joint(settings.torque.deflection.joint, JointOutput::locked);
+    const JointReference reference = {.mode = JointMode::torque, .torque_Nm = 10.0};
+    double last_A = run(controller, joint, drive_of(settings), reference, 3000).current_A;
+    ASSERT_GT(last_A, 0.5);
+    const auto refused = controller.step({.mode = JointMode::deflection, .deflection_rad = kNaN},
+                                         sample_of(joint, drive_of(settings)));
+    EXPECT_TRUE(refused.is_reference_refused);
+    EXPECT_EQ(refused.fault, Fault::input_not_finite);
+    EXPECT_NEAR(refused.current_A, last_A, 1e-3);
+    last_A = refused.current_A;
+    for (int n = 0; n < 90; ++n) {
+      JointSample lost = sample_of(joint, drive_of(settings));
+      (n % 3 == 0   ? lost.motor_angle_rad
+       : n % 3 == 1 ? lost.gear_angle_rad
+                    : lost.joint_angle_rad) = kNaN;
+      const auto output = controller.step(reference, lost);
+      ASSERT_EQ(output.fault, Fault::input_not_finite);
+      ASSERT_NEAR(output.current_A, last_A * std::exp(-0.001 / 0.02), 1e-9);
+      last_A = output.current_A;
+    }
+    const auto back = controller.step(reference, sample_of(joint, drive_of(settings)));
+    EXPECT_EQ(back.fault, Fault::none);
+    EXPECT_NEAR(back.current_A, last_A, 1e-9);
+    run(controller, joint, drive_of(settings), reference, 3000);
+    EXPECT_NEAR(joint.torque_Nm(), 10.0, 0.1);
+  }
+}
+
+TEST(JointController, RefusesWhatContradicts) {
+  const auto refusal = [](auto change, Actuation actuation = Actuation::current) -> std::string {
+    auto settings = settings_of("dfki-50", actuation);
+    change(settings);
+    return test::error_message([&] { static_cast<void>(controller_of(settings)); });
+  };
+  EXPECT_EQ(refusal([](auto&) {}), "");
+  EXPECT_NE(refusal([](auto& s) { s.torque.observer_cutoff_Hz = 10.0; }, Actuation::velocity)
+                .find("acts on the speed"),
+            std::string::npos);
+  // 48 V / (0.104 Vs/rad 120) = 3.85 rad/s.
+  EXPECT_NE(refusal([](auto& s) { s.limits.speed_rad_s = 3.9; }).find("back-EMF"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.limits.highest_rad = -0.99; }).find("no room between"),
+            std::string::npos);
+  // A deflection loop that is faster than the velocity loop inside it.
+  EXPECT_NE(
+      refusal([](auto& s) { s.torque.deflection.bandwidth_rad_s = 500.0; }, Actuation::velocity)
+          .find("unstable"),
+      std::string::npos);
+}
+
+// ------------------------------------------------------------------------------------ properties
+
+JointReference any_reference(Random& random, const Controller::Settings& settings, double far) {
+  const double torque_Nm = settings.torque.largest_torque_Nm;
+  const auto wild = [&](double usual) {
+    const double draw = random.uniform();
+    return draw < 0.01 ? far * usual * random.normal() : usual * random.normal();
+  };
+  return {.mode = static_cast<JointMode>(6.0 * random.uniform()),
+          .position_rad = wild(1.0),
+          .velocity_rad_s = wild(settings.limits.speed_rad_s),
+          .acceleration_rad_s2 = wild(5.0),
+          .torque_Nm = wild(torque_Nm),
+          .current_A = random.uniform() < 0.5 ? 0.0 : wild(drive_of(settings).rated_current_A),
+          .stiffness_Nm_rad = std::abs(wild(torque_Nm)),
+          .damping_Nms_rad = std::abs(wild(0.05 * torque_Nm)),
+          .deflection_rad = wild(torque_Nm / settings.torque.deflection.joint.stiffness_Nm_rad)};
+}
+
+// The override takes over and lets go where its bound meets the command: no step of the current.
+TEST(JointController, TakesOverAndLetsGoWithoutAJump) {
+  for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
+    const auto settings = settings_of("dfki-50", actuation);
+    Controller controller = controller_of(settings);
+    SpringJoint joint(settings.torque.deflection.joint, JointOutput::free);
+    const Drive& drive = drive_of(settings);
+    int changes = 0;
+    auto last = run(controller, joint, drive, {.mode = JointMode::torque}, 10);
+    for (int n = 0; n < 20'000; ++n) {
+      const double wanted_Nm = 12.0 * std::sin(2e-3 * n);
+      const auto output =
+          run(controller, joint, drive, {.mode = JointMode::torque, .torque_Nm = wanted_Nm}, 1);
+      if (output.limit != last.limit) ++changes;
+      // A thousandth of the way of the sine, and what spring and rotor do within a tick.
+      EXPECT_LT(std::abs(output.current_A - last.current_A), 0.05 * drive.peak_current_A);
+      last = output;
+    }
+    EXPECT_GE(changes, 10);
+  }
+}
+
+// 10^6 ticks: all modes, on every actuator with a spring, through both loops. The output is locked
+// or free, and a person pushes it.
+TEST(JointController, NeverLetsTheMotorSideOutOfItsLimits) {
+  constexpr int kTicks = 84'000;
+  Random random(19);
+  for (const char* actuator : kActuators)
+    for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
+      for (const JointOutput end : {JointOutput::locked, JointOutput::free}) {
+        auto settings = settings_of(actuator, actuation);
+        JointCascade::Limits& limits = settings.limits;
+        // Where the output is locked, the position limits the torque of the spring.
+        if (end == JointOutput::locked)
+          limits.highest_rad =
+              0.9 * limits.max_measured_load_Nm / settings.torque.deflection.joint.stiffness_Nm_rad;
+        limits.lowest_rad = -limits.highest_rad;
+        double farthest_rad = 0.0;
+        double fastest_rad_s = 0.0;
+        Controller controller = controller_of(settings);
+        SpringJoint joint(settings.torque.deflection.joint, end);
+        JointReference reference;
+        double push_Nm = 0.0;
+        double most_Nm = 0.0;
+        for (int n = 0; n < kTicks / 2; ++n) {
+          if (random.uniform() < 0.01) reference = any_reference(random, settings, 1e3);
+          if (random.uniform() < 0.003)
+            push_Nm = 0.2 * settings.torque.largest_torque_Nm * (2.0 * random.uniform() - 1.0);
+          const auto output = controller.step(reference, sample_of(joint, drive_of(settings)));
+          joint.step(output.current_A, 1.0 / kRate_Hz, push_Nm);
+          most_Nm = std::max(most_Nm, std::abs(joint.torque_Nm()));
+          farthest_rad = std::max(farthest_rad, std::abs(joint.angle_rad()));
+          fastest_rad_s = std::max(fastest_rad_s, std::abs(joint.speed_rad_s()));
+        }
+        const std::string run_name =
+            fmt::format("{} {} {}", actuator, end == JointOutput::locked ? "locked" : "free",
+                        actuation == Actuation::current ? "current" : "velocity");
+        EXPECT_LE(most_Nm, limits.max_measured_load_Nm) << run_name << ": beyond the condition";
+        EXPECT_LE(farthest_rad, limits.highest_rad) << run_name;
+        EXPECT_GT(farthest_rad, 0.4 * limits.highest_rad) << run_name << ": never near the limit";
+        EXPECT_LE(fastest_rad_s, limits.speed_rad_s) << run_name;
+      }
+    }
+}
+
+RC_GTEST_PROP(JointController, SwitchesItsModeWithoutAJump, ()) {
+  const auto settings = settings_of(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"),
+                                    *rc::gen::element(Actuation::current, Actuation::velocity));
+  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Controller controller = controller_of(settings);
+  SpringJoint joint(settings.torque.deflection.joint, JointOutput::free);
+  for (int change = 0; change < 20; ++change) {
+    JointReference reference = any_reference(random, settings, 1.0);
+    const double before_A = run(controller, joint, drive_of(settings), reference, 30).current_A;
+    const int mode =
+        static_cast<int>(reference.mode) + 1 + static_cast<int>(random.uniform() * 5.0);
+    reference = any_reference(random, settings, 1.0);
+    reference.mode = static_cast<JointMode>(mode % 6);
+    const auto after = controller.step(reference, sample_of(joint, drive_of(settings)));
+    // What the override allows moves with the joint.
+    if (after.limit == JointCascade::Limit::none)
+      RC_ASSERT(std::abs(after.current_A - before_A) < 1e-9);
+    else
+      RC_ASSERT(std::abs(after.current_A - before_A) < 0.3 * drive_of(settings).peak_current_A);
+  }
+}
+
+}  // namespace
+}  // namespace torsio
