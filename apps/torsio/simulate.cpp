@@ -9,6 +9,7 @@
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "torsio/actuator/brake_sheet.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/error.hpp"
@@ -95,6 +96,8 @@ std::vector<torsio::SheetRow> sheet_rows(const torsio::DataSheet& sheet, bool is
   std::vector<torsio::SheetRow> rows = torsio::describe(sheet);
   if (!is_electrical) return rows;
   for (torsio::SheetRow& row : torsio::describe(torsio::electrical_sheet(sheet)))
+    rows.push_back(std::move(row));
+  for (torsio::SheetRow& row : torsio::describe(torsio::brake_sheet(sheet)))
     rows.push_back(std::move(row));
   return rows;
 }

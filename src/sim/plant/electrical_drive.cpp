@@ -108,6 +108,11 @@ double ElectricalDrive::step(double wanted_A, double rotor_angle_rad, double rot
   return impulse_Nms / dt_s;
 }
 
+void ElectricalDrive::switch_off(double dt_s) noexcept {
+  reset();
+  warm(0.0, dt_s);
+}
+
 void ElectricalDrive::warm(double copper_J, double dt_s) noexcept {
   const MotorThermal& thermal = parameters_.thermal;
   const double to_stator_W = (copper_K_ - stator_K_) / thermal.copper_stator_K_W;

@@ -71,6 +71,10 @@ class ElectricalDrive {
   double step(double wanted_A, double rotor_angle_rad, double rotor_speed_rad_s,
               double dt_s) noexcept TORSIO_REALTIME;
 
+  /// The inverter is off for so long: no current at once (it flows back into the supply within a
+  /// small part of a millisecond), and the motor cools.
+  void switch_off(double dt_s) noexcept TORSIO_REALTIME;
+
   /// @returns i_q after the last step [A]
   [[nodiscard]] double current() const noexcept { return current_A_.q; }
   [[nodiscard]] double direct_current() const noexcept { return current_A_.d; }

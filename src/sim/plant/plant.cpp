@@ -131,6 +131,18 @@ Plant::Plant(const PlantParameters& parameters, double longest_step_s)
   reset();
 }
 
+void Plant::use(const Brake::Parameters& brake) {
+  const Brake made(brake);
+  const double longest_s = 0.25 / std::sqrt(made.steepest() / parameters_.rotor_inertia_kg_m2);
+  if (!(longest_step_s_ <= longest_s))
+    throw Error({.place = "plant",
+                 .problem = "the bristle of the brake is too stiff for the steps",
+                 .expected = fmt::format("a step of at most {:.3g} s", longest_s),
+                 .found = fmt::format("{:.3g} s", longest_step_s_),
+                 .advice = "Give it a larger break-away angle."});
+  brake_.emplace(made);
+}
+
 double Plant::step_limit(const PlantParameters& parameters) {
   const StepLimits limits = step_limits(parameters);
   return std::min(limits.stiffness_s, limits.damping_s);
@@ -165,6 +177,7 @@ void Plant::start(const PlantState& state) noexcept {
   motor_.reset();
   if (electrical_) electrical_->reset();
   rotor_friction_.reset();
+  if (brake_) brake_->reset(brake_->is_closed());
   middle_friction_.reset();
   detail::dispatch(first_, [&](auto& stage) {
     reset_stage(stage, state.rotor_angle_rad, state.middle_angle_rad);
@@ -221,7 +234,7 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
   PlantTorques& t = torques_;
   const double dt = dt_s_;
 
-  t.motor_Nm = condition_.torque_constant_factor * motor_torque(command.current_A);
+  t.motor_Nm = condition_.torque_constant_factor * motor_torque(command);
   const StageTorques second = step_second();
   t.second_Nm = second.output_Nm;
   t.second_on_middle_Nm = second.input_Nm;
@@ -235,11 +248,12 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
       condition_.friction_factor * rotor_friction_.step(s.rotor_speed_rad_s, t.first_Nm, dt);
   t.middle_friction_Nm =
       condition_.friction_factor * middle_friction_.step(s.middle_speed_rad_s, t.second_Nm, dt);
+  t.brake_Nm = brake_ ? brake_->step(command.brake_V, s.rotor_speed_rad_s, dt) : 0.0;
   t.bearing_Nm = bearing_.step(s.joint_speed_rad_s, 0.0, dt);
   t.joint_Nm = t.second_Nm - t.bearing_Nm;
   t.wall_Nm = wall_torque(load, s.joint_angle_rad, s.joint_speed_rad_s);
 
-  const double rotor_Nm = t.motor_Nm - t.rotor_friction_Nm - t.first_on_rotor_Nm;
+  const double rotor_Nm = t.motor_Nm - t.rotor_friction_Nm - t.brake_Nm - t.first_on_rotor_Nm;
   const double middle_Nm = t.first_Nm - t.middle_friction_Nm - t.second_on_middle_Nm;
   const double joint_Nm = t.joint_Nm + load.external_torque_Nm - t.wall_Nm -
                           parameters_.joint_viscous_Nms_rad * s.joint_speed_rad_s -
@@ -258,7 +272,13 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
   s.joint_angle_rad += dt * s.joint_speed_rad_s;
 }
 
-double Plant::motor_torque(double wanted_A) noexcept {
+double Plant::motor_torque(const PlantCommand& command) noexcept {
+  const double wanted_A = command.current_A;
+  if (!command.is_powered) {
+    motor_.reset();
+    if (electrical_) electrical_->switch_off(dt_s_);
+    return 0.0;
+  }
   if (!electrical_) return motor_.step(wanted_A, state_.rotor_angle_rad, state_.rotor_speed_rad_s);
   return motor_.ripple_torque(state_.rotor_angle_rad) +
          electrical_->step(wanted_A, state_.rotor_angle_rad, state_.rotor_speed_rad_s, dt_s_);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <variant>
 
+#include "actuator/parts/brake.hpp"
 #include "actuator/parts/elastomer_coupling.hpp"
 #include "actuator/parts/friction.hpp"
 #include "actuator/parts/gear.hpp"
@@ -24,6 +25,8 @@ namespace torsio {
 struct PlantCommand {
   double current_A = 0.0;      ///< wanted motor current
   bool is_motor_held = false;  ///< the rotor is clamped; the current has no effect
+  bool is_powered = true;      ///< false: the inverter is off, and there is no current at once
+  double brake_V = 0.0;        ///< voltage at the coil of the brake, if there is one
 };
 
 /// The load of the joint.
@@ -76,6 +79,7 @@ struct PlantParameters {
 /// @param seed of the noise of the current sensors
 [[nodiscard]] ElectricalDrive::Parameters electrical_parameters(const DataSheet& sheet,
                                                                 std::uint64_t seed);
+[[nodiscard]] Brake::Parameters brake_parameters(const DataSheet& sheet);
 
 /// @returns turns of the rotor a turn of the joint
 [[nodiscard]] double total_ratio(const PlantParameters& parameters) noexcept;
@@ -99,6 +103,7 @@ struct PlantState {
 struct PlantTorques {
   double motor_Nm = 0.0;             ///< on the rotor, ripple included
   double rotor_friction_Nm = 0.0;    ///< against the rotor
+  double brake_Nm = 0.0;             ///< against the rotor
   double first_Nm = 0.0;             ///< torque of the first stage on the middle body
   double first_on_rotor_Nm = 0.0;    ///< against the rotor
   double middle_friction_Nm = 0.0;   ///< against the middle body
@@ -152,7 +157,7 @@ struct StoredEnergy {
 class Plant {
  public:
   static constexpr double kDefaultStep_s = 1e-4;
-  static constexpr std::size_t kWorkPorts = 11;
+  static constexpr std::size_t kWorkPorts = 12;
 
   /// @param longest_step_s a longer step is divided into equal ones; none: `step_limit`, but at
   /// most `kDefaultStep_s`
@@ -191,6 +196,16 @@ class Plant {
     return electrical_ ? &*electrical_ : nullptr;
   }
 
+  /// From now on there is a brake on the rotor, closed. @throws Error as `Brake`, or if the steps are
+  /// too long for its bristle.
+  void use(const Brake::Parameters& brake);
+  /// @returns null without a brake
+  [[nodiscard]] const Brake* brake() const noexcept { return brake_ ? &*brake_ : nullptr; }
+  /// The brake is open (closed) now, for longer than its delays; without effect if there is none.
+  void set_brake(bool is_closed) noexcept {
+    if (brake_) brake_->reset(is_closed);
+  }
+
   /// Advances the plant. A value that is not finite, a negative inertia, a wall whose stiffness or
   /// damping is negative or too large for the steps (half a radian of its mode with the joint, half
   /// a time constant), or a dt that is not positive or longer than 10^6 of the longest steps is
@@ -227,12 +242,13 @@ class Plant {
   void set_period(double dt_s) noexcept;
   void start(const PlantState& state) noexcept;
   void small_step(const PlantCommand& command, const Load& load) noexcept;
-  double motor_torque(double wanted_A) noexcept;
+  double motor_torque(const PlantCommand& command) noexcept;
   StageTorques step_second() noexcept;
 
   PlantParameters parameters_;
   Motor motor_;
   std::optional<ElectricalDrive> electrical_;
+  std::optional<Brake> brake_;
   LuGreFriction rotor_friction_;
   FirstStage first_;
   LuGreFriction middle_friction_;

@@ -71,6 +71,7 @@ std::array<WorkPort, Plant::kWorkPorts> Plant::work_ports(const Load& load) cons
       {hysteretic, second_friction_torque(), second.rate_rad_s, 0.0,
        detail::dispatch(second_, stored)},
       {hysteretic, torques_.wall_Nm, joint, 0.0, wall_energy(load, state_.joint_angle_rad)},
+      {hysteretic, torques_.brake_Nm, rotor, 0.0, brake_ ? brake_->energy() : 0.0},
   }};
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sim/plant/plant.hpp"
+#include "torsio/actuator/brake_sheet.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/dispatch.hpp"
 
@@ -214,6 +215,18 @@ ElectricalDrive::Parameters electrical_parameters(const DataSheet& sheet, std::u
           .derating_begins_K = parts.derating_begins_K.value,
           .derating_ends_K = parts.derating_ends_K.value,
           .seed = seed};
+}
+
+Brake::Parameters brake_parameters(const DataSheet& sheet) {
+  const BrakeSheet parts = brake_sheet(sheet);
+  const double static_Nm = parts.static_torque_Nm.value / total_ratio(plant_parameters(sheet));
+  return {.static_Nm = static_Nm,
+          .sliding_Nm = parts.sliding_ratio.value * static_Nm,
+          .bristle_rad = parts.bristle_rad.value,
+          .stribeck_rad_s = parts.stribeck_rad_s.value,
+          .activation_V = parts.activation_V.value,
+          .engage_s = parts.engage_s.value,
+          .release_s = parts.release_s.value};
 }
 
 PlantParameters plant_parameters(const DataSheet& sheet) {

@@ -1,0 +1,260 @@
+#include "torsio/safety/joint_stop.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "sim/plant/plant.hpp"
+#include "support/error_message.hpp"
+#include "torsio/control/joint_controller.hpp"
+
+namespace torsio {
+namespace {
+
+using Phase = JointStop::Phase;
+
+constexpr double kRate_Hz = 1000.0;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kActuators[] = {"dfki-28", "dfki-50", "dfki-120", "dfki-300"};
+
+JointStop::Settings stop_settings(const DataSheet& sheet, double load_Nm) {
+  const Drive drive = drive_of(sheet);
+  const Brake::Parameters brake = brake_parameters(sheet);
+  return {.drive = drive,
+          .deceleration_rad_s2 = 5.0,
+          .brake_static_Nm = brake.static_Nm * drive.ratio,
+          .brake_sliding_Nm = brake.sliding_Nm * drive.ratio,
+          .brake_engage_s = brake.engage_s,
+          .brake_release_s = brake.release_s,
+          .load_Nm = load_Nm};
+}
+
+JointControllerCore::Settings controller_settings(const DataSheet& sheet) {
+  const SeriesElasticJoint joint = series_elastic_joint(sheet);
+  const double rated_Nm = joint.drive.rated_current_A * joint.drive.torque_per_current();
+  return {
+      .torque = {.deflection = {.joint = joint}, .largest_torque_Nm = sheet.rating.torque_Nm.value},
+      .limits = {.speed_rad_s = 0.9 * sheet.rating.speed_rad_s.value,
+                 .max_unmeasured_load_Nm = 0.05 * rated_Nm,
+                 .max_measured_load_Nm = 0.6 * rated_Nm}};
+}
+
+/// A simulated joint with a lever, its controller, the stop and the brake.
+class Rig {
+ public:
+  Rig(const DataSheet& sheet, double gravity_share, bool is_electrical = false)
+      : drive_(drive_of(sheet)),
+        load_(lever(gravity_share * sheet.rating.torque_Nm.value / (9.81 * 0.5), 0.5)),
+        plant_(plant_parameters(sheet)),
+        controller_(LinearInverse(series_elastic_joint(sheet).stiffness_Nm_rad),
+                    controller_settings(sheet), kRate_Hz),
+        stop_(stop_settings(sheet, load_.gravity_Nm), kRate_Hz),
+        speed_(kRate_Hz, 120.0),
+        coil_V_(brake_parameters(sheet).activation_V) {
+    if (is_electrical) plant_.use(electrical_parameters(sheet, 1));
+    plant_.use(brake_parameters(sheet));
+    plant_.set_brake(false);
+    EXPECT_EQ(plant_.reset(1.2, load_), Fault::none);
+  }
+
+  JointStop::Output tick(const JointReference& wanted, bool is_lost = false) {
+    const PlantState& state = plant_.state();
+    const double nothing_rad = is_lost ? kNaN : 0.0;
+    const JointSample sample = {.motor_angle_rad = state.rotor_angle_rad + nothing_rad,
+                                .gear_angle_rad = state.middle_angle_rad,
+                                .joint_angle_rad = state.joint_angle_rad};
+    const double angle_rad = sample.motor_angle_rad / drive_.ratio;
+    JointState measured = {.angle_rad = angle_rad};
+    if (is_lost)
+      speed_.skip();
+    else
+      measured.speed_rad_s = speed_.step(angle_rad);
+    const auto wanted_A = controller_.step(stop_.reference(wanted, measured), sample).current_A;
+    const JointStop::Output output = stop_.step(wanted_A, measured);
+    if (output.is_current_cut) controller_.track(output.current_A);
+    const double before_rad = state.joint_angle_rad;
+    EXPECT_EQ(plant_.step({.current_A = output.current_A,
+                           .is_powered = output.is_powered,
+                           .brake_V = output.is_brake_open ? coil_V_ : 0.0},
+                          load_, 1.0 / kRate_Hz),
+              Fault::none);
+    external_J_ += load_.external_torque_Nm * (plant_.state().joint_angle_rad - before_rad);
+    return output;
+  }
+  void push(double torque_Nm) { load_.external_torque_Nm = torque_Nm; }
+
+  [[nodiscard]] double energy_J() const { return plant_.stored_energy(load_).all_J; }
+  [[nodiscard]] double external_J() const { return external_J_; }
+  [[nodiscard]] const Plant& plant() const { return plant_; }
+  JointStop& stop() { return stop_; }
+  [[nodiscard]] double drive_speed_rad_s() const {
+    return plant_.state().rotor_speed_rad_s / drive_.ratio;
+  }
+
+ private:
+  Drive drive_;
+  Load load_;
+  Plant plant_;
+  JointController<LinearInverse> controller_;
+  JointStop stop_;
+  Differentiator speed_;
+  double coil_V_;
+  double external_J_ = 0.0;
+};
+
+/// In motion for half a second: upwards, downwards, or while its torque is controlled.
+void move(Rig& rig, const JointReference& reference) {
+  for (int n = 0; n < 500; ++n) (void)rig.tick(reference);
+}
+
+const JointReference kMotions[] = {
+    {.mode = JointMode::velocity, .velocity_rad_s = 0.5},
+    {.mode = JointMode::velocity, .velocity_rad_s = -0.5},
+    {.mode = JointMode::torque, .torque_Nm = 0.0},
+    {.mode = JointMode::current, .current_A = 2.0},
+};
+
+std::string name_of(const char* actuator, const JointReference& motion) {
+  return fmt::format("{} {} {} rad/s", actuator, name(motion.mode), motion.velocity_rad_s);
+}
+
+TEST(JointStop, NeverAddsEnergyWithThePowerOff) {
+  for (const char* actuator : kActuators)
+    for (const bool is_electrical : {false, true})
+      for (const JointReference& motion : kMotions) {
+        Rig rig(data_sheet(actuator), 0.3, is_electrical);
+        move(rig, motion);
+        rig.stop().trigger(StopCategory::power_off);
+        const double first_J = rig.energy_J();
+        double last_J = first_J;
+        for (int n = 0; n < 2000; ++n) {
+          const auto output = rig.tick(motion);
+          ASSERT_EQ(output.phase, Phase::off);
+          ASSERT_FALSE(output.is_powered);
+          ASSERT_FALSE(output.is_brake_open);
+          // What the integration of the plant creates in a tick.
+          ASSERT_LE(rig.energy_J(), last_J + 1e-4 * first_J) << name_of(actuator, motion);
+          ASSERT_LE(rig.energy_J(), first_J * 1.001) << name_of(actuator, motion);
+          last_J = rig.energy_J();
+        }
+        EXPECT_TRUE(rig.plant().brake()->is_closed());
+        EXPECT_LT(std::abs(rig.drive_speed_rad_s()), 0.01) << name_of(actuator, motion);
+      }
+}
+
+TEST(JointStop, StopsUnderPowerWithoutAddingEnergy) {
+  for (const char* actuator : kActuators)
+    for (const StopCategory category : {StopCategory::ramp_and_brake, StopCategory::ramp_and_hold})
+      for (const JointReference& motion : kMotions)
+        for (const double push_share : {0.0, 0.2, -0.2}) {
+          const DataSheet sheet = data_sheet(actuator);
+          Rig rig(sheet, 0.3);
+          move(rig, motion);
+          rig.stop().trigger(category);
+          rig.push(push_share * sheet.rating.torque_Nm.value);
+          const double first_J = rig.energy_J() - rig.external_J();
+          double most_J = first_J;
+          JointStop::Output output;
+          for (int n = 0; n < 3000; ++n) {
+            output = rig.tick(motion);
+            most_J = std::max(most_J, rig.energy_J() - rig.external_J());
+          }
+          const std::string run =
+              fmt::format("{} {} {}", name_of(actuator, motion), name(category), push_share);
+          EXPECT_LE(most_J, 1.01 * first_J) << run;
+          EXPECT_TRUE(output.is_at_rest) << run;
+          EXPECT_FALSE(output.has_escalated) << run;
+          EXPECT_LT(std::abs(rig.drive_speed_rad_s()), 0.01) << run;
+          const bool holds = category == StopCategory::ramp_and_hold;
+          EXPECT_EQ(output.phase, holds ? Phase::holding : Phase::off) << run;
+          EXPECT_EQ(output.is_powered, holds) << run;
+          EXPECT_EQ(rig.plant().brake()->is_closed(), !holds) << run;
+        }
+}
+
+// docs/faults.md 22: what is reported is what was measured.
+TEST(JointStop, ReportsTheMeasuredStateAndNotTheWantedOne) {
+  Rig rig(data_sheet("dfki-120"), 0.3);
+  move(rig, kMotions[0]);
+  rig.stop().trigger(StopCategory::power_off);
+  auto output = rig.tick({});
+  EXPECT_EQ(output.phase, Phase::off);
+  EXPECT_FALSE(output.is_at_rest) << "the power is off, and the joint still moves";
+  EXPECT_NEAR(output.speed_rad_s, 0.5, 0.05);
+  for (int n = 0; n < 2000; ++n) output = rig.tick({});
+  EXPECT_TRUE(output.is_at_rest);
+  EXPECT_NEAR(output.since_s, 2.0, 0.01);
+}
+
+TEST(JointStop, RemovesThePowerWhenAMeasurementIsLostOrTheRampTakesTooLong) {
+  Rig lost(data_sheet("dfki-50"), 0.2);
+  move(lost, kMotions[1]);
+  lost.stop().trigger(StopCategory::ramp_and_hold);
+  EXPECT_EQ(lost.tick({}).phase, Phase::ramping);
+  const auto off = lost.tick({}, true);
+  EXPECT_EQ(off.phase, Phase::off);
+  EXPECT_TRUE(off.has_escalated);
+  EXPECT_FALSE(lost.stop().release()) << "nobody knows whether it rests";
+
+  const DataSheet sheet = data_sheet("dfki-50");
+  JointStop::Settings settings = stop_settings(sheet, 0.0);
+  settings.longest_ramp_s = 0.1;
+  JointStop stop(settings, kRate_Hz);
+  stop.trigger(StopCategory::ramp_and_brake);
+  JointStop::Output output;
+  for (int n = 0; n < 200; ++n) {
+    const JointState moving = {.angle_rad = 1e-3 * n, .speed_rad_s = 1.0};
+    (void)stop.reference({}, moving);
+    output = stop.step(0.0, moving);
+  }
+  EXPECT_EQ(output.phase, Phase::off);
+  EXPECT_TRUE(output.has_escalated);
+}
+
+TEST(JointStop, IsLatchedAndReplacedOnlyByALowerCategory) {
+  Rig rig(data_sheet("dfki-50"), 0.2);
+  EXPECT_FALSE(rig.stop().release()) << "it runs";
+  rig.stop().trigger(StopCategory::ramp_and_hold);
+  for (int n = 0; n < 1000; ++n) (void)rig.tick(kMotions[0]);
+  EXPECT_EQ(rig.stop().phase(), Phase::holding) << "no reference ends it";
+  rig.stop().trigger(StopCategory::ramp_and_brake);
+  for (int n = 0; n < 100; ++n) (void)rig.tick(kMotions[0]);
+  EXPECT_EQ(rig.stop().phase(), Phase::off);
+  EXPECT_TRUE(rig.plant().brake()->is_closed());
+  rig.stop().trigger(StopCategory::ramp_and_hold);
+  (void)rig.tick(kMotions[0]);
+  EXPECT_EQ(rig.stop().phase(), Phase::off);
+  const double angle_rad = rig.plant().state().joint_angle_rad;
+  EXPECT_TRUE(rig.stop().release());
+  auto output = rig.tick(kMotions[0]);
+  EXPECT_EQ(output.phase, Phase::releasing);
+  EXPECT_TRUE(output.is_powered);
+  for (int n = 0; n < 39; ++n) output = rig.tick(kMotions[0]);
+  EXPECT_NEAR(rig.plant().state().joint_angle_rad, angle_rad, 0.01) << "the motor holds the load";
+  move(rig, kMotions[0]);
+  EXPECT_EQ(rig.stop().phase(), Phase::running);
+  EXPECT_GT(rig.plant().state().joint_angle_rad, angle_rad + 0.05);
+}
+
+TEST(JointStop, RefusesABrakeThatIsWeakerThanTheLoad) {
+  const auto refusal = [](auto change) {
+    JointStop::Settings settings = stop_settings(data_sheet("dfki-50"), 20.0);
+    change(settings);
+    return test::error_message([&] { return JointStop(settings, kRate_Hz); });
+  };
+  EXPECT_EQ(refusal([](auto&) {}), "");
+  const std::string weak = refusal([](auto& s) { s.load_Nm = 81.0; });
+  EXPECT_NE(weak.find("the brake is weaker than the load"), std::string::npos) << weak;
+  EXPECT_NE(weak.find("80 Nm"), std::string::npos) << weak;
+  EXPECT_NE(refusal([](auto& s) { s.brake_static_Nm = 70.0; }).find("static torque"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.deceleration_rad_s2 = 0.0; }), "");
+  EXPECT_NE(refusal([](auto& s) { s.longest_ramp_s = kNaN; }), "");
+}
+
+}  // namespace
+}  // namespace torsio
