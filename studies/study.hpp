@@ -117,6 +117,20 @@ struct LoopTable {
   std::vector<LoopRow> rows = {};
 };
 
+/// One quantity under one condition, beside the figure of the paper if it prints one.
+struct QuantityRow {
+  std::string condition;
+  std::string quantity;
+  double value = kNotMeasured;
+  std::string unit;
+  std::optional<PaperFigure> published = {};
+  std::string remark = {};
+};
+
+struct QuantityTable {
+  std::vector<QuantityRow> rows = {};
+};
+
 /// How far the subject of a comparison is from the best model under a condition.
 struct StudyVerdict {
   std::string condition;
@@ -140,7 +154,7 @@ struct Study {
   std::string unit;      ///< unit of the errors
   StudyOptions options;
   std::vector<StudyPlant> plants = {};
-  std::variant<ErrorTable, ComparisonTable, LoopTable> table = {};
+  std::variant<ErrorTable, ComparisonTable, LoopTable, QuantityTable> table = {};
   std::vector<std::string> notes = {};  ///< conclusions, and settings of the named models
 };
 

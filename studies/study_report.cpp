@@ -250,18 +250,34 @@ std::string text_of(const ErrorTable& table, const std::string& unit) {
   return text;
 }
 
+std::string text_of(const QuantityTable& of, const std::string& /*unit*/) {
+  TextTable table;
+  table.header({"condition", "quantity", "value", "unit", "paper", ""});
+  std::string last;
+  for (const QuantityRow& row : of.rows) {
+    table.row({row.condition == last ? "" : row.condition, row.quantity, number(row.value),
+               row.unit, std::string(row.published ? row.published->text : ""), row.remark});
+    last = row.condition;
+  }
+  return '\n' + table.text();
+}
+
 using Json = nlohmann::ordered_json;
+
+Json figure_json(const PaperFigure& figure) {
+  return {{"value", figure.value},
+          {"text", figure.text},
+          {"unit", figure.unit},
+          {"paper", figure.paper},
+          {"item", figure.item}};
+}
 
 /// The published figures of a row by quantity, each with its source; empty if there are none.
 Json published_json(const StudyRow& row) {
   Json all = Json::object();
   for (const PublishedName& name : kPublishedNames)
     if (const PaperFigure* const figure = published(row, name.quantity))
-      all[name.key] = {{"value", figure->value},
-                       {"text", figure->text},
-                       {"unit", figure->unit},
-                       {"paper", figure->paper},
-                       {"item", figure->item}};
+      all[name.key] = figure_json(*figure);
   return all;
 }
 
@@ -321,6 +337,17 @@ void write(Json& document, const LoopTable& table) {
                      {"stopped", row.stopped}});
     document["rows"].push_back(std::move(json));
   }
+}
+
+void write(Json& document, const QuantityTable& table) {
+  for (const QuantityRow& row : table.rows)
+    document["rows"].push_back(
+        {{"condition", row.condition},
+         {"quantity", row.quantity},
+         {"value", row.value},
+         {"unit", row.unit},
+         {"published", row.published ? figure_json(*row.published) : Json(nullptr)},
+         {"remark", row.remark}});
 }
 
 }  // namespace

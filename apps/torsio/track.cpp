@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,6 +40,9 @@ struct TrackFlags {
   double friction = 0.0;
   std::string observer;
   bool feeds_rate_forward = false;
+  std::string limits;
+  std::string acts_on = "current";
+  std::string velocity_bandwidth;
   std::vector<std::string> models;
   DataFlags data;  ///< options for the replayed recording
   std::string faults;
@@ -117,6 +121,42 @@ torsio::TorqueReference reference_of(const TrackFlags& flags, const std::vector<
   return reference;
 }
 
+/// position=LOW..HIGH or position=HIGH (then LOW is its negative), speed=SPEED, in any order.
+torsio::MotorLimits limits_of(const std::string& text) {
+  torsio::MotorLimits limits;
+  const auto refuse = [&](std::string problem) {
+    throw torsio::UsageError({.place = "--limits",
+                              .problem = std::move(problem),
+                              .expected = "position=0.5rad or position=-20deg..45deg, "
+                                          "speed=1rad_s, separated by a comma",
+                              .found = "'" + text + "'"});
+  };
+  std::set<std::string> given;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string part = text.substr(begin, end - begin);
+    begin = end + 1;
+    const std::size_t equals = part.find('=');
+    const std::string name = part.substr(0, equals);
+    if (equals == std::string::npos || (name != "position" && name != "speed"))
+      refuse("unknown limit '" + part + "'");
+    if (!given.insert(name).second) refuse(name + " is given twice");
+    const std::string value = part.substr(equals + 1);
+    if (name == "speed") {
+      limits.speed_rad_s = above_zero(torsio::si_quantity(value, "rad_s", "--limits"), "--limits");
+    } else if (const std::size_t dots = value.find(".."); dots == std::string::npos) {
+      limits.highest_rad = above_zero(torsio::si_quantity(value, "rad", "--limits"), "--limits");
+      limits.lowest_rad = -limits.highest_rad;
+    } else {
+      limits.lowest_rad = torsio::si_quantity(value.substr(0, dots), "rad", "--limits");
+      limits.highest_rad = torsio::si_quantity(value.substr(dots + 2), "rad", "--limits");
+      if (!(limits.lowest_rad < 0.0 && limits.highest_rad > 0.0))
+        refuse("the run starts at 0 rad, which is not between the limits");
+    }
+  }
+  return limits;
+}
+
 torsio::TrackingSpec spec_of(const TrackFlags& flags, const std::vector<NamedModel>& models,
                              const torsio::DataSheet& sheet, const torsio::Progress& progress) {
   torsio::TrackingSpec spec{
@@ -141,6 +181,16 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const std::vector<NamedMod
   if (!flags.observer.empty())
     spec.observer_cutoff_Hz =
         above_zero(torsio::si_quantity(flags.observer, "Hz", "--observer"), "--observer");
+  if (!flags.limits.empty()) spec.limits = limits_of(flags.limits);
+  if (flags.acts_on == "velocity")
+    spec.actuation = torsio::DeflectionController::Actuation::velocity;
+  if (!flags.velocity_bandwidth.empty()) {
+    if (flags.acts_on != "velocity")
+      throw torsio::UsageError({.place = "--velocity-bandwidth",
+                                .problem = "the loop acts on the current",
+                                .advice = "Give --acts-on velocity, too."});
+    spec.velocity_rad_s = angular_frequency_rad_s(flags.velocity_bandwidth, "--velocity-bandwidth");
+  }
   if (!flags.faults.empty())
     spec.faults = torsio::read_fault_schedule(flags.faults, sheet, progress);
   return spec;
@@ -287,6 +337,17 @@ void add_track(CLI::App& app) {
   verb->add_option("--observer", flags->observer, "cut-off of a disturbance observer: 10Hz");
   verb->add_flag("--feed-forward", flags->feeds_rate_forward,
                  "feed the rate of the reference torque forward: no lag");
+  verb->add_option("--limits", flags->limits,
+                   "limits of the motor side, which override the torque loop: "
+                   "position=-20deg..45deg,speed=1rad_s");
+  verb->add_option("--acts-on", flags->acts_on,
+                   "what the deflection controller commands: current, or the speed of a velocity "
+                   "loop")
+      ->check(CLI::IsMember({"current", "velocity"}))
+      ->capture_default_str();
+  verb->add_option("--velocity-bandwidth", flags->velocity_bandwidth,
+                   "bandwidth of the velocity loop (default four times that of the deflection "
+                   "controller, at most 200 rad/s)");
   verb->add_option("--faults", flags->faults, "YAML schedule of faults (docs/faults.md)");
   add_seed(*verb, flags->seed, "seed of the first run's sensor noise and of a random walk");
   verb->add_option("--seeds", flags->seeds, "runs of each model, seed after seed")

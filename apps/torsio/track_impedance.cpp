@@ -68,7 +68,8 @@ void ImpedanceFlags::check(const CLI::App& verb) const {
   if (impedance.empty()) return;
   for (const char* flag :
        {"--output", "--lever", "--reference", "--replay", "--mapping", "--model", "--bandwidth",
-        "--rate", "--damping", "--friction", "--observer", "--feed-forward", "--faults", "--seeds"})
+        "--rate", "--damping", "--friction", "--observer", "--feed-forward", "--limits",
+        "--acts-on", "--velocity-bandwidth", "--faults", "--seeds"})
     if (is_given(flag))
       throw torsio::UsageError(
           {.place = flag,

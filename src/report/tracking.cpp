@@ -164,6 +164,26 @@ std::string fault_text(std::span<const TrackingRow> rows) {
       table.text(), undetected);
 }
 
+/// A line for each run with limits.
+std::string motor_text(std::span<const TrackingRow> rows) {
+  std::string text;
+  for (const TrackingRow& row : rows)
+    if (row.motor && row.status == "ok")
+      text += fmt::format(
+          "{}, seed {}: motor side from {:.4g} to {:.4g} rad, at most {:.4g} rad/s; limited for "
+          "{:.3g} s\n",
+          row.model, row.seed, row.motor->lowest_rad, row.motor->highest_rad,
+          row.motor->fastest_rad_s, row.score.limited_s);
+  return text;
+}
+
+Json motor_json(const std::optional<MotorRange>& motor) {
+  if (!motor) return nullptr;
+  return {{"lowest_rad", motor->lowest_rad},
+          {"highest_rad", motor->highest_rad},
+          {"fastest_rad_s", motor->fastest_rad_s}};
+}
+
 Json faults_json(const std::vector<FaultDetection>& faults) {
   Json list = Json::array();
   for (const FaultDetection& fault : faults)
@@ -213,6 +233,7 @@ Json row_json(const TrackingRow& row) {
                                         : Json(nullptr)},
       {"inverse_faults", count(score.inverse_faults)},
       {"loop_faults", count(score.loop_faults)},
+      {"motor", motor_json(row.motor)},
       {"faults", faults_json(row.faults)}};
 }
 
@@ -249,7 +270,7 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
       "or never was above\n",
       first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,
       rows.size() / models.size(), rows.size() == models.size() ? "" : "s", table.text(), remarks);
-  return summary + fault_text(rows);
+  return summary + motor_text(rows) + fault_text(rows);
 }
 
 std::string tracking_json(std::span<const TrackingRow> rows) {

@@ -102,8 +102,8 @@ TEST(JointController, RendersAnImpedanceAtTheMotorSide) {
   EXPECT_NEAR(joint.torque_Nm(), 40.0 * (0.2 - joint.angle_rad()), 1e-3);
 }
 
-// Paper 000, section 4: the limits are kept without a stop of the system, and let go.
-TEST(JointController, StaysAtALimitInSpringModesAndLetsGoAtOnce) {
+// Paper 000, section 4: the limits are kept without a stop of the system, and released.
+TEST(JointController, StaysAtALimitInSpringModesAndReleasesItAtOnce) {
   for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
     auto settings = settings_of("dfki-50", actuation);
     settings.limits.lowest_rad = -0.2;
@@ -198,8 +198,8 @@ JointReference any_reference(Random& random, const Controller::Settings& setting
           .deflection_rad = wild(torque_Nm / settings.torque.deflection.joint.stiffness_Nm_rad)};
 }
 
-// The override takes over and lets go where its bound meets the command: no step of the current.
-TEST(JointController, TakesOverAndLetsGoWithoutAJump) {
+// The override begins and ends where its bound meets the command: no step of the current.
+TEST(JointController, OverridesAndReleasesWithoutAJump) {
   for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
     const auto settings = settings_of("dfki-50", actuation);
     Controller controller = controller_of(settings);
@@ -241,21 +241,21 @@ TEST(JointController, NeverLetsTheMotorSideOutOfItsLimits) {
         SpringJoint joint(settings.torque.deflection.joint, end);
         JointReference reference;
         double push_Nm = 0.0;
-        double most_Nm = 0.0;
+        double max_Nm = 0.0;
         for (int n = 0; n < kTicks / 2; ++n) {
           if (random.uniform() < 0.01) reference = any_reference(random, settings, 1e3);
           if (random.uniform() < 0.003)
             push_Nm = 0.2 * settings.torque.largest_torque_Nm * (2.0 * random.uniform() - 1.0);
           const auto output = controller.step(reference, sample_of(joint, drive_of(settings)));
           joint.step(output.current_A, 1.0 / kRate_Hz, push_Nm);
-          most_Nm = std::max(most_Nm, std::abs(joint.torque_Nm()));
+          max_Nm = std::max(max_Nm, std::abs(joint.torque_Nm()));
           farthest_rad = std::max(farthest_rad, std::abs(joint.angle_rad()));
           fastest_rad_s = std::max(fastest_rad_s, std::abs(joint.speed_rad_s()));
         }
         const std::string run_name =
             fmt::format("{} {} {}", actuator, end == JointOutput::locked ? "locked" : "free",
                         actuation == Actuation::current ? "current" : "velocity");
-        EXPECT_LE(most_Nm, limits.max_measured_load_Nm) << run_name << ": beyond the condition";
+        EXPECT_LE(max_Nm, limits.max_measured_load_Nm) << run_name << ": beyond the condition";
         EXPECT_LE(farthest_rad, limits.highest_rad) << run_name;
         EXPECT_GT(farthest_rad, 0.4 * limits.highest_rad) << run_name << ": never near the limit";
         EXPECT_LE(fastest_rad_s, limits.speed_rad_s) << run_name;

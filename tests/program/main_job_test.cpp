@@ -243,6 +243,10 @@ TEST_F(MainJob, RunsTheExamples) {
   const Outcome fast = shell(std::string(TORSIO_EXAMPLES) + "/example_05_loop_margins 200");
   EXPECT_EQ(fast.exit_code, 1) << fast.out;
   EXPECT_NE(fast.err.find("unstable with its output locked"), std::string::npos) << fast.err;
+  const Outcome limits = shell(std::string(TORSIO_EXAMPLES) + "/example_08_joint_limits");
+  EXPECT_EQ(limits.exit_code, 0) << limits.err;
+  EXPECT_NE(limits.out.find("limit position, running, brake open"), std::string::npos);
+  EXPECT_NE(limits.out.find("off, brake closing or closed"), std::string::npos) << limits.out;
   const Outcome own = shell(std::string(TORSIO_EXAMPLES) + "/example_02_own_model");
   EXPECT_EQ(own.exit_code, 0) << own.err;
   EXPECT_NE(own.out.find("outside_training_range"), std::string::npos) << own.out;

@@ -88,6 +88,12 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
   expect_error(torsio("track --friction nan"), kCallWasWrong, "--friction: expected a share");
   expect_error(torsio("track --observer 0Hz"), kCallWasWrong, "--observer: expected");
   expect_error(torsio("track --observer 400Hz"), kWorkFailed, "phase margin, found -");
+  expect_error(torsio("track --limits position=1..2"), kCallWasWrong, "not between the limits");
+  expect_error(torsio("track --limits speed=1,speed=2"), kCallWasWrong, "speed is given twice");
+  expect_error(torsio("track --limits torque=5Nm"), kCallWasWrong, "unknown limit 'torque=5Nm'");
+  expect_error(torsio("track --limits position=0.0001rad"), kWorkFailed, "no room between");
+  expect_error(torsio("track --velocity-bandwidth 50rad_s"), kCallWasWrong, "--acts-on velocity");
+  expect_error(torsio("track --acts-on torque"), kCallWasWrong, "{current,velocity}");
   expect_error(torsio("track --seeds 0"), kCallWasWrong, "1 to 100");
   expect_error(torsio("track --model none.safetensors"), kWorkFailed, "none.safetensors");
   ASSERT_EQ(torsio("simulate dfki-50 chirp --duration 30s -o a.csv").exit_code, 0);

@@ -22,12 +22,14 @@
 #include "support/system_calls.hpp"
 #include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
+#include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/any_estimator.hpp"
+#include "torsio/safety/joint_stop.hpp"
 #include "torsio/signal/excitation.hpp"
 #include "torsio/signal/joint_move.hpp"
 
@@ -168,6 +170,58 @@ TEST(ControlCalls, OfJointCascadeAreNone) {
               return faults > kLeastFaults;
             }),
             "");
+}
+
+// Through both loops, with a stop in between: every mode and every phase.
+TEST(ControlCalls, OfJointControllerAndJointStopAreNone) {
+  for (const auto actuation :
+       {DeflectionController::Actuation::current, DeflectionController::Actuation::velocity}) {
+    const SeriesElasticJoint joint = series_elastic_joint(data_sheet("dfki-50"));
+    JointController controller(
+        LinearInverse(joint.stiffness_Nm_rad),
+        JointControllerCore::Settings{
+            .torque = {.deflection = {.joint = joint, .actuation = actuation}},
+            .limits = {.lowest_rad = -1.0,
+                       .highest_rad = 1.0,
+                       .speed_rad_s = 2.0,
+                       .max_unmeasured_load_Nm = 2.0}},
+        kRate_Hz);
+    JointStop stop({.drive = joint.drive,
+                    .deceleration_rad_s2 = 5.0,
+                    .brake_static_Nm = 100.0,
+                    .brake_sliding_Nm = 80.0,
+                    .brake_engage_s = 0.02,
+                    .brake_release_s = 0.04},
+                   kRate_Hz);
+    Spoiled position(1.0, 4099);
+    Spoiled torque(1.0, 4111);
+    Spoiled angle(0.5, 4127);
+    EXPECT_EQ(besides_computing([&] {
+                int faults = 0;
+                for (int n = 0; n < kCycles / 4; ++n) {
+                  const double angle_rad = angle.next();
+                  const JointState state = {.angle_rad = angle_rad,
+                                            .speed_rad_s = n % 5000 < 4000 ? 0.1 : 0.0};
+                  if (n % 5000 == 0) stop.trigger(static_cast<StopCategory>(n / 5000 % 3));
+                  if (n % 5000 == 4500) static_cast<void>(stop.release());
+                  const JointReference wanted = {.mode = static_cast<JointMode>(n / 1000 % 6),
+                                                 .position_rad = position.next(),
+                                                 .torque_Nm = torque.next(),
+                                                 .deflection_rad = 0.01};
+                  const auto output = controller.step(stop.reference(wanted, state),
+                                                      {.motor_angle_rad = angle_rad * 120.0,
+                                                       .gear_angle_rad = angle_rad,
+                                                       .joint_angle_rad = 0.99 * angle_rad});
+                  const auto stopped = stop.step(output.current_A, state);
+                  if (stopped.is_current_cut) controller.track(stopped.current_A);
+                  faults += output.fault != Fault::none ? 1 : 0;
+                  if (n % 777'777 == 0) controller.reset();
+                  if (!(std::abs(stopped.current_A) <= joint.drive.peak_current_A)) return false;
+                }
+                return faults > kLeastFaults / 4;
+              }),
+              "");
+  }
 }
 
 TEST(ControlCalls, OfDeflectionControllerAreNone) {

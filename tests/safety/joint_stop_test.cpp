@@ -157,15 +157,15 @@ TEST(JointStop, StopsUnderPowerWithoutAddingEnergy) {
           rig.stop().trigger(category);
           rig.push(push_share * sheet.rating.torque_Nm.value);
           const double first_J = rig.energy_J() - rig.external_J();
-          double most_J = first_J;
+          double max_J = first_J;
           JointStop::Output output;
           for (int n = 0; n < 3000; ++n) {
             output = rig.tick(motion);
-            most_J = std::max(most_J, rig.energy_J() - rig.external_J());
+            max_J = std::max(max_J, rig.energy_J() - rig.external_J());
           }
           const std::string run =
               fmt::format("{} {} {}", name_of(actuator, motion), name(category), push_share);
-          EXPECT_LE(most_J, 1.01 * first_J) << run;
+          EXPECT_LE(max_J, 1.01 * first_J) << run;
           EXPECT_TRUE(output.is_at_rest) << run;
           EXPECT_FALSE(output.has_escalated) << run;
           EXPECT_LT(std::abs(rig.drive_speed_rad_s()), 0.01) << run;
@@ -198,7 +198,7 @@ TEST(JointStop, RemovesThePowerWhenAMeasurementIsLostOrTheRampTakesTooLong) {
   const auto off = lost.tick({}, true);
   EXPECT_EQ(off.phase, Phase::off);
   EXPECT_TRUE(off.has_escalated);
-  EXPECT_FALSE(lost.stop().release()) << "nobody knows whether it rests";
+  EXPECT_FALSE(lost.stop().release()) << "whether it rests is not measured";
 
   const DataSheet sheet = data_sheet("dfki-50");
   JointStop::Settings settings = stop_settings(sheet, 0.0);

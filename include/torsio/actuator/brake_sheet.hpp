@@ -16,7 +16,7 @@ struct BrakeSheet {
   SheetValue static_torque_Nm;  ///< referred to the joint: twice its rated torque
   SheetValue sliding_ratio;     ///< over the static torque: 0.8
   SheetValue bristle_rad;       ///< break-away angle of the rotor: 0.02
-  SheetValue stribeck_rad_s;    ///< of the rotor: 3
+  SheetValue stribeck_rad_s;    ///< speed of the rotor: 3
   SheetValue engage_s;          ///< from the loss of the voltage to the torque: 20 ms
   SheetValue release_s;         ///< from the voltage to no torque: 40 ms
 };

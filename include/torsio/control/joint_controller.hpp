@@ -73,7 +73,7 @@ class JointControllerCore {
   bool is_accepted_ = true;      ///< the last reference
 };
 
-/// Every controller of a series-elastic joint in one piece: current, velocity, position, and through
+/// Every controller of a series-elastic joint in one class: current, velocity, position, and through
 /// the spring deflection, torque and impedance, within the limits of a `JointCascade`.
 ///
 ///     torque       δ* = inverse(τ*)                       (`TorqueController`)

@@ -36,7 +36,7 @@ class JointStop {
  public:
   struct Settings {
     Drive drive = {};
-    double deceleration_rad_s2 = 0.0;  ///< of the ramp, motor side over the ratio
+    double deceleration_rad_s2 = 0.0;  ///< rate of the ramp, motor side over the ratio
     double longest_ramp_s = 1.0;       ///< until the power is removed
     double standstill_rad_s = 0.01;    ///< slower than this, for `standstill_s`, is at rest
     double standstill_s = 0.02;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -33,11 +34,16 @@ Load load_of(const TrackingSpec& spec) {
   return lever(kLeverMass_kg, spec.lever_m);
 }
 
+/// What no sensor measures, and what the spring may carry, of the torque at rated current.
+constexpr double kUnmeasuredShare = 0.05;
+constexpr double kMeasuredShare = 0.6;
+
 TorqueLoopCore::Settings loop_settings(const DataSheet& sheet, const TrackingSpec& spec,
                                        const Load& load) {
   SeriesElasticJoint joint = series_elastic_joint(sheet);
   joint.joint_inertia_kg_m2 += load.inertia_kg_m2;
   return {.deflection = {.joint = joint,
+                         .actuation = spec.actuation,
                          .bandwidth_rad_s = spec.bandwidth_rad_s,
                          .damping = spec.damping},
           .largest_torque_Nm = sheet.rating.torque_Nm.value,
@@ -46,6 +52,60 @@ TorqueLoopCore::Settings loop_settings(const DataSheet& sheet, const TrackingSpe
           .feeds_rate_forward = spec.feeds_rate_forward};
 }
 
+JointControllerCore::Settings joint_settings(const DataSheet& sheet, const TrackingSpec& spec,
+                                             const Load& load) {
+  const TorqueLoopCore::Settings torque = loop_settings(sheet, spec, load);
+  const Drive& drive = torque.deflection.joint.drive;
+  const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
+  const MotorLimits limits = spec.limits.value_or(MotorLimits{});
+  std::optional<JointCascade::Gains> gains;
+  if (spec.velocity_rad_s) gains = JointCascade::gains_for(drive, *spec.velocity_rad_s);
+  return {.torque = torque,
+          .limits = {.lowest_rad = limits.lowest_rad,
+                     .highest_rad = limits.highest_rad,
+                     .speed_rad_s = std::min(limits.speed_rad_s, sheet.rating.speed_rad_s.value),
+                     .max_unmeasured_load_Nm = kUnmeasuredShare * rated_Nm,
+                     .max_measured_load_Nm = kMeasuredShare * rated_Nm},
+          .gains = gains};
+}
+
+/// The torque loop alone, or as a part of the controller that keeps the limits.
+class Controller {
+ public:
+  Controller(const DataSheet& sheet, const TrackingSpec& spec, const AnyInverse& inverse,
+             const Load& load) {
+    const bool is_plain =
+        !spec.limits && spec.actuation == DeflectionController::Actuation::current;
+    if (is_plain)
+      plain_.emplace(inverse, loop_settings(sheet, spec, load), kBenchRate_Hz);
+    else
+      limited_.emplace(inverse, joint_settings(sheet, spec, load), kBenchRate_Hz);
+  }
+
+  struct Output {
+    TorqueLoopCore::Output loop;
+    double limit = 0.0;
+  };
+  Output step(double wanted_Nm, const JointSample& sample) {
+    if (plain_) return {plain_->step(wanted_Nm, sample)};
+    const auto joint = limited_->step({.mode = JointMode::torque, .torque_Nm = wanted_Nm}, sample);
+    TorqueLoopCore::Output loop = joint.torque;
+    // In the cascade, the current of the torque loop is a feed-forward.
+    loop.proportional_A += joint.cascade.proportional_A;
+    loop.integral_A += joint.cascade.integral_A;
+    loop.derivative_A += joint.cascade.derivative_A;
+    loop.transfer_A += joint.cascade.transfer_A;
+    loop.current_A = joint.current_A;
+    loop.is_limited = joint.is_limited;
+    loop.fault = joint.fault;
+    return {loop, static_cast<double>(joint.limit)};
+  }
+
+ private:
+  std::optional<TorqueController<AnyInverse>> plain_;
+  std::optional<JointController<AnyInverse>> limited_;
+};
+
 /// What the controller made of each tick, as channels.
 class LoopLog {
  public:
@@ -53,7 +113,8 @@ class LoopLog {
     for (auto& values : columns_) values.reserve(ticks);
   }
 
-  void add(double wanted_Nm, const TorqueLoopCore::Output& out) {
+  void add(double wanted_Nm, const Controller::Output& controller) {
+    const TorqueLoopCore::Output& out = controller.loop;
     const double terms_A = out.proportional_A + out.integral_A + out.derivative_A +
                            out.feed_forward_A + out.rate_feed_forward_A + out.friction_A +
                            out.observer_A + out.transfer_A;
@@ -72,7 +133,9 @@ class LoopLog {
                                                 out.current_A,
                                                 out.is_limited ? 1.0 : 0.0,
                                                 static_cast<double>(out.inverse),
-                                                static_cast<double>(out.fault)};
+                                                static_cast<double>(out.fault),
+                                                out.speed_rad_s,
+                                                controller.limit};
     for (std::size_t i = 0; i < row.size(); ++i) columns_[i].push_back(row[i]);
   }
   void add_to(Recording& recording) && {
@@ -88,7 +151,8 @@ class LoopLog {
                                      "friction_current_A",     "observer_current_A",
                                      "transfer_current_A",     "rest_current_A",
                                      "command_current_A",      "is_limited_1",
-                                     "inverse_fault_1",        "fault_1"};
+                                     "inverse_fault_1",        "fault_1",
+                                     "wanted_speed_rad_s",     "limit_1"};
   std::array<std::vector<double>, kNames.size()> columns_;
 };
 
@@ -109,7 +173,8 @@ class Loop {
                {.start = load_, .next = {}}),
         bench_log_(sheet, reference_Nm_.size(), true),
         loop_log_(reference_Nm_.size()),
-        controller_(inverse, loop_settings(sheet, spec, load_), kBenchRate_Hz),
+        controller_(sheet, spec, inverse, load_),
+        inverse_ratio_(1.0 / drive_of(sheet).ratio),
         max_Nm_(kMaxTorque * sheet.rating.torque_Nm.value) {
     if (load_.is_locked) return;
     check_swing(
@@ -130,7 +195,8 @@ class Loop {
       const Measurement measured = bench_.sense();
       const BenchTruth truth = bench_.truth();
       bench_log_.add(measured, truth);
-      const TorqueLoopCore::Output out =
+      observe(truth.plant.state());
+      const Controller::Output out =
           controller_.step(reference_Nm_[tick], {.t_s = bench_.time_s(),
                                                  .motor_angle_rad = measured.motor_angle_rad,
                                                  .gear_angle_rad = measured.middle_angle_rad,
@@ -140,10 +206,11 @@ class Loop {
       if (!(std::abs(truth.plant.state().joint_angle_rad) < kTurnedRound_rad &&
             std::abs(truth.load_cell_Nm) < max_Nm_))
         return false;
-      bench_.act({.command = {.current_A = out.current_A}, .load = load_});
+      bench_.act({.command = {.current_A = out.loop.current_A}, .load = load_});
     }
     return true;
   }
+  [[nodiscard]] const MotorRange& motor() const { return motor_; }
   Recording finish() && {
     Recording record = bench_log_.finish(name_);
     std::move(loop_log_).add_to(record);
@@ -151,13 +218,23 @@ class Loop {
   }
 
  private:
+  void observe(const PlantState& state) {
+    const double angle_rad = state.rotor_angle_rad * inverse_ratio_;
+    motor_.lowest_rad = std::min(motor_.lowest_rad, angle_rad);
+    motor_.highest_rad = std::max(motor_.highest_rad, angle_rad);
+    motor_.fastest_rad_s =
+        std::max(motor_.fastest_rad_s, std::abs(state.rotor_speed_rad_s) * inverse_ratio_);
+  }
+
   std::string name_;
   std::vector<double> reference_Nm_;
   Load load_;
   Bench bench_;
   BenchLog bench_log_;
   LoopLog loop_log_;
-  TorqueController<AnyInverse> controller_;
+  Controller controller_;
+  double inverse_ratio_;
+  MotorRange motor_;
   double max_Nm_;
 };
 
@@ -203,6 +280,7 @@ void run_into(TrackingRow& row, const DataSheet& sheet, const TrackingSpec& spec
     row.score = run.score;
     row.bandwidth_Hz = run.bandwidth_Hz;
     row.faults = run.faults;
+    if (spec.limits) row.motor = run.motor;
     if (!run.has_diverged) return;
     row.status = "diverged";
     row.reason = fmt::format("stopped after {:.3g} s",
@@ -235,7 +313,10 @@ TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, const AnyI
   const DataSheet sheet = aged(nominal, spec.conditions.age);
   Loop loop(sheet, spec, inverse, seed);
   const bool has_held = loop.run(progress);
-  TrackingRun done{.score = {}, .has_diverged = !has_held, .record = std::move(loop).finish()};
+  TrackingRun done{.score = {},
+                   .has_diverged = !has_held,
+                   .motor = loop.motor(),
+                   .record = std::move(loop).finish()};
   if (!spec.faults.faults.empty())
     done.faults = fault_detections(spec.faults, sheet, done.record,
                                    run_without_faults(sheet, spec, inverse, seed, progress));

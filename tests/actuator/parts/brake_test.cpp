@@ -42,11 +42,11 @@ TEST(Brake, OpensAndClosesAfterItsDelays) {
 
 TEST(Brake, HoldsUpToItsStaticTorqueAndSlidesWithTheSlidingOne) {
   Brake brake(parameters());
-  double most_Nm = 0.0;
-  for (int n = 0; n < 100'000; ++n) most_Nm = std::max(most_Nm, brake.step(0.0, 0.05, 1e-4));
-  EXPECT_NEAR(most_Nm, 1.0, 1e-3);
-  for (int n = 0; n < 10'000; ++n) most_Nm = brake.step(0.0, 100.0, 1e-4);
-  EXPECT_NEAR(most_Nm, 0.8, 1e-6);
+  double max_Nm = 0.0;
+  for (int n = 0; n < 100'000; ++n) max_Nm = std::max(max_Nm, brake.step(0.0, 0.05, 1e-4));
+  EXPECT_NEAR(max_Nm, 1.0, 1e-3);
+  for (int n = 0; n < 10'000; ++n) max_Nm = brake.step(0.0, 100.0, 1e-4);
+  EXPECT_NEAR(max_Nm, 0.8, 1e-6);
   brake.reset(false);
   EXPECT_EQ(brake.step(24.0, 100.0, 1e-4), 0.0);
   EXPECT_EQ(brake.energy(), 0.0);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/wear.hpp"
+#include "torsio/control/joint_controller.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/progress.hpp"
@@ -21,6 +23,20 @@
 
 namespace torsio {
 
+/// Limits of the motor side, over the ratio, within which a `JointController` keeps a loop.
+struct MotorLimits {
+  double lowest_rad = -std::numeric_limits<double>::infinity();
+  double highest_rad = std::numeric_limits<double>::infinity();
+  double speed_rad_s = std::numeric_limits<double>::infinity();  ///< none: that of the rating
+};
+
+/// Range of the motor side in a run, from the true angle of the rotor over the ratio.
+struct MotorRange {
+  double lowest_rad = 0.0;
+  double highest_rad = 0.0;
+  double fastest_rad_s = 0.0;
+};
+
 /// A torque loop on the simulated bench of a series-elastic actuator.
 struct TrackingSpec {
   JointOutput output = JointOutput::locked;
@@ -31,6 +47,11 @@ struct TrackingSpec {
   std::optional<FrictionCompensation> friction = std::nullopt;
   std::optional<double> observer_cutoff_Hz = std::nullopt;
   bool feeds_rate_forward = false;
+  /// With `velocity` or with limits the loop is that of a `JointController`. Of the torque at rated
+  /// current, the limits allow for 5 % that no sensor measures and for 60 % in the spring.
+  DeflectionController::Actuation actuation = DeflectionController::Actuation::current;
+  std::optional<double> velocity_rad_s = std::nullopt;  ///< bandwidth of the velocity loop
+  std::optional<MotorLimits> limits = std::nullopt;
   bool measures_bandwidth = true;  ///< by a run of its own with `frequency_sweep`
   OperatingConditions conditions = {};
   FaultSchedule faults = {};
@@ -38,7 +59,7 @@ struct TrackingSpec {
 
 /// Checks a run. @throws UsageError if the actuator is not series-elastic, the reference exceeds
 /// its rating, the lever would tip over, or as `FaultInjector`; Error if the loop would be
-/// unstable.
+/// unstable, or the limits contradict each other.
 void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed);
 
 struct TrackingRun {
@@ -48,6 +69,7 @@ struct TrackingRun {
   std::optional<double> bandwidth_Hz = {};
   bool has_diverged =
       false;  ///< stopped: the joint made a full turn, or the torque exceeded every bound
+  MotorRange motor = {};
   /// If faults are scheduled: one entry for each, compared with a run without them.
   std::vector<FaultDetection> faults = {};
   /// Sensor signals, each term of the command, and the `truth_` channels.
@@ -56,7 +78,9 @@ struct TrackingRun {
   ///               friction + observer + transfer + rest,   all `..._current_A`
   ///
   /// where rest is the part that a limit removed, or the rest of the command while a fault fades it
-  /// to 0.
+  /// to 0. With `Actuation::velocity`, proportional, integral, derivative and feed_forward are those of
+  /// the velocity loop, and `wanted_speed_rad_s` is the command of the deflection controller;
+  /// `limit_1` is a `JointCascade::Limit`.
   Recording record;
 };
 
@@ -98,6 +122,7 @@ struct TrackingRow {
   TrackingScore score = {};
   std::optional<double> mad_to_linear = {};  ///< MAD over that of the linear inverse, same seed
   std::optional<double> bandwidth_Hz = {};   ///< as `TrackingRun`'s
+  std::optional<MotorRange> motor = {};      ///< as `TrackingRun`'s; none without limits
   std::vector<FaultDetection> faults = {};   ///< as `TrackingRun`'s
   std::string status = "ok";                 ///< "diverged", "failed"
   std::string reason = {};
