@@ -59,8 +59,13 @@ int run(double bandwidth_rad_s) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const double bandwidth_rad_s = argc > 1 ? std::atof(argv[1]) : 50.0;
+  if (!(bandwidth_rad_s > 0.0)) {
+    std::fprintf(stderr, "usage: %s [BANDWIDTH_RAD_S] (a number above 0)\n", argv[0]);
+    return 2;
+  }
   try {
-    return run(argc > 1 ? std::atof(argv[1]) : 50.0);
+    return run(bandwidth_rad_s);
   } catch (const torsio::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -72,7 +72,7 @@ void run(const char* recording) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  run(argc > 1 ? argv[1] : "run.tsr");
+  run(argc > 1 && argv[1][0] != '-' ? argv[1] : "run.tsr");
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 1;

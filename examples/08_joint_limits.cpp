@@ -3,8 +3,8 @@
 #include <cstdio>
 
 #include "torsio/control/joint_controller.hpp"
+#include "torsio/control/joint_stop.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/safety/joint_stop.hpp"
 
 namespace {
 
@@ -36,6 +36,7 @@ int run() {
                                                        .max_measured_load_Nm = 30.0}},
       1000.0);  // throws if the limits contradict each other or the drive
   torsio::JointStop stop({.drive = joint.drive,
+                          .speed_rad_s = 1.0,
                           .deceleration_rad_s2 = 5.0,
                           .brake_static_Nm = 100.0,
                           .brake_sliding_Nm = 80.0,
@@ -54,14 +55,14 @@ int run() {
         controller.step(reference, {.motor_angle_rad = motor.angle_rad * joint.drive.ratio,
                                     .gear_angle_rad = motor.angle_rad,
                                     .joint_angle_rad = motor.angle_rad});
-    const auto command = stop.step(output.current_A, state);
+    const auto command = stop.step(output.current_A, state, output.fault);
     if (command.is_current_cut) controller.track(command.current_A);
     motor.step(command.current_A);
     if (tick % 200 == 0)
-      std::printf("t = %.1f s: %6.3f rad, %6.3f rad/s, %6.3f A, limit %s, %s, brake %s\n",
+      std::printf("t = %.1f s: %6.3f rad, %6.3f rad/s, %6.3f A, limit %s, stop %s, at rest: %s\n",
                   1e-3 * tick, motor.angle_rad, motor.speed_rad_s, command.current_A,
                   name(output.limit).data(), name(command.phase).data(),
-                  command.is_brake_open ? "open" : "closing or closed");
+                  command.is_drive_at_rest ? "yes" : "no");
   }
   return 0;
 }

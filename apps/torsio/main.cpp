@@ -23,6 +23,16 @@ int complain(const char* message, int exit_code) {
   return exit_code;
 }
 
+/// An empty value, from a variable of the shell that is not set, must not act as no option.
+void refuse_empty_values(CLI::App& app) {
+  const auto refuse = [](const std::string& text) {
+    return text.empty() ? std::string("expected a value, found an empty text") : std::string();
+  };
+  for (CLI::App* verb : app.get_subcommands({}))
+    for (CLI::Option* option : verb->get_options())
+      if (option->get_items_expected_max() > 0) option->check(refuse);
+}
+
 int run(int argc, char** argv) {
   CLI::App app(
       "Fits models of a series-elastic actuator's spring and estimates the joint torque with them.",
@@ -44,6 +54,7 @@ int run(int argc, char** argv) {
   add_tune_loop(app);
   add_reproduce(app);
   add_unpack(app);
+  refuse_empty_values(app);
   catch_interrupts();
   try {
     app.parse(argc, argv);

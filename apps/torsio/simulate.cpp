@@ -261,6 +261,11 @@ void describe(const SimulateFlags& flags) {
                               .found = flags.actuator});
   DataFlags().check_outputs({flags.json.destination, flags.yaml}, {sheet_file(flags.describe)});
   require_ending("--yaml", flags.yaml, {".yaml", ".yml"});
+  if (flags.is_electrical && !flags.yaml.empty())
+    throw torsio::UsageError({.place = "--yaml",
+                              .problem = "a data sheet as a file has no values of the electrical "
+                                         "side and of the brake, which follow from the others",
+                              .advice = "Leave out --electrical."});
   const torsio::OperatingConditions of = conditions(flags);
   torsio::check(of);
   const torsio::DataSheet sheet = torsio::aged(torsio::find_data_sheet(flags.describe), of.age);

@@ -43,6 +43,7 @@ struct TrackFlags {
   std::string limits;
   std::string acts_on = "current";
   std::string velocity_bandwidth;
+  bool has_damping = false;  ///< --damping was given
   std::vector<std::string> models;
   DataFlags data;  ///< options for the replayed recording
   std::string faults;
@@ -122,19 +123,19 @@ torsio::TorqueReference reference_of(const TrackFlags& flags, const std::vector<
 }
 
 /// position=LOW..HIGH or position=HIGH (then LOW is its negative), speed=SPEED, in any order.
-torsio::MotorLimits limits_of(const std::string& text) {
-  torsio::MotorLimits limits;
+torsio::DriveLimits limits_of(const std::string& text) {
+  torsio::DriveLimits limits;
   const auto refuse = [&](std::string problem) {
     throw torsio::UsageError({.place = "--limits",
                               .problem = std::move(problem),
-                              .expected = "position=0.5rad or position=-20deg..45deg, "
-                                          "speed=1rad_s, separated by a comma",
-                              .found = "'" + text + "'"});
+                              .advice = "For example --limits position=-20deg..45deg,speed=1rad_s, "
+                                        "or position=0.5rad for -0.5 to 0.5 rad."});
   };
   std::set<std::string> given;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string part = text.substr(begin, end - begin);
+    const std::size_t first = std::min(text.find_first_not_of(' ', begin), end);
+    const std::string part = text.substr(first, end - first);
     begin = end + 1;
     const std::size_t equals = part.find('=');
     const std::string name = part.substr(0, equals);
@@ -143,18 +144,41 @@ torsio::MotorLimits limits_of(const std::string& text) {
     if (!given.insert(name).second) refuse(name + " is given twice");
     const std::string value = part.substr(equals + 1);
     if (name == "speed") {
-      limits.speed_rad_s = above_zero(torsio::si_quantity(value, "rad_s", "--limits"), "--limits");
+      limits.speed_rad_s =
+          above_zero(torsio::si_quantity(value, "rad_s", "--limits speed"), "--limits speed");
     } else if (const std::size_t dots = value.find(".."); dots == std::string::npos) {
-      limits.highest_rad = above_zero(torsio::si_quantity(value, "rad", "--limits"), "--limits");
+      limits.highest_rad =
+          above_zero(torsio::si_quantity(value, "rad", "--limits position"), "--limits position");
       limits.lowest_rad = -limits.highest_rad;
     } else {
-      limits.lowest_rad = torsio::si_quantity(value.substr(0, dots), "rad", "--limits");
-      limits.highest_rad = torsio::si_quantity(value.substr(dots + 2), "rad", "--limits");
+      limits.lowest_rad = torsio::si_quantity(value.substr(0, dots), "rad", "--limits position");
+      limits.highest_rad = torsio::si_quantity(value.substr(dots + 2), "rad", "--limits position");
+      if (!(limits.lowest_rad < limits.highest_rad))
+        refuse("position: the lower limit comes first, found '" + value + "'");
       if (!(limits.lowest_rad < 0.0 && limits.highest_rad > 0.0))
-        refuse("the run starts at 0 rad, which is not between the limits");
+        refuse("position: the run starts at 0 rad, which is not between the limits '" + value +
+               "'");
     }
   }
   return limits;
+}
+
+/// Refuses flags that have no effect on the loop that was chosen.
+void check_velocity_loop(const TrackFlags& flags) {
+  const auto refuse = [](const char* flag, const char* problem, const char* advice) {
+    throw torsio::UsageError({.place = flag, .problem = problem, .advice = advice});
+  };
+  if (flags.acts_on == "current") {
+    if (!flags.velocity_bandwidth.empty())
+      refuse("--velocity-bandwidth", "the loop acts on the current",
+             "Give --acts-on velocity, too.");
+    return;
+  }
+  const char* const problem = "it belongs to a loop on the current";
+  const char* const advice = "Leave it out, or leave out --acts-on velocity.";
+  if (!flags.observer.empty()) refuse("--observer", problem, advice);
+  if (flags.feeds_rate_forward) refuse("--feed-forward", problem, advice);
+  if (flags.has_damping) refuse("--damping", problem, advice);
 }
 
 torsio::TrackingSpec spec_of(const TrackFlags& flags, const std::vector<NamedModel>& models,
@@ -182,15 +206,11 @@ torsio::TrackingSpec spec_of(const TrackFlags& flags, const std::vector<NamedMod
     spec.observer_cutoff_Hz =
         above_zero(torsio::si_quantity(flags.observer, "Hz", "--observer"), "--observer");
   if (!flags.limits.empty()) spec.limits = limits_of(flags.limits);
+  check_velocity_loop(flags);
   if (flags.acts_on == "velocity")
     spec.actuation = torsio::DeflectionController::Actuation::velocity;
-  if (!flags.velocity_bandwidth.empty()) {
-    if (flags.acts_on != "velocity")
-      throw torsio::UsageError({.place = "--velocity-bandwidth",
-                                .problem = "the loop acts on the current",
-                                .advice = "Give --acts-on velocity, too."});
+  if (!flags.velocity_bandwidth.empty())
     spec.velocity_rad_s = angular_frequency_rad_s(flags.velocity_bandwidth, "--velocity-bandwidth");
-  }
   if (!flags.faults.empty())
     spec.faults = torsio::read_fault_schedule(flags.faults, sheet, progress);
   return spec;
@@ -246,6 +266,11 @@ std::string refuse_output(const std::string& text) {
          "'. Results are written with --json FILE, the loop's signals with --record FILE.csv";
 }
 
+std::string refuse_actuation(const std::string& text) {
+  if (text == "current" || text == "velocity") return {};
+  return "expected current or velocity, found '" + text + "'";
+}
+
 void run(TrackFlags& flags, const CLI::App& verb) {
   flags.impedance.check(verb);
   const bool is_impedance = !flags.impedance.impedance.empty();
@@ -259,6 +284,7 @@ void run(TrackFlags& flags, const CLI::App& verb) {
                                            .seed = flags.seed,
                                            .record = flags.record,
                                            .json = flags.json});
+  flags.has_damping = verb.get_option("--damping")->count() > 0;
   ProgressBar progress;
   const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());
   const std::vector<NamedModel> files = load_models(flags);
@@ -338,16 +364,17 @@ void add_track(CLI::App& app) {
   verb->add_flag("--feed-forward", flags->feeds_rate_forward,
                  "feed the rate of the reference torque forward: no lag");
   verb->add_option("--limits", flags->limits,
-                   "limits of the motor side, which override the torque loop: "
-                   "position=-20deg..45deg,speed=1rad_s");
+                   "limits of the rotor's angle and speed over the gear ratio, which override the "
+                   "torque loop: position=-20deg..45deg,speed=1rad_s");
   verb->add_option("--acts-on", flags->acts_on,
                    "what the deflection controller commands: current, or the speed of a velocity "
                    "loop")
-      ->check(CLI::IsMember({"current", "velocity"}))
+      ->check(refuse_actuation)
       ->capture_default_str();
-  verb->add_option("--velocity-bandwidth", flags->velocity_bandwidth,
-                   "bandwidth of the velocity loop (default four times that of the deflection "
-                   "controller, at most 200 rad/s)");
+  verb->add_option(
+      "--velocity-bandwidth", flags->velocity_bandwidth,
+      "bandwidth of the velocity loop, as 8Hz or 50rad_s, at most 200 rad/s (default four "
+      "times that of the deflection controller)");
   verb->add_option("--faults", flags->faults, "YAML schedule of faults (docs/faults.md)");
   add_seed(*verb, flags->seed, "seed of the first run's sensor noise and of a random walk");
   verb->add_option("--seeds", flags->seeds, "runs of each model, seed after seed")

@@ -21,7 +21,7 @@ ElectricalSheet electrical_sheet(const DataSheet& sheet) {
   const double rated_A = sheet.rating.current_A.value;
   const double peak_A = sheet.motor.peak_current_ratio.value * rated_A;
   const double resistance_Ohm = sheet.motor.winding_resistance_Ohm.value;
-  const double phase_Ohm = resistance_Ohm / 1.5;
+  const double phase_Ohm = kPhaseResistanceShare * resistance_Ohm;
   const double loss_W =
       resistance_Ohm * rated_A * rated_A * (1.0 + kCopperResistanceRise_1_K * kRise_K);
   const double rise_K_W = kRise_K / loss_W;
@@ -55,7 +55,6 @@ std::vector<SheetRow> describe(const ElectricalSheet& sheet) {
           {"trip_current", "A", sheet.trip_current_A},
           {"current_offset", "A", sheet.current_offset_A},
           {"current_gain_error", "", sheet.current_gain_error},
-          {"current_noise", "A", sheet.current_noise_A},
           {"commutation_error", "rad", sheet.commutation_error_rad},
           {"copper_heat_capacity", "J/K", sheet.copper_J_K},
           {"stator_heat_capacity", "J/K", sheet.stator_J_K},

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/checks.hpp"
+#include "torsio/actuator/electrical_sheet.hpp"
 
 namespace torsio {
 namespace {
@@ -64,7 +65,7 @@ void Windings::check() const {
 }
 
 Windings windings_of(const Drive& drive, double inductance_H, int pole_pairs) {
-  const Windings windings{.resistance_Ohm = drive.resistance_Ohm / 1.5,
+  const Windings windings{.resistance_Ohm = kPhaseResistanceShare * drive.resistance_Ohm,
                           .inductance_H = inductance_H,
                           .torque_constant_Nm_A = drive.torque_constant_Nm_A,
                           .pole_pairs = pole_pairs};

@@ -23,7 +23,7 @@ JointCascade::Settings checked(const JointCascade::Settings& settings, double sa
   const double max_rad_s = kMaxBandwidthShare * sample_rate_Hz;
   require(settings.bandwidth_rad_s > 0.0 && settings.bandwidth_rad_s <= max_rad_s, kPlace,
           fmt::format("0 < bandwidth_rad_s <= {}", max_rad_s), settings.bandwidth_rad_s);
-  require_not_negative(kPlace, "load_Nm", settings.limits.max_unmeasured_load_Nm);
+  require_not_negative(kPlace, "max_unmeasured_load_Nm", settings.limits.max_unmeasured_load_Nm);
   require_not_negative(kPlace, "max_measured_load_Nm", settings.limits.max_measured_load_Nm);
   require_positive(kPlace, "speed_rad_s", settings.limits.speed_rad_s);
   require(settings.limits.torque_Nm > 0.0, kPlace, "torque_Nm > 0", settings.limits.torque_Nm);
@@ -113,7 +113,7 @@ void JointCascade::check_limits() const {
   if (!(braking_rad_s2_ > 0.0))
     contradict(
         "the rated current cannot brake against the load",
-        fmt::format("load_Nm and max_measured_load_Nm together below {:.4g} Nm",
+        fmt::format("max_unmeasured_load_Nm and max_measured_load_Nm together below {:.4g} Nm",
                     settings_.drive.rated_current_A / amperes_per_Nm_),
         fmt::format("{:.4g} Nm", limits.max_unmeasured_load_Nm + limits.max_measured_load_Nm));
   if (!(soft_speed_rad_s_ > 0.0))
@@ -197,12 +197,20 @@ void JointCascade::enter(JointMode mode) noexcept {
 
 void JointCascade::track(double applied_A) noexcept {
   if (!std::isfinite(applied_A)) return;
-  const Loop active = loop_of(reference_.mode);
-  if (active != Loop::none && !is_switching_) {
-    Pid& loop = active == Loop::torque ? torque_ : velocity_;
-    loop.track(loop.command() + applied_A - current_A_);
-  }
+  double cut_A = applied_A - current_A_;
   current_A_ = applied_A;
+  if (is_switching_) return;
+  // What is left of a transfer that points against the cut is dropped first.
+  const double fading_A = transfer_.pending();
+  if (fading_A * cut_A < 0.0) {
+    const double dropped_A = std::clamp(cut_A, -std::abs(fading_A), std::abs(fading_A));
+    transfer_.add(dropped_A);
+    cut_A -= dropped_A;
+  }
+  const Loop active = loop_of(reference_.mode);
+  if (active == Loop::none) return;
+  Pid& loop = active == Loop::torque ? torque_ : velocity_;
+  loop.track(loop.command() + cut_A);
 }
 
 JointCascade::Output JointCascade::fade() noexcept {

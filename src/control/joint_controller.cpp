@@ -29,6 +29,7 @@ JointCascade::Gains gains_of(const Settings& settings, double sample_rate_Hz) {
 
 TorqueLoopCore::Settings torque_settings(const Settings& settings, double sample_rate_Hz) {
   TorqueLoopCore::Settings torque = settings.torque;
+  torque.largest_torque_Nm = std::min(torque.largest_torque_Nm, settings.limits.torque_Nm);
   if (torque.deflection.actuation == Actuation::velocity)
     torque.deflection.speed_loop = gains_of(settings, sample_rate_Hz).velocity;
   return torque;
@@ -49,7 +50,9 @@ JointControllerCore::JointControllerCore(const Settings& settings, double sample
       acts_on_speed_(settings.torque.deflection.actuation == Actuation::velocity),
       torque_(torque_settings(settings, sample_rate_Hz), sample_rate_Hz),
       cascade_(cascade_settings(settings, sample_rate_Hz), sample_rate_Hz),
-      impedance_({.torque_Nm = settings.torque.largest_torque_Nm}, sample_rate_Hz),
+      impedance_(
+          {.torque_Nm = std::min(settings.torque.largest_torque_Nm, settings.limits.torque_Nm)},
+          sample_rate_Hz),
       speed_(sample_rate_Hz, settings.speed_cutoff_Hz) {}
 
 void JointControllerCore::reset() noexcept {
@@ -60,6 +63,8 @@ void JointControllerCore::reset() noexcept {
   reference_ = {};
   state_ = {};
   deflection_rad_ = 0.0;
+  accepted_Nm_ = 0.0;
+  transfer_A_ = 0.0;
   is_number_ = true;
   is_accepted_ = true;
 }
@@ -96,6 +101,7 @@ double JointControllerCore::wanted_torque() noexcept {
                 {state_.angle_rad, state_.speed_rad_s})
           .torque_Nm;
     }
+    case JointMode::deflection: return joint_.stiffness_Nm_rad * reference_.deflection_rad;
     default: return joint_.stiffness_Nm_rad * deflection_rad_;
   }
 }
@@ -110,7 +116,8 @@ double JointControllerCore::accept(const JointReference& reference,
     reference_ = reference;
   }
   state_ = measure(sample);
-  return torque_.accept(wanted_torque());
+  accepted_Nm_ = torque_.accept(wanted_torque(), reference_.mode != JointMode::impedance);
+  return accepted_Nm_;
 }
 
 JointControllerCore::Output JointControllerCore::step(const Estimate& wanted_rad,
@@ -122,7 +129,7 @@ JointControllerCore::Output JointControllerCore::step(const Estimate& wanted_rad
   const bool is_spring = uses_spring(reference_.mode);
   if (is_spring) {
     const Estimate deflection = reference_.mode == JointMode::deflection
-                                    ? Estimate{.value = reference_.deflection_rad}
+                                    ? Estimate{.value = accepted_Nm_ / joint_.stiffness_Nm_rad}
                                     : wanted_rad;
     // All or nothing: one lost angle fades the whole current, as in the cascade.
     const bool is_measured = std::isfinite(state_.angle_rad);
@@ -137,7 +144,11 @@ JointControllerCore::Output JointControllerCore::step(const Estimate& wanted_rad
   output.limit = limit_of(output);
   output.is_limited = output.limit != JointCascade::Limit::none || output.torque.is_limited;
   output.fault = is_number_ ? output.cascade.fault : Fault::input_not_finite;
-  if (is_spring) track_torque(output);
+  transfer_A_ = output.cascade.transfer_A;
+  if (is_spring && output.cascade.fault == Fault::none) {
+    torque_.set_motor_current(output.current_A);
+    if (output.limit != JointCascade::Limit::none) track_spring_loop(output.current_A);
+  }
   return output;
 }
 
@@ -152,18 +163,16 @@ JointCascade::Limit JointControllerCore::limit_of(const Output& output) const no
                                                          : JointCascade::Limit::speed;
 }
 
-void JointControllerCore::track_torque(const Output& output) noexcept {
-  if (output.limit == JointCascade::Limit::none || output.cascade.fault != Fault::none) return;
-  if (acts_on_speed_)
-    torque_.track(state_.speed_rad_s);
-  else
-    torque_.track(output.current_A - output.cascade.transfer_A - reference_.current_A);
+void JointControllerCore::track_spring_loop(double applied_A) noexcept {
+  torque_.track(acts_on_speed_ ? state_.speed_rad_s
+                               : applied_A - transfer_A_ - reference_.current_A);
 }
 
 void JointControllerCore::track(double applied_A) noexcept {
   cascade_.track(applied_A);
-  if (uses_spring(reference_.mode) && !acts_on_speed_)
-    torque_.track(applied_A - reference_.current_A);
+  if (!uses_spring(reference_.mode)) return;
+  torque_.set_motor_current(applied_A);
+  track_spring_loop(applied_A);
 }
 
 }  // namespace torsio

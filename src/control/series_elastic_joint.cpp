@@ -39,7 +39,9 @@ SeriesElasticJoint series_elastic_joint(const DataSheet& sheet) {
   if (const auto* const gear = std::get_if<GearSheet>(&sheet.second)) {
     const double tube_Nm_rad =
         std::visit([](const auto& stage) { return stage.stiffness_Nm_rad.value; }, sheet.first);
-    joint.stiffness_Nm_rad = tube_Nm_rad * gear->ratio.value * gear->ratio.value;
+    const double squared_ratio = gear->ratio.value * gear->ratio.value;
+    joint.stiffness_Nm_rad = tube_Nm_rad * squared_ratio;
+    joint.joint_inertia_kg_m2 += sheet.middle_inertia_kg_m2.value * squared_ratio;
   } else {
     joint.stiffness_Nm_rad = std::visit(
         [](const auto& stage) {
@@ -88,9 +90,11 @@ void require_stable(std::string_view place, const LinearSystem& loop, JointOutpu
   throw Error({.place = std::string(place),
                .problem = fmt::format("unstable with its output {}",
                                       output == JointOutput::locked ? "locked" : "free"),
-               .expected = "a positive phase margin",
-               .found = fmt::format("{:.3g} degrees at {:.4g} rad/s", deg_from_rad(found.phase_rad),
-                                    found.crossover_rad_s),
+               .expected = found.phase_rad > 0.0 ? "closed-loop poles within the unit circle"
+                                                 : "a positive phase margin",
+               .found = fmt::format("{:.3g} degrees at {:.4g} rad/s{}",
+                                    deg_from_rad(found.phase_rad), found.crossover_rad_s,
+                                    found.phase_rad > 0.0 ? ", but poles outside" : ""),
                .advice = "Take less bandwidth, smaller gains or a higher sample rate."});
 }
 

@@ -71,7 +71,8 @@ void TorqueLoopCore::reset() noexcept {
   applied_ = 0.0;
 }
 
-double TorqueLoopCore::accept(double wanted_Nm) noexcept {
+double TorqueLoopCore::accept(double wanted_Nm, bool is_planned) noexcept {
+  is_planned_ = is_planned;
   is_refused_ = !std::isfinite(wanted_Nm);
   if (!is_refused_)
     wanted_Nm_ = std::clamp(wanted_Nm, -settings_.largest_torque_Nm, settings_.largest_torque_Nm);
@@ -99,6 +100,7 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
     output.feed_forward_A = loop.feed_forward;
     output.transfer_A = loop.transfer;
   }
+  if (!is_planned_) wanted_rate_.reset();
   const double rate_rad_s =
       wanted_rate_.step(wanted_Nm_) / settings_.deflection.joint.stiffness_Nm_rad;
   if (loop.is_fading) return fade(output);
@@ -132,9 +134,11 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
 }
 
 void TorqueLoopCore::track(double applied) noexcept {
-  if (!std::isfinite(applied)) return;
-  applied_ = applied;
   deflection_.track(acts_on_speed(settings_) ? applied : applied - added_A_);
+}
+
+void TorqueLoopCore::set_motor_current(double current_A) noexcept {
+  if (std::isfinite(current_A) && !acts_on_speed(settings_)) applied_ = current_A;
 }
 
 // The whole current fades, not the deflection controller's part of it.

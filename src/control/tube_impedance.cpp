@@ -44,7 +44,7 @@ TubeImpedance::Settings TubeImpedance::settings_of(const DataSheet& sheet, const
           .tube_ratio = tube->ratio.value,
           .tube_Nm_rad = tube->stiffness_Nm_rad.value,
           .gains = gains,
-          .joint_inertia_kg_m2 = sheet.joint.inertia_kg_m2.value,
+          .joint_inertia_kg_m2 = series_elastic_joint(sheet).joint_inertia_kg_m2,
           .joint_viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value};
 }
 

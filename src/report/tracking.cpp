@@ -164,24 +164,62 @@ std::string fault_text(std::span<const TrackingRow> rows) {
       table.text(), undetected);
 }
 
-/// A line for each run with limits.
-std::string motor_text(std::span<const TrackingRow> rows) {
-  std::string text;
-  for (const TrackingRow& row : rows)
-    if (row.motor && row.status == "ok")
-      text += fmt::format(
-          "{}, seed {}: motor side from {:.4g} to {:.4g} rad, at most {:.4g} rad/s; limited for "
-          "{:.3g} s\n",
-          row.model, row.seed, row.motor->lowest_rad, row.motor->highest_rad,
-          row.motor->fastest_rad_s, row.score.limited_s);
+/// The loop that was closed, where it is not the default one.
+std::string loop_text(const TrackingRow& row) {
+  std::string text = fmt::format(", bandwidth {:.4g} rad/s", row.bandwidth_rad_s);
+  if (row.velocity_rad_s)
+    text += fmt::format(" on a velocity loop of {:.4g} rad/s", *row.velocity_rad_s);
   return text;
 }
 
-Json motor_json(const std::optional<MotorRange>& motor) {
-  if (!motor) return nullptr;
-  return {{"lowest_rad", motor->lowest_rad},
-          {"highest_rad", motor->highest_rad},
-          {"fastest_rad_s", motor->fastest_rad_s}};
+std::string bound_text(double value) {
+  return std::isfinite(value) ? fmt::format("{:.4g}", value) : std::string("none");
+}
+
+bool are_kept(const DriveLimits& limits, const DriveRange& range) {
+  return range.lowest_rad >= limits.lowest_rad && range.highest_rad <= limits.highest_rad &&
+         range.fastest_rad_s <= limits.speed_rad_s;
+}
+
+/// A line for each run with limits.
+std::string drive_text(std::span<const TrackingRow> rows) {
+  std::string text;
+  for (const TrackingRow& row : rows) {
+    if (!row.limits || !row.drive) continue;
+    const DriveLimits& limits = *row.limits;
+    text += fmt::format(
+        "{}, seed {}: rotor over gear ratio {:.4g} to {:.4g} rad (limits {} to {}), up to {:.4g} "
+        "rad/s (limit {}): {}; a limit was active for {:.3g} s\n",
+        row.model, row.seed, row.drive->lowest_rad, row.drive->highest_rad,
+        bound_text(limits.lowest_rad), bound_text(limits.highest_rad), row.drive->fastest_rad_s,
+        bound_text(limits.speed_rad_s), are_kept(limits, *row.drive) ? "kept" : "NOT KEPT",
+        row.drive->limited_s);
+    if (row.drive->largest_spring_Nm > row.drive->allowed_spring_Nm)
+      text += fmt::format(
+          "{}, seed {}: the spring had {:.4g} Nm; the limits are guaranteed up to {:.4g} Nm (60 % "
+          "of "
+          "the torque at rated current)\n",
+          row.model, row.seed, row.drive->largest_spring_Nm, row.drive->allowed_spring_Nm);
+  }
+  return text;
+}
+
+Json drive_json(const TrackingRow& row) {
+  if (!row.limits || !row.drive) return nullptr;
+  const auto bound = [](double value) {
+    return std::isfinite(value) ? Json(value) : Json(nullptr);
+  };
+  return {{"lowest_rad", row.drive->lowest_rad},
+          {"highest_rad", row.drive->highest_rad},
+          {"fastest_rad_s", row.drive->fastest_rad_s},
+          {"largest_spring_Nm", row.drive->largest_spring_Nm},
+          {"allowed_spring_Nm", row.drive->allowed_spring_Nm},
+          {"limited_s", row.drive->limited_s},
+          {"limits",
+           {{"lowest_rad", bound(row.limits->lowest_rad)},
+            {"highest_rad", bound(row.limits->highest_rad)},
+            {"speed_rad_s", bound(row.limits->speed_rad_s)}}},
+          {"kept", are_kept(*row.limits, *row.drive)}};
 }
 
 Json faults_json(const std::vector<FaultDetection>& faults) {
@@ -233,7 +271,10 @@ Json row_json(const TrackingRow& row) {
                                         : Json(nullptr)},
       {"inverse_faults", count(score.inverse_faults)},
       {"loop_faults", count(score.loop_faults)},
-      {"motor", motor_json(row.motor)},
+      {"acts_on", row.velocity_rad_s ? "velocity" : "current"},
+      {"bandwidth_rad_s", row.bandwidth_rad_s},
+      {"velocity_bandwidth_rad_s", optional(row.velocity_rad_s)},
+      {"drive", drive_json(row)},
       {"faults", faults_json(row.faults)}};
 }
 
@@ -263,14 +304,16 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
     for (const std::string& remark : means.remarks) remarks += remark + "\n";
   }
   const std::string summary = fmt::format(
-      "{} ({}), output {}, {} of {:.4g} Nm, {} run{} per model\n{}{}errors: of the joint's torque "
+      "{} ({}), output {}, {} of {:.4g} Nm{}, {} run{} per model\n{}{}errors: of the joint's "
+      "torque "
       "without noise, without the first 2 s; limits: number of limit events;\nfallback: steps on "
       "the linear fallback; cycles: runs with a limit cycle;\n"
       "-3 dB Hz: frequency at which the response to a sweep has fallen to 0.71, - if it has not, "
       "or never was above\n",
       first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,
-      rows.size() / models.size(), rows.size() == models.size() ? "" : "s", table.text(), remarks);
-  return summary + motor_text(rows) + fault_text(rows);
+      loop_text(first), rows.size() / models.size(), rows.size() == models.size() ? "" : "s",
+      table.text(), remarks);
+  return summary + drive_text(rows) + fault_text(rows);
 }
 
 std::string tracking_json(std::span<const TrackingRow> rows) {

@@ -245,8 +245,8 @@ TEST_F(MainJob, RunsTheExamples) {
   EXPECT_NE(fast.err.find("unstable with its output locked"), std::string::npos) << fast.err;
   const Outcome limits = shell(std::string(TORSIO_EXAMPLES) + "/example_08_joint_limits");
   EXPECT_EQ(limits.exit_code, 0) << limits.err;
-  EXPECT_NE(limits.out.find("limit position, running, brake open"), std::string::npos);
-  EXPECT_NE(limits.out.find("off, brake closing or closed"), std::string::npos) << limits.out;
+  EXPECT_NE(limits.out.find("limit position, stop running"), std::string::npos);
+  EXPECT_NE(limits.out.find("stop off, at rest: yes"), std::string::npos) << limits.out;
   const Outcome own = shell(std::string(TORSIO_EXAMPLES) + "/example_02_own_model");
   EXPECT_EQ(own.exit_code, 0) << own.err;
   EXPECT_NE(own.out.find("outside_training_range"), std::string::npos) << own.out;

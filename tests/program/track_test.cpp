@@ -93,7 +93,18 @@ TEST_F(TrackVerb, RefusesBeforeTheFirstStep) {
   expect_error(torsio("track --limits torque=5Nm"), kCallWasWrong, "unknown limit 'torque=5Nm'");
   expect_error(torsio("track --limits position=0.0001rad"), kWorkFailed, "no room between");
   expect_error(torsio("track --velocity-bandwidth 50rad_s"), kCallWasWrong, "--acts-on velocity");
-  expect_error(torsio("track --acts-on torque"), kCallWasWrong, "{current,velocity}");
+  expect_error(torsio("track --acts-on velocity --observer 8Hz"), kCallWasWrong,
+               "--observer: it belongs to a loop on the current");
+  expect_error(torsio("track --acts-on velocity --damping 0.5"), kCallWasWrong, "--damping");
+  expect_error(torsio("track --acts-on velocity --velocity-bandwidth 300rad_s"), kCallWasWrong,
+               "up to 200 rad/s");
+  expect_error(torsio("track --limits speed=100rad_s"), kCallWasWrong,
+               "up to the rated 1.658 rad/s");
+  expect_error(torsio("track --limits position=0.3..-0.1"), kCallWasWrong,
+               "lower limit comes first");
+  expect_error(torsio("track --limits ''"), kCallWasWrong, "expected a value, found an empty text");
+  expect_error(torsio("track --record ''"), kCallWasWrong, "--record");
+  expect_error(torsio("track --acts-on torque"), kCallWasWrong, "expected current or velocity");
   expect_error(torsio("track --seeds 0"), kCallWasWrong, "1 to 100");
   expect_error(torsio("track --model none.safetensors"), kWorkFailed, "none.safetensors");
   ASSERT_EQ(torsio("simulate dfki-50 chirp --duration 30s -o a.csv").exit_code, 0);

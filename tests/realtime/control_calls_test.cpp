@@ -24,12 +24,12 @@
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_impedance.hpp"
+#include "torsio/control/joint_stop.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/any_estimator.hpp"
-#include "torsio/safety/joint_stop.hpp"
 #include "torsio/signal/excitation.hpp"
 #include "torsio/signal/joint_move.hpp"
 
@@ -187,6 +187,7 @@ TEST(ControlCalls, OfJointControllerAndJointStopAreNone) {
                        .max_unmeasured_load_Nm = 2.0}},
         kRate_Hz);
     JointStop stop({.drive = joint.drive,
+                    .speed_rad_s = 2.0,
                     .deceleration_rad_s2 = 5.0,
                     .brake_static_Nm = 100.0,
                     .brake_sliding_Nm = 80.0,
@@ -212,7 +213,7 @@ TEST(ControlCalls, OfJointControllerAndJointStopAreNone) {
                                                       {.motor_angle_rad = angle_rad * 120.0,
                                                        .gear_angle_rad = angle_rad,
                                                        .joint_angle_rad = 0.99 * angle_rad});
-                  const auto stopped = stop.step(output.current_A, state);
+                  const auto stopped = stop.step(output.current_A, state, output.fault);
                   if (stopped.is_current_cut) controller.track(stopped.current_A);
                   faults += output.fault != Fault::none ? 1 : 0;
                   if (n % 777'777 == 0) controller.reset();

@@ -21,6 +21,8 @@ class BumplessTransfer {
   void reset() noexcept { bump_ = 0.0; }
   /// Adds `bump` to the part that has not decayed yet.
   void add(double bump) noexcept { bump_ += bump; }
+  /// @returns the part that the next `step` adds
+  [[nodiscard]] double pending() const noexcept { return bump_; }
   /// @returns the part that is added in this tick
   double step() noexcept TORSIO_REALTIME {
     const double now = bump_;

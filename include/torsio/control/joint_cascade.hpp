@@ -148,8 +148,9 @@ class JointCascade {
   /// measurements return.
   Output step(const JointReference& reference, const JointState& measured) noexcept TORSIO_REALTIME;
 
-  /// The current that was applied in place of that of the last step: no integral winds up, and the
-  /// next transfer continues from it. Not finite: changes nothing.
+  /// The current that was applied in place of that of the last step: no integral winds up, what is
+  /// left of a transfer that the cut opposes is dropped, and the next transfer continues from this
+  /// current. Not finite: changes nothing.
   void track(double applied_A) noexcept TORSIO_REALTIME;
   /// The next current continues from the last one, as after a change of mode: for a controller
   /// before this one whose own mode changes.

@@ -14,10 +14,12 @@ class JointControllerCore {
   struct Settings {
     /// With the joint, and the `actuation` of the deflection controller: current or velocity.
     TorqueLoopCore::Settings torque = {};
+    /// Its `torque_Nm` is a limit beside `largest_torque_Nm`.
     JointCascade::Limits limits = {};
     double override_rad_s = 50.0;  ///< bandwidth of the speed loops that override near a limit
     /// None: those of `JointCascade` for `override_rad_s`. With `Actuation::velocity` the speed loop
-    /// is four times as fast as the deflection controller, if the sample rate allows it.
+    /// is four times as fast as the deflection controller, if the sample rate allows it. The torque
+    /// gains have no effect: torque is controlled through the spring.
     std::optional<JointCascade::Gains> gains = std::nullopt;
     double speed_cutoff_Hz = 120.0;  ///< low-pass of the speed of the motor side
   };
@@ -58,7 +60,7 @@ class JointControllerCore {
   JointState measure(const JointSample& sample) noexcept;
   double wanted_torque() noexcept;
   [[nodiscard]] JointCascade::Limit limit_of(const Output& output) const noexcept;
-  void track_torque(const Output& output) noexcept;
+  void track_spring_loop(double applied_A) noexcept;
 
   SeriesElasticJoint joint_;
   bool acts_on_speed_;
@@ -69,8 +71,10 @@ class JointControllerCore {
   JointReference reference_;
   JointState state_;
   double deflection_rad_ = 0.0;  ///< the last measured one
-  bool is_number_ = true;        ///< the last reference
-  bool is_accepted_ = true;      ///< the last reference
+  double accepted_Nm_ = 0.0;
+  double transfer_A_ = 0.0;  ///< transfer of the cascade in the last tick
+  bool is_number_ = true;    ///< the last reference
+  bool is_accepted_ = true;  ///< the last reference
 };
 
 /// Every controller of a series-elastic joint in one class: current, velocity, position, and through
@@ -78,22 +82,23 @@ class JointControllerCore {
 ///
 ///     torque       δ* = inverse(τ*)                       (`TorqueController`)
 ///     impedance    τ* = K (q* − q) + D (q̇* − q̇) + τ_ff    at the motor side (`JointImpedance`)
-///     deflection   δ*
+///     deflection   δ*, within the largest torque over K
 ///
 /// each then by the deflection controller, which acts on the current, i = PID(δ* − δ) + K δ* / (N
 /// k_t), or on the velocity loop, θ̇* = ω (δ* − δ) + D[δ*]. In every mode position and velocity
 /// controllers are inactive until the motor side comes near a limit, and then override
-/// (`JointCascade`: the conditions, and what is guaranteed). The deflection controller is given what
+/// (see `JointCascade` for the guarantee and its conditions). The deflection controller is given what
 /// they removed, so that its integral does not wind up. Every change of mode and every return from
 /// an override continues from the present current. Settings of the torque loop that add to its
-/// current (observer, friction) act in the spring's modes only.
+/// current act in the spring's modes only; those that use the rate of the wanted torque (friction,
+/// feed-forward of the rate) do not act in an impedance, whose torque follows from measurements.
 ///
 /// The load of the motor is taken as K δ of the linear spring; its error belongs to
 /// `max_unmeasured_load_Nm`, and the largest spring torque to `max_measured_load_Nm`. References and
 /// measurements that are not finite: as `JointCascade`.
 ///
 /// Source: paper 000 section 4, Figure 6 (position and velocity controllers that override); the
-/// override without a switch is ours.
+/// continuous override is ours.
 template <SpringInverse I>
 class JointController {
  public:

@@ -25,7 +25,8 @@ struct SeriesElasticJoint {
 };
 
 /// The joint of a data sheet: the relaxed stiffness of an elastomer, the middle one of rubber; a
-/// torsion tube before the last gear is referred to the joint, and the gear is rigid.
+/// torsion tube before the last gear is referred to the joint, and the gear is rigid: M contains
+/// the inertia of its wave generator.
 [[nodiscard]] SeriesElasticJoint series_elastic_joint(const DataSheet& sheet);
 
 /// The boundary condition at the output side of the spring.

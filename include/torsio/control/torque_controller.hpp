@@ -63,12 +63,17 @@ class TorqueLoopCore {
   TorqueLoopCore(const Settings& settings, double sample_rate_Hz);
 
   void reset() noexcept;
-  /// The torque for the inverse: finite, and within the limit.
-  double accept(double wanted_Nm) noexcept TORSIO_REALTIME;
+  /// @param is_planned false for a torque that follows from a measurement: its rate is not used,
+  /// neither for the friction nor for `feeds_rate_forward`
+  /// @returns the torque for the inverse: finite, and within the limit
+  double accept(double wanted_Nm, bool is_planned = true) noexcept TORSIO_REALTIME;
   Output step(const Estimate& wanted_rad, const JointSample& sample) noexcept TORSIO_REALTIME;
   /// The current (speed) that was applied in place of that of the last step, where a limit after
   /// the controller cut it: the integral does not wind up. Not finite: changes nothing.
   void track(double applied) noexcept TORSIO_REALTIME;
+  /// The whole current of the motor in the last tick, for the disturbance observer, where another
+  /// controller adds to that of the last step. Not finite: changes nothing.
+  void set_motor_current(double current_A) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] const DeflectionController& deflection() const noexcept { return deflection_; }
   [[nodiscard]] DeflectionController& deflection() noexcept { return deflection_; }
@@ -88,6 +93,7 @@ class TorqueLoopCore {
   double amperes_per_Nm_;
   double wanted_Nm_ = 0.0;
   bool is_refused_ = false;
+  bool is_planned_ = true;
   bool is_returning_ = false;  ///< from a fault
   double added_A_ = 0.0;       ///< in the last step to the current of the deflection controller
   double applied_ = 0.0;       ///< current [A], or speed [rad/s]

@@ -42,15 +42,10 @@ constexpr std::array kFrequencies_Hz = {0.1, 0.2, 0.4, 0.5, 0.8, 1.0, 2.0, 4.0, 
 struct Linear {
   SeriesElasticJoint joint;
   JointFeedback feedback;
-  double output_inertia_kg_m2;  ///< with the wave generator, through the rigid gear
 
-  Linear(const DataSheet& sheet, const TubeImpedance::Settings& settings)
+  explicit Linear(const TubeImpedance::Settings& settings)
       : joint(TubeImpedance::joint_of(settings)),
-        feedback(TubeImpedance::feedback_of(settings, kBenchRate_Hz)),
-        output_inertia_kg_m2(joint.joint_inertia_kg_m2) {
-    const double gear_ratio = std::get<GearSheet>(sheet.second).ratio.value;
-    output_inertia_kg_m2 += sheet.middle_inertia_kg_m2.value * gear_ratio * gear_ratio;
-  }
+        feedback(TubeImpedance::feedback_of(settings, kBenchRate_Hz)) {}
 
   [[nodiscard]] double passive_to_Hz() const {
     for (const JointOutput output : {JointOutput::locked, JointOutput::free})
@@ -61,7 +56,7 @@ struct Linear {
   [[nodiscard]] Complex at(double frequency_Hz) const {
     const double rad_s = kTurn * frequency_Hz;
     const Complex s(0.0, rad_s);
-    return s * (impedance(joint, feedback, rad_s) + s * output_inertia_kg_m2 +
+    return s * (impedance(joint, feedback, rad_s) + s * joint.joint_inertia_kg_m2 +
                 joint.joint_viscous_Nms_rad);
   }
 };
@@ -91,9 +86,8 @@ double largest_passive_Nm_rad(const TubeImpedance::Settings& settings, double da
                            kBenchRate_Hz);
 }
 
-void require_passive(const DataSheet& sheet, const TubeImpedance::Settings& settings,
-                     const ImpedanceSpec& spec) {
-  const double passive_to_Hz = Linear(sheet, settings).passive_to_Hz();
+void require_passive(const TubeImpedance::Settings& settings, const ImpedanceSpec& spec) {
+  const double passive_to_Hz = Linear(settings).passive_to_Hz();
   if (passive_to_Hz >= ImpedanceRun::kPassiveTo_Hz) return;
   const double largest_Nm_rad = largest_passive_Nm_rad(settings, spec.damping_Nms_rad);
   const std::string with = fmt::format("a damping of {:g} Nms/rad and a torque gain of {:g} Nm/rad",
@@ -207,7 +201,7 @@ ImpedancePoint point_at(double frequency_Hz, const DataSheet& sheet,
   const Complex hold = std::polar(std::sin(0.5 * rad) / (0.5 * rad), -0.5 * rad);
   return {.frequency_Hz = frequency_Hz,
           .wanted_Nm_rad = {},
-          .linear_Nm_rad = Linear(sheet, settings).at(frequency_Hz),
+          .linear_Nm_rad = Linear(settings).at(frequency_Hz),
           .rendered_Nm_rad = hold * torque / angle};
 }
 
@@ -292,7 +286,7 @@ TubeImpedance::Settings impedance_settings(const DataSheet& sheet, const Impedan
   if (spec.kind != Kind::wanted) return settings;
   settings.gains = TubeImpedance::gains_for(settings, spec.stiffness_Nm_rad, spec.damping_Nms_rad,
                                             spec.torque_gain_Nm_rad);
-  require_passive(sheet, settings, spec);
+  require_passive(settings, spec);
   return settings;
 }
 
@@ -307,7 +301,7 @@ ImpedanceRun track_impedance(const DataSheet& sheet, const ImpedanceSpec& spec, 
       .gains = settings.gains,
       .stiffness_Nm_rad = TubeImpedance(settings, kBenchRate_Hz).stiffness(),
       .damping_Nms_rad = spec.kind == Kind::wanted ? spec.damping_Nms_rad : 0.0,
-      .passive_to_Hz = Linear(sheet, settings).passive_to_Hz(),
+      .passive_to_Hz = Linear(settings).passive_to_Hz(),
       .record = Recording("", kBenchRate_Hz)};
   run.largest_passive_Nm_rad = largest_passive_Nm_rad(settings, run.damping_Nms_rad);
   const std::size_t runs = kFrequencies_Hz.size() + 1;

@@ -37,6 +37,14 @@ Load load_of(const TrackingSpec& spec) {
 /// What no sensor measures, and what the spring may carry, of the torque at rated current.
 constexpr double kUnmeasuredShare = 0.05;
 constexpr double kMeasuredShare = 0.6;
+/// Fast, so that dry friction makes little difference to the speed at a limit.
+constexpr double kOverride_rad_s = 100.0;
+constexpr double kInnerLoopFactor = 4.0;
+
+double velocity_rad_s(const TrackingSpec& spec) {
+  return spec.velocity_rad_s.value_or(
+      std::min(kInnerLoopFactor * spec.bandwidth_rad_s, TrackingSpec::kMaxVelocity_rad_s));
+}
 
 TorqueLoopCore::Settings loop_settings(const DataSheet& sheet, const TrackingSpec& spec,
                                        const Load& load) {
@@ -57,16 +65,33 @@ JointControllerCore::Settings joint_settings(const DataSheet& sheet, const Track
   const TorqueLoopCore::Settings torque = loop_settings(sheet, spec, load);
   const Drive& drive = torque.deflection.joint.drive;
   const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
-  const MotorLimits limits = spec.limits.value_or(MotorLimits{});
-  std::optional<JointCascade::Gains> gains;
-  if (spec.velocity_rad_s) gains = JointCascade::gains_for(drive, *spec.velocity_rad_s);
+  const DriveLimits limits = spec.limits.value_or(DriveLimits{});
+  const JointCascade::Gains gains = JointCascade::gains_for(
+      drive, spec.actuation == DeflectionController::Actuation::velocity ? velocity_rad_s(spec)
+                                                                         : kOverride_rad_s);
   return {.torque = torque,
           .limits = {.lowest_rad = limits.lowest_rad,
                      .highest_rad = limits.highest_rad,
                      .speed_rad_s = std::min(limits.speed_rad_s, sheet.rating.speed_rad_s.value),
                      .max_unmeasured_load_Nm = kUnmeasuredShare * rated_Nm,
                      .max_measured_load_Nm = kMeasuredShare * rated_Nm},
+          .override_rad_s = kOverride_rad_s,
           .gains = gains};
+}
+
+void check_limits(const DataSheet& sheet, const TrackingSpec& spec) {
+  const double rated_rad_s = sheet.rating.speed_rad_s.value;
+  if (spec.limits && std::isfinite(spec.limits->speed_rad_s) &&
+      spec.limits->speed_rad_s > rated_rad_s)
+    throw UsageError({.place = fmt::format("{} limits", kPlace),
+                      .expected = fmt::format("a speed up to the rated {:.4g} rad/s", rated_rad_s),
+                      .found = fmt::format("{:g} rad/s", spec.limits->speed_rad_s)});
+  if (spec.velocity_rad_s && *spec.velocity_rad_s > TrackingSpec::kMaxVelocity_rad_s)
+    throw UsageError({.place = fmt::format("{} velocity loop", kPlace),
+                      .expected = fmt::format("a bandwidth up to {:g} rad/s, a fifth of the sample "
+                                              "rate",
+                                              TrackingSpec::kMaxVelocity_rad_s),
+                      .found = fmt::format("{:.4g} rad/s", *spec.velocity_rad_s)});
 }
 
 /// The torque loop alone, or as a part of the controller that keeps the limits.
@@ -81,6 +106,8 @@ class Controller {
     else
       limited_.emplace(inverse, joint_settings(sheet, spec, load), kBenchRate_Hz);
   }
+
+  [[nodiscard]] bool has_limits() const { return limited_.has_value(); }
 
   struct Output {
     TorqueLoopCore::Output loop;
@@ -106,10 +133,11 @@ class Controller {
   std::optional<JointController<AnyInverse>> limited_;
 };
 
-/// What the controller made of each tick, as channels.
+/// Outputs of the controller in each tick, as channels.
 class LoopLog {
  public:
-  explicit LoopLog(std::size_t ticks) {
+  LoopLog(std::size_t ticks, bool has_limits)
+      : columns_count_(has_limits ? kNames.size() : kNames.size() - 2) {
     for (auto& values : columns_) values.reserve(ticks);
   }
 
@@ -136,10 +164,10 @@ class LoopLog {
                                                 static_cast<double>(out.fault),
                                                 out.speed_rad_s,
                                                 controller.limit};
-    for (std::size_t i = 0; i < row.size(); ++i) columns_[i].push_back(row[i]);
+    for (std::size_t i = 0; i < columns_count_; ++i) columns_[i].push_back(row[i]);
   }
   void add_to(Recording& recording) && {
-    for (std::size_t i = 0; i < columns_.size(); ++i)
+    for (std::size_t i = 0; i < columns_count_; ++i)
       recording.add({.name = kNames[i], .values = std::move(columns_[i])});
   }
 
@@ -153,6 +181,7 @@ class LoopLog {
                                      "command_current_A",      "is_limited_1",
                                      "inverse_fault_1",        "fault_1",
                                      "wanted_speed_rad_s",     "limit_1"};
+  std::size_t columns_count_;  ///< the last two belong to a controller with limits
   std::array<std::vector<double>, kNames.size()> columns_;
 };
 
@@ -172,10 +201,13 @@ class Loop {
                 .faults = spec.faults},
                {.start = load_, .next = {}}),
         bench_log_(sheet, reference_Nm_.size(), true),
-        loop_log_(reference_Nm_.size()),
         controller_(sheet, spec, inverse, load_),
+        loop_log_(reference_Nm_.size(), controller_.has_limits()),
         inverse_ratio_(1.0 / drive_of(sheet).ratio),
+        stiffness_Nm_rad_(series_elastic_joint(sheet).stiffness_Nm_rad),
         max_Nm_(kMaxTorque * sheet.rating.torque_Nm.value) {
+    const Drive drive = drive_of(sheet);
+    range_.allowed_spring_Nm = kMeasuredShare * drive.rated_current_A * drive.torque_per_current();
     if (load_.is_locked) return;
     check_swing(
         {.place = kPlace,
@@ -203,6 +235,7 @@ class Loop {
                                                  .joint_angle_rad = measured.joint_angle_rad,
                                                  .motor_current_A = measured.motor_current_A});
       loop_log_.add(reference_Nm_[tick], out);
+      if (out.limit != 0.0) range_.limited_s += 1.0 / kBenchRate_Hz;
       if (!(std::abs(truth.plant.state().joint_angle_rad) < kTurnedRound_rad &&
             std::abs(truth.load_cell_Nm) < max_Nm_))
         return false;
@@ -210,7 +243,7 @@ class Loop {
     }
     return true;
   }
-  [[nodiscard]] const MotorRange& motor() const { return motor_; }
+  [[nodiscard]] const DriveRange& drive() const { return range_; }
   Recording finish() && {
     Recording record = bench_log_.finish(name_);
     std::move(loop_log_).add_to(record);
@@ -220,10 +253,13 @@ class Loop {
  private:
   void observe(const PlantState& state) {
     const double angle_rad = state.rotor_angle_rad * inverse_ratio_;
-    motor_.lowest_rad = std::min(motor_.lowest_rad, angle_rad);
-    motor_.highest_rad = std::max(motor_.highest_rad, angle_rad);
-    motor_.fastest_rad_s =
-        std::max(motor_.fastest_rad_s, std::abs(state.rotor_speed_rad_s) * inverse_ratio_);
+    range_.lowest_rad = std::min(range_.lowest_rad, angle_rad);
+    range_.highest_rad = std::max(range_.highest_rad, angle_rad);
+    range_.fastest_rad_s =
+        std::max(range_.fastest_rad_s, std::abs(state.rotor_speed_rad_s) * inverse_ratio_);
+    range_.largest_spring_Nm =
+        std::max(range_.largest_spring_Nm,
+                 stiffness_Nm_rad_ * std::abs(state.middle_angle_rad - state.joint_angle_rad));
   }
 
   std::string name_;
@@ -231,10 +267,11 @@ class Loop {
   Load load_;
   Bench bench_;
   BenchLog bench_log_;
-  LoopLog loop_log_;
   Controller controller_;
+  LoopLog loop_log_;
   double inverse_ratio_;
-  MotorRange motor_;
+  double stiffness_Nm_rad_;
+  DriveRange range_;
   double max_Nm_;
 };
 
@@ -270,7 +307,13 @@ TrackingRow row_of(const DataSheet& sheet, const TrackingSpec& spec, const std::
           .reference = std::string(name(spec.reference.kind)),
           .amplitude_Nm = amplitude_of(spec.reference, sheet),
           .model = model,
-          .seed = seed};
+          .seed = seed,
+          .actuation = spec.actuation,
+          .bandwidth_rad_s = spec.bandwidth_rad_s,
+          .velocity_rad_s = spec.actuation == DeflectionController::Actuation::velocity
+                                ? std::optional(velocity_rad_s(spec))
+                                : std::nullopt,
+          .limits = spec.limits};
 }
 
 void run_into(TrackingRow& row, const DataSheet& sheet, const TrackingSpec& spec,
@@ -280,7 +323,7 @@ void run_into(TrackingRow& row, const DataSheet& sheet, const TrackingSpec& spec
     row.score = run.score;
     row.bandwidth_Hz = run.bandwidth_Hz;
     row.faults = run.faults;
-    if (spec.limits) row.motor = run.motor;
+    if (spec.limits) row.drive = run.drive;
     if (!run.has_diverged) return;
     row.status = "diverged";
     row.reason = fmt::format("stopped after {:.3g} s",
@@ -303,6 +346,7 @@ void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uin
                       .expected = "a series-elastic actuator, dfki-28 to dfki-300",
                       .found = std::string(nominal.name)});
   check(spec.conditions);
+  check_limits(nominal, spec);
   const DataSheet sheet = aged(nominal, spec.conditions.age);
   (void)Loop(sheet, spec, LinearInverse(1.0), seed);
 }
@@ -315,7 +359,7 @@ TrackingRun track(const DataSheet& nominal, const TrackingSpec& spec, const AnyI
   const bool has_held = loop.run(progress);
   TrackingRun done{.score = {},
                    .has_diverged = !has_held,
-                   .motor = loop.motor(),
+                   .drive = loop.drive(),
                    .record = std::move(loop).finish()};
   if (!spec.faults.faults.empty())
     done.faults = fault_detections(spec.faults, sheet, done.record,

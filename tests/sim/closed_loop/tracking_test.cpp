@@ -318,11 +318,11 @@ TEST(Tracking, KeepsTheMotorSideWithinItsLimits) {
   const LinearInverse linear(series_elastic_joint(sheet).stiffness_Nm_rad);
   TrackingSpec spec = {
       .output = JointOutput::free,
-      .lever_m = 0.2,
-      .reference = {.kind = TorqueReference::Kind::steps, .amplitude_Nm = 6.0, .duration_s = 10.0},
+      .lever_m = 0.3,
+      .reference = {.kind = TorqueReference::Kind::steps, .amplitude_Nm = 3.0, .duration_s = 10.0},
       .measures_bandwidth = false};
-  const MotorRange unlimited = track(sheet, spec, linear, 1).motor;
-  spec.limits = MotorLimits{.lowest_rad = -0.10, .highest_rad = 0.12, .speed_rad_s = 0.5};
+  const DriveRange unlimited = track(sheet, spec, linear, 1).drive;
+  spec.limits = DriveLimits{.lowest_rad = -0.10, .highest_rad = 0.12, .speed_rad_s = 0.5};
   ASSERT_GT(unlimited.highest_rad, 0.12) << "the limits matter";
   ASSERT_GT(unlimited.fastest_rad_s, 0.5);
   for (const auto actuation :
@@ -330,9 +330,9 @@ TEST(Tracking, KeepsTheMotorSideWithinItsLimits) {
     spec.actuation = actuation;
     const TrackingRun run = track(sheet, spec, linear, 1);
     EXPECT_FALSE(run.has_diverged);
-    EXPECT_GE(run.motor.lowest_rad, -0.10);
-    EXPECT_LE(run.motor.highest_rad, 0.12);
-    EXPECT_LE(run.motor.fastest_rad_s, 0.5);
+    EXPECT_GE(run.drive.lowest_rad, -0.10);
+    EXPECT_LE(run.drive.highest_rad, 0.12);
+    EXPECT_LE(run.drive.fastest_rad_s, 0.5);
     EXPECT_GT(run.score.limited_s, 0.1);
     const std::vector<double>& limit = run.record.channel("limit_1").values;
     EXPECT_NE(std::ranges::count(limit, static_cast<double>(JointCascade::Limit::position)), 0);
@@ -340,32 +340,34 @@ TEST(Tracking, KeepsTheMotorSideWithinItsLimits) {
 }
 
 // Paper 000 found the deflection controller on the velocity loop less responsive and prone to
-// oscillate. Both are true of a velocity loop that is not faster than the deflection loop needs.
-TEST(Tracking, IsSluggishOrCloseToOscillationOnASlowVelocityLoop) {
+// oscillate. So it is with a velocity loop of the same bandwidth: the phase margin is smaller, and
+// with that of the loop on the current the torque follows worse.
+TEST(Tracking, IsCloseToOscillationOrSluggishOnASlowVelocityLoop) {
   const DataSheet sheet = data_sheet("dfki-50");
   const SeriesElasticJoint joint = series_elastic_joint(sheet);
-  const auto phase_rad = [&](DeflectionController::Settings settings) {
+  const auto phase_deg = [&](DeflectionController::Settings settings) {
     settings.joint = joint;
     const DeflectionController loop(settings, 1000.0);
-    return loop.margins_of(loop.gains(), JointOutput::free).phase_rad;
+    return deg_from_rad(loop.margins_of(loop.gains(), JointOutput::free).phase_rad);
   };
+  constexpr auto kVelocity = DeflectionController::Actuation::velocity;
   const Pid::Gains slow = JointCascade::gains_for(joint.drive, 50.0).velocity;
-  const double on_current_rad = phase_rad({.bandwidth_rad_s = 50.0});
-  const double on_velocity_rad = phase_rad({.actuation = DeflectionController::Actuation::velocity,
-                                            .bandwidth_rad_s = 50.0,
-                                            .speed_loop = slow});
-  EXPECT_NEAR(deg_from_rad(on_current_rad), 55.4, 0.2);
-  EXPECT_NEAR(deg_from_rad(on_velocity_rad), 34.6, 0.2);
+  constexpr double kEqual_rad_s = 17.5;  // bandwidth for an equal phase margin
+  EXPECT_NEAR(phase_deg({.bandwidth_rad_s = 50.0}), 55.4, 0.2);
+  EXPECT_NEAR(phase_deg({.actuation = kVelocity, .bandwidth_rad_s = 50.0, .speed_loop = slow}),
+              34.6, 0.2);
+  EXPECT_NEAR(
+      phase_deg({.actuation = kVelocity, .bandwidth_rad_s = kEqual_rad_s, .speed_loop = slow}),
+      55.4, 0.3);
 
   const LinearInverse linear(joint.stiffness_Nm_rad);
   TrackingSpec spec = {.reference = {.kind = TorqueReference::Kind::steps, .duration_s = 8.0},
                        .measures_bandwidth = false};
   const double mad_on_current = track(sheet, spec, linear, 1).score.mad;
-  spec.actuation = DeflectionController::Actuation::velocity;
+  spec.actuation = kVelocity;
   spec.velocity_rad_s = 50.0;
-  spec.bandwidth_rad_s = 10.0;  // for the phase margin of the loop on the current
-  EXPECT_GT(track(sheet, spec, linear, 1).score.mad, 1.3 * mad_on_current);
+  spec.bandwidth_rad_s = kEqual_rad_s;
+  EXPECT_GT(track(sheet, spec, linear, 1).score.mad, 1.1 * mad_on_current);
 }
-
 }  // namespace
 }  // namespace torsio

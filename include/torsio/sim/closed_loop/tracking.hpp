@@ -23,18 +23,23 @@
 
 namespace torsio {
 
-/// Limits of the motor side, over the ratio, within which a `JointController` keeps a loop.
-struct MotorLimits {
+/// Limits of a drive, in the angle and speed of the rotor over the ratio, within which a
+/// `JointController` keeps a loop.
+struct DriveLimits {
   double lowest_rad = -std::numeric_limits<double>::infinity();
   double highest_rad = std::numeric_limits<double>::infinity();
-  double speed_rad_s = std::numeric_limits<double>::infinity();  ///< none: that of the rating
+  double speed_rad_s =
+      std::numeric_limits<double>::infinity();  ///< at most that of the rating; none: that
 };
 
-/// Range of the motor side in a run, from the true angle of the rotor over the ratio.
-struct MotorRange {
+/// Range of a drive in a run: the true angle and speed of the rotor over the ratio.
+struct DriveRange {
   double lowest_rad = 0.0;
   double highest_rad = 0.0;
   double fastest_rad_s = 0.0;
+  double largest_spring_Nm = 0.0;  ///< K times the true deflection
+  double allowed_spring_Nm = 0.0;  ///< up to which the limits are guaranteed
+  double limited_s = 0.0;          ///< time with an active limit of position, speed or current
 };
 
 /// A torque loop on the simulated bench of a series-elastic actuator.
@@ -50,8 +55,11 @@ struct TrackingSpec {
   /// With `velocity` or with limits the loop is that of a `JointController`. Of the torque at rated
   /// current, the limits allow for 5 % that no sensor measures and for 60 % in the spring.
   DeflectionController::Actuation actuation = DeflectionController::Actuation::current;
-  std::optional<double> velocity_rad_s = std::nullopt;  ///< bandwidth of the velocity loop
-  std::optional<MotorLimits> limits = std::nullopt;
+  /// Bandwidth of the velocity loop; none: four times that of the deflection controller, at most
+  /// `kMaxVelocity_rad_s`.
+  std::optional<double> velocity_rad_s = std::nullopt;
+  static constexpr double kMaxVelocity_rad_s = 200.0;  ///< a fifth of the sample rate
+  std::optional<DriveLimits> limits = std::nullopt;
   bool measures_bandwidth = true;  ///< by a run of its own with `frequency_sweep`
   OperatingConditions conditions = {};
   FaultSchedule faults = {};
@@ -59,7 +67,8 @@ struct TrackingSpec {
 
 /// Checks a run. @throws UsageError if the actuator is not series-elastic, the reference exceeds
 /// its rating, the lever would tip over, or as `FaultInjector`; Error if the loop would be
-/// unstable, or the limits contradict each other.
+/// unstable, or the limits contradict each other. UsageError for a limit of the speed above the
+/// rating, or a velocity loop that is too fast.
 void check_tracking(const DataSheet& nominal, const TrackingSpec& spec, std::uint64_t seed);
 
 struct TrackingRun {
@@ -69,7 +78,7 @@ struct TrackingRun {
   std::optional<double> bandwidth_Hz = {};
   bool has_diverged =
       false;  ///< stopped: the joint made a full turn, or the torque exceeded every bound
-  MotorRange motor = {};
+  DriveRange drive = {};
   /// If faults are scheduled: one entry for each, compared with a run without them.
   std::vector<FaultDetection> faults = {};
   /// Sensor signals, each term of the command, and the `truth_` channels.
@@ -80,7 +89,8 @@ struct TrackingRun {
   /// where rest is the part that a limit removed, or the rest of the command while a fault fades it
   /// to 0. With `Actuation::velocity`, proportional, integral, derivative and feed_forward are those of
   /// the velocity loop, and `wanted_speed_rad_s` is the command of the deflection controller;
-  /// `limit_1` is a `JointCascade::Limit`.
+  /// `limit_1` is a `JointCascade::Limit`. Both are missing where the loop has neither limits nor a
+  /// velocity loop.
   Recording record;
 };
 
@@ -122,9 +132,14 @@ struct TrackingRow {
   TrackingScore score = {};
   std::optional<double> mad_to_linear = {};  ///< MAD over that of the linear inverse, same seed
   std::optional<double> bandwidth_Hz = {};   ///< as `TrackingRun`'s
-  std::optional<MotorRange> motor = {};      ///< as `TrackingRun`'s; none without limits
-  std::vector<FaultDetection> faults = {};   ///< as `TrackingRun`'s
-  std::string status = "ok";                 ///< "diverged", "failed"
+  std::optional<DriveRange> drive = {};      ///< as `TrackingRun`'s; none without limits
+  /// As in `TrackingSpec`.
+  DeflectionController::Actuation actuation = DeflectionController::Actuation::current;
+  double bandwidth_rad_s = 0.0;
+  std::optional<double> velocity_rad_s = {};  ///< with `Actuation::velocity`
+  std::optional<DriveLimits> limits = {};
+  std::vector<FaultDetection> faults = {};  ///< as `TrackingRun`'s
+  std::string status = "ok";                ///< "diverged", "failed"
   std::string reason = {};
 };
 

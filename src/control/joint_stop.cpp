@@ -1,4 +1,4 @@
-#include "torsio/safety/joint_stop.hpp"
+#include "torsio/control/joint_stop.hpp"
 
 #include <fmt/format.h>
 
@@ -14,19 +14,24 @@ namespace {
 constexpr auto kPlace = "joint stop";
 /// A current acts during the present tick and, because of the current loop, in the next one.
 constexpr double kTicksOfACurrent = 2.0;
+/// A brake may be slower than its data sheet: no command before twice its delay.
+constexpr double kReleaseMargin = 2.0;
 
 JointStop::Settings checked(const JointStop::Settings& settings, double sample_rate_Hz) {
   settings.drive.check();
   require_positive(kPlace, "sample_rate_Hz", sample_rate_Hz);
+  require_positive(kPlace, "speed_rad_s", settings.speed_rad_s);
   require_positive(kPlace, "deceleration_rad_s2", settings.deceleration_rad_s2);
   require_positive(kPlace, "longest_ramp_s", settings.longest_ramp_s);
   require_positive(kPlace, "standstill_rad_s", settings.standstill_rad_s);
   require_positive(kPlace, "standstill_s", settings.standstill_s);
+  require_positive(kPlace, "hold_rad", settings.hold_rad);
   require_positive(kPlace, "brake_static_Nm", settings.brake_static_Nm);
   require_positive(kPlace, "brake_sliding_Nm", settings.brake_sliding_Nm);
   require_not_negative(kPlace, "brake_engage_s", settings.brake_engage_s);
   require_not_negative(kPlace, "brake_release_s", settings.brake_release_s);
   require_not_negative(kPlace, "load_Nm", settings.load_Nm);
+  require_positive(kPlace, "takeover_s", settings.takeover_s);
   require(settings.brake_static_Nm >= settings.brake_sliding_Nm, kPlace,
           fmt::format("a static torque of the brake of at least the sliding {:.4g} Nm",
                       settings.brake_sliding_Nm),
@@ -38,6 +43,17 @@ JointStop::Settings checked(const JointStop::Settings& settings, double sample_r
                                          settings.load_Nm),
                  .found = fmt::format("{:.4g} Nm", settings.brake_sliding_Nm),
                  .advice = "Reduce the load, or take a stronger brake."});
+  const Drive& drive = settings.drive;
+  const double strongest_rad_s2 =
+      drive.torque_per_current() * drive.rated_current_A / drive.inertia();
+  require(settings.deceleration_rad_s2 <= strongest_rad_s2, kPlace,
+          fmt::format("a deceleration that the rated current makes, up to {:.4g} rad/s2",
+                      strongest_rad_s2),
+          settings.deceleration_rad_s2);
+  require(settings.speed_rad_s <= settings.deceleration_rad_s2 * settings.longest_ramp_s, kPlace,
+          fmt::format("a ramp that ends within longest_ramp_s, from a speed up to {:.4g} rad/s",
+                      settings.deceleration_rad_s2 * settings.longest_ramp_s),
+          settings.speed_rad_s);
   return settings;
 }
 
@@ -68,6 +84,9 @@ bool JointStop::release() noexcept {
   const bool is_stopped = phase_ == Phase::off || phase_ == Phase::holding;
   if (!is_stopped || !(slow_s_ >= settings_.standstill_s)) return false;
   begin(phase_ == Phase::holding ? Phase::running : Phase::releasing);
+  has_escalated_ = false;
+  load_Nm_ = last_Nm_;
+  hold_rad_ = last_angle_rad_;
   return true;
 }
 
@@ -81,26 +100,44 @@ void JointStop::begin(Phase phase) noexcept {
   phase_s_ = 0.0;
 }
 
-void JointStop::advance() noexcept {
-  const bool is_at_rest = slow_s_ >= settings_.standstill_s;
+void JointStop::escalate() noexcept {
+  has_escalated_ = true;
+  begin(Phase::off);
+}
+
+bool JointStop::is_under_power() const noexcept {
+  return phase_ == Phase::ramping || phase_ == Phase::engaging || phase_ == Phase::holding ||
+         phase_ == Phase::releasing;
+}
+
+void JointStop::advance(const JointState& measured) noexcept {
+  const bool is_lost = !(std::abs(measured.angle_rad - hold_rad_) <= settings_.hold_rad);
   switch (phase_) {
     case Phase::running:
     case Phase::off: return;
-    case Phase::releasing:
-      if (phase_s_ >= settings_.brake_release_s) begin(Phase::running);
-      return;
     case Phase::ramping:
-      if (is_at_rest) {
+      if (slow_s_ >= settings_.standstill_s) {
+        hold_rad_ = measured.angle_rad;
         begin(category_ == StopCategory::ramp_and_hold ? Phase::holding : Phase::engaging);
       } else if (since_s_ >= settings_.longest_ramp_s) {
-        has_escalated_ = true;
-        begin(Phase::off);
+        escalate();
       }
       return;
     case Phase::engaging:
-      if (phase_s_ >= settings_.brake_engage_s) begin(Phase::off);
+      if (is_lost)
+        escalate();
+      else if (phase_s_ >= settings_.brake_engage_s)
+        begin(Phase::off);
       return;
-    case Phase::holding: return;
+    case Phase::holding:
+      if (is_lost) escalate();
+      return;
+    case Phase::releasing:
+      if (is_lost)
+        escalate();
+      else if (phase_s_ >= settings_.takeover_s + kReleaseMargin * settings_.brake_release_s)
+        begin(Phase::running);
+      return;
   }
 }
 
@@ -108,12 +145,7 @@ void JointStop::watch(const JointState& measured) noexcept {
   if (!is_measured(measured)) {
     slow_s_ = 0.0;
     last_angle_rad_ = kNotMeasured;
-    const bool is_powered_stop =
-        phase_ == Phase::ramping || phase_ == Phase::engaging || phase_ == Phase::holding;
-    if (is_powered_stop || phase_ == Phase::releasing) {
-      has_escalated_ = true;
-      begin(Phase::off);
-    }
+    if (is_under_power()) escalate();
     return;
   }
   const bool is_slow = std::abs(measured.speed_rad_s) <= settings_.standstill_rad_s;
@@ -122,6 +154,7 @@ void JointStop::watch(const JointState& measured) noexcept {
     work_J_ +=
         settings_.drive.torque_per_current() * applied_A_ * (measured.angle_rad - last_angle_rad_);
   last_angle_rad_ = measured.angle_rad;
+  if (std::isfinite(measured.torque_Nm)) last_Nm_ = measured.torque_Nm;
 }
 
 JointReference JointStop::reference(const JointReference& wanted,
@@ -132,9 +165,9 @@ JointReference JointStop::reference(const JointReference& wanted,
     begin(Phase::ramping);
     slow_s_ = 0.0;
     start_rad_s_ = measured.speed_rad_s;
-    if (!is_measured(measured)) watch(measured);  // no ramp without a speed
+    if (!is_measured(measured)) escalate();  // no ramp without a speed
   }
-  advance();
+  advance(measured);
   since_s_ += period_s_;
   phase_s_ += period_s_;
   switch (phase_) {
@@ -147,9 +180,9 @@ JointReference JointStop::reference(const JointReference& wanted,
               .velocity_rad_s = std::copysign(left_rad_s, start_rad_s_),
               .acceleration_rad_s2 = -std::copysign(settings_.deceleration_rad_s2, start_rad_s_)};
     }
+    case Phase::releasing: return {.mode = JointMode::velocity, .torque_Nm = load_Nm_};
     case Phase::engaging:
-    case Phase::holding:
-    case Phase::releasing: break;
+    case Phase::holding: break;
   }
   // The integral of the speed is the position: it does not creep against dry friction.
   return {.mode = JointMode::velocity};
@@ -162,11 +195,14 @@ double JointStop::limited(double current_A, double speed_rad_s) const noexcept {
   return current_A * std::min(1.0, budget_J / (kTicksOfACurrent * period_s_ * power_W));
 }
 
-JointStop::Output JointStop::step(double current_A, const JointState& measured) noexcept {
+JointStop::Output JointStop::step(double current_A, const JointState& measured,
+                                  Fault fault) noexcept {
+  if (fault != Fault::none && is_under_power()) escalate();
   Output output = {.current_A = std::isfinite(current_A) ? current_A : 0.0,
                    .phase = phase_,
                    .speed_rad_s = measured.speed_rad_s,
-                   .is_at_rest = slow_s_ >= settings_.standstill_s,
+                   .spring_Nm = measured.torque_Nm,
+                   .is_drive_at_rest = slow_s_ >= settings_.standstill_s,
                    .has_escalated = has_escalated_};
   if (phase_ == Phase::off) {
     output.current_A = 0.0;
@@ -174,7 +210,8 @@ JointStop::Output JointStop::step(double current_A, const JointState& measured) 
   } else if (phase_ != Phase::running && phase_ != Phase::releasing) {
     output.current_A = limited(output.current_A, measured.speed_rad_s);
   }
-  output.is_brake_open = phase_ != Phase::off && phase_ != Phase::engaging;
+  const bool is_taking_over = phase_ == Phase::releasing && phase_s_ <= settings_.takeover_s;
+  output.is_brake_open = phase_ != Phase::off && phase_ != Phase::engaging && !is_taking_over;
   output.is_current_cut = output.current_A != current_A;
   if (phase_ != Phase::running) {
     output.since_s = since_s_;
