@@ -87,15 +87,16 @@ LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& fee
 void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output) {
   if (is_stable_closed(loop)) return;
   const Margins found = margins(loop);
-  throw Error({.place = std::string(place),
-               .problem = fmt::format("unstable with its output {}",
-                                      output == JointOutput::locked ? "locked" : "free"),
-               .expected = found.phase_rad > 0.0 ? "closed-loop poles within the unit circle"
-                                                 : "a positive phase margin",
-               .found = fmt::format("{:.3g} degrees at {:.4g} rad/s{}",
-                                    deg_from_rad(found.phase_rad), found.crossover_rad_s,
-                                    found.phase_rad > 0.0 ? ", but poles outside" : ""),
-               .advice = "Take less bandwidth, smaller gains or a higher sample rate."});
+  throw Error(
+      {.place = std::string(place),
+       .problem = fmt::format("unstable with its output {}",
+                              output == JointOutput::locked ? "locked" : "free"),
+       .expected = found.phase_rad > 0.0 ? "closed-loop poles within the unit circle"
+                                         : "a positive phase margin",
+       .found = fmt::format("{:.3g} degrees at {:.4g} rad/s{}", deg_from_rad(found.phase_rad),
+                            found.crossover_rad_s,
+                            found.phase_rad > 0.0 ? " of phase margin, but poles outside" : ""),
+       .advice = "Take less bandwidth, smaller gains or a higher sample rate."});
 }
 
 std::complex<double> impedance(const SeriesElasticJoint& joint, const JointFeedback& feedback,
