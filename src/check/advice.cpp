@@ -18,6 +18,7 @@
 #include "check/signal_pair.hpp"
 #include "check/strokes.hpp"
 #include "core/report_progress.hpp"
+#include "data/finest_step.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/fit/train_model.hpp"

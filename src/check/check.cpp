@@ -27,6 +27,10 @@ std::vector<Finding> Checker::run() {
   check_saturation();
   check_frozen();
   check_resolution();
+  check_repeats();
+  check_spikes();
+  check_noise();
+  check_columns();
   check_units();
   check_sign_flips();
   check_gaps();
