@@ -116,7 +116,7 @@ void Checker::check_delay() {
   for (std::size_t r = 0; r < pairs_.size(); ++r) {
     if (spoiled_[r] != 0 || check_sides(r)) continue;
     const auto delay = estimate_delay(pairs_[r], rate);
-    if (delay && (is_late(*delay, rate) || is_early(*delay, rate)))
+    if (delay && (is_late(*delay, rate) || is_early(*delay)))
       report_delay(r, *delay);
     else
       shortest_s = std::max(shortest_s, delay ? delay->shortest_s : HUGE_VAL);
@@ -155,10 +155,13 @@ void Checker::report_delay(std::size_t r, const Delay& delay) {
                   dataset_.target, 1e3 * std::abs(delay.lag_s),
                   delay.lag_s > 0.0 ? "after" : "before", spec_.inputs.front(),
                   100.0 * delay.unexplained, 100.0 * delay.without_shift),
-      delay.is_at_end     ? "The search ends there: check the loggers' clocks."
-      : delay.lag_s > 0.0 ? fmt::format("Mapping line that removes it: latency: {{{}: {:.1f}ms}}",
-                                        dataset_.target, 1e3 * delay.lag_s)
-                          : "Check the loggers' clocks: a torque cannot precede its deflection.");
+      delay.is_at_end ? "The search ends there: check the loggers' clocks."
+      : delay.lag_s > 0.0
+          ? fmt::format("Mapping line that removes it: latency: {{{}: {:.1f}ms}}", dataset_.target,
+                        1e3 * delay.lag_s)
+          : fmt::format("No damping explains so long a lead: {} is late, or the loggers' "
+                        "clocks differ.",
+                        spec_.inputs.front()));
 }
 
 void Checker::check_sign() {

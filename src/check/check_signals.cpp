@@ -82,7 +82,7 @@ void Checker::check_noise_of(std::size_t r, const Channel& channel, double range
   const NoiseCourse course = noise_course(channel, recording.sample_rate_Hz());
   if (course.sigma.empty()) return;
   const double least = std::max(kBurstShare * range, finest_step(channel));
-  const auto burst = find_burst(course, recording.sample_rate_Hz(), least);
+  const auto burst = find_burst(channel, course, recording.sample_rate_Hz(), least);
   if (burst) {
     add(Verdict::warn, "noise", recording.name(),
         fmt::format("{} has noise of {:.3g} {} from t = {:.4g} s to {:.4g} s, {:.3g} elsewhere",

@@ -7,11 +7,21 @@
 
 namespace torsio {
 
-/// The shift of the target at which a static curve with hysteresis over the input explains it best.
+/// The shift of the target at which a dissipative spring over the input explains it best:
+///
+///     target(t + lag) = f(z) + sum c_k s_k(z) + sum d_k |z| s_k(z) + sum e_l (z - low-pass_l(z))
+///
+/// f is a static curve, s_k are stop operators (`hysteresis_fit.hpp`), the low-passes have time
+/// constants from 0.02 to 20 s; c, d, e >= 0 (non-negative least squares). The friction of the
+/// stops does not depend on the speed, a lag shifts fast parts of the motion more than slow ones;
+/// and with these signs friction, viscosity and relaxation only make the torque lead, so that a
+/// late torque remains unexplained without a shift.
 struct Delay {
-  double lag_s = 0.0;          ///< positive: the target comes late
-  double unexplained = 1.0;    ///< share of the target's variance, there
-  double without_shift = 1.0;  ///< the same without shift
+  double lag_s = 0.0;           ///< positive: the target comes late
+  double unexplained = 1.0;     ///< share of the target's variance, there
+  double without_shift = 1.0;   ///< the same without shift
+  double held_out_share = 1.0;  ///< error with over error without shift, in the worst of four parts
+                                ///< of the recording, of fits to the other three
   /// The shortest lag that would be reported: a slow motion has nearly the same torque before and
   /// after it. Infinite if none would.
   double shortest_s = 0.0;
@@ -21,11 +31,11 @@ struct Delay {
 /// Lags up to 0.6 s are searched. Empty if there are too few samples.
 [[nodiscard]] std::optional<Delay> estimate_delay(const Pair& pair, double sample_rate_Hz);
 
-/// Whether a delay explains what hysteresis does not. Late: at least 8 ms, and 13 % of the variance
-/// that is unexplained without shift. Early: viscosity and relaxation make the torque of a spring
-/// lead its deflection, too, so the rest must nearly vanish at the best shift.
+/// Whether a shift explains a good part of what is unexplained without it, also in parts of the
+/// recording that were not used for the fit. Late: at least 8 ms, and a quarter of it. Early: the
+/// input is late, by at least 20 ms; three quarters of it, and hardly anything else remains.
 [[nodiscard]] bool is_late(const Delay& delay, double sample_rate_Hz);
-[[nodiscard]] bool is_early(const Delay& delay, double sample_rate_Hz);
+[[nodiscard]] bool is_early(const Delay& delay);
 
 /// How the angles of both sides of a spring are related beyond the deflection that the torque
 /// explains:

@@ -10,7 +10,9 @@ namespace torsio {
 namespace {
 
 constexpr auto kStops = std::to_array<double>({0.01, 0.04, 0.16, 0.5});  // shares of half the range
-constexpr Eigen::Index kStatic = 4;
+constexpr auto kHinges = std::to_array<double>({-0.75, -0.5, -0.25, 0.25, 0.5, 0.75});
+constexpr Eigen::Index kPowers = 4;
+constexpr Eigen::Index kStatic = kPowers + static_cast<Eigen::Index>(kHinges.size());
 
 }  // namespace
 
@@ -33,7 +35,9 @@ Eigen::MatrixXd hysteresis_columns(const std::vector<double>& signal,
       for (std::size_t k = 0; k < stops.size(); ++k)
         stops[k] = std::clamp(stops[k] + moved, -kStops[k], kStops[k]);
     }
-    columns.row(row).head<kStatic>() << 1.0, z, z * std::abs(z), z * z * z;
+    columns.row(row).head<kPowers>() << 1.0, z, z * std::abs(z), z * z * z;
+    for (std::size_t k = 0; k < kHinges.size(); ++k)
+      columns(row, kPowers + static_cast<Eigen::Index>(k)) = std::max(z - kHinges[k], 0.0);
     for (std::size_t k = 0; k < stops.size(); ++k)
       columns(row, kStatic + static_cast<Eigen::Index>(k)) = stops[k];
   }

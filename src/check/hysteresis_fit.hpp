@@ -11,11 +11,12 @@ namespace torsio {
 
 /// The columns of a static curve with hysteresis over a signal, at the given samples:
 ///
-///     1, z, z |z|, z^3, s_r(z) for four r;   s_r <- clip(s_r + dz, -r, r)
+///     1, z, z |z|, z^3, max(z - h, 0) for six h, s_r(z) for four r;   s_r <- clip(s_r + dz, -r, r)
 ///
-/// z is the signal scaled to -1 ... 1; the stop operators s_r are those of Maxwell slip (Brokate
+/// z is the signal scaled to -1 ... 1. The hinges h follow curves that a cubic does not: a backlash,
+/// a spring that softens. The stop operators s_r are those of Maxwell slip (Brokate
 /// and Sprekels, Hysteresis and Phase Transitions, 1996, 2.1). They do not depend on the rate of
-/// the signal, so that a delay cannot be taken for hysteresis. Samples that are not finite are
+/// the signal. Samples that are not finite are
 /// passed over.
 /// @param extent the range that is scaled to -1 ... 1
 [[nodiscard]] Eigen::MatrixXd hysteresis_columns(const std::vector<double>& signal,

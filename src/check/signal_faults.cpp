@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "check/signal_pair.hpp"
+#include "numerics/quantile.hpp"
 
 namespace torsio {
 namespace {
@@ -29,11 +30,26 @@ constexpr std::size_t kFewSteps = 100;
 constexpr double kFewRows = 8.0;
 constexpr double kAgree = 1.5;
 
-double quantile(std::vector<double> values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
+/// x3 - 3 x2 + 3 x1 - x0 of four successive new samples.
+double third_difference(const Channel& channel, const std::vector<std::size_t>& samples,
+                        std::size_t k) {
+  const auto at = [&](std::size_t ahead) { return channel.values[samples[k + ahead]]; };
+  return at(3) - 3.0 * at(2) + 3.0 * at(1) - at(0);
+}
+
+/// Narrows [begin, end) to the samples whose third differences are large.
+void narrow(Burst& burst, const Channel& channel, double large) {
+  const std::vector<std::size_t> samples = new_samples(channel);
+  std::optional<std::size_t> first;
+  std::size_t last = 0;
+  const auto from = std::ranges::lower_bound(samples, burst.begin) - samples.begin();
+  for (auto k = static_cast<std::size_t>(from); k + 3 < samples.size() && samples[k] < burst.end;
+       ++k)
+    if (std::abs(third_difference(channel, samples, k)) > large) {
+      if (!first) first = samples[k + 3];
+      last = samples[k];
+    }
+  if (first && *first < last) burst.begin = *first, burst.end = last + 1;
 }
 
 std::uint64_t mixed(std::uint64_t hash, std::uint64_t value) {
@@ -109,8 +125,7 @@ NoiseCourse noise_course(const Channel& channel, double sample_rate_Hz) {
   for (std::size_t begin = 0; begin + window + 3 <= samples.size(); begin += window) {
     double sum = 0.0;
     for (std::size_t k = begin; k < begin + window; ++k) {
-      const auto at = [&](std::size_t ahead) { return channel.values[samples[k + ahead]]; };
-      const double third = at(3) - 3.0 * at(2) + 3.0 * at(1) - at(0);
+      const double third = third_difference(channel, samples, k);
       sum += third * third;
     }
     course.samples.push_back(samples[begin]);
@@ -124,7 +139,8 @@ double usual_noise(const NoiseCourse& course) {
   return course.sigma.empty() ? 0.0 : quantile(course.sigma, 0.5);
 }
 
-std::optional<Burst> find_burst(const NoiseCourse& course, double sample_rate_Hz, double least) {
+std::optional<Burst> find_burst(const Channel& channel, const NoiseCourse& course,
+                                double sample_rate_Hz, double least) {
   if (course.sigma.size() < 10 * kWindowsOfABurst) return {};
   Burst burst{.usual = quantile(course.sigma, kUsualQuantile)};
   const double high = std::max(least, kOverUsual * burst.usual);
@@ -140,7 +156,10 @@ std::optional<Burst> find_burst(const NoiseCourse& course, double sample_rate_Hz
       burst.sigma = *std::max_element(course.sigma.begin() + static_cast<std::ptrdiff_t>(k - run),
                                       course.sigma.begin() + static_cast<std::ptrdiff_t>(k));
       const double duration_s = static_cast<double>(burst.end - burst.begin) / sample_rate_Hz;
-      if (duration_s >= 0.99 * kWindow_s * static_cast<double>(kWindowsOfABurst)) return burst;
+      if (duration_s >= 0.99 * kWindow_s * static_cast<double>(kWindowsOfABurst)) {
+        narrow(burst, channel, 0.5 * std::sqrt(kThirdDifference) * high);
+        return burst;
+      }
     }
     run = 0;
   }

@@ -30,8 +30,8 @@ struct Burst {
   double usual = 0.0;
 };
 /// @param least noise below which nothing is reported, in the channel's unit
-[[nodiscard]] std::optional<Burst> find_burst(const NoiseCourse& course, double sample_rate_Hz,
-                                              double least);
+[[nodiscard]] std::optional<Burst> find_burst(const Channel& channel, const NoiseCourse& course,
+                                              double sample_rate_Hz, double least);
 
 /// New samples that differ from both neighbours by more than `least`, in the same direction, while
 /// the neighbours agree with each other and the signal around is quiet.
