@@ -30,13 +30,14 @@ std::vector<Finding> Checker::run() {
   check_repeats();
   check_spikes();
   check_noise();
-  check_columns();
+  relate();
   check_units();
   check_sign_flips();
   check_gaps();
   check_delay();
   check_sign();
   check_change();
+  check_columns();
   check_excitation();
   check_offsets();
   check_leak();

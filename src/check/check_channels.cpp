@@ -262,7 +262,7 @@ void Checker::check_gaps() {
   pass_unless_found("gaps", "no jump", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
       check_jump_of_input(r);
-      check_cut(r);
+      if (!check_cut(r)) check_cadence(r);
       const Recording& recording = dataset_.records[r].recording;
       for (const std::string& name : channels_) {
         const Channel& channel = recording.channel(name);

@@ -15,21 +15,27 @@ void Checker::check_units() {
   pass_unless_found("units", "the recordings agree", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
       check_units_within(r);
-      if (spoiled_[r] == 0) check_scale(r);
+      if (spoiled_[r] == 0 && !changes_[r]) check_scale(r);
       if (spoiled_[r] == 0) check_twist(r);
     }
-    if (pairs_.size() < 2) return;
-    std::vector<double> slopes;
+    compare_slopes();
     for (std::size_t r = 0; r < pairs_.size(); ++r)
-      slopes.push_back(is_clear(r) ? std::abs(line_through(pairs_[r]).slope) : 0.0);
-    const std::size_t usual = usual_slope(slopes);
-    const auto near_usual = std::ranges::count_if(slopes, [&](double slope) {
-      return slope > 0.0 && ratio_of(slope, slopes[usual]) < kSlopeRatio;
-    });
-    for (std::size_t r = 0; r < pairs_.size(); ++r)
-      if (slopes[r] > 0.0 && ratio_of(slopes[r], slopes[usual]) >= kSlopeRatio)
-        report_slope(r, slopes[r], usual, slopes[usual], near_usual > 1);
+      if (spoiled_[r] == 0) check_load(r);
   });
+}
+
+void Checker::compare_slopes() {
+  if (pairs_.size() < 2) return;
+  std::vector<double> slopes;
+  for (std::size_t r = 0; r < pairs_.size(); ++r)
+    slopes.push_back(is_clear(r) ? std::abs(line_through(pairs_[r]).slope) : 0.0);
+  const std::size_t usual = usual_slope(slopes);
+  const auto near_usual = std::ranges::count_if(slopes, [&](double slope) {
+    return slope > 0.0 && ratio_of(slope, slopes[usual]) < kSlopeRatio;
+  });
+  for (std::size_t r = 0; r < pairs_.size(); ++r)
+    if (slopes[r] > 0.0 && ratio_of(slopes[r], slopes[usual]) >= kSlopeRatio)
+      report_slope(r, slopes[r], usual, slopes[usual], near_usual > 1);
 }
 
 void Checker::report_slope(std::size_t r, double slope, std::size_t usual, double usual_slope,
@@ -114,9 +120,9 @@ void Checker::check_delay() {
   double shortest_s = 0.0;
   const std::size_t before = findings_.size();
   for (std::size_t r = 0; r < pairs_.size(); ++r) {
-    if (spoiled_[r] != 0 || check_sides(r)) continue;
+    if (spoiled_[r] != 0 || changes_[r] || check_sides(r)) continue;
     const auto delay = estimate_delay(pairs_[r], rate);
-    if (delay && (is_late(*delay, rate) || is_early(*delay)))
+    if (delay && (is_late(*delay, rate) || is_early(*delay, rate)))
       report_delay(r, *delay);
     else
       shortest_s = std::max(shortest_s, delay ? delay->shortest_s : HUGE_VAL);
@@ -135,11 +141,8 @@ void Checker::check_delay() {
 
 /// One of two angles that is late: the difference then contains the speed of the joint.
 bool Checker::check_sides(std::size_t r) {
-  if (order_of_difference(r) == 0) return false;
   const Recording& recording = dataset_.records[r].recording;
-  const auto sides =
-      relate_sides(recording.channel(sources_[0]).values, recording.channel(sources_[1]).values,
-                   pairs_[r].target, recording.sample_rate_Hz());
+  const auto& sides = sides_[r];
   if (!sides || !has_late_side(*sides, recording.sample_rate_Hz())) return false;
   const bool is_first = sides->lateness_s > 0.0;
   add(Verdict::warn, "delay", recording.name(),
@@ -270,13 +273,25 @@ int Checker::order_of_difference(std::size_t r) const {
   return is_difference(1.0) ? 1 : is_difference(-1.0) ? -1 : 0;
 }
 
+// Before the other checks of the relation: they would take a change for a delay or a wrong scale.
+void Checker::relate() {
+  for (std::size_t r = 0; r < pairs_.size(); ++r) {
+    const Recording& recording = dataset_.records[r].recording;
+    changes_.push_back(find_relation_change(pairs_[r]));
+    sides_.push_back(order_of_difference(r) == 0
+                         ? std::nullopt
+                         : relate_sides(recording.channel(sources_[0]).values,
+                                        recording.channel(sources_[1]).values, pairs_[r].target,
+                                        recording.sample_rate_Hz()));
+  }
+}
+
 // Changes without a jump: a zero that drifts, a spring that breaks.
 void Checker::check_change() {
   pass_unless_found("change", "each recording has the same relation early and late", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
-      if (spoiled_[r] != 0) continue;
-      const auto change = find_relation_change(pairs_[r]);
-      if (!change) continue;
+      const auto& change = changes_[r];
+      if (spoiled_[r] != 0 || !change) continue;
       const Recording& recording = dataset_.records[r].recording;
       const std::string when = change->is_gradual ? std::string("gradually from beginning to end")
                                                   : fmt::format("at about t = {:.3g} s",
@@ -301,7 +316,7 @@ void Checker::check_offsets() {
     std::vector<std::size_t> records;
     double spread = 0.0;
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
-      if (spoiled_[r] != 0) continue;
+      if (spoiled_[r] != 0 || changes_[r]) continue;
       pairs.push_back(&pairs_[r]);
       records.push_back(r);
       spread = std::max(spread, extent_of(pairs_[r].target).width());

@@ -29,6 +29,7 @@ bool Checker::is_spike(std::size_t r, std::size_t sample) const {
 void Checker::check_columns() {
   pass_unless_found("columns", "no other channel follows the first input better", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
+      if (spoiled_[r] != 0 || changes_[r]) continue;
       const Recording& recording = dataset_.records[r].recording;
       const Pair& pair = pairs_[r];
       std::vector<double> known = pair.input;
@@ -165,7 +166,7 @@ void Checker::check_repeats() {
 
 // Rows that are missing while the stamps are even: every channel jumps by what it passes through in
 // the same time. Currents may jump.
-void Checker::check_cut(std::size_t r) {
+bool Checker::check_cut(std::size_t r) {
   const Recording& recording = dataset_.records[r].recording;
   std::vector<const Channel*> channels;
   std::vector<double> codes;
@@ -178,11 +179,49 @@ void Checker::check_cut(std::size_t r) {
     codes.push_back(finest_step(channel));
   }
   const auto cut = find_cut(channels, codes);
-  if (!cut || is_spike(r, cut->sample)) return;
+  if (!cut || is_spike(r, cut->sample)) return false;
   add(Verdict::warn, "gaps", recording.name(),
       fmt::format("several channels jump together at t = {:.4g} s, as if {:.2g} s were missing",
                   recording.time_s(cut->sample), cut->rows / recording.sample_rate_Hz()),
       "Rows are missing although the stamps are even. Cut the recording in two there.");
+  return true;
+}
+
+/// The range without the outermost hundredth of the samples on either side.
+double Checker::inner_range(const std::vector<double>& values) {
+  std::vector<double> sorted;
+  std::ranges::copy_if(values, std::back_inserter(sorted), is_finite);
+  if (sorted.empty()) return 0.0;
+  std::ranges::sort(sorted);
+  const auto outer = static_cast<std::size_t>(kOuter * static_cast<double>(sorted.size()));
+  return sorted[sorted.size() - 1 - outer] - sorted[outer];
+}
+
+// A torque in mNm in every recording: nothing in the recordings contradicts it.
+void Checker::check_load(std::size_t r) {
+  const auto parts = split_channel_name(dataset_.target);
+  if (!parts || parts->unit->si_suffix != "Nm") return;
+  const double range_Nm = inner_range(pairs_[r].target);
+  if (range_Nm < kHighestLoad_Nm) return;
+  add(Verdict::warn, "units", dataset_.records[r].recording.name(),
+      fmt::format("{} ranges through {:.3g} Nm", dataset_.target, range_Nm),
+      "Hardly any joint with a spring carries so much: check the unit of the torque.");
+}
+
+// The rows between two new samples of a slow sensor are counted by its own clock.
+void Checker::check_cadence(std::size_t r) {
+  const Recording& recording = dataset_.records[r].recording;
+  for (const Channel& channel : recording.channels()) {
+    const auto cadence = find_broken_cadence(channel);
+    if (!cadence) continue;
+    add(Verdict::warn, "gaps", recording.name(),
+        fmt::format("{} has a new sample in every {}. row, but at t = {:.4g} s after {} rows",
+                    channel.name, cadence->usual, recording.time_s(cadence->sample),
+                    cadence->found),
+        "Rows are missing or were inserted although the stamps are even. Cut the recording in two "
+        "there.");
+    return;
+  }
 }
 
 // A wrong unit of both angles, or a column that contains another quantity.
@@ -190,12 +229,7 @@ void Checker::check_twist(std::size_t r) {
   const auto parts = split_channel_name(sources_.front());
   if (!parts || parts->unit->si_suffix != "rad") return;
   if (order_of_difference(r) == 0 && spec_.inputs.front() != "spring_deflection_rad") return;
-  std::vector<double> sorted;
-  std::ranges::copy_if(pairs_[r].input, std::back_inserter(sorted), is_finite);
-  if (sorted.empty()) return;
-  std::ranges::sort(sorted);
-  const auto outer = static_cast<std::size_t>(kOuter * static_cast<double>(sorted.size()));
-  const double width = sorted[sorted.size() - 1 - outer] - sorted[outer];
+  const double width = inner_range(pairs_[r].input);
   if (width < kWidestTwist_rad) return;
   spoiled_[r] = 1;
   add(Verdict::warn, "units", dataset_.records[r].recording.name(),
@@ -207,18 +241,12 @@ void Checker::check_twist(std::size_t r) {
 
 // The sensors of both sides of a spring turn by the same angle, apart from the deflection.
 void Checker::check_scale(std::size_t r) {
-  const int order = order_of_difference(r);
-  if (order == 0) return;
-  const Recording& recording = dataset_.records[r].recording;
-  const std::string& first = sources_[0];
-  const std::string& second = sources_[1];
-  const auto sides = relate_sides(recording.channel(first).values, recording.channel(second).values,
-                                  pairs_[r].target, recording.sample_rate_Hz());
+  const auto& sides = sides_[r];
   if (!sides || !has_wrong_scale(*sides)) return;
   spoiled_[r] = 1;
-  add(Verdict::fail, "units", recording.name(),
+  add(Verdict::fail, "units", dataset_.records[r].recording.name(),
       fmt::format("{} moves {:.4g} times as far as {}, apart from the deflection that {} explains",
-                  first, 1.0 + sides->excess, second, dataset_.target),
+                  sources_[0], 1.0 + sides->excess, sources_[1], dataset_.target),
       "Both sides of a spring turn by the same angle: check the gear ratio and the scale of the "
       "columns (scale: in a mapping).");
 }

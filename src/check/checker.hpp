@@ -81,12 +81,16 @@ class Checker {
   void check_spikes();
   [[nodiscard]] bool hardly_moves(std::size_t r) const;
   void check_repeats();
-  void check_cut(std::size_t r);
+  [[nodiscard]] bool check_cut(std::size_t r);
+  void check_cadence(std::size_t r);
   [[nodiscard]] double range_in_use(std::size_t r, const std::string& name) const;
   [[nodiscard]] bool is_spike(std::size_t r, std::size_t sample) const;
   void check_units();
+  [[nodiscard]] static double inner_range(const std::vector<double>& values);
   void check_twist(std::size_t r);
+  void check_load(std::size_t r);
   void check_scale(std::size_t r);
+  void compare_slopes();
   void report_slope(std::size_t r, double slope, std::size_t usual, double usual_slope,
                     bool is_majority);
   [[nodiscard]] static std::size_t usual_slope(const std::vector<double>& slopes);
@@ -109,6 +113,7 @@ class Checker {
   void report_flip(std::size_t r);
   [[nodiscard]] std::string flipped_source(const std::vector<double>& values) const;
   [[nodiscard]] int order_of_difference(std::size_t r) const;
+  void relate();
   void check_change();
   void check_excitation();
   void check_offsets();
@@ -151,6 +156,7 @@ class Checker {
   static constexpr double kRepeat_s = 0.25;
   static constexpr std::size_t kRepeatRows = 50;
   static constexpr double kWidestTwist_rad = 1.5;
+  static constexpr double kHighestLoad_Nm = 3000.0;
   static constexpr double kOuter = 0.01;          ///< share of the samples on either side
   static constexpr double kOtherExplained = 0.3;  ///< share of what is unexplained of the target
   static constexpr double kWellExplained = 0.02;  ///< share of the variance
@@ -162,9 +168,11 @@ class Checker {
   std::vector<std::string> sources_;   ///< channels of the first input's expression
   std::vector<Pair> pairs_;
   std::vector<std::uint8_t> spoiled_;  ///< by record: its relation is known to be wrong
-  std::vector<std::pair<std::size_t, Rest>> stalls_;  ///< record, samples
-  std::vector<std::optional<SignFlip>> flips_;        ///< by record
-  std::vector<std::vector<std::size_t>> spikes_;      ///< by record: samples
+  std::vector<std::pair<std::size_t, Rest>> stalls_;    ///< record, samples
+  std::vector<std::optional<SignFlip>> flips_;          ///< by record
+  std::vector<std::optional<RelationChange>> changes_;  ///< by record
+  std::vector<std::optional<TwoSides>> sides_;          ///< by record
+  std::vector<std::vector<std::size_t>> spikes_;        ///< by record: samples
   std::vector<Finding> findings_;
 };
 

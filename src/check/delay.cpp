@@ -19,13 +19,13 @@ constexpr double kCoarseStep_s = 4e-3;
 constexpr std::size_t kFewSamples = 200;
 constexpr std::size_t kEnoughSamples = 8000;
 constexpr double kExplainsLittle = 0.2;  ///< share of the variance: there is no delay to find
-constexpr double kLateShare = 0.75;      ///< of what is unexplained without shift
+constexpr double kShare = 0.75;          ///< of what is unexplained without shift
 constexpr double kEarlyShare = 0.3;
+constexpr double kLongLag_s = 0.2;
 constexpr double kEarlyRest = 0.01;
-constexpr double kHeldOutShare = 0.95;
-constexpr double kSmallPart = 0.05;  ///< share of the error of all parts
+constexpr double kHeldOutShare = 0.6;
+constexpr std::size_t kMostParts = 3;
 constexpr double kShortest_s = 8e-3;
-constexpr double kShortestLead_s = 0.02;
 constexpr auto kHinges = std::to_array<double>({-0.5, 0.0, 0.5});  // of the scaled input
 constexpr std::size_t kStops = 20;
 constexpr double kSmallestStop = 0.004;  ///< share of half the range
@@ -54,7 +54,19 @@ std::pair<std::size_t, std::size_t> finite_part(const std::vector<double>& value
   return {begin, end};
 }
 
+/// Share that a shift leaves of what is unexplained without it, at most. The error without shift
+/// grows with the delay, so that a long one must explain more: in a slow motion the valley over the
+/// lags is flat, and its lowest point is accidental.
+double greatest_share(double lag_s) {
+  return kShare / (1.0 + 2.0 * std::min(std::abs(lag_s), kLongLag_s) / kLongLag_s);
+}
+
 double shortest_lag_s(double sample_rate_Hz) { return std::max(kShortest_s, 1.5 / sample_rate_Hz); }
+
+/// Whether the shift also explains parts that were not used for the fit.
+bool is_held_out(const Delay& delay) {
+  return delay.held_out_share <= kHeldOutShare && delay.better_parts >= kMostParts;
+}
 
 /// The columns of a dissipative spring over the input: the first kFree are a static curve, the
 /// others stop operators (also with a friction that grows with the load) and relaxations. With
@@ -189,18 +201,23 @@ class Search {
     Delay delay{.lag_s = static_cast<double>(best.first) / sample_rate_Hz_,
                 .unexplained = best.second,
                 .without_shift = unshifted.unexplained(),
-                .held_out_share = 0.0,
+                .held_out_share = 1.0,
+                .better_parts = 0,
                 .shortest_s = std::numeric_limits<double>::infinity(),
                 .is_at_end = std::abs(best.first) + step > longest_};
-    std::array<double, kParts> before{};
-    double all_before = 0.0;
-    for (std::size_t p = 0; p < kParts; ++p) all_before += before[p] = unshifted.held_out(p);
-    for (std::size_t p = 0; p < kParts; ++p)  // where little moves, noise is all there is
-      if (before[p] > kSmallPart * all_before)
-        delay.held_out_share = std::max(delay.held_out_share, shifted.held_out(p) / before[p]);
+    double before = 0.0;
+    double after = 0.0;
+    for (std::size_t p = 0; p < kParts; ++p) {
+      const double without = unshifted.held_out(p);
+      const double with = shifted.held_out(p);
+      before += without, after += with;
+      if (with < without) ++delay.better_parts;
+    }
+    if (before > 0.0) delay.held_out_share = after / before;
     for (const auto& [lag, share] : shares)
-      if (lag < best.first && kLateShare * share >= best.second)
-        delay.shortest_s = static_cast<double>(best.first - lag) / sample_rate_Hz_;
+      if (const double late_s = static_cast<double>(best.first - lag) / sample_rate_Hz_;
+          late_s > 0.0 && greatest_share(late_s) * share >= best.second)
+        delay.shortest_s = late_s;
     return delay;
   }
 
@@ -230,15 +247,14 @@ std::optional<Delay> estimate_delay(const Pair& pair, double sample_rate_Hz) {
 }
 
 bool is_late(const Delay& delay, double sample_rate_Hz) {
-  return delay.unexplained <= kExplainsLittle && delay.lag_s >= shortest_lag_s(sample_rate_Hz) &&
-         delay.unexplained <= kLateShare * delay.without_shift &&
-         delay.held_out_share <= kHeldOutShare;
+  return delay.lag_s >= shortest_lag_s(sample_rate_Hz) && delay.unexplained <= kExplainsLittle &&
+         delay.unexplained <= greatest_share(delay.lag_s) * delay.without_shift &&
+         is_held_out(delay);
 }
 
-bool is_early(const Delay& delay) {
-  return delay.unexplained <= kEarlyRest && delay.lag_s <= -kShortestLead_s &&
-         delay.unexplained <= kEarlyShare * delay.without_shift &&
-         delay.held_out_share <= kHeldOutShare;
+bool is_early(const Delay& delay, double sample_rate_Hz) {
+  return delay.lag_s <= -shortest_lag_s(sample_rate_Hz) && delay.unexplained <= kEarlyRest &&
+         delay.unexplained <= kEarlyShare * delay.without_shift && is_held_out(delay);
 }
 
 std::optional<TwoSides> relate_sides(const std::vector<double>& first,

@@ -17,11 +17,13 @@ namespace torsio {
 /// and with these signs friction, viscosity and relaxation only make the torque lead, so that a
 /// late torque remains unexplained without a shift.
 struct Delay {
-  double lag_s = 0.0;           ///< positive: the target comes late
-  double unexplained = 1.0;     ///< share of the target's variance, there
-  double without_shift = 1.0;   ///< the same without shift
-  double held_out_share = 1.0;  ///< error with over error without shift, in the worst of four parts
-                                ///< of the recording, of fits to the other three
+  double lag_s = 0.0;          ///< positive: the target comes late
+  double unexplained = 1.0;    ///< share of the target's variance, there
+  double without_shift = 1.0;  ///< the same without shift
+  /// Square sum of the errors in four parts of the recording, each of the fit to the other three,
+  /// over the same without shift; and in how many parts it is smaller.
+  double held_out_share = 1.0;
+  std::size_t better_parts = 0;
   /// The shortest lag that would be reported: a slow motion has nearly the same torque before and
   /// after it. Infinite if none would.
   double shortest_s = 0.0;
@@ -32,10 +34,10 @@ struct Delay {
 [[nodiscard]] std::optional<Delay> estimate_delay(const Pair& pair, double sample_rate_Hz);
 
 /// Whether a shift explains a good part of what is unexplained without it, also in parts of the
-/// recording that were not used for the fit. Late: at least 8 ms, and a quarter of it. Early: the
-/// input is late, by at least 20 ms; three quarters of it, and hardly anything else remains.
+/// recording that were not used for the fit. Late: at least 8 ms; the shift explains 30 % of it, of a long delay 75 %. Early: the
+/// input is late; the shift explains 70 % of it, and hardly anything else remains.
 [[nodiscard]] bool is_late(const Delay& delay, double sample_rate_Hz);
-[[nodiscard]] bool is_early(const Delay& delay);
+[[nodiscard]] bool is_early(const Delay& delay, double sample_rate_Hz);
 
 /// How the angles of both sides of a spring are related beyond the deflection that the torque
 /// explains:

@@ -29,6 +29,8 @@ constexpr std::size_t kCutNeighbourhood = 8;
 constexpr std::size_t kFewSteps = 100;
 constexpr double kFewRows = 8.0;
 constexpr double kAgree = 1.5;
+constexpr std::size_t kFewIntervals = 100;
+constexpr std::size_t kMostBroken = 3;
 
 /// x3 - 3 x2 + 3 x1 - x0 of four successive new samples.
 double third_difference(const Channel& channel, const std::vector<std::size_t>& samples,
@@ -247,6 +249,23 @@ std::optional<Cut> find_cut(const std::vector<const Channel*>& channels,
       if (height(k) > height(cut->sample)) cut->sample = k;
   }
   return cut;
+}
+
+std::optional<BrokenCadence> find_broken_cadence(const Channel& channel) {
+  const std::vector<std::size_t> samples = new_samples(channel);
+  if (channel.fresh.empty() || samples.size() < kFewIntervals) return {};
+  std::vector<std::size_t> intervals;
+  for (std::size_t k = 1; k < samples.size(); ++k) intervals.push_back(samples[k] - samples[k - 1]);
+  std::vector<std::size_t> sorted = intervals;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::ranges::nth_element(sorted, middle);
+  BrokenCadence cadence{.usual = *middle};
+  std::size_t broken = 0;
+  for (std::size_t k = 0; k < intervals.size(); ++k) {
+    if (intervals[k] % cadence.usual == 0) continue;
+    if (broken++ == 0) cadence.sample = samples[k + 1], cadence.found = intervals[k];
+  }
+  return broken > 0 && broken <= kMostBroken ? std::optional(cadence) : std::nullopt;
 }
 
 }  // namespace torsio

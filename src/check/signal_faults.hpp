@@ -58,4 +58,14 @@ struct Cut {
 [[nodiscard]] std::optional<Cut> find_cut(const std::vector<const Channel*>& channels,
                                           const std::vector<double>& codes);
 
+/// A slow sensor has a new sample in every n-th row, except at one to three places.
+struct BrokenCadence {
+  std::size_t sample = 0;  ///< of the first of these places
+  std::size_t usual = 0;   ///< n
+  std::size_t found = 0;   ///< rows from the new sample before
+};
+/// Whole missing samples of the sensor (a multiple of n) do not count. Empty if the new samples are
+/// not regular, or in all rows.
+[[nodiscard]] std::optional<BrokenCadence> find_broken_cadence(const Channel& channel);
+
 }  // namespace torsio

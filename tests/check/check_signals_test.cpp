@@ -187,5 +187,34 @@ TEST(CheckSignals, WarnOfMissingRowsWhoseStampsWereClosedUp) {
       << text_of(findings);
 }
 
+TEST(CheckSignals, WarnOfRowsThatAreMissingAtATurningPointByTheClockOfASlowSensor) {
+  const auto with_cut = [](std::size_t rows) {
+    const Recording sound = noisy_bench();
+    Recording recording("cut", 1000.0);
+    for (Channel copy : sound.channels()) {
+      if (copy.name == "torque_Nm") {
+        copy.fresh.resize(copy.values.size());
+        for (std::size_t i = 0; i < copy.values.size(); ++i) {
+          copy.fresh[i] = i % 8 == 0 ? 1 : 0;
+          copy.values[i] = copy.values[i / 8 * 8];
+        }
+        copy.fresh.erase(copy.fresh.begin() + 4100,
+                         copy.fresh.begin() + 4100 + static_cast<std::ptrdiff_t>(rows));
+      }
+      const double level = copy.values[4099];  // nothing moves
+      std::fill(copy.values.begin() + 4100, copy.values.end(), level);
+      copy.values.resize(copy.values.size() - rows);
+      recording.add(std::move(copy));
+    }
+    return findings_of(alone(recording));
+  };
+  EXPECT_EQ(verdict_of(with_cut(0), "gaps"), Verdict::pass) << text_of(with_cut(0));
+  const auto findings = with_cut(100);
+  ASSERT_EQ(verdict_of(findings, "gaps"), Verdict::warn);
+  EXPECT_NE(text_of(findings).find("a new sample in every 8. row, but at t = 4.1 s after 4 rows"),
+            std::string::npos)
+      << text_of(findings);
+}
+
 }  // namespace
 }  // namespace torsio
