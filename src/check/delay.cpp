@@ -16,17 +16,18 @@ namespace {
 
 constexpr double kLongest_s = 0.6;
 constexpr double kCoarseStep_s = 4e-3;
+constexpr double kFineStep_s = 2e-4;
 constexpr std::size_t kFewSamples = 200;
 constexpr std::size_t kEnoughSamples = 8000;
 constexpr double kExplainsLittle = 0.2;  ///< share of the variance: there is no delay to find
-constexpr double kShare = 0.75;          ///< of what is unexplained without shift
+constexpr double kShare = 0.75;          ///< share of what is unexplained without shift
 constexpr double kEarlyShare = 0.3;
 constexpr double kLongLag_s = 0.2;
 constexpr double kEarlyRest = 0.01;
 constexpr double kHeldOutShare = 0.6;
-constexpr std::size_t kMostParts = 3;
+constexpr std::size_t kLeastParts = 3;
 constexpr double kShortest_s = 8e-3;
-constexpr auto kHinges = std::to_array<double>({-0.5, 0.0, 0.5});  // of the scaled input
+constexpr auto kHinges = std::to_array<double>({-0.5, 0.0, 0.5});  // the input is scaled
 constexpr std::size_t kStops = 20;
 constexpr double kSmallestStop = 0.004;  ///< share of half the range
 constexpr auto kLoadedStops = std::to_array<std::size_t>({4, 8, 12});
@@ -65,7 +66,7 @@ double shortest_lag_s(double sample_rate_Hz) { return std::max(kShortest_s, 1.5 
 
 /// Whether the shift also explains parts that were not used for the fit.
 bool is_held_out(const Delay& delay) {
-  return delay.held_out_share <= kHeldOutShare && delay.better_parts >= kMostParts;
+  return delay.held_out_share <= kHeldOutShare && delay.better_parts >= kLeastParts;
 }
 
 /// The columns of a dissipative spring over the input: the first kFree are a static curve, the
@@ -174,13 +175,12 @@ class Search {
                         static_cast<std::ptrdiff_t>((end - begin) / 8));
     samples_ = samples_for_fit(pair.input, begin + static_cast<std::size_t>(longest_),
                                end - static_cast<std::size_t>(longest_), kEnoughSamples);
-    // An inverted torque would seem to have a negative friction.
-    sign_ = correlation(pair.input, pair.target) < 0.0 ? -1.0 : 1.0;
   }
   [[nodiscard]] bool is_possible() const { return longest_ > 0 && samples_.size() >= kFewSamples; }
 
   [[nodiscard]] Delay run() {
     columns_ = spring_columns(pair_.input, samples_, sample_rate_Hz_);
+    line_ = columns_.col(1).array() - columns_.col(1).mean();
     for (std::size_t p = 0; p < kParts; ++p) {
       const Eigen::Index begin = part_begin(p);
       const auto rows = columns_.middleRows(begin, part_begin(p + 1) - begin);
@@ -193,8 +193,10 @@ class Search {
       shares.emplace_back(lag, fit(lag).unexplained());
     auto best = *std::ranges::min_element(shares, {}, &std::pair<std::ptrdiff_t, double>::second);
     const std::ptrdiff_t coarse = best.first;
+    const auto fine = std::max<std::ptrdiff_t>(
+        1, static_cast<std::ptrdiff_t>(std::round(kFineStep_s * sample_rate_Hz_)));
     for (std::ptrdiff_t lag = std::max(-longest_, coarse - step + 1);
-         lag < std::min(longest_, coarse + step); ++lag)
+         lag < std::min(longest_, coarse + step); lag += fine)
       if (const double share = fit(lag).unexplained(); share < best.second) best = {lag, share};
     const ShiftedFit unshifted = fit(0);
     const ShiftedFit shifted = fit(best.first);
@@ -226,15 +228,18 @@ class Search {
     return columns_.rows() * static_cast<Eigen::Index>(p) / static_cast<Eigen::Index>(kParts);
   }
   [[nodiscard]] ShiftedFit fit(std::ptrdiff_t lag) const {
-    return {columns_, products_, sign_ * at_samples(pair_.target, samples_, lag)};
+    const Eigen::VectorXd target = at_samples(pair_.target, samples_, lag);
+    // An inverted torque would seem to have a negative friction.
+    const bool is_inverted = line_.dot(target) < 0.0;
+    return {columns_, products_, is_inverted ? Eigen::VectorXd(-target) : target};
   }
 
   const Pair& pair_;
   double sample_rate_Hz_;
   std::ptrdiff_t longest_ = 0;
-  double sign_ = 1.0;
   std::vector<std::size_t> samples_;
   Eigen::MatrixXd columns_;
+  Eigen::VectorXd line_;  ///< the input, without its mean
   std::array<Eigen::MatrixXd, kParts> products_;
 };
 

@@ -14,10 +14,9 @@ namespace torsio {
 ///     1, z, z |z|, z^3, max(z - h, 0) for six h, s_r(z) for four r;   s_r <- clip(s_r + dz, -r, r)
 ///
 /// z is the signal scaled to -1 ... 1. The hinges h follow curves that a cubic does not: a backlash,
-/// a spring that softens. The stop operators s_r are those of Maxwell slip (Brokate
-/// and Sprekels, Hysteresis and Phase Transitions, 1996, 2.1). They do not depend on the rate of
-/// the signal. Samples that are not finite are
-/// passed over.
+/// a spring that softens. The stop operators s_r are those of Maxwell slip (Brokate and Sprekels,
+/// Hysteresis and Phase Transitions, 1996, 2.1); they do not depend on the rate of the signal.
+/// Samples that are not finite are passed over.
 /// @param extent the range that is scaled to -1 ... 1
 [[nodiscard]] Eigen::MatrixXd hysteresis_columns(const std::vector<double>& signal,
                                                  std::span<const std::size_t> samples,

@@ -30,7 +30,7 @@ constexpr std::size_t kFewSteps = 100;
 constexpr double kFewRows = 8.0;
 constexpr double kAgree = 1.5;
 constexpr std::size_t kFewIntervals = 100;
-constexpr std::size_t kMostBroken = 3;
+constexpr std::size_t kMaxBroken = 3;
 
 /// x3 - 3 x2 + 3 x1 - x0 of four successive new samples.
 double third_difference(const Channel& channel, const std::vector<std::size_t>& samples,
@@ -265,7 +265,7 @@ std::optional<BrokenCadence> find_broken_cadence(const Channel& channel) {
     if (intervals[k] % cadence.usual == 0) continue;
     if (broken++ == 0) cadence.sample = samples[k + 1], cadence.found = intervals[k];
   }
-  return broken > 0 && broken <= kMostBroken ? std::optional(cadence) : std::nullopt;
+  return broken > 0 && broken <= kMaxBroken ? std::optional(cadence) : std::nullopt;
 }
 
 }  // namespace torsio

@@ -60,7 +60,7 @@ struct Cut {
 
 /// A slow sensor has a new sample in every n-th row, except at one to three places.
 struct BrokenCadence {
-  std::size_t sample = 0;  ///< of the first of these places
+  std::size_t sample = 0;  ///< the first of these places
   std::size_t usual = 0;   ///< n
   std::size_t found = 0;   ///< rows from the new sample before
 };

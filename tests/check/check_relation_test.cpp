@@ -67,6 +67,28 @@ TEST(CheckDelay, IsFoundInSpiteOfHysteresis) {
   }
 }
 
+TEST(CheckDelay, IsNotReportedForALeadThatDampingExplains) {
+  const Recording elastic = hysteretic(0.5, 3.0, 0.02, 0);
+  const std::vector<double> x = elastic.channel("spring_deflection_rad").values;
+  const auto findings = findings_of(alone(with_channel(elastic, "torque_Nm", [&](Channel& channel) {
+    for (std::size_t i = 1; i < x.size(); ++i)
+      channel.values[i] += 3.0 * (x[i] - x[i - 1]) / 1e-3;  // as much as a lead of 30 ms
+  })));
+  EXPECT_EQ(verdict_of(findings, "delay"), Verdict::pass) << text_of(findings);
+}
+
+TEST(CheckDelay, OfTheDeflectionMakesTheTorqueComeBeforeIt) {
+  const auto findings = findings_of(alone(
+      with_channel(hysteretic(2.0, 3.0, 0.02, 0), "spring_deflection_rad", [](Channel& channel) {
+        std::rotate(channel.values.begin(), channel.values.end() - 100, channel.values.end());
+        std::fill_n(channel.values.begin(), 100, channel.values[100]);
+      })));
+  ASSERT_EQ(verdict_of(findings, "delay"), Verdict::warn);
+  EXPECT_NE(first_of(findings, "delay").message.find("before spring_deflection_rad"),
+            std::string::npos)
+      << first_of(findings, "delay").message;
+}
+
 TEST(CheckDelay, CannotBeDeterminedFromASlowMotionWithNoise) {
   const Recording clear = hysteretic(0.05, 3.0, 0.02, 0, 40000);
   const auto slow = with_channel(clear, "torque_Nm", [](Channel& channel) {
@@ -118,6 +140,15 @@ TEST(CheckUnits, WarnOfADeflectionOfMoreThanOneAndAHalfRadians) {
   EXPECT_NE(first_of(findings, "units").message.find("turns"), std::string::npos);
 }
 
+TEST(CheckUnits, WarnOfATorqueThatHardlyAnyJointCarries) {
+  const auto findings = findings_of(alone(with_channel(sweep(), "torque_Nm", [](Channel& channel) {
+    for (double& value : channel.values) value *= 1000.0;
+  })));
+  ASSERT_EQ(verdict_of(findings, "units"), Verdict::warn);
+  EXPECT_NE(first_of(findings, "units").message.find("torque_Nm ranges through"),
+            std::string::npos);
+}
+
 TEST(CheckColumns, WarnWhereTheCurrentFollowsTheDeflectionMoreCloselyThanTheTorque) {
   EXPECT_EQ(verdict_of(findings_of(alone(sweep())), "columns"), Verdict::pass);
   const Recording sound = sweep();
@@ -163,6 +194,17 @@ TEST(CheckChange, IsFoundForAGainThatChangesByAThird) {
       channel.values[i] *= 1.3;
   })));
   EXPECT_EQ(verdict_of(findings, "change"), Verdict::warn) << text_of(findings);
+}
+
+TEST(CheckChange, IsFoundWithTwoReversalsAndNotTakenForADelayOrForAnotherFault) {
+  const auto findings = findings_of(alone(with_channel(sweep(), "torque_Nm", [](Channel& channel) {
+    const auto samples = static_cast<double>(channel.values.size());
+    for (std::size_t i = 0; i < channel.values.size(); ++i)
+      channel.values[i] += 4.0 * static_cast<double>(i) / samples;
+  })));
+  EXPECT_EQ(verdict_of(findings, "change"), Verdict::warn) << text_of(findings);
+  for (const char* check : {"delay", "columns", "units"})
+    EXPECT_EQ(verdict_of(findings, check), Verdict::pass) << text_of(findings);
 }
 
 TEST(CheckChange, IsNotReportedForRelaxationAtRest) {
