@@ -27,12 +27,17 @@ std::vector<Finding> Checker::run() {
   check_saturation();
   check_frozen();
   check_resolution();
+  check_repeats();
+  check_spikes();
+  check_noise();
+  relate();
   check_units();
   check_sign_flips();
   check_gaps();
   check_delay();
   check_sign();
   check_change();
+  check_columns();
   check_excitation();
   check_offsets();
   check_leak();

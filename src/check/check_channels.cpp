@@ -4,10 +4,28 @@
 #include <cmath>
 
 #include "check/checker.hpp"
+#include "data/finest_step.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
+
+namespace {
+
+/// Means over the `half_window` samples before and after each; NaN where one of them is.
+std::vector<double> without_noise(const std::vector<double>& values, std::size_t half_window) {
+  std::vector<double> means(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t begin = i > half_window ? i - half_window : 0;
+    const std::size_t end = std::min(values.size(), i + half_window + 1);
+    double sum = 0.0;
+    for (std::size_t k = begin; k < end; ++k) sum += values[k];
+    means[i] = sum / static_cast<double>(end - begin);
+  }
+  return means;
+}
+
+}  // namespace
 
 // A locked output: compared with the deflection the channel does not move, and the torque follows
 // that deflection, which it would not do if a sensor were dead while its side moved.
@@ -67,16 +85,16 @@ void Checker::check_constant() {
 // A range limit causes many consecutive samples exactly at the extreme value.
 void Checker::check_saturation() {
   pass_unless_found("saturation", "no channel rests at its extreme value", [&] {
-    for_each_moving_channel([&](std::size_t, const Recording& recording, const Channel& channel) {
+    for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
       const Extent span = extent_of(channel.values);
       if (!(span.width() > 0.0)) return;
       // A motion that turns within the last of few codes rests there, too.
-      const double by_code = kCodesAtATurn * finest_step(channel.values) / span.width();
+      const double by_code = kCodesAtATurn * finest_step(channel) / span.width();
       for (const double extreme : {span.lowest, span.highest}) {
         const auto count = static_cast<double>(std::ranges::count(channel.values, extreme));
         const double share = count / static_cast<double>(channel.values.size());
         if (share < std::max(kSaturatedShare, by_code) ||
-            approaches_gradually(channel, extreme, span))
+            approaches_gradually(channel, extreme, span) || is_turn(r, channel, extreme))
           continue;
         add(Verdict::warn, "saturation", recording.name(),
             fmt::format("{}: {:.1f} % of the samples are exactly {:g}", channel.name, 100.0 * share,
@@ -99,6 +117,40 @@ bool Checker::approaches_gradually(const Channel& channel, double extreme, const
   return 2 * at_extreme < near_extreme;
 }
 
+/// Whether the motion itself ends at the extreme: while the channel rests there, the channel that
+/// follows it best moves no further in the direction in which it came than two codes of the channel
+/// explain. A limit of the sensor hides the rest of a motion that continues. False if no channel
+/// follows it.
+bool Checker::is_turn(std::size_t r, const Channel& channel, double extreme) const {
+  const std::vector<double>& values = channel.values;
+  const Extent span = extent_of(values);
+  std::vector<double> other;
+  double closest = kClearCorrelation;
+  for (const Channel& each : others_of(r, channel.name)) {
+    const double together = std::abs(correlation(values, each.values));
+    if (together > closest) closest = together, other = bridged(each);
+  }
+  if (other.empty()) return false;
+  other = without_noise(other,
+                        static_cast<std::size_t>(kSpeedHalfWindow_s * dataset_.sample_rate_Hz()));
+  const double beyond = std::max(kCodesAtATurn * finest_step(channel), kBeyondShare * span.width());
+  const double zone = kApproachShare * span.width();
+  for (std::size_t begin = 0, end = 0; begin < values.size(); begin = end) {
+    end = begin + 1;
+    if (values[begin] != extreme) continue;
+    // The visit of the extreme, and the last part of the motion towards it.
+    while (end < values.size() && std::abs(values[end] - extreme) < zone) ++end;
+    std::size_t from = begin;
+    while (from > 0 && std::abs(values[from] - extreme) < zone) --from;
+    const double slope = (other[begin] - other[from]) / (values[begin] - values[from]);
+    if (!is_finite(slope) || slope == 0.0) continue;
+    const double direction = (values[begin] > values[from] ? 1.0 : -1.0) / slope;
+    for (std::size_t i = begin; i < end; ++i)
+      if (direction * (other[i] - other[begin]) > beyond) return false;
+  }
+  return true;
+}
+
 // A sensor with a constant value is frozen if the other channels move; at a standstill it is
 // correct.
 void Checker::check_frozen() {
@@ -118,7 +170,9 @@ void Checker::check_frozen() {
           return;
         for (const Channel& other : others) {
           const double moved = share_moved(other, rest);
-          if (moved < kMovedMeanwhile && !is_odd_one_out(rest, rests, channel, other)) continue;
+          if (moved < kMovedMeanwhile &&
+              (is_stop_of_motion(channel, rest) || !is_odd_one_out(rest, rests, channel, other)))
+            continue;
           add(Verdict::warn, "frozen sensors", recording.name(),
               fmt::format(
                   "{} is constant at {:g} for {:.3g} s from t = {:.4g} s, while {} moves through "
@@ -134,12 +188,22 @@ void Checker::check_frozen() {
   });
 }
 
+/// A rest at a turning point, or at the beginning or end of the recording: friction holds the joint
+/// while the torque still changes.
+bool Checker::is_stop_of_motion(const Channel& channel, const Rest& rest) {
+  const double step = std::max(kCodesAtATurn * finest_step(channel),
+                               kStepShare * extent_of(channel.values).width());
+  return rest.begin == 0 || rest.end == channel.values.size() ||
+         is_turning_point(rest, channel.values, step);
+}
+
 /// The channels that should move if a channel does; the target is compared with the first input,
 /// not with the channels of its expression.
 std::vector<Channel> Checker::others_of(std::size_t r, const std::string& name) const {
   std::vector<Channel> others;
   for (const std::string& each : channels_)
-    if (each != name) others.push_back(dataset_.records[r].recording.channel(each));
+    if (each != name && !stands_still(r, each))
+      others.push_back(dataset_.records[r].recording.channel(each));
   if (name == dataset_.target && sources_.size() > 1)
     others.push_back({.name = spec_.inputs.front(), .values = pairs_[r].input});
   return others;
@@ -176,7 +240,7 @@ void Checker::check_resolution() {
         if (first_input > 0.0 && unit_of(name) == unit_of(channels_.front()) &&
             name != dataset_.target)
           range = std::min(range, first_input);
-        const double code = finest_step(values);
+        const double code = finest_step(recording.channel(name));
         if (!(range > 0.0) || code < kCoarseShare * range) continue;
         add(Verdict::warn, "resolution", recording.name(),
             fmt::format("{} has a resolution of {:.3g}: {} moves through only {:.0f} such steps",
@@ -198,14 +262,22 @@ void Checker::check_gaps() {
   pass_unless_found("gaps", "no jump", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
       check_jump_of_input(r);
+      if (!check_cut(r)) check_cadence(r);
       const Recording& recording = dataset_.records[r].recording;
       for (const std::string& name : channels_) {
         const Channel& channel = recording.channel(name);
         if (is_condition(recording, name) || stands_still(r, name)) continue;
-        const std::vector<double> values = bridged(channel);
-        const Jump jump = largest_jump(values);
+        // Between the new samples of a slow sensor there is no jump.
+        const std::vector<double> whole = bridged(channel);
+        std::vector<std::size_t> samples;
+        std::vector<double> values;
+        for (std::size_t i = 0; i < whole.size(); ++i)
+          if (channel.is_fresh(i)) samples.push_back(i), values.push_back(whole[i]);
+        Jump jump = largest_jump(values);
+        if (!samples.empty()) jump.sample = samples[jump.sample];
         if (!stands_out(jump, values) || is_end_of_stall(r, jump.sample) ||
-            is_sign_flip(r, name, jump) || (spoiled_[r] != 0 && is_source(name)))
+            is_sign_flip(r, name, jump) || is_spike(r, jump.sample) ||
+            (spoiled_[r] != 0 && is_source(name)))
           continue;
         add(Verdict::warn, "gaps", recording.name(), jump_text(recording, name, jump),
             "Check for lost samples and a slipping sensor. Cut the recording in two there.");
@@ -218,7 +290,7 @@ void Checker::check_gaps() {
 void Checker::check_jump_of_input(std::size_t r) {
   const std::vector<double>& input = pairs_[r].input;
   const Jump jump = largest_jump(input);
-  if (sources_.size() < 2 || !stands_out(jump, input) ||
+  if (sources_.size() < 2 || !stands_out(jump, input) || is_spike(r, jump.sample) ||
       jump.height < kInputJumpShare * extent_of(input).width())
     return;
   const Recording& recording = dataset_.records[r].recording;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "check/checker.hpp"
+#include "data/finest_step.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -12,19 +13,29 @@ namespace torsio {
 // turns by a unit's factor as much; and recordings of one joint have one stiffness.
 void Checker::check_units() {
   pass_unless_found("units", "the recordings agree", [&] {
-    for (std::size_t r = 0; r < pairs_.size(); ++r) check_units_within(r);
-    if (pairs_.size() < 2) return;
-    std::vector<double> slopes;
+    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+      check_units_within(r);
+      if (spoiled_[r] == 0 && !changes_[r]) check_scale(r);
+      if (spoiled_[r] == 0) check_twist(r);
+    }
+    compare_slopes();
     for (std::size_t r = 0; r < pairs_.size(); ++r)
-      slopes.push_back(is_clear(r) ? std::abs(line_through(pairs_[r]).slope) : 0.0);
-    const std::size_t usual = usual_slope(slopes);
-    const auto near_usual = std::ranges::count_if(slopes, [&](double slope) {
-      return slope > 0.0 && ratio_of(slope, slopes[usual]) < kSlopeRatio;
-    });
-    for (std::size_t r = 0; r < pairs_.size(); ++r)
-      if (slopes[r] > 0.0 && ratio_of(slopes[r], slopes[usual]) >= kSlopeRatio)
-        report_slope(r, slopes[r], usual, slopes[usual], near_usual > 1);
+      if (spoiled_[r] == 0) check_load(r);
   });
+}
+
+void Checker::compare_slopes() {
+  if (pairs_.size() < 2) return;
+  std::vector<double> slopes;
+  for (std::size_t r = 0; r < pairs_.size(); ++r)
+    slopes.push_back(is_clear(r) ? std::abs(line_through(pairs_[r]).slope) : 0.0);
+  const std::size_t usual = usual_slope(slopes);
+  const auto near_usual = std::ranges::count_if(slopes, [&](double slope) {
+    return slope > 0.0 && ratio_of(slope, slopes[usual]) < kSlopeRatio;
+  });
+  for (std::size_t r = 0; r < pairs_.size(); ++r)
+    if (slopes[r] > 0.0 && ratio_of(slopes[r], slopes[usual]) >= kSlopeRatio)
+      report_slope(r, slopes[r], usual, slopes[usual], near_usual > 1);
 }
 
 void Checker::report_slope(std::size_t r, double slope, std::size_t usual, double usual_slope,
@@ -93,40 +104,67 @@ void Checker::check_units_within(std::size_t r) {
 void Checker::check_sign_flips() {
   flips_.resize(pairs_.size());
   for (std::size_t r = 0; r < pairs_.size(); ++r)
-    if (const Jump jump = largest_jump(pairs_[r].input); !stands_out(jump, pairs_[r].input))
-      flips_[r] = find_sign_flip(pairs_[r]);
+    if (const Jump jump = largest_jump(pairs_[r].input); !stands_out(jump, pairs_[r].input)) {
+      const Recording& recording = dataset_.records[r].recording;
+      double code = 0.0;
+      for (const std::string& source : sources_)
+        code = std::max(code, finest_step(recording.channel(source)));
+      flips_[r] = find_sign_flip(pairs_[r], code, finest_step(recording.channel(dataset_.target)));
+    }
 }
 
-// Friction makes the torque lead the deflection, so that the cross-correlation alone would report a
-// delay for every hysteretic spring. The delay is therefore the shift at which spring and friction
-// together explain the torque best.
+// Hysteresis makes the torque lead the deflection as well. A delay is what a static curve with
+// hysteresis does not explain: it shifts fast parts of the motion more than slow ones.
 void Checker::check_delay() {
   const double rate = dataset_.sample_rate_Hz();
-  const auto longest = static_cast<std::ptrdiff_t>(std::round(kLongestDelay_s * rate));
-  pass_unless_found(
-      "delay", fmt::format("{} and {} move together", spec_.inputs.front(), dataset_.target), [&] {
-        for (std::size_t r = 0; r < pairs_.size(); ++r) {
-          const ShiftedFit fit(pairs_[r], rate);
-          const double at_zero = fit.unexplained(0);
-          std::ptrdiff_t best = 0;
-          double least = at_zero;
-          for (std::ptrdiff_t lag = -longest; lag <= longest; ++lag)
-            if (const double share = fit.unexplained(lag); share < least) best = lag, least = share;
-          if (least > kExplainsLittle || least > kDelayGain * at_zero) continue;
-          const double delay_ms = 1e3 * static_cast<double>(best) / rate;
-          add(Verdict::warn, "delay", dataset_.records[r].recording.name(),
-              fmt::format(
-                  "{} comes {:.1f} ms {} {} (unexplained {:.2f} % there, {:.2f} % without shift)",
-                  dataset_.target, std::abs(delay_ms), delay_ms > 0 ? "after" : "before",
-                  spec_.inputs.front(), 100.0 * least, 100.0 * at_zero),
-              delay_ms > 0 && best < longest
-                  ? fmt::format("Mapping line that removes it: latency: {{{}: {:.1f}ms}}",
-                                dataset_.target, delay_ms)
-              : best == longest
-                  ? "The search ends there: check the loggers' clocks."
-                  : "Check the loggers' clocks: a torque cannot precede its deflection.");
-        }
-      });
+  double shortest_s = 0.0;
+  const std::size_t before = findings_.size();
+  for (std::size_t r = 0; r < pairs_.size(); ++r) {
+    if (spoiled_[r] != 0 || changes_[r] || check_sides(r)) continue;
+    const auto delay = estimate_delay(pairs_[r], rate);
+    if (delay && (is_late(*delay, rate) || is_early(*delay, rate)))
+      report_delay(r, *delay);
+    else
+      shortest_s = std::max(shortest_s, delay ? delay->shortest_s : HUGE_VAL);
+  }
+  if (findings_.size() > before) return;
+  add(Verdict::pass, "delay", "",
+      fmt::format("{} and {} move together{}", spec_.inputs.front(), dataset_.target,
+                  shortest_s > kClearDelay_s
+                      ? std::isfinite(shortest_s)
+                            ? fmt::format("; delays below {:.0f} ms cannot be determined from so "
+                                          "slow a motion",
+                                          1e3 * shortest_s)
+                            : "; delays cannot be determined from this motion"
+                      : ""));
+}
+
+/// One of two angles that is late: the difference then contains the speed of the joint.
+bool Checker::check_sides(std::size_t r) {
+  const Recording& recording = dataset_.records[r].recording;
+  const auto& sides = sides_[r];
+  if (!sides || !has_late_side(*sides, recording.sample_rate_Hz())) return false;
+  const bool is_first = sides->lateness_s > 0.0;
+  add(Verdict::warn, "delay", recording.name(),
+      fmt::format("{} comes {:.1f} ms after {}", is_first ? sources_[0] : sources_[1],
+                  1e3 * std::abs(sides->lateness_s), is_first ? sources_[1] : sources_[0]),
+      "The difference of two angles needs both at the same time: check how they are sampled.");
+  return true;
+}
+
+void Checker::report_delay(std::size_t r, const Delay& delay) {
+  add(Verdict::warn, "delay", dataset_.records[r].recording.name(),
+      fmt::format("{} comes {:.1f} ms {} {} (unexplained {:.2g} % there, {:.2g} % without shift)",
+                  dataset_.target, 1e3 * std::abs(delay.lag_s),
+                  delay.lag_s > 0.0 ? "after" : "before", spec_.inputs.front(),
+                  100.0 * delay.unexplained, 100.0 * delay.without_shift),
+      delay.is_at_end ? "The search ends there: check the loggers' clocks."
+      : delay.lag_s > 0.0
+          ? fmt::format("Mapping line that removes it: latency: {{{}: {:.1f}ms}}", dataset_.target,
+                        1e3 * delay.lag_s)
+          : fmt::format("No damping explains so long a lead: {} is late, or the loggers' "
+                        "clocks differ.",
+                        spec_.inputs.front()));
 }
 
 void Checker::check_sign() {
@@ -162,6 +200,12 @@ void Checker::check_sign() {
                     : fmt::format("Mapping: invert one of them with sign: -1 (channels: "
                                   "{{{}: {{from: ..., sign: -1}}}})",
                                   dataset_.target));
+          } else if (values[r] < kClearCorrelation && hardly_moves(r)) {
+            add(Verdict::warn, "excitation", recording,
+                fmt::format("{} hardly moves more than its noise: neither sign nor delay can be "
+                            "determined",
+                            spec_.inputs.front()),
+                "Record a motion that loads the spring.");
           } else if (values[r] < kClearCorrelation) {
             add(Verdict::warn, "sign", recording,
                 fmt::format("{} hardly follows {} (correlation {:.3f})", dataset_.target,
@@ -229,61 +273,75 @@ int Checker::order_of_difference(std::size_t r) const {
   return is_difference(1.0) ? 1 : is_difference(-1.0) ? -1 : 0;
 }
 
+// Before the other checks of the relation: they would take a change for a delay or a wrong scale.
+void Checker::relate() {
+  for (std::size_t r = 0; r < pairs_.size(); ++r) {
+    const Recording& recording = dataset_.records[r].recording;
+    changes_.push_back(find_relation_change(pairs_[r]));
+    sides_.push_back(order_of_difference(r) == 0
+                         ? std::nullopt
+                         : relate_sides(recording.channel(sources_[0]).values,
+                                        recording.channel(sources_[1]).values, pairs_[r].target,
+                                        recording.sample_rate_Hz()));
+  }
+}
+
 // Changes without a jump: a zero that drifts, a spring that breaks.
 void Checker::check_change() {
   pass_unless_found("change", "each recording has the same relation early and late", [&] {
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
-      if (spoiled_[r] != 0) continue;
-      const auto change = find_relation_change(pairs_[r], dataset_.sample_rate_Hz());
-      if (!change) continue;
+      const auto& change = changes_[r];
+      if (spoiled_[r] != 0 || !change) continue;
       const Recording& recording = dataset_.records[r].recording;
       const std::string when = change->is_gradual ? std::string("gradually from beginning to end")
                                                   : fmt::format("at about t = {:.3g} s",
                                                                 recording.time_s(change->sample));
       add(Verdict::warn, "change", recording.name(),
           change->is_of_slope
-              ? fmt::format("at equal {} and speed the slope of {} changes to {:.2g} times, {}",
+              ? fmt::format("at equal {} the slope of {} changes to {:.2g} times, {}",
                             spec_.inputs.front(), dataset_.target, change->slope_ratio, when)
-              : fmt::format("at equal {} and speed {} changes by {:.3g} {}, {}",
-                            spec_.inputs.front(), dataset_.target, change->offset,
-                            unit_label(dataset_.target), when),
+              : fmt::format("at equal {} {} changes by {:.3g} {}, {}", spec_.inputs.front(),
+                            dataset_.target, change->offset, unit_label(dataset_.target), when),
           "Check for a zero that slipped or drifted and for a part that broke or crept. A model "
           "would learn the mean of before and after.");
     }
   });
 }
 
-// Two recordings of one joint whose torques differ by a constant at the same deflection have
-// different zeros.
+// Recordings of one joint have one curve: at common inputs their torques neither differ by a
+// constant nor by a factor.
 void Checker::check_offsets() {
-  pass_unless_found("offsets", "the recordings have the same zero", [&] {
-    double slope = 0.0;
-    double spread = 0.0;
-    std::vector<Line> lines;
+  pass_unless_found("offsets", "the recordings have the same zero and gain", [&] {
+    std::vector<const Pair*> pairs;
     std::vector<std::size_t> records;
+    double spread = 0.0;
     for (std::size_t r = 0; r < pairs_.size(); ++r) {
-      if (spoiled_[r] != 0) continue;
+      if (spoiled_[r] != 0 || changes_[r]) continue;
+      pairs.push_back(&pairs_[r]);
       records.push_back(r);
-      lines.push_back(line_through(pairs_[r]));
-      slope += lines.back().slope;
       spread = std::max(spread, extent_of(pairs_[r].target).width());
     }
-    if (lines.size() < 2) return;
-    slope /= static_cast<double>(lines.size());
-    std::vector<double> offsets;
-    offsets.reserve(lines.size());
-    for (const Line& line : lines) offsets.push_back(line.mean_target - slope * line.mean_input);
-    std::vector<double> sorted = offsets;
-    std::ranges::sort(sorted);
-    const double median = sorted[sorted.size() / 2];
-    for (std::size_t r = 0; r < offsets.size(); ++r)
-      if (std::abs(offsets[r] - median) > kOffsetShare * spread)
-        add(Verdict::warn, "offsets", dataset_.records[records[r]].recording.name(),
-            fmt::format("the zero is {:.3g} {} away from that of the other recordings",
-                        offsets[r] - median, unit_label(dataset_.target)),
-            "Remove the zero of each recording in the mapping: zero: [{channel: ..., first: "
-            "0.1s}]");
+    if (pairs.size() < 2) return;
+    const std::vector<RecordLine> lines = compare_records(pairs);
+    for (std::size_t k = 0; k < lines.size(); ++k) report_line(records[k], lines[k], spread);
   });
+}
+
+void Checker::report_line(std::size_t r, const RecordLine& line, double spread) {
+  if (line.unexplained > kLinesLeave * line.without_lines) return;
+  const Recording& recording = dataset_.records[r].recording;
+  if (std::abs(line.offset) > kOffsetShare * spread)
+    add(std::abs(line.offset) > spread ? Verdict::fail : Verdict::warn, "offsets", recording.name(),
+        fmt::format("the zero is {:.3g} {} away from that of the other recordings{}", line.offset,
+                    unit_label(dataset_.target),
+                    std::abs(line.offset) > spread ? ", more than the range of the torque" : ""),
+        "Remove the zero of each recording in the mapping: zero: [{channel: ..., first: 0.1s}]");
+  if (std::abs(line.slope - 1.0) > kGainChange && recording.conditions().empty())
+    add(Verdict::warn, "offsets", recording.name(),
+        fmt::format("{} rises {:.3g} times as steeply with {} as in the other recordings",
+                    dataset_.target, line.slope, spec_.inputs.front()),
+        "Recordings of one joint have one stiffness: check the gain of the torque sensor, or list "
+        "what differs under conditions: in a manifest.");
 }
 
 }  // namespace torsio

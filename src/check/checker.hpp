@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "check/delay.hpp"
 #include "check/signal_pair.hpp"
 #include "check/torque_relation.hpp"
 #include "torsio/check/check.hpp"
@@ -31,6 +32,7 @@ class Checker {
       pairs_.push_back({first_feature(record.recording, spec),
                         bridged(record.recording.channel(dataset.target))});
     spoiled_.resize(pairs_.size());
+    spikes_.resize(pairs_.size());
   }
 
   std::vector<Finding> run();
@@ -65,12 +67,30 @@ class Checker {
   void check_saturation();
   [[nodiscard]] static bool approaches_gradually(const Channel& channel, double extreme,
                                                  const Extent& span);
+  [[nodiscard]] bool is_turn(std::size_t r, const Channel& channel, double extreme) const;
   void check_frozen();
+  [[nodiscard]] static bool is_stop_of_motion(const Channel& channel, const Rest& rest);
   [[nodiscard]] std::vector<Channel> others_of(std::size_t r, const std::string& name) const;
   void leave_out(std::size_t r, const Rest& rest);
   [[nodiscard]] bool is_end_of_stall(std::size_t r, std::size_t sample) const;
   void check_resolution();
+  void check_columns();
+  [[nodiscard]] bool may_be_target(const Recording& recording, const Channel& channel) const;
+  void check_noise();
+  void check_noise_of(std::size_t r, const Channel& channel, double range);
+  void check_spikes();
+  [[nodiscard]] bool hardly_moves(std::size_t r) const;
+  void check_repeats();
+  [[nodiscard]] bool check_cut(std::size_t r);
+  void check_cadence(std::size_t r);
+  [[nodiscard]] double range_in_use(std::size_t r, const std::string& name) const;
+  [[nodiscard]] bool is_spike(std::size_t r, std::size_t sample) const;
   void check_units();
+  [[nodiscard]] static double inner_range(const std::vector<double>& values);
+  void check_twist(std::size_t r);
+  void check_load(std::size_t r);
+  void check_scale(std::size_t r);
+  void compare_slopes();
   void report_slope(std::size_t r, double slope, std::size_t usual, double usual_slope,
                     bool is_majority);
   [[nodiscard]] static std::size_t usual_slope(const std::vector<double>& slopes);
@@ -87,13 +107,17 @@ class Checker {
   [[nodiscard]] bool is_source(const std::string& name) const;
   [[nodiscard]] bool is_sign_flip(std::size_t r, const std::string& name, const Jump& jump) const;
   void check_delay();
+  [[nodiscard]] bool check_sides(std::size_t r);
+  void report_delay(std::size_t r, const Delay& delay);
   void check_sign();
   void report_flip(std::size_t r);
   [[nodiscard]] std::string flipped_source(const std::vector<double>& values) const;
   [[nodiscard]] int order_of_difference(std::size_t r) const;
+  void relate();
   void check_change();
   void check_excitation();
   void check_offsets();
+  void report_line(std::size_t r, const RecordLine& line, double spread);
   void check_leak();
   void check_training();
   void check_range();
@@ -115,15 +139,27 @@ class Checker {
   static constexpr double kOneMotion = 0.99;  ///< correlation
   static constexpr double kNarrow = 0.5;
   static constexpr double kSlopeRatio = 5.0;
-  static constexpr double kLongestDelay_s = 0.1;
-  static constexpr double kExplainsLittle =
-      0.2;  ///< share of the variance: if a fit leaves more, there is no delay to find
-  static constexpr double kDelayGain =
-      0.7;  ///< share of the variance that is unexplained without shift
   static constexpr std::size_t kFewReversals = 3;
   static constexpr double kSpeedHalfWindow_s = 0.05;
   static constexpr double kSpeedRatio = 2.0;
   static constexpr double kOffsetShare = 0.05;
+  static constexpr double kGainChange = 0.12;
+  static constexpr double kClearDelay_s = 0.03;
+  static constexpr double kLinesLeave = 0.5;    ///< share of what one common curve does not explain
+  static constexpr double kBeyondShare = 0.06;  ///< share of the range
+  static constexpr double kApproachShare = 0.2;  ///< share of the range
+  static constexpr double kStepShare = 0.005;    ///< share of the range
+  static constexpr double kNoiseShare = 0.025;   ///< share of the range
+  static constexpr double kMotionOverNoise = 10.0;
+  static constexpr double kBurstShare = 0.01;  ///< share of the range
+  static constexpr double kSpikeShare = 0.05;  ///< share of the range
+  static constexpr double kRepeat_s = 0.25;
+  static constexpr std::size_t kRepeatRows = 50;
+  static constexpr double kWidestTwist_rad = 1.5;
+  static constexpr double kHighestLoad_Nm = 3000.0;
+  static constexpr double kOuter = 0.01;          ///< share of the samples on either side
+  static constexpr double kOtherExplained = 0.3;  ///< share of what is unexplained of the target
+  static constexpr double kWellExplained = 0.02;  ///< share of the variance
 
   const Dataset& dataset_;
   const FeatureSpec& spec_;
@@ -132,8 +168,11 @@ class Checker {
   std::vector<std::string> sources_;   ///< channels of the first input's expression
   std::vector<Pair> pairs_;
   std::vector<std::uint8_t> spoiled_;  ///< by record: its relation is known to be wrong
-  std::vector<std::pair<std::size_t, Rest>> stalls_;  ///< record, samples
-  std::vector<std::optional<SignFlip>> flips_;        ///< by record
+  std::vector<std::pair<std::size_t, Rest>> stalls_;    ///< record, samples
+  std::vector<std::optional<SignFlip>> flips_;          ///< by record
+  std::vector<std::optional<RelationChange>> changes_;  ///< by record
+  std::vector<std::optional<TwoSides>> sides_;          ///< by record
+  std::vector<std::vector<std::size_t>> spikes_;        ///< by record: samples
   std::vector<Finding> findings_;
 };
 

@@ -1,21 +1,33 @@
 #include "check/signal_pair.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 
+#include "data/finest_step.hpp"
 #include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kHalfWindow_s = 0.005;
-constexpr double kSmallStep = 0.1;
-constexpr std::size_t kEnoughSamples = 20000;
 constexpr std::size_t kJumpNeighbourhood = 3;
 constexpr double kReversalShare = 0.05;
 constexpr double kRestShare = 0.05;
+
+/// Standard deviation of white noise, from the median of third differences.
+double white_noise(const std::vector<double>& values) {
+  constexpr double kMedianOverSigma = 0.6745;
+  std::vector<double> thirds;
+  for (std::size_t i = 3; i < values.size(); ++i)
+    if (const double third =
+            std::abs(values[i] - 3.0 * values[i - 1] + 3.0 * values[i - 2] - values[i - 3]);
+        is_finite(third))
+      thirds.push_back(third);
+  if (thirds.empty()) return 0.0;
+  const auto middle = thirds.begin() + static_cast<std::ptrdiff_t>(thirds.size() / 2);
+  std::ranges::nth_element(thirds, middle);
+  return *middle / (kMedianOverSigma * std::sqrt(20.0));
+}
 
 }  // namespace
 
@@ -90,13 +102,11 @@ std::vector<Rest> rests_of(const Channel& channel, std::size_t shortest) {
   return rests;
 }
 
-double finest_step(const std::vector<double>& values) {
-  double finest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    const double step = std::abs(values[i] - values[i - 1]);
-    if (step > 0.0) finest = std::min(finest, step);
-  }
-  return std::isfinite(finest) ? finest : 0.0;
+bool is_turning_point(const Rest& rest, const std::vector<double>& values, double step_at_most) {
+  if (rest.begin == 0 || rest.end >= values.size()) return false;
+  const double before = values[rest.begin] - values[rest.begin - 1];
+  const double after = values[rest.end] - values[rest.end - 1];
+  return before * after < 0.0 && std::abs(after) <= step_at_most;
 }
 
 double share_fresh(const Channel& channel) {
@@ -117,9 +127,12 @@ bool is_odd_one_out(const Rest& rest, const std::vector<Rest>& rests, const Chan
   constexpr double kLittle = 0.02;  // share of the other's range
   constexpr double kTogether = 0.9;
   constexpr double kFewCodes = 5.0;
-  const double moved = share_moved(other, rest);
+  constexpr double kNoiseRange = 6.0;  // over the standard deviation, in hundreds of samples
+  const double whole = extent_of(other.values).width();
+  const double moved = share_moved(other, rest) -
+                       (whole > 0.0 ? kNoiseRange * white_noise(other.values) / whole : 0.0);
   return moved >= kLittle &&
-         moved * extent_of(channel.values).width() >= kFewCodes * finest_step(channel.values) &&
+         moved * extent_of(channel.values).width() >= kFewCodes * finest_step(channel) &&
          std::abs(correlation(channel.values, other.values)) >= kTogether &&
          std::ranges::none_of(rests, [&](const Rest& each) {
            return !(each == rest) && 2 * each.length() >= rest.length() &&
@@ -175,44 +188,6 @@ std::vector<double> typical_speeds(const std::vector<double>& differences) {
   std::ranges::sort(speeds);
   if (speeds.empty()) return {};
   return {speeds[speeds.size() / 10], speeds[speeds.size() * 9 / 10]};
-}
-
-ShiftedFit::ShiftedFit(const Pair& pair, double sample_rate_Hz) : pair_(pair) {
-  const auto half_window =
-      static_cast<std::size_t>(std::max(1.0, std::round(kHalfWindow_s * sample_rate_Hz)));
-  direction_ = movement(pair.input, half_window);
-  double sum = 0.0;
-  double count = 0.0;
-  for (const double step : direction_)
-    if (is_finite(step)) sum += step * step, count += 1.0;
-  const double typical = count > 0.0 ? std::sqrt(sum / count) : 1.0;
-  for (double& step : direction_) step = std::tanh(step / (kSmallStep * typical));
-  stride_ =
-      static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, pair.input.size() / kEnoughSamples));
-}
-
-double ShiftedFit::unexplained(std::ptrdiff_t lag) const {
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-  double sum = 0.0;
-  double square_sum = 0.0;
-  const auto size = static_cast<std::ptrdiff_t>(pair_.input.size());
-  for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, lag); i < std::min(size, size + lag);
-       i += stride_) {
-    const auto now = static_cast<std::size_t>(i);
-    const auto then = static_cast<std::size_t>(i - lag);
-    const Eigen::Vector3d row(1.0, pair_.input[then], direction_[then]);
-    const double y = pair_.target[now];
-    if (!is_finite(y) || !row.allFinite()) continue;
-    normal += row * row.transpose();
-    moment += row * y;
-    sum += y;
-    square_sum += y * y;
-  }
-  const double variance = square_sum - sum * sum / std::max(1.0, normal(0, 0));
-  if (!(variance > 0.0)) return 1.0;
-  const Eigen::Vector3d solution = normal.completeOrthogonalDecomposition().solve(moment);
-  return std::max(0.0, square_sum - solution.dot(moment)) / variance;
 }
 
 }  // namespace torsio

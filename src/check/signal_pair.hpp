@@ -56,12 +56,14 @@ struct Rest {
 /// Constant parts of at least `shortest` samples, the longest first.
 [[nodiscard]] std::vector<Rest> rests_of(const Channel& channel, std::size_t shortest);
 
-/// The smallest step of a channel: the resolution of a quantised sensor, nearly zero for
-/// any other; 0 if it never moves.
-[[nodiscard]] double finest_step(const std::vector<double>& values);
-
 /// The share of new samples.
 [[nodiscard]] double share_fresh(const Channel& channel);
+
+/// The channel turns there: it leaves in the direction from which it came, by small steps. Friction
+/// holds a joint while the torque reverses. A sensor that froze continues with a jump.
+/// @param step_at_most the largest step with which it may leave
+[[nodiscard]] bool is_turning_point(const Rest& rest, const std::vector<double>& values,
+                                    double step_at_most);
 
 /// The share of its range that a channel passes through meanwhile.
 [[nodiscard]] double share_moved(const Channel& channel, const Rest& meanwhile);
@@ -91,20 +93,5 @@ struct Line {
 /// delay; NaN at both ends.
 [[nodiscard]] std::vector<double> movement(const std::vector<double>& values,
                                            std::size_t half_window);
-
-/// The fit target(t) = a + k input(t - lag) + c sign(rate of input(t - lag)) and the share of the
-/// target that it does not explain.
-class ShiftedFit {
- public:
-  ShiftedFit(const Pair& pair, double sample_rate_Hz);
-
-  /// Share of the target's variance; 1 if there are no data.
-  [[nodiscard]] double unexplained(std::ptrdiff_t lag) const;
-
- private:
-  const Pair& pair_;
-  std::vector<double> direction_;  ///< direction of the input's motion, -1 to 1
-  std::ptrdiff_t stride_ = 1;
-};
 
 }  // namespace torsio

@@ -1,31 +1,31 @@
 #include "check/torque_relation.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <map>
+#include <numeric>
 #include <utility>
-#include <vector>
+
+#include "check/hysteresis_fit.hpp"
+#include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
 
 constexpr double kStrongCorrelation = 0.8;
 constexpr double kShortestPart = 0.05;  ///< share of the recording
-constexpr double kHalfWindow_s = 0.05;
-constexpr double kInputBins = 48.0;
-constexpr double kSlowest = 0.05;  ///< share of the upper decile of the speeds
-constexpr double kSpeedStep = 4.0;
-constexpr std::size_t kFewPassages = 40;
-constexpr std::size_t kFewSharedCells = 6;
-constexpr int kCandidates = 80;
-constexpr std::size_t kFewReversals = 3;
-constexpr double kOffsetExplains = 0.65;  ///< share of the scatter
-constexpr double kSlopeExplains = 0.45;
-constexpr double kOverScatter = 3.0;
-constexpr double kOffsetShare = 0.15;  ///< share of the torque's range
-constexpr double kSlopeFactor = 2.0;
+constexpr double kFlipShare = 0.05;     ///< share of the ranges that each part passes through
+constexpr double kFlipCodes = 5.0;
+constexpr std::size_t kCandidates = 80;
+constexpr std::size_t kFewReversals = 2;
+constexpr std::size_t kFewSamples = 200;
+constexpr double kChangeLeaves = 0.25;  ///< share of what is unexplained without the change
+constexpr double kOffsetShare = 0.05;   ///< share of the torque's range
+constexpr double kSlopeChange = 0.12;
+constexpr double kSmallRest = 0.01;  ///< share of the torque's variance
+constexpr std::size_t kManyReversals = 5;
+constexpr double kPartShare = 0.2;  ///< share of the input's range that each part passes through
 
 /// Running sums of one part of a record.
 struct Sums {
@@ -41,181 +41,95 @@ struct Sums {
   }
 };
 
-/// A passage through one cell of input and speed.
-struct Passage {
-  int cell = 0;
-  double weight = 0.0;  ///< samples
-  double input = 0.0;
-  double torque = 0.0;
-  double time = 0.0;  ///< in samples
-};
-
-/// The upper decile: a single snap has no effect.
-double fast(const std::vector<double>& speeds) {
-  std::vector<double> sorted;
-  for (const double speed : speeds)
-    if (is_finite(speed)) sorted.push_back(std::abs(speed));
-  if (sorted.empty()) return 0.0;
-  const auto decile = sorted.begin() + static_cast<std::ptrdiff_t>(9 * sorted.size() / 10);
-  std::ranges::nth_element(sorted, decile);
-  return *decile;
+bool is_known(const Pair& pair, std::size_t i) {
+  return is_finite(pair.input[i]) && is_finite(pair.target[i]);
 }
 
-/// Cell of a sample, -1 at rest: creep and relaxation are not passages.
-std::vector<int> cells_of(const Pair& pair, double sample_rate_Hz) {
-  const auto window =
-      static_cast<std::size_t>(std::max(1.0, std::round(kHalfWindow_s * sample_rate_Hz)));
-  const std::vector<double> speed = movement(pair.input, window);
-  const Extent extent = extent_of(pair.input);
-  const double slowest = kSlowest * fast(speed);
-  std::vector<int> cells(pair.input.size(), -1);
-  if (!(slowest > 0.0) || !(extent.width() > 0.0)) return cells;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (!is_finite(speed[i]) || !is_finite(pair.input[i]) || !is_finite(pair.target[i]) ||
-        std::abs(speed[i]) < slowest)
-      continue;
-    const int place = static_cast<int>(
-        std::min(kInputBins - 1.0, kInputBins * (pair.input[i] - extent.lowest) / extent.width()));
-    const int gear =
-        static_cast<int>(std::log(std::abs(speed[i]) / slowest) / std::log(kSpeedStep));
-    cells[i] = (2 * gear + (speed[i] > 0.0 ? 1 : 0)) * static_cast<int>(kInputBins) + place;
-  }
-  return cells;
+/// Extents of input and target in [begin, end).
+std::pair<double, double> passed(const Pair& pair, std::size_t begin, std::size_t end) {
+  Extent input;
+  Extent target;
+  for (std::size_t i = begin; i < end; ++i)
+    if (is_known(pair, i)) input.include(pair.input[i]), target.include(pair.target[i]);
+  return {input.width(), target.width()};
 }
 
-std::vector<Passage> passages_of(const Pair& pair, double sample_rate_Hz) {
-  const std::vector<int> cells = cells_of(pair, sample_rate_Hz);
-  std::vector<Passage> passages;
-  std::map<int, std::size_t> last;  // noise at a border does not start a new passage
-  const double apart = std::max(1.0, sample_rate_Hz * kHalfWindow_s);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (cells[i] < 0) continue;
-    const auto now = static_cast<double>(i);
-    const auto [at, is_new] = last.try_emplace(cells[i], passages.size());
-    if (is_new || now - passages[at->second].time > apart) {
-      at->second = passages.size();
-      passages.push_back({.cell = cells[i]});
-    }
-    Passage& passage = passages[at->second];
-    passage.weight += 1.0;
-    passage.input += (pair.input[i] - passage.input) / passage.weight;
-    passage.torque += (pair.target[i] - passage.torque) / passage.weight;
-    passage.time = now;  // the end of the passage
-  }
-  return passages;
+/// Whether input and target pass through a good part of their ranges in [begin, end), and the input
+/// reverses there.
+bool is_excited(const Pair& pair, std::size_t begin, std::size_t end, double input_width,
+                double target_width) {
+  const auto [input, target] = passed(pair, begin, end);
+  const std::vector<double> part(pair.input.begin() + static_cast<std::ptrdiff_t>(begin),
+                                 pair.input.begin() + static_cast<std::ptrdiff_t>(end));
+  return input > kPartShare * input_width && target > kPartShare * target_width &&
+         count_reversals(part) > 0;
 }
 
-/// The part of the passages' torque that a change over time explains.
+/// What one course over time (0 early, 1 late) of offset and slope explains of a rest.
 struct Explained {
-  double explained = 0.0;  ///< share of the scatter at equal input and speed
-  double offset = 0.0;     ///< in the middle of the input's range
-  double slope = 0.0;
-  double scatter = 0.0;  ///< the remainder, root mean square
+  double share = 1.0;  ///< share of the variance of the rest that remains
+  double offset = 0.0;
+  double slope = 0.0;  ///< per unit of the scaled input
+  double mean = 0.0;   ///< mean value of the course
 };
 
-/// Passages through cells, compared with the others of their cell.
-class Comparison {
+class Course {
  public:
-  Comparison(std::vector<Passage> passages, const Pair& pair)
-      : passages_(std::move(passages)), slope_(line_through(pair).slope) {
-    std::map<int, std::size_t> number;
-    for (const Passage& each : passages_)
-      cells_.push_back(number.try_emplace(each.cell, number.size()).first->second);
-    cell_count_ = number.size();
-    const Extent extent = extent_of(pair.input);
-    middle_ = 0.5 * (extent.lowest + extent.highest);
-    std::vector<double> torque;
-    for (const Passage& each : passages_) torque.push_back(each.torque - slope_ * each.input);
-    torque_ = centred(torque);
-  }
+  Course(const Eigen::MatrixXd& columns, const Eigen::VectorXd& target)
+      : columns_(columns),
+        z_(columns.col(1)),
+        rest_(columns_.residual(target)),
+        unexplained_(share_of_variance(rest_, target)) {}
 
-  [[nodiscard]] const std::vector<Passage>& passages() const { return passages_; }
-  [[nodiscard]] double slope() const { return slope_; }
+  /// Share of the variance of the target that a fit without a change leaves.
+  [[nodiscard]] double unexplained() const { return unexplained_; }
 
-  /// `course`: 0 early, 1 late, one for each passage.
-  [[nodiscard]] Explained explained_by(const std::vector<double>& course) const {
-    std::vector<double> tilted;
-    for (std::size_t i = 0; i < course.size(); ++i)
-      tilted.push_back(course[i] * (passages_[i].input - middle_));
-    const std::vector<double> a = centred(course);
-    const std::vector<double> b = centred(tilted);
-    const double aa = product(a, a);
-    const double ab = product(a, b);
-    const double bb = product(b, b);
-    const double ay = product(a, torque_);
-    const double by = product(b, torque_);
-    const double yy = product(torque_, torque_);
-    const double determinant = aa * bb - ab * ab;
-    if (!(determinant > 1e-9 * aa * bb) || !(yy > 0.0)) return {};
-    Explained relation{.offset = (bb * ay - ab * by) / determinant,
-                       .slope = (aa * by - ab * ay) / determinant};
-    const double explained = relation.offset * ay + relation.slope * by;
-    relation.explained = explained / yy;
-    double weight = 0.0;
-    for (const Passage& each : passages_) weight += each.weight;
-    relation.scatter = std::sqrt(std::max(0.0, yy - explained) / weight);
-    return relation;
-  }
-
-  /// Cells that were passed both before and after a time.
-  [[nodiscard]] std::size_t shared_cells(double time) const {
-    std::vector<std::uint8_t> seen(cell_count_, 0);
-    for (std::size_t i = 0; i < passages_.size(); ++i)
-      seen[cells_[i]] =
-          static_cast<std::uint8_t>(seen[cells_[i]] | (passages_[i].time < time ? 1U : 2U));
-    return static_cast<std::size_t>(std::ranges::count(seen, 3));
+  [[nodiscard]] Explained explained_by(const Eigen::VectorXd& course) const {
+    Eigen::MatrixXd extra(rest_.size(), 2);
+    extra << columns_.residual(course), columns_.residual(course.cwiseProduct(z_));
+    const Eigen::Matrix2d normal = extra.transpose() * extra;
+    const Eigen::Vector2d moment = extra.transpose() * rest_;
+    const double determinant = normal.determinant();
+    if (!(determinant > 1e-9 * normal(0, 0) * normal(1, 1))) return {};
+    const Eigen::Vector2d solution = normal.inverse() * moment;
+    const double all = rest_.squaredNorm();
+    if (!(all > 0.0)) return {};
+    return {std::max(0.0, 1.0 - solution.dot(moment) / all), solution(0), solution(1),
+            course.mean()};
   }
 
  private:
-  [[nodiscard]] std::vector<double> centred(std::vector<double> values) const {
-    std::vector<double> sum(cell_count_, 0.0);
-    std::vector<double> weight(cell_count_, 0.0);
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      sum[cells_[i]] += passages_[i].weight * values[i];
-      weight[cells_[i]] += passages_[i].weight;
-    }
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] -= sum[cells_[i]] / weight[cells_[i]];
-    return values;
-  }
-
-  [[nodiscard]] double product(const std::vector<double>& x, const std::vector<double>& y) const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < x.size(); ++i) sum += passages_[i].weight * x[i] * y[i];
-    return sum;
-  }
-
-  std::vector<Passage> passages_;
-  std::vector<std::size_t> cells_;
-  std::size_t cell_count_ = 0;
-  double slope_ = 0.0;
-  double middle_ = 0.0;
-  std::vector<double> torque_;
+  FixedColumns columns_;
+  Eigen::VectorXd z_;
+  Eigen::VectorXd rest_;
+  double unexplained_ = 1.0;
 };
 
-// Before its first reversal a hysteretic spring is on its virgin curve: another torque, but no
-// change.
-bool turns_on_both_sides(const std::vector<double>& input, double sample) {
-  constexpr std::size_t kThereAndBack = 2;
-  const auto middle = input.begin() + static_cast<std::ptrdiff_t>(sample);
-  return count_reversals({input.begin(), middle}) >= kThereAndBack &&
-         count_reversals({middle, input.end()}) >= kThereAndBack;
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// Slope of the target over z, by least squares.
+double slope_over(const Eigen::VectorXd& z, const Eigen::VectorXd& target) {
+  const Eigen::VectorXd varying = z.array() - z.mean();
+  const double variance = varying.squaredNorm();
+  return variance > 0.0 ? varying.dot(target) / variance : 0.0;
 }
 
 }  // namespace
 
-std::optional<SignFlip> find_sign_flip(const Pair& pair) {
+std::optional<SignFlip> find_sign_flip(const Pair& pair, double input_code, double target_code) {
   Sums whole;
-  const auto is_known = [&](std::size_t i) {
-    return is_finite(pair.input[i]) && is_finite(pair.target[i]);
-  };
   for (std::size_t i = 0; i < pair.input.size(); ++i)
-    if (is_known(i)) whole.add(pair.input[i], pair.target[i]);
+    if (is_known(pair, i)) whole.add(pair.input[i], pair.target[i]);
   Sums before;
   Sums best;
   SignFlip flip;
   double strongest = 0.0;
   for (std::size_t i = 0; i < pair.input.size(); ++i) {
-    if (!is_known(i)) continue;
+    if (!is_known(pair, i)) continue;
     const double contrast = std::abs(before.covariance() - whole.without(before).covariance());
     if (before.n > kShortestPart * whole.n && before.n < (1.0 - kShortestPart) * whole.n &&
         contrast > strongest)
@@ -226,47 +140,118 @@ std::optional<SignFlip> find_sign_flip(const Pair& pair) {
   flip.after = whole.without(best).correlation();
   const bool turns = std::min(flip.before, flip.after) < -kStrongCorrelation &&
                      std::max(flip.before, flip.after) > kStrongCorrelation;
-  return turns ? std::optional(flip) : std::nullopt;
+  if (!turns) return {};
+  const double input_least =
+      std::max(kFlipShare * extent_of(pair.input).width(), kFlipCodes * input_code);
+  const double target_least =
+      std::max(kFlipShare * extent_of(pair.target).width(), kFlipCodes * target_code);
+  for (const auto& [begin, end] :
+       {std::pair<std::size_t, std::size_t>{0, flip.sample}, {flip.sample, pair.input.size()}}) {
+    const auto [input, target] = passed(pair, begin, end);
+    if (!(input >= input_least) || !(target >= target_least)) return {};
+  }
+  return flip;
 }
 
-std::optional<RelationChange> find_relation_change(const Pair& pair, double sample_rate_Hz) {
-  if (correlation(pair.input, pair.target) < kClearCorrelation ||
-      count_reversals(pair.input) < kFewReversals)
+std::optional<RelationChange> find_relation_change(const Pair& pair) {
+  const std::size_t reversals = count_reversals(pair.input);
+  if (correlation(pair.input, pair.target) < kClearCorrelation || reversals < kFewReversals)
     return {};
-  std::vector<Passage> passages = passages_of(pair, sample_rate_Hz);
-  if (passages.size() < kFewPassages) return {};
-  const Comparison comparison(std::move(passages), pair);
-  const auto& all = comparison.passages();
-  const auto samples = static_cast<double>(pair.input.size());
-  Explained best;
-  RelationChange change;
-  std::vector<double> course(all.size());
-  for (int k = 1; k < kCandidates; ++k) {
-    const double time = samples * k / kCandidates;
-    if (comparison.shared_cells(time) < kFewSharedCells || !turns_on_both_sides(pair.input, time))
+  std::vector<double> known = pair.input;
+  for (std::size_t i = 0; i < known.size(); ++i)
+    if (!is_finite(pair.target[i])) known[i] = kNotMeasured;
+  const std::vector<std::size_t> samples = samples_for_fit(known, 0, known.size());
+  if (samples.size() < kFewSamples) return {};
+  const Eigen::MatrixXd columns = hysteresis_columns(pair.input, samples);
+  const Eigen::VectorXd target = at_samples(pair.target, samples);
+  const Course course(columns, target);
+  Pair coarse;
+  for (const std::size_t i : samples)
+    coarse.input.push_back(pair.input[i]), coarse.target.push_back(pair.target[i]);
+  const std::size_t size = coarse.input.size();
+  const auto [input_width, target_width] = passed(coarse, 0, size);
+  Eigen::VectorXd late(target.size());
+  for (Eigen::Index i = 0; i < late.size(); ++i)
+    late(i) = static_cast<double>(i) / static_cast<double>(late.size());
+  Explained best = course.explained_by(late);
+  RelationChange change{.is_gradual = true};
+  for (std::size_t k = 1; k < kCandidates; ++k) {
+    const std::size_t split = size * k / kCandidates;
+    if (!is_excited(coarse, 0, split, input_width, target_width) ||
+        !is_excited(coarse, split, size, input_width, target_width))
       continue;
-    std::ranges::transform(all, course.begin(),
-                           [&](const Passage& each) { return each.time < time ? 0.0 : 1.0; });
-    if (const Explained relation = comparison.explained_by(course);
-        relation.explained > best.explained)
-      best = relation, change.sample = static_cast<std::size_t>(time);
+    for (Eigen::Index i = 0; i < late.size(); ++i)
+      late(i) = i < static_cast<Eigen::Index>(split) ? 0.0 : 1.0;
+    const Explained explained = course.explained_by(late);
+    if (explained.share < best.share)
+      best = explained, change = {.is_gradual = false, .sample = samples[split]};
   }
-  std::ranges::transform(all, course.begin(),
-                         [&](const Passage& each) { return each.time / samples; });
-  if (const Explained relation = comparison.explained_by(course);
-      relation.explained >= best.explained)
-    best = relation, change.is_gradual = true;
+  // A motion that hardly repeats has another torque on each stroke: then the rest must vanish.
+  const double rest = best.share * course.unexplained();
+  if (best.share > kChangeLeaves || (rest > kSmallRest && reversals < kManyReversals)) return {};
   change.offset = best.offset;
-  const double early = comparison.slope() - 0.5 * best.slope;
-  const double late = comparison.slope() + 0.5 * best.slope;
-  change.slope_ratio = early > 0.0 && late > 0.0 ? late / early : 1.0;
-  change.is_of_slope = best.explained >= kSlopeExplains &&
-                       std::max(change.slope_ratio, 1.0 / change.slope_ratio) >= kSlopeFactor;
-  const double least =
-      std::max(kOffsetShare * extent_of(pair.target).width(), kOverScatter * best.scatter);
-  const bool is_of_offset = best.explained >= kOffsetExplains && std::abs(change.offset) >= least;
-  if (is_of_offset) change.is_of_slope = false;
-  return is_of_offset || change.is_of_slope ? std::optional(change) : std::nullopt;
+  // The slope without a change is the mean of early and late, each as long as it lasts.
+  const double early = slope_over(columns.col(1), target) - best.mean * best.slope;
+  const double late_slope = early + best.slope;
+  change.slope_ratio = early > 0.0 && late_slope > 0.0 ? late_slope / early : 1.0;
+  const double by_slope = std::abs(change.slope_ratio - 1.0) / kSlopeChange;
+  const double by_offset =
+      std::abs(change.offset) / (kOffsetShare * extent_of(pair.target).width());
+  change.is_of_slope = by_slope > by_offset;
+  return std::max(by_slope, by_offset) >= 1.0 ? std::optional(change) : std::nullopt;
+}
+
+std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
+  Extent extent;
+  for (const Pair* pair : pairs)
+    for (std::size_t i = 0; i < pair->input.size(); ++i)
+      if (is_known(*pair, i)) extent.include(pair->input[i]);
+  std::vector<Eigen::MatrixXd> parts;
+  std::vector<Eigen::VectorXd> targets;
+  Eigen::Index rows = 0;
+  for (const Pair* pair : pairs) {
+    std::vector<double> known = pair->input;
+    for (std::size_t i = 0; i < known.size(); ++i)
+      if (!is_finite(pair->target[i])) known[i] = kNotMeasured;
+    const auto samples = samples_for_fit(known, 0, known.size(), 10000 / pairs.size());
+    if (samples.size() < kFewSamples) return {};
+    parts.push_back(hysteresis_columns(pair->input, samples, extent));
+    targets.push_back(at_samples(pair->target, samples));
+    rows += parts.back().rows();
+  }
+  const Eigen::Index common = parts.front().cols();
+  const auto records = static_cast<Eigen::Index>(pairs.size());
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows, common + 2 * (records - 1));
+  Eigen::VectorXd target(rows);
+  Eigen::Index row = 0;
+  for (Eigen::Index r = 0; r < records; ++r) {
+    const Eigen::MatrixXd& part = parts[static_cast<std::size_t>(r)];
+    columns.block(row, 0, part.rows(), common) = part;
+    if (r > 0) columns.block(row, common + 2 * (r - 1), part.rows(), 2) = part.leftCols(2);
+    target.segment(row, part.rows()) = targets[static_cast<std::size_t>(r)];
+    row += part.rows();
+  }
+  const Eigen::VectorXd solution =
+      (columns.transpose() * columns).ldlt().solve(columns.transpose() * target);
+  const double with_lines = share_of_variance(target - columns * solution, target);
+  const double without_lines = FixedColumns(columns.leftCols(common)).unexplained(target);
+  std::vector<double> offsets{0.0};
+  std::vector<double> slopes{0.0};
+  for (Eigen::Index r = 0; r + 1 < records; ++r) {
+    offsets.push_back(solution(common + 2 * r));
+    slopes.push_back(solution(common + 2 * r + 1));
+  }
+  const double usual_offset = median_of(offsets);
+  const double usual_slope = median_of(slopes);
+  const double slope = slope_over(columns.col(1), target);
+  std::vector<RecordLine> lines;
+  for (std::size_t r = 0; r < pairs.size(); ++r)
+    lines.push_back(
+        {.offset = offsets[r] - usual_offset + (slopes[r] - usual_slope) * parts[r].col(1).mean(),
+         .slope = slope != 0.0 ? 1.0 + (slopes[r] - usual_slope) / slope : 1.0,
+         .unexplained = with_lines,
+         .without_lines = without_lines});
+  return lines;
 }
 
 std::string_view unit_mistake(double ratio) {

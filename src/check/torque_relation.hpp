@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "check/signal_pair.hpp"
 
@@ -18,9 +19,13 @@ struct SignFlip {
   double before = 0.0;     ///< correlation
   double after = 0.0;
 };
-[[nodiscard]] std::optional<SignFlip> find_sign_flip(const Pair& pair);
+/// In each of the two parts input and torque pass through at least 5 % of their range and 5 of
+/// their codes: within less, noise and hysteresis determine the correlation.
+/// @param input_code, target_code resolution of the sensors
+[[nodiscard]] std::optional<SignFlip> find_sign_flip(const Pair& pair, double input_code,
+                                                     double target_code);
 
-/// Change of the torque at equal input and speed between early and late parts of one recording.
+/// Change of the torque at equal input between early and late parts of one recording.
 struct RelationChange {
   bool is_gradual = false;   ///< over the whole recording, else at `sample`
   std::size_t sample = 0;    ///< the first of the second part, about
@@ -29,13 +34,22 @@ struct RelationChange {
   bool is_of_slope = false;  ///< true: the slope changed; false: the offset
 };
 
-/// Each passage through a cell of input and speed has a torque. If the torques of equal cells are
-/// scattered, and one step or one linear trend in time explains most of that scatter, the joint or
-/// a sensor changed. Hysteresis and creep cause scatter too, but in both directions. Only changes
-/// above 15 % of the torque's range, or of the slope by a factor of 2, are reported; empty if there
-/// are too few passages or the torque does not follow the input.
-[[nodiscard]] std::optional<RelationChange> find_relation_change(const Pair& pair,
-                                                                 double sample_rate_Hz);
+/// The torque is fitted by a static curve with hysteresis over the input (`hysteresis_columns`). If
+/// one step or one linear trend in time, of offset and slope, explains three quarters of what
+/// remains, the joint or a sensor changed. Only offsets above 5 % of the torque's range and slopes
+/// that change by more than 12 % are reported; empty if the torque does not follow the input, or
+/// the motion does not reverse on both sides of the step.
+[[nodiscard]] std::optional<RelationChange> find_relation_change(const Pair& pair);
+
+/// Offset and slope of the torque of each recording at common inputs: all recordings are fitted by
+/// one static curve with hysteresis, and by an offset and a slope for each.
+struct RecordLine {
+  double offset = 0.0;         ///< over its inputs, minus that of the usual (median) recording
+  double slope = 1.0;          ///< over that of the usual recording
+  double unexplained = 1.0;    ///< share of the variance of all targets
+  double without_lines = 1.0;  ///< the same for the common curve alone
+};
+[[nodiscard]] std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs);
 
 /// The unit mistake that makes a number `ratio` (or 1 / `ratio`) times too large, within 10 %;
 /// empty if none does.

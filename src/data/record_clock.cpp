@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "data/csv_table.hpp"
+#include "data/finest_step.hpp"
 #include "data/inspect_clock.hpp"
 #include "data/interpolate.hpp"
 #include "torsio/core/error.hpp"
@@ -238,7 +239,7 @@ std::vector<double> spread_within_stamps(std::span<const double> stamps) {
 
 Channel on_even_clock(const Channel& channel, std::span<const double> stamps_s,
                       double sample_rate_Hz, std::size_t samples) {
-  Channel even{.name = channel.name, .values = {}};
+  Channel even{.name = channel.name, .values = {}, .step_before_resampling = finest_step(channel)};
   if (channel.fresh.empty()) {
     even.values = interpolate(stamps_s, channel.values, sample_rate_Hz, samples);
     return even;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "data/csv_table.hpp"
+#include "data/finest_step.hpp"
 #include "data/interpolate.hpp"
 #include "data/whole_samples.hpp"
 #include "torsio/data/csv.hpp"
@@ -97,7 +98,10 @@ Recording resample(const Recording& recording, double sample_rate_Hz) {
     std::vector<std::uint8_t> fresh;
     auto values = channel.fresh.empty() ? smooth(channel, step, samples)
                                         : held(channel, step, samples, fresh);
-    result.add({.name = channel.name, .values = std::move(values), .fresh = std::move(fresh)});
+    result.add({.name = channel.name,
+                .values = std::move(values),
+                .fresh = std::move(fresh),
+                .step_before_resampling = finest_step(channel)});
   }
   for (const std::string& name : recording.conditions())
     result.add_condition(name, recording.channel(name).values.front());

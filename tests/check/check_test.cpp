@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 
+#include "check/check_support.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -18,45 +19,11 @@ namespace {
 using test::add_record;
 using test::bench_recording;
 using test::BenchOptions;
-
-std::vector<Finding> findings_of(const Dataset& dataset) {
-  return check_dataset(dataset, resolve_inputs(dataset, {}));
-}
-
-/// The worst verdict of one check.
-Verdict verdict_of(const std::vector<Finding>& findings, const std::string& check) {
-  Verdict worst = Verdict::pass;
-  bool is_found = false;
-  for (const Finding& finding : findings) {
-    if (finding.check != check) continue;
-    worst = std::max(worst, finding.verdict);
-    is_found = true;
-  }
-  EXPECT_TRUE(is_found) << check;
-  return worst;
-}
-
-const Finding& first_of(const std::vector<Finding>& findings, const std::string& check) {
-  return *std::ranges::find_if(findings,
-                               [&](const Finding& finding) { return finding.check == check; });
-}
-
-/// The good bench with one record changed.
-Dataset with_record(Recording recording) {
-  Dataset dataset = test::bench_dataset();
-  add_record(dataset, std::move(recording), Role::train);
-  return dataset;
-}
-
-Recording changed(const std::string& channel, const std::function<void(Channel&)>& change) {
-  const Recording good = bench_recording("changed");
-  Recording recording("changed", 1000.0);
-  for (Channel copy : good.channels()) {
-    if (copy.name == channel) change(copy);
-    recording.add(std::move(copy));
-  }
-  return recording;
-}
+using test::changed;
+using test::findings_of;
+using test::first_of;
+using test::verdict_of;
+using test::with_record;
 
 TEST(Check, PassesAGoodBench) {
   for (const Finding& finding : findings_of(test::bench_dataset()))

@@ -22,6 +22,9 @@ struct Channel {
   /// 1 where the sensor measured again, 0 where the last value is held (a load cell at 125 Hz
   /// in a log of 1 kHz). Empty: every sample is new.
   std::vector<std::uint8_t> fresh = {};
+  /// The smallest step between two samples before they were resampled, which hides the codes of a
+  /// sensor; 0: not resampled.
+  double step_before_resampling = 0.0;
 
   [[nodiscard]] bool is_fresh(std::size_t sample) const {
     return fresh.empty() || fresh[sample] != 0;

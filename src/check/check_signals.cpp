@@ -1,0 +1,254 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "check/checker.hpp"
+#include "check/hysteresis_fit.hpp"
+#include "check/signal_faults.hpp"
+#include "data/finest_step.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+
+/// The range of a channel; of an angle of the first input that of this input, if it is smaller.
+double Checker::range_in_use(std::size_t r, const std::string& name) const {
+  const double range = extent_of(dataset_.records[r].recording.channel(name).values).width();
+  const double input = extent_of(pairs_[r].input).width();
+  return is_source(name) && input > 0.0 ? std::min(range, input) : range;
+}
+
+bool Checker::is_spike(std::size_t r, std::size_t sample) const {
+  return std::ranges::any_of(
+      spikes_[r], [&](std::size_t spike) { return sample == spike || sample == spike + 1; });
+}
+
+// Two columns that were interchanged: a torque sensor after the spring follows the deflection
+// closely, apart from hysteresis; a current contains the friction of the gear as well.
+void Checker::check_columns() {
+  pass_unless_found("columns", "no other channel follows the first input better", [&] {
+    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+      if (spoiled_[r] != 0 || changes_[r]) continue;
+      const Recording& recording = dataset_.records[r].recording;
+      const Pair& pair = pairs_[r];
+      std::vector<double> known = pair.input;
+      for (std::size_t i = 0; i < known.size(); ++i)
+        if (!is_finite(pair.target[i])) known[i] = pair.target[i];
+      const std::vector<std::size_t> samples = samples_for_fit(known, 0, known.size());
+      if (samples.size() < kFewSamples) continue;
+      const FixedColumns columns(hysteresis_columns(pair.input, samples));
+      const double own = columns.unexplained(at_samples(pair.target, samples));
+      for (const Channel& channel : recording.channels()) {
+        if (!may_be_target(recording, channel)) continue;
+        const std::vector<double> values = bridged(channel);
+        if (std::abs(correlation(pair.input, values)) < kClearCorrelation) continue;
+        const Eigen::VectorXd other = at_samples(values, samples);
+        if (!other.allFinite()) continue;
+        const double left = columns.unexplained(other);
+        if (left > kWellExplained || left > kOtherExplained * own) continue;
+        add(Verdict::warn, "columns", recording.name(),
+            fmt::format("{} follows {} more closely than {} does ({:.2g} and {:.2g} % unexplained)",
+                        channel.name, spec_.inputs.front(), dataset_.target, 100.0 * left,
+                        100.0 * own),
+            "Check whether two columns were interchanged.");
+      }
+    }
+  });
+}
+
+/// Torques, forces and currents that are neither the target nor an input.
+bool Checker::may_be_target(const Recording& recording, const Channel& channel) const {
+  const auto parts = split_channel_name(channel.name);
+  const std::string_view unit = parts ? parts->unit->si_suffix : std::string_view();
+  return (unit == "Nm" || unit == "N" || unit == "A") &&
+         std::ranges::find(channels_, channel.name) == channels_.end() &&
+         !channel.name.starts_with(kTruthPrefix) && !is_condition(recording, channel.name) &&
+         std::ranges::find(dataset_.target_computed_from, channel.name) ==
+             dataset_.target_computed_from.end();
+}
+
+void Checker::check_noise() {
+  pass_unless_found("noise", "small, and the same throughout", [&] {
+    for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
+      if (is_condition(recording, channel.name)) return;
+      const double range = range_in_use(r, channel.name);
+      if (range > 0.0) check_noise_of(r, channel, range);
+    });
+  });
+}
+
+void Checker::check_noise_of(std::size_t r, const Channel& channel, double range) {
+  const Recording& recording = dataset_.records[r].recording;
+  const NoiseCourse course = noise_course(channel, recording.sample_rate_Hz());
+  if (course.sigma.empty()) return;
+  const double least = std::max(kBurstShare * range, finest_step(channel));
+  const auto burst = find_burst(channel, course, recording.sample_rate_Hz(), least);
+  if (burst) {
+    add(Verdict::warn, "noise", recording.name(),
+        fmt::format("{} has noise of {:.3g} {} from t = {:.4g} s to {:.4g} s, {:.3g} elsewhere",
+                    channel.name, burst->sigma, unit_label(channel.name),
+                    recording.time_s(burst->begin), recording.time_s(burst->end), burst->usual),
+        "Check cables and supply. Cut that part out.");
+    return;
+  }
+  // Where nothing moves, noise is all there is.
+  const double usual = usual_noise(course);
+  if (channel.name != dataset_.target || !is_clear(r) ||
+      usual < std::max(kNoiseShare * range, finest_step(channel)))
+    return;
+  add(Verdict::warn, "noise", recording.name(),
+      fmt::format("{} has noise of {:.3g} {}, {:.2g} % of its range", channel.name, usual,
+                  unit_label(channel.name), 100.0 * usual / range),
+      "Check cables and shielding. The error of a model cannot be measured below the noise.");
+}
+
+/// Whether the standard deviation of the first input is less than ten times its noise.
+bool Checker::hardly_moves(std::size_t r) const {
+  const Channel input{.name = spec_.inputs.front(), .values = pairs_[r].input};
+  const NoiseCourse course = noise_course(input, dataset_.sample_rate_Hz());
+  if (course.sigma.empty()) return false;
+  double mean = 0.0;
+  double square = 0.0;
+  double count = 0.0;
+  for (const double value : input.values) {
+    if (!is_finite(value)) continue;
+    count += 1.0;
+    const double step = value - mean;
+    mean += step / count;
+    square += step * (value - mean);
+  }
+  return square < count * std::pow(kMotionOverNoise * usual_noise(course), 2);
+}
+
+void Checker::check_spikes() {
+  pass_unless_found("spikes", "no single sample is far from its neighbours", [&] {
+    for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
+      if (is_condition(recording, channel.name)) return;
+      const double range = range_in_use(r, channel.name);
+      const double least = std::max(kSpikeShare * range, 2.0 * finest_step(channel));
+      const std::vector<std::size_t> spikes = find_spikes(channel, least);
+      if (spikes.empty()) return;
+      std::ranges::copy(spikes, std::back_inserter(spikes_[r]));
+      add(Verdict::warn, "spikes", recording.name(),
+          fmt::format("{}: {} single samples are far from both neighbours, the first at t = {:.4g} "
+                      "s by {:.3g} {}",
+                      channel.name, spikes.size(), recording.time_s(spikes.front()),
+                      std::abs(channel.values[spikes.front()] - channel.values[spikes.front() - 1]),
+                      unit_label(channel.name)),
+          "Check the bus for invalid telegrams, and the log for lost digits.");
+    });
+  });
+}
+
+void Checker::check_repeats() {
+  pass_unless_found("repeats", "no rows occur twice", [&] {
+    for (const DatasetRecord& record : dataset_.records) {
+      const Recording& recording = record.recording;
+      std::vector<const Channel*> channels;
+      for (const std::string& name : channels_)
+        if (!is_condition(recording, name)) channels.push_back(&recording.channel(name));
+      const auto rows =
+          std::max(kRepeatRows,
+                   static_cast<std::size_t>(std::round(kRepeat_s * recording.sample_rate_Hz())));
+      const auto repeat = find_repeat(channels, rows);
+      if (!repeat) continue;
+      add(Verdict::warn, "repeats", recording.name(),
+          fmt::format(
+              "the rows from t = {:.4g} s on occur again from t = {:.4g} s on, for {:.3g} s",
+              recording.time_s(repeat->first), recording.time_s(repeat->again),
+              static_cast<double>(repeat->length) / recording.sample_rate_Hz()),
+          "No sensor repeats its noise: check the logger for a buffer that was written twice, and "
+          "cut the second one out.");
+    }
+  });
+}
+
+// Rows that are missing while the stamps are even: every channel jumps by what it passes through in
+// the same time. Currents may jump.
+bool Checker::check_cut(std::size_t r) {
+  const Recording& recording = dataset_.records[r].recording;
+  std::vector<const Channel*> channels;
+  std::vector<double> codes;
+  for (const Channel& channel : recording.channels()) {
+    const auto parts = split_channel_name(channel.name);
+    if (is_condition(recording, channel.name) || channel.name.starts_with(kTruthPrefix) || !parts ||
+        parts->unit->si_suffix == "A" || parts->unit->si_suffix == "V")
+      continue;
+    channels.push_back(&channel);
+    codes.push_back(finest_step(channel));
+  }
+  const auto cut = find_cut(channels, codes);
+  if (!cut || is_spike(r, cut->sample)) return false;
+  add(Verdict::warn, "gaps", recording.name(),
+      fmt::format("several channels jump together at t = {:.4g} s, as if {:.2g} s were missing",
+                  recording.time_s(cut->sample), cut->rows / recording.sample_rate_Hz()),
+      "Rows are missing although the stamps are even. Cut the recording in two there.");
+  return true;
+}
+
+/// The range without the outermost hundredth of the samples on either side.
+double Checker::inner_range(const std::vector<double>& values) {
+  std::vector<double> sorted;
+  std::ranges::copy_if(values, std::back_inserter(sorted), is_finite);
+  if (sorted.empty()) return 0.0;
+  std::ranges::sort(sorted);
+  const auto outer = static_cast<std::size_t>(kOuter * static_cast<double>(sorted.size()));
+  return sorted[sorted.size() - 1 - outer] - sorted[outer];
+}
+
+// A torque in mNm in every recording: nothing in the recordings contradicts it.
+void Checker::check_load(std::size_t r) {
+  const auto parts = split_channel_name(dataset_.target);
+  if (!parts || parts->unit->si_suffix != "Nm") return;
+  const double range_Nm = inner_range(pairs_[r].target);
+  if (range_Nm < kHighestLoad_Nm) return;
+  add(Verdict::warn, "units", dataset_.records[r].recording.name(),
+      fmt::format("{} ranges through {:.3g} Nm", dataset_.target, range_Nm),
+      "Hardly any joint with a spring carries so much: check the unit of the torque.");
+}
+
+// The rows between two new samples of a slow sensor are counted by its own clock.
+void Checker::check_cadence(std::size_t r) {
+  const Recording& recording = dataset_.records[r].recording;
+  for (const Channel& channel : recording.channels()) {
+    const auto cadence = find_broken_cadence(channel);
+    if (!cadence) continue;
+    add(Verdict::warn, "gaps", recording.name(),
+        fmt::format("{} has a new sample in every {}. row, but at t = {:.4g} s after {} rows",
+                    channel.name, cadence->usual, recording.time_s(cadence->sample),
+                    cadence->found),
+        "Rows are missing or were inserted although the stamps are even. Cut the recording in two "
+        "there.");
+    return;
+  }
+}
+
+// A wrong unit of both angles, or a column that contains another quantity.
+void Checker::check_twist(std::size_t r) {
+  const auto parts = split_channel_name(sources_.front());
+  if (!parts || parts->unit->si_suffix != "rad") return;
+  if (order_of_difference(r) == 0 && spec_.inputs.front() != "spring_deflection_rad") return;
+  const double width = inner_range(pairs_[r].input);
+  if (width < kWidestTwist_rad) return;
+  spoiled_[r] = 1;
+  add(Verdict::warn, "units", dataset_.records[r].recording.name(),
+      fmt::format("{} ranges through {:.3g} rad, {:.2g} turns", spec_.inputs.front(), width,
+                  width / (2.0 * std::numbers::pi)),
+      "No spring of a joint twists so far: check the unit of the angles, their gear ratio, a wrap "
+      "by one turn, and whether two columns were interchanged.");
+}
+
+// The sensors of both sides of a spring turn by the same angle, apart from the deflection.
+void Checker::check_scale(std::size_t r) {
+  const auto& sides = sides_[r];
+  if (!sides || !has_wrong_scale(*sides)) return;
+  spoiled_[r] = 1;
+  add(Verdict::fail, "units", dataset_.records[r].recording.name(),
+      fmt::format("{} moves {:.4g} times as far as {}, apart from the deflection that {} explains",
+                  sources_[0], 1.0 + sides->excess, sources_[1], dataset_.target),
+      "Both sides of a spring turn by the same angle: check the gear ratio and the scale of the "
+      "columns (scale: in a mapping).");
+}
+
+}  // namespace torsio

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "torsio/data/recording.hpp"
+
+namespace torsio {
+
+/// Indices of the samples that are new and finite.
+[[nodiscard]] std::vector<std::size_t> new_samples(const Channel& channel);
+
+/// Standard deviation of the white noise of a channel in successive windows, from third
+/// differences of new samples: sigma^2 = mean((d3 x)^2) / 20. A motion has small ones.
+struct NoiseCourse {
+  std::vector<double> sigma;         ///< one for each window
+  std::vector<std::size_t> samples;  ///< where the windows begin, and the end of the last one
+};
+[[nodiscard]] NoiseCourse noise_course(const Channel& channel, double sample_rate_Hz);
+
+/// The median over the windows.
+[[nodiscard]] double usual_noise(const NoiseCourse& course);
+
+/// Successive windows of at least 0.3 s whose noise is far above that of nine tenths of the others.
+struct Burst {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  double sigma = 0.0;
+  double usual = 0.0;
+};
+/// @param least noise below which nothing is reported, in the channel's unit
+[[nodiscard]] std::optional<Burst> find_burst(const Channel& channel, const NoiseCourse& course,
+                                              double sample_rate_Hz, double least);
+
+/// New samples that differ from both neighbours by more than `least`, in the same direction, while
+/// the neighbours agree with each other and the signal around is quiet.
+[[nodiscard]] std::vector<std::size_t> find_spikes(const Channel& channel, double least);
+
+/// A block of rows in which every channel has exactly the values of an earlier block.
+struct RepeatedBlock {
+  std::size_t first = 0;
+  std::size_t again = 0;
+  std::size_t length = 0;
+};
+/// The longest one of at least `shortest` rows; rows at rest do not count.
+[[nodiscard]] std::optional<RepeatedBlock> find_repeat(const std::vector<const Channel*>& channels,
+                                                       std::size_t shortest);
+
+/// Rows that are missing before a sample.
+struct Cut {
+  std::size_t sample = 0;
+  double rows = 0.0;  ///< about how many
+};
+/// At least two channels jump at the same moment, by what they pass through in the same number of
+/// rows at their speeds there; nowhere else.
+/// @param codes resolution of each channel
+[[nodiscard]] std::optional<Cut> find_cut(const std::vector<const Channel*>& channels,
+                                          const std::vector<double>& codes);
+
+/// A slow sensor has a new sample in every n-th row, except at one to three places.
+struct BrokenCadence {
+  std::size_t sample = 0;  ///< the first of these places
+  std::size_t usual = 0;   ///< n
+  std::size_t found = 0;   ///< rows from the new sample before
+};
+/// Whole missing samples of the sensor (a multiple of n) do not count. Empty if the new samples are
+/// not regular, or in all rows.
+[[nodiscard]] std::optional<BrokenCadence> find_broken_cadence(const Channel& channel);
+
+}  // namespace torsio
