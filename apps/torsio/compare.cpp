@@ -12,7 +12,6 @@
 #include "torsio/evaluate/structure_search.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/cross_validation.hpp"
-#include "torsio/report/html.hpp"
 #include "torsio/report/results.hpp"
 #include "verbs.hpp"
 

@@ -10,8 +10,8 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/import/foreign_network.hpp"
 #include "torsio/import/import_network.hpp"
-#include "torsio/import/weights_json.hpp"
 #include "torsio/report/model_description.hpp"
 #include "verbs.hpp"
 #ifdef TORSIO_HAS_ONNX

@@ -6,7 +6,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
-#include "torsio/report/impedance_tracking.hpp"
+#include "torsio/report/tracking.hpp"
 #include "torsio/sim/closed_loop/impedance_tracking.hpp"
 #include "torsio/sim/sheet_file.hpp"
 

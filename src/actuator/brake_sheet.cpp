@@ -1,4 +1,4 @@
-#include "torsio/actuator/brake_sheet.hpp"
+#include "torsio/actuator/electrical_sheet.hpp"
 
 namespace torsio {
 namespace {

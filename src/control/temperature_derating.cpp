@@ -1,4 +1,4 @@
-#include "torsio/control/temperature_derating.hpp"
+#include "control/temperature_derating.hpp"
 
 #include <fmt/format.h>
 

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "data/column_advice.hpp"
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/mapping.hpp"
 #include "torsio/data/recording.hpp"

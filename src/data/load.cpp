@@ -11,17 +11,17 @@
 
 #include "data/canonical_channels.hpp"
 #include "data/channel_names.hpp"
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "data/names.hpp"
 #include "data/needed_definitions.hpp"
+#include "data/resample.hpp"
 #include "data/whole_samples.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/manifest.hpp"
 #include "torsio/data/mapping.hpp"
-#include "torsio/data/resample.hpp"
 
 namespace torsio {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "data/channel_names.hpp"
 #include "data/columns.hpp"
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "data/names.hpp"
 #include "data/record_clock.hpp"

@@ -8,13 +8,13 @@
 #include <span>
 #include <utility>
 
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/finest_step.hpp"
 #include "data/inspect_clock.hpp"
 #include "data/interpolate.hpp"
+#include "data/resample.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
-#include "torsio/data/resample.hpp"
 
 namespace torsio {
 namespace {

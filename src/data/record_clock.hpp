@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "data/columns.hpp"
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/mapping.hpp"
 

@@ -1,4 +1,4 @@
-#include "torsio/data/resample.hpp"
+#include "data/resample.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/finest_step.hpp"
 #include "data/interpolate.hpp"
 #include "data/whole_samples.hpp"

@@ -1,5 +1,3 @@
-#include "torsio/import/weights_json.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -18,6 +16,7 @@
 #include "files/safetensors.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/import/foreign_network.hpp"
 
 namespace torsio {
 namespace {

@@ -1,5 +1,3 @@
-#include "torsio/report/html.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,6 +5,7 @@
 
 #include "markup_text.hpp"
 #include "torsio/core/version.hpp"
+#include "torsio/report/results.hpp"
 
 namespace torsio {
 namespace {

@@ -1,5 +1,3 @@
-#include "torsio/report/impedance_tracking.hpp"
-
 #include <fmt/format.h>
 
 #include <cmath>
@@ -10,6 +8,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
+#include "torsio/report/tracking.hpp"
 
 namespace torsio {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "torsio/report/curve.hpp"
+#include "torsio/report/plots.hpp"
 
 namespace torsio {
 

@@ -1,5 +1,3 @@
-#include "torsio/report/svg_plot.hpp"
-
 #include <fmt/format.h>
 
 #include <array>
@@ -9,6 +7,7 @@
 
 #include "markup_text.hpp"
 #include "plot_range.hpp"
+#include "torsio/report/plots.hpp"
 
 namespace torsio {
 namespace {

@@ -1,5 +1,3 @@
-#include "torsio/report/terminal_plot.hpp"
-
 #include <fmt/format.h>
 
 #include <array>
@@ -7,6 +5,7 @@
 #include <cstdint>
 
 #include "plot_range.hpp"
+#include "torsio/report/plots.hpp"
 
 namespace torsio {
 namespace {

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"

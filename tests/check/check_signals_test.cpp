@@ -5,8 +5,8 @@
 
 #include "check/check_support.hpp"
 #include "data/record_clock.hpp"
+#include "data/resample.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/data/resample.hpp"
 
 namespace torsio {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"

@@ -1,4 +1,4 @@
-#include "torsio/data/resample.hpp"
+#include "data/resample.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>

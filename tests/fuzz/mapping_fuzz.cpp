@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"

@@ -3,8 +3,8 @@
 #include <string>
 
 #include "torsio/core/error.hpp"
+#include "torsio/import/foreign_network.hpp"
 #include "torsio/import/import_network.hpp"
-#include "torsio/import/weights_json.hpp"
 #ifdef TORSIO_HAS_ONNX
 #include "torsio/import/onnx_network.hpp"
 #endif

@@ -1,5 +1,3 @@
-#include "torsio/import/weights_json.hpp"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +9,7 @@
 #include "import/network_parameters.hpp"
 #include "model/network/lstm.hpp"
 #include "support/error_message.hpp"
+#include "torsio/import/foreign_network.hpp"
 #include "torsio/import/import_network.hpp"
 
 namespace torsio {

@@ -11,8 +11,8 @@
 #include "real_data/real_data.hpp"
 #include "support/each_instruction_set.hpp"
 #include "support/network_reference.hpp"
+#include "torsio/import/foreign_network.hpp"
 #include "torsio/import/import_network.hpp"
-#include "torsio/import/weights_json.hpp"
 
 namespace torsio {
 namespace {

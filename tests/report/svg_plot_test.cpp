@@ -1,11 +1,11 @@
-#include "torsio/report/svg_plot.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
+
+#include "torsio/report/plots.hpp"
 
 namespace torsio {
 namespace {

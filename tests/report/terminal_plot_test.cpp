@@ -1,8 +1,8 @@
-#include "torsio/report/terminal_plot.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "torsio/report/plots.hpp"
 
 namespace torsio {
 namespace {

@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 
+#include "torsio/sim/closed_loop/impedance_tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
 
 namespace torsio {
@@ -12,5 +13,12 @@ namespace torsio {
 
 /// A JSON object with every row; ends with a line feed.
 [[nodiscard]] std::string tracking_json(std::span<const TrackingRow> rows);
+
+/// The task with its gains, a table of wanted and rendered impedance over the frequency, and the
+/// forces of the hand.
+[[nodiscard]] std::string impedance_text(const ImpedanceRun& run);
+
+/// The same as a JSON object; ends with a line feed.
+[[nodiscard]] std::string impedance_json(const ImpedanceRun& run);
 
 }  // namespace torsio

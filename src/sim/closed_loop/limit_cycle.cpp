@@ -1,5 +1,3 @@
-#include "torsio/sim/closed_loop/limit_cycle.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include "sim/closed_loop/tracking_parts.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"
+#include "torsio/sim/closed_loop/tracking_score.hpp"
 
 namespace torsio {
 namespace {

@@ -8,7 +8,6 @@
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/closed_loop/limit_cycle.hpp"
 #include "torsio/sim/closed_loop/reference.hpp"
 #include "torsio/sim/closed_loop/tracking_score.hpp"
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "sim/plant/plant.hpp"
-#include "torsio/actuator/brake_sheet.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/dispatch.hpp"
 

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "support/error_message.hpp"
-#include "torsio/actuator/brake_sheet.hpp"
+#include "torsio/actuator/electrical_sheet.hpp"
 
 namespace torsio {
 namespace {

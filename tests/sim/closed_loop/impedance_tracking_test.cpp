@@ -8,7 +8,7 @@
 
 #include "support/error_message.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/report/impedance_tracking.hpp"
+#include "torsio/report/tracking.hpp"
 
 namespace torsio {
 namespace {

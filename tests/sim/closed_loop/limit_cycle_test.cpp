@@ -1,5 +1,3 @@
-#include "torsio/sim/closed_loop/limit_cycle.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +9,7 @@
 #include "sim/closed_loop/tracking_parts.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/sim/closed_loop/tracking_score.hpp"
 
 namespace torsio {
 namespace {

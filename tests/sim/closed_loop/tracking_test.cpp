@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
+#include "data/resample.hpp"
 #include "model/grey_box/grey_box.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/mapping.hpp"
-#include "torsio/data/resample.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
 #include "torsio/report/tracking.hpp"

@@ -3,9 +3,13 @@
 #include <cstddef>
 #include <optional>
 
-#include "torsio/sim/closed_loop/limit_cycle.hpp"
-
 namespace torsio {
+
+/// A motion that a loop keeps up by itself.
+struct LimitCycle {
+  double frequency_Hz = 0.0;
+  double amplitude = 0.0;  ///< in the unit of the error
+};
 
 /// How well a torque was followed: e = wanted - torque, of the joint's torque without the noise of
 /// any sensor, in Nm. The first two seconds are not scored, but for `overshoot`. Source:

@@ -1,4 +1,4 @@
-#include "data/csv_header.hpp"
+#include "data/csv/csv_header.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <map>
 
 #include "core/trimmed.hpp"
-#include "data/decimal.hpp"
+#include "data/csv/decimal.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 

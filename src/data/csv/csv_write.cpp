@@ -3,7 +3,7 @@
 #include <string>
 
 #include "core/report_progress.hpp"
-#include "data/csv_table.hpp"
+#include "data/csv/csv_table.hpp"
 #include "text_sink.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

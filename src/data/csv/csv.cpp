@@ -7,10 +7,10 @@
 #include <string_view>
 
 #include "data/byte_source.hpp"
-#include "data/csv_header.hpp"
-#include "data/csv_table.hpp"
-#include "data/decimal.hpp"
-#include "data/line_reader.hpp"
+#include "data/csv/csv_header.hpp"
+#include "data/csv/csv_table.hpp"
+#include "data/csv/decimal.hpp"
+#include "data/csv/line_reader.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
