@@ -1,4 +1,4 @@
-#include "text_sink.hpp"
+#include "data/text_sink.hpp"
 
 #include <charconv>
 #include <cmath>

@@ -4,7 +4,7 @@
 
 #include "core/report_progress.hpp"
 #include "data/csv/csv_table.hpp"
-#include "text_sink.hpp"
+#include "data/text_sink.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
