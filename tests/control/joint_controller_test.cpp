@@ -8,6 +8,9 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "spring_joint.hpp"
 #include "support/error_message.hpp"
@@ -290,51 +293,62 @@ TEST(JointController, OverridesAndReleasesWithoutAJump) {
 
 // 10^6 ticks: all modes, on every actuator with a spring, through both loops. The output is locked
 // or free, and a person pushes it; drive friction of any sign and a spring that is 3 % stiffer than
-// the controller's are the load that it does not measure.
+// the controller's are the load that it does not measure. The tube of the harmonic drive is too
+// stiff for a deflection loop on the current (its own controller is `TubeImpedance`), not for one on
+// the velocity.
 TEST(JointController, NeverLetsTheMotorSideOutOfItsLimits) {
   constexpr int kTicks = 84'000;
   Random random(19);
+  std::vector<std::pair<const char*, Actuation>> joints;
   for (const char* actuator : kActuators)
-    for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
-      for (const JointOutput end : {JointOutput::locked, JointOutput::free}) {
-        auto settings = settings_of(actuator, actuation);
-        JointCascade::Limits& limits = settings.limits;
-        // Where the output is locked, the position limits the torque of the spring.
-        if (end == JointOutput::locked)
-          limits.highest_rad =
-              0.9 * limits.max_measured_load_Nm / settings.torque.deflection.joint.stiffness_Nm_rad;
-        limits.lowest_rad = -limits.highest_rad;
-        double farthest_rad = 0.0;
-        double fastest_rad_s = 0.0;
-        Controller controller = controller_of(settings);
-        SeriesElasticJoint stiffer = settings.torque.deflection.joint;
-        stiffer.stiffness_Nm_rad *= 1.03;
-        SpringJoint joint(stiffer, end);
-        JointReference reference;
-        double push_Nm = 0.0;
-        double drive_Nm = 0.0;
-        double max_Nm = 0.0;
-        for (int n = 0; n < kTicks / 2; ++n) {
-          if (random.uniform() < 0.01) reference = any_reference(random, settings, 1e3);
-          if (random.uniform() < 0.003)
-            push_Nm = 0.2 * settings.torque.largest_torque_Nm * (2.0 * random.uniform() - 1.0);
-          if (random.uniform() < 0.02)
-            drive_Nm = (random.uniform() < 0.5 ? 0.5 : -0.5) * limits.max_unmeasured_load_Nm;
-          const auto output = controller.step(reference, sample_of(joint, drive_of(settings)));
-          joint.step(output.current_A, 1.0 / kRate_Hz, push_Nm, drive_Nm);
-          max_Nm = std::max(max_Nm, std::abs(joint.torque_Nm()));
-          farthest_rad = std::max(farthest_rad, std::abs(joint.angle_rad()));
-          fastest_rad_s = std::max(fastest_rad_s, std::abs(joint.speed_rad_s()));
-        }
-        const std::string run_name =
-            fmt::format("{} {} {}", actuator, end == JointOutput::locked ? "locked" : "free",
-                        actuation == Actuation::current ? "current" : "velocity");
-        EXPECT_LE(max_Nm, limits.max_measured_load_Nm) << run_name << ": beyond the condition";
-        EXPECT_LE(farthest_rad, limits.highest_rad) << run_name;
-        EXPECT_GT(farthest_rad, 0.3 * limits.highest_rad) << run_name << ": never near the limit";
-        EXPECT_LE(fastest_rad_s, limits.speed_rad_s) << run_name;
+    for (const Actuation actuation : {Actuation::current, Actuation::velocity})
+      joints.emplace_back(actuator, actuation);
+  joints.emplace_back("harmonic-drive", Actuation::velocity);
+  for (const auto& [actuator, actuation] : joints) {
+    for (const JointOutput end : {JointOutput::locked, JointOutput::free}) {
+      auto settings = settings_of(actuator, actuation);
+      if (actuator == std::string_view("harmonic-drive")) {
+        // Locked, its tube allows less motion than the margin for the load.
+        if (end == JointOutput::locked) continue;
+        settings.limits.speed_rad_s *= 0.5;
       }
+      JointCascade::Limits& limits = settings.limits;
+      // Where the output is locked, the position limits the torque of the spring.
+      if (end == JointOutput::locked)
+        limits.highest_rad =
+            0.9 * limits.max_measured_load_Nm / settings.torque.deflection.joint.stiffness_Nm_rad;
+      limits.lowest_rad = -limits.highest_rad;
+      double farthest_rad = 0.0;
+      double fastest_rad_s = 0.0;
+      Controller controller = controller_of(settings);
+      SeriesElasticJoint stiffer = settings.torque.deflection.joint;
+      stiffer.stiffness_Nm_rad *= 1.03;
+      SpringJoint joint(stiffer, end);
+      JointReference reference;
+      double push_Nm = 0.0;
+      double drive_Nm = 0.0;
+      double max_Nm = 0.0;
+      for (int n = 0; n < kTicks / 2; ++n) {
+        if (random.uniform() < 0.01) reference = any_reference(random, settings, 1e3);
+        if (random.uniform() < 0.003)
+          push_Nm = 0.2 * settings.torque.largest_torque_Nm * (2.0 * random.uniform() - 1.0);
+        if (random.uniform() < 0.02)
+          drive_Nm = (random.uniform() < 0.5 ? 0.5 : -0.5) * limits.max_unmeasured_load_Nm;
+        const auto output = controller.step(reference, sample_of(joint, drive_of(settings)));
+        joint.step(output.current_A, 1.0 / kRate_Hz, push_Nm, drive_Nm);
+        max_Nm = std::max(max_Nm, std::abs(joint.torque_Nm()));
+        farthest_rad = std::max(farthest_rad, std::abs(joint.angle_rad()));
+        fastest_rad_s = std::max(fastest_rad_s, std::abs(joint.speed_rad_s()));
+      }
+      const std::string run_name =
+          fmt::format("{} {} {}", actuator, end == JointOutput::locked ? "locked" : "free",
+                      actuation == Actuation::current ? "current" : "velocity");
+      EXPECT_LE(max_Nm, limits.max_measured_load_Nm) << run_name << ": beyond the condition";
+      EXPECT_LE(farthest_rad, limits.highest_rad) << run_name;
+      EXPECT_GT(farthest_rad, 0.3 * limits.highest_rad) << run_name << ": never near the limit";
+      EXPECT_LE(fastest_rad_s, limits.speed_rad_s) << run_name;
     }
+  }
 }
 
 RC_GTEST_PROP(JointController, SwitchesItsModeWithoutAJump, ()) {
