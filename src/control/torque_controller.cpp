@@ -87,19 +87,17 @@ TorqueLoopCore::Output TorqueLoopCore::step(const Estimate& wanted_rad,
       std::isfinite(deflection_rad) && (!observer_ || std::isfinite(sample.motor_angle_rad));
   const DeflectionController::Output loop =
       deflection_.step(wanted_rad.value, is_measured ? deflection_rad : kNotMeasured);
+  const bool is_speed = acts_on_speed(settings_);
   Output output = {.wanted_torque_Nm = wanted_Nm_,
                    .wanted_deflection_rad = loop.wanted_deflection_rad,
+                   .proportional_A = is_speed ? 0.0 : loop.proportional,
+                   .integral_A = is_speed ? 0.0 : loop.integral,
+                   .derivative_A = is_speed ? 0.0 : loop.derivative,
+                   .feed_forward_A = is_speed ? 0.0 : loop.feed_forward,
+                   .transfer_A = is_speed ? 0.0 : loop.transfer,
                    .is_limited = loop.is_limited,
                    .inverse = wanted_rad.fault,
                    .fault = is_refused_ ? Fault::input_not_finite : loop.fault};
-  const bool is_speed = acts_on_speed(settings_);
-  if (!is_speed) {
-    output.proportional_A = loop.proportional;
-    output.integral_A = loop.integral;
-    output.derivative_A = loop.derivative;
-    output.feed_forward_A = loop.feed_forward;
-    output.transfer_A = loop.transfer;
-  }
   if (!is_planned_) wanted_rate_.reset();
   const double rate_rad_s =
       wanted_rate_.step(wanted_Nm_) / settings_.deflection.joint.stiffness_Nm_rad;

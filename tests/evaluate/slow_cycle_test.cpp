@@ -6,7 +6,6 @@
 #include <cmath>
 #include <string>
 
-#include "model/linear/linear.hpp"
 #include "model/linear/linear_coulomb.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/example_model_file.hpp"

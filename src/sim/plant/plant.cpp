@@ -234,7 +234,9 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
   PlantTorques& t = torques_;
   const double dt = dt_s_;
 
-  t.motor_Nm = condition_.torque_constant_factor * motor_torque(command);
+  t.motor_Nm = command.is_powered
+                   ? condition_.torque_constant_factor * motor_torque(command.current_A)
+                   : switched_off();
   const StageTorques second = step_second();
   t.second_Nm = second.output_Nm;
   t.second_on_middle_Nm = second.input_Nm;
@@ -248,7 +250,7 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
       condition_.friction_factor * rotor_friction_.step(s.rotor_speed_rad_s, t.first_Nm, dt);
   t.middle_friction_Nm =
       condition_.friction_factor * middle_friction_.step(s.middle_speed_rad_s, t.second_Nm, dt);
-  t.brake_Nm = brake_ ? brake_->step(command.brake_V, s.rotor_speed_rad_s, dt) : 0.0;
+  if (brake_) t.brake_Nm = brake_->step(command.brake_V, s.rotor_speed_rad_s, dt);
   t.bearing_Nm = bearing_.step(s.joint_speed_rad_s, 0.0, dt);
   t.joint_Nm = t.second_Nm - t.bearing_Nm;
   t.wall_Nm = wall_torque(load, s.joint_angle_rad, s.joint_speed_rad_s);
@@ -272,13 +274,13 @@ void Plant::small_step(const PlantCommand& command, const Load& load) noexcept {
   s.joint_angle_rad += dt * s.joint_speed_rad_s;
 }
 
-double Plant::motor_torque(const PlantCommand& command) noexcept {
-  const double wanted_A = command.current_A;
-  if (!command.is_powered) {
-    motor_.reset();
-    if (electrical_) electrical_->switch_off(dt_s_);
-    return 0.0;
-  }
+double Plant::switched_off() noexcept {
+  motor_.reset();
+  if (electrical_) electrical_->switch_off(dt_s_);
+  return 0.0;
+}
+
+double Plant::motor_torque(double wanted_A) noexcept {
   if (!electrical_) return motor_.step(wanted_A, state_.rotor_angle_rad, state_.rotor_speed_rad_s);
   return motor_.ripple_torque(state_.rotor_angle_rad) +
          electrical_->step(wanted_A, state_.rotor_angle_rad, state_.rotor_speed_rad_s, dt_s_);

@@ -103,7 +103,6 @@ struct PlantState {
 struct PlantTorques {
   double motor_Nm = 0.0;             ///< on the rotor, ripple included
   double rotor_friction_Nm = 0.0;    ///< against the rotor
-  double brake_Nm = 0.0;             ///< against the rotor
   double first_Nm = 0.0;             ///< torque of the first stage on the middle body
   double first_on_rotor_Nm = 0.0;    ///< against the rotor
   double middle_friction_Nm = 0.0;   ///< against the middle body
@@ -112,6 +111,7 @@ struct PlantTorques {
   double bearing_Nm = 0.0;           ///< dry friction of the joint, against it
   double joint_Nm = 0.0;             ///< torque at a load cell between joint and lever
   double wall_Nm = 0.0;              ///< torque of the obstacle, against the joint
+  double brake_Nm = 0.0;             ///< against the rotor
 };
 
 /// What a stage does to the bodies at its two ends.
@@ -242,13 +242,13 @@ class Plant {
   void set_period(double dt_s) noexcept;
   void start(const PlantState& state) noexcept;
   void small_step(const PlantCommand& command, const Load& load) noexcept;
-  double motor_torque(const PlantCommand& command) noexcept;
+  double motor_torque(double wanted_A) noexcept;
+  double switched_off() noexcept;
   StageTorques step_second() noexcept;
 
   PlantParameters parameters_;
   Motor motor_;
   std::optional<ElectricalDrive> electrical_;
-  std::optional<Brake> brake_;
   LuGreFriction rotor_friction_;
   FirstStage first_;
   LuGreFriction middle_friction_;
@@ -263,6 +263,7 @@ class Plant {
   double asked_dt_s_ = 0.0;
   double dt_s_ = 0.0;
   std::size_t small_steps_ = 1;
+  std::optional<Brake> brake_;
 };
 
 }  // namespace torsio
