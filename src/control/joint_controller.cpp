@@ -20,10 +20,10 @@ constexpr bool uses_spring(JointMode mode) noexcept {
 JointCascade::Gains gains_of(const Settings& settings, double sample_rate_Hz) {
   if (settings.gains) return *settings.gains;
   const DeflectionController::Settings& deflection = settings.torque.deflection;
-  const double bandwidth_rad_s = deflection.actuation == Actuation::velocity
-                                     ? std::min(kInnerLoopFactor * deflection.bandwidth_rad_s,
-                                                kMaxBandwidthShare * sample_rate_Hz)
-                                     : settings.override_rad_s;
+  const double bandwidth_rad_s =
+      deflection.actuation == Actuation::velocity
+          ? JointControllerCore::velocity_bandwidth(deflection.bandwidth_rad_s, sample_rate_Hz)
+          : settings.override_rad_s;
   return JointCascade::gains_for(deflection.joint.drive, bandwidth_rad_s);
 }
 
@@ -45,14 +45,18 @@ JointCascade::Settings cascade_settings(const Settings& settings, double sample_
 
 }  // namespace
 
+double JointControllerCore::velocity_bandwidth(double deflection_rad_s,
+                                               double sample_rate_Hz) noexcept {
+  return std::min(kInnerLoopFactor * deflection_rad_s, kMaxBandwidthShare * sample_rate_Hz);
+}
+
 JointControllerCore::JointControllerCore(const Settings& settings, double sample_rate_Hz)
     : joint_(settings.torque.deflection.joint),
       acts_on_speed_(settings.torque.deflection.actuation == Actuation::velocity),
       torque_(torque_settings(settings, sample_rate_Hz), sample_rate_Hz),
       cascade_(cascade_settings(settings, sample_rate_Hz), sample_rate_Hz),
-      impedance_(
-          {.torque_Nm = std::min(settings.torque.largest_torque_Nm, settings.limits.torque_Nm)},
-          sample_rate_Hz),
+      impedance_({.torque_Nm = torque_settings(settings, sample_rate_Hz).largest_torque_Nm},
+                 sample_rate_Hz),
       speed_(sample_rate_Hz, settings.speed_cutoff_Hz) {}
 
 void JointControllerCore::reset() noexcept {

@@ -38,6 +38,12 @@ class JointControllerCore {
     Fault fault = Fault::none;
   };
 
+  /// @returns the bandwidth [rad/s] of the velocity loop inside a deflection controller on the
+  /// velocity, if no gains are given: four times that of the controller, at most a fifth of the
+  /// sample rate
+  [[nodiscard]] static double velocity_bandwidth(double deflection_rad_s,
+                                                 double sample_rate_Hz) noexcept;
+
   /// @throws Error as `TorqueLoopCore` and `JointCascade`.
   JointControllerCore(const Settings& settings, double sample_rate_Hz);
 

@@ -39,11 +39,10 @@ constexpr double kUnmeasuredShare = 0.05;
 constexpr double kMeasuredShare = 0.6;
 /// Fast, so that dry friction makes little difference to the speed at a limit.
 constexpr double kOverride_rad_s = 100.0;
-constexpr double kInnerLoopFactor = 4.0;
 
 double velocity_rad_s(const TrackingSpec& spec) {
   return spec.velocity_rad_s.value_or(
-      std::min(kInnerLoopFactor * spec.bandwidth_rad_s, TrackingSpec::kMaxVelocity_rad_s));
+      JointControllerCore::velocity_bandwidth(spec.bandwidth_rad_s, kBenchRate_Hz));
 }
 
 TorqueLoopCore::Settings loop_settings(const DataSheet& sheet, const TrackingSpec& spec,
