@@ -30,6 +30,9 @@ double computed(Operation operation, double left, double right) noexcept {
       if (left > 0.0) return 1.0;
       return left < 0.0 ? -1.0 : left;  // a zero or a NaN
     case Operation::tanh: return std::tanh(left);
+    case Operation::sin: return std::sin(left);
+    case Operation::cos: return std::cos(left);
+    case Operation::atan: return std::atan(left);
     case Operation::abs: return std::abs(left);
     case Operation::sqrt: return std::sqrt(left);
     case Operation::exp: return std::exp(left);
@@ -40,7 +43,8 @@ double computed(Operation operation, double left, double right) noexcept {
     case Operation::constant:
     case Operation::rate:
     case Operation::lowpass:
-    case Operation::lag: break;
+    case Operation::lag:
+    case Operation::stop: break;
   }
   return left;  // those are not computed from their operands alone
 }
@@ -76,7 +80,10 @@ std::uint32_t ExpressionGraph::operation(Operation operation, std::uint32_t left
 
 std::uint32_t ExpressionGraph::memory(Operation operation, std::uint32_t operand,
                                       double parameter) {
-  if (is_constant(operand)) return operation == Operation::rate ? constant(0.0) : operand;
+  if (is_constant(operand)) {
+    const bool is_of_changes = operation == Operation::rate || operation == Operation::stop;
+    return is_of_changes ? constant(0.0) : operand;
+  }
   if (operation == Operation::lag && parameter == 0.0) return operand;
   return unique(
       {.operation = operation, .left = operand, .right = operand, .parameter = parameter});

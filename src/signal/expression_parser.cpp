@@ -24,8 +24,12 @@ constexpr auto kFunctions = std::to_array<Function>({
     {"rate", Operation::rate, 1},
     {"lowpass", Operation::lowpass, 2},
     {"lag", Operation::lag, 2},
+    {"stop", Operation::stop, 2},
     {"sign", Operation::sign, 1},
     {"tanh", Operation::tanh, 1},
+    {"sin", Operation::sin, 1},
+    {"cos", Operation::cos, 1},
+    {"atan", Operation::atan, 1},
     {"abs", Operation::abs, 1},
     {"sqrt", Operation::sqrt, 1},
     {"exp", Operation::exp, 1},
@@ -266,6 +270,7 @@ class ExpressionParser::Reader {
       case Operation::rate: return graph_.memory(operation, first, 0.0);
       case Operation::lowpass: return graph_.memory(operation, first, cutoff_of(arguments[1]));
       case Operation::lag: return graph_.memory(operation, first, lag_of(arguments[1]));
+      case Operation::stop: return graph_.memory(operation, first, threshold_of(arguments[1]));
       default: return graph_.operation(operation, first, arguments[1].node);
     }
   }
@@ -291,6 +296,14 @@ class ExpressionParser::Reader {
       fail(argument.start, fmt::format("a whole number of samples from 0 to {}", kLongestLag),
            as_written(argument));
     return value + 0.0;  // no negative zero
+  }
+
+  double threshold_of(const Operand& argument) const {
+    const double value = graph_.nodes()[argument.node].parameter;
+    if (!graph_.is_constant(argument.node) || !(value > 0.0))
+      fail(argument.start, "a positive constant as threshold, in the unit of the first argument",
+           as_written(argument));
+    return value;
   }
 
   // The argument's text; the reader is after the call's closing parenthesis.

@@ -47,12 +47,38 @@ class DelayLine {
   bool is_full_ = false;
 };
 
+/// s <- clip(s + change of the input, +-threshold): the deflection of a spring whose far end slips.
+class StopOperator {
+ public:
+  explicit StopOperator(double threshold) : threshold_(threshold) {}
+
+  void reset() noexcept {
+    state_ = 0.0;
+    has_last_ = false;
+  }
+
+  /// A value that is not finite is returned and leaves the state.
+  double step(double input) noexcept {
+    if (!std::isfinite(input)) return input;
+    if (has_last_) state_ = std::clamp(state_ + (input - last_), -threshold_, threshold_);
+    last_ = input;
+    has_last_ = true;
+    return state_;
+  }
+
+ private:
+  double threshold_;
+  double state_ = 0.0;
+  double last_ = 0.0;
+  bool has_last_ = false;
+};
+
 struct Instruction {
   Operation operation;
   std::uint32_t target;  ///< index into the values; the operands' likewise
   std::uint32_t left;
   std::uint32_t right;
-  std::uint32_t state;  ///< index among the differentiators, low-passes or lags
+  std::uint32_t state;  ///< index among the differentiators, low-passes, lags or stops
 };
 
 bool has_operands(const Node& node) {
@@ -87,6 +113,7 @@ struct FeaturePipeline::Program {
   std::vector<Differentiator> differentiators;
   std::vector<Lowpass> lowpasses;
   std::vector<DelayLine> delay_lines;
+  std::vector<StopOperator> stops;
   std::size_t lag_memory = 0;
   std::vector<std::uint32_t> feature_sources;
   std::vector<double> features;
@@ -168,6 +195,10 @@ std::size_t FeaturePipeline::Program::add(const Node& node, std::uint32_t target
                      .found = "more"});
       delay_lines.emplace_back(delay);
       break;
+    case Operation::stop:
+      state = stops.size();
+      stops.emplace_back(node.parameter);
+      break;
     default: break;
   }
   instructions.push_back(
@@ -181,6 +212,7 @@ double FeaturePipeline::Program::run(const Instruction& instruction) noexcept {
     case Operation::rate: return differentiators[instruction.state].step(left);
     case Operation::lowpass: return lowpasses[instruction.state].step(left);
     case Operation::lag: return delay_lines[instruction.state].step(left);
+    case Operation::stop: return stops[instruction.state].step(left);
     default: return computed(instruction.operation, left, values[instruction.right]);
   }
 }
@@ -237,6 +269,7 @@ void FeaturePipeline::reset() noexcept {
   for (Differentiator& differentiator : program_->differentiators) differentiator.reset();
   for (Lowpass& lowpass : program_->lowpasses) lowpass.reset();
   for (DelayLine& line : program_->delay_lines) line.reset();
+  for (StopOperator& stop : program_->stops) stop.reset();
   program_->seen = 0;
 }
 

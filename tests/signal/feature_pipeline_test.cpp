@@ -47,6 +47,28 @@ TEST(Expression, BindsAsInMathematics) {
   EXPECT_EQ(value("x ^ 3", {2.0}), 8.0);
 }
 
+TEST(Expression, ComputesSineCosineAndArcTangent) {
+  EXPECT_DOUBLE_EQ(value("sin(x)", {0.5}), std::sin(0.5));
+  EXPECT_DOUBLE_EQ(value("cos(x)", {0.5}), std::cos(0.5));
+  EXPECT_DOUBLE_EQ(value("atan(100 * x)", {-0.02}), std::atan(-2.0));
+  EXPECT_DOUBLE_EQ(value("sin(30deg)"), 0.5);
+}
+
+TEST(Expression, StopFollowsChangesUpToItsThreshold) {
+  FeaturePipeline features = pipeline({"stop(x, 0.5)"});
+  const auto step = [&](double x) { return features.step(std::vector{x})[0]; };
+  EXPECT_EQ(step(10.0), 0.0);  // the first value is no change
+  EXPECT_EQ(step(10.25), 0.25);
+  EXPECT_EQ(step(12.0), 0.5);
+  EXPECT_EQ(step(11.75), 0.25);
+  EXPECT_EQ(step(-3.0), -0.5);
+  EXPECT_TRUE(std::isnan(step(std::numeric_limits<double>::quiet_NaN())));
+  EXPECT_EQ(step(-2.75), -0.25);  // the value that was not finite left no trace
+  features.reset();
+  EXPECT_EQ(step(5.0), 0.0);
+  EXPECT_EQ(value("stop(3, 0.5)"), 0.0);
+}
+
 TEST(Expression, ReadsNumbersInEveryKnownUnit) {
   EXPECT_EQ(value("1.5e-3"), 0.0015);
   EXPECT_EQ(value(".5"), 0.5);

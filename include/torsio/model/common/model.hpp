@@ -5,23 +5,13 @@
 #include <cstddef>
 #include <span>
 
-#include "torsio/core/fault.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {
 
 /// The inputs of one tick, in the order that the model's own `inputs` list names.
 using Features = std::span<const double>;
-
-/// The output of a model or an estimator at one tick. `value` is finite in every case.
-struct Estimate {
-  double value = 0.0;  ///< in the target's unit
-  double std_dev =
-      kNotMeasured;  ///< one standard deviation, same unit; NaN where there is no evidence, never 0
-  double novelty = kNotMeasured;  ///< larger: less like the training data; NaN if unknown
-  Fault fault = Fault::none;
-};
 
 /// The interface of every model family; tests/laws checks its meaning.
 ///

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "torsio/core/realtime.hpp"
+#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/safety/monitor.hpp"
+#include "torsio/safety/redundancy.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// The sources of a joint's torque, their combination and their monitor, fed with the channels of the
+/// drive. A monitored signal is an expression of these channels ("gear_angle_rad - joint_angle_rad");
+/// its age is that of the oldest channel in it.
+class MonitoredTorque {
+ public:
+  /// @param sources one for each of `redundancy.sources`, in that order; all of one sample rate and with
+  /// a torque in Nm as target
+  /// @throws Error if these do not fit together, or as `Redundancy`, `Monitor` and `FeaturePipeline` do.
+  MonitoredTorque(std::vector<Estimator> sources, const RedundancySettings& redundancy,
+                  const MonitorSettings& monitor);
+
+  /// The channels that `step` requires, in this order.
+  [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept { return raw_inputs_; }
+
+  /// Subtracts `value` (SI) from a channel of every source and signal that uses it; call it while
+  /// configuring. @throws UsageError for an unknown channel or a value that is not finite.
+  void set_zero(std::string_view channel, double value);
+
+  void reset() noexcept;
+
+  /// @param raw one sample for each of `raw_inputs()`. A channel older than the longest age of a
+  /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite.
+  FusedTorque step(double t_s, std::span<const SignalSample> raw) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] Monitor& monitor() noexcept { return monitor_; }
+  [[nodiscard]] const Monitor& monitor() const noexcept { return monitor_; }
+  [[nodiscard]] const Redundancy& redundancy() const noexcept { return redundancy_; }
+  /// The estimates of the last step, one a source.
+  [[nodiscard]] std::span<const Estimate> estimates() const noexcept { return estimates_; }
+
+ private:
+  /// A source or the pipeline of the signals takes its channels from these places of `raw`.
+  struct Input {
+    std::vector<std::size_t> channels;
+    std::vector<double> values;
+  };
+  [[nodiscard]] Input input_of(const std::vector<std::string>& names);
+
+  std::vector<Estimator> sources_;
+  Redundancy redundancy_;
+  Monitor monitor_;
+  std::vector<std::string> raw_inputs_;
+  std::vector<Input> inputs_;          ///< of the sources
+  FeaturePipeline signal_pipeline_;
+  Input signal_input_;
+  std::vector<std::vector<std::size_t>> signal_channels_;  ///< per signal: places in `raw`
+  std::vector<double> longest_age_s_;                      ///< per channel
+  std::vector<Estimate> estimates_;
+  std::vector<SignalSample> signals_;
+};
+
+}  // namespace torsio

@@ -1,0 +1,164 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/estimate.hpp"
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+/// What a monitor checks. docs/safety.md has the fault that each one detects.
+enum class MonitorCheck : std::uint8_t {
+  disagreement,     ///< two valid sources differ by more than the threshold of their pair
+  drift,            ///< they differ by a little for a long time (cumulative sum)
+  sign,             ///< they have opposite signs, each beyond three of its error bars
+  source_lost,      ///< an input of a source is missing, stale or not a number
+  source_fault,     ///< a source has inputs outside its range, or its model failed
+  redundancy_lost,  ///< fewer than two sources are valid, or all valid ones have the same sensor
+  novelty,          ///< the inputs of a source are unlike those of its training
+  not_finite,       ///< a signal is NaN or infinite
+  stale,            ///< a signal has not been measured for too long
+  range,            ///< a signal is outside its range; a deflection, a temperature likewise
+  rate,             ///< a signal changed faster than it can
+  wrap,             ///< an angle changed by a turn of its encoder
+  frozen,           ///< a signal does not change while one that is connected to it moves
+  period,           ///< the loop is late, or its clock runs backwards
+};
+inline constexpr std::size_t kMonitorChecks = 14;
+
+/// What happens when a check finds something.
+enum class MonitorAction : std::uint8_t { off, warn, stop };
+
+/// A measured quantity, as the drive delivers it.
+struct MonitoredSignal {
+  std::string name;
+  double lowest = -std::numeric_limits<double>::infinity();
+  double highest = std::numeric_limits<double>::infinity();
+  double largest_rate = std::numeric_limits<double>::infinity();  ///< in its unit per second
+  double longest_age_s = std::numeric_limits<double>::infinity();
+  double turn = 0.0;  ///< by which its encoder wraps around; 0: it does not
+  /// A signal that cannot move without this one: "gear_angle_rad" of "motor_angle_rad". Empty: none.
+  std::string moves_with = {};
+  /// How far that one may move, in its unit, without a change of this one.
+  double largest_hidden_travel = std::numeric_limits<double>::infinity();
+};
+
+/// Limits for the difference of two sources.
+struct PairLimits {
+  std::uint8_t first = 0;
+  std::uint8_t second = 1;
+  /// Threshold of |difference| as a multiple of the standard deviation of the difference that the
+  /// error bars give, never below the floor nor above the ceiling.
+  double factor = 6.0;
+  double floor_Nm = 0.0;
+  double ceiling_Nm = std::numeric_limits<double>::infinity();
+  /// Of the cumulative sum: the share of the threshold that is not counted, and the sum in seconds
+  /// times threshold at which it reports.
+  double drift_allowance = 0.75;
+  double drift_limit_s = std::numeric_limits<double>::infinity();
+};
+
+struct MonitorSettings {
+  std::vector<std::string> sources;
+  std::vector<MonitoredSignal> signals;
+  std::vector<PairLimits> pairs;
+  /// Correlation of the sources' errors, row by row; empty: none.
+  std::vector<double> correlation;
+  std::array<MonitorAction, kMonitorChecks> actions = default_actions();
+  double persistence_s = 5e-3;  ///< how long a difference must exceed its threshold
+  double release_share = 0.8;   ///< below this share of the threshold, it has ended
+  double longest_loss_s = 0.5;   ///< how long a lost source is only a warning
+  double longest_fault_s = 0.015;  ///< how long a source may report a fault of its model or range
+  double largest_novelty = std::numeric_limits<double>::infinity();
+  double sample_period_s = 1e-3;
+  std::uint32_t longest_overrun = 3;  ///< late ticks in a row
+  std::uint32_t spikes_in_a_row = 2;  ///< samples beyond range or rate before they are a fault: one is passed over
+  double proof_s = 0.05;  ///< how long every check must be silent before the joint may move
+
+  /// stop, but for source_lost and novelty, which warn.
+  static std::array<MonitorAction, kMonitorChecks> default_actions() noexcept;
+};
+
+/// Why a monitor stopped, in numbers; `reason_json` writes it for machines.
+struct MonitorEvent {
+  double t_s = 0.0;
+  MonitorCheck check = MonitorCheck::disagreement;
+  MonitorAction action = MonitorAction::off;
+  std::uint8_t first = 0;   ///< index of the source or signal
+  std::uint8_t second = 0;  ///< of the other source of a pair; else equal to `first`
+  double value = 0.0;       ///< what was found, and its limit
+  double limit = 0.0;
+};
+
+/// One signal at one tick.
+struct SignalSample {
+  double value = kNotMeasured;
+  double age_s = 0.0;  ///< since its sensor measured it, by the clock of the loop
+};
+
+/// Decides in every tick whether a joint may move with the torque that its sources estimate.
+///
+///     unproven  --every check silent for proof_s, and armed-->  watching
+///     watching  --a check whose action is stop-->  stopped  --reset-->  unproven
+///
+/// A stop is latched: only `reset` ends it, and the joint may move again after the proof and `arm`
+/// with a command that was written after the reset. Valid sources that disagree stop the joint; there
+/// is no vote. Only `is_watching()` permits torque; what a stop does is a matter of `JointStop` and of
+/// the brake.
+///
+/// - disagreement: |t_i - t_j| > clamp(factor sqrt(s_i^2 + s_j^2 - 2 R_ij s_i s_j), floor, ceiling) =: h for
+///   `persistence_s`, with hysteresis: it ends below `release_share` h.
+/// - drift: S <- max(0, S + (|mean difference| / h - drift_allowance) T), S > drift_limit_s, on either side.
+/// - frozen: the signal keeps exactly one value while its companion travels further than
+///   `largest_hidden_travel`; at rest there is no travel.
+///
+/// Every comparison is written so that NaN is a fault. Source: specification 3.9 for the residuals; Page
+/// 1954 for the cumulative sum; states and checks are ours.
+class Monitor {
+ public:
+  static constexpr std::size_t kMaxSources = 8;
+  static constexpr std::size_t kMaxSignals = 16;
+
+  enum class State : std::uint8_t { unproven, ready, watching, stopped };
+
+  /// @throws Error if a name, an index or a limit is not valid.
+  explicit Monitor(MonitorSettings settings);
+
+  /// The operator permits motion. Without effect unless the state is `ready` and the command is newer
+  /// than the last reset. @returns whether it watches now
+  bool arm(double command_written_s) noexcept TORSIO_REALTIME;
+  /// Ends a stop. Nothing moves before the proof and `arm`.
+  void reset(double t_s) noexcept TORSIO_REALTIME;
+  /// A stop from outside.
+  void stop(double t_s) noexcept TORSIO_REALTIME;
+
+  /// Call in every tick. @param sources, signals in the order of the settings; another count is
+  /// `not_finite`, a stop.
+  State step(double t_s, std::span<const Estimate> sources,
+             std::span<const SignalSample> signals) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] State state() const noexcept { return state_; }
+  [[nodiscard]] bool is_watching() const noexcept { return state_ == State::watching; }
+  /// Checks that found something in the last tick: bit (int)check.
+  [[nodiscard]] std::uint32_t active() const noexcept { return active_; }
+  /// The first finding of the last stop; `action` is off if there was none.
+  [[nodiscard]] const MonitorEvent& reason() const noexcept { return reason_; }
+  /// The most recent finding of any check, warnings included.
+  [[nodiscard]] const MonitorEvent& latest() const noexcept { return latest_; }
+  /// Pairs of sources that differ too much at present.
+  [[nodiscard]] std::span<const std::array<std::uint8_t, 2>> disagreeing() const noexcept {
+    return std::span(disagreeing_).first(disagreeing_count_);
+  }
+  [[nodiscard]] const MonitorSettings& settings() const noexcept { return settings_; }
+
+ private:
+  // see src
+};
+
+}  // namespace torsio

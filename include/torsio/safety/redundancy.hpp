@@ -1,0 +1,102 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "torsio/core/estimate.hpp"
+#include "torsio/core/realtime.hpp"
+
+namespace torsio {
+
+/// One estimate of the joint torque, and what it depends on.
+struct TorqueSource {
+  std::string name;  ///< "current", "gear", "spring"
+  /// Encoders, sensors, supply, clock, calibration: names of parts whose fault changes this estimate.
+  /// Sources that list the same name can fail together.
+  std::vector<std::string> depends_on;
+
+  template <class Self, class Visit>
+  static void visit_fields(Self& self, Visit&& visit) {
+    visit("name", self.name);
+    visit("depends_on", self.depends_on);
+  }
+};
+
+struct RedundancySettings {
+  std::vector<TorqueSource> sources;
+  /// Correlation of the sources' errors in units of their error bars, row by row; empty: none.
+  std::vector<double> correlation;
+};
+
+/// A set of sources or of parts: bit i is the i-th one.
+using SourceSet = std::uint32_t;
+using PartSet = std::uint32_t;
+
+/// The torque in which several sources are combined.
+struct FusedTorque {
+  double value_Nm = 0.0;  ///< finite in every case; the last one where no source is valid
+  double std_dev_Nm = kNotMeasured;
+  SourceSet used = 0;        ///< the valid sources
+  PartSet not_redundant = 0;  ///< parts on which every valid source depends: no comparison covers them
+  Fault fault = Fault::none;  ///< input_not_finite where no source is valid
+};
+
+/// Combines estimates of one torque by their error bars:
+///
+///     tau = w' t,  var = w' S w,  S_ij = s_i R_ij s_j
+///
+/// t the valid estimates, s their error bars at this tick, R the correlation of their errors. w are
+/// the weights >= 0 with sum 1 of the smallest variance. Since the weights are not negative, the
+/// result lies between the estimates; since a smaller set of sources has a larger minimum, the error
+/// bar never becomes narrower when a source is lost.
+///
+/// A source is left out only if it reports itself invalid: a fault, a value or an error bar that is
+/// not finite. Valid sources that disagree are all used: which of them is wrong is not decided here
+/// (`Monitor` stops the joint), since two sources with a common part can agree on a wrong torque.
+/// Source: paper 000, section 6.4, compares three estimates; the combination is ours (minimum variance,
+/// as in Maybeck 1979).
+class Redundancy {
+ public:
+  static constexpr std::size_t kMaxSources = 8;
+  static constexpr std::size_t kMaxParts = 32;
+
+  /// @throws Error for no sources or more than `kMaxSources`, names that are empty or used twice, more
+  /// than `kMaxParts` parts, or a correlation that is not a correlation matrix (size, ones on the
+  /// diagonal, symmetric, positive definite).
+  explicit Redundancy(const RedundancySettings& settings);
+
+  /// @param sources one estimate for each source; of another size, none is used
+  FusedTorque step(std::span<const Estimate> sources) noexcept TORSIO_REALTIME;
+  void reset() noexcept { last_Nm_ = 0.0; }
+
+  [[nodiscard]] const RedundancySettings& settings() const noexcept { return settings_; }
+  /// Every part that a source depends on, in the order of first appearance: bits of a `PartSet`.
+  [[nodiscard]] const std::vector<std::string>& parts() const noexcept { return parts_; }
+  [[nodiscard]] PartSet parts_of(std::size_t source) const noexcept { return parts_of_[source]; }
+  [[nodiscard]] std::vector<std::string> names(PartSet parts) const;
+
+  /// The parts of which a single fault can explain which valid sources disagree: those on which at
+  /// least one source of each disagreeing pair depends. For reports; no decision is based on it.
+  /// @param pairs the disagreeing pairs of sources
+  [[nodiscard]] PartSet suspects(
+      std::span<const std::array<std::uint8_t, 2>> pairs) const noexcept TORSIO_REALTIME;
+
+ private:
+  using Row = std::array<double, kMaxSources>;
+
+  /// The weights of the sources in `index`; those that would be negative are 0.
+  void find_weights(std::span<const std::size_t> index, const Row& std_dev_Nm,
+                    Row& weights) const noexcept;
+
+  RedundancySettings settings_;
+  std::vector<std::string> parts_;
+  std::array<PartSet, kMaxSources> parts_of_{};
+  std::array<Row, kMaxSources> correlation_{};
+  double last_Nm_ = 0.0;
+};
+
+}  // namespace torsio
