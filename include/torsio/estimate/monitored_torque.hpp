@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
 #include "torsio/estimate/any_estimator.hpp"
+#include "torsio/safety/history.hpp"
 #include "torsio/safety/monitor.hpp"
 #include "torsio/safety/redundancy.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
@@ -40,6 +42,9 @@ class MonitoredTorque {
   [[nodiscard]] Monitor& monitor() noexcept { return monitor_; }
   [[nodiscard]] const Monitor& monitor() const noexcept { return monitor_; }
   [[nodiscard]] const Redundancy& redundancy() const noexcept { return redundancy_; }
+  /// The last second, kept once the monitor has stopped; the columns are `history_columns()`.
+  [[nodiscard]] const History& history() const noexcept { return history_; }
+  [[nodiscard]] std::vector<std::string> history_columns() const;
   /// The estimates of the last step, one a source.
   [[nodiscard]] std::span<const Estimate> estimates() const noexcept { return estimates_; }
 
@@ -55,13 +60,15 @@ class MonitoredTorque {
   Redundancy redundancy_;
   Monitor monitor_;
   std::vector<std::string> raw_inputs_;
-  std::vector<Input> inputs_;          ///< of the sources
+  std::vector<Input> inputs_;  ///< of the sources
   FeaturePipeline signal_pipeline_;
   Input signal_input_;
   std::vector<std::vector<std::size_t>> signal_channels_;  ///< per signal: places in `raw`
   std::vector<double> longest_age_s_;                      ///< per channel
   std::vector<Estimate> estimates_;
   std::vector<SignalSample> signals_;
+  std::vector<double> row_;  ///< of the history
+  History history_;
 };
 
 }  // namespace torsio

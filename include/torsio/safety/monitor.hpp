@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,10 +18,10 @@ namespace torsio {
 enum class MonitorCheck : std::uint8_t {
   disagreement,     ///< two valid sources differ by more than the threshold of their pair
   drift,            ///< they differ by a little for a long time (cumulative sum)
-  sign,             ///< they have opposite signs, each beyond three of its error bars
+  sign,             ///< they have opposite signs, each beyond half the threshold of their pair
   source_lost,      ///< an input of a source is missing, stale or not a number
   source_fault,     ///< a source has inputs outside its range, or its model failed
-  redundancy_lost,  ///< fewer than two sources are valid, or all valid ones have the same sensor
+  redundancy_lost,  ///< fewer than two sources are valid
   novelty,          ///< the inputs of a source are unlike those of its training
   not_finite,       ///< a signal is NaN or infinite
   stale,            ///< a signal has not been measured for too long
@@ -71,21 +72,22 @@ struct MonitorSettings {
   /// Correlation of the sources' errors, row by row; empty: none.
   std::vector<double> correlation;
   std::array<MonitorAction, kMonitorChecks> actions = default_actions();
-  double persistence_s = 5e-3;  ///< how long a difference must exceed its threshold
-  double release_share = 0.8;   ///< below this share of the threshold, it has ended
-  double longest_loss_s = 0.5;   ///< how long a lost source is only a warning
+  double persistence_s = 5e-3;     ///< how long a difference must exceed its threshold
+  double release_share = 0.8;      ///< below this share of the threshold, it has ended
+  double longest_loss_s = 0.5;     ///< how long a lost source is only a warning
   double longest_fault_s = 0.015;  ///< how long a source may report a fault of its model or range
   double largest_novelty = std::numeric_limits<double>::infinity();
   double sample_period_s = 1e-3;
   std::uint32_t longest_overrun = 3;  ///< late ticks in a row
-  std::uint32_t spikes_in_a_row = 2;  ///< samples beyond range or rate before they are a fault: one is passed over
+  std::uint32_t spikes_in_a_row =
+      2;  ///< samples beyond range or rate before they are a fault: one is passed over
   double proof_s = 0.05;  ///< how long every check must be silent before the joint may move
 
-  /// stop, but for source_lost and novelty, which warn.
+  /// stop, but warn for source_lost (which stops after `longest_loss_s`) and novelty.
   static std::array<MonitorAction, kMonitorChecks> default_actions() noexcept;
 };
 
-/// Why a monitor stopped, in numbers; `reason_json` writes it for machines.
+/// A finding of a monitor, in numbers.
 struct MonitorEvent {
   double t_s = 0.0;
   MonitorCheck check = MonitorCheck::disagreement;
@@ -124,6 +126,7 @@ class Monitor {
  public:
   static constexpr std::size_t kMaxSources = 8;
   static constexpr std::size_t kMaxSignals = 16;
+  static constexpr std::size_t kMaxPairs = kMaxSources * (kMaxSources - 1) / 2;
 
   enum class State : std::uint8_t { unproven, ready, watching, stopped };
 
@@ -158,7 +161,64 @@ class Monitor {
   [[nodiscard]] const MonitorSettings& settings() const noexcept { return settings_; }
 
  private:
-  // see src
+  struct SignalState {
+    double last = 0.0;  ///< last sample that was not passed over
+    double last_t_s = 0.0;
+    double companion = 0.0;    ///< angle of the companion when this signal changed last
+    std::uint32_t beyond = 0;  ///< samples in a row beyond range or rate
+    bool has_last = false;
+  };
+  struct SourceState {
+    double lost_s = 0.0;
+    double faulty_s = 0.0;
+    double novel_s = 0.0;
+  };
+  struct PairState {
+    double beyond_s = 0.0;
+    double opposite_s = 0.0;
+    double drift_up_s = 0.0;
+    double drift_down_s = 0.0;
+    bool disagrees = false;
+  };
+
+  void clear() noexcept;
+  void find(const MonitorEvent& found) noexcept TORSIO_REALTIME;
+  void check_period(double t_s) noexcept TORSIO_REALTIME;
+  void check_signal(std::size_t i, std::span<const SignalSample> signals) noexcept TORSIO_REALTIME;
+  void check_change(std::size_t i, const SignalSample& sample) noexcept TORSIO_REALTIME;
+  void check_frozen(std::size_t i, std::span<const SignalSample> signals) noexcept TORSIO_REALTIME;
+  void check_source(std::size_t i, const Estimate& estimate) noexcept TORSIO_REALTIME;
+  void check_pair(std::size_t i, std::span<const Estimate> sources) noexcept TORSIO_REALTIME;
+  [[nodiscard]] double threshold(const PairLimits& pair, double first_Nm,
+                                 double second_Nm) const noexcept TORSIO_REALTIME;
+  void decide(double t_s) noexcept TORSIO_REALTIME;
+
+  MonitorSettings settings_;
+  std::array<std::uint8_t, kMaxSignals> companion_{};  ///< of a signal; its own index: none
+  std::array<SignalState, kMaxSignals> signal_states_{};
+  std::array<SourceState, kMaxSources> source_states_{};
+  std::array<PairState, kMaxPairs> pair_states_{};
+  std::array<std::array<double, kMaxSources>, kMaxSources> correlation_{};
+  std::array<std::array<std::uint8_t, 2>, kMaxPairs> disagreeing_{};
+  std::size_t disagreeing_count_ = 0;
+  State state_ = State::unproven;
+  MonitorEvent reason_;
+  MonitorEvent latest_;
+  std::uint32_t active_ = 0;
+  MonitorEvent stop_found_;  ///< the first finding of this tick that stops; `action` off: none
+  double last_t_s_ = kNotMeasured;
+  double t_s_ = 0.0;
+  std::uint32_t late_ = 0;
+  double silent_since_s_ = kNotMeasured;
+  double reset_t_s_ = -std::numeric_limits<double>::infinity();
 };
+
+/// The enumerators' own spelling.
+[[nodiscard]] std::string_view name(MonitorCheck check) noexcept;
+[[nodiscard]] std::string_view name(MonitorAction action) noexcept;
+[[nodiscard]] std::string_view name(Monitor::State state) noexcept;
+
+/// A finding as a sentence, with the names of its source or signal, value and limit. Allocates.
+[[nodiscard]] std::string describe(const MonitorEvent& event, const MonitorSettings& settings);
 
 }  // namespace torsio

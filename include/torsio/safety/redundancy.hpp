@@ -40,8 +40,9 @@ using PartSet = std::uint32_t;
 struct FusedTorque {
   double value_Nm = 0.0;  ///< finite in every case; the last one where no source is valid
   double std_dev_Nm = kNotMeasured;
-  SourceSet used = 0;        ///< the valid sources
-  PartSet not_redundant = 0;  ///< parts on which every valid source depends: no comparison covers them
+  SourceSet used = 0;  ///< the valid sources
+  PartSet not_redundant =
+      0;  ///< parts on which every valid source depends: no comparison covers them
   Fault fault = Fault::none;  ///< input_not_finite where no source is valid
 };
 
@@ -82,8 +83,8 @@ class Redundancy {
   /// The parts of which a single fault can explain which valid sources disagree: those on which at
   /// least one source of each disagreeing pair depends. For reports; no decision is based on it.
   /// @param pairs the disagreeing pairs of sources
-  [[nodiscard]] PartSet suspects(
-      std::span<const std::array<std::uint8_t, 2>> pairs) const noexcept TORSIO_REALTIME;
+  [[nodiscard]] PartSet suspects(std::span<const std::array<std::uint8_t, 2>> pairs) const noexcept
+      TORSIO_REALTIME;
 
  private:
   using Row = std::array<double, kMaxSources>;

@@ -1,0 +1,61 @@
+#include <fmt/format.h>
+
+#include "torsio/safety/monitor.hpp"
+
+namespace torsio {
+
+std::string describe(const MonitorEvent& event, const MonitorSettings& settings) {
+  const auto source = [&](std::uint8_t i) -> std::string {
+    return i < settings.sources.size() ? settings.sources[i] : "?";
+  };
+  const auto signal = [&](std::uint8_t i) -> std::string {
+    return i < settings.signals.size() ? settings.signals[i].name : "?";
+  };
+  const double value = event.value;
+  const double limit = event.limit;
+  switch (event.check) {
+    case MonitorCheck::disagreement:
+      return fmt::format("the torques of {} and {} differ by {:.3g} Nm, more than {:.3g} Nm",
+                         source(event.first), source(event.second), value, limit);
+    case MonitorCheck::drift:
+      return fmt::format(
+          "the torques of {} and {} have differed for too long: the cumulative sum is {:.3g} s, "
+          "the "
+          "limit {:.3g} s",
+          source(event.first), source(event.second), value, limit);
+    case MonitorCheck::sign:
+      return fmt::format("the torques of {} and {} have opposite signs and differ by {:.3g} Nm",
+                         source(event.first), source(event.second), value);
+    case MonitorCheck::source_lost:
+      return fmt::format("an input of the torque of {} has not been measured for {:.3g} s",
+                         source(event.first), value);
+    case MonitorCheck::source_fault:
+      return fmt::format(
+          "the torque of {} has been outside the range of its model for {:.3g} s, limit {:.3g} s",
+          source(event.first), value, limit);
+    case MonitorCheck::redundancy_lost:
+      return fmt::format("{:.0f} valid torques are left, at least {:.0f} are needed", value, limit);
+    case MonitorCheck::novelty:
+      return fmt::format("the inputs of the torque of {} have a novelty of {:.3g}, limit {:.3g}",
+                         source(event.first), value, limit);
+    case MonitorCheck::not_finite:
+      return fmt::format("{} is not a finite number", signal(event.first));
+    case MonitorCheck::stale:
+      return fmt::format("{} is {:.3g} s old, limit {:.3g} s", signal(event.first), value, limit);
+    case MonitorCheck::range:
+      return fmt::format("{} is {:.4g}, beyond {:.4g}", signal(event.first), value, limit);
+    case MonitorCheck::rate:
+      return fmt::format("{} changes by {:.3g} per second, limit {:.3g}", signal(event.first),
+                         value, limit);
+    case MonitorCheck::wrap:
+      return fmt::format("{} changed by {:.4g}, a turn of its encoder", signal(event.first), value);
+    case MonitorCheck::frozen:
+      return fmt::format("{} did not change while {} moved by {:.3g}, limit {:.3g}",
+                         signal(event.first), signal(event.second), value, limit);
+    case MonitorCheck::period:
+      return fmt::format("the loop was called after {:.3g} s, limit {:.3g} s", value, limit);
+  }
+  return {};
+}
+
+}  // namespace torsio
