@@ -102,10 +102,12 @@ void add_monitor(CLI::App& app) {
   verb->add_option(
       "--source", calibration.sources,
       "NAME=MODEL or NAME=MODEL:PART+PART: a model file that estimates the torque, and "
-      "the parts on which it depends");
+      "the parts on which it depends")
+      ->allow_extra_args(false);
   verb->add_option("--signal", calibration.signals,
                    "a channel or expression to watch, or 'A moves with B'; default: every channel "
-                   "of the sources");
+                   "of the sources")
+      ->allow_extra_args(false);
   verb->add_option("--false-alarms-per-hour", calibration.false_alarms_per_hour,
                    "wanted rate; T hours of recordings support 3 / T or more")
       ->capture_default_str();

@@ -44,7 +44,7 @@ void Bench::require_taken(Fault fault) const {
 
 Measurement Bench::sense() {
   torque_Nm_ = load_cell_torque();
-  sound_ = sensors_.step(plant_, torque_Nm_);
+  sound_ = sensors_.step(sensed(plant_), torque_Nm_);
   Measurement measured = sound_;
   faults_.apply(measured, time_s());
   return measured;

@@ -36,15 +36,22 @@ SensorSet::SensorSet(const DataSheet& sheet, double sample_rate_Hz, std::uint64_
 
 void SensorSet::reset(double torque_Nm) noexcept { torque_sensor_.reset(torque_Nm, random_); }
 
-Measurement SensorSet::step(const Plant& plant, double torque_Nm) noexcept {
-  const PlantState& state = plant.state();
+SensedPlant sensed(const Plant& plant) noexcept {
+  return {.state = plant.state(),
+          .second_twist_rad = plant.second_twist(),
+          .current_A = plant.current(),
+          .electrical = plant.electrical()};
+}
+
+Measurement SensorSet::step(const SensedPlant& plant, double torque_Nm) noexcept {
+  const PlantState& state = plant.state;
   Measurement measured;
   measured.motor_angle_rad = motor_encoder_.read(state.rotor_angle_rad, random_);
   measured.middle_angle_rad = middle_encoder_.read(state.middle_angle_rad, random_);
   measured.joint_angle_rad = joint_encoder_.read(state.joint_angle_rad, random_);
-  if (twist_sensor_) measured.twist_rad = twist_sensor_->read(plant.second_twist(), random_);
-  measured.motor_current_A = current_sensor_.read(plant.current(), random_);
-  if (const ElectricalDrive* drive = plant.electrical()) {
+  if (twist_sensor_) measured.twist_rad = twist_sensor_->read(plant.second_twist_rad, random_);
+  measured.motor_current_A = current_sensor_.read(plant.current_A, random_);
+  if (const ElectricalDrive* const drive = plant.electrical) {
     measured.motor_current_A = drive->command().current_A.q;
     measured.phase_a_current_A = drive->measured_phases().a;
     measured.phase_b_current_A = drive->measured_phases().b;

@@ -34,6 +34,15 @@ struct Measurement {
   bool is_torque_fresh = false;
 };
 
+/// What the sensors of an actuator read of its plant.
+struct SensedPlant {
+  PlantState state;
+  double second_twist_rad = 0.0;
+  double current_A = 0.0;
+  const ElectricalDrive* electrical = nullptr;  ///< null: none
+};
+[[nodiscard]] SensedPlant sensed(const Plant& plant) noexcept;
+
 /// The sensors of one actuator with their noise. A tick draws the same numbers whatever the plant
 /// does, so that equal seeds compare plants under equal noise.
 class SensorSet {
@@ -44,7 +53,7 @@ class SensorSet {
   /// Sets the load cell to the steady state at this torque. The noise sequence continues.
   void reset(double torque_Nm) noexcept;
   /// @param torque_Nm torque at the load cell
-  Measurement step(const Plant& plant, double torque_Nm) noexcept;
+  Measurement step(const SensedPlant& plant, double torque_Nm) noexcept;
 
  private:
   Random random_;

@@ -57,7 +57,7 @@ void expect_encoder_errors(const DataSheet& sheet) {
     plant.reset(PlantState{.rotor_angle_rad = 2.0 * random.uniform() - 1.0,
                            .middle_angle_rad = 2.0 * random.uniform() - 1.0,
                            .joint_angle_rad = 2.0 * random.uniform() - 1.0});
-    const Measurement measured = sensors.step(plant, 0.0);
+    const Measurement measured = sensors.step(sensed(plant), 0.0);
     for (std::size_t k = 0; k < encoders().size(); ++k)
       errors_rad[k].push_back(measured.*encoders()[k].estimated_rad -
                               encoders()[k].truth_rad(plant));
@@ -95,7 +95,7 @@ TEST(SensorSet, LoadCellAndCurrentSensorHaveTheirNoiseOnEverySheet) {
     std::vector<double> torques_Nm;
     std::vector<double> currents_A;
     for (int i = 0; i < kReadings; ++i) {
-      const Measurement measured = sensors.step(plant, torque_Nm);
+      const Measurement measured = sensors.step(sensed(plant), torque_Nm);
       currents_A.push_back(measured.motor_current_A);
       if (measured.is_torque_fresh) torques_Nm.push_back(measured.torque_Nm);
     }
@@ -135,7 +135,7 @@ TEST(SensorSet, LoadCellIsLateByItsLatencyOnEverySheet) {
     Random random(6);
     for (int i = 0; i < 20000; ++i) {
       truth.push_back(sheet.rating.torque_Nm.value * random.normal());
-      measured.push_back(sensors.step(plant, truth.back()));
+      measured.push_back(sensors.step(sensed(plant), truth.back()));
     }
     const auto expected_lag =
         static_cast<std::size_t>(std::lround(kRate_Hz * sheet.sensors.torque_latency_s.value));

@@ -88,7 +88,7 @@ TrackingError chirp_error_with_sweep_line(const char* actuator, double amplitude
   std::vector<double> torque;
   for (const double wanted_Nm : wanted) {
     torque.push_back(plant.torques().joint_Nm);
-    const Measurement measured = sensors.step(plant, torque.back());
+    const Measurement measured = sensors.step(sensed(plant), torque.back());
     const double wanted_rad = rad_from_deg((wanted_Nm - line.intercept) / line.slope);
     const double deflection_rad = measured.middle_angle_rad - measured.joint_angle_rad;
     EXPECT_EQ(plant.step({.current_A = loop.step(wanted_rad, deflection_rad)}, locked, 1e-3),

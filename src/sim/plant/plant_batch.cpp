@@ -89,5 +89,8 @@ PlantTorques PlantBatch::torques(std::size_t plant) const noexcept {
   return lanes_->torques(plant);
 }
 double PlantBatch::current(std::size_t plant) const noexcept { return lanes_->current(plant); }
+double PlantBatch::second_twist(std::size_t plant) const noexcept {
+  return lanes_->second_twist(plant);
+}
 
 }  // namespace torsio

@@ -63,6 +63,8 @@ class PlantBatch {
   [[nodiscard]] PlantState state(std::size_t plant) const noexcept;
   [[nodiscard]] PlantTorques torques(std::size_t plant) const noexcept;
   [[nodiscard]] double current(std::size_t plant) const noexcept;  ///< [A]
+  /// @returns twist [rad] of the second stage in the last step
+  [[nodiscard]] double second_twist(std::size_t plant) const noexcept;
   /// @returns what the last step made of one plant's input
   [[nodiscard]] Fault fault(std::size_t plant) const noexcept { return faults_[plant]; }
 

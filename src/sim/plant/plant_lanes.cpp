@@ -314,4 +314,10 @@ double PlantLanes::current(std::size_t at) const noexcept {
   });
 }
 
+double PlantLanes::second_twist(std::size_t at) const noexcept {
+  return detail::dispatch(blocks_, [&](const auto& blocks) {
+    return lane_of(at)(block_of(blocks, at).second.twist_rad);
+  });
+}
+
 }  // namespace torsio

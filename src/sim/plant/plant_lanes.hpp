@@ -34,6 +34,7 @@ class PlantLanes {
   [[nodiscard]] PlantState state(std::size_t at) const noexcept;
   [[nodiscard]] PlantTorques torques(std::size_t at) const noexcept;
   [[nodiscard]] double current(std::size_t at) const noexcept;
+  [[nodiscard]] double second_twist(std::size_t at) const noexcept;
 
  private:
   PlantBlocks blocks_;

@@ -1,4 +1,4 @@
-#include "torsio/sim/torque_sources.hpp"
+#include "torsio/sim/campaign/torque_sources.hpp"
 
 #include <fmt/format.h>
 
