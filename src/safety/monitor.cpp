@@ -244,7 +244,7 @@ void Monitor::check_change(std::size_t i, const SignalSample& sample) noexcept {
 void Monitor::check_frozen(std::size_t i) noexcept {
   const std::size_t companion = companion_[i];
   SignalState& state = signal_states_[i];
-  // A spike of either signal is no motion: only samples that were not passed over count.
+  // A spike of either signal is not a motion: only samples that were not passed over count.
   if (companion == i || !signal_states_[companion].has_last) return;
   const double other = signal_states_[companion].last;
   if (std::isnan(state.companion)) state.companion = other;

@@ -494,7 +494,7 @@ TEST(Monitor, StopsOnASignalThatIsFrozenWhileItsCompanionMoves) {
   }
 }
 
-TEST(Monitor, NothingIsFrozenAtStandstill) {
+TEST(Monitor, NothingIsFrozenAtRest) {
   Loop loop;
   loop.signals[0].value = 40.0;
   loop.signals[1].value = 0.3;
@@ -876,7 +876,7 @@ TEST(Monitor, StopsOnASmallDifferenceThatLasts) {
   for (const double sign : {1.0, -1.0}) {
     Loop loop(with_drift());
     loop.start();
-    loop.sources[0].value = 0.75 * sign;  // 0.5 ms a tick beyond the allowance
+    loop.sources[0].value = 0.75 * sign;  // 0.5 ms per tick beyond the allowance
     EXPECT_EQ(loop.ticks_to_stop(), 101);
     EXPECT_EQ(loop.reason(), MonitorCheck::drift);
     EXPECT_EQ(loop.monitor.reason().first, 0);
@@ -929,7 +929,7 @@ TEST(Monitor, TheSumOfADriftIsKeptOverALossAndLimited) {
   EXPECT_EQ(loop.monitor.active(), 0U);
 }
 
-// Error bars whose squares are 0: no threshold, and 0 / 0 is no drift.
+// Error bars whose squares are 0: no threshold, and 0 / 0 is not a drift.
 TEST(Monitor, ComparesSourcesWithoutAThreshold) {
   MonitorSettings settings = with_drift();
   settings.pairs[0].floor_Nm = 0.0;
@@ -945,7 +945,7 @@ TEST(Monitor, ComparesSourcesWithoutAThreshold) {
 // --- the clock ----------------------------------------------------------------------------------
 
 // docs/faults.md 27
-TEST(Monitor, StopsWhereTheClockStandsRunsBackwardsOrIsNone) {
+TEST(Monitor, StopsWhereTheClockPausesRunsBackwardsOrIsNaN) {
   for (const double period_s : {0.0, -1e-3, -50.0, kNaN, kInfinity}) {
     Loop loop;
     loop.start();

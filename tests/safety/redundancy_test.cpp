@@ -236,7 +236,8 @@ TEST(Redundancy, RefusesAnotherNumberOfEstimates) {
   }
 }
 
-// The squares of 1e-200 and 1e200 are no numbers; a ratio of 1e12 once had a weight that widened the bar.
+// The squares of 1e-200 and 1e200 are 0 and infinite; a source with a ratio of 1e12 once had a weight
+// that widened the error bar.
 TEST(Redundancy, TakesErrorBarsOfAnySize) {
   Redundancy redundancy(three_sources());
   for (const double scale : {1e-300, 1e-200, 1.0, 1e200, 1e307}) {
@@ -252,7 +253,7 @@ TEST(Redundancy, TakesErrorBarsOfAnySize) {
     EXPECT_NEAR(fused.std_dev_Nm, 1.0, 1e-12) << ratio;
     EXPECT_EQ(fused.used, 0b111U);
   }
-  // 10^100 times the smallest bar still has a weight, of 10^-200.
+  // 10^100 times the smallest error bar still has a weight, of 10^-200.
   const auto value_at = [&](double ratio) {
     return redundancy.step(std::array{torque(1e200, ratio), torque(0.0, 1.0), torque(0.0, 1e200)})
         .value_Nm;

@@ -63,14 +63,14 @@ class MonitoredTorque {
   Redundancy redundancy_;
   Monitor monitor_;
   std::vector<std::string> raw_inputs_;
-  std::vector<Input> inputs_;  ///< of the sources
+  std::vector<Input> inputs_;  ///< one for each source
   FeaturePipeline signal_pipeline_;
   Input signal_input_;
   std::vector<std::vector<std::size_t>> signal_channels_;  ///< per signal: places in `raw`
   std::vector<double> longest_age_s_;                      ///< per channel
   std::vector<Estimate> estimates_;
   std::vector<SignalSample> signals_;
-  std::vector<double> row_;  ///< of the history
+  std::vector<double> row_;  ///< for the history
   History history_;
 };
 

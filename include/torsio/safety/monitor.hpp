@@ -59,7 +59,7 @@ struct PairLimits {
   double factor = 6.0;
   double floor_Nm = 0.0;
   double ceiling_Nm = std::numeric_limits<double>::infinity();
-  /// Of the cumulative sum: the share of the threshold that is not counted, and the sum in seconds
+  /// For the cumulative sum: the share of the threshold that is not counted, and the sum in seconds
   /// times threshold at which it reports.
   double drift_allowance = 0.75;
   double drift_limit_s = std::numeric_limits<double>::infinity();
@@ -95,7 +95,7 @@ struct MonitorEvent {
   MonitorCheck check = MonitorCheck::disagreement;
   MonitorAction action = MonitorAction::off;
   std::uint8_t first = 0;   ///< index of the source or signal
-  std::uint8_t second = 0;  ///< of the other source of a pair; else equal to `first`
+  std::uint8_t second = 0;  ///< the other source of a pair, else equal to `first`
   double value = 0.0;       ///< what was found, and its limit
   double limit = 0.0;
 };
@@ -112,8 +112,8 @@ struct SignalSample {
 ///     watching  --a check whose action is stop-->  stopped  --reset-->  unproven
 ///
 /// A stop is latched: only `reset` ends it, and the joint may move again after the proof and `arm`
-/// with a command that was written after the reset. Valid sources that disagree stop the joint; there
-/// is no vote. Only `is_watching()` permits torque; what a stop does is a matter of `JointStop` and of
+/// with a command that was written after the reset. Valid sources that disagree stop the joint,
+/// without a vote. Only `is_watching()` permits torque; what a stop does is a matter of `JointStop` and of
 /// the brake.
 ///
 /// - disagreement: |t_i - t_j| > clamp(factor sqrt(s_i^2 + s_j^2 - 2 R_ij s_i s_j), floor, ceiling) =: h for
@@ -199,7 +199,7 @@ class Monitor {
   void decide(double t_s) noexcept TORSIO_REALTIME;
 
   MonitorSettings settings_;
-  std::array<std::uint8_t, kMaxSignals> companion_{};  ///< of a signal; its own index: none
+  std::array<std::uint8_t, kMaxSignals> companion_{};  ///< one for each signal; its own index: none
   std::array<SignalState, kMaxSignals> signal_states_{};
   std::array<SourceState, kMaxSources> source_states_{};
   std::array<PairState, kMaxPairs> pair_states_{};

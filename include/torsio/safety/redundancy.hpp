@@ -52,9 +52,9 @@ struct FusedTorque {
 ///
 /// t the valid estimates, s their error bars at this tick, R the correlation of their errors. w are
 /// the weights >= 0 with sum 1 of the smallest variance. Since the weights are not negative, the
-/// result lies between the estimates; since a smaller set of sources has a larger minimum, the error
-/// bar never becomes narrower when a source is lost. A source whose error bar is more than 10^100 times
-/// the smallest one has no weight.
+/// result lies between the estimates; since a smaller set of sources has a larger minimum, the
+/// error bar never becomes narrower when a source is lost. A source whose error bar is more than 10^100
+/// times the smallest one has no weight.
 ///
 /// A source is left out only if it reports itself invalid: a fault, a value that is not finite, an
 /// error bar that is not finite or not positive. Valid sources that disagree are all used: which of them is wrong is not decided here
