@@ -15,7 +15,7 @@ namespace {
 
 void require_positive(double value, const char* name) {
   if (value > 0.0 && std::isfinite(value)) return;
-  throw Error({.place = fmt::format("friction filter: {}", name),
+  throw Error({.place = fmt::format("torque sources: {}", name),
                .expected = "a positive number",
                .found = fmt::format("{}", value)});
 }
@@ -38,7 +38,7 @@ FrictionFilter::FrictionFilter(const Settings& settings, double sample_rate_Hz)
   require_positive(sample_rate_Hz, "sample rate");
   if (!(settings.lowest > 0.0 && settings.lowest < 1.0 && settings.highest > 1.0 &&
         std::isfinite(settings.highest)))
-    throw Error({.place = "friction filter",
+    throw Error({.place = "torque sources: friction",
                  .expected = "bounds above 0 that contain 1",
                  .found = fmt::format("{} to {}", settings.lowest, settings.highest)});
   samples_ = std::max(1.0, settings.correlation_s * sample_rate_Hz);
@@ -95,7 +95,11 @@ TorqueSources::TorqueSources(std::vector<SourceModel> sources) : estimates_(sour
   if (sources.empty())
     throw Error({.place = "torque sources", .expected = "at least one model", .found = "none"});
   for (SourceModel& model : sources) {
-    Source source{.torque = fed(std::move(model.torque)), .friction = {}, .filter = {}};
+    require_positive(model.error_bar_factor, "error_bar_factor");
+    Source source{.torque = fed(std::move(model.torque)),
+                  .friction = {},
+                  .filter = {},
+                  .error_bar_factor = model.error_bar_factor};
     if (model.friction) {
       source.friction = fed(std::move(*model.friction));
       source.filter = FrictionFilter({}, sample_rate_Hz_);
@@ -134,6 +138,7 @@ std::span<const Estimate> TorqueSources::step(std::span<const double> raw) noexc
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     Source& source = sources_[i];
     Estimate estimate = source.torque.step(raw);
+    estimate.std_dev *= source.error_bar_factor;
     if (source.friction) {
       const Estimate friction = source.friction->step(raw);
       source.without_friction = estimate;
@@ -154,7 +159,8 @@ void TorqueSources::adapt(std::size_t source) noexcept {
   double weights = 0.0;
   double sum_Nm = 0.0;
   for (std::size_t i = 0; i < estimates_.size(); ++i) {
-    if (i == source || estimates_[i].fault != Fault::none || !(estimates_[i].std_dev > 0.0)) continue;
+    if (i == source || estimates_[i].fault != Fault::none || !(estimates_[i].std_dev > 0.0))
+      continue;
     const double weight = 1.0 / (estimates_[i].std_dev * estimates_[i].std_dev);
     weights += weight;
     sum_Nm += weight * estimates_[i].value;

@@ -57,11 +57,14 @@ class FrictionFilter {
 struct SourceModel {
   Estimator torque;
   std::optional<Estimator> friction = {};
+  /// The error bar of the models is multiplied by this, from recordings at work.
+  double error_bar_factor = 1.0;
 };
 
 /// Several estimates of one torque from one row of channels.
 ///
-/// A source with friction gives t + phi f with the variance s² + var(phi) f²; phi follows the mean of the
+/// A source with friction gives t + phi f with the variance c² s² + var(phi) f², c the factor of its error
+/// bar; phi follows the mean of the
 /// other valid sources (weights 1 / variance).
 class TorqueSources {
  public:
@@ -97,6 +100,7 @@ class TorqueSources {
     Fed torque;
     std::optional<Fed> friction;
     std::optional<FrictionFilter> filter;
+    double error_bar_factor = 1.0;
     Estimate without_friction = {};
     double friction_Nm = 0.0;
   };

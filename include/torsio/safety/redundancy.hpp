@@ -18,12 +18,6 @@ struct TorqueSource {
   /// Encoders, sensors, supply, clock, calibration: names of parts whose fault changes this estimate.
   /// Sources that list the same name can fail together.
   std::vector<std::string> depends_on;
-
-  template <class Self, class Visit>
-  static void visit_fields(Self& self, Visit&& visit) {
-    visit("name", self.name);
-    visit("depends_on", self.depends_on);
-  }
 };
 
 struct RedundancySettings {
