@@ -41,7 +41,9 @@ struct TwoTorques {
   }
   [[nodiscard]] static MonitorPlan plan() {
     return {.sources = {{"spring", {"encoder", "clock"}}, {"current", {"current_sensor", "clock"}}},
-            .signals = {{.name = "spring_deflection_rad"}, {.name = "motor_current_A"}}};
+            .signals = {
+                {.name = "spring_deflection_rad"},
+                {.name = "motor_current_A", .lowest = -9.0, .highest = 9.0, .largest_rate = 1e5}}};
   }
   /// A torque of 5 Nm at 1 Hz. @param gain of the current sensor from `fault_s` on
   [[nodiscard]] static Recording recording(double duration_s, std::uint64_t seed, double gain = 1.0,

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
@@ -28,15 +29,22 @@ std::string speed(const std::string& angle) {
 }
 std::string acceleration(const std::string& angle) { return fmt::format("rate({})", speed(angle)); }
 
+double encoder_step(const SheetValue& bits) { return kTurn_rad / std::exp2(bits.value); }
+
 /// Dry friction of a body that is driven at this angle, a part of it in proportion to the load: Dahl's with
-/// distances around that of the presliding, which the load lengthens.
-Expressions friction(const std::string& angle, double sliding_rad, const std::string& load) {
+/// distances around that of the presliding, which the load lengthens. The noise of the encoder is no motion:
+/// a play of some of its steps takes it away.
+Expressions friction(const std::string& angle, double sliding_rad, const std::string& load,
+                     double encoder_step_rad) {
   Expressions terms;
+  const std::string moved = fmt::format("{0} - stop({0}, {1:.6g})", angle, 2.5 * encoder_step_rad);
   for (const double share : {0.5, 1.0, 2.0}) {
-    const std::string state = fmt::format("dahl({}, {:.6g})", angle, share * sliding_rad);
+    const std::string state = fmt::format("dahl({}, {:.6g})", moved, share * sliding_rad);
     terms.push_back(delayed(state));
     terms.push_back(delayed(fmt::format("{} * abs({})", state, load)));
   }
+  // The load is what is left of the drive's torque: less where friction acts against it.
+  terms.push_back(delayed(fmt::format("dahl({}, {:.6g})^2 * {}", moved, sliding_rad, load)));
   terms.push_back(delayed(fmt::format("tanh(rate({}) / 3)", angle)));
   terms.push_back(speed(angle));
   return terms;
@@ -119,7 +127,9 @@ MonitorRecipe series_elastic(const DataSheet& sheet) {
   recipe.sources.push_back(
       drive({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
             {delayed(current), acceleration(motor)},
-            friction(motor, sheet.friction.bristle_rad.value, current), {}));
+            friction(motor, sheet.friction.bristle_rad.value, current,
+                     encoder_step(sheet.sensors.motor_encoder_bits)),
+            {}));
   recipe.sources.push_back(
       gear({"gear", {"motor_encoder", "gear_encoder", "gear"}}, twist, break_away_rad, motor));
   recipe.sources.push_back(spring({"spring", {"gear_encoder", "joint_encoder", "spring"}},
@@ -144,18 +154,19 @@ MonitorRecipe harmonic_drive(const DataSheet& sheet) {
   const ChannelDefinition twist{
       "gear_twist_rad", fmt::format("{} / {} - joint_angle_rad", wave, strain_wave.ratio.value)};
   const double sliding_rad = sheet.friction.bristle_rad.value;
+  const double wave_step_rad = encoder_step(sheet.sensors.middle_encoder_bits);
   MonitorRecipe recipe;
   recipe.sources.push_back(
       drive({"current",
              {"current_sensor", "motor_encoder", "wave_encoder", "torque_constant", "friction"}},
             {delayed(torque), acceleration(motor), acceleration(wave), speed(motor)},
-            friction(wave, sliding_rad, torque), {}));
+            friction(wave, sliding_rad, torque, wave_step_rad), {}));
   recipe.sources.push_back(gear({"gear", {"wave_encoder", "joint_encoder", "gear"}}, twist,
                                 strain_wave.break_away_rad.value, wave));
   recipe.sources.push_back(
       drive({"spring", {"motor_encoder", "wave_encoder", "spring", "friction"}},
             {delayed(tube.name), rate_of(tube.name), acceleration(wave)},
-            friction(wave, sliding_rad, tube.name), {tube}));
+            friction(wave, sliding_rad, tube.name, wave_step_rad), {tube}));
   recipe.plan.signals = {
       encoder(motor, wave), encoder(wave, motor),      encoder("joint_angle_rad", wave),
       {.name = torque},     {.name = tube.expression}, {.name = twist.expression}};
@@ -170,7 +181,9 @@ MonitorRecipe elastomer(const DataSheet& sheet) {
   recipe.sources.push_back(
       drive({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
             {delayed(current), acceleration(motor)},
-            friction(motor, sheet.friction.bristle_rad.value, current), {}));
+            friction(motor, sheet.friction.bristle_rad.value, current,
+                     encoder_step(sheet.sensors.motor_encoder_bits)),
+            {}));
   recipe.sources.push_back(spring({"spring", {"twist_sensor", "spring"}}, twist, ""));
   recipe.plan.signals = {encoder(motor), {.name = twist}, {.name = current}};
   return recipe;
@@ -185,7 +198,9 @@ MonitorRecipe rubber_clutch(const DataSheet& sheet) {
   recipe.sources.push_back(
       drive({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
             {delayed(current), acceleration(input)},
-            friction(input, sheet.friction.bristle_rad.value / ratio, current), {}));
+            friction(input, sheet.friction.bristle_rad.value / ratio, current,
+                     encoder_step(sheet.sensors.motor_encoder_bits) / ratio),
+            {}));
   recipe.sources.push_back(spring({"spring", {"motor_encoder", "joint_encoder", "spring"}},
                                   deflection.name, "joint_angle_rad", {deflection}));
   recipe.plan.signals = {encoder(input, "joint_angle_rad"),

@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "support/error_message.hpp"
@@ -131,9 +133,16 @@ TEST(CalibrateMonitor, RefusesWhatItCannotUse) {
 
 TEST(ReplayMonitor, ReportsARecordingThatItCannotArm) {
   const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
-  const MonitorReplay replay =
-      replay_monitor(monitored(monitor), TwoTorques::recording(5.0, 5, 2.0, 0.0));
-  EXPECT_FALSE(replay.watching_from_s < 0.2) << "a wrong gain never looks sound for long";
+  Recording without_spring("log", 1000.0);
+  const Recording sound = TwoTorques::recording(5.0, 5);
+  for (Channel channel : sound.channels()) {
+    if (channel.name == "spring_deflection_rad") std::ranges::fill(channel.values, kNotMeasured);
+    without_spring.add(std::move(channel));
+  }
+  const MonitorReplay replay = replay_monitor(monitored(monitor), without_spring);
+  EXPECT_TRUE(std::isnan(replay.watching_from_s));
+  EXPECT_TRUE(replay.events.empty());
+  EXPECT_THAT(replays_text({replay}, monitor.monitor), HasSubstr("was never armed"));
   Recording slow("slow", 500.0);
   slow.add({.name = "spring_deflection_rad", .values = {0.0}});
   EXPECT_THAT(
