@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+
+/// The flags of `torsio monitor --calibrate`.
+struct CalibrateFlags {
+  std::vector<std::string> sources;  ///< NAME=MODEL:PART+PART
+  std::vector<std::string> signals;
+  std::string output;
+  std::string device_serial;
+  std::string valid_until;
+  double false_alarms_per_hour = 1.0;
+  bool extrapolate = false;
+};
+
+/// Writes a monitor file from fault-free recordings.
+void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json);

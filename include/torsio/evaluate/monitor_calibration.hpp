@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/safety/monitor.hpp"
+#include "torsio/safety/redundancy.hpp"
+
+namespace torsio {
+
+/// What a monitor is to watch. Limits of a signal that are not set (infinite) come from the data.
+struct MonitorPlan {
+  std::vector<TorqueSource> sources;     ///< in the order of their estimators
+  std::vector<MonitoredSignal> signals;  ///< expressions of channels
+};
+
+struct CalibrationOptions {
+  /// The wanted rate of false alarms of all pairs of sources together.
+  double false_alarms_per_hour = 1.0;
+  /// T hours without a fault support no rate below 3 / T (95 %). A smaller one is refused, or, with
+  /// this, extrapolated from the tail of the differences and labelled so.
+  bool extrapolate = false;
+};
+
+/// The limits of one pair of sources, in words of the data.
+struct CalibratedPair {
+  std::string first;
+  std::string second;
+  double largest_difference_Nm = 0.0;  ///< in the fault-free recordings
+  double typical_threshold_Nm = 0.0;   ///< median over the recordings
+  /// A fault that changes the difference by this is found in any of the recorded states, even where
+  /// the fault-free difference has the opposite sign: largest difference and largest threshold.
+  double surely_detected_Nm = 0.0;
+};
+
+struct CalibratedMonitor {
+  RedundancySettings redundancy;
+  MonitorSettings monitor;
+  std::vector<CalibratedPair> pairs;
+  std::vector<double> guarded_share;  ///< per source: share of the samples with a fault
+  double hours = 0.0;                 ///< of fault-free recordings
+  double false_alarms_per_hour = 0.0;
+  bool is_extrapolated = false;
+};
+
+/// The limits of a monitor from fault-free recordings of the joint.
+///
+/// - Pair of sources: with d the difference and s its standard deviation from the error bars, h =
+///   max(floor, factor s). The floor comes from |d| where s is below its median, the factor from |d| / s
+///   where it is above. Of each statistic, reduced to what persists for `persistence_s`, the maxima of
+///   blocks of 10 s above their 90 % quantile u have an exponential tail of mean b; the threshold is
+///   u + b ln(rate above u / wanted rate), and at least 1.05 times the largest one observed.
+/// - Correlation of the sources' errors: where the recordings have the measured torque.
+/// - Signals: range with a tenth of its width on either side; 1.5 times the largest rate; 1.5 times the
+///   longest gap between fresh samples (at least a sample); twice the longest travel of a companion
+///   without a change.
+/// - Drift: what is allowed is 1.2 times the largest mean of |d| / h over a minute, at least half.
+///
+/// The sum over checks of signals is not part of the wanted rate: their limits have margins instead.
+/// Form: ours; exponential tails: Pickands 1975 with shape 0.
+/// @throws Error if the recordings lack a channel, are shorter than ten blocks, cannot support the
+/// wanted rate, or if a source has a fault in more than 1 % of the samples; UsageError for a rate that
+/// is not positive; Cancelled.
+[[nodiscard]] CalibratedMonitor calibrate_monitor(const std::vector<Estimator>& sources,
+                                                  const MonitorPlan& plan,
+                                                  const Dataset& fault_free,
+                                                  const CalibrationOptions& options = {},
+                                                  const Progress& progress = {});
+
+}  // namespace torsio

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/data/recording.hpp"
+#include "torsio/estimate/monitored_torque.hpp"
+#include "torsio/evaluate/estimate_recording.hpp"
+
+namespace torsio {
+
+/// What a monitor reports over a recording.
+struct MonitorReplay {
+  /// The raw inputs, the combined torque ("estimated_torque_Nm") with its error bar, the torque of each
+  /// source ("current_torque_Nm"), and the state of the monitor (0 unproven, 1 ready, 2 watching, 3
+  /// stopped: "monitor_state_1").
+  EstimatedRecording estimated;
+  double watching_from_s = kNotMeasured;  ///< NaN: the proof was never complete
+  double stopped_at_s = kNotMeasured;     ///< NaN: it did not stop
+  /// Each finding at its begin, in the order of time; after the stop none.
+  std::vector<MonitorEvent> events = {};
+  std::vector<std::string>
+      suspects;  ///< parts of which one fault explains the disagreement at the stop
+};
+
+/// Streams the recording through sources, redundancy and monitor from `reset()`, as a loop would. The
+/// monitor is armed as soon as it is ready.
+/// @throws Error if a channel is missing or the recording has another sample rate; Cancelled.
+[[nodiscard]] MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recording,
+                                           const Progress& progress = {});
+
+}  // namespace torsio

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "torsio/evaluate/monitor_calibration.hpp"
+#include "torsio/evaluate/monitor_replay.hpp"
+
+namespace torsio {
+
+/// The limits of a calibrated monitor: a row for each pair of sources, and what they rest on.
+[[nodiscard]] std::string calibration_text(const CalibratedMonitor& calibrated);
+[[nodiscard]] std::string calibration_json(const CalibratedMonitor& calibrated);
+
+/// What was found when, one line a finding, and a plot of the torques for a recording that stopped.
+[[nodiscard]] std::string replays_text(const std::vector<MonitorReplay>& replays,
+                                       const MonitorSettings& settings);
+[[nodiscard]] std::string replays_json(const std::vector<MonitorReplay>& replays,
+                                       const MonitorSettings& settings);
+/// The torque of every source and the combined one over time, as an SVG picture.
+[[nodiscard]] std::string replay_svg(const MonitorReplay& replay, const MonitorSettings& settings);
+
+}  // namespace torsio

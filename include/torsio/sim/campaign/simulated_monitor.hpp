@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/estimate/monitored_torque.hpp"
+#include "torsio/evaluate/monitor_calibration.hpp"
+#include "torsio/files/model_file.hpp"
+
+namespace torsio {
+
+/// How the monitor of a simulated joint is calibrated, as on a real one: recordings at work instead of
+/// the truth.
+struct SimulatedCalibration {
+  std::uint64_t seed = 1000;
+  double training_s = 1200.0;     ///< of each training recording, with the torque of a load cell
+  double fault_free_hours = 3.2;  ///< for the thresholds
+  double false_alarms_per_hour = 1e-4;
+  /// Specimen whose spring was calibrated; the joint's own is another one, or has another variant.
+  unsigned spring_serial = 3;
+};
+
+/// Sources, their models and the limits of their monitor.
+struct SimulatedMonitor {
+  std::vector<ModelFile> models;
+  CalibratedMonitor calibrated;
+
+  [[nodiscard]] MonitoredTorque monitored() const;
+};
+
+/// Trains the sources of the joint on recordings at work (`duty_recording`), the spring on those of
+/// another specimen, with error bars from recordings of this one at other temperatures, and chooses
+/// the thresholds from further recordings. @throws Error, Cancelled.
+[[nodiscard]] SimulatedMonitor calibrate_simulated(const DataSheet& joint,
+                                                   const SimulatedCalibration& settings = {},
+                                                   const Progress& progress = {});
+
+}  // namespace torsio

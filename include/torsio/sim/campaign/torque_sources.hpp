@@ -1,0 +1,50 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/evaluate/monitor_calibration.hpp"
+#include "torsio/fit/train_model.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+
+/// How one estimate of an actuator's torque is made.
+struct SourceRecipe {
+  TorqueSource source;
+  std::string family;
+  std::map<std::string, std::string> options;
+  FeatureSpec features;
+  /// Of a gear: the name of its twist among the definitions, and the angle of its input. The kinematic
+  /// error over that angle is fitted first and added to the twist, so that its hysteresis is one of
+  /// the twist that makes torque.
+  std::string gear_twist = {};
+  std::string gear_input = {};
+};
+
+/// The estimates of an actuator's torque that its sensors permit, and the signals to watch.
+///
+/// - current: N k_t i on the motor side, minus inertia and friction (presliding, load-dependent, viscous)
+///   of what is between motor and load;
+/// - gear: the twist of the gear's stiffness with its hysteresis, damping and kinematic error;
+/// - spring: a learned model of the deflection (`grey_box`).
+///
+/// All have the same delay: every input passes a 100 Hz low-pass and the sample that two differences
+/// cost. Each then estimates the torque on the load side of the elastic element.
+struct MonitorRecipe {
+  std::vector<SourceRecipe> sources;
+  MonitorPlan plan;
+};
+[[nodiscard]] MonitorRecipe monitor_recipe(const DataSheet& sheet);
+
+/// @param dataset the torque of a load cell, in records with the role train; records with the role
+/// validation give the error bar
+/// @throws Error as `train_model`
+[[nodiscard]] TrainedModel fit_source(const SourceRecipe& recipe, const Dataset& dataset,
+                                      const Progress& progress = {});
+
+}  // namespace torsio

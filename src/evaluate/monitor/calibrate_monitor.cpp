@@ -1,0 +1,388 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "core/report_progress.hpp"
+#include "evaluate/monitor/exceedance.hpp"
+#include "evaluate/monitor/source_run.hpp"
+#include "numerics/quantile.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/evaluate/monitor_calibration.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kBlock_s = 10.0;
+constexpr std::size_t kLeastBlocks = 10;
+constexpr double kSecondsPerHour = 3600.0;
+constexpr double kLargestGuardedShare = 0.01;
+constexpr double kDriftWindow_s = 60.0;
+/// The correlation is known only from a finite record: it is taken a little towards none.
+constexpr double kCorrelationShare = 0.95;
+
+std::size_t samples_of(double seconds, double rate_Hz) {
+  return static_cast<std::size_t>(std::ceil(seconds * rate_Hz - 1e-9));
+}
+
+/// The correlation of the errors in units of their error bars, where the torque was measured.
+class ErrorCorrelation {
+ public:
+  explicit ErrorCorrelation(std::size_t sources) : sources_(sources), sums_(sources * sources) {}
+
+  void add(const std::vector<SourceRun>& runs, std::span<const double> measured_Nm) {
+    std::vector<double> errors(sources_);
+    for (std::size_t n = 0; n < measured_Nm.size(); ++n) {
+      bool is_usable = std::isfinite(measured_Nm[n]);
+      for (std::size_t i = 0; i < sources_ && is_usable; ++i) {
+        is_usable = runs[i].is_valid(n);
+        errors[i] = (runs[i].value_Nm[n] - measured_Nm[n]) / runs[i].std_dev_Nm[n];
+      }
+      if (!is_usable) continue;
+      for (std::size_t i = 0; i < sources_; ++i)
+        for (std::size_t j = 0; j < sources_; ++j) sums_[i * sources_ + j] += errors[i] * errors[j];
+      ++samples_;
+    }
+  }
+
+  [[nodiscard]] std::vector<double> rows() const {
+    if (samples_ == 0) return {};
+    std::vector<double> rows(sums_.size(), 1.0);
+    for (std::size_t i = 0; i < sources_; ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        const double length = std::sqrt(sums_[i * sources_ + i] * sums_[j * sources_ + j]);
+        const double correlation =
+            length > 0.0 ? kCorrelationShare * sums_[i * sources_ + j] / length : 0.0;
+        rows[i * sources_ + j] = rows[j * sources_ + i] = correlation;
+      }
+    return rows;
+  }
+
+ private:
+  std::size_t sources_;
+  std::size_t samples_ = 0;
+  std::vector<double> sums_;
+};
+
+/// The differences of two sources in the recordings.
+class PairStatistics {
+ public:
+  PairStatistics(PairLimits pair, double correlation, double rate_Hz, double persistence_s)
+      : pair_(pair),
+        correlation_(correlation),
+        window_(samples_of(persistence_s, rate_Hz)),
+        small_(samples_of(kBlock_s, rate_Hz)),
+        large_(samples_of(kBlock_s, rate_Hz)) {}
+
+  void see_spread(const std::vector<SourceRun>& runs) {
+    constexpr std::size_t kEvery = 97;  // the median needs no more
+    for (std::size_t n = 0; n < runs[0].value_Nm.size(); n += kEvery)
+      if (runs[pair_.first].is_valid(n) && runs[pair_.second].is_valid(n))
+        spreads_.push_back(spread(runs, n));
+  }
+
+  void see_differences(const std::vector<SourceRun>& runs) {
+    if (std::isnan(median_Nm_)) median_Nm_ = quantile(spreads_, 0.5);
+    const std::size_t samples = runs[0].value_Nm.size();
+    std::vector<double> small(samples, kNotMeasured);
+    std::vector<double> large(samples, kNotMeasured);
+    for (std::size_t n = 0; n < samples; ++n) {
+      if (!runs[pair_.first].is_valid(n) || !runs[pair_.second].is_valid(n)) continue;
+      const double size_Nm = std::abs(difference(runs, n));
+      const double spread_Nm = spread(runs, n);
+      (spread_Nm <= median_Nm_ ? small : large)[n] =
+          spread_Nm <= median_Nm_ ? size_Nm : size_Nm / spread_Nm;
+      largest_Nm_ = std::max(largest_Nm_, size_Nm);
+    }
+    small_.add(persisting(small, window_));
+    large_.add(persisting(large, window_));
+  }
+
+  /// @param share of the blocks in which the pair may exceed its threshold
+  void set_thresholds(double share) {
+    pair_.floor_Nm = small_.threshold(share);
+    pair_.factor = std::max(large_.threshold(share), 1.0);
+  }
+
+  void see_drift(const std::vector<SourceRun>& runs, double rate_Hz) {
+    const std::size_t window = samples_of(kDriftWindow_s, rate_Hz);
+    double sum = 0.0;
+    std::size_t seen = 0;
+    for (std::size_t n = 0; n < runs[0].value_Nm.size(); ++n) {
+      if (!runs[pair_.first].is_valid(n) || !runs[pair_.second].is_valid(n)) continue;
+      sum += difference(runs, n) / threshold(runs, n);
+      if (++seen < window) continue;
+      largest_mean_ = std::max(largest_mean_, std::abs(sum) / static_cast<double>(seen));
+      sum = 0.0;
+      seen = 0;
+    }
+  }
+  void set_allowance() { pair_.drift_allowance = std::clamp(1.2 * largest_mean_, 0.5, 0.95); }
+
+  void see_sums(const std::vector<SourceRun>& runs, double rate_Hz) {
+    double up_s = 0.0;
+    double down_s = 0.0;
+    for (std::size_t n = 0; n < runs[0].value_Nm.size(); ++n) {
+      if (!runs[pair_.first].is_valid(n) || !runs[pair_.second].is_valid(n)) continue;
+      const double share = difference(runs, n) / threshold(runs, n);
+      up_s = std::max(0.0, up_s + (share - pair_.drift_allowance) / rate_Hz);
+      down_s = std::max(0.0, down_s + (-share - pair_.drift_allowance) / rate_Hz);
+      largest_sum_s_ = std::max({largest_sum_s_, up_s, down_s});
+    }
+  }
+
+  [[nodiscard]] PairLimits limits() const {
+    PairLimits pair = pair_;
+    pair.drift_limit_s = std::max(1.0, 3.0 * largest_sum_s_);
+    return pair;
+  }
+  [[nodiscard]] CalibratedPair report(const std::vector<TorqueSource>& sources) const {
+    const double largest_threshold_Nm =
+        std::max(pair_.floor_Nm, pair_.factor * quantile(spreads_, 1.0));
+    return {.first = sources[pair_.first].name,
+            .second = sources[pair_.second].name,
+            .largest_difference_Nm = largest_Nm_,
+            .typical_threshold_Nm = std::max(pair_.floor_Nm, pair_.factor * median_Nm_),
+            .surely_detected_Nm = largest_Nm_ + largest_threshold_Nm};
+  }
+  [[nodiscard]] std::size_t blocks() const { return std::max(small_.size(), large_.size()); }
+
+ private:
+  [[nodiscard]] double difference(const std::vector<SourceRun>& runs, std::size_t n) const {
+    return runs[pair_.first].value_Nm[n] - runs[pair_.second].value_Nm[n];
+  }
+  [[nodiscard]] double spread(const std::vector<SourceRun>& runs, std::size_t n) const {
+    const double first_Nm = runs[pair_.first].std_dev_Nm[n];
+    const double second_Nm = runs[pair_.second].std_dev_Nm[n];
+    return std::sqrt(std::max(0.0, first_Nm * first_Nm + second_Nm * second_Nm -
+                                       2.0 * correlation_ * first_Nm * second_Nm));
+  }
+  [[nodiscard]] double threshold(const std::vector<SourceRun>& runs, std::size_t n) const {
+    return std::max(pair_.floor_Nm, pair_.factor * spread(runs, n));
+  }
+
+  PairLimits pair_;
+  double correlation_;
+  std::size_t window_;
+  BlockMaxima small_;  ///< |d| where the error bars are small
+  BlockMaxima large_;  ///< |d| / s where they are large
+  std::vector<double> spreads_;
+  double median_Nm_ = kNotMeasured;
+  double largest_Nm_ = 0.0;
+  double largest_mean_ = 0.0;
+  double largest_sum_s_ = 0.0;
+};
+
+/// The limits of the signals.
+class SignalStatistics {
+ public:
+  SignalStatistics(const std::vector<MonitoredSignal>& signals, double rate_Hz)
+      : signals_(signals), states_(signals.size()), rate_Hz_(rate_Hz) {
+    for (const MonitoredSignal& signal : signals) {
+      spec_.inputs.push_back(signal.name);
+      const auto companion = std::ranges::find(signals, signal.moves_with, &MonitoredSignal::name);
+      companions_.push_back(static_cast<std::size_t>(companion - signals.begin()));
+    }
+  }
+
+  void see(const Recording& recording) {
+    FeaturePipeline pipeline(spec_, rate_Hz_);
+    std::vector<const Channel*> channels;
+    for (const std::string& name : pipeline.raw_inputs())
+      channels.push_back(&recording.channel(name));
+    std::vector<double> raw(channels.size());
+    std::vector<std::size_t> ages(channels.size(), 0);
+    for (State& state : states_) state.is_started = false;
+    for (std::size_t n = 0; n < recording.size(); ++n) {
+      for (std::size_t k = 0; k < channels.size(); ++k) {
+        raw[k] = channels[k]->values[n];
+        ages[k] = channels[k]->is_fresh(n) ? 0 : ages[k] + 1;
+        longest_gap_ = std::max(longest_gap_, ages[k]);
+      }
+      const std::span<const double> values = pipeline.step(raw);
+      for (std::size_t i = 0; i < values.size(); ++i) see(states_[i], values, i);
+    }
+  }
+
+  [[nodiscard]] std::vector<MonitoredSignal> limits() const {
+    std::vector<MonitoredSignal> limits = signals_;
+    for (std::size_t i = 0; i < limits.size(); ++i) {
+      const State& state = states_[i];
+      MonitoredSignal& signal = limits[i];
+      const double margin = 0.1 * (state.highest - state.lowest);
+      if (std::isinf(signal.lowest)) signal.lowest = state.lowest - margin;
+      if (std::isinf(signal.highest)) signal.highest = state.highest + margin;
+      if (!(signal.lowest < signal.highest))
+        throw Error({.place = "monitor: " + signal.name,
+                     .problem = "the signal is constant in the fault-free recordings",
+                     .advice = "record it while the joint moves, or give its range"});
+      if (std::isinf(signal.largest_rate))
+        signal.largest_rate = 1.5 * state.largest_step * rate_Hz_;
+      if (std::isinf(signal.longest_age_s))
+        signal.longest_age_s = 1.5 * static_cast<double>(longest_gap_ + 1) / rate_Hz_;
+      if (!signal.moves_with.empty() && std::isinf(signal.largest_hidden_travel))
+        signal.largest_hidden_travel = 2.0 * std::max(state.hidden_travel, state.companion_step);
+    }
+    return limits;
+  }
+
+ private:
+  struct State {
+    double lowest = std::numeric_limits<double>::infinity();
+    double highest = -std::numeric_limits<double>::infinity();
+    double largest_step = 0.0;
+    double hidden_travel = 0.0;
+    double companion_step = 0.0;
+    double last = 0.0;
+    double companion = 0.0;
+    double last_companion = 0.0;
+    bool is_started = false;
+  };
+
+  void see(State& state, std::span<const double> values, std::size_t i) const {
+    const double value = values[i];
+    if (!std::isfinite(value)) return;
+    const bool has_companion = companions_[i] < values.size();
+    const double companion = has_companion ? values[companions_[i]] : 0.0;
+    state.lowest = std::min(state.lowest, value);
+    state.highest = std::max(state.highest, value);
+    if (state.is_started) {
+      state.largest_step = std::max(state.largest_step, std::abs(value - state.last));
+      state.companion_step =
+          std::max(state.companion_step, std::abs(companion - state.last_companion));
+    }
+    if (!state.is_started || value != state.last) state.companion = companion;
+    state.hidden_travel = std::max(state.hidden_travel, std::abs(companion - state.companion));
+    state.last = value;
+    state.last_companion = companion;
+    state.is_started = true;
+  }
+
+  std::vector<MonitoredSignal> signals_;
+  std::vector<State> states_;
+  std::vector<std::size_t> companions_;  ///< beyond the last signal: none
+  FeatureSpec spec_;
+  double rate_Hz_;
+  std::size_t longest_gap_ = 0;
+};
+
+void check_arguments(const std::vector<Estimator>& sources, const MonitorPlan& plan,
+                     const Dataset& fault_free, const CalibrationOptions& options) {
+  if (!(options.false_alarms_per_hour > 0.0) || !std::isfinite(options.false_alarms_per_hour))
+    throw UsageError({.place = "wanted rate of false alarms",
+                      .expected = "a positive number per hour",
+                      .found = fmt::format("{}", options.false_alarms_per_hour)});
+  if (sources.size() != plan.sources.size() || sources.empty())
+    throw Error({.place = "calibration of a monitor",
+                 .expected = "one estimator for each source of the plan",
+                 .found = fmt::format("{} and {}", sources.size(), plan.sources.size())});
+  if (fault_free.records.empty())
+    throw Error({.place = "calibration of a monitor", .problem = "there is no recording"});
+}
+
+/// @returns whether the wanted rate is extrapolated
+bool check_rate(const CalibrationOptions& options, double hours) {
+  const double supported = 3.0 / hours;
+  if (options.false_alarms_per_hour >= supported) return false;
+  if (!options.extrapolate)
+    throw Error(
+        {.place = "wanted rate of false alarms",
+         .expected = fmt::format("at least {:.3g} per hour: {:.3g} h without a fault support no "
+                                 "smaller one (3 / T, 95 %)",
+                                 supported, hours),
+         .found = fmt::format("{:.3g} per hour", options.false_alarms_per_hour),
+         .advice = "record longer, or permit an extrapolation, which the file then states"});
+  return true;
+}
+
+}  // namespace
+
+CalibratedMonitor calibrate_monitor(const std::vector<Estimator>& sources, const MonitorPlan& plan,
+                                    const Dataset& fault_free, const CalibrationOptions& options,
+                                    const Progress& progress) {
+  check_arguments(sources, plan, fault_free, options);
+  const double rate_Hz = fault_free.sample_rate_Hz();
+  CalibratedMonitor result;
+  result.redundancy.sources = plan.sources;
+  result.monitor.sample_period_s = 1.0 / rate_Hz;
+  result.monitor.persistence_s = std::max(result.monitor.persistence_s, 2.0 / rate_Hz);
+  std::size_t samples = 0;
+  for (const DatasetRecord& record : fault_free.records) samples += record.recording.size();
+  result.hours = static_cast<double>(samples) / rate_Hz / kSecondsPerHour;
+  result.false_alarms_per_hour = options.false_alarms_per_hour;
+  result.is_extrapolated = check_rate(options, result.hours);
+
+  std::vector<std::vector<SourceRun>> recorded;
+  for (const DatasetRecord& record : fault_free.records) {
+    report_progress(
+        progress,
+        static_cast<double>(recorded.size()) / static_cast<double>(fault_free.records.size()),
+        "calibration of the monitor");
+    recorded.push_back(run_sources(sources, record.recording));
+  }
+
+  ErrorCorrelation correlation(sources.size());
+  SignalStatistics signals(plan.signals, rate_Hz);
+  std::vector<double> guarded(sources.size(), 0.0);
+  for (std::size_t r = 0; r < recorded.size(); ++r) {
+    const std::vector<SourceRun>& runs = recorded[r];
+    const Recording& recording = fault_free.records[r].recording;
+    if (recording.has(fault_free.target)) {
+      const Channel& measured = recording.channel(fault_free.target);
+      std::vector<double> fresh(measured.values);
+      for (std::size_t n = 0; n < fresh.size(); ++n)
+        if (!measured.is_fresh(n)) fresh[n] = kNotMeasured;
+      correlation.add(runs, fresh);
+    }
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      guarded[i] += static_cast<double>(runs[i].guarded);
+    signals.see(recording);
+  }
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    result.guarded_share.push_back(guarded[i] / static_cast<double>(samples));
+    if (result.guarded_share[i] > kLargestGuardedShare)
+      throw Error({.place = "source " + plan.sources[i].name,
+                   .expected = "fault-free recordings within the range of its model",
+                   .found = fmt::format("{:.1f} % of the samples with a fault",
+                                        100.0 * result.guarded_share[i]),
+                   .advice = "train its model on recordings that cover this motion and load"});
+  }
+  result.redundancy.correlation = result.monitor.correlation = correlation.rows();
+  result.monitor.signals = signals.limits();
+  for (const TorqueSource& source : plan.sources) result.monitor.sources.push_back(source.name);
+
+  std::vector<PairStatistics> pairs;
+  for (std::uint8_t i = 0; i < sources.size(); ++i)
+    for (std::uint8_t j = i + 1; j < sources.size(); ++j)
+      pairs.emplace_back(PairLimits{.first = i, .second = j},
+                         result.redundancy.correlation.empty()
+                             ? 0.0
+                             : result.redundancy.correlation[i * sources.size() + j],
+                         rate_Hz, result.monitor.persistence_s);
+  for (PairStatistics& pair : pairs) {
+    for (const std::vector<SourceRun>& runs : recorded) pair.see_spread(runs);
+    for (const std::vector<SourceRun>& runs : recorded) pair.see_differences(runs);
+  }
+  // Floor and factor of every pair have the same share of the wanted rate.
+  const double share = options.false_alarms_per_hour * kBlock_s / kSecondsPerHour /
+                       (2.0 * static_cast<double>(std::max<std::size_t>(pairs.size(), 1)));
+  for (PairStatistics& pair : pairs) {
+    if (pair.blocks() < kLeastBlocks)
+      throw Error({.place = "calibration of a monitor",
+                   .expected = fmt::format("at least {} s without a fault",
+                                           kBlock_s * static_cast<double>(kLeastBlocks)),
+                   .found = fmt::format("{:.0f} s", static_cast<double>(samples) / rate_Hz)});
+    pair.set_thresholds(share);
+    for (const std::vector<SourceRun>& runs : recorded) pair.see_drift(runs, rate_Hz);
+    pair.set_allowance();
+    for (const std::vector<SourceRun>& runs : recorded) pair.see_sums(runs, rate_Hz);
+    result.monitor.pairs.push_back(pair.limits());
+    result.pairs.push_back(pair.report(plan.sources));
+  }
+  return result;
+}
+
+}  // namespace torsio

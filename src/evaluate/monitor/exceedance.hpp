@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace torsio {
+
+/// The largest value that each sample and the `window` before it all reach: what persists.
+[[nodiscard]] std::vector<double> persisting(std::span<const double> values, std::size_t window);
+
+/// The maxima of a statistic over blocks of equal length, and the threshold that it exceeds at a
+/// given rate.
+class BlockMaxima {
+ public:
+  /// @param block samples of a block
+  explicit BlockMaxima(std::size_t block) : block_(block) {}
+
+  /// Adds samples; NaN is none. Blocks run across calls.
+  void add(std::span<const double> values);
+
+  /// Complete blocks that had a value.
+  [[nodiscard]] std::size_t size() const noexcept { return maxima_.size(); }
+  [[nodiscard]] double largest() const noexcept { return largest_; }
+
+  /// The threshold that is exceeded in a share `share` of the blocks: u + b ln(p / share) with u the 90 %
+  /// quantile of the maxima, p the share of those above it, b their mean excess; at least 1.05 times
+  /// the largest one. 0 if there is no block.
+  [[nodiscard]] double threshold(double share) const;
+
+ private:
+  std::size_t block_;
+  std::size_t in_block_ = 0;
+  double maximum_ = -std::numeric_limits<double>::infinity();
+  double largest_ = 0.0;
+  std::vector<double> maxima_;
+};
+
+}  // namespace torsio

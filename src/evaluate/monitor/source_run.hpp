@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "torsio/data/recording.hpp"
+#include "torsio/estimate/any_estimator.hpp"
+
+namespace torsio {
+
+/// One source over a recording.
+struct SourceRun {
+  std::vector<double> value_Nm;
+  std::vector<double> std_dev_Nm;  ///< NaN where the source has a fault
+  std::size_t guarded = 0;         ///< samples with a fault after the filters have settled
+
+  [[nodiscard]] bool is_valid(std::size_t sample) const noexcept {
+    return std_dev_Nm[sample] > 0.0;
+  }
+};
+
+/// All sources over a recording, each from `reset()`. @throws Error if a channel is missing.
+[[nodiscard]] std::vector<SourceRun> run_sources(const std::vector<Estimator>& sources,
+                                                 const Recording& recording);
+
+}  // namespace torsio

@@ -1,0 +1,314 @@
+#include "torsio/files/monitor_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "actuator/text_hash.hpp"
+#include "files/json_object.hpp"
+#include "files/json_text.hpp"
+#include "files/whole_file.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/version.hpp"
+#include "torsio/files/model_file.hpp"
+
+namespace torsio {
+namespace {
+
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kRateTolerance = 1e-3;
+constexpr std::string_view kAdvice =
+    "The monitor file is damaged: calibrate the monitor again (torsio monitor --calibrate).";
+
+/// JSON has no infinity: a limit that is none is null.
+ordered_json limit(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
+}
+double limit_of(const JsonObject& object, const char* key, double none) {
+  const double value = object.number(key);
+  return std::isnan(value) ? none : value;
+}
+
+std::string_view text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+ordered_json signal_json(const MonitoredSignal& signal) {
+  return {{"signal", signal.name},
+          {"lowest", limit(signal.lowest)},
+          {"highest", limit(signal.highest)},
+          {"largest_rate", limit(signal.largest_rate)},
+          {"longest_age_s", limit(signal.longest_age_s)},
+          {"turn", signal.turn},
+          {"moves_with", signal.moves_with},
+          {"largest_hidden_travel", limit(signal.largest_hidden_travel)}};
+}
+
+MonitoredSignal signal_of(const JsonObject& object) {
+  object.allow_only({"signal", "lowest", "highest", "largest_rate", "longest_age_s", "turn",
+                     "moves_with", "largest_hidden_travel"});
+  return {.name = object.text("signal"),
+          .lowest = limit_of(object, "lowest", -kInfinity),
+          .highest = limit_of(object, "highest", kInfinity),
+          .largest_rate = limit_of(object, "largest_rate", kInfinity),
+          .longest_age_s = limit_of(object, "longest_age_s", kInfinity),
+          .turn = object.number("turn"),
+          .moves_with = object.text("moves_with"),
+          .largest_hidden_travel = limit_of(object, "largest_hidden_travel", kInfinity)};
+}
+
+ordered_json pair_json(const PairLimits& pair, const std::vector<std::string>& sources) {
+  return {{"first", sources.at(pair.first)},
+          {"second", sources.at(pair.second)},
+          {"factor", pair.factor},
+          {"floor_Nm", pair.floor_Nm},
+          {"ceiling_Nm", limit(pair.ceiling_Nm)},
+          {"drift_allowance", pair.drift_allowance},
+          {"drift_limit_s", limit(pair.drift_limit_s)}};
+}
+
+std::uint8_t source_index(const std::vector<std::string>& sources, const std::string& name,
+                          const std::string& place) {
+  const auto found = std::ranges::find(sources, name);
+  if (found == sources.end())
+    throw Error({.place = place,
+                 .expected = fmt::format("one of {}", fmt::join(sources, ", ")),
+                 .found = fmt::format("'{}'", name)});
+  return static_cast<std::uint8_t>(found - sources.begin());
+}
+
+PairLimits pair_of(const JsonObject& object, const std::vector<std::string>& sources,
+                   const std::string& place) {
+  object.allow_only(
+      {"first", "second", "factor", "floor_Nm", "ceiling_Nm", "drift_allowance", "drift_limit_s"});
+  return {.first = source_index(sources, object.text("first"), place),
+          .second = source_index(sources, object.text("second"), place),
+          .factor = object.number("factor"),
+          .floor_Nm = object.number("floor_Nm"),
+          .ceiling_Nm = limit_of(object, "ceiling_Nm", kInfinity),
+          .drift_allowance = object.number("drift_allowance"),
+          .drift_limit_s = limit_of(object, "drift_limit_s", kInfinity)};
+}
+
+ordered_json actions_json(const MonitorSettings& settings) {
+  ordered_json actions = ordered_json::object();
+  for (std::size_t i = 0; i < kMonitorChecks; ++i)
+    actions[std::string(name(static_cast<MonitorCheck>(i)))] = name(settings.actions[i]);
+  return actions;
+}
+
+/// A check that is not named keeps its default.
+void read_actions(const std::map<std::string, std::string>& actions, MonitorSettings& settings,
+                  const std::string& place) {
+  for (const auto& [check, action] : actions) {
+    std::size_t index = 0;
+    while (index < kMonitorChecks && name(static_cast<MonitorCheck>(index)) != check) ++index;
+    if (index == kMonitorChecks)
+      throw Error({.place = place, .expected = "a check", .found = fmt::format("'{}'", check)});
+    const auto known = {MonitorAction::off, MonitorAction::warn, MonitorAction::stop};
+    const auto found =
+        std::ranges::find_if(known, [&](MonitorAction each) { return name(each) == action; });
+    if (found == known.end())
+      throw Error({.place = fmt::format("{}/{}", place, check),
+                   .expected = "off, warn or stop",
+                   .found = fmt::format("'{}'", action)});
+    settings.actions[index] = *found;
+  }
+}
+
+ordered_json monitor_json(const MonitorFile& file) {
+  const MonitorSettings& monitor = file.monitor;
+  ordered_json document;
+  document["format"] = "torsio monitor";
+  document["format_version"] = kMonitorFormatVersion;
+  document["torsio_version"] = kVersion;
+  document["device_serial"] = file.device_serial;
+  document["valid_until"] = file.valid_until;
+  document["sample_period_s"] = monitor.sample_period_s;
+  document["fault_free_hours"] = file.fault_free_hours;
+  document["false_alarms_per_hour"] = limit(file.false_alarms_per_hour);
+  document["is_extrapolated"] = file.is_extrapolated;
+  document["recordings"] = ordered_json::array();
+  for (const Source& source : file.recordings)
+    document["recordings"].push_back({{"file", source.file}, {"sha256", source.sha256}});
+  document["sources"] = ordered_json::array();
+  for (std::size_t i = 0; i < file.redundancy.sources.size(); ++i)
+    document["sources"].push_back({{"name", file.redundancy.sources[i].name},
+                                   {"model", file.models.at(i).file},
+                                   {"model_hash", file.models.at(i).hash},
+                                   {"depends_on", file.redundancy.sources[i].depends_on}});
+  document["correlation"] = file.redundancy.correlation;
+  document["signals"] = ordered_json::array();
+  for (const MonitoredSignal& signal : monitor.signals)
+    document["signals"].push_back(signal_json(signal));
+  document["pairs"] = ordered_json::array();
+  for (const PairLimits& pair : monitor.pairs)
+    document["pairs"].push_back(pair_json(pair, monitor.sources));
+  document["actions"] = actions_json(monitor);
+  document["persistence_s"] = monitor.persistence_s;
+  document["release_share"] = monitor.release_share;
+  document["longest_loss_s"] = limit(monitor.longest_loss_s);
+  document["longest_fault_s"] = limit(monitor.longest_fault_s);
+  document["largest_novelty"] = limit(monitor.largest_novelty);
+  document["longest_overrun"] = monitor.longest_overrun;
+  document["spikes_in_a_row"] = monitor.spikes_in_a_row;
+  document["proof_s"] = monitor.proof_s;
+  return document;
+}
+
+void check_version(const JsonObject& document, const std::string& place) {
+  if (document.optional_text("format") != "torsio monitor")
+    throw Error({.place = place,
+                 .expected = "a monitor file, as torsio monitor --calibrate writes it",
+                 .found = "another JSON document"});
+  const std::uint64_t version = document.whole_number("format_version");
+  if (version != kMonitorFormatVersion)
+    throw Error(
+        {.place = place + "/format_version",
+         .expected = fmt::format("{}, which torsio {} reads", kMonitorFormatVersion, kVersion),
+         .found = fmt::format("{}", version)});
+}
+
+MonitorFile file_of(const JsonObject& document, const std::string& place) {
+  document.allow_only(
+      {"format",          "format_version",  "torsio_version",   "device_serial",
+       "valid_until",     "sample_period_s", "fault_free_hours", "false_alarms_per_hour",
+       "is_extrapolated", "recordings",      "sources",          "correlation",
+       "signals",         "pairs",           "actions",          "persistence_s",
+       "release_share",   "longest_loss_s",  "longest_fault_s",  "largest_novelty",
+       "longest_overrun", "spikes_in_a_row", "proof_s"});
+  MonitorFile file;
+  file.device_serial = document.text("device_serial");
+  file.valid_until = document.text("valid_until");
+  file.fault_free_hours = document.number("fault_free_hours");
+  file.false_alarms_per_hour = document.number("false_alarms_per_hour");
+  file.is_extrapolated = document.boolean("is_extrapolated");
+  file.recordings = document.objects("recordings", [](const JsonObject& source) {
+    return Source{source.text("file"), source.text("sha256")};
+  });
+  file.redundancy.sources = document.objects("sources", [&](const JsonObject& source) {
+    source.allow_only({"name", "model", "model_hash", "depends_on"});
+    file.models.push_back({source.text("model"), source.text("model_hash")});
+    return TorqueSource{source.text("name"), source.texts("depends_on")};
+  });
+  MonitorSettings& monitor = file.monitor;
+  for (const TorqueSource& source : file.redundancy.sources) monitor.sources.push_back(source.name);
+  file.redundancy.correlation = monitor.correlation = document.numbers("correlation");
+  monitor.signals = document.objects("signals", signal_of);
+  monitor.pairs = document.objects("pairs", [&](const JsonObject& pair) {
+    return pair_of(pair, monitor.sources, place + "/pairs");
+  });
+  read_actions(document.text_map("actions"), monitor, place + "/actions");
+  monitor.sample_period_s = document.number("sample_period_s");
+  monitor.persistence_s = document.number("persistence_s");
+  monitor.release_share = document.number("release_share");
+  monitor.longest_loss_s = limit_of(document, "longest_loss_s", kInfinity);
+  monitor.longest_fault_s = limit_of(document, "longest_fault_s", kInfinity);
+  monitor.largest_novelty = limit_of(document, "largest_novelty", kInfinity);
+  const auto count = [&](const char* key) {
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(
+        document.whole_number(key), std::numeric_limits<std::uint32_t>::max()));
+  };
+  monitor.longest_overrun = count("longest_overrun");
+  monitor.spikes_in_a_row = count("spikes_in_a_row");
+  monitor.proof_s = document.number("proof_s");
+  return file;
+}
+
+std::string today_of(const MonitorFileOptions& options) {
+  if (!options.today.empty()) return options.today;
+  const std::chrono::year_month_day day =
+      std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now());
+  return fmt::format("{:04}-{:02}-{:02}", static_cast<int>(day.year()),
+                     static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()));
+}
+
+/// Dates of one form compare as text.
+void check_date(const std::string& date, const std::string& place) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  bool is_date = date.size() == 10;
+  for (std::size_t i = 0; i < date.size() && is_date; ++i)
+    is_date = i == 4 || i == 7 ? date[i] == '-' : is_digit(date[i]);
+  if (!is_date)
+    throw Error(
+        {.place = place, .expected = "a date as 2027-11-22", .found = fmt::format("'{}'", date)});
+}
+
+}  // namespace
+
+std::string model_hash(const std::filesystem::path& model) {
+  return fmt::format("{:016x}", text_hash(text_of(read_whole_file(model, kMaxModelFileBytes))));
+}
+
+void save_monitor(const std::filesystem::path& path, const MonitorFile& file) {
+  const Redundancy redundancy(file.redundancy);
+  const Monitor monitor(file.monitor);
+  if (!file.valid_until.empty()) check_date(file.valid_until, "valid_until");
+  const std::string text =
+      monitor_json(file).dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+  write_whole_file(path, std::as_bytes(std::span(text)));
+}
+
+MonitorFile read_monitor(const std::filesystem::path& path) {
+  const std::string place = path.string();
+  const std::vector<std::byte> bytes = read_whole_file(path, kMaxFileBytes);
+  const json parsed = parse_json(text_of(bytes), place);
+  const JsonObject document(parsed, place, kAdvice);
+  check_version(document, place);
+  MonitorFile file = file_of(document, place);
+  if (!file.valid_until.empty()) check_date(file.valid_until, place + "/valid_until");
+  const Redundancy redundancy(file.redundancy);
+  const Monitor monitor(file.monitor);
+  return file;
+}
+
+MonitoredTorque load_monitor(const std::filesystem::path& path, const MonitorFileOptions& options) {
+  const std::string place = path.string();
+  const MonitorFile file = read_monitor(path);
+  if (!options.serial.empty() && !file.device_serial.empty() &&
+      options.serial != file.device_serial)
+    throw Error(
+        {.place = place,
+         .expected = fmt::format("the monitor of device '{}'", options.serial),
+         .found = fmt::format("that of '{}'", file.device_serial),
+         .advice = "the limits of a monitor hold for the joint on which they were calibrated"});
+  if (!file.valid_until.empty()) {
+    const std::string today = today_of(options);
+    check_date(today, "today");
+    if (today > file.valid_until)
+      throw Error({.place = place,
+                   .problem = fmt::format("the calibration expired on {}, today is {}",
+                                          file.valid_until, today),
+                   .advice = "calibrate the monitor again"});
+  }
+  const double rate_Hz = 1.0 / file.monitor.sample_period_s;
+  if (!std::isnan(options.rate_Hz) &&
+      !(std::abs(options.rate_Hz / rate_Hz - 1.0) <= kRateTolerance))
+    throw Error({.place = place,
+                 .expected = fmt::format("a loop at {} Hz, for which the limits hold", rate_Hz),
+                 .found = fmt::format("{} Hz", options.rate_Hz)});
+  std::vector<Estimator> sources;
+  for (std::size_t i = 0; i < file.models.size(); ++i) {
+    const std::filesystem::path model = path.parent_path() / file.models[i].file;
+    if (const std::string hash = model_hash(model); hash != file.models[i].hash)
+      throw Error({.place = model.string(),
+                   .expected = fmt::format("the model with which '{}' was calibrated, hash {}",
+                                           file.redundancy.sources[i].name, file.models[i].hash),
+                   .found = "hash " + hash,
+                   .advice = "restore the model file, or calibrate the monitor again"});
+    sources.push_back(make_estimator(load_model(model), rate_Hz));
+  }
+  return {std::move(sources), file.redundancy, file.monitor};
+}
+
+}  // namespace torsio

@@ -1,0 +1,144 @@
+#include "torsio/report/monitor.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "report/result_parts.hpp"
+#include "torsio/report/json_text.hpp"
+#include "torsio/report/plots.hpp"
+#include "torsio/report/text_table.hpp"
+
+namespace torsio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Around a stop the plot shows so much before and after it.
+constexpr double kPlotBefore_s = 1.0;
+constexpr double kPlotAfter_s = 0.25;
+
+Json event_json(const MonitorEvent& event, const MonitorSettings& settings) {
+  return {{"t_s", event.t_s},
+          {"check", name(event.check)},
+          {"action", name(event.action)},
+          {"value", json_number(event.value)},
+          {"limit", json_number(event.limit)},
+          {"text", describe(event, settings)}};
+}
+
+std::vector<Curve> curves_of(const MonitorReplay& replay, const MonitorSettings& settings,
+                             std::span<const double> time_s, std::size_t begin, std::size_t end) {
+  std::vector<Curve> curves;
+  const auto add = [&](const std::string& label, const std::string& channel) {
+    const std::vector<double>& values = replay.estimated.channels.channel(channel).values;
+    curves.push_back({.label = label,
+                      .x = time_s.subspan(begin, end - begin),
+                      .y = std::span(values).subspan(begin, end - begin)});
+  };
+  for (const std::string& source : settings.sources) add(source, source + "_torque_Nm");
+  add("combined", estimate_channel("torque_Nm"));
+  return curves;
+}
+
+std::vector<double> times(const Recording& recording) {
+  std::vector<double> time_s(recording.size());
+  for (std::size_t n = 0; n < time_s.size(); ++n) time_s[n] = recording.time_s(n);
+  return time_s;
+}
+
+std::string plot_of_stop(const MonitorReplay& replay, const MonitorSettings& settings) {
+  const std::vector<double> time_s = times(replay.estimated.channels);
+  const auto index = [&](double t_s) {
+    return static_cast<std::size_t>(std::ranges::lower_bound(time_s, t_s) - time_s.begin());
+  };
+  const std::size_t begin = index(replay.stopped_at_s - kPlotBefore_s);
+  const std::size_t end = index(replay.stopped_at_s + kPlotAfter_s);
+  return terminal_plot(curves_of(replay, settings, time_s, begin, end), {"t [s]", "torque [Nm]"});
+}
+
+std::string verdict(const MonitorReplay& replay) {
+  if (std::isnan(replay.watching_from_s))
+    return "was never armed: its checks were not silent for long enough";
+  if (std::isnan(replay.stopped_at_s))
+    return fmt::format("no stop from {:.3f} s to the end", replay.watching_from_s);
+  return fmt::format("stopped at {:.3f} s", replay.stopped_at_s);
+}
+
+}  // namespace
+
+std::string calibration_text(const CalibratedMonitor& calibrated) {
+  TextTable table;
+  table.header({"pair", "largest difference Nm", "threshold Nm", "surely detected Nm"});
+  for (const CalibratedPair& pair : calibrated.pairs)
+    table.row({fmt::format("{}, {}", pair.first, pair.second),
+               fmt::format("{:.3g}", pair.largest_difference_Nm),
+               fmt::format("{:.3g}", pair.typical_threshold_Nm),
+               fmt::format("{:.3g}", pair.surely_detected_Nm)});
+  return fmt::format(
+      "{:.3g} h without a fault, thresholds for {:.3g} false alarms per hour{}\n{}"
+      "largest difference: in these recordings; threshold: its median; surely detected: a fault "
+      "that "
+      "changes the difference by so much\n",
+      calibrated.hours, calibrated.false_alarms_per_hour,
+      calibrated.is_extrapolated
+          ? fmt::format(" (extrapolated: the recordings support {:.3g})", 3.0 / calibrated.hours)
+          : "",
+      table.text());
+}
+
+std::string calibration_json(const CalibratedMonitor& calibrated) {
+  Json document{{"fault_free_hours", calibrated.hours},
+                {"false_alarms_per_hour", calibrated.false_alarms_per_hour},
+                {"is_extrapolated", calibrated.is_extrapolated},
+                {"pairs", Json::array()}};
+  for (const CalibratedPair& pair : calibrated.pairs)
+    document["pairs"].push_back({{"first", pair.first},
+                                 {"second", pair.second},
+                                 {"largest_difference_Nm", pair.largest_difference_Nm},
+                                 {"threshold_Nm", pair.typical_threshold_Nm},
+                                 {"surely_detected_Nm", pair.surely_detected_Nm}});
+  return json_text(document);
+}
+
+std::string replays_text(const std::vector<MonitorReplay>& replays,
+                         const MonitorSettings& settings) {
+  std::string text;
+  for (const MonitorReplay& replay : replays) {
+    text += fmt::format("{}: {}\n", replay.estimated.channels.name(), verdict(replay));
+    for (const MonitorEvent& event : replay.events)
+      text += fmt::format("  {:.3f} s  {}  {}: {}\n", event.t_s, name(event.action),
+                          name(event.check), describe(event, settings));
+    if (!replay.suspects.empty())
+      text += fmt::format("  one fault of any of these explains it: {}\n",
+                          fmt::join(replay.suspects, ", "));
+    if (!std::isnan(replay.stopped_at_s)) text += plot_of_stop(replay, settings);
+  }
+  return text;
+}
+
+std::string replays_json(const std::vector<MonitorReplay>& replays,
+                         const MonitorSettings& settings) {
+  Json document{{"recordings", Json::array()}};
+  for (const MonitorReplay& replay : replays) {
+    Json events = Json::array();
+    for (const MonitorEvent& event : replay.events) events.push_back(event_json(event, settings));
+    document["recordings"].push_back({{"recording", replay.estimated.channels.name()},
+                                      {"watching_from_s", json_number(replay.watching_from_s)},
+                                      {"stopped_at_s", json_number(replay.stopped_at_s)},
+                                      {"events", std::move(events)},
+                                      {"suspects", replay.suspects}});
+  }
+  return json_text(document);
+}
+
+std::string replay_svg(const MonitorReplay& replay, const MonitorSettings& settings) {
+  const std::vector<double> time_s = times(replay.estimated.channels);
+  return svg_plot(curves_of(replay, settings, time_s, 0, time_s.size()), {"t [s]", "torque [Nm]"},
+                  replay.estimated.channels.name());
+}
+
+}  // namespace torsio

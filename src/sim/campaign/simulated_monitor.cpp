@@ -1,0 +1,74 @@
+#include "torsio/sim/campaign/simulated_monitor.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "core/report_progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/sim/campaign.hpp"
+#include "torsio/sim/campaign/torque_sources.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kRecording_s = 600.0;
+constexpr double kSecondsPerHour = 3600.0;
+
+void add(Dataset& dataset, Recording recording, Role role) {
+  const std::size_t samples = recording.size();
+  dataset.records.push_back({std::move(recording), whole_record(samples, role)});
+}
+
+/// The specimen of the same actuator in its default variant on which the spring was calibrated.
+DataSheet other_specimen(const DataSheet& joint, unsigned serial) {
+  return data_sheet(fmt::format("{}#{:02}", joint.name, serial));
+}
+
+}  // namespace
+
+MonitoredTorque SimulatedMonitor::monitored() const {
+  std::vector<Estimator> sources;
+  for (const ModelFile& model : models) sources.push_back(make_estimator(model));
+  return {std::move(sources), calibrated.redundancy, calibrated.monitor};
+}
+
+SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCalibration& settings,
+                                     const Progress& progress) {
+  const MonitorRecipe recipe = monitor_recipe(joint);
+  std::uint64_t seed = settings.seed;
+  const auto work = [&](const DataSheet& sheet, double duration_s) {
+    return duty_recording(sheet, {.seed = seed++, .duration_s = duration_s}, progress);
+  };
+  Dataset own;
+  add(own, work(joint, settings.training_s), Role::train);
+  Dataset other;
+  add(other, work(other_specimen(joint, settings.spring_serial), settings.training_s), Role::train);
+  for (int i = 0; i < 4; ++i) {
+    const Recording validation = work(joint, kRecording_s);
+    add(own, validation, Role::validation);
+    add(other, validation, Role::validation);
+  }
+  SimulatedMonitor result;
+  for (const SourceRecipe& source : recipe.sources)
+    result.models.push_back(
+        fit_source(source, source.source.name == "spring" ? other : own, progress).file);
+  own = {};
+  other = {};
+
+  Dataset fault_free;
+  const auto recordings = static_cast<std::size_t>(
+      std::ceil(settings.fault_free_hours * kSecondsPerHour / kRecording_s));
+  for (std::size_t i = 0; i < recordings; ++i)
+    add(fault_free, work(joint, kRecording_s), Role::validation);
+  std::vector<Estimator> sources;
+  for (const ModelFile& model : result.models) sources.push_back(make_estimator(model));
+  result.calibrated = calibrate_monitor(
+      sources, recipe.plan, fault_free,
+      {.false_alarms_per_hour = settings.false_alarms_per_hour, .extrapolate = true}, progress);
+  return result;
+}
+
+}  // namespace torsio

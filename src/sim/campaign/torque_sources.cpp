@@ -1,0 +1,238 @@
+#include "torsio/sim/campaign/torque_sources.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <numbers>
+#include <utility>
+
+namespace torsio {
+namespace {
+
+using Expressions = std::vector<std::string>;
+
+constexpr std::uint64_t kSeed = 1;
+constexpr double kTurn_rad = 2.0 * std::numbers::pi;
+
+/// A quantity with the delay that all sources have.
+std::string delayed(const std::string& expression) {
+  return fmt::format("lag(lowpass({}, 100Hz), 1)", expression);
+}
+std::string speed(const std::string& angle) {
+  return fmt::format("lowpass(rate({}), 100Hz)", angle);
+}
+std::string acceleration(const std::string& angle) { return fmt::format("rate({})", speed(angle)); }
+
+/// Dry friction of a body that is driven at this angle: presliding over `sliding_rad`, a part of it in
+/// proportion to the load.
+Expressions friction(const std::string& angle, double sliding_rad, const std::string& load) {
+  Expressions terms;
+  for (const double share : {0.5, 2.0}) {
+    const std::string stop = fmt::format("stop({}, {:.6g})", angle, share * sliding_rad);
+    terms.push_back(delayed(stop));
+    terms.push_back(delayed(fmt::format("{} * abs({})", stop, load)));
+  }
+  terms.push_back(speed(angle));
+  return terms;
+}
+
+std::string rate_of(const std::string& expression) {
+  return fmt::format("rate(lowpass({}, 100Hz))", expression);
+}
+
+/// The twist of a gear, its hysteresis and damping.
+Expressions gear_terms(const std::string& twist, double break_away_rad) {
+  const std::string filtered = delayed(twist);
+  return {filtered, fmt::format("stop({}, {:.6g})", filtered, break_away_rad),
+          fmt::format("stop({}, {:.6g})", filtered, 3.0 * break_away_rad), rate_of(twist)};
+}
+
+/// The waves of a strain-wave gear's kinematic error: twice and four times a turn of its input.
+Expressions kinematic_waves(const std::string& input) {
+  Expressions waves;
+  for (const int order : {2, 4})
+    for (const char* const wave : {"sin", "cos"})
+      waves.push_back(fmt::format("{}({} * {})", wave, order, input));
+  return waves;
+}
+
+Expressions with(Expressions first, const Expressions& more) {
+  first.insert(first.end(), more.begin(), more.end());
+  return first;
+}
+
+SourceRecipe linear(TorqueSource source, Expressions inputs,
+                    std::vector<ChannelDefinition> definitions) {
+  return {.source = std::move(source),
+          .family = "linear",
+          .options = {{"rates", "true"}},
+          .features = {.inputs = std::move(inputs), .definitions = std::move(definitions)}};
+}
+
+SourceRecipe gear(TorqueSource source, const ChannelDefinition& twist, double break_away_rad,
+                  const std::string& input) {
+  SourceRecipe recipe = linear(std::move(source), gear_terms(twist.name, break_away_rad), {twist});
+  recipe.gear_twist = twist.name;
+  recipe.gear_input = input;
+  return recipe;
+}
+
+SourceRecipe spring(TorqueSource source, const std::string& deflection, const std::string& angle,
+                    std::vector<ChannelDefinition> definitions = {}) {
+  Expressions inputs{delayed(deflection), fmt::format("lowpass(rate({}), 10Hz)", deflection)};
+  if (!angle.empty()) inputs.push_back(fmt::format("lowpass(rate({}), 10Hz)", angle));
+  return {.source = std::move(source),
+          .family = "grey_box",
+          .options = {{"residual", "none"}},
+          .features = {.inputs = std::move(inputs), .definitions = std::move(definitions)}};
+}
+
+MonitoredSignal encoder(std::string name, std::string moves_with = {}) {
+  return {.name = std::move(name), .turn = kTurn_rad, .moves_with = std::move(moves_with)};
+}
+
+MonitorRecipe series_elastic(const DataSheet& sheet) {
+  const double ratio = std::get<GearSheet>(sheet.first).ratio.value;
+  const double break_away_rad = std::get<GearSheet>(sheet.first).break_away_rad.value;
+  const std::string motor = "motor_angle_rad";
+  const ChannelDefinition twist{"gear_twist_rad",
+                                fmt::format("motor_angle_rad / {} - gear_angle_rad", ratio)};
+  const ChannelDefinition deflection{"spring_deflection_rad", "gear_angle_rad - joint_angle_rad"};
+  const std::string current = "motor_current_A";
+  MonitorRecipe recipe;
+  recipe.sources.push_back(
+      linear({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
+             with({delayed(current), acceleration(motor)},
+                  friction(motor, sheet.friction.bristle_rad.value, current)),
+             {}));
+  recipe.sources.push_back(
+      gear({"gear", {"motor_encoder", "gear_encoder", "gear"}}, twist, break_away_rad, motor));
+  recipe.sources.push_back(spring({"spring", {"gear_encoder", "joint_encoder", "spring"}},
+                                  deflection.name, "joint_angle_rad", {deflection}));
+  recipe.plan.signals = {encoder(motor, "gear_angle_rad"),
+                         encoder("gear_angle_rad", motor),
+                         encoder("joint_angle_rad", "gear_angle_rad"),
+                         {.name = current},
+                         {.name = "gear_angle_rad - joint_angle_rad"},
+                         {.name = twist.expression}};
+  return recipe;
+}
+
+MonitorRecipe harmonic_drive(const DataSheet& sheet) {
+  const double tube_ratio = std::get<TubeSheet>(sheet.first).ratio.value;
+  const GearSheet& drive = std::get<GearSheet>(sheet.second);
+  const std::string motor = "motor_angle_rad";
+  const std::string wave = "wave_generator_angle_rad";
+  const std::string torque = "motor_torque_Nm";
+  const ChannelDefinition tube{"tube_twist_rad",
+                               fmt::format("{} / {} - {}", motor, tube_ratio, wave)};
+  const ChannelDefinition twist{"gear_twist_rad",
+                                fmt::format("{} / {} - joint_angle_rad", wave, drive.ratio.value)};
+  const double sliding_rad = sheet.friction.bristle_rad.value;
+  MonitorRecipe recipe;
+  recipe.sources.push_back(
+      linear({"current",
+              {"current_sensor", "motor_encoder", "wave_encoder", "torque_constant", "friction"}},
+             with({delayed(torque), acceleration(motor), acceleration(wave), speed(motor)},
+                  friction(wave, sliding_rad, torque)),
+             {}));
+  recipe.sources.push_back(gear({"gear", {"wave_encoder", "joint_encoder", "gear"}}, twist,
+                                drive.break_away_rad.value, wave));
+  recipe.sources.push_back(
+      linear({"spring", {"motor_encoder", "wave_encoder", "spring", "friction"}},
+             with({delayed(tube.name), rate_of(tube.name), acceleration(wave)},
+                  friction(wave, sliding_rad, tube.name)),
+             {tube}));
+  recipe.plan.signals = {
+      encoder(motor, wave), encoder(wave, motor),      encoder("joint_angle_rad", wave),
+      {.name = torque},     {.name = tube.expression}, {.name = twist.expression}};
+  return recipe;
+}
+
+MonitorRecipe elastomer(const DataSheet& sheet) {
+  const std::string motor = "motor_angle_rad";
+  const std::string current = "motor_current_A";
+  const std::string twist = "spring_deflection_rad";
+  MonitorRecipe recipe;
+  recipe.sources.push_back(
+      linear({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
+             with({delayed(current), acceleration(motor)},
+                  friction(motor, sheet.friction.bristle_rad.value, current)),
+             {}));
+  recipe.sources.push_back(spring({"spring", {"twist_sensor", "spring"}}, twist, ""));
+  recipe.plan.signals = {encoder(motor), {.name = twist}, {.name = current}};
+  return recipe;
+}
+
+MonitorRecipe rubber_clutch(const DataSheet& sheet) {
+  const double ratio = std::get<ClutchSheet>(sheet.first).ratio.value;
+  const std::string input = "input_angle_rad";
+  const std::string current = "motor_current_A";
+  const ChannelDefinition deflection{"spring_deflection_rad", "input_angle_rad - joint_angle_rad"};
+  MonitorRecipe recipe;
+  recipe.sources.push_back(
+      linear({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
+             with({delayed(current), acceleration(input)},
+                  friction(input, sheet.friction.bristle_rad.value / ratio, current)),
+             {}));
+  recipe.sources.push_back(spring({"spring", {"motor_encoder", "joint_encoder", "spring"}},
+                                  deflection.name, "joint_angle_rad", {deflection}));
+  recipe.plan.signals = {encoder(input, "joint_angle_rad"),
+                         encoder("joint_angle_rad", input),
+                         {.name = current},
+                         {.name = deflection.expression}};
+  return recipe;
+}
+
+MonitorRecipe recipe_of(const DataSheet& sheet) {
+  switch (sheet.family) {
+    case ActuatorFamily::series_elastic: break;
+    case ActuatorFamily::elastomer: return elastomer(sheet);
+    case ActuatorFamily::rubber_clutch: return rubber_clutch(sheet);
+    case ActuatorFamily::harmonic_drive: return harmonic_drive(sheet);
+  }
+  return series_elastic(sheet);
+}
+
+/// The torque is K (twist + error): linear in the twist and the waves, which gives the error over K.
+std::string with_kinematic_error(const SourceRecipe& recipe, const ChannelDefinition& twist,
+                                 const Dataset& dataset, const Progress& progress) {
+  const Expressions waves = kinematic_waves(recipe.gear_input);
+  ModelChoice choice{
+      .family = "linear",
+      .options = {{"rates", "true"}},
+      .features = {.inputs = {delayed(twist.name), rate_of(twist.name)}, .definitions = {twist}}};
+  for (const std::string& wave : waves) choice.features.inputs.push_back(delayed(wave));
+  const TrainedModel first = train_model(dataset, choice, kSeed, progress);
+  const auto coefficient = [&](std::size_t input) { return first.table.at(input).value; };
+  const double stiffness_Nm_rad = coefficient(1);
+  std::string corrected = twist.expression;
+  for (std::size_t i = 0; i < waves.size(); ++i)
+    corrected += fmt::format(" + {:.6e} * {}", coefficient(3 + i) / stiffness_Nm_rad, waves[i]);
+  return corrected;
+}
+
+}  // namespace
+
+TrainedModel fit_source(const SourceRecipe& recipe, const Dataset& dataset,
+                        const Progress& progress) {
+  ModelChoice choice{
+      .family = recipe.family, .options = recipe.options, .features = recipe.features};
+  for (ChannelDefinition& definition : choice.features.definitions)
+    if (definition.name == recipe.gear_twist)
+      definition.expression = with_kinematic_error(recipe, definition, dataset, progress);
+  return train_model(dataset, choice, kSeed, progress);
+}
+
+MonitorRecipe monitor_recipe(const DataSheet& sheet) {
+  MonitorRecipe recipe = recipe_of(sheet);
+  for (SourceRecipe& source : recipe.sources) {
+    // One supply and one clock for all: what they change, no comparison of the sources shows.
+    source.source.depends_on.emplace_back("supply");
+    source.source.depends_on.emplace_back("clock");
+    recipe.plan.sources.push_back(source.source);
+  }
+  return recipe;
+}
+
+}  // namespace torsio

@@ -1,0 +1,142 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "support/error_message.hpp"
+#include "support/two_torques.hpp"
+#include "torsio/evaluate/monitor_calibration.hpp"
+#include "torsio/evaluate/monitor_replay.hpp"
+#include "torsio/report/monitor.hpp"
+
+namespace torsio {
+namespace {
+
+using test::TwoTorques;
+using testing::HasSubstr;
+
+CalibratedMonitor calibrated(double minutes, const CalibrationOptions& options = {}) {
+  const TwoTorques joint;
+  return calibrate_monitor(joint.estimators(), TwoTorques::plan(),
+                           TwoTorques::fault_free(60.0 * minutes), options);
+}
+MonitoredTorque monitored(const CalibratedMonitor& monitor) {
+  return {TwoTorques().estimators(), monitor.redundancy, monitor.monitor};
+}
+
+TEST(CalibrateMonitor, ChoosesThresholdsAboveTheFaultFreeDifferences) {
+  const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  ASSERT_EQ(monitor.pairs.size(), 1U);
+  // The difference has a standard deviation of 0.45 Nm; what persists for 5 ms is far smaller.
+  EXPECT_GT(monitor.pairs[0].largest_difference_Nm, 1.2);
+  EXPECT_LT(monitor.pairs[0].typical_threshold_Nm, monitor.pairs[0].largest_difference_Nm);
+  EXPECT_GT(monitor.pairs[0].typical_threshold_Nm, 0.05);
+  EXPECT_GT(monitor.pairs[0].surely_detected_Nm, monitor.pairs[0].largest_difference_Nm);
+  EXPECT_NEAR(monitor.hours, 5.0 / 60.0, 1e-9);
+  EXPECT_FALSE(monitor.is_extrapolated);
+  // Other fault-free data give no alarm.
+  const MonitorReplay replay = replay_monitor(monitored(monitor), TwoTorques::recording(60.0, 99));
+  EXPECT_TRUE(std::isnan(replay.stopped_at_s));
+  EXPECT_LT(replay.watching_from_s, 0.2);
+  EXPECT_TRUE(replay.events.empty());
+}
+
+TEST(CalibrateMonitor, FindsAFaultAndNamesWhatExplainsIt) {
+  const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  const MonitorReplay replay =
+      replay_monitor(monitored(monitor), TwoTorques::recording(10.0, 99, 1.5, 4.25));
+  EXPECT_GE(replay.stopped_at_s, 4.25);
+  EXPECT_LT(replay.stopped_at_s, 4.30);
+  ASSERT_FALSE(replay.events.empty());
+  EXPECT_EQ(replay.events.back().check, MonitorCheck::disagreement);
+  EXPECT_THAT(replay.suspects, testing::UnorderedElementsAre("encoder", "clock", "current_sensor"));
+  const std::string text = replays_text({replay}, monitor.monitor);
+  EXPECT_THAT(text, HasSubstr("stopped at 4.2"));
+  EXPECT_THAT(text, HasSubstr("the torques of spring and current differ by"));
+  EXPECT_THAT(replays_json({replay}, monitor.monitor), HasSubstr("\"check\": \"disagreement\""));
+  EXPECT_THAT(replay_svg(replay, monitor.monitor), HasSubstr("<svg"));
+}
+
+TEST(CalibrateMonitor, RefusesARateThatTheDataCannotSupport) {
+  const CalibrationOptions rare{.false_alarms_per_hour = 1.0};
+  EXPECT_THAT(test::error_message([&] { calibrated(5.0, rare); }),
+              testing::AllOf(HasSubstr("at least 36 per hour"), HasSubstr("found 1 per hour")));
+  const CalibratedMonitor monitor =
+      calibrated(5.0, {.false_alarms_per_hour = 1.0, .extrapolate = true});
+  EXPECT_TRUE(monitor.is_extrapolated);
+  EXPECT_THAT(calibration_text(monitor), HasSubstr("extrapolated: the recordings support 36"));
+  EXPECT_GT(monitor.pairs[0].typical_threshold_Nm,
+            calibrated(5.0, {.false_alarms_per_hour = 40.0}).pairs[0].typical_threshold_Nm);
+}
+
+TEST(CalibrateMonitor, MeasuresTheCorrelationOfTheErrorsWhereTheTorqueIsKnown) {
+  const std::vector<double> rows =
+      calibrated(5.0, {.false_alarms_per_hour = 40.0}).redundancy.correlation;
+  ASSERT_EQ(rows.size(), 4U);
+  EXPECT_EQ(rows[0], 1.0);
+  EXPECT_NEAR(rows[1], 0.0, 0.05);  // independent noise
+  // Twice the same sensor has the correlation 1, taken a little towards none.
+  const TwoTorques joint;
+  const std::vector<Estimator> twice{make_estimator(joint.spring), make_estimator(joint.spring)};
+  const CalibratedMonitor same = calibrate_monitor(
+      twice, TwoTorques::plan(), TwoTorques::fault_free(300.0), {.false_alarms_per_hour = 40.0});
+  EXPECT_NEAR(same.redundancy.correlation[1], 0.95, 1e-6);
+}
+
+TEST(CalibrateMonitor, TakesTheLimitsOfSignalsFromTheDataUnlessTheyAreGiven) {
+  MonitorPlan plan = TwoTorques::plan();
+  plan.signals[1].highest = 50.0;
+  const CalibratedMonitor monitor =
+      calibrate_monitor(TwoTorques().estimators(), plan, TwoTorques::fault_free(300.0),
+                        {.false_alarms_per_hour = 40.0});
+  const MonitoredSignal& spring = monitor.monitor.signals[0];
+  EXPECT_GT(spring.highest, 0.5);
+  EXPECT_LT(spring.highest, 0.8);
+  EXPECT_NEAR(spring.lowest, -spring.highest, 0.05);
+  EXPECT_GT(spring.largest_rate, 50.0);
+  EXPECT_NEAR(spring.longest_age_s, 1.5e-3, 1e-12);
+  EXPECT_EQ(monitor.monitor.signals[1].highest, 50.0);
+}
+
+TEST(CalibrateMonitor, RefusesWhatItCannotUse) {
+  const TwoTorques joint;
+  const Dataset sound = TwoTorques::fault_free(300.0);
+  const CalibrationOptions options{.false_alarms_per_hour = 40.0};
+  const auto message = [&](const std::vector<Estimator>& sources, const MonitorPlan& plan,
+                           const Dataset& dataset, const CalibrationOptions& with) {
+    return test::error_message([&] { calibrate_monitor(sources, plan, dataset, with); });
+  };
+  EXPECT_THAT(message({make_estimator(joint.spring)}, TwoTorques::plan(), sound, options),
+              HasSubstr("one estimator for each source of the plan"));
+  EXPECT_THAT(message(joint.estimators(), TwoTorques::plan(), {}, options),
+              HasSubstr("there is no recording"));
+  EXPECT_THAT(
+      message(joint.estimators(), TwoTorques::plan(), sound, {.false_alarms_per_hour = 0.0}),
+      HasSubstr("a positive number per hour"));
+  EXPECT_THAT(message(joint.estimators(), TwoTorques::plan(), TwoTorques::fault_free(50.0),
+                      {.false_alarms_per_hour = 1e4}),
+              HasSubstr("at least 100 s without a fault"));
+  MonitorPlan other = TwoTorques::plan();
+  other.signals.push_back({.name = "gear_angle_rad"});
+  EXPECT_THAT(message(joint.estimators(), other, sound, options), HasSubstr("gear_angle_rad"));
+  ModelFile narrow = joint.spring;
+  narrow.settings.ranges = {.lowest = {-0.2}, .highest = {0.2}};
+  EXPECT_THAT(message({make_estimator(narrow), make_estimator(joint.current)}, TwoTorques::plan(),
+                      sound, options),
+              HasSubstr("% of the samples with a fault"));
+}
+
+TEST(ReplayMonitor, ReportsARecordingThatItCannotArm) {
+  const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  const MonitorReplay replay =
+      replay_monitor(monitored(monitor), TwoTorques::recording(5.0, 5, 2.0, 0.0));
+  EXPECT_FALSE(replay.watching_from_s < 0.2) << "a wrong gain never looks sound for long";
+  Recording slow("slow", 500.0);
+  slow.add({.name = "spring_deflection_rad", .values = {0.0}});
+  EXPECT_THAT(test::error_message([&] { replay_monitor(monitored(monitor), slow); }),
+              testing::AllOf(HasSubstr("1000 Hz"), HasSubstr("--rate")));
+}
+
+}  // namespace
+}  // namespace torsio
