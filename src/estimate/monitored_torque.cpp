@@ -119,7 +119,12 @@ void MonitoredTorque::reset() noexcept {
   redundancy_.reset();
   signal_pipeline_.reset();
   history_.reset();
+  failed_ = 0;
   for (Estimate& estimate : estimates_) estimate = {.fault = Fault::warming_up};
+}
+
+void MonitoredTorque::fail_model(std::size_t source) noexcept {
+  if (source < sources_.size()) failed_ |= SourceSet{1} << source;
 }
 
 FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw) noexcept {
@@ -136,6 +141,7 @@ FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw)
       input.values[k] = is_fresh ? sample.value : kNotMeasured;
     }
     estimates_[i] = sources_[i].step(input.values);
+    if ((failed_ >> i & 1U) != 0) estimates_[i].fault = Fault::model_not_finite;
   }
   const FusedTorque fused = redundancy_.step(estimates_);
   for (std::size_t k = 0; k < signal_input_.channels.size(); ++k)

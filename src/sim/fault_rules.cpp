@@ -95,12 +95,6 @@ std::string_view second_stage_name(const DataSheet& sheet) {
   return sheet.family == ActuatorFamily::harmonic_drive ? "gear" : kSpring;
 }
 
-/// That the bench's steps still follow.
-double stiffest_stop(const DataSheet& sheet) {
-  const PlantParameters plant = plant_parameters(sheet);
-  return Plant::stiffest_stop(plant, std::min(Plant::step_limit(plant), Plant::kDefaultStep_s));
-}
-
 std::string text(double value, std::string_view unit) {
   return fmt::format("{:g}{}{}", value, unit.empty() ? "" : " ", unit);
 }
@@ -161,6 +155,11 @@ void check_amount(const ScheduledFault& fault, const FaultRule& rule) {
 std::string_view common_part_name(std::string_view part, const DataSheet& sheet) {
   if (part == kFriction || part == kTorqueConstant) return part;
   return part == second_stage_name(sheet) ? kSpring : std::string_view{};
+}
+
+double stiffest_stop(const DataSheet& sheet) {
+  const PlantParameters plant = plant_parameters(sheet);
+  return Plant::stiffest_stop(plant, std::min(Plant::step_limit(plant), Plant::kDefaultStep_s));
 }
 
 double second_stage_stiffness(const DataSheet& sheet) {

@@ -29,6 +29,8 @@ struct FaultRule {
 [[nodiscard]] std::string_view common_part_name(std::string_view part, const DataSheet& sheet);
 
 [[nodiscard]] double second_stage_stiffness(const DataSheet& sheet);  ///< [Nm/rad]
+/// Of a stop [Nm/rad]: the bench's steps still follow.
+[[nodiscard]] double stiffest_stop(const DataSheet& sheet);
 
 /// Null if it has no such fault.
 [[nodiscard]] const FaultRule* find_fault_rule(std::string_view name,

@@ -35,6 +35,10 @@ class MonitoredTorque {
 
   void reset() noexcept;
 
+  /// To prove that the monitor stops: until `reset` this source reports a model without a
+  /// finite output. Without effect if there is no such source.
+  void fail_model(std::size_t source) noexcept;
+
   /// @param raw one sample for each of `raw_inputs()`. A channel older than the longest age of a
   /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite.
   FusedTorque step(double t_s, std::span<const SignalSample> raw) noexcept TORSIO_REALTIME;
@@ -57,6 +61,7 @@ class MonitoredTorque {
   [[nodiscard]] Input input_of(const std::vector<std::string>& names);
 
   std::vector<Estimator> sources_;
+  SourceSet failed_ = 0;  ///< of `fail_model`
   Redundancy redundancy_;
   Monitor monitor_;
   std::vector<std::string> raw_inputs_;
