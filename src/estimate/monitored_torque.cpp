@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
@@ -107,18 +108,20 @@ void MonitoredTorque::set_zero(std::string_view channel, double value) {
   const auto uses = [channel](const std::vector<std::string>& names) {
     return std::ranges::find(names, channel) != names.end();
   };
+  if (!uses(raw_inputs_))
+    throw UsageError({.place = "set_zero",
+                      .expected = fmt::format("one of {}", fmt::join(raw_inputs_, ", ")),
+                      .found = fmt::format("'{}'", channel),
+                      .advice = did_you_mean(channel, raw_inputs_)});
   for (Estimator& source : sources_)
     if (uses(source.raw_inputs())) source.set_zero(channel, value);
-  // A channel that nothing uses is refused here, with the list of those that are known.
-  if (uses(signal_pipeline_.raw_inputs()) || !uses(raw_inputs_))
-    signal_pipeline_.set_zero(channel, value);
+  if (uses(signal_pipeline_.raw_inputs())) signal_pipeline_.set_zero(channel, value);
 }
 
 void MonitoredTorque::reset() noexcept {
   for (Estimator& source : sources_) source.reset();
   redundancy_.reset();
   signal_pipeline_.reset();
-  history_.reset();
   failed_ = 0;
   for (Estimate& estimate : estimates_) estimate = {.fault = Fault::warming_up};
 }
@@ -129,8 +132,10 @@ void MonitoredTorque::fail_model(std::size_t source) noexcept {
 
 FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw) noexcept {
   if (raw.size() != raw_inputs_.size()) {
-    (void)monitor_.step(t_s, estimates_, {});
-    return {.fault = Fault::input_count_wrong};
+    (void)monitor_.step(t_s, {}, {});  // a stop: there is at least one source
+    if (monitor_.state() == Monitor::State::stopped) history_.freeze();
+    for (Estimate& estimate : estimates_) estimate.fault = Fault::input_count_wrong;
+    return redundancy_.step({});
   }
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     Input& input = inputs_[i];
@@ -144,15 +149,20 @@ FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw)
     if ((failed_ >> i & 1U) != 0) estimates_[i].fault = Fault::model_not_finite;
   }
   const FusedTorque fused = redundancy_.step(estimates_);
-  for (std::size_t k = 0; k < signal_input_.channels.size(); ++k)
-    signal_input_.values[k] = raw[signal_input_.channels[k]].value;
+  // The memory of an expression continues with the last number of a channel that is none now.
+  for (std::size_t k = 0; k < signal_input_.channels.size(); ++k) {
+    const double value = raw[signal_input_.channels[k]].value;
+    if (std::isfinite(value)) signal_input_.values[k] = value;
+  }
   const std::span<const double> values = signal_pipeline_.step(signal_input_.values);
   for (std::size_t i = 0; i < signals_.size(); ++i) {
     signals_[i] = {.value = values[i]};
     for (const std::size_t place : signal_channels_[i]) {
+      if (!std::isfinite(raw[place].value)) signals_[i].value = kNotMeasured;
       const double age_s = raw[place].age_s;
-      if (!(age_s <= signals_[i].age_s)) signals_[i].age_s = age_s;  // the oldest, or NaN
-      if (age_s < 0.0) signals_[i].age_s = age_s;                    // a time in the future
+      // The oldest one; a time in the future, or none at all, is worse.
+      double& worst_s = signals_[i].age_s;
+      if (worst_s >= 0.0 && !(age_s >= 0.0 && age_s <= worst_s)) worst_s = age_s;
     }
   }
   const bool was_stopped = monitor_.state() == Monitor::State::stopped;

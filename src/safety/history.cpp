@@ -9,12 +9,12 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostNumbers = 10'000'000;
+constexpr std::size_t kMaxNumbers = 10'000'000;
 
 std::size_t checked_size(std::size_t rows, std::size_t columns) {
-  if (rows == 0 || columns == 0 || rows > kMostNumbers / columns)
+  if (rows == 0 || columns == 0 || rows > kMaxNumbers / columns)
     throw Error({.place = "history",
-                 .expected = fmt::format("rows and columns of at most {} numbers", kMostNumbers),
+                 .expected = fmt::format("rows and columns of at most {} numbers", kMaxNumbers),
                  .found = fmt::format("{} rows, {} columns", rows, columns)});
   return rows * columns;
 }

@@ -7,6 +7,7 @@
 
 #include "error_correlation.hpp"
 #include "torsio/core/error.hpp"
+#include "valid_source.hpp"
 
 namespace torsio {
 namespace {
@@ -82,6 +83,7 @@ void check_times(const MonitorSettings& settings) {
           settings.largest_novelty);
   require(settings.proof_s >= 0.0 && std::isfinite(settings.proof_s), "proof_s", "0 or more",
           settings.proof_s);
+  require(settings.spike_memory_s >= 0.0, "spike_memory_s", "0 or more", settings.spike_memory_s);
   require(settings.longest_overrun > 0, "longest_overrun", "1 or more", 0.0);
   require(settings.spikes_in_a_row > 0, "spikes_in_a_row", "1 or more", 0.0);
 }
@@ -100,6 +102,11 @@ bool is_wrap(double change, double turn) noexcept {
 }
 
 constexpr double kLatePeriods = 1.5;
+
+/// Whether so many samples in a row are longer than a time; rounding does not make them longer.
+bool lasts_longer(std::uint32_t samples, double period_s, double longest_s) noexcept {
+  return samples * period_s > longest_s * (1.0 + 1e-9);
+}
 
 }  // namespace
 
@@ -145,14 +152,16 @@ void Monitor::clear() noexcept {
 }
 
 bool Monitor::arm(double command_written_s) noexcept {
-  if (state_ == State::ready && command_written_s > reset_t_s_) state_ = State::watching;
+  if (state_ == State::ready && std::isfinite(command_written_s) && command_written_s > reset_t_s_)
+    state_ = State::watching;
   return is_watching();
 }
 
 void Monitor::reset(double t_s) noexcept {
   clear();
   last_t_s_ = kNotMeasured;
-  reset_t_s_ = std::isfinite(t_s) ? t_s : reset_t_s_;
+  // A reset at an unknown time: no command is newer.
+  reset_t_s_ = std::isfinite(t_s) ? t_s : std::numeric_limits<double>::infinity();
   state_ = State::unproven;
 }
 
@@ -166,7 +175,7 @@ void Monitor::find(const MonitorEvent& found) noexcept {
   MonitorEvent event = found;
   const auto check = static_cast<std::size_t>(event.check);
   if (event.action == MonitorAction::off) event.action = settings_.actions[check];
-  if (settings_.actions[check] == MonitorAction::off) return;
+  if (event.action == MonitorAction::off) return;
   event.t_s = t_s_;
   const std::uint32_t bit = std::uint32_t{1} << check;
   active_ |= bit;
@@ -185,7 +194,9 @@ void Monitor::check_period(double t_s) noexcept {
   const bool advances = period_s > 0.0;
   late_ = advances && period_s <= late_s ? 0 : late_ + 1;
   if (advances && period_s <= longest_s && late_ < settings_.longest_overrun) return;
-  find({.check = MonitorCheck::period, .value = period_s, .limit = longest_s});
+  find({.check = MonitorCheck::period,
+        .value = period_s,
+        .limit = period_s <= longest_s ? late_s : longest_s});
 }
 
 void Monitor::check_change(std::size_t i, const SignalSample& sample) noexcept {
@@ -199,12 +210,15 @@ void Monitor::check_change(std::size_t i, const SignalSample& sample) noexcept {
   const bool is_inside = sample.value >= signal.lowest && sample.value <= signal.highest;
   const bool is_slow = !state.has_last || std::abs(change) <= signal.largest_rate * elapsed_s;
   if (is_inside && is_slow && !wraps) {
-    state.beyond = 0;
+    if (lasts_longer(++state.within, settings_.sample_period_s, settings_.spike_memory_s))
+      state.beyond = 0;
+    if (sample.value != state.last) state.companion = kNotMeasured;
     state.last = sample.value;
     state.last_t_s = t_s_;
     state.has_last = true;
     return;
   }
+  state.within = 0;
   if (++state.beyond < settings_.spikes_in_a_row) return;
   if (wraps) {
     find({.check = MonitorCheck::wrap,
@@ -227,14 +241,13 @@ void Monitor::check_change(std::size_t i, const SignalSample& sample) noexcept {
   }
 }
 
-void Monitor::check_frozen(std::size_t i, std::span<const SignalSample> signals) noexcept {
+void Monitor::check_frozen(std::size_t i) noexcept {
   const std::size_t companion = companion_[i];
-  if (companion == i) return;
   SignalState& state = signal_states_[i];
-  const double other = signals[companion].value;
-  if (!std::isfinite(other)) return;
-  const bool has_changed = !state.has_last || signals[i].value != state.last;
-  if (has_changed || !std::isfinite(state.companion)) state.companion = other;
+  // A spike of either signal is not a motion: only samples that were not passed over count.
+  if (companion == i || !signal_states_[companion].has_last) return;
+  const double other = signal_states_[companion].last;
+  if (std::isnan(state.companion)) state.companion = other;
   const double travel = std::abs(other - state.companion);
   if (travel <= settings_.signals[i].largest_hidden_travel) return;
   find({.check = MonitorCheck::frozen,
@@ -259,8 +272,8 @@ void Monitor::check_signal(std::size_t i, std::span<const SignalSample> signals)
                  .first = index,
                  .second = index,
                  .value = sample.value});
-  check_frozen(i, signals);  // before the sample becomes the last one
   check_change(i, sample);
+  check_frozen(i);
 }
 
 void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
@@ -268,26 +281,28 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
   const auto index = static_cast<std::uint8_t>(i);
   const double period_s = settings_.sample_period_s;
   const bool lost = is_lost(estimate.fault) || !std::isfinite(estimate.value);
-  const bool faulty = !lost && (estimate.fault != Fault::none || !(estimate.std_dev > 0.0));
-  state.lost_s = lost ? state.lost_s + period_s : 0.0;
-  state.faulty_s = faulty ? state.faulty_s + period_s : 0.0;
+  const bool faulty = !lost && !detail::is_valid(estimate);
   const bool is_novel = estimate.novelty > settings_.largest_novelty;
-  state.novel_s = is_novel ? state.novel_s + period_s : 0.0;
+  state.lost = lost ? state.lost + 1 : 0;
+  state.faulty = faulty ? state.faulty + 1 : 0;
+  state.novel = is_novel ? state.novel + 1 : 0;
+  constexpr auto kLost = static_cast<std::size_t>(MonitorCheck::source_lost);
+  const bool too_long = settings_.actions[kLost] != MonitorAction::off &&
+                        lasts_longer(state.lost, period_s, settings_.longest_loss_s);
   if (lost)
     find({.check = MonitorCheck::source_lost,
-          .action =
-              state.lost_s > settings_.longest_loss_s ? MonitorAction::stop : MonitorAction::off,
+          .action = too_long ? MonitorAction::stop : MonitorAction::off,
           .first = index,
           .second = index,
-          .value = state.lost_s,
+          .value = state.lost * period_s,
           .limit = settings_.longest_loss_s});
-  if (state.faulty_s > settings_.longest_fault_s)
+  if (lasts_longer(state.faulty, period_s, settings_.longest_fault_s))
     find({.check = MonitorCheck::source_fault,
           .first = index,
           .second = index,
-          .value = state.faulty_s,
+          .value = state.faulty * period_s,
           .limit = settings_.longest_fault_s});
-  if (state.novel_s > settings_.persistence_s)
+  if (lasts_longer(state.novel, period_s, settings_.persistence_s))
     find({.check = MonitorCheck::novelty,
           .first = index,
           .second = index,
@@ -299,9 +314,8 @@ double Monitor::threshold(const PairLimits& pair, double first_Nm,
                           double second_Nm) const noexcept {
   const double variance = first_Nm * first_Nm + second_Nm * second_Nm -
                           2.0 * correlation_[pair.first][pair.second] * first_Nm * second_Nm;
-  const double spread_Nm = pair.factor * std::sqrt(std::max(variance, 0.0));
-  // In this order an error bar that is not a number gives the floor: the narrowest threshold.
-  return std::min(std::max(pair.floor_Nm, spread_Nm), pair.ceiling_Nm);
+  // A square that overflows is not a number; in this order it gives the floor, the narrowest one.
+  return std::min(std::max(pair.floor_Nm, pair.factor * std::sqrt(variance)), pair.ceiling_Nm);
 }
 
 void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexcept {
@@ -309,17 +323,17 @@ void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexc
   PairState& state = pair_states_[i];
   const Estimate& first = sources[pair.first];
   const Estimate& second = sources[pair.second];
-  if (first.fault != Fault::none || second.fault != Fault::none) {
-    state.beyond_s = state.opposite_s = 0.0;  // the sums of a drift are kept over a short loss
-    state.disagrees = false;
-    return;
-  }
+  // What was counted is kept: a source that is lost now and then would otherwise never disagree.
+  if (!detail::is_valid(first) || !detail::is_valid(second)) return;
   const double period_s = settings_.sample_period_s;
   const double limit_Nm = threshold(pair, first.std_dev, second.std_dev);
   const double difference_Nm = first.value - second.value;
   const double release_Nm = state.disagrees ? settings_.release_share * limit_Nm : limit_Nm;
-  state.beyond_s = std::abs(difference_Nm) <= release_Nm ? 0.0 : state.beyond_s + period_s;
-  state.disagrees = state.beyond_s > settings_.persistence_s;
+  state.beyond = std::abs(difference_Nm) <= release_Nm ? 0 : state.beyond + 1;
+  state.disagrees = lasts_longer(state.beyond, period_s, settings_.persistence_s);
+  const bool is_opposite = std::signbit(first.value) != std::signbit(second.value) &&
+                           std::min(std::abs(first.value), std::abs(second.value)) > 0.5 * limit_Nm;
+  state.opposite = is_opposite ? state.opposite + 1 : 0;
   const auto found = [&](MonitorCheck check, double value, double limit) {
     find({.check = check,
           .first = pair.first,
@@ -327,19 +341,18 @@ void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexc
           .value = value,
           .limit = limit});
   };
+  // Before the disagreement that it is as well: the reason of a stop is the first finding.
+  if (lasts_longer(state.opposite, period_s, settings_.persistence_s))
+    found(MonitorCheck::sign, difference_Nm, limit_Nm);
   if (state.disagrees) {
     disagreeing_[disagreeing_count_++] = {pair.first, pair.second};
     found(MonitorCheck::disagreement, difference_Nm, limit_Nm);
   }
-  const bool is_opposite = first.value * second.value < 0.0 &&
-                           std::min(std::abs(first.value), std::abs(second.value)) > 0.5 * limit_Nm;
-  state.opposite_s = is_opposite ? state.opposite_s + period_s : 0.0;
-  if (state.opposite_s > settings_.persistence_s)
-    found(MonitorCheck::sign, difference_Nm, limit_Nm);
-  const double share = limit_Nm > 0.0 ? difference_Nm / limit_Nm : 0.0;
+  const double share = difference_Nm / limit_Nm;
+  // Limited, so that a difference that has ended is not reported for long; 0 / 0 counts as 0.
   const auto summed = [&](double sum_s, double excess) {
-    return std::clamp(sum_s + (excess - pair.drift_allowance) * period_s, 0.0,
-                      2.0 * pair.drift_limit_s);
+    const double next_s = sum_s + (excess - pair.drift_allowance) * period_s;
+    return std::min(std::max(0.0, next_s), 2.0 * pair.drift_limit_s);
   };
   state.drift_up_s = summed(state.drift_up_s, share);
   state.drift_down_s = summed(state.drift_down_s, -share);
@@ -375,6 +388,7 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
   check_period(t_s);
   if (sources.size() != settings_.sources.size() || signals.size() != settings_.signals.size()) {
     find({.check = MonitorCheck::not_finite,
+          .action = MonitorAction::stop,  // even if the check is off: nothing has been checked
           .value = static_cast<double>(sources.size() + signals.size()),
           .limit = static_cast<double>(settings_.sources.size() + settings_.signals.size())});
     decide(t_s);
@@ -384,7 +398,7 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
   std::size_t valid = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     check_source(i, sources[i]);
-    if (sources[i].fault == Fault::none) ++valid;
+    if (detail::is_valid(sources[i])) ++valid;
   }
   if (sources.size() > 1 && valid < 2)
     find({.check = MonitorCheck::redundancy_lost,

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "torsio/safety/monitor.hpp"
 
 namespace torsio {
@@ -19,9 +21,8 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
                          source(event.first), source(event.second), value, limit);
     case MonitorCheck::drift:
       return fmt::format(
-          "the torques of {} and {} have differed for too long: the cumulative sum is {:.3g} s, "
-          "the "
-          "limit {:.3g} s",
+          "the torques of {} and {} have differed for too long: cumulative sum {:.3g} s, limit "
+          "{:.3g} s",
           source(event.first), source(event.second), value, limit);
     case MonitorCheck::sign:
       return fmt::format("the torques of {} and {} have opposite signs and differ by {:.3g} Nm",
@@ -31,7 +32,8 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
                          source(event.first), value);
     case MonitorCheck::source_fault:
       return fmt::format(
-          "the torque of {} has been outside the range of its model for {:.3g} s, limit {:.3g} s",
+          "the torque of {} has been without a valid model or error bar for {:.3g} s, limit {:.3g} "
+          "s",
           source(event.first), value, limit);
     case MonitorCheck::redundancy_lost:
       return fmt::format("{:.0f} valid torques are left, at least {:.0f} are needed", value, limit);
@@ -39,6 +41,9 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
       return fmt::format("the inputs of the torque of {} have a novelty of {:.3g}, limit {:.3g}",
                          source(event.first), value, limit);
     case MonitorCheck::not_finite:
+      if (std::isfinite(value))
+        return fmt::format("the monitor was given {:.0f} sources and signals, expected {:.0f}",
+                           value, limit);
       return fmt::format("{} is not a finite number", signal(event.first));
     case MonitorCheck::stale:
       return fmt::format("{} is {:.3g} s old, limit {:.3g} s", signal(event.first), value, limit);

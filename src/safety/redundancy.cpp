@@ -4,15 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "error_correlation.hpp"
 #include "torsio/core/error.hpp"
+#include "valid_source.hpp"
 
 namespace torsio {
 namespace {
 
 /// An error bar of more than so many times the smallest one has no weight.
-constexpr double kLargestRatio = 1e6;
+constexpr double kLargestRatio = 1e100;
 
 void check_sources(const std::vector<TorqueSource>& sources) {
   if (sources.empty() || sources.size() > Redundancy::kMaxSources)
@@ -27,11 +29,6 @@ void check_sources(const std::vector<TorqueSource>& sources) {
                      .found = fmt::format("'{}'", sources[i].name)});
 }
 
-bool is_valid(const Estimate& source) noexcept {
-  return source.fault == Fault::none && std::isfinite(source.value) && source.std_dev > 0.0 &&
-         std::isfinite(source.std_dev);
-}
-
 }  // namespace
 
 Redundancy::Redundancy(const RedundancySettings& settings) : settings_(settings) {
@@ -40,6 +37,10 @@ Redundancy::Redundancy(const RedundancySettings& settings) : settings_(settings)
       detail::error_correlation(settings.correlation, settings.sources.size(), "redundancy");
   for (std::size_t i = 0; i < settings.sources.size(); ++i) {
     for (const std::string& part : settings.sources[i].depends_on) {
+      if (part.empty())
+        throw Error({.place = "redundancy",
+                     .expected = "parts with names",
+                     .found = fmt::format("a part of '{}' without one", settings.sources[i].name)});
       const auto bit = static_cast<std::size_t>(std::ranges::find(parts_, part) - parts_.begin());
       if (bit == kMaxParts)
         throw Error({.place = "redundancy",
@@ -65,66 +66,90 @@ PartSet Redundancy::suspects(std::span<const std::array<std::uint8_t, 2>> pairs)
   return common;
 }
 
-// The active-set method of Lawson and Hanson for min w'Sw with w >= 0 and sum 1: at the solution every
-// source with a weight has the same gradient S w = var, and no other one has a smaller one.
-void Redundancy::find_weights(std::span<const std::size_t> index, const Row& std_dev_Nm,
-                              Row& weights) const noexcept {
-  const std::size_t count = index.size();
-  double smallest = std_dev_Nm[index[0]];
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < count; ++i) {
-    if (!(std_dev_Nm[index[i]] < smallest)) continue;
-    smallest = std_dev_Nm[index[i]];
+namespace {
+
+using Row = std::array<double, Redundancy::kMaxSources>;
+
+/// The weights and the sources that may have one.
+struct Weights {
+  Row of{};
+  std::array<std::size_t, Redundancy::kMaxSources> chosen{};
+  std::size_t chosen_count = 0;
+};
+
+/// Moves the weights of the chosen sources to those of the smallest variance. A source whose weight
+/// would become negative on the way loses it and is no longer chosen.
+void minimise_over_chosen(const detail::SquareMatrix& covariance, Weights& weights) noexcept {
+  std::size_t limiting = 0;
+  do {
+    const std::size_t count = weights.chosen_count;
+    const Row least = detail::smallest_variance(covariance, std::span(weights.chosen).first(count));
+    double share = 1.0;
+    limiting = count;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double weight = weights.of[weights.chosen[k]];
+      const double reach = least[k] < 0.0 ? weight / (weight - least[k]) : 1.0;
+      if (!(reach < share)) continue;
+      share = reach;
+      limiting = k;
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      double& weight = weights.of[weights.chosen[k]];
+      weight += share * (least[k] - weight);
+    }
+    if (limiting == count) return;
+    weights.of[weights.chosen[limiting]] = 0.0;
+    std::copy(weights.chosen.begin() + static_cast<std::ptrdiff_t>(limiting) + 1,
+              weights.chosen.begin() + static_cast<std::ptrdiff_t>(count),
+              weights.chosen.begin() + static_cast<std::ptrdiff_t>(limiting));
+    --weights.chosen_count;
+  } while (true);
+}
+
+/// @returns the source that is not chosen and whose weight would reduce the variance most; `count`: none
+std::size_t entering(const detail::SquareMatrix& covariance, std::size_t count,
+                     const Weights& weights) noexcept {
+  std::array<bool, Redundancy::kMaxSources> is_chosen{};
+  double variance = 0.0;
+  Row gradient{};
+  for (std::size_t k = 0; k < weights.chosen_count; ++k) is_chosen[weights.chosen[k]] = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < count; ++j) gradient[i] += covariance[i][j] * weights.of[j];
+    variance += weights.of[i] * gradient[i];
+  }
+  std::size_t best = count;
+  double least = variance * (1.0 - 1e-9);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (is_chosen[i] || !(gradient[i] < least)) continue;
+    least = gradient[i];
     best = i;
   }
-  detail::SquareMatrix covariance{};
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = 0; j <= i; ++j) {
-      const double left = std::min(std_dev_Nm[index[i]] / smallest, kLargestRatio);
-      const double right = std::min(std_dev_Nm[index[j]] / smallest, kLargestRatio);
-      covariance[i][j] = covariance[j][i] = left * correlation_[index[i]][index[j]] * right;
-    }
-
-  Row w{};
-  w[best] = 1.0;
-  std::array<std::size_t, kMaxSources> chosen{best};
-  std::size_t chosen_count = 1;
-  for (std::size_t round = 0; round < 3 * count; ++round) {
-    double variance = 0.0;
-    Row gradient{};
-    for (std::size_t i = 0; i < count; ++i) {
-      for (std::size_t j = 0; j < count; ++j) gradient[i] += covariance[i][j] * w[j];
-      variance += w[i] * gradient[i];
-    }
-    std::size_t entering = count;
-    double least = variance * (1.0 - 1e-12);
-    for (std::size_t i = 0; i < count; ++i) {
-      if (w[i] > 0.0 || !(gradient[i] < least)) continue;
-      least = gradient[i];
-      entering = i;
-    }
-    if (entering == count) break;
-    chosen[chosen_count++] = entering;
-    while (chosen_count > 0) {
-      const Row x = detail::smallest_variance(covariance, std::span(chosen).first(chosen_count));
-      // As far towards x as no weight becomes negative.
-      double share = 1.0;
-      for (std::size_t k = 0; k < chosen_count; ++k)
-        if (!(x[k] > 0.0)) share = std::min(share, w[chosen[k]] / (w[chosen[k]] - x[k]));
-      std::size_t kept = 0;
-      for (std::size_t k = 0; k < chosen_count; ++k) {
-        const std::size_t i = chosen[k];
-        w[i] += share * (x[k] - w[i]);
-        if (!(x[k] > 0.0) && !(w[i] > 1e-12)) w[i] = 0.0;
-        if (w[i] > 0.0) chosen[kept++] = i;
-      }
-      const bool is_complete = share == 1.0 || kept == chosen_count;
-      chosen_count = kept;
-      if (is_complete) break;
-    }
-  }
-  for (std::size_t i = 0; i < count; ++i) weights[index[i]] = w[i];
+  return best;
 }
+
+/// The weights of the smallest variance by an active-set method (Lawson & Hanson 1974, for w'Sw with
+/// w >= 0 and sum 1): at the solution every source with a weight has the same gradient, and no other
+/// source has a smaller one. It begins with the weights that are the solution without correlation.
+Row smallest_weights(const detail::SquareMatrix& covariance, std::size_t count) noexcept {
+  Weights weights{.chosen_count = count};
+  double sum = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    weights.chosen[i] = i;
+    weights.of[i] = 1.0 / covariance[i][i];
+    sum += weights.of[i];
+  }
+  for (std::size_t i = 0; i < count; ++i) weights.of[i] /= sum;
+  // Bounded: rounding could otherwise let one source enter and leave again without end.
+  for (std::size_t rounds = 3 * count; rounds > 0;) {
+    minimise_over_chosen(covariance, weights);
+    const std::size_t next = entering(covariance, count, weights);
+    rounds = next < count ? rounds - 1 : 0;
+    if (next < count) weights.chosen[weights.chosen_count++] = next;
+  }
+  return weights.of;
+}
+
+}  // namespace
 
 FusedTorque Redundancy::step(std::span<const Estimate> sources) noexcept {
   FusedTorque fused{.value_Nm = last_Nm_, .fault = Fault::input_not_finite};
@@ -132,34 +157,45 @@ FusedTorque Redundancy::step(std::span<const Estimate> sources) noexcept {
     fused.fault = Fault::input_count_wrong;
     return fused;
   }
-  std::array<std::size_t, kMaxSources> index{};
-  std::size_t count = 0;
-  Row std_dev_Nm{};
   PartSet shared = ~PartSet{0};
+  double smallest_Nm = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (!is_valid(sources[i])) continue;
-    index[count++] = i;
-    std_dev_Nm[i] = sources[i].std_dev;
+    if (!detail::is_valid(sources[i])) continue;
     fused.used |= SourceSet{1} << i;
     shared &= parts_of_[i];
+    smallest_Nm = std::min(smallest_Nm, sources[i].std_dev);
   }
-  if (count == 0) return fused;
-  Row weights{};
-  find_weights(std::span(index).first(count), std_dev_Nm, weights);
+  if (fused.used == 0) return fused;
+  // In units of the smallest error bar: no square overflows or becomes 0.
+  std::array<std::size_t, kMaxSources> index{};
+  Row ratio{};
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if ((fused.used >> i & 1U) == 0 || !(sources[i].std_dev / smallest_Nm <= kLargestRatio))
+      continue;
+    ratio[count] = sources[i].std_dev / smallest_Nm;
+    index[count++] = i;
+  }
+  detail::SquareMatrix covariance{};
+  for (std::size_t a = 0; a < count; ++a)
+    for (std::size_t b = 0; b < count; ++b)
+      covariance[a][b] = ratio[a] * correlation_[index[a]][index[b]] * ratio[b];
+  const Row weights = smallest_weights(covariance, count);
   double value_Nm = 0.0;
   double variance = 0.0;
+  double lowest_Nm = std::numeric_limits<double>::infinity();
+  double highest_Nm = -lowest_Nm;
   for (std::size_t a = 0; a < count; ++a) {
-    const std::size_t i = index[a];
-    value_Nm += weights[i] * sources[i].value;
-    for (std::size_t b = 0; b < count; ++b) {
-      const std::size_t j = index[b];
-      variance += weights[i] * weights[j] * std_dev_Nm[i] * std_dev_Nm[j] * correlation_[i][j];
-    }
+    const double source_Nm = sources[index[a]].value;
+    value_Nm += weights[a] * source_Nm;
+    lowest_Nm = std::min(lowest_Nm, source_Nm);
+    highest_Nm = std::max(highest_Nm, source_Nm);
+    for (std::size_t b = 0; b < count; ++b) variance += weights[a] * weights[b] * covariance[a][b];
   }
+  // Between the estimates in spite of rounding; in this order a number in every case.
+  last_Nm_ = fused.value_Nm = std::min(std::max(lowest_Nm, value_Nm), highest_Nm);
+  fused.std_dev_Nm = smallest_Nm * std::sqrt(variance);
   fused.not_redundant = shared;
-  if (!std::isfinite(value_Nm)) return fused;
-  last_Nm_ = fused.value_Nm = value_Nm;
-  fused.std_dev_Nm = std::sqrt(std::max(variance, 0.0));
   fused.fault = Fault::none;
   return fused;
 }

@@ -2,12 +2,14 @@
 // lock, no system call.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <mutex>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +21,7 @@
 #include "support/examples/linear.hpp"
 #include "support/examples/network.hpp"
 #include "support/examples/viscoelastic.hpp"
+#include "support/monitored_joint.hpp"
 #include "support/system_calls.hpp"
 #include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
@@ -30,6 +33,10 @@
 #include "torsio/control/tube_impedance.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/monitored_torque.hpp"
+#include "torsio/safety/history.hpp"
+#include "torsio/safety/monitor.hpp"
+#include "torsio/safety/redundancy.hpp"
 #include "torsio/signal/excitation.hpp"
 #include "torsio/signal/joint_move.hpp"
 
@@ -414,6 +421,95 @@ TEST(ControlCalls, OfTubeImpedanceAreNone) {
                 if (!std::isfinite(output.current_A)) return false;
               }
               return faults > kLeastFaults;
+            }),
+            "");
+}
+
+TEST(ControlCalls, OfRedundancyAndHistoryAreNone) {
+  RedundancySettings settings = test::joint_redundancy();
+  settings.correlation = {1.0, 0.3, 0.2, 0.3, 1.0, -0.8, 0.2, -0.8, 1.0};
+  Redundancy redundancy(settings);
+  History history(1000, 2);
+  Spoiled value(5.0, 4099);
+  Spoiled std_dev(1.0, 4111);
+  EXPECT_EQ(besides_computing([&] {
+              int faults = 0;
+              for (int n = 0; n < kCycles / 4; ++n) {
+                std::array<Estimate, 3> sources;
+                for (Estimate& source : sources)
+                  source = {.value = value.next(),
+                            .std_dev = std_dev.next(),
+                            .fault = n % 5 == 0 ? Fault::warming_up : Fault::none};
+                const auto count = static_cast<std::size_t>(n % 1000 == 0 ? 2 : 3);
+                const FusedTorque fused = redundancy.step(std::span(sources).first(count));
+                faults += fused.fault != Fault::none ? 1 : 0;
+                static_cast<void>(redundancy.suspects({}));
+                history.record(std::array{fused.value_Nm, fused.std_dev_Nm});
+                if (n % 77'777 == 0) history.freeze();
+                if (n % 77'777 == 7) history.reset();
+                if (!std::isfinite(fused.value_Nm)) return false;
+              }
+              return faults > kLeastFaults / 4;
+            }),
+            "");
+}
+
+// Through every state: armed when it can be, reset after each stop.
+TEST(ControlCalls, OfMonitorAreNone) {
+  MonitorSettings settings = test::joint_monitor();
+  settings.proof_s = 0.002;
+  settings.signals[0].turn = 6.3;
+  settings.signals[0].largest_rate = 1000.0;
+  settings.signals[1].moves_with = "gear_angle_rad";
+  settings.signals[1].largest_hidden_travel = 5.0;
+  settings.largest_novelty = 1.0;
+  for (PairLimits& pair : settings.pairs) pair.drift_limit_s = 0.01;
+  Monitor monitor(settings);
+  Spoiled torque(1.0, 4099);
+  Spoiled angle(0.01, 4111);
+  EXPECT_EQ(besides_computing([&] {
+              int stops = 0;
+              for (int n = 0; n < kCycles / 4; ++n) {
+                const double t_s = n % 9999 == 0 ? 0.0 : 1e-3 * n;
+                std::array<Estimate, 3> sources;
+                std::array<SignalSample, 3> signals;
+                for (Estimate& source : sources)
+                  source = {.value = torque.next(), .std_dev = 0.1, .novelty = 0.9};
+                for (SignalSample& sample : signals)
+                  sample = {.value = angle.next(), .age_s = n % 777 == 0 ? 1.0 : 0.0};
+                const auto count = static_cast<std::size_t>(n % 5000 == 0 ? 2 : 3);
+                if (monitor.step(t_s, std::span(sources).first(count), signals) ==
+                    Monitor::State::stopped) {
+                  ++stops;
+                  monitor.reset(t_s);
+                }
+                static_cast<void>(monitor.arm(t_s));
+                if (n % 77'777 == 0) monitor.stop(t_s);
+              }
+              return stops > kLeastFaults / 4;
+            }),
+            "");
+}
+
+TEST(ControlCalls, OfMonitoredTorqueAreNone) {
+  MonitoredTorque torque = test::monitored_joint();
+  Spoiled value(0.001, 4099);
+  EXPECT_EQ(besides_computing([&] {
+              int faults = 0;
+              for (int n = 0; n < kCycles / 20; ++n) {
+                std::array<SignalSample, 4> raw;
+                for (SignalSample& sample : raw)
+                  sample = {.value = value.next(), .age_s = n % 777 == 0 ? 1.0 : 0.0};
+                const auto count = static_cast<std::size_t>(n % 5000 == 0 ? 2 : 4);
+                const FusedTorque fused = torque.step(1e-3 * n, std::span(raw).first(count));
+                faults += fused.fault != Fault::none ? 1 : 0;
+                static_cast<void>(torque.monitor().arm(1e-3 * n));
+                if (torque.monitor().state() == Monitor::State::stopped && n % 100 == 0)
+                  torque.monitor().reset(1e-3 * n);
+                if (n % 7777 == 0) torque.reset();
+                if (!std::isfinite(fused.value_Nm)) return false;
+              }
+              return faults > kCycles / 20 / 10'000 && torque.history().size() > 0;
             }),
             "");
 }

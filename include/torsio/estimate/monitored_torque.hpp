@@ -33,6 +33,8 @@ class MonitoredTorque {
   /// configuring. @throws UsageError for an unknown channel or a value that is not finite.
   void set_zero(std::string_view channel, double value);
 
+  /// Empties the memory of the sources and signals. The monitor has a reset of its own,
+  /// `monitor().reset(t_s)`, with which the next step begins the history again.
   void reset() noexcept;
 
   /// To prove that the monitor stops: until `reset` this source reports a model without a
@@ -40,7 +42,8 @@ class MonitoredTorque {
   void fail_model(std::size_t source) noexcept;
 
   /// @param raw one sample for each of `raw_inputs()`. A channel older than the longest age of a
-  /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite.
+  /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite. Another
+  /// number of samples is a stop of the monitor.
   FusedTorque step(double t_s, std::span<const SignalSample> raw) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] Monitor& monitor() noexcept { return monitor_; }
@@ -65,14 +68,14 @@ class MonitoredTorque {
   Redundancy redundancy_;
   Monitor monitor_;
   std::vector<std::string> raw_inputs_;
-  std::vector<Input> inputs_;  ///< of the sources
+  std::vector<Input> inputs_;  ///< one for each source
   FeaturePipeline signal_pipeline_;
   Input signal_input_;
   std::vector<std::vector<std::size_t>> signal_channels_;  ///< per signal: places in `raw`
   std::vector<double> longest_age_s_;                      ///< per channel
   std::vector<Estimate> estimates_;
   std::vector<SignalSample> signals_;
-  std::vector<double> row_;  ///< of the history
+  std::vector<double> row_;  ///< for the history
   History history_;
 };
 

@@ -21,7 +21,7 @@ enum class MonitorCheck : std::uint8_t {
   sign,             ///< they have opposite signs, each beyond half the threshold of their pair
   source_lost,      ///< an input of a source is missing, stale or not a number
   source_fault,     ///< a source has inputs outside its range, or its model failed
-  redundancy_lost,  ///< fewer than two sources are valid
+  redundancy_lost,  ///< fewer than two sources of several are valid
   novelty,          ///< the inputs of a source are unlike those of its training
   not_finite,       ///< a signal is NaN or infinite
   stale,            ///< a signal has not been measured for too long
@@ -59,7 +59,7 @@ struct PairLimits {
   double factor = 6.0;
   double floor_Nm = 0.0;
   double ceiling_Nm = std::numeric_limits<double>::infinity();
-  /// Of the cumulative sum: the share of the threshold that is not counted, and the sum in seconds
+  /// For the cumulative sum: the share of the threshold that is not counted, and the sum in seconds
   /// times threshold at which it reports.
   double drift_allowance = 0.75;
   double drift_limit_s = std::numeric_limits<double>::infinity();
@@ -78,9 +78,11 @@ struct MonitorSettings {
   double longest_fault_s = 0.015;  ///< how long a source may report a fault of its model or range
   double largest_novelty = std::numeric_limits<double>::infinity();
   double sample_period_s = 1e-3;
-  std::uint32_t longest_overrun = 3;  ///< late ticks in a row
-  std::uint32_t spikes_in_a_row =
-      2;  ///< samples beyond range or rate before they are a fault: one is passed over
+  std::uint32_t longest_overrun = 3;  ///< so many late ticks in a row are a fault
+  /// So many samples beyond range or rate are a fault: one is passed over. Those before count if the
+  /// samples between were good for `spike_memory_s` at most.
+  std::uint32_t spikes_in_a_row = 2;
+  double spike_memory_s = 0.02;
   double proof_s = 0.05;  ///< how long every check must be silent before the joint may move
 
   /// stop, but warn for source_lost (which stops after `longest_loss_s`) and novelty.
@@ -93,7 +95,7 @@ struct MonitorEvent {
   MonitorCheck check = MonitorCheck::disagreement;
   MonitorAction action = MonitorAction::off;
   std::uint8_t first = 0;   ///< index of the source or signal
-  std::uint8_t second = 0;  ///< of the other source of a pair; else equal to `first`
+  std::uint8_t second = 0;  ///< the other source of a pair, else equal to `first`
   double value = 0.0;       ///< what was found, and its limit
   double limit = 0.0;
 };
@@ -110,13 +112,14 @@ struct SignalSample {
 ///     watching  --a check whose action is stop-->  stopped  --reset-->  unproven
 ///
 /// A stop is latched: only `reset` ends it, and the joint may move again after the proof and `arm`
-/// with a command that was written after the reset. Valid sources that disagree stop the joint; there
-/// is no vote. Only `is_watching()` permits torque; what a stop does is a matter of `JointStop` and of
+/// with a command that was written after the reset. Valid sources that disagree stop the joint,
+/// without a vote. Only `is_watching()` permits torque; what a stop does is a matter of `JointStop` and of
 /// the brake.
 ///
 /// - disagreement: |t_i - t_j| > clamp(factor sqrt(s_i^2 + s_j^2 - 2 R_ij s_i s_j), floor, ceiling) =: h for
 ///   `persistence_s`, with hysteresis: it ends below `release_share` h.
-/// - drift: S <- max(0, S + (|mean difference| / h - drift_allowance) T), S > drift_limit_s, on either side.
+/// - drift: S <- max(0, S + ((t_i - t_j) / h - drift_allowance) T) > drift_limit_s, on either side.
+/// - sign: t_i and t_j have opposite signs and min(|t_i|, |t_j|) > h / 2 for `persistence_s`.
 /// - frozen: the signal keeps exactly one value while its companion travels further than
 ///   `largest_hidden_travel`; at rest there is no travel.
 ///
@@ -133,16 +136,17 @@ class Monitor {
   /// @throws Error if a name, an index or a limit is not valid.
   explicit Monitor(MonitorSettings settings);
 
-  /// The operator permits motion. Without effect unless the state is `ready` and the command is newer
-  /// than the last reset. @returns whether it watches now
+  /// The operator permits motion. Without effect unless the state is `ready` and the time of the command
+  /// is finite and later than the last reset. @returns whether it watches now
   bool arm(double command_written_s) noexcept TORSIO_REALTIME;
-  /// Ends a stop. Nothing moves before the proof and `arm`.
+  /// Ends a stop. Nothing moves before the proof and `arm`; after a reset at a time that is not finite,
+  /// not before another reset either.
   void reset(double t_s) noexcept TORSIO_REALTIME;
   /// A stop from outside.
   void stop(double t_s) noexcept TORSIO_REALTIME;
 
   /// Call in every tick. @param sources, signals in the order of the settings; another count is
-  /// `not_finite`, a stop.
+  /// `not_finite`, and a stop whatever the action of that check.
   State step(double t_s, std::span<const Estimate> sources,
              std::span<const SignalSample> signals) noexcept TORSIO_REALTIME;
 
@@ -164,18 +168,19 @@ class Monitor {
   struct SignalState {
     double last = 0.0;  ///< last sample that was not passed over
     double last_t_s = 0.0;
-    double companion = 0.0;    ///< angle of the companion when this signal changed last
-    std::uint32_t beyond = 0;  ///< samples in a row beyond range or rate
+    double companion = kNotMeasured;  ///< angle of the companion when this signal changed last
+    std::uint32_t beyond = 0;         ///< recent samples beyond range or rate
+    std::uint32_t within = 0;         ///< samples since then
     bool has_last = false;
   };
   struct SourceState {
-    double lost_s = 0.0;
-    double faulty_s = 0.0;
-    double novel_s = 0.0;
+    std::uint32_t lost = 0;  ///< samples in a row, here and below
+    std::uint32_t faulty = 0;
+    std::uint32_t novel = 0;
   };
   struct PairState {
-    double beyond_s = 0.0;
-    double opposite_s = 0.0;
+    std::uint32_t beyond = 0;
+    std::uint32_t opposite = 0;
     double drift_up_s = 0.0;
     double drift_down_s = 0.0;
     bool disagrees = false;
@@ -186,7 +191,7 @@ class Monitor {
   void check_period(double t_s) noexcept TORSIO_REALTIME;
   void check_signal(std::size_t i, std::span<const SignalSample> signals) noexcept TORSIO_REALTIME;
   void check_change(std::size_t i, const SignalSample& sample) noexcept TORSIO_REALTIME;
-  void check_frozen(std::size_t i, std::span<const SignalSample> signals) noexcept TORSIO_REALTIME;
+  void check_frozen(std::size_t i) noexcept TORSIO_REALTIME;
   void check_source(std::size_t i, const Estimate& estimate) noexcept TORSIO_REALTIME;
   void check_pair(std::size_t i, std::span<const Estimate> sources) noexcept TORSIO_REALTIME;
   [[nodiscard]] double threshold(const PairLimits& pair, double first_Nm,
@@ -194,7 +199,7 @@ class Monitor {
   void decide(double t_s) noexcept TORSIO_REALTIME;
 
   MonitorSettings settings_;
-  std::array<std::uint8_t, kMaxSignals> companion_{};  ///< of a signal; its own index: none
+  std::array<std::uint8_t, kMaxSignals> companion_{};  ///< one for each signal; its own index: none
   std::array<SignalState, kMaxSignals> signal_states_{};
   std::array<SourceState, kMaxSources> source_states_{};
   std::array<PairState, kMaxPairs> pair_states_{};

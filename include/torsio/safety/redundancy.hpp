@@ -52,11 +52,12 @@ struct FusedTorque {
 ///
 /// t the valid estimates, s their error bars at this tick, R the correlation of their errors. w are
 /// the weights >= 0 with sum 1 of the smallest variance. Since the weights are not negative, the
-/// result lies between the estimates; since a smaller set of sources has a larger minimum, the error
-/// bar never becomes narrower when a source is lost.
+/// result lies between the estimates; since a smaller set of sources has a larger minimum, the
+/// error bar never becomes narrower when a source is lost. A source whose error bar is more than 10^100
+/// times the smallest one has no weight.
 ///
-/// A source is left out only if it reports itself invalid: a fault, a value or an error bar that is
-/// not finite. Valid sources that disagree are all used: which of them is wrong is not decided here
+/// A source is left out only if it reports itself invalid: a fault, a value that is not finite, an
+/// error bar that is not finite or not positive. Valid sources that disagree are all used: which of them is wrong is not decided here
 /// (`Monitor` stops the joint), since two sources with a common part can agree on a wrong torque.
 /// Source: paper 000, section 6.4, compares three estimates; the combination is ours (minimum variance,
 /// as in Maybeck 1979).
@@ -65,8 +66,8 @@ class Redundancy {
   static constexpr std::size_t kMaxSources = 8;
   static constexpr std::size_t kMaxParts = 32;
 
-  /// @throws Error for no sources or more than `kMaxSources`, names that are empty or used twice, more
-  /// than `kMaxParts` parts, or a correlation that is not a correlation matrix (size, ones on the
+  /// @throws Error for no sources or more than `kMaxSources`, names that are empty or used twice, parts
+  /// without a name or more than `kMaxParts` of them, or a correlation that is not a correlation matrix (size, ones on the
   /// diagonal, symmetric, positive definite).
   explicit Redundancy(const RedundancySettings& settings);
 
@@ -88,10 +89,6 @@ class Redundancy {
 
  private:
   using Row = std::array<double, kMaxSources>;
-
-  /// The weights of the sources in `index`; those that would be negative are 0.
-  void find_weights(std::span<const std::size_t> index, const Row& std_dev_Nm,
-                    Row& weights) const noexcept;
 
   RedundancySettings settings_;
   std::vector<std::string> parts_;
