@@ -226,7 +226,10 @@ std::string done(const WorkUnit& unit, const Group& group, const CampaignSetting
                    .is_electrical = settings.is_electrical};
   const bool is_low = unit.kind == WorkUnit::Kind::low_load;
   run.seed = unit_seed(settings.seed, of.name, is_low ? "low load" : "work") + unit.first;
-  if (is_low) run.settings.gravity_share = kLowLoad;
+  if (is_low) {
+    run.settings.gravity_share = kLowLoad;
+    run.settings.impacts_per_min = 0.0;
+  }
   for (std::size_t i = 0; i < unit.count; ++i)
     run.sheets.push_back(
         is_low ? zeroed_specimen(of.sheet, static_cast<unsigned>(100 + unit.first + i)) : of.sheet);

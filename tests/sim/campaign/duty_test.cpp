@@ -131,6 +131,19 @@ TEST(DutyRecording, HasTruthAndTheElectricalSideOnRequest) {
   for (std::size_t i = 0; i < recording.size(); ++i) EXPECT_NEAR(measured_Nm[i], truth_Nm[i], 0.1);
 }
 
+TEST(DutyRecording, HasTheFaultsOfItsSensors) {
+  const DataSheet sheet = data_sheet("dfki-50");
+  const FaultSchedule faults{{parse_injection("joint_angle=dropout@200ms..300ms", sheet),
+                              parse_injection("gear_angle=1rad@400ms", sheet)}};
+  const Recording sound = duty_recording(sheet, {.duration_s = 0.5});
+  const Recording faulty = duty_recording(sheet, {.duration_s = 0.5, .faults = faults});
+  EXPECT_TRUE(faulty.channel("joint_angle_rad").is_fresh(199));
+  EXPECT_FALSE(faulty.channel("joint_angle_rad").is_fresh(250));
+  EXPECT_NEAR(faulty.channel("gear_angle_rad").values[450],
+              sound.channel("gear_angle_rad").values[450] + 1.0, 1e-12);
+  EXPECT_THROW((void)duty_recording(sheet, {.duration_s = 0.1, .faults = faults}), UsageError);
+}
+
 TEST(DutyRecording, RefusesADurationOutOfRange) {
   EXPECT_THROW((void)duty_recording(data_sheet("dfki-28"), {.duration_s = -1.0}), UsageError);
   EXPECT_THROW((void)duty_recording(data_sheet("dfki-28"), {.duration_s = NAN}), UsageError);
