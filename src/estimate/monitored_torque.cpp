@@ -42,7 +42,7 @@ FeatureSpec signal_spec(const MonitorSettings& monitor) {
   return spec;
 }
 
-/// The age of a signal is that of its oldest channel; one that is negative or not a number is kept.
+/// The age of a signal is that of its oldest channel; a time in the future, or none at all, is worse.
 double older(double age_s, double other_s) noexcept {
   if (!(age_s >= 0.0)) return age_s;
   return other_s <= age_s && other_s >= 0.0 ? age_s : other_s;
@@ -110,13 +110,14 @@ void MonitoredTorque::reset() noexcept {
   sources_.reset();
   redundancy_.reset();
   signal_pipeline_.reset();
-  history_.reset();
 }
 
 FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw) noexcept {
   if (raw.size() != raw_inputs_.size()) {
-    (void)monitor_.step(t_s, sources_.estimates(), {});
-    return {.fault = Fault::input_count_wrong};
+    (void)monitor_.step(t_s, {}, {});  // a stop: there is at least one source
+    if (monitor_.state() == Monitor::State::stopped) history_.freeze();
+    sources_.refuse(Fault::input_count_wrong);
+    return redundancy_.step({});
   }
   for (std::size_t k = 0; k < source_values_.size(); ++k) {
     const bool is_fresh = raw[k].age_s >= 0.0 && raw[k].age_s <= longest_age_s_[k];
@@ -124,13 +125,18 @@ FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw)
   }
   const std::span<const Estimate> estimates = sources_.step(source_values_);
   const FusedTorque fused = redundancy_.step(estimates);
-  for (std::size_t k = 0; k < signal_places_.size(); ++k)
-    signal_values_[k] = raw[signal_places_[k]].value;
+  // The memory of an expression continues with the last number of a channel that is none now.
+  for (std::size_t k = 0; k < signal_places_.size(); ++k) {
+    const double value = raw[signal_places_[k]].value;
+    if (std::isfinite(value)) signal_values_[k] = value;
+  }
   const std::span<const double> values = signal_pipeline_.step(signal_values_);
   for (std::size_t i = 0; i < signals_.size(); ++i) {
     signals_[i] = {.value = values[i]};
-    for (const std::size_t place : channels_of_signal_[i])
+    for (const std::size_t place : channels_of_signal_[i]) {
+      if (!std::isfinite(raw[place].value)) signals_[i].value = kNotMeasured;
       signals_[i].age_s = older(signals_[i].age_s, raw[place].age_s);
+    }
   }
   const bool was_stopped = monitor_.state() == Monitor::State::stopped;
   const Monitor::State state = monitor_.step(t_s, estimates, signals_);

@@ -130,8 +130,17 @@ void TorqueSources::reset() noexcept {
     source.torque.estimator.reset();
     if (source.friction) source.friction->estimator.reset();
     if (source.filter) source.filter->reset();
+    source.has_failed = false;
   }
   for (Estimate& estimate : estimates_) estimate = {.fault = Fault::warming_up};
+}
+
+void TorqueSources::fail_model(std::size_t source) noexcept {
+  if (source < sources_.size()) sources_[source].has_failed = true;
+}
+
+void TorqueSources::refuse(Fault fault) noexcept {
+  for (Estimate& estimate : estimates_) estimate.fault = fault;
 }
 
 std::span<const Estimate> TorqueSources::step(std::span<const double> raw) noexcept {
@@ -148,6 +157,7 @@ std::span<const Estimate> TorqueSources::step(std::span<const double> raw) noexc
       estimate.std_dev = std::sqrt(estimate.std_dev * estimate.std_dev + spread_Nm * spread_Nm);
       if (estimate.fault == Fault::none) estimate.fault = friction.fault;
     }
+    if (source.has_failed) estimate.fault = Fault::model_not_finite;
     estimates_[i] = estimate;
   }
   for (std::size_t i = 0; i < sources_.size(); ++i)

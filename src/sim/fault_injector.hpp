@@ -44,6 +44,8 @@ class FaultInjector {
     FaultKind kind = FaultKind::freeze;
     Window window;
     double amount = 0.0;  ///< in the unit of the measurement
+    double every_s = 0.0;
+    double next_s = 0.0;  ///< from which the next spike is due
     std::optional<double> held = {};
   };
   struct Sensor {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <variant>
 
 #include "data/names.hpp"
 #include "sensed_channels.hpp"
@@ -42,6 +43,23 @@ constexpr auto kRules = std::to_array<FaultRule>({
      .highest = kLargest},
     {.name = "dropout", .kind = FaultKind::dropout},
     {.name = "nan", .kind = FaultKind::nan},
+    {.name = "gain",
+     .kind = FaultKind::gain,
+     .amount_key = "to",
+     .amount_unit = "1",
+     .highest = kLargest},
+    {.name = "spike",
+     .kind = FaultKind::spike,
+     .amount_key = "by",
+     .lowest = kSmallest,
+     .highest = kLargest},
+    {.name = "wrap",
+     .kind = FaultKind::wrap,
+     .amount_key = "by",
+     .amount_unit = "1",
+     .lowest = 1.0,
+     .highest = 1e3},
+    {.name = "zero", .kind = FaultKind::zero},
     {.name = "break",
      .kind = FaultKind::broken,
      .part = kSpring,
@@ -77,12 +95,6 @@ std::string_view second_stage_name(const DataSheet& sheet) {
   return sheet.family == ActuatorFamily::harmonic_drive ? "gear" : kSpring;
 }
 
-/// That the bench's steps still follow.
-double stiffest_stop(const DataSheet& sheet) {
-  const PlantParameters plant = plant_parameters(sheet);
-  return Plant::stiffest_stop(plant, std::min(Plant::step_limit(plant), Plant::kDefaultStep_s));
-}
-
 std::string text(double value, std::string_view unit) {
   return fmt::format("{:g}{}{}", value, unit.empty() ? "" : " ", unit);
 }
@@ -113,12 +125,25 @@ void check_times(const ScheduledFault& fault, double run_s) {
   if (fault.duration_s) require_within(fault, "for", *fault.duration_s, 1e-6, kLongest_s, "s");
 }
 
+std::string_view channel_unit(std::string_view channel) {
+  const auto parts = split_channel_name(channel);
+  return parts ? parts->unit->suffix : std::string_view{};
+}
+
+/// Only an encoder has turns.
+void check_turns(const ScheduledFault& fault) {
+  if (channel_unit(fault.what) != "rad")
+    refuse(fault, "", "an angle, whose encoder has turns", fault.what);
+  if (fault.amount != std::round(fault.amount))
+    refuse(fault, "by", "a whole number of turns", text(fault.amount, ""));
+}
+
 void check_amount(const ScheduledFault& fault, const FaultRule& rule) {
   if (rule.amount_key.empty()) return;
   std::string_view unit = rule.amount_unit == "1" ? std::string_view{} : rule.amount_unit;
   double value = fault.amount;
   if (rule.part.empty()) {
-    if (const auto parts = split_channel_name(fault.what)) unit = parts->unit->suffix;
+    if (rule.amount_unit.empty()) unit = channel_unit(fault.what);
     // Only a resolution has no sign.
     if (rule.kind != FaultKind::quantised) value = std::abs(value);
   }
@@ -130,6 +155,15 @@ void check_amount(const ScheduledFault& fault, const FaultRule& rule) {
 std::string_view common_part_name(std::string_view part, const DataSheet& sheet) {
   if (part == kFriction || part == kTorqueConstant) return part;
   return part == second_stage_name(sheet) ? kSpring : std::string_view{};
+}
+
+double stiffest_stop(const DataSheet& sheet) {
+  const PlantParameters plant = plant_parameters(sheet);
+  return Plant::stiffest_stop(plant, std::min(Plant::step_limit(plant), Plant::kDefaultStep_s));
+}
+
+double second_stage_stiffness(const DataSheet& sheet) {
+  return std::visit([](const auto& stage) { return stage.stiffness_Nm_rad.value; }, sheet.second);
 }
 
 std::vector<std::string> fault_sensors(const DataSheet& sheet) {
@@ -180,6 +214,9 @@ void check_fault(const ScheduledFault& fault, const DataSheet& sheet, double run
   if (rule->kind == FaultKind::bottom)
     require_within(fault, "stiffness", fault.stop_stiffness_Nm_rad, 1e-3, stiffest_stop(sheet),
                    "Nm/rad");
+  if (rule->kind == FaultKind::wrap) check_turns(fault);
+  if (rule->kind == FaultKind::spike)
+    require_within(fault, "every", fault.every_s, 0.0, kLongest_s, "s");
   if (rule->kind == FaultKind::drift && !rule->part.empty())
     require_within(fault, "over", fault.over_s, 0.0, kLongest_s, "s");
 }

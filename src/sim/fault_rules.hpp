@@ -17,17 +17,20 @@ constexpr double kLargestFactor = 10.0;
 struct FaultRule {
   std::string_view name;  ///< as a schedule writes it
   FaultKind kind = FaultKind::freeze;
-  std::string_view part = {};        ///< empty: any sensor
-  std::string_view amount_key = {};  ///< key of `amount` in a schedule; empty: none
-  std::string_view amount_unit =
-      {};                ///< unit for a part; a sensor's amount has the unit of its channel
-  double lowest = 0.0;   ///< lower limit of |amount|
-  double highest = 0.0;  ///< upper limit of |amount|
+  std::string_view part = {};         ///< empty: any sensor
+  std::string_view amount_key = {};   ///< key of `amount` in a schedule; empty: none
+  std::string_view amount_unit = {};  ///< empty: a sensor's amount has the unit of its channel
+  double lowest = 0.0;                ///< lower limit of |amount|
+  double highest = 0.0;               ///< upper limit of |amount|
   double PlantCondition::*factor = nullptr;  ///< factor that is set to the amount
 };
 
 /// The part's name in `FaultRule::part`, whatever this actuator calls it; empty: no part of it.
 [[nodiscard]] std::string_view common_part_name(std::string_view part, const DataSheet& sheet);
+
+[[nodiscard]] double second_stage_stiffness(const DataSheet& sheet);  ///< [Nm/rad]
+/// Of a stop [Nm/rad]: the bench's steps still follow.
+[[nodiscard]] double stiffest_stop(const DataSheet& sheet);
 
 /// Null if it has no such fault.
 [[nodiscard]] const FaultRule* find_fault_rule(std::string_view name,

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 #include "fault_rules.hpp"
 #include "sensed_channels.hpp"
@@ -51,14 +53,23 @@ void FaultInjector::add_sensor_fault(const ScheduledFault& fault, const Window& 
   auto sensor = std::ranges::find(sensors_, channel.value, &Sensor::value);
   if (sensor == sensors_.end())
     sensor = sensors_.insert(sensor, Sensor{.value = channel.value, .is_fresh = channel.is_fresh});
-  sensor->faults.push_back(
-      {.kind = fault.kind, .window = window, .amount = fault.amount / channel.scale});
+  double amount = fault.amount / channel.scale;
+  if (fault.kind == FaultKind::gain) amount = fault.amount;
+  if (fault.kind == FaultKind::wrap) amount = 2.0 * std::numbers::pi * fault.amount;
+  sensor->faults.push_back({.kind = fault.kind,
+                            .window = window,
+                            .amount = amount,
+                            .every_s = fault.every_s,
+                            .next_s = window.start_s});
 }
 
 void FaultInjector::reset() noexcept {
   for (Sensor& sensor : sensors_) {
     sensor.delivered.reset();
-    for (SensorFault& fault : sensor.faults) fault.held.reset();
+    for (SensorFault& fault : sensor.faults) {
+      fault.held.reset();
+      fault.next_s = fault.window.start_s;
+    }
   }
 }
 
@@ -73,6 +84,14 @@ double FaultInjector::changed(SensorFault& fault, double value, double time_s) n
     case FaultKind::sign_flip: return -value;
     case FaultKind::quantised: return fault.amount * std::round(value / fault.amount);
     case FaultKind::nan: return kNotMeasured;
+    case FaultKind::gain: return value * fault.amount;
+    case FaultKind::wrap: return value + fault.amount;
+    case FaultKind::zero: return 0.0;
+    case FaultKind::spike:
+      if (time_s < fault.next_s - kRounding_s) return value;
+      fault.next_s = fault.every_s > 0.0 ? fault.next_s + fault.every_s
+                                         : std::numeric_limits<double>::infinity();
+      return value + fault.amount;
     case FaultKind::dropout:  // `apply` holds the value
     case FaultKind::broken:
     case FaultKind::bottom: break;

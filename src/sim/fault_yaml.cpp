@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <variant>
 
 #include "data/names.hpp"
 #include "data/yaml_reader.hpp"
@@ -21,12 +20,8 @@ std::string chosen(const YamlValue& yaml, const std::vector<std::string>& known)
   return text;
 }
 
-double second_stage_stiffness(const DataSheet& sheet) {
-  return std::visit([](const auto& stage) { return stage.stiffness_Nm_rad.value; }, sheet.second);
-}
-
 double amount_from(const YamlValue& yaml, const FaultRule& rule, const std::string& what) {
-  if (!rule.part.empty()) return yaml.number(rule.amount_unit);
+  if (!rule.amount_unit.empty()) return yaml.number(rule.amount_unit);
   return yaml.number(split_channel_name(what)->unit->suffix);
 }
 
@@ -49,13 +44,18 @@ void read_amounts(const YamlValue& yaml, const FaultRule& rule, const DataSheet&
   } else if (rule.kind == FaultKind::drift && !rule.part.empty()) {
     yaml.allow_only({who, "fault", "at", "for", key, "over"});
     fault.over_s = yaml.at("over").number("s");
+  } else if (rule.kind == FaultKind::spike) {
+    yaml.allow_only({who, "fault", "at", "for", key, "every"});
+    if (const auto every = yaml.find("every")) fault.every_s = every->number("s");
   } else if (!key.empty()) {
     yaml.allow_only({who, "fault", "at", "for", key});
   } else {
     yaml.allow_only({who, "fault", "at", "for"});
   }
   if (key.empty()) return;
-  const bool may_miss = rule.kind == FaultKind::broken;  // all of it breaks
+  // All of it breaks; one turn.
+  const bool may_miss = rule.kind == FaultKind::broken || rule.kind == FaultKind::wrap;
+  if (rule.kind == FaultKind::wrap) fault.amount = 1.0;
   if (const auto amount = may_miss ? yaml.find(key) : yaml.at(key))
     fault.amount = amount_from(*amount, rule, fault.what);
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -72,6 +73,53 @@ TEST(FaultInjector, DoesToASensorWhatItsKindSays) {
   EXPECT_EQ(at_tick_40(FaultKind::sign_flip), -0.040);
   EXPECT_NEAR(at_tick_40(FaultKind::quantised, 0.03), 0.03, 1e-12);
   EXPECT_TRUE(std::isnan(at_tick_40(FaultKind::nan)));
+}
+
+TEST(FaultInjector, ScalesZeroesAndWraps) {
+  const auto at_tick_40 = [](FaultKind kind, double amount = 0.0) {
+    return seen({gear(kind, amount)})[40].middle_angle_rad;
+  };
+  EXPECT_NEAR(at_tick_40(FaultKind::gain, 0.8), 0.8 * 0.040, 1e-15);
+  EXPECT_EQ(at_tick_40(FaultKind::zero), 0.0);
+  EXPECT_NEAR(at_tick_40(FaultKind::wrap, -2.0), 0.040 - 4.0 * std::numbers::pi, 1e-12);
+  // The encoder of the rubber bench is on the rotor, the channel at the joint.
+  FaultInjector clutch({{{.what = "input_angle_rad", .kind = FaultKind::wrap, .amount = 1.0}}},
+                       data_sheet("rubber-clutch"));
+  Measurement measured;
+  clutch.apply(measured, 0.0);
+  EXPECT_NEAR(measured.motor_angle_rad, 2.0 * std::numbers::pi, 1e-12);
+}
+
+TEST(FaultInjector, ASpikeIsOneSampleAndRepeatsIfAsked) {
+  const auto spikes = [](double every_s) {
+    ScheduledFault fault = gear(FaultKind::spike, 5.0);
+    fault.every_s = every_s;
+    std::vector<std::size_t> at;
+    const std::vector<Measurement> all = seen({fault});
+    for (std::size_t tick = 0; tick < all.size(); ++tick)
+      if (all[tick].middle_angle_rad > 4.0) at.push_back(tick);
+    return at;
+  };
+  EXPECT_EQ(spikes(0.0), (std::vector<std::size_t>{30}));
+  EXPECT_EQ(spikes(0.004), (std::vector<std::size_t>{30, 34, 38, 42, 46}));
+  // A slow sensor has it in its next sample.
+  const std::vector<Measurement> all =
+      seen({{.what = "torque_Nm", .kind = FaultKind::spike, .start_s = 0.0305, .amount = 5.0}});
+  for (std::size_t tick = 0; tick < all.size(); ++tick)
+    EXPECT_EQ(all[tick].torque_Nm > 4.0, tick >= 34 && tick < 42) << tick;
+}
+
+TEST(FaultInjector, SpikesAgainAfterAReset) {
+  FaultInjector injector({{gear(FaultKind::spike, 5.0)}}, data_sheet("dfki-50"));
+  for (int run = 0; run < 2; ++run) {
+    Measurement measured;
+    injector.apply(measured, 0.030);
+    EXPECT_EQ(measured.middle_angle_rad, 5.0);
+    Measurement next;
+    injector.apply(next, 0.031);
+    EXPECT_EQ(next.middle_angle_rad, 0.0);
+    injector.reset();
+  }
 }
 
 TEST(FaultInjector, AFrozenSensorDeliversAndASilentOneDoesNot) {
@@ -190,7 +238,8 @@ TEST(FaultInjector, RefusesWhatCannotBe) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   expect({.what = "gear_angel_rad"}, "Did you mean 'gear_angle_rad'?");
   expect({.what = "gear_angle_rad", .kind = FaultKind::broken},
-         "expected one of freeze, jump, drift, sign_flip, quantised, dropout, nan, found break");
+         "expected one of freeze, jump, drift, sign_flip, quantised, dropout, nan, gain, spike, "
+         "wrap, zero, found break");
   expect({.what = "spring", .kind = FaultKind::freeze}, "expected one of break, bottom");
   expect({.what = "gear_angle_rad", .start_s = kNaN}, "at: expected 0 s");
   expect({.what = "gear_angle_rad", .start_s = -1.0}, "at: expected 0 s");
@@ -204,12 +253,73 @@ TEST(FaultInjector, RefusesWhatCannotBe) {
   expect(
       {.what = "spring", .kind = FaultKind::bottom, .amount = 0.05, .stop_stiffness_Nm_rad = 1e9},
       "stiffness: expected");
+  expect({.what = "torque_Nm", .kind = FaultKind::wrap, .amount = 1.0}, "an angle");
+  expect({.what = "gear_angle_rad", .kind = FaultKind::wrap, .amount = 1.5}, "whole number");
+  expect({.what = "gear_angle_rad", .kind = FaultKind::gain, .amount = kNaN}, "to: expected");
+  expect({.what = "gear_angle_rad", .kind = FaultKind::spike, .amount = 1.0, .every_s = -1.0},
+         "every: expected");
   EXPECT_EQ(message({.what = "gear_angle_rad", .start_s = 9.9}), "");
   EXPECT_NE(error_message([] {
               const FaultInjector injector(
                   {std::vector<ScheduledFault>(257, {.what = "torque_Nm"})}, data_sheet("dfki-50"));
             }).find("at most 256 faults"),
             std::string::npos);
+}
+
+TEST(Injection, ReadsTheShortForm) {
+  const DataSheet sheet = data_sheet("dfki-50");
+  const ScheduledFault kt = parse_injection("kt=-20%@3s", sheet);
+  EXPECT_EQ(kt.what, "torque-constant");
+  EXPECT_EQ(kt.kind, FaultKind::drift);
+  EXPECT_NEAR(kt.amount, 0.8, 1e-15);
+  EXPECT_EQ(kt.over_s, 0.0);
+  EXPECT_EQ(kt.start_s, 3.0);
+  EXPECT_FALSE(kt.duration_s);
+  const ScheduledFault jump = parse_injection("gear_angle=1deg@200ms..2s", sheet);
+  EXPECT_EQ(jump.what, "gear_angle_rad");
+  EXPECT_EQ(jump.kind, FaultKind::jump);
+  EXPECT_NEAR(jump.amount, rad_from_deg(1.0), 1e-15);
+  EXPECT_NEAR(*jump.duration_s, 1.8, 1e-12);
+  const ScheduledFault gain = parse_injection("current=gain:-20%@2s", sheet);
+  EXPECT_EQ(gain.what, "motor_current_A");
+  EXPECT_EQ(gain.kind, FaultKind::gain);
+  EXPECT_NEAR(gain.amount, 0.8, 1e-15);
+  EXPECT_EQ(parse_injection("current=+5%@2s", sheet).kind, FaultKind::gain);
+  EXPECT_EQ(parse_injection("motor_angle=freeze@2s", sheet).kind, FaultKind::freeze);
+  EXPECT_EQ(parse_injection("joint_angle=nan@2s", sheet).kind, FaultKind::nan);
+  EXPECT_EQ(parse_injection("joint_angle=wrap@2s", sheet).amount, 1.0);
+  EXPECT_EQ(parse_injection("joint_angle=wrap:-1@2s", sheet).amount, -1.0);
+  EXPECT_EQ(parse_injection("spring=break@2s", sheet).amount, 0.0);
+  EXPECT_NEAR(parse_injection("spring=-60%@2s", sheet).amount, 0.4, 1e-15);
+  EXPECT_GT(parse_injection("spring=bottom:3deg@2s", sheet).stop_stiffness_Nm_rad, 0.0);
+  EXPECT_EQ(parse_injection("current=gain:-20%@2s", data_sheet("harmonic-drive")).what,
+            "motor_torque_Nm");
+}
+
+TEST(Injection, RefusesWhatIsNotOneAndListsWhatIs) {
+  const auto expect = [](const char* text, const char* part) {
+    const std::string message =
+        error_message([&] { (void)parse_injection(text, data_sheet("dfki-50")); });
+    EXPECT_NE(message.find(part), std::string::npos) << text << ": " << message;
+  };
+  expect("", "WHAT=AMOUNT@TIME");
+  expect("kt=-20%", "WHAT=AMOUNT@TIME");
+  expect("kt@3s", "WHAT=AMOUNT@TIME");
+  expect("@3s=", "WHAT=AMOUNT@TIME");
+  expect("gear_angel=1deg@2s", "Did you mean 'gear_angle'?");
+  expect("gear_angel=1deg@2s", "motor_current, current, torque_Nm");
+  expect("gear_angle=1Nm@2s", "a number in rad");
+  expect("gear_angle=freez@2s", "Did you mean 'freeze'?");
+  expect("gear_angle=freeze:3@2s", "'freeze' without an amount");
+  expect("gear_angle=jump@2s", "an amount, 'jump:...'");
+  expect("gear_angle=1deg@soon", "a number in s");
+  expect("gear_angle=1deg@3s..2s", "an end after the start");
+  expect("gear_angle=1deg@-3s", "at: expected");
+  expect("kt=20%@3s", "a change with its sign");
+  expect("kt=-120%@3s", "to: expected");
+  expect("kt=-2x%@3s", "a number");
+  expect("kt=freeze@3s", "one of drift");
+  expect("current=wrap@3s", "an angle");
 }
 
 TEST(FaultSchedule, ReadsEveryKindWithUnits) {

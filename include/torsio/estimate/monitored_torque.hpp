@@ -32,11 +32,13 @@ class MonitoredTorque {
   /// configuring. @throws UsageError for an unknown channel or a value that is not finite.
   void set_zero(std::string_view channel, double value);
 
-  /// Sources, combination and history begin anew; the monitor stays as it is (`Monitor::reset`).
+  /// Empties the memory of the sources and signals. The monitor has a reset of its own,
+  /// `monitor().reset(t_s)`, with which the next step begins the history again.
   void reset() noexcept;
 
   /// @param raw one sample for each of `raw_inputs()`. A channel older than the longest age of a
   /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite.
+  /// Another number of samples is a stop of the monitor.
   FusedTorque step(double t_s, std::span<const SignalSample> raw) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] Monitor& monitor() noexcept { return monitor_; }

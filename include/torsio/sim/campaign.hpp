@@ -1,12 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/wear.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
+#include "torsio/sim/fault_schedule.hpp"
 
 namespace torsio {
 
@@ -40,13 +40,15 @@ struct DutyRun {
   DutySettings settings = {};
   bool is_electrical = false;  ///< with windings, inverter and current control
   bool with_truth = false;     ///< add the `truth_*` channels
+  FaultSchedule faults = {};   ///< on the sensors, for the position loop as well, and on the parts
 };
 
 /// A joint at work: random moves, rests, loads, temperature, wear of its friction and impacts, all at
 /// random from one seed. The channels are those of `simulate`, at 1 kHz for every actuator, and
 /// `torque_Nm` of a load cell that samples at 1 kHz without latency. Equal arguments give equal
 /// recordings.
-/// @throws UsageError for a duration that is not 1 ms to 10 h; Cancelled.
+/// @throws UsageError for a duration that is not 1 ms to 10 h, or faults that this actuator cannot have in
+/// it; Cancelled.
 [[nodiscard]] Recording duty_recording(const DataSheet& sheet, const DutyRun& run,
                                        const Progress& progress = {});
 

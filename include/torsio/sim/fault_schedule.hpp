@@ -11,8 +11,8 @@
 
 namespace torsio {
 
-/// Kinds of faults. The first seven are faults of sensors, the last two of the spring; drift is a
-/// fault of both sensors and parts.
+/// Kinds of faults: of sensors, and the last two of the spring; drift is a fault of both sensors and
+/// parts.
 enum class FaultKind : std::uint8_t {
   freeze,     ///< always the same value, marked as new
   jump,       ///< `amount` is added
@@ -22,6 +22,10 @@ enum class FaultKind : std::uint8_t {
   quantised,  ///< resolution of `amount`
   dropout,    ///< no new samples: the last value is held and not marked as new
   nan,        ///< not a number
+  gain,       ///< times `amount`
+  spike,      ///< `amount` is added to one sample, or to one every `every_s`
+  wrap,       ///< an angle jumps by `amount` turns of its encoder
+  zero,       ///< delivers 0, as an encoder that starts up
   broken,     ///< the spring's torque falls to the share `amount`, 0 for a broken spring
   bottom,     ///< the spring's deflection meets a stop at `amount` radians, to either side
 };
@@ -36,6 +40,7 @@ struct ScheduledFault {
   std::optional<double> duration_s = {};  ///< none: to the end; afterwards there is no fault
   double amount = 0.0;                 ///< depends on the kind; for a sensor in its channel's unit
   double over_s = 0.0;                 ///< drift of a part
+  double every_s = 0.0;                ///< of repeated spikes; 0: one
   double stop_stiffness_Nm_rad = 0.0;  ///< bottom
   std::string place = {};              ///< where it was read, for messages
 };
@@ -63,5 +68,14 @@ struct FaultSchedule {
                                                 const Progress& progress = {});
 [[nodiscard]] FaultSchedule parse_fault_schedule(std::string_view text, const std::string& name,
                                                  const DataSheet& sheet);
+
+/// Reads one fault in the short form WHAT=AMOUNT@TIME or WHAT=KIND:AMOUNT@TIME, TIME with an end as
+/// "2s..5s". WHAT is a sensor, by its channel without the unit ("gear_angle", "current"), or a part
+/// ("kt", "friction", "spring"). Without a kind a sensor's amount is a jump, a part's a factor.
+///
+///     kt=-20%@3s   gear_angle=1deg@2s   current=gain:-20%@2s   motor_angle=freeze@2s..4s
+///
+/// @throws UsageError that lists what is possible
+[[nodiscard]] ScheduledFault parse_injection(std::string_view text, const DataSheet& sheet);
 
 }  // namespace torsio

@@ -37,6 +37,10 @@ class Duty {
   [[nodiscard]] bool is_condition_new() const noexcept { return tick_ % kConditionTicks == 1; }
   /// Since the last impact began; infinity if there was none.
   [[nodiscard]] double since_impact_s() const noexcept;
+  /// An impact has begun at this tick.
+  [[nodiscard]] bool has_impact_begun() const noexcept {
+    return impact_ticks_ != 0 && tick_ == impact_tick_ + 1;
+  }
   [[nodiscard]] bool is_moving() const noexcept { return is_moving_; }
 
  private:

@@ -38,6 +38,8 @@ std::vector<std::uint64_t> drive_seeds(const std::vector<DutyLane>& lanes, bool 
 
 }  // namespace
 
+std::uint64_t duty_seed(std::uint64_t seed) { return Seeds(seed).duty; }
+
 DataSheet with_duty_bench(DataSheet sheet) {
   sheet.sensors.torque_rate_Hz = assumed(kBenchRate_Hz);
   sheet.sensors.torque_latency_s = assumed(0.0);
@@ -50,7 +52,8 @@ DutyBench::Lane::Lane(const DutyLane& from, double run_s)
       duty(from.sheet, from.settings, Seeds(from.seed).duty),
       loop(plant_parameters(from.sheet), kBenchRate_Hz, duty_limits(from.sheet).bandwidth_rad_s),
       faults(from.faults, from.sheet, run_s),
-      has_faults(!from.faults.faults.empty()) {}
+      has_faults(!from.faults.faults.empty()),
+      is_loop_sound(from.is_loop_sound) {}
 
 DutyBench::DutyBench(std::vector<DutyLane> lanes, const Options& options)
     : plants_(sheets_of(lanes), drive_seeds(lanes, options.is_electrical), options.is_single),

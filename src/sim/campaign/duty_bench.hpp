@@ -21,10 +21,14 @@ struct DutyLane {
   std::uint64_t seed = 1;  ///< of its work and of the noise of its sensors
   DutySettings settings = {};
   FaultSchedule faults = {};
+  bool is_loop_sound = false;  ///< faults of its sensors do not reach the position loop
 };
 
 /// The sheet with the bench of `duty_recording`: a load cell of 1 kHz without latency, a log of 1 kHz.
 [[nodiscard]] DataSheet with_duty_bench(DataSheet sheet);
+
+/// Of the `Duty` of a lane with this seed.
+[[nodiscard]] std::uint64_t duty_seed(std::uint64_t seed);
 
 /// Joints at work side by side, 1 kHz, each with its own plant, sensors, position loop, work and faults.
 /// What a joint does depends neither on the others nor on how many there are.
@@ -73,6 +77,7 @@ class DutyBench {
     PositionLoop loop;
     FaultInjector faults;
     bool has_faults;
+    bool is_loop_sound;
     bool is_cut = false;
     double torque_Nm = 0.0;
     Measurement sound;

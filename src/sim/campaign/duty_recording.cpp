@@ -21,8 +21,11 @@ Recording duty_recording(const DataSheet& sheet, const DutyRun& run, const Progr
     throw UsageError({.place = "duration of the work",
                       .expected = fmt::format("{} to {} s", 1.0 / kBenchRate_Hz, kLongest_s),
                       .found = fmt::format("{}", run.duration_s)});
-  DutyBench bench({{.sheet = sheet, .seed = run.seed, .settings = run.settings}},
-                  {.is_electrical = run.is_electrical, .is_single = true});
+  static_cast<void>(
+      FaultInjector(run.faults, sheet, run.duration_s));  // refuses what is beyond the run
+  DutyBench bench(
+      {{.sheet = sheet, .seed = run.seed, .settings = run.settings, .faults = run.faults}},
+      {.is_electrical = run.is_electrical, .is_single = true});
   const auto ticks = static_cast<std::size_t>(std::lround(run.duration_s * kBenchRate_Hz));
   BenchLog log(with_duty_bench(sheet), ticks, run.with_truth, run.is_electrical);
   for (std::size_t tick = 0; tick < ticks; ++tick) {

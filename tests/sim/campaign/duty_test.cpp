@@ -45,7 +45,7 @@ TEST_P(EveryActuatorAtWork, StaysWithinItsLimits) {
       largest_error_rad = std::max(
           largest_error_rad,
           std::abs(bench.sound(lane).motor_angle_rad / ratio - bench.duty(lane).wanted_rad()));
-      impacts += bench.duty(lane).since_impact_s() == 0.001 ? 1 : 0;
+      impacts += bench.duty(lane).has_impact_begun() ? 1 : 0;
       EXPECT_TRUE(std::isfinite(sum(bench.sound(lane))));
     }
     bench.act();
@@ -129,6 +129,19 @@ TEST(DutyRecording, HasTruthAndTheElectricalSideOnRequest) {
   const std::vector<double>& measured_Nm = recording.channel("torque_Nm").values;
   const std::vector<double>& truth_Nm = recording.channel("truth_torque_Nm").values;
   for (std::size_t i = 0; i < recording.size(); ++i) EXPECT_NEAR(measured_Nm[i], truth_Nm[i], 0.1);
+}
+
+TEST(DutyRecording, HasTheFaultsOfItsSensors) {
+  const DataSheet sheet = data_sheet("dfki-50");
+  const FaultSchedule faults{{parse_injection("joint_angle=dropout@200ms..300ms", sheet),
+                              parse_injection("gear_angle=1rad@400ms", sheet)}};
+  const Recording sound = duty_recording(sheet, {.duration_s = 0.5});
+  const Recording faulty = duty_recording(sheet, {.duration_s = 0.5, .faults = faults});
+  EXPECT_TRUE(faulty.channel("joint_angle_rad").is_fresh(199));
+  EXPECT_FALSE(faulty.channel("joint_angle_rad").is_fresh(250));
+  EXPECT_NEAR(faulty.channel("gear_angle_rad").values[450],
+              sound.channel("gear_angle_rad").values[450] + 1.0, 1e-12);
+  EXPECT_THROW((void)duty_recording(sheet, {.duration_s = 0.1, .faults = faults}), UsageError);
 }
 
 TEST(DutyRecording, RefusesADurationOutOfRange) {

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/not_measured.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/estimate/monitored_torque.hpp"
+
+namespace torsio {
+
+/// A joint of a campaign and its monitor.
+struct CampaignGroup {
+  std::string name;  ///< "dfki-50"
+  DataSheet sheet;   ///< the joint that works
+  /// Called once; the joints get copies.
+  std::function<MonitoredTorque()> monitor;
+  /// What identifies the monitor, for `CampaignSettings::resume`: the hash of its file.
+  std::string monitor_hash = {};
+};
+
+struct CampaignSettings {
+  std::uint64_t seed = 1;
+  std::size_t injections = 300;           ///< of each class and group
+  std::size_t injections_of_a_size = 60;  ///< of each smaller size of a class and group
+  double fault_free_hours = 1000.0;       ///< of joints at work, of all groups together
+  /// Of other specimens under little load, of all groups together (docs/faults.md 5).
+  double low_load_hours = 70.0;
+  std::vector<std::string> classes = {};  ///< only those whose name begins so; empty: all
+  std::size_t threads = 0;                ///< 0: as many as the machine has
+  /// Results are appended to this file, and those that are in it are not simulated again; empty: none.
+  std::string resume = {};
+  bool is_electrical = false;
+};
+
+struct Latencies {
+  double p50_ms = kNotMeasured;
+  double p99_ms = kNotMeasured;
+  double longest_ms = kNotMeasured;
+};
+
+/// Injections of one class into one group. The disagreement of an injection is the largest difference
+/// between two sources that the fault causes: what changes against a monitor with the sound signals.
+/// Latencies count from where it reaches 20 % of the rated torque, and are 0 if the monitor stopped
+/// before; for a signal that is missing, not finite or wraps, and for the loop, from the injection.
+struct ClassResult {
+  std::string name;
+  std::string group = {};
+  int row = 0;  ///< of the table in docs/faults.md
+  bool must_stop =
+      true;  ///< false: a single spike; `detected` are stops, of which there must be none
+  std::size_t injected = 0;
+  std::size_t detected = 0;
+  std::size_t late = 0;       ///< detected after `limit_ms`
+  std::size_t redrawn = 0;    ///< attempts whose disagreement did not reach 20 %
+  std::size_t unreached = 0;  ///< not in `injected`: in no attempt
+  double limit_ms = 0.0;
+  double missed_upper_95 = 1.0;  ///< bound of the share that is missed
+  Latencies latency = {};
+  std::map<std::string, std::size_t> checks = {};  ///< which checks stopped, how often
+  // With the onset in the 100 ms after the beginning of an impact.
+  std::size_t near_impact = 0;
+  std::size_t near_impact_detected = 0;
+  Latencies near_impact_latency = {};
+  // After a detection the power is removed and the brake closes.
+  std::size_t stops = 0;
+  std::size_t stops_with_gain = 0;     ///< more than 1e-3 of the energy in motion and springs
+  double largest_gain = kNotMeasured;  ///< over that energy
+};
+
+/// How often disagreements around a size are detected.
+struct SizeResult {
+  std::string name;
+  std::string group = {};
+  double size = 0.0;  ///< middle of a range, over the rated torque
+  std::size_t injected = 0;
+  std::size_t detected = 0;
+};
+
+/// Joints without a fault.
+struct FaultFreeResult {
+  std::string group = {};
+  bool is_low_load = false;  ///< other specimens under little load
+  double joint_hours = 0.0;  ///< during which the monitor watched
+  double simulated_hours = 0.0;
+  std::size_t false_alarms = 0;
+  double upper_95 = kNotMeasured;  ///< of the false alarms an hour
+  std::size_t impacts = 0;
+  std::map<std::string, std::size_t> causes = {};  ///< "disagreement current spring"
+};
+
+struct CampaignResult {
+  std::uint64_t seed = 1;
+  std::vector<ClassResult> classes = {};
+  std::vector<SizeResult> sizes = {};
+  std::vector<FaultFreeResult> fault_free = {};
+  FaultFreeResult work = {};  ///< of all groups together
+  FaultFreeResult low_load = {};
+};
+
+/// Injects random faults into simulated joints at work (`DutySettings`) and lets them work without one.
+/// The result depends on settings and groups alone, not on the number of threads or interruptions.
+/// @throws UsageError for settings out of range, Error if `resume` belongs to another campaign, cannot be
+/// written, or if a monitor does not fit its joint; Cancelled: what is done is in `resume`.
+[[nodiscard]] CampaignResult run_fault_campaign(const std::vector<CampaignGroup>& groups,
+                                                const CampaignSettings& settings,
+                                                const Progress& progress = {});
+
+/// The names of the classes that a group can have.
+[[nodiscard]] std::vector<std::string> campaign_classes(const CampaignGroup& group);
+
+}  // namespace torsio

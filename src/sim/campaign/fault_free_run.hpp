@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "joint_monitor.hpp"
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/sim/campaign.hpp"
+
+namespace torsio {
+
+/// What a monitor did while its joints worked without a fault.
+struct FaultFreeOutcome {
+  std::size_t ticks = 0;
+  std::size_t watched_ticks = 0;
+  std::size_t impacts = 0;
+  std::map<std::string, std::size_t> alarms = {};  ///< by their cause
+};
+
+struct FaultFreeRun {
+  std::vector<DataSheet> sheets;  ///< one a joint
+  const JointMonitor& monitor;    ///< copied for each joint
+  std::uint64_t seed = 1;         ///< of the first joint; the next ones have the next ones
+  DutySettings settings = {};
+  std::size_t ticks = 0;
+  bool is_electrical = false;
+};
+
+/// After a false alarm the monitor is reset and armed again.
+[[nodiscard]] FaultFreeOutcome run_fault_free(const FaultFreeRun& run);
+
+/// Another specimen of this joint (specification 4.6), with encoders whose zeros were set.
+[[nodiscard]] DataSheet zeroed_specimen(const DataSheet& sheet, unsigned serial);
+
+}  // namespace torsio

@@ -1,0 +1,76 @@
+#include "joint_monitor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "data/names.hpp"
+#include "sim/sensed_channels.hpp"
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+
+JointMonitor::JointMonitor(MonitoredTorque monitored, const DataSheet& sheet, bool is_electrical)
+    : monitored_(std::move(monitored)), raw_(monitored_.raw_inputs().size()) {
+  const std::vector<SensedChannel> channels = sensed_channels(sheet, is_electrical);
+  for (const std::string& name : monitored_.raw_inputs()) {
+    const auto found = std::ranges::find(channels, name, &SensedChannel::name);
+    if (found == channels.end()) {
+      std::vector<std::string> known;
+      for (const SensedChannel& channel : channels) known.emplace_back(channel.name);
+      throw Error({.place = "monitor of " + sheet.name,
+                   .expected = "inputs that its sensors measure: " + joined(known),
+                   .found = fmt::format("'{}'", printable(name))});
+    }
+    inputs_.push_back({.value = found->value,
+                       .is_fresh = found->is_fresh,
+                       .scale = found->scale,
+                       .is_current = found->value == &Measurement::motor_current_A});
+  }
+}
+
+Monitor::State JointMonitor::step(double t_s, const Measurement& measured,
+                                  double current_factor) noexcept {
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    Input& input = inputs_[i];
+    if (measured.*input.is_fresh) input.measured_s = t_s;
+    raw_[i].value = (input.is_current ? current_factor : 1.0) * input.scale * measured.*input.value;
+    raw_[i].age_s = t_s - input.measured_s;
+  }
+  monitored_.step(t_s, raw_);
+  if (monitor().state() == Monitor::State::ready) monitored_.monitor().arm(t_s);
+  return monitor().state();
+}
+
+double JointMonitor::changed_difference_Nm(const JointMonitor& sound) const noexcept {
+  const std::span<const Estimate> own = monitored_.estimates();
+  const std::span<const Estimate> other = sound.monitored_.estimates();
+  double lowest = 0.0;
+  double highest = 0.0;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const double change = own[i].value - other[i].value;
+    lowest = i == 0 ? change : std::min(lowest, change);
+    highest = i == 0 ? change : std::max(highest, change);
+  }
+  return highest - lowest;
+}
+
+double JointMonitor::difference_Nm() const noexcept {
+  double lowest = 0.0;
+  double highest = 0.0;
+  for (std::size_t i = 0; i < monitored_.estimates().size(); ++i) {
+    const double value = monitored_.estimates()[i].value;
+    lowest = i == 0 ? value : std::min(lowest, value);
+    highest = i == 0 ? value : std::max(highest, value);
+  }
+  return highest - lowest;
+}
+
+bool uses(const MonitoredTorque& monitored, std::string_view channel) {
+  return std::ranges::find(monitored.raw_inputs(), channel) != monitored.raw_inputs().end();
+}
+
+}  // namespace torsio

@@ -1,0 +1,61 @@
+#include "stop_energy.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/experiment_table.hpp"
+#include "torsio/control/drive.hpp"
+#include "torsio/control/joint_stop.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr int kStopTicks = 500;
+
+JointStop::Settings stop_settings(const DataSheet& sheet, const Brake::Parameters& brake) {
+  const double ratio = total_ratio(plant_parameters(sheet));
+  return {.drive = drive_of(sheet),
+          .speed_rad_s = sheet.rating.speed_rad_s.value,
+          .deceleration_rad_s2 = 2.0 * sheet.rating.speed_rad_s.value,
+          .brake_static_Nm = brake.static_Nm * ratio,
+          .brake_sliding_Nm = brake.sliding_Nm * ratio,
+          .brake_engage_s = brake.engage_s,
+          .brake_release_s = brake.release_s};
+}
+
+}  // namespace
+
+double stop_energy_gain(const DataSheet& sheet, const PlantState& state, const Load& at_stop) {
+  const Brake::Parameters brake = brake_parameters(sheet);
+  Load load = at_stop;
+  load.external_torque_Nm = 0.0;
+  Plant plant(plant_parameters(sheet));
+  plant.use(brake);
+  plant.set_brake(false);
+  if (plant.reset(state) != Fault::none) return kNotMeasured;
+  JointStop stop(stop_settings(sheet, brake), kBenchRate_Hz);
+  stop.trigger(StopCategory::power_off);
+  const double ratio = total_ratio(plant.parameters());
+  const double first_J = plant.stored_energy(load).all_J;
+  const double moving_J =
+      first_J - load.gravity_Nm * (1.0 - std::cos(plant.state().joint_angle_rad));
+  double largest_J = first_J;
+  for (int tick = 0; tick < kStopTicks; ++tick) {
+    const JointState measured = {.angle_rad = plant.state().rotor_angle_rad / ratio,
+                                 .speed_rad_s = plant.state().rotor_speed_rad_s / ratio,
+                                 .torque_Nm = plant.torques().second_Nm};
+    static_cast<void>(stop.reference({}, measured));
+    const JointStop::Output output = stop.step(0.0, measured);
+    if (plant.step({.current_A = output.current_A,
+                    .is_powered = output.is_powered,
+                    .brake_V = output.is_brake_open ? brake.activation_V : 0.0},
+                   load, 1.0 / kBenchRate_Hz) != Fault::none)
+      return kNotMeasured;
+    largest_J = std::max(largest_J, plant.stored_energy(load).all_J);
+  }
+  return moving_J > 0.0 ? (largest_J - first_J) / moving_J : kNotMeasured;
+}
+
+}  // namespace torsio
