@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
-#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -73,16 +71,6 @@ std::string chosen(const YamlValue& yaml, const std::vector<std::string>& known)
   return text;
 }
 
-/// A number without unit.
-double plain_number(const YamlValue& yaml) {
-  const std::string text = yaml.text();
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(std::abs(value) <= kLargest))
-    yaml.refuse(fmt::format("a number of at most {:g} in size, without its unit", kLargest));
-  return value;
-}
-
 /// A value in the sheet's unit, from another one of the same quantity if that is known.
 double in_sheet_unit(double value, const YamlValue& row, std::string_view label) {
   const Unit* const own = find_written_unit(label.empty() ? "1" : label);
@@ -137,7 +125,7 @@ SheetValue value_from(const YamlValue& row, const std::string& name, std::string
   if (!row.is_map()) row.refuse(fmt::format("'{{value: 1, unit: {}, origin: A}}'", unit));
   row.allow_only({"value", "unit", "origin"});
   const YamlValue number = required(row, "value", "a number", sheet);
-  const double value = in_sheet_unit(plain_number(number), row, unit);
+  const double value = in_sheet_unit(number.plain_number(kLargest), row, unit);
   check_sign(number, name, value);
   const YamlValue origin =
       required(row, "origin", "P printed, D derived from printed numbers or A assumed", sheet);
@@ -189,8 +177,8 @@ std::vector<CurvePoint> points_from(const YamlValue& yaml, const DataSheet& shee
                 "a list of [deflection, torque]")) {
     const auto numbers = items_of(point, "[deflection, torque]");
     if (numbers.size() != 2) point.refuse("two numbers: [deflection, torque]");
-    curve.push_back({{deflection.si(plain_number(numbers[0])), origin},
-                     {torque.si(plain_number(numbers[1])), origin}});
+    curve.push_back({{deflection.si(numbers[0].plain_number(kLargest)), origin},
+                     {torque.si(numbers[1].plain_number(kLargest)), origin}});
   }
   return curve;
 }

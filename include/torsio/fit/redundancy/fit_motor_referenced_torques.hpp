@@ -13,8 +13,8 @@ namespace torsio {
 
 struct TorqueRegressionOptions {
   double speed_cutoff_Hz = 20.0;  ///< low-pass of q̇, the difference of the joint angle
-  std::size_t resamples = 1000;   ///< of the bootstrap, at least 100
-  std::uint64_t seed = 1;         ///< of the bootstrap
+  std::size_t resamples = 1000;   ///< drawn by the bootstrap, at least 100
+  std::uint64_t seed = 1;         ///< seed of the bootstrap
 };
 
 /// The samples of one regression (16).
@@ -31,10 +31,10 @@ struct DeflectionTorqueFit {
   /// One standard deviation of each coefficient; NaN if the record has less than 10 blocks, 0 if
   /// the residual is rounding.
   DeflectionTorque standard_errors = {kNotMeasured, kNotMeasured, kNotMeasured, kNotMeasured};
-  double condition_number = kNotMeasured;  ///< of (16), each column scaled to length 1
+  double condition_number = kNotMeasured;  ///< condition number of (16) with columns of length 1
   /// The same without scaling, in the paper's units (1, deg, deg/s, rad).
   double unscaled_condition_number = kNotMeasured;
-  double rmse_Nm = kNotMeasured;            ///< of the residual, against τ_mot
+  double rmse_Nm = kNotMeasured;            ///< root mean square of the residual
   double effective_samples = kNotMeasured;  ///< N / (1 + 2 sum r_k) of the residual
   double block_s = kNotMeasured;            ///< length of a block of the bootstrap
 };
@@ -53,9 +53,9 @@ struct DeflectionTorqueFit {
 /// is the length of a block [samples], the optimum for an autoregressive residual (Politis and
 /// White 2004, with the constant of 2009). Two losses of such errors are corrected: the covariance
 /// between blocks, Σ r_k k/L, and the four fitted coefficients out of N/T effective samples. They
-/// contain noise and everything of the residual that varies along the record, not a systematic error that
-/// every block has. Long records are summed over bins of at least N / 8192 samples, and L is a
-/// whole number of these. Deterministic for a seed.
+/// contain noise and every part of the residual that varies along the record, not a systematic
+/// error that all blocks have. Of more than 8192 samples at most 8192 sums over neighbours are
+/// used, and L is a whole number of these. Deterministic for a seed.
 ///
 /// @throws Error if there are fewer than 20 samples, numbers that are not finite, or a column that
 /// depends on the ones before it (a joint at rest or a constant deflection); UsageError if the
