@@ -34,6 +34,8 @@ constexpr std::array kStudies{
               torque_tracking_000, kPublishedTracking},
     StudyInfo{"000-brake", "000, section 3.1",
               "How far a person moves a braked link, and how a joint stops", brake_000},
+    StudyInfo{"000-redundancy", "000, Table 3 and Figure 15",
+              "The torque of an arm's joints from motor current, gear and spring", redundancy_000},
     StudyInfo{"004-encoders", "004, Table 4", "Which encoders an LSTM needs to estimate the torque",
               encoders_004, kPublishedEncoders},
     StudyInfo{"004-torque", "004, Table 5", "Trained on 10 to 20 Nm, tested on 5 to 50 Nm",

@@ -156,6 +156,7 @@ struct Study {
   std::vector<StudyPlant> plants = {};
   std::variant<ErrorTable, ComparisonTable, LoopTable, QuantityTable> table = {};
   std::vector<std::string> notes = {};  ///< conclusions, and settings of the named models
+  std::string picture_svg = {};         ///< the paper's figure, drawn again; empty: none
 };
 
 /// Condition by condition. @throws Error if none is ranked under one.

@@ -20,6 +20,7 @@ struct ReproduceFlags {
   std::vector<std::string> items;
   torsio::StudyOptions options;
   bool list = false;
+  std::string plot;
   JsonOutput json;
 };
 
@@ -38,11 +39,24 @@ void run(const ReproduceFlags& flags) {
   if (wanted.empty())
     for (const torsio::StudyInfo& info : torsio::studies())
       if (!info.needs_recordings) wanted.push_back(&info);
-  DataFlags().check_outputs({flags.json.destination});
+  if (!flags.plot.empty() && wanted.size() != 1)
+    throw torsio::UsageError({.place = "torsio reproduce --plot",
+                              .expected = "one ITEM, whose figure is drawn",
+                              .found = fmt::format("{} items", wanted.size())});
+  DataFlags().check_outputs({flags.json.destination, flags.plot});
+  require_ending("--plot", flags.plot, {".svg"});
   auto documents = nlohmann::ordered_json::array();
   for (const torsio::StudyInfo* info : wanted) {
     ProgressBar progress;
     const torsio::Study study = torsio::run_study(*info, flags.options, progress.listener());
+    if (!flags.plot.empty()) {
+      if (study.picture_svg.empty())
+        throw torsio::UsageError({.place = fmt::format("{} --plot", info->name),
+                                  .expected = "an item with a figure",
+                                  .found = "a table alone",
+                                  .advice = "000-redundancy has one."});
+      write_text(flags.plot, study.picture_svg);
+    }
     documents.push_back(nlohmann::ordered_json::parse(torsio::study_json(*info, study)));
     if (flags.json.wants_tables()) {
       print(torsio::study_text(*info, study) + "\n");
@@ -72,5 +86,7 @@ void add_reproduce(CLI::App& app) {
   add_seed(*verb, flags->options.seed, "seed of the first repeat");
   verb->add_option("--json", flags->json.destination,
                    "write the figures as JSON to a file, or - for standard output");
+  verb->add_option("--plot", flags->plot,
+                   "draw the figure of an experiment that has one into an SVG file");
   verb->callback([flags] { run(*flags); });
 }
