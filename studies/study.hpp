@@ -169,6 +169,7 @@ struct StudyInfo {
   Study (*run)(const StudyOptions& options, const Progress& progress);
   std::span<const PaperEntry> published = {};  ///< every figure that its table shows beside ours
   bool needs_recordings = false;  ///< in TORSIO_DATA or ../shared/data: must be named to be run
+  bool has_picture = false;       ///< `Study::picture_svg` is set
 };
 
 /// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets

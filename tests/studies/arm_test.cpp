@@ -59,11 +59,15 @@ TEST(Arm, LoadsEachJointWithinItsRating) {
   }
 }
 
-/// The row of a joint in the study; the study is run once.
-const QuantityRow& row(const std::string& joint, const std::string& quantity) {
+/// The study, run once.
+const Study& redundancy() {
   static const Study study =
       run_study(find_study("000-redundancy"), {.seed = 3, .repeats = 1, .is_quick = true});
-  const auto& rows = std::get<QuantityTable>(study.table).rows;
+  return study;
+}
+
+const QuantityRow& row(const std::string& joint, const std::string& quantity) {
+  const auto& rows = std::get<QuantityTable>(redundancy().table).rows;
   const auto found = std::ranges::find_if(
       rows, [&](const auto& of) { return of.condition == joint && of.quantity == quantity; });
   if (found == rows.end()) throw Error({.problem = joint + " " + quantity});
@@ -122,6 +126,22 @@ TEST(RedundancyStudy, FindsTheLoadInTheDeflectionAloneAndTheMotorTorqueInTheSum)
     EXPECT_LT(row(joint, "RMSE of p0 + p1 dq spring to load cell").value,
               0.2 * row(joint, "RMSE of (19) spring to load cell").value)
         << joint;
+}
+
+TEST(RedundancyStudy, DrawsPositionSpeedAndTorquesOfEachJoint) {
+  EXPECT_TRUE(find_study("000-redundancy").has_picture);
+  const std::string& svg = redundancy().picture_svg;
+  const auto count = [&](const std::string& what) {
+    std::size_t found = 0;
+    for (std::size_t at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1))
+      ++found;
+    return found;
+  };
+  for (const ArmPart& part : kArm)
+    EXPECT_EQ(count(">" + std::string(part.joint) + "<"), 3U) << part.joint;
+  for (const char* axis : {"position [deg]", "speed [deg/s]", "torque [Nm]", "motor current (17)",
+                           "gear deflection (18)", "spring deflection (19)"})
+    EXPECT_EQ(count(axis), kArmJoints) << axis;
 }
 
 }  // namespace
