@@ -120,12 +120,12 @@ ArmAngles arm_gravity_torques(const ArmAngles& angles_rad) {
     absolute_rad += angles_rad[j];
     sines[j] = std::sin(absolute_rad);
   }
-  double behind_kg = 0.0;
+  double outer_kg = 0.0;
   double moment_kg_m = 0.0;
   for (std::size_t j = kArmJoints; j-- > 0;) {
     const ArmPart& part = kArm[j];
-    moment_kg_m += part.length_m * sines[j] * (0.5 * part.link_kg + part.tip_kg + behind_kg);
-    behind_kg += part.link_kg + part.tip_kg;
+    moment_kg_m += part.length_m * sines[j] * (0.5 * part.link_kg + part.tip_kg + outer_kg);
+    outer_kg += part.link_kg + part.tip_kg;
     torques[j] = -kGravity_m_s2 * moment_kg_m;
   }
   return torques;

@@ -12,7 +12,7 @@
 
 namespace torsio {
 
-/// A joint of the arm and the link behind it, up to the next joint or the hand.
+/// A joint of the arm and its link, up to the next joint or the hand.
 struct ArmPart {
   std::string_view joint;     ///< as the paper's Table 3 names it
   std::string_view actuator;  ///< data sheet
@@ -22,8 +22,8 @@ struct ArmPart {
 };
 
 /// Joints 2 to 4 of the arm of paper 000, section 6.4, whose axes are taken as horizontal and
-/// parallel. The paper prints the actuators (Table 1 has their weights: 3.9 kg of the 120 Nm, 0.9 kg
-/// of each 28 Nm actuator); every length, the masses of the links and the payload are assumed.
+/// parallel. The paper prints the actuators (in Table 1 the 120 Nm actuator weighs 3.9 kg and a
+/// 28 Nm actuator 0.9 kg); every length, the masses of the links and the payload are assumed.
 /// Stretched out level, they load the joints with 122, 49 and 12 Nm, within the ratings.
 inline constexpr std::array kArm{
     ArmPart{"joint 2 (300 Nm)", "dfki-300", 0.45, 4.0, 3.9},  // upper arm; actuator of joint 3
@@ -35,7 +35,7 @@ using ArmAngles = std::array<double, kArmJoints>;  ///< [rad]; all 0: the arm ha
 
 /// Torque of gravity on each joint [Nm], along its angle.
 [[nodiscard]] ArmAngles arm_gravity_torques(const ArmAngles& angles_rad);
-/// Inertia about each joint of all that is behind it, stretched out [kg m²].
+/// Inertia about each joint of everything that it moves, stretched out [kg m²].
 [[nodiscard]] ArmAngles arm_inertias();
 
 /// The joints of the arm while it moves through random configurations: quintic segments in joint
