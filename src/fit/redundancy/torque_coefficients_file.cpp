@@ -14,7 +14,8 @@
 namespace torsio {
 namespace {
 
-constexpr double kLargest = 1e12;  // no product with an angle or a speed overflows
+constexpr double kLargest = 1e12;           // no product with an angle or a speed overflows
+constexpr double kLargestPerDegree = 1e10;  // below it per radian: a file in SI can be read again
 constexpr std::size_t kMaxJoints = 1000;
 
 /// A coefficient with its key in SI and, where it is per angle, per degree.
@@ -46,7 +47,8 @@ double coefficient(const YamlValue& yaml, const Row& row) {
     throw Error({.place = yaml.place(),
                  .expected = fmt::format("either {} or {}", row.key_per_degree, row.key),
                  .found = si ? "both" : "neither"});
-  return si ? si->plain_number(kLargest) : deg_from_rad(per_degree->plain_number(kLargest));
+  return si ? si->plain_number(kLargest)
+            : deg_from_rad(per_degree->plain_number(kLargestPerDegree));
 }
 
 DeflectionTorque deflection_torque(const YamlValue& yaml) {

@@ -80,6 +80,13 @@ TEST(TorqueCoefficientsFile, WrittenAndReadGivesTheSameBits) {
   EXPECT_EQ(parse_torque_coefficients(torque_coefficients_yaml(joints), "again.yaml"), joints);
 }
 
+TEST(TorqueCoefficientsFile, WrittenCanBeReadHoweverLargeItWas) {
+  const auto joints =
+      parse_torque_coefficients(with("p1_Nm_deg: -16.12", "p1_Nm_deg: -1e10"), "large.yaml");
+  EXPECT_EQ(parse_torque_coefficients(torque_coefficients_yaml(joints), "again.yaml"), joints);
+  EXPECT_THAT(refusal(with("p1_Nm_deg: -16.12", "p1_Nm_deg: -2e10")), HasSubstr("at most 1e+10"));
+}
+
 TEST(TorqueCoefficientsFile, RefusesMissingAndUnknownKeysWithTheirLine) {
   EXPECT_THAT(refusal(with("p3_Nm: 8.9038", "p4_Nm: 8.9038")),
               AllOf(HasSubstr("arm.yaml: line 5"), HasSubstr("unknown key 'p4_Nm'")));
