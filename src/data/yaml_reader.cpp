@@ -45,6 +45,15 @@ YamlValue YamlValue::read(const std::string& path, const Progress& progress) {
   return parse(std::string_view(text).substr(0, size), path);
 }
 
+std::string yaml_quoted(std::string_view text) {
+  std::string all = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') all += '\\';
+    all += c;
+  }
+  return all + '"';
+}
+
 std::string YamlValue::place() const {
   const YAML::Mark mark = node_.Mark();
   std::string place = file_;

@@ -15,6 +15,9 @@
 
 namespace torsio {
 
+/// A text without control characters in double quotes; `YamlValue::text` gives its bytes again.
+[[nodiscard]] std::string yaml_quoted(std::string_view text);
+
 /// A YAML value with its place, so that every message names file, line and key.
 class YamlValue {
  public:

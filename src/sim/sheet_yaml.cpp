@@ -39,15 +39,6 @@ constexpr unsigned kHighestSerial = 9999;
 
 // Writing.
 
-std::string quoted(std::string_view text) {
-  std::string all = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') all += '\\';
-    all += c;
-  }
-  return all + '"';
-}
-
 std::string_view family_name(ActuatorFamily family) {
   return std::ranges::find(kFamilies, family, &decltype(kFamilies)::value_type::second)->first;
 }
@@ -323,7 +314,7 @@ std::string data_sheet_yaml(const DataSheet& sheet) {
   std::string text = fmt::format(
       "# origin: P printed in a paper, D derived from printed numbers, A assumed\n"
       "name: {}\ntitle: {}\nfamily: {}\n",
-      sheet.name, quoted(sheet.title), family_name(sheet.family));
+      sheet.name, yaml_quoted(sheet.title), family_name(sheet.family));
   if (!sheet.variant.empty()) text += fmt::format("variant: {}\n", sheet.variant);
   if (sheet.serial) text += fmt::format("serial: {}\n", *sheet.serial);
   text += "values:\n";

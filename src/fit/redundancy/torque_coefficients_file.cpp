@@ -1,7 +1,6 @@
 #include "torsio/fit/redundancy/torque_coefficients_file.hpp"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <array>
@@ -29,14 +28,11 @@ constexpr std::array kRows{Row{"p0_Nm", nullptr, &DeflectionTorque::offset_Nm},
                            Row{"p2_Nms_rad", "p2_Nms_deg", &DeflectionTorque::viscous_Nms_rad},
                            Row{"p3_Nm", nullptr, &DeflectionTorque::coulomb_Nm}};
 
-void write(YAML::Emitter& yaml, const char* key, double value) {
-  yaml << YAML::Key << key << YAML::Value << fmt::format("{}", value);
-}
-
-void write(YAML::Emitter& yaml, const char* source, const DeflectionTorque& of) {
-  yaml << YAML::Key << source << YAML::Value << YAML::Flow << YAML::BeginMap;
-  for (const Row& row : kRows) write(yaml, row.key, of.*row.value);
-  yaml << YAML::EndMap;
+std::string flow_map(const DeflectionTorque& of) {
+  std::string text;
+  for (const Row& row : kRows)
+    text += fmt::format("{}{}: {}", text.empty() ? "{" : ", ", row.key, of.*row.value);
+  return text + "}";
 }
 
 double coefficient(const YamlValue& yaml, const Row& row) {
@@ -102,19 +98,14 @@ std::vector<JointTorqueCoefficients> joints(const YamlValue& yaml) {
 }  // namespace
 
 std::string torque_coefficients_yaml(std::span<const JointTorqueCoefficients> joints) {
-  YAML::Emitter yaml;
-  yaml << YAML::BeginMap << YAML::Key << "joints" << YAML::Value << YAML::BeginSeq;
-  for (const JointTorqueCoefficients& joint : joints) {
-    yaml << YAML::BeginMap << YAML::Key << "name" << YAML::Value << YAML::DoubleQuoted
-         << joint.name;
-    write(yaml, "torque_constant_Nm_A", joint.parameters.torque_constant_Nm_A);
-    write(yaml, "gear_ratio", joint.parameters.gear_ratio);
-    write(yaml, "spring", joint.parameters.spring);
-    write(yaml, "gear", joint.parameters.gear);
-    yaml << YAML::EndMap;
-  }
-  yaml << YAML::EndSeq << YAML::EndMap;
-  return std::string(yaml.c_str()) + "\n";
+  std::string text = "joints:\n";
+  for (const JointTorqueCoefficients& joint : joints)
+    text += fmt::format(
+        "  - name: {}\n    torque_constant_Nm_A: {}\n    gear_ratio: {}\n    spring: {}\n"
+        "    gear: {}\n",
+        yaml_quoted(joint.name), joint.parameters.torque_constant_Nm_A, joint.parameters.gear_ratio,
+        flow_map(joint.parameters.spring), flow_map(joint.parameters.gear));
+  return text;
 }
 
 std::vector<JointTorqueCoefficients> read_torque_coefficients(const std::string& path,

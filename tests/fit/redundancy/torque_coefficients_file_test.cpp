@@ -76,6 +76,7 @@ TEST(TorqueCoefficientsFile, WrittenAndReadGivesTheSameBits) {
   std::vector<JointTorqueCoefficients> joints =
       read_torque_coefficients(std::string(TORSIO_SOURCE) + "/studies/paper_000_table_3.yaml");
   joints[1].name = "a \"quoted\": name, # with signs";
+  joints[2].name = "28\x8c Nm in Latin-1";
   joints[1].parameters.spring.viscous_Nms_rad = 1.0 / 3.0;
   EXPECT_EQ(parse_torque_coefficients(torque_coefficients_yaml(joints), "again.yaml"), joints);
 }
