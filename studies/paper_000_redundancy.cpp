@@ -225,14 +225,15 @@ std::vector<double> shown(const std::vector<double>& values, double sample_rate_
 void draw(std::vector<std::string>& plots, std::string_view joint, const JointLog& log,
           double sample_rate_Hz) {
   const auto t_s = shown(log.t_s, sample_rate_Hz);
-  const auto plot = [&](const char* y, std::string title,
+  const auto plot = [&](const char* y, const std::string& title,
                         const std::vector<std::pair<const char*, const std::vector<double>*>>& of) {
     std::vector<std::vector<double>> values;
     std::vector<Curve> curves;
     values.reserve(of.size());
+    curves.reserve(of.size());
     for (const auto& [label, all] : of)
       curves.push_back({label, t_s, values.emplace_back(shown(*all, sample_rate_Hz))});
-    plots.push_back(svg_plot(curves, {"time [s]", y}, std::move(title)));
+    plots.push_back(svg_plot(curves, {"time [s]", y}, title));
   };
   const std::string name(joint);
   plot("position [deg]", name, {{"", &log.angle_deg}});

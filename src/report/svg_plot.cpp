@@ -134,10 +134,12 @@ std::string svg_grid(const std::vector<std::string>& plots, std::size_t columns)
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
       "height=\"{1}\">\n",
       kWidth * static_cast<double>(columns), kHeight * static_cast<double>(rows));
-  for (std::size_t i = 0; i < plots.size(); ++i)
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    const std::size_t row = i / columns;
     text += fmt::format("<g transform=\"translate({} {})\">\n{}</g>\n",
                         kWidth * static_cast<double>(i % columns),
-                        kHeight * static_cast<double>(i / columns), plots[i]);
+                        kHeight * static_cast<double>(row), plots[i]);
+  }
   return text + "</svg>\n";
 }
 
