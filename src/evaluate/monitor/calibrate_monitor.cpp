@@ -349,7 +349,7 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
   CalibratedMonitor result;
   result.redundancy.sources = plan.sources;
   result.monitor.sample_period_s = 1.0 / rate_Hz;
-  result.monitor.persistence_s = std::max(10e-3, 2.0 / rate_Hz);
+  result.monitor.persistence_s = std::max(result.monitor.persistence_s, 2.0 / rate_Hz);
   std::size_t samples = 0;
   for (const DatasetRecord& record : fault_free.records) samples += record.recording.size();
   result.hours = static_cast<double>(samples) / rate_Hz / kSecondsPerHour;

@@ -47,7 +47,8 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
   const MonitorRecipe recipe = monitor_recipe(joint);
   std::uint64_t seed = settings.seed;
   const auto work = [&](const DataSheet& sheet, double duration_s) {
-    return duty_recording(sheet, {.seed = seed++, .duration_s = duration_s}, progress);
+    return with_source_delay(
+        duty_recording(sheet, {.seed = seed++, .duration_s = duration_s}, progress));
   };
   Dataset own;
   add(own, work(joint, settings.training_s), Role::train);

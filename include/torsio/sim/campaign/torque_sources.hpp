@@ -54,6 +54,11 @@ struct MonitorRecipe {
 };
 [[nodiscard]] MonitorRecipe monitor_recipe(const DataSheet& sheet);
 
+/// The same recording with the delay of the sources in its `torque_Nm`. Models that are trained on a torque
+/// without it make up for the delay with rates of their inputs, each in its own way, and disagree while
+/// the torque changes fast.
+[[nodiscard]] Recording with_source_delay(const Recording& recording);
+
 /// @param dataset the torque of a load cell, in records with the role train; records with the role
 /// validation give the error bar
 /// @throws Error as `train_model`
