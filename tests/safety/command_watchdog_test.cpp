@@ -177,6 +177,8 @@ TEST(CommandWatchdog, NamesItsStatesAndReasons) {
   EXPECT_EQ(name(State::waiting), "waiting");
   EXPECT_EQ(name(State::running), "running");
   EXPECT_EQ(name(State::stopped), "stopped");
+  EXPECT_EQ(name(static_cast<State>(9)), "stopped");
+  EXPECT_EQ(name(static_cast<Reason>(9)), "requested");
   EXPECT_EQ(name(Reason::none), "none");
   EXPECT_EQ(name(Reason::command_lost), "command_lost");
   EXPECT_EQ(name(Reason::fault), "fault");

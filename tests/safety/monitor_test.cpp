@@ -109,6 +109,15 @@ TEST(Monitor, WatchesOnlyAfterTheProofAndWhenItIsArmed) {
   EXPECT_TRUE(loop.monitor.arm(loop.t_s)) << "without effect";
 }
 
+TEST(Monitor, AFindingBeforeTheProofDoesNotStopAfterIt) {
+  Loop loop;
+  loop.signals[0].value = kNaN;
+  loop.step_for(10);
+  loop.signals[0].value = 0.0;
+  loop.start();
+  EXPECT_EQ(loop.step(), State::watching);
+}
+
 TEST(Monitor, NeedsNoProofOfNoTime) {
   MonitorSettings settings = joint();
   settings.proof_s = 0.0;
