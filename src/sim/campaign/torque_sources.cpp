@@ -71,6 +71,13 @@ Expressions kinematic_waves(const std::string& input) {
   return waves;
 }
 
+/// A drive before a strain-wave gear: the slope of its kinematic error is one of the transmitted torque.
+Expressions through_gear(Expressions drive, const std::string& load, const std::string& input) {
+  for (const std::string& wave : kinematic_waves(input))
+    drive.push_back(delayed(fmt::format("{} * {}", load, wave)));
+  return drive;
+}
+
 Expressions with(Expressions first, const Expressions& more) {
   first.insert(first.end(), more.begin(), more.end());
   return first;
@@ -112,8 +119,9 @@ SourceRecipe spring(TorqueSource source, const std::string& deflection, const st
           .features = {.inputs = std::move(inputs), .definitions = std::move(definitions)}};
 }
 
-MonitoredSignal encoder(std::string name, std::string moves_with = {}) {
-  return {.name = std::move(name), .turn = kTurn_rad, .moves_with = std::move(moves_with)};
+MonitoredSignal encoder(std::string name, std::string moves_with = {},
+                        double turn_rad = kTurn_rad) {
+  return {.name = std::move(name), .turn = turn_rad, .moves_with = std::move(moves_with)};
 }
 
 MonitorRecipe series_elastic(const DataSheet& sheet) {
@@ -127,7 +135,7 @@ MonitorRecipe series_elastic(const DataSheet& sheet) {
   MonitorRecipe recipe;
   recipe.sources.push_back(
       drive({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
-            {delayed(current), acceleration(motor)},
+            through_gear({delayed(current), acceleration(motor)}, current, motor),
             friction(motor, sheet.friction.bristle_rad.value, current,
                      encoder_step(sheet.sensors.motor_encoder_bits)),
             {}));
@@ -160,14 +168,15 @@ MonitorRecipe harmonic_drive(const DataSheet& sheet) {
   recipe.sources.push_back(
       drive({"current",
              {"current_sensor", "motor_encoder", "wave_encoder", "torque_constant", "friction"}},
-            {delayed(torque), acceleration(motor), acceleration(wave), speed(motor)},
+            through_gear({delayed(torque), acceleration(motor), acceleration(wave), speed(motor)},
+                         torque, wave),
             friction(wave, sliding_rad, torque, wave_step_rad), {}));
   recipe.sources.push_back(gear({"gear", {"wave_encoder", "joint_encoder", "gear"}}, twist,
                                 strain_wave.break_away_rad.value, wave));
-  recipe.sources.push_back(
-      drive({"spring", {"motor_encoder", "wave_encoder", "spring", "friction"}},
-            {delayed(tube.name), rate_of(tube.name), acceleration(wave)},
-            friction(wave, sliding_rad, tube.name, wave_step_rad), {tube}));
+  recipe.sources.push_back(drive(
+      {"spring", {"motor_encoder", "wave_encoder", "spring", "friction"}},
+      through_gear({delayed(tube.name), rate_of(tube.name), acceleration(wave)}, tube.name, wave),
+      friction(wave, sliding_rad, tube.name, wave_step_rad), {tube}));
   recipe.plan.signals = {
       encoder(motor, wave), encoder(wave, motor),      encoder("joint_angle_rad", wave),
       {.name = torque},     {.name = tube.expression}, {.name = twist.expression}};
@@ -181,7 +190,7 @@ MonitorRecipe elastomer(const DataSheet& sheet) {
   MonitorRecipe recipe;
   recipe.sources.push_back(
       drive({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
-            {delayed(current), acceleration(motor)},
+            through_gear({delayed(current), acceleration(motor)}, current, motor),
             friction(motor, sheet.friction.bristle_rad.value, current,
                      encoder_step(sheet.sensors.motor_encoder_bits)),
             {}));
@@ -204,7 +213,7 @@ MonitorRecipe rubber_clutch(const DataSheet& sheet) {
             {}));
   recipe.sources.push_back(spring({"spring", {"motor_encoder", "joint_encoder", "spring"}},
                                   deflection.name, "joint_angle_rad", {deflection}));
-  recipe.plan.signals = {encoder(input, "joint_angle_rad"),
+  recipe.plan.signals = {encoder(input, "joint_angle_rad", kTurn_rad / ratio),
                          encoder("joint_angle_rad", input),
                          {.name = current},
                          {.name = deflection.expression}};
