@@ -159,6 +159,11 @@ TEST(StopEnergy, DoesNotIncreaseFromAMotionUnderLoad) {
   EXPECT_LT(gain, 1e-3);
 }
 
+TEST(StopEnergy, IsDefinedForEveryActuator) {
+  for (const DataSheet& sheet : data_sheets())
+    EXPECT_LT(stop_energy_gain(sheet, {.rotor_speed_rad_s = 1.0}, {}), 1e-3) << sheet.name;
+}
+
 TEST(FaultCampaign, DetectsWhatItInjectsAndBoundsWhatItMisses) {
   CampaignSettings settings = few({"nan", "offset", "spike"}, 20);
   settings.injections_of_a_size = 8;
