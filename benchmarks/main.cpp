@@ -82,6 +82,8 @@ constexpr std::array kBenches{
     Bench{"torque_loop_grey_box_step", torque_loop_grey_box_step},
     Bench{"mailbox_read", mailbox_read},
     Bench{"recorder_push", recorder_push},
+    Bench{"redundancy_step", redundancy_step},
+    Bench{"monitor_step", monitor_step},
 };
 
 struct Arguments {

@@ -54,6 +54,8 @@ Row torque_loop_dgmm300_step();
 Row torque_loop_grey_box_step();
 Row mailbox_read();
 Row recorder_push();
+Row redundancy_step();
+Row monitor_step();
 
 /// Writes the data of these rows to `scratch_folder()`, as raw doubles row by row, so that the peers use
 /// the same data. The peer of `csv_load` reads the file that this row writes there.

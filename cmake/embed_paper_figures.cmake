@@ -3,9 +3,10 @@
 cmake_minimum_required(VERSION 3.25)
 
 set(header "paper,item,condition,quantity,value,unit")
-set(known_units Nm N m deg % -)
-set(known_quantities RMSE MAE MAD STD BF "MAD ratio" "mean error ratio" "error percentage" torque twist "peak force" "spring movement")
-set(items_000 "Fig. 8" "section 3.1" "section 6.1")
+set(known_units Nm "Nm/deg" "Nm/(deg/s)" N m deg % -)
+set(known_quantities RMSE MAE MAD STD BF "MAD ratio" "mean error ratio" "error percentage" torque twist "peak force" "spring movement"
+  "p0 spring" "p1 spring" "p2 spring" "p3 spring" "p0 gear" "p1 gear" "p2 gear" "p3 gear")
+set(items_000 "Fig. 8" "Table 3" "section 3.1" "section 6.1")
 set(items_001 "Fig. 6")
 set(items_002 "Fig. 8" "Fig. 10" "Table III" "section III-C")
 set(items_003 "Table 3" "section 4.2.1" "section 4.3")

@@ -12,6 +12,7 @@ Study sensor_models_002(const StudyOptions& options, const Progress& progress);
 Study slow_loops_002(const StudyOptions& options, const Progress& progress);
 Study collision_002(const StudyOptions& options, const Progress& progress);
 Study models_003(const StudyOptions& options, const Progress& progress);
+Study redundancy_000(const StudyOptions& options, const Progress& progress);
 Study brake_000(const StudyOptions& options, const Progress& progress);
 Study torque_tracking_000(const StudyOptions& options, const Progress& progress);
 Study encoders_004(const StudyOptions& options, const Progress& progress);

@@ -156,6 +156,7 @@ struct Study {
   std::vector<StudyPlant> plants = {};
   std::variant<ErrorTable, ComparisonTable, LoopTable, QuantityTable> table = {};
   std::vector<std::string> notes = {};  ///< conclusions, and settings of the named models
+  std::string picture_svg = {};         ///< the paper's figure, drawn again; empty: none
 };
 
 /// Condition by condition. @throws Error if none is ranked under one.
@@ -168,6 +169,7 @@ struct StudyInfo {
   Study (*run)(const StudyOptions& options, const Progress& progress);
   std::span<const PaperEntry> published = {};  ///< every figure that its table shows beside ours
   bool needs_recordings = false;  ///< in TORSIO_DATA or ../shared/data: must be named to be run
+  bool has_picture = false;       ///< `Study::picture_svg` is set
 };
 
 /// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets

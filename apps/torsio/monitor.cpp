@@ -45,7 +45,7 @@ void replay(MonitorFlags& flags) {
   const torsio::MonitoredTorque monitored =
       torsio::load_monitor(monitor_file, {.serial = flags.serial});
   const std::filesystem::path model = std::filesystem::path(monitor_file).parent_path() /
-                                      torsio::read_monitor(monitor_file).models.front().file;
+                                      torsio::read_monitor(monitor_file).models.front().torque.file;
   flags.data.use_model_mapping(torsio::load_model(model).card.mapping, model.string());
   ProgressBar progress;
   const torsio::Dataset dataset =
@@ -100,9 +100,9 @@ void add_monitor(CLI::App& app) {
                  "choose the limits from recordings without a fault and write a monitor file");
   CalibrateFlags& calibration = flags->calibration;
   verb->add_option(
-      "--source", calibration.sources,
-      "NAME=MODEL or NAME=MODEL:PART+PART: a model file that estimates the torque, and "
-      "the parts on which it depends")
+          "--source", calibration.sources,
+          "NAME=MODEL or NAME=MODEL:PART+PART: a model file that estimates the torque, and "
+          "the parts on which it depends")
       ->allow_extra_args(false);
   verb->add_option("--signal", calibration.signals,
                    "a channel or expression to watch, or 'A moves with B'; default: every channel "

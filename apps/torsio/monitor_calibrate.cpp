@@ -18,10 +18,11 @@ namespace {
 
 constexpr double kTurn_rad = 6.283185307179586;
 
-/// NAME=MODEL or NAME=MODEL:PART+PART
+/// NAME=MODEL, NAME=MODEL,FRICTION, each with or without :PART+PART
 struct SourceFlag {
   torsio::TorqueSource source;
   std::string model;
+  std::string friction;
 };
 
 std::vector<std::string> split(const std::string& text, char separator) {
@@ -39,16 +40,28 @@ SourceFlag source_of(const std::string& text) {
   if (equals == 0 || equals == std::string::npos || equals + 1 == text.size())
     throw torsio::UsageError(
         {.place = "--source",
-         .expected = "NAME=MODEL or NAME=MODEL:PART+PART",
+         .expected = "NAME=MODEL, NAME=MODEL:PART+PART or NAME=MODEL,FRICTION:PART+PART",
          .found = "'" + text + "'",
          .advice = "for example --source spring=spring.safetensors:gear_encoder+joint_encoder"});
   SourceFlag flag{.source = {.name = text.substr(0, equals), .depends_on = {}},
-                  .model = text.substr(equals + 1)};
-  const std::size_t colon = flag.model.rfind(':');
-  if (colon == std::string::npos) return flag;
-  flag.source.depends_on = split(flag.model.substr(colon + 1), '+');
-  flag.model.resize(colon);
+                  .model = text.substr(equals + 1),
+                  .friction = {}};
+  if (const std::size_t colon = flag.model.rfind(':'); colon != std::string::npos) {
+    flag.source.depends_on = split(flag.model.substr(colon + 1), '+');
+    flag.model.resize(colon);
+  }
+  if (const std::size_t comma = flag.model.find(','); comma != std::string::npos) {
+    flag.friction = flag.model.substr(comma + 1);
+    flag.model.resize(comma);
+  }
   return flag;
+}
+
+/// The models of a source, as the file names them: relative to its folder.
+torsio::MonitoredModel named(const std::string& model, const std::filesystem::path& folder) {
+  if (model.empty()) return {};
+  return {.file = std::filesystem::relative(std::filesystem::absolute(model), folder).string(),
+          .hash = torsio::model_hash(model)};
 }
 
 /// EXPRESSION, or EXPRESSION with=EXPRESSION: the second one moves with the first one.
@@ -62,16 +75,6 @@ torsio::MonitoredSignal signal_of(const std::string& text) {
   return signal;
 }
 
-/// Every channel that a source uses, where no signal is named.
-std::vector<torsio::MonitoredSignal> all_channels(const std::vector<torsio::Estimator>& sources) {
-  std::vector<torsio::MonitoredSignal> signals;
-  for (const torsio::Estimator& source : sources)
-    for (const std::string& channel : source.raw_inputs())
-      if (std::ranges::find(signals, channel, &torsio::MonitoredSignal::name) == signals.end())
-        signals.push_back(signal_of(channel));
-  return signals;
-}
-
 }  // namespace
 
 void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
@@ -79,32 +82,35 @@ void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
     throw torsio::UsageError(
         {.place = "--calibrate", .expected = "at least one --source NAME=MODEL", .found = "none"});
   std::vector<std::string> models;
-  std::vector<torsio::Estimator> sources;
+  std::vector<torsio::SourceModel> sources;
   torsio::MonitorPlan plan;
   torsio::MonitorFile file;
   file.device_serial = flags.device_serial;
   file.valid_until = flags.valid_until;
-  const std::filesystem::path folder = std::filesystem::path(flags.output).parent_path();
+  const std::filesystem::path folder =
+      std::filesystem::absolute(flags.output).lexically_normal().parent_path();
   for (const std::string& text : flags.sources) {
     SourceFlag flag = source_of(text);
     const torsio::ModelFile model = torsio::load_model(flag.model, flags.device_serial);
-    sources.push_back(torsio::make_estimator(model));
-    plan.sources.push_back(std::move(flag.source));
+    torsio::SourceModel source{.torque = torsio::make_estimator(model)};
+    if (models.empty()) data.use_model_mapping(model.card.mapping, flag.model);
     models.push_back(flag.model);
-    const std::filesystem::path from =
-        std::filesystem::absolute(folder.empty() ? std::filesystem::path(".") : folder);
+    if (!flag.friction.empty()) {
+      source.friction =
+          torsio::make_estimator(torsio::load_model(flag.friction, flags.device_serial));
+      models.push_back(flag.friction);
+    }
+    sources.push_back(std::move(source));
+    plan.sources.push_back(std::move(flag.source));
     file.models.push_back(
-        {.file = std::filesystem::relative(std::filesystem::absolute(flag.model), from).string(),
-         .hash = torsio::model_hash(flag.model)});
-    if (models.size() == 1) data.use_model_mapping(model.card.mapping, flag.model);
+        {.torque = named(flag.model, folder), .friction = named(flag.friction, folder)});
   }
   data.check_outputs({flags.output, json.destination}, models);
   require_writable(flags.output);
   for (const std::string& text : flags.signals) plan.signals.push_back(signal_of(text));
-  if (plan.signals.empty()) plan.signals = all_channels(sources);
-  std::vector<std::string> channels;
-  for (const torsio::Estimator& source : sources)
-    channels.insert(channels.end(), source.raw_inputs().begin(), source.raw_inputs().end());
+  std::vector<std::string> channels = torsio::TorqueSources(sources).raw_inputs();
+  if (plan.signals.empty())
+    for (const std::string& channel : channels) plan.signals.push_back(signal_of(channel));
   for (const torsio::MonitoredSignal& signal : plan.signals)
     for (const std::string& channel : torsio::channels_of(signal.name)) channels.push_back(channel);
   std::ranges::sort(channels);
@@ -116,6 +122,8 @@ void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
       sources, plan, dataset,
       {.false_alarms_per_hour = flags.false_alarms_per_hour, .extrapolate = flags.extrapolate},
       progress.listener());
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    file.models[i].error_bar_factor = calibrated.error_bar_factors[i];
   file.redundancy = calibrated.redundancy;
   file.monitor = calibrated.monitor;
   file.fault_free_hours = calibrated.hours;

@@ -20,6 +20,7 @@ struct ReproduceFlags {
   std::vector<std::string> items;
   torsio::StudyOptions options;
   bool list = false;
+  std::string plot;
   JsonOutput json;
 };
 
@@ -31,6 +32,18 @@ void list() {
   print(table.text());
 }
 
+/// --plot is for one study that has a picture.
+void check_plot(const ReproduceFlags& flags, const std::vector<const torsio::StudyInfo*>& wanted) {
+  if (flags.plot.empty() || (wanted.size() == 1 && wanted.front()->has_picture)) return;
+  std::string known;
+  for (const torsio::StudyInfo& info : torsio::studies())
+    if (info.has_picture) known += fmt::format("{}{}", known.empty() ? "" : ", ", info.name);
+  throw torsio::UsageError({.place = "torsio reproduce --plot",
+                            .expected = "one item that has a figure: " + known,
+                            .found = wanted.size() == 1 ? std::string(wanted.front()->name)
+                                                        : fmt::format("{} items", wanted.size())});
+}
+
 void run(const ReproduceFlags& flags) {
   if (flags.list) return list();
   std::vector<const torsio::StudyInfo*> wanted;
@@ -38,11 +51,14 @@ void run(const ReproduceFlags& flags) {
   if (wanted.empty())
     for (const torsio::StudyInfo& info : torsio::studies())
       if (!info.needs_recordings) wanted.push_back(&info);
-  DataFlags().check_outputs({flags.json.destination});
+  check_plot(flags, wanted);
+  DataFlags().check_outputs({flags.json.destination, flags.plot});
+  require_ending("--plot", flags.plot, {".svg"});
   auto documents = nlohmann::ordered_json::array();
   for (const torsio::StudyInfo* info : wanted) {
     ProgressBar progress;
     const torsio::Study study = torsio::run_study(*info, flags.options, progress.listener());
+    if (!flags.plot.empty()) write_text(flags.plot, study.picture_svg);
     documents.push_back(nlohmann::ordered_json::parse(torsio::study_json(*info, study)));
     if (flags.json.wants_tables()) {
       print(torsio::study_text(*info, study) + "\n");
@@ -72,5 +88,7 @@ void add_reproduce(CLI::App& app) {
   add_seed(*verb, flags->options.seed, "seed of the first repeat");
   verb->add_option("--json", flags->json.destination,
                    "write the figures as JSON to a file, or - for standard output");
+  verb->add_option("--plot", flags->plot,
+                   "draw the figure of an experiment that has one into an SVG file");
   verb->callback([flags] { run(*flags); });
 }

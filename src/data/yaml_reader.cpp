@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <set>
 
@@ -42,6 +43,15 @@ YamlValue YamlValue::read(const std::string& path, const Progress& progress) {
     size += got;
   }
   return parse(std::string_view(text).substr(0, size), path);
+}
+
+std::string yaml_quoted(std::string_view text) {
+  std::string all = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') all += '\\';
+    all += c;
+  }
+  return all + '"';
 }
 
 std::string YamlValue::place() const {
@@ -123,6 +133,16 @@ std::string YamlValue::text() const {
 double YamlValue::number(std::string_view si_unit) const {
   if (!node_.IsScalar()) refuse("a number");
   return si_quantity(node_.Scalar(), si_unit, place());
+}
+
+double YamlValue::plain_number(double largest) const {
+  const std::string written = text();
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(written.data(), written.data() + written.size(), value);
+  if (error != std::errc() || end != written.data() + written.size() ||
+      !(std::abs(value) <= largest))
+    refuse(fmt::format("a number of at most {:g} in size, without its unit", largest));
+  return value;
 }
 
 double YamlValue::factor() const {

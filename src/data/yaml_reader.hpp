@@ -15,6 +15,9 @@
 
 namespace torsio {
 
+/// A text without control characters in double quotes; `YamlValue::text` gives its bytes again.
+[[nodiscard]] std::string yaml_quoted(std::string_view text);
+
 /// A YAML value with its place, so that every message names file, line and key.
 class YamlValue {
  public:
@@ -43,6 +46,9 @@ class YamlValue {
   [[nodiscard]] std::string text() const;
   /// A number in the SI unit, which may carry another unit of the same quantity.
   [[nodiscard]] double number(std::string_view si_unit = "1") const;
+  /// A number without a unit, where the key or another entry states it. @throws Error also if it is
+  /// larger than `largest`.
+  [[nodiscard]] double plain_number(double largest) const;
   /// A number without a unit, or a fraction: "1/150".
   [[nodiscard]] double factor() const;
   [[nodiscard]] double positive_number(std::string_view si_unit) const;

@@ -15,7 +15,7 @@ namespace {
 
 void require_positive(double value, const char* name) {
   if (value > 0.0 && std::isfinite(value)) return;
-  throw Error({.place = fmt::format("friction filter: {}", name),
+  throw Error({.place = fmt::format("torque sources: {}", name),
                .expected = "a positive number",
                .found = fmt::format("{}", value)});
 }
@@ -38,7 +38,7 @@ FrictionFilter::FrictionFilter(const Settings& settings, double sample_rate_Hz)
   require_positive(sample_rate_Hz, "sample rate");
   if (!(settings.lowest > 0.0 && settings.lowest < 1.0 && settings.highest > 1.0 &&
         std::isfinite(settings.highest)))
-    throw Error({.place = "friction filter",
+    throw Error({.place = "torque sources: friction",
                  .expected = "bounds above 0 that contain 1",
                  .found = fmt::format("{} to {}", settings.lowest, settings.highest)});
   samples_ = std::max(1.0, settings.correlation_s * sample_rate_Hz);
@@ -95,7 +95,11 @@ TorqueSources::TorqueSources(std::vector<SourceModel> sources) : estimates_(sour
   if (sources.empty())
     throw Error({.place = "torque sources", .expected = "at least one model", .found = "none"});
   for (SourceModel& model : sources) {
-    Source source{.torque = fed(std::move(model.torque)), .friction = {}, .filter = {}};
+    require_positive(model.error_bar_factor, "error_bar_factor");
+    Source source{.torque = fed(std::move(model.torque)),
+                  .friction = {},
+                  .filter = {},
+                  .error_bar_factor = model.error_bar_factor};
     if (model.friction) {
       source.friction = fed(std::move(*model.friction));
       source.filter = FrictionFilter({}, sample_rate_Hz_);
@@ -126,14 +130,24 @@ void TorqueSources::reset() noexcept {
     source.torque.estimator.reset();
     if (source.friction) source.friction->estimator.reset();
     if (source.filter) source.filter->reset();
+    source.has_failed = false;
   }
   for (Estimate& estimate : estimates_) estimate = {.fault = Fault::warming_up};
+}
+
+void TorqueSources::fail_model(std::size_t source) noexcept {
+  if (source < sources_.size()) sources_[source].has_failed = true;
+}
+
+void TorqueSources::refuse(Fault fault) noexcept {
+  for (Estimate& estimate : estimates_) estimate.fault = fault;
 }
 
 std::span<const Estimate> TorqueSources::step(std::span<const double> raw) noexcept {
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     Source& source = sources_[i];
     Estimate estimate = source.torque.step(raw);
+    estimate.std_dev *= source.error_bar_factor;
     if (source.friction) {
       const Estimate friction = source.friction->step(raw);
       source.without_friction = estimate;
@@ -143,6 +157,7 @@ std::span<const Estimate> TorqueSources::step(std::span<const double> raw) noexc
       estimate.std_dev = std::sqrt(estimate.std_dev * estimate.std_dev + spread_Nm * spread_Nm);
       if (estimate.fault == Fault::none) estimate.fault = friction.fault;
     }
+    if (source.has_failed) estimate.fault = Fault::model_not_finite;
     estimates_[i] = estimate;
   }
   for (std::size_t i = 0; i < sources_.size(); ++i)
@@ -154,7 +169,8 @@ void TorqueSources::adapt(std::size_t source) noexcept {
   double weights = 0.0;
   double sum_Nm = 0.0;
   for (std::size_t i = 0; i < estimates_.size(); ++i) {
-    if (i == source || estimates_[i].fault != Fault::none || !(estimates_[i].std_dev > 0.0)) continue;
+    if (i == source || estimates_[i].fault != Fault::none || !(estimates_[i].std_dev > 0.0))
+      continue;
     const double weight = 1.0 / (estimates_[i].std_dev * estimates_[i].std_dev);
     weights += weight;
     sum_Nm += weight * estimates_[i].value;

@@ -126,6 +126,18 @@ void read_actions(const std::map<std::string, std::string>& actions, MonitorSett
   }
 }
 
+ordered_json source_json(const TorqueSource& source, const MonitoredSource& models) {
+  ordered_json document{
+      {"name", source.name}, {"model", models.torque.file}, {"model_hash", models.torque.hash}};
+  if (!models.friction.file.empty()) {
+    document["friction_model"] = models.friction.file;
+    document["friction_model_hash"] = models.friction.hash;
+  }
+  document["error_bar_factor"] = models.error_bar_factor;
+  document["depends_on"] = source.depends_on;
+  return document;
+}
+
 ordered_json monitor_json(const MonitorFile& file) {
   const MonitorSettings& monitor = file.monitor;
   ordered_json document;
@@ -143,10 +155,7 @@ ordered_json monitor_json(const MonitorFile& file) {
     document["recordings"].push_back({{"file", source.file}, {"sha256", source.sha256}});
   document["sources"] = ordered_json::array();
   for (std::size_t i = 0; i < file.redundancy.sources.size(); ++i)
-    document["sources"].push_back({{"name", file.redundancy.sources[i].name},
-                                   {"model", file.models.at(i).file},
-                                   {"model_hash", file.models.at(i).hash},
-                                   {"depends_on", file.redundancy.sources[i].depends_on}});
+    document["sources"].push_back(source_json(file.redundancy.sources[i], file.models.at(i)));
   document["correlation"] = file.redundancy.correlation;
   document["signals"] = ordered_json::array();
   for (const MonitoredSignal& signal : monitor.signals)
@@ -197,8 +206,12 @@ MonitorFile file_of(const JsonObject& document, const std::string& place) {
     return Source{source.text("file"), source.text("sha256")};
   });
   file.redundancy.sources = document.objects("sources", [&](const JsonObject& source) {
-    source.allow_only({"name", "model", "model_hash", "depends_on"});
-    file.models.push_back({source.text("model"), source.text("model_hash")});
+    source.allow_only({"name", "model", "model_hash", "friction_model", "friction_model_hash",
+                       "error_bar_factor", "depends_on"});
+    file.models.push_back({.torque = {source.text("model"), source.text("model_hash")},
+                           .friction = {source.optional_text("friction_model"),
+                                        source.optional_text("friction_model_hash")},
+                           .error_bar_factor = source.number("error_bar_factor")});
     return TorqueSource{source.text("name"), source.texts("depends_on")};
   });
   MonitorSettings& monitor = file.monitor;
@@ -297,18 +310,23 @@ MonitoredTorque load_monitor(const std::filesystem::path& path, const MonitorFil
     throw Error({.place = place,
                  .expected = fmt::format("a loop at {} Hz, for which the limits hold", rate_Hz),
                  .found = fmt::format("{} Hz", options.rate_Hz)});
-  std::vector<Estimator> sources;
-  for (std::size_t i = 0; i < file.models.size(); ++i) {
-    const std::filesystem::path model = path.parent_path() / file.models[i].file;
-    if (const std::string hash = model_hash(model); hash != file.models[i].hash)
-      throw Error({.place = model.string(),
-                   .expected = fmt::format("the model with which '{}' was calibrated, hash {}",
-                                           file.redundancy.sources[i].name, file.models[i].hash),
+  const auto estimator = [&](const MonitoredModel& model) {
+    const std::filesystem::path name = path.parent_path() / model.file;
+    if (const std::string hash = model_hash(name); hash != model.hash)
+      throw Error({.place = name.string(),
+                   .expected = fmt::format("the model of the calibration, hash {}", model.hash),
                    .found = "hash " + hash,
                    .advice = "restore the model file, or calibrate the monitor again"});
-    sources.push_back(make_estimator(load_model(model), rate_Hz));
+    return make_estimator(load_model(name), rate_Hz);
+  };
+  std::vector<SourceModel> sources;
+  for (const MonitoredSource& models : file.models) {
+    SourceModel source{.torque = estimator(models.torque),
+                       .error_bar_factor = models.error_bar_factor};
+    if (!models.friction.file.empty()) source.friction = estimator(models.friction);
+    sources.push_back(std::move(source));
   }
-  return {std::move(sources), file.redundancy, file.monitor};
+  return {TorqueSources(std::move(sources)), file.redundancy, file.monitor};
 }
 
 }  // namespace torsio

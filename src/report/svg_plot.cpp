@@ -7,6 +7,7 @@
 
 #include "markup_text.hpp"
 #include "plot_range.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/report/plots.hpp"
 
 namespace torsio {
@@ -120,6 +121,25 @@ std::string svg_plot(const std::vector<Curve>& curves, const PlotLabels& labels,
     text += fmt::format("<text x=\"{}\" y=\"{}\" fill=\"{}\">{}</text>\n", kLeft + 8.0,
                         kTop + 14.0 * static_cast<double>(i + 1), kColours[i % kColours.size()],
                         markup_text(curves[i].label));
+  return text + "</svg>\n";
+}
+
+std::string svg_grid(const std::vector<std::string>& plots, std::size_t columns) {
+  if (plots.empty() || columns == 0)
+    throw UsageError({.place = "svg_grid",
+                      .expected = "at least one picture and one column",
+                      .found = fmt::format("{} and {}", plots.size(), columns)});
+  const std::size_t rows = (plots.size() + columns - 1) / columns;
+  std::string text = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
+      "height=\"{1}\">\n",
+      kWidth * static_cast<double>(columns), kHeight * static_cast<double>(rows));
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    const std::size_t row = i / columns;
+    text += fmt::format("<g transform=\"translate({} {})\">\n{}</g>\n",
+                        kWidth * static_cast<double>(i % columns),
+                        kHeight * static_cast<double>(row), plots[i]);
+  }
   return text + "</svg>\n";
 }
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "torsio/core/error.hpp"
 
@@ -54,27 +54,34 @@ SquareMatrix error_correlation(const std::vector<double>& rows, std::size_t coun
   return matrix;
 }
 
-std::array<double, Redundancy::kMaxSources> smallest_variance(
-    const SquareMatrix& covariance, std::span<const std::size_t> index) noexcept {
-  const std::size_t count = index.size();
-  SquareMatrix factor{};
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = 0; j <= i; ++j) factor[i][j] = covariance[index[i]][index[j]];
-  factorise(factor, count);
-  std::array<double, Redundancy::kMaxSources> x{};
-  for (std::size_t i = 0; i < count; ++i) {
-    x[i] = 1.0;
-    for (std::size_t k = 0; k < i; ++k) x[i] -= factor[i][k] * x[k];
-    x[i] /= factor[i][i];
+std::vector<double> inverses(const SquareMatrix& correlation, std::size_t count) {
+  const std::size_t size = count * count;
+  std::vector<double> result((std::size_t{1} << count) * size, 0.0);
+  for (std::size_t set = 1; set < std::size_t{1} << count; ++set) {
+    // The other sources keep a row and column of the unit matrix, which is its own inverse.
+    SquareMatrix factor{};
+    const auto has = [set](std::size_t i) { return (set >> i & 1U) != 0; };
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j <= i; ++j)
+        factor[i][j] = i == j || (has(i) && has(j)) ? correlation[i][j] : 0.0;
+    factorise(factor, count);
+    for (std::size_t column = 0; column < count; ++column) {
+      if (!has(column)) continue;
+      std::array<double, Redundancy::kMaxSources> x{};
+      x[column] = 1.0;
+      for (std::size_t i = 0; i < count; ++i) {
+        for (std::size_t k = 0; k < i; ++k) x[i] -= factor[i][k] * x[k];
+        x[i] /= factor[i][i];
+      }
+      for (std::size_t i = count; i-- > 0;) {
+        for (std::size_t k = i + 1; k < count; ++k) x[i] -= factor[k][i] * x[k];
+        x[i] /= factor[i][i];
+      }
+      std::copy_n(x.begin(), count,
+                  result.begin() + static_cast<std::ptrdiff_t>(set * size + column * count));
+    }
   }
-  for (std::size_t i = count; i-- > 0;) {
-    for (std::size_t k = i + 1; k < count; ++k) x[i] -= factor[k][i] * x[k];
-    x[i] /= factor[i][i];
-  }
-  const double sum =
-      std::accumulate(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(count), 0.0);
-  for (std::size_t i = 0; i < count; ++i) x[i] /= sum;
-  return x;
+  return result;
 }
 
 }  // namespace torsio::detail

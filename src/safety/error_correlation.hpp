@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <span>
 #include <string_view>
 #include <vector>
 
@@ -18,10 +17,8 @@ using SquareMatrix =
 [[nodiscard]] SquareMatrix error_correlation(const std::vector<double>& rows, std::size_t count,
                                              std::string_view place);
 
-/// The weights x with sum 1, of either sign, for which x' C x is smallest: x = C^-1 1 / (1' C^-1 1).
-/// @param index rows and columns of C, which is positive definite
-/// @returns the weight of index[k] at place k
-[[nodiscard]] std::array<double, Redundancy::kMaxSources> smallest_variance(
-    const SquareMatrix& covariance, std::span<const std::size_t> index) noexcept;
+/// The inverses of the correlation of each set of the sources: element [(set * count + i) * count + j],
+/// bit i of `set` is source i; 0 where i or j is not in the set.
+[[nodiscard]] std::vector<double> inverses(const SquareMatrix& correlation, std::size_t count);
 
 }  // namespace torsio::detail

@@ -91,7 +91,7 @@ void check_times(const MonitorSettings& settings) {
 /// An input of the source was not measured.
 bool is_lost(Fault fault) noexcept {
   return fault == Fault::input_not_finite || fault == Fault::input_count_wrong ||
-         fault == Fault::zero_not_set || fault == Fault::warming_up;
+         fault == Fault::zero_not_set;
 }
 
 /// A change is a wrap of the encoder if it is a turn or several of them up to a tenth of a turn.
@@ -281,7 +281,9 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
   const auto index = static_cast<std::uint8_t>(i);
   const double period_s = settings_.sample_period_s;
   const bool lost = is_lost(estimate.fault) || !std::isfinite(estimate.value);
-  const bool faulty = !lost && !detail::is_valid(estimate);
+  // A source that warms up is not used yet, which is no fault: a friction state settles with the motion.
+  const bool is_warming_up = estimate.fault == Fault::warming_up;
+  const bool faulty = !lost && !is_warming_up && !detail::is_valid(estimate);
   const bool is_novel = estimate.novelty > settings_.largest_novelty;
   state.lost = lost ? state.lost + 1 : 0;
   state.faulty = faulty ? state.faulty + 1 : 0;

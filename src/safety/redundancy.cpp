@@ -13,9 +13,6 @@
 namespace torsio {
 namespace {
 
-/// An error bar of more than so many times the smallest one has no weight.
-constexpr double kLargestRatio = 1e100;
-
 void check_sources(const std::vector<TorqueSource>& sources) {
   if (sources.empty() || sources.size() > Redundancy::kMaxSources)
     throw Error({.place = "redundancy",
@@ -35,6 +32,7 @@ Redundancy::Redundancy(const RedundancySettings& settings) : settings_(settings)
   check_sources(settings.sources);
   correlation_ =
       detail::error_correlation(settings.correlation, settings.sources.size(), "redundancy");
+  inverses_ = detail::inverses(correlation_, settings.sources.size());
   for (std::size_t i = 0; i < settings.sources.size(); ++i) {
     for (const std::string& part : settings.sources[i].depends_on) {
       if (part.empty())
@@ -66,90 +64,72 @@ PartSet Redundancy::suspects(std::span<const std::array<std::uint8_t, 2>> pairs)
   return common;
 }
 
-namespace {
+// With p_i = s_min / s_i and u_i = w_i / p_i the weights minimise u'Ru under u >= 0 and p'u = 1, where
+// no number is large: an error bar may have any size, and the inverses of R are computed beforehand.
+// An active-set method (Lawson & Hanson 1974): at the solution Ru = var p for every source with a weight,
+// and Ru >= var p for every other one. It begins with the solution without correlation.
 
-using Row = std::array<double, Redundancy::kMaxSources>;
-
-/// The weights and the sources that may have one.
-struct Weights {
-  Row of{};
-  std::array<std::size_t, Redundancy::kMaxSources> chosen{};
-  std::size_t chosen_count = 0;
-};
-
-/// Moves the weights of the chosen sources to those of the smallest variance. A source whose weight
-/// would become negative on the way loses it and is no longer chosen.
-void minimise_over_chosen(const detail::SquareMatrix& covariance, Weights& weights) noexcept {
-  std::size_t limiting = 0;
-  do {
-    const std::size_t count = weights.chosen_count;
-    const Row least = detail::smallest_variance(covariance, std::span(weights.chosen).first(count));
+double Redundancy::minimise_over(SourceSet& chosen, const Row& precision, Row& u) const noexcept {
+  const std::size_t count = settings_.sources.size();
+  while (true) {
+    const double* inverse = &inverses_[chosen * count * count];
+    Row least{};
+    double sum = 0.0;
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t j = 0; j < count; ++j) least[i] += inverse[i * count + j] * precision[j];
+      sum += precision[i] * least[i];
+    }
+    const double variance = 1.0 / sum;
     double share = 1.0;
-    limiting = count;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double weight = weights.of[weights.chosen[k]];
-      const double reach = least[k] < 0.0 ? weight / (weight - least[k]) : 1.0;
+    SourceSet limiting = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      least[i] *= variance;
+      const double reach = least[i] < 0.0 ? u[i] / (u[i] - least[i]) : 1.0;
       if (!(reach < share)) continue;
       share = reach;
-      limiting = k;
+      limiting = SourceSet{1} << i;
     }
-    for (std::size_t k = 0; k < count; ++k) {
-      double& weight = weights.of[weights.chosen[k]];
-      weight += share * (least[k] - weight);
+    if (limiting == 0) {
+      u = least;
+      return variance;
     }
-    if (limiting == count) return;
-    weights.of[weights.chosen[limiting]] = 0.0;
-    std::copy(weights.chosen.begin() + static_cast<std::ptrdiff_t>(limiting) + 1,
-              weights.chosen.begin() + static_cast<std::ptrdiff_t>(count),
-              weights.chosen.begin() + static_cast<std::ptrdiff_t>(limiting));
-    --weights.chosen_count;
-  } while (true);
+    // As far as no weight becomes negative; the source whose weight ends at 0 is no longer chosen.
+    chosen &= ~limiting;
+    for (std::size_t i = 0; i < count; ++i)
+      u[i] = (chosen >> i & 1U) != 0 ? u[i] + share * (least[i] - u[i]) : 0.0;
+  }
 }
 
-/// @returns the source that is not chosen and whose weight would reduce the variance most; `count`: none
-std::size_t entering(const detail::SquareMatrix& covariance, std::size_t count,
-                     const Weights& weights) noexcept {
-  std::array<bool, Redundancy::kMaxSources> is_chosen{};
-  double variance = 0.0;
-  Row gradient{};
-  for (std::size_t k = 0; k < weights.chosen_count; ++k) is_chosen[weights.chosen[k]] = true;
+SourceSet Redundancy::entering(SourceSet others, const Row& precision, const Row& u,
+                               double variance) const noexcept {
+  const std::size_t count = settings_.sources.size();
+  SourceSet best = 0;
+  double least = -1e-9 * std::sqrt(variance);
   for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t j = 0; j < count; ++j) gradient[i] += covariance[i][j] * weights.of[j];
-    variance += weights.of[i] * gradient[i];
-  }
-  std::size_t best = count;
-  double least = variance * (1.0 - 1e-9);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (is_chosen[i] || !(gradient[i] < least)) continue;
-    least = gradient[i];
-    best = i;
+    double slope = -variance * precision[i];
+    for (std::size_t j = 0; j < count; ++j) slope += correlation_[i][j] * u[j];
+    if ((others >> i & 1U) == 0 || !(slope < least)) continue;
+    least = slope;
+    best = SourceSet{1} << i;
   }
   return best;
 }
 
-/// The weights of the smallest variance by an active-set method (Lawson & Hanson 1974, for w'Sw with
-/// w >= 0 and sum 1): at the solution every source with a weight has the same gradient, and no other
-/// source has a smaller one. It begins with the weights that are the solution without correlation.
-Row smallest_weights(const detail::SquareMatrix& covariance, std::size_t count) noexcept {
-  Weights weights{.chosen_count = count};
-  double sum = 0.0;
-  for (std::size_t i = 0; i < count; ++i) {
-    weights.chosen[i] = i;
-    weights.of[i] = 1.0 / covariance[i][i];
-    sum += weights.of[i];
-  }
-  for (std::size_t i = 0; i < count; ++i) weights.of[i] /= sum;
+double Redundancy::minimise(SourceSet valid, const Row& precision, Row& u) const noexcept {
+  double square = 0.0;
+  for (const double p : precision) square += p * p;
+  for (std::size_t i = 0; i < kMaxSources; ++i) u[i] = precision[i] / square;
+  SourceSet chosen = valid;
+  double variance = 0.0;
   // Bounded: rounding could otherwise let one source enter and leave again without end.
-  for (std::size_t rounds = 3 * count; rounds > 0;) {
-    minimise_over_chosen(covariance, weights);
-    const std::size_t next = entering(covariance, count, weights);
-    rounds = next < count ? rounds - 1 : 0;
-    if (next < count) weights.chosen[weights.chosen_count++] = next;
+  for (std::size_t rounds = 3 * kMaxSources; rounds > 0;) {
+    variance = minimise_over(chosen, precision, u);
+    const SourceSet next = chosen == valid ? 0 : entering(valid & ~chosen, precision, u, variance);
+    chosen |= next;
+    rounds = next == 0 ? 0 : rounds - 1;
   }
-  return weights.of;
+  return variance;
 }
-
-}  // namespace
 
 FusedTorque Redundancy::step(std::span<const Estimate> sources) noexcept {
   FusedTorque fused{.value_Nm = last_Nm_, .fault = Fault::input_not_finite};
@@ -166,32 +146,20 @@ FusedTorque Redundancy::step(std::span<const Estimate> sources) noexcept {
     smallest_Nm = std::min(smallest_Nm, sources[i].std_dev);
   }
   if (fused.used == 0) return fused;
-  // In units of the smallest error bar: no square overflows or becomes 0.
-  std::array<std::size_t, kMaxSources> index{};
-  Row ratio{};
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    if ((fused.used >> i & 1U) == 0 || !(sources[i].std_dev / smallest_Nm <= kLargestRatio))
-      continue;
-    ratio[count] = sources[i].std_dev / smallest_Nm;
-    index[count++] = i;
-  }
-  detail::SquareMatrix covariance{};
-  for (std::size_t a = 0; a < count; ++a)
-    for (std::size_t b = 0; b < count; ++b)
-      covariance[a][b] = ratio[a] * correlation_[index[a]][index[b]] * ratio[b];
-  const Row weights = smallest_weights(covariance, count);
-  double value_Nm = 0.0;
-  double variance = 0.0;
+  Row precision{};
+  Row u{};
   double lowest_Nm = std::numeric_limits<double>::infinity();
   double highest_Nm = -lowest_Nm;
-  for (std::size_t a = 0; a < count; ++a) {
-    const double source_Nm = sources[index[a]].value;
-    value_Nm += weights[a] * source_Nm;
-    lowest_Nm = std::min(lowest_Nm, source_Nm);
-    highest_Nm = std::max(highest_Nm, source_Nm);
-    for (std::size_t b = 0; b < count; ++b) variance += weights[a] * weights[b] * covariance[a][b];
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if ((fused.used >> i & 1U) == 0) continue;
+    precision[i] = smallest_Nm / sources[i].std_dev;
+    lowest_Nm = std::min(lowest_Nm, sources[i].value);
+    highest_Nm = std::max(highest_Nm, sources[i].value);
   }
+  const double variance = minimise(fused.used, precision, u);
+  double value_Nm = 0.0;
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    if ((fused.used >> i & 1U) != 0) value_Nm += precision[i] * u[i] * sources[i].value;
   // Between the estimates in spite of rounding; in this order a number in every case.
   last_Nm_ = fused.value_Nm = std::min(std::max(lowest_Nm, value_Nm), highest_Nm);
   fused.std_dev_Nm = smallest_Nm * std::sqrt(variance);

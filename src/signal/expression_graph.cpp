@@ -44,7 +44,8 @@ double computed(Operation operation, double left, double right) noexcept {
     case Operation::rate:
     case Operation::lowpass:
     case Operation::lag:
-    case Operation::stop: break;
+    case Operation::stop:
+    case Operation::dahl: break;
   }
   return left;  // those are not computed from their operands alone
 }
@@ -81,7 +82,8 @@ std::uint32_t ExpressionGraph::operation(Operation operation, std::uint32_t left
 std::uint32_t ExpressionGraph::memory(Operation operation, std::uint32_t operand,
                                       double parameter) {
   if (is_constant(operand)) {
-    const bool is_of_changes = operation == Operation::rate || operation == Operation::stop;
+    const bool is_of_changes = operation == Operation::rate || operation == Operation::stop ||
+                               operation == Operation::dahl;
     return is_of_changes ? constant(0.0) : operand;
   }
   if (operation == Operation::lag && parameter == 0.0) return operand;

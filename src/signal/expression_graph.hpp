@@ -33,6 +33,7 @@ enum class Operation : std::uint8_t {
   lowpass,
   lag,
   stop,
+  dahl,
 };
 
 /// The value of an operation without memory; those of one operand take it from `left`.
@@ -43,7 +44,7 @@ struct Node {
   Operation operation = Operation::constant;
   std::uint32_t left = 0;   ///< operand; for a channel its index in `channels()`
   std::uint32_t right = 0;  ///< second operand; the first again where there is one only
-  double parameter = 0.0;   ///< value of a constant, cut-off in Hz, lag in samples, threshold of a stop
+  double parameter = 0.0;   ///< value of a constant, cut-off in Hz, lag in samples, threshold of a stop, distance of dahl
 };
 
 /// The kind of motion that an expression depends on: none (constants), a rate, or something else.
@@ -56,7 +57,7 @@ class ExpressionGraph {
   std::uint32_t channel(std::string_view name);
   std::uint32_t constant(double value);
   std::uint32_t operation(Operation operation, std::uint32_t left, std::uint32_t right);
-  /// `parameter` is the cut-off of `lowpass`, the number of samples of `lag`, the threshold of `stop`.
+  /// `parameter` is the cut-off of `lowpass`, the number of samples of `lag`, the threshold of `stop`, the distance of `dahl`.
   std::uint32_t memory(Operation operation, std::uint32_t operand, double parameter);
 
   /// A name in the unit of a rate (rad_s, m_s) makes its node one, whatever it is made of.

@@ -25,6 +25,7 @@ constexpr auto kFunctions = std::to_array<Function>({
     {"lowpass", Operation::lowpass, 2},
     {"lag", Operation::lag, 2},
     {"stop", Operation::stop, 2},
+    {"dahl", Operation::dahl, 2},
     {"sign", Operation::sign, 1},
     {"tanh", Operation::tanh, 1},
     {"sin", Operation::sin, 1},
@@ -270,7 +271,8 @@ class ExpressionParser::Reader {
       case Operation::rate: return graph_.memory(operation, first, 0.0);
       case Operation::lowpass: return graph_.memory(operation, first, cutoff_of(arguments[1]));
       case Operation::lag: return graph_.memory(operation, first, lag_of(arguments[1]));
-      case Operation::stop: return graph_.memory(operation, first, threshold_of(arguments[1]));
+      case Operation::stop:
+      case Operation::dahl: return graph_.memory(operation, first, distance_of(arguments[1]));
       default: return graph_.operation(operation, first, arguments[1].node);
     }
   }
@@ -298,10 +300,10 @@ class ExpressionParser::Reader {
     return value + 0.0;  // no negative zero
   }
 
-  double threshold_of(const Operand& argument) const {
+  double distance_of(const Operand& argument) const {
     const double value = graph_.nodes()[argument.node].parameter;
     if (!graph_.is_constant(argument.node) || !(value > 0.0))
-      fail(argument.start, "a positive constant as threshold, in the unit of the first argument",
+      fail(argument.start, "a positive constant in the unit of the first argument",
            as_written(argument));
     return value;
   }

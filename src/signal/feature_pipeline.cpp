@@ -53,7 +53,7 @@ class StopOperator {
   explicit StopOperator(double threshold) : threshold_(threshold) {}
 
   void reset() noexcept {
-    state_ = 0.0;
+    state_ = lowest_ = highest_ = 0.0;
     has_last_ = false;
   }
 
@@ -61,13 +61,58 @@ class StopOperator {
   double step(double input) noexcept {
     if (!std::isfinite(input)) return input;
     if (has_last_) state_ = std::clamp(state_ + (input - last_), -threshold_, threshold_);
+    if (has_last_) {
+      lowest_ = std::min(lowest_, input);
+      highest_ = std::max(highest_, input);
+    } else {
+      lowest_ = highest_ = input;
+    }
     last_ = input;
     has_last_ = true;
     return state_;
   }
+  /// Whether the input has moved so far that the state no longer depends on that at the start.
+  [[nodiscard]] bool is_settled() const noexcept { return highest_ - lowest_ >= 2.0 * threshold_; }
 
  private:
   double threshold_;
+  double lowest_ = 0.0;
+  double highest_ = 0.0;
+  double state_ = 0.0;
+  double last_ = 0.0;
+  bool has_last_ = false;
+};
+
+/// s <- d + (s - d) exp(-|change of the input| / distance), d the sign of the change: the friction of Dahl 1968
+/// over its level.
+class DahlOperator {
+ public:
+  explicit DahlOperator(double distance) : distance_(distance) {}
+
+  void reset() noexcept {
+    state_ = 0.0;
+    travel_ = 0.0;
+    has_last_ = false;
+  }
+
+  /// A value that is not finite is returned and leaves the state.
+  double step(double input) noexcept {
+    if (!std::isfinite(input)) return input;
+    if (has_last_ && input != last_) {
+      const double direction = input > last_ ? 1.0 : -1.0;
+      state_ = direction + (state_ - direction) * std::exp(-std::abs(input - last_) / distance_);
+    }
+    travel_ += has_last_ ? std::abs(input - last_) : 0.0;
+    last_ = input;
+    has_last_ = true;
+    return state_;
+  }
+  /// Whether what is left of the unknown state at the start is below 5 %.
+  [[nodiscard]] bool is_settled() const noexcept { return travel_ >= 3.0 * distance_; }
+
+ private:
+  double distance_;
+  double travel_ = 0.0;
   double state_ = 0.0;
   double last_ = 0.0;
   bool has_last_ = false;
@@ -78,7 +123,8 @@ struct Instruction {
   std::uint32_t target;  ///< index into the values; the operands' likewise
   std::uint32_t left;
   std::uint32_t right;
-  std::uint32_t state;  ///< index among the differentiators, low-passes, lags or stops
+  std::uint32_t
+      state;  ///< index among the differentiators, low-passes, lags, stops or friction states
 };
 
 bool has_operands(const Node& node) {
@@ -114,12 +160,19 @@ struct FeaturePipeline::Program {
   std::vector<Lowpass> lowpasses;
   std::vector<DelayLine> delay_lines;
   std::vector<StopOperator> stops;
+  std::vector<DahlOperator> dahls;
   std::size_t lag_memory = 0;
   std::vector<std::uint32_t> feature_sources;
   std::vector<double> features;
   std::vector<bool> is_rate;
   std::size_t settling_samples = 0;
   std::size_t seen = 0;
+  bool has_travelled = false;  ///< every operator has forgotten its state at the start
+
+  [[nodiscard]] bool have_travelled() const noexcept {
+    const auto is_settled = [](const auto& of) { return of.is_settled(); };
+    return std::ranges::all_of(stops, is_settled) && std::ranges::all_of(dahls, is_settled);
+  }
 };
 
 FeaturePipeline::Program::Program(FeatureSpec feature_spec, double rate_Hz)
@@ -167,6 +220,7 @@ void FeaturePipeline::Program::compile(const ExpressionGraph& graph,
     longest = std::max(longest, unsettled[node]);
   }
   settling_samples = longest == 0 ? 0 : longest + 1;
+  has_travelled = stops.empty() && dahls.empty();
   feature_sources = input_nodes;
   features.resize(input_nodes.size());
 }
@@ -199,6 +253,10 @@ std::size_t FeaturePipeline::Program::add(const Node& node, std::uint32_t target
       state = stops.size();
       stops.emplace_back(node.parameter);
       break;
+    case Operation::dahl:
+      state = dahls.size();
+      dahls.emplace_back(node.parameter);
+      break;
     default: break;
   }
   instructions.push_back(
@@ -213,6 +271,7 @@ double FeaturePipeline::Program::run(const Instruction& instruction) noexcept {
     case Operation::lowpass: return lowpasses[instruction.state].step(left);
     case Operation::lag: return delay_lines[instruction.state].step(left);
     case Operation::stop: return stops[instruction.state].step(left);
+    case Operation::dahl: return dahls[instruction.state].step(left);
     default: return computed(instruction.operation, left, values[instruction.right]);
   }
 }
@@ -270,7 +329,9 @@ void FeaturePipeline::reset() noexcept {
   for (Lowpass& lowpass : program_->lowpasses) lowpass.reset();
   for (DelayLine& line : program_->delay_lines) line.reset();
   for (StopOperator& stop : program_->stops) stop.reset();
+  for (DahlOperator& dahl : program_->dahls) dahl.reset();
   program_->seen = 0;
+  program_->has_travelled = program_->stops.empty() && program_->dahls.empty();
 }
 
 std::span<const double> FeaturePipeline::step(std::span<const double> raw) noexcept {
@@ -282,11 +343,12 @@ std::span<const double> FeaturePipeline::step(std::span<const double> raw) noexc
   for (std::size_t i = 0; i < program.features.size(); ++i)
     program.features[i] = program.values[program.feature_sources[i]];
   if (program.seen < program.settling_samples) ++program.seen;
+  if (!program.has_travelled) program.has_travelled = program.have_travelled();
   return program.features;
 }
 
 bool FeaturePipeline::is_settled() const noexcept {
-  return program_->seen == program_->settling_samples;
+  return program_->seen == program_->settling_samples && program_->has_travelled;
 }
 
 std::vector<std::string> channels_of(std::string_view expression) {

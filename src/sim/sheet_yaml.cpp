@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
-#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -41,15 +39,6 @@ constexpr unsigned kHighestSerial = 9999;
 
 // Writing.
 
-std::string quoted(std::string_view text) {
-  std::string all = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') all += '\\';
-    all += c;
-  }
-  return all + '"';
-}
-
 std::string_view family_name(ActuatorFamily family) {
   return std::ranges::find(kFamilies, family, &decltype(kFamilies)::value_type::second)->first;
 }
@@ -71,16 +60,6 @@ std::string chosen(const YamlValue& yaml, const std::vector<std::string>& known)
   if (std::ranges::find(known, text) == known.end())
     yaml.refuse("one of " + joined(known), did_you_mean(text, known));
   return text;
-}
-
-/// A number without unit.
-double plain_number(const YamlValue& yaml) {
-  const std::string text = yaml.text();
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(std::abs(value) <= kLargest))
-    yaml.refuse(fmt::format("a number of at most {:g} in size, without its unit", kLargest));
-  return value;
 }
 
 /// A value in the sheet's unit, from another one of the same quantity if that is known.
@@ -137,7 +116,7 @@ SheetValue value_from(const YamlValue& row, const std::string& name, std::string
   if (!row.is_map()) row.refuse(fmt::format("'{{value: 1, unit: {}, origin: A}}'", unit));
   row.allow_only({"value", "unit", "origin"});
   const YamlValue number = required(row, "value", "a number", sheet);
-  const double value = in_sheet_unit(plain_number(number), row, unit);
+  const double value = in_sheet_unit(number.plain_number(kLargest), row, unit);
   check_sign(number, name, value);
   const YamlValue origin =
       required(row, "origin", "P printed, D derived from printed numbers or A assumed", sheet);
@@ -189,8 +168,8 @@ std::vector<CurvePoint> points_from(const YamlValue& yaml, const DataSheet& shee
                 "a list of [deflection, torque]")) {
     const auto numbers = items_of(point, "[deflection, torque]");
     if (numbers.size() != 2) point.refuse("two numbers: [deflection, torque]");
-    curve.push_back({{deflection.si(plain_number(numbers[0])), origin},
-                     {torque.si(plain_number(numbers[1])), origin}});
+    curve.push_back({{deflection.si(numbers[0].plain_number(kLargest)), origin},
+                     {torque.si(numbers[1].plain_number(kLargest)), origin}});
   }
   return curve;
 }
@@ -335,7 +314,7 @@ std::string data_sheet_yaml(const DataSheet& sheet) {
   std::string text = fmt::format(
       "# origin: P printed in a paper, D derived from printed numbers, A assumed\n"
       "name: {}\ntitle: {}\nfamily: {}\n",
-      sheet.name, quoted(sheet.title), family_name(sheet.family));
+      sheet.name, yaml_quoted(sheet.title), family_name(sheet.family));
   if (!sheet.variant.empty()) text += fmt::format("variant: {}\n", sheet.variant);
   if (sheet.serial) text += fmt::format("serial: {}\n", *sheet.serial);
   text += "values:\n";

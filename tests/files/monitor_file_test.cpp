@@ -29,8 +29,11 @@ struct Written {
     save_model(folder.path("current.safetensors"), joint.current);
     file.device_serial = "J-07";
     file.valid_until = "2027-03-01";
-    file.models = {{"spring.safetensors", model_hash(folder.path("spring.safetensors"))},
-                   {"current.safetensors", model_hash(folder.path("current.safetensors"))}};
+    file.models = {
+        {.torque = {"spring.safetensors", model_hash(folder.path("spring.safetensors"))},
+         .error_bar_factor = 1.25},
+        {.torque = {"current.safetensors", model_hash(folder.path("current.safetensors"))},
+         .friction = {"spring.safetensors", model_hash(folder.path("spring.safetensors"))}}};
     file.redundancy.sources = test::TwoTorques::plan().sources;
     file.redundancy.correlation = file.monitor.correlation = {1.0, 0.25, 0.25, 1.0};
     file.monitor.sources = {"spring", "current"};
@@ -92,7 +95,10 @@ TEST(MonitorFile, BuildsTheMonitorOfARobot) {
   const std::vector<SignalSample> raw{{.value = 0.1}, {.value = 0.5}};
   const FusedTorque torque = monitored.step(0.0, raw);
   EXPECT_EQ(torque.fault, Fault::none);
-  EXPECT_NEAR(torque.value_Nm, 1.0, 1e-12);
+  EXPECT_GT(torque.value_Nm, 1.0);  // 1 Nm of the spring; 1 Nm and its friction of the current
+  EXPECT_EQ(monitored.estimates()[0].value, 1.0);
+  EXPECT_EQ(monitored.estimates()[1].value, 2.0);
+  EXPECT_NEAR(monitored.estimates()[0].std_dev, 0.25, 1e-12);
 }
 
 TEST(MonitorFile, IsRefusedOnAnotherDeviceAfterItsLastDayAndAtAnotherRate) {

@@ -16,6 +16,7 @@
 #include "support/example_settings.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
 #include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/motor_referenced_torques.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
@@ -54,6 +55,17 @@ TEST(AllocationCounter, DetectsNoneWhereThereIsNone) {
   double sum = 0.0;
   EXPECT_EQ(heap_calls_during([&] { sum = std::sin(1.0); }), 0U);
   EXPECT_GT(sum, 0.0);
+}
+
+TEST(MotorReferencedTorques, StepNeverTouchesTheHeap) {
+  MotorReferencedTorques torques({.torque_constant_Nm_A = 0.2, .gear_ratio = 160.0});
+  double sum = 0.0;
+  EXPECT_EQ(heap_calls_during([&] {
+              for (const double each : {0.1, kNaN, kInfinity, 1e308})
+                sum += torques.step({.motor_current_A = each}, each).motor_Nm;
+            }),
+            0U);
+  EXPECT_TRUE(std::isfinite(sum));
 }
 
 TEST(FeaturePipeline, StepNeverTouchesTheHeap) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "torsio/core/error.hpp"
 #include "torsio/report/plots.hpp"
 
 namespace torsio {
@@ -46,6 +47,16 @@ TEST(SvgPlot, EscapesTextAndNamesCurvesIfThereIsMoreThanOne) {
   EXPECT_NE(svg.find("x &amp; x"), std::string::npos);
   EXPECT_NE(svg.find("&quot;quoted&quot;"), std::string::npos);
   EXPECT_EQ(svg_plot({{"alone", x, x}}, {"x", "y"}, "t").find("alone"), std::string::npos);
+}
+
+TEST(SvgGrid, PutsPicturesSideBySideInRows) {
+  const std::string svg = svg_grid({"<svg>a</svg>", "<svg>b</svg>", "<svg>c</svg>"}, 2);
+  EXPECT_NE(svg.find("viewBox=\"0 0 880 660\""), std::string::npos) << svg;
+  EXPECT_NE(svg.find("translate(0 0)\">\n<svg>a"), std::string::npos);
+  EXPECT_NE(svg.find("translate(440 0)\">\n<svg>b"), std::string::npos);
+  EXPECT_NE(svg.find("translate(0 330)\">\n<svg>c"), std::string::npos);
+  EXPECT_THROW((void)svg_grid({}, 2), UsageError);
+  EXPECT_THROW((void)svg_grid({"<svg/>"}, 0), UsageError);
 }
 
 TEST(SvgPlot, DrawsAnEmptyFrameForNothing) {

@@ -541,7 +541,6 @@ TEST(Monitor, ContinuesWithoutOneOfThreeSourcesForAWhile) {
        {Estimate{.std_dev = 0.1, .fault = Fault::input_not_finite},
         Estimate{.std_dev = 0.1, .fault = Fault::input_count_wrong},
         Estimate{.std_dev = 0.1, .fault = Fault::zero_not_set},
-        Estimate{.std_dev = 0.1, .fault = Fault::warming_up},
         Estimate{.value = kNaN, .std_dev = 0.1}, Estimate{.value = -kInfinity, .std_dev = 0.1}}) {
     Loop loop;
     loop.start();
@@ -557,6 +556,18 @@ TEST(Monitor, ContinuesWithoutOneOfThreeSourcesForAWhile) {
     EXPECT_EQ(loop.monitor.reason().limit, 0.5);
     EXPECT_EQ(loop.text(), "an input of the torque of spring has not been measured for 0.501 s");
   }
+}
+
+TEST(Monitor, ASourceThatWarmsUpIsNotUsedAndNoFinding) {
+  Loop loop;
+  loop.sources[2].fault = Fault::warming_up;
+  loop.sources[2].value = 1000.0;
+  loop.start();
+  loop.step_for(2000);
+  EXPECT_TRUE(loop.monitor.is_watching());
+  EXPECT_EQ(loop.monitor.active(), 0U);
+  loop.sources[1].fault = Fault::warming_up;
+  EXPECT_EQ(loop.ticks_to_stop(), 1) << "fewer than two are left";
 }
 
 TEST(Monitor, ALossThatEndsIsNotCounted) {

@@ -21,7 +21,8 @@ std::string message(std::string input, std::vector<ChannelDefinition> definition
 }
 
 constexpr const char* kFunctionList =
-    "\n  the functions are rate, lowpass, lag, stop, sign, tanh, sin, cos, atan, abs, sqrt, exp, "
+    "\n  the functions are rate, lowpass, lag, stop, dahl, sign, tanh, sin, cos, atan, abs, sqrt, "
+    "exp, "
     "min, max";
 
 TEST(ExpressionError, StatesPlaceExpectedAndFound) {
@@ -56,13 +57,11 @@ TEST(ExpressionError, StatesPlaceExpectedAndFound) {
        "input 'lowpass(a, 0.5kHz)': column 12: expected a cut-off from 0.001 Hz to below 500 Hz, "
        "half the sample rate, found 500 Hz"},
       {"stop(a, 0)",
-       "input 'stop(a, 0)': column 9: expected a positive constant as threshold, in the unit of "
-       "the "
-       "first argument, found '0'"},
+       "input 'stop(a, 0)': column 9: expected a positive constant in the unit of the first "
+       "argument, found '0'"},
       {"stop(a, b)",
-       "input 'stop(a, b)': column 9: expected a positive constant as threshold, in the unit of "
-       "the "
-       "first argument, found 'b'"},
+       "input 'stop(a, b)': column 9: expected a positive constant in the unit of the first "
+       "argument, found 'b'"},
       {"lag(a, 1.5)",
        "input 'lag(a, 1.5)': column 8: expected a whole number of samples from 0 to 100000, found "
        "'1.5'"},

@@ -69,6 +69,34 @@ TEST(Expression, StopFollowsChangesUpToItsThreshold) {
   EXPECT_EQ(value("stop(3, 0.5)"), 0.0);
 }
 
+TEST(Expression, DahlFrictionApproachesItsLevelOverADistance) {
+  FeaturePipeline features = pipeline({"dahl(x, 0.5)"});
+  const auto step = [&](double x) { return features.step(std::vector{x})[0]; };
+  EXPECT_EQ(step(3.0), 0.0);
+  EXPECT_DOUBLE_EQ(step(3.25), 1.0 - std::exp(-0.5));
+  // The path counts, not the number of its samples.
+  EXPECT_DOUBLE_EQ(step(3.5), 1.0 - std::exp(-1.0));
+  EXPECT_EQ(step(3.5), 1.0 - std::exp(-1.0));
+  EXPECT_DOUBLE_EQ(step(3.25), -1.0 + (2.0 - std::exp(-1.0)) * std::exp(-0.5));
+  EXPECT_TRUE(std::isnan(step(std::numeric_limits<double>::quiet_NaN())));
+  EXPECT_NEAR(step(-100.0), -1.0, 1e-12);
+}
+
+TEST(Expression, FrictionHasSettledAfterAMotionThatForgetsItsStart) {
+  FeaturePipeline features = pipeline({"stop(x, 0.5)", "dahl(x, 0.25)"});
+  const auto settles_at = [&](double x) {
+    static_cast<void>(features.step(std::vector{x}));
+    return features.is_settled();
+  };
+  EXPECT_FALSE(settles_at(0.0));
+  EXPECT_FALSE(settles_at(0.4));
+  EXPECT_FALSE(settles_at(0.0)) << "a path of 0.8 is enough for the second one only";
+  EXPECT_TRUE(settles_at(-0.6));
+  features.reset();
+  EXPECT_FALSE(features.is_settled());
+  EXPECT_TRUE(pipeline({"x"}).is_settled());
+}
+
 TEST(Expression, ReadsNumbersInEveryKnownUnit) {
   EXPECT_EQ(value("1.5e-3"), 0.0015);
   EXPECT_EQ(value(".5"), 0.5);

@@ -17,19 +17,18 @@ namespace torsio::test {
 /// A model of one slope: the torque from `channel`.
 inline ModelFile slope_model(const std::string& channel, double slope, double std_dev_Nm,
                              double rate_Hz = 1000.0) {
-  ModelFile file;
-  file.settings = {
-      .features = {.inputs = {channel}},
-      .sample_rate_Hz = rate_Hz,
-      .target = "torque_Nm",
-      .ranges = {.lowest = {-100.0}, .highest = {100.0}},
-      .disturbances = {.largest_step = {50.0}, .largest_travel = 50.0},
-      .fallback = {.intercept = 0.0, .slope = {slope}, .residual_std = 2.0 * std_dev_Nm},
-      .residuals = {.edges = {-1000.0, 1000.0}, .std_dev = {std_dev_Nm}}};
   Matrix coefficients(1, 2);
   coefficients(0, 1) = slope;
-  file.parameters = Linear::Parameters{.coefficients = {.values = coefficients}};
-  return file;
+  return {.card = {},
+          .settings = {.features = {.inputs = {channel}, .definitions = {}},
+                       .sample_rate_Hz = rate_Hz,
+                       .target = "torque_Nm",
+                       .zeroed_channels = {},
+                       .ranges = {.lowest = {-100.0}, .highest = {100.0}},
+                       .disturbances = {.largest_step = {50.0}, .largest_travel = 50.0},
+                       .fallback = {.slope = {slope}, .residual_std = 2.0 * std_dev_Nm},
+                       .residuals = {.edges = {-1000.0, 1000.0}, .std_dev = {std_dev_Nm}}},
+          .parameters = Linear::Parameters{.coefficients = {.values = coefficients}}};
 }
 
 /// Two sensors of one torque, 10 Nm/rad and 2 Nm/A, with errors of 0.2 and 0.4 Nm.
@@ -37,12 +36,14 @@ struct TwoTorques {
   ModelFile spring = slope_model("spring_deflection_rad", 10.0, 0.2);
   ModelFile current = slope_model("motor_current_A", 2.0, 0.4);
 
-  [[nodiscard]] std::vector<Estimator> estimators() const {
-    return {make_estimator(spring), make_estimator(current)};
+  [[nodiscard]] std::vector<SourceModel> models() const {
+    return {{.torque = make_estimator(spring)}, {.torque = make_estimator(current)}};
   }
   [[nodiscard]] static MonitorPlan plan() {
     return {.sources = {{"spring", {"encoder", "clock"}}, {"current", {"current_sensor", "clock"}}},
-            .signals = {{.name = "spring_deflection_rad"}, {.name = "motor_current_A"}}};
+            .signals = {
+                {.name = "spring_deflection_rad"},
+                {.name = "motor_current_A", .lowest = -9.0, .highest = 9.0, .largest_rate = 1e5}}};
   }
   /// A torque of 5 Nm at 1 Hz. @param gain of the current sensor from `fault_s` on
   [[nodiscard]] static Recording recording(double duration_s, std::uint64_t seed, double gain = 1.0,

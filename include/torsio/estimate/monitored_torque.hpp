@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_sources.hpp"
 #include "torsio/safety/history.hpp"
 #include "torsio/safety/monitor.hpp"
 #include "torsio/safety/redundancy.hpp"
@@ -20,10 +20,9 @@ namespace torsio {
 /// its age is that of the oldest channel in it.
 class MonitoredTorque {
  public:
-  /// @param sources one for each of `redundancy.sources`, in that order; all of one sample rate and with
-  /// a torque in Nm as target
+  /// @param sources one for each of `redundancy.sources`, in that order
   /// @throws Error if these do not fit together, or as `Redundancy`, `Monitor` and `FeaturePipeline` do.
-  MonitoredTorque(std::vector<Estimator> sources, const RedundancySettings& redundancy,
+  MonitoredTorque(TorqueSources sources, const RedundancySettings& redundancy,
                   const MonitorSettings& monitor);
 
   /// The channels that `step` requires, in this order.
@@ -37,45 +36,40 @@ class MonitoredTorque {
   /// `monitor().reset(t_s)`, with which the next step begins the history again.
   void reset() noexcept;
 
-  /// To prove that the monitor stops: until `reset` this source reports a model without a
-  /// finite output. Without effect if there is no such source.
-  void fail_model(std::size_t source) noexcept;
-
   /// @param raw one sample for each of `raw_inputs()`. A channel older than the longest age of a
-  /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite. Another
-  /// number of samples is a stop of the monitor.
+  /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite.
+  /// Another number of samples is a stop of the monitor.
   FusedTorque step(double t_s, std::span<const SignalSample> raw) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] Monitor& monitor() noexcept { return monitor_; }
   [[nodiscard]] const Monitor& monitor() const noexcept { return monitor_; }
   [[nodiscard]] const Redundancy& redundancy() const noexcept { return redundancy_; }
+  [[nodiscard]] TorqueSources& sources() noexcept { return sources_; }
+  [[nodiscard]] const TorqueSources& sources() const noexcept { return sources_; }
   /// The last second, kept once the monitor has stopped; the columns are `history_columns()`.
   [[nodiscard]] const History& history() const noexcept { return history_; }
   [[nodiscard]] std::vector<std::string> history_columns() const;
   /// The estimates of the last step, one a source.
-  [[nodiscard]] std::span<const Estimate> estimates() const noexcept { return estimates_; }
+  [[nodiscard]] std::span<const Estimate> estimates() const noexcept {
+    return sources_.estimates();
+  }
 
  private:
-  /// A source or the pipeline of the signals takes its channels from these places of `raw`.
-  struct Input {
-    std::vector<std::size_t> channels;
-    std::vector<double> values;
-  };
-  [[nodiscard]] Input input_of(const std::vector<std::string>& names);
+  [[nodiscard]] std::vector<std::size_t> places_of(const std::vector<std::string>& channels) const;
+  void record(double t_s, const FusedTorque& fused, std::span<const SignalSample> raw) noexcept;
 
-  std::vector<Estimator> sources_;
-  SourceSet failed_ = 0;  ///< of `fail_model`
+  TorqueSources sources_;
   Redundancy redundancy_;
   Monitor monitor_;
-  std::vector<std::string> raw_inputs_;
-  std::vector<Input> inputs_;  ///< one for each source
   FeaturePipeline signal_pipeline_;
-  Input signal_input_;
-  std::vector<std::vector<std::size_t>> signal_channels_;  ///< per signal: places in `raw`
-  std::vector<double> longest_age_s_;                      ///< per channel
-  std::vector<Estimate> estimates_;
+  std::vector<std::string> raw_inputs_;  ///< first those of the sources
+  std::vector<std::size_t> signal_places_;
+  std::vector<std::vector<std::size_t>> channels_of_signal_;  ///< places in `raw`
+  std::vector<double> longest_age_s_;                         ///< per channel
+  std::vector<double> source_values_;
+  std::vector<double> signal_values_;
   std::vector<SignalSample> signals_;
-  std::vector<double> row_;  ///< for the history
+  std::vector<double> row_;  ///< of the history
   History history_;
 };
 

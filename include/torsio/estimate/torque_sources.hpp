@@ -57,11 +57,14 @@ class FrictionFilter {
 struct SourceModel {
   Estimator torque;
   std::optional<Estimator> friction = {};
+  /// The error bar of the models is multiplied by this, from recordings at work.
+  double error_bar_factor = 1.0;
 };
 
 /// Several estimates of one torque from one row of channels.
 ///
-/// A source with friction gives t + phi f with the variance s² + var(phi) f²; phi follows the mean of the
+/// A source with friction gives t + phi f with the variance c² s² + var(phi) f², c the factor of its error
+/// bar; phi follows the mean of the
 /// other valid sources (weights 1 / variance).
 class TorqueSources {
  public:
@@ -75,6 +78,11 @@ class TorqueSources {
   /// As the estimators'. @throws UsageError for an unknown channel or a value that is not finite.
   void set_zero(std::string_view channel, double value);
   void reset() noexcept;
+  /// To prove that a monitor stops: until `reset` this source reports a model without a finite output.
+  /// Without effect if there is no such source.
+  void fail_model(std::size_t source) noexcept;
+  /// The estimates of this tick have this fault: their inputs could not be taken.
+  void refuse(Fault fault) noexcept TORSIO_REALTIME;
 
   /// @param raw one value for each of `raw_inputs()`; NaN for one that was not measured
   /// @returns one estimate a source, valid until the next call
@@ -97,8 +105,10 @@ class TorqueSources {
     Fed torque;
     std::optional<Fed> friction;
     std::optional<FrictionFilter> filter;
+    double error_bar_factor = 1.0;
     Estimate without_friction = {};
     double friction_Nm = 0.0;
+    bool has_failed = false;  ///< `fail_model`
   };
   [[nodiscard]] Fed fed(Estimator estimator);
   void adapt(std::size_t source) noexcept TORSIO_REALTIME;

@@ -6,7 +6,7 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_sources.hpp"
 #include "torsio/safety/monitor.hpp"
 #include "torsio/safety/redundancy.hpp"
 
@@ -38,6 +38,9 @@ struct CalibratedPair {
 };
 
 struct CalibratedMonitor {
+  /// Per source, for `SourceModel::error_bar_factor`: the root mean square of its errors in units of their
+  /// bars, where the torque was measured; else that of the model as it was.
+  std::vector<double> error_bar_factors;
   RedundancySettings redundancy;
   MonitorSettings monitor;
   std::vector<CalibratedPair> pairs;
@@ -52,20 +55,20 @@ struct CalibratedMonitor {
 /// - Pair of sources: with d the difference and s its standard deviation from the error bars, h =
 ///   max(floor, factor s). The floor comes from |d| where s is below its median, the factor from |d| / s
 ///   where it is above. Of each statistic, reduced to what persists for `persistence_s`, the maxima of
-///   blocks of 10 s above their 90 % quantile u have an exponential tail of mean b; the threshold is
-///   u + b ln(rate above u / wanted rate), and at least 1.05 times the largest one observed.
-/// - Correlation of the sources' errors: where the recordings have the measured torque.
+///   blocks of 10 s have a generalised Pareto tail above their 90 % quantile, which gives the threshold
+///   for the wanted rate, at least 1.05 times the largest one observed.
+/// - Error bars and correlation of the sources' errors: where the recordings have the measured torque.
 /// - Signals: range with a tenth of its width on either side; 1.5 times the largest rate; 1.5 times the
 ///   longest gap between fresh samples (at least a sample); twice the longest travel of a companion
 ///   without a change.
 /// - Drift: what is allowed is 1.2 times the largest mean of |d| / h over a minute, at least half.
 ///
 /// The sum over checks of signals is not part of the wanted rate: their limits have margins instead.
-/// Form: ours; exponential tails: Pickands 1975 with shape 0.
+/// Form: ours; tails: Pickands 1975, their moments Hosking and Wallis 1987.
 /// @throws Error if the recordings lack a channel, are shorter than ten blocks, cannot support the
 /// wanted rate, or if a source has a fault in more than 1 % of the samples; UsageError for a rate that
 /// is not positive; Cancelled.
-[[nodiscard]] CalibratedMonitor calibrate_monitor(const std::vector<Estimator>& sources,
+[[nodiscard]] CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
                                                   const MonitorPlan& plan,
                                                   const Dataset& fault_free,
                                                   const CalibrationOptions& options = {},

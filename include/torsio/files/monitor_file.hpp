@@ -22,11 +22,19 @@ struct MonitoredModel {
   bool operator==(const MonitoredModel&) const = default;
 };
 
+/// The models of one source.
+struct MonitoredSource {
+  MonitoredModel torque;
+  MonitoredModel friction = {};  ///< of a drive; without a file: none
+  double error_bar_factor = 1.0;
+  bool operator==(const MonitoredSource&) const = default;
+};
+
 /// Sources, limits and what the limits rest on. Plain data.
 struct MonitorFile {
   std::string device_serial;           ///< actuator that was calibrated; empty: any
   std::string valid_until;             ///< the last day, as 2027-11-22; empty: no end
-  std::vector<MonitoredModel> models;  ///< one for each source
+  std::vector<MonitoredSource> models;  ///< one for each source
   RedundancySettings redundancy;
   MonitorSettings monitor;
   double fault_free_hours = 0.0;

@@ -25,6 +25,10 @@ struct PlotLabels {
 [[nodiscard]] std::string svg_plot(const std::vector<Curve>& curves, const PlotLabels& labels,
                                    const std::string& title);
 
+/// Pictures of `svg_plot` side by side in rows of `columns`, as one SVG picture.
+/// @throws UsageError if there is no picture or no column.
+[[nodiscard]] std::string svg_grid(const std::vector<std::string>& plots, std::size_t columns);
+
 /// Draws curves as braille dots, two by four per character, with axes; several curves share the
 /// canvas (their labels are printed below it, marked by the curve that was drawn last). Non-finite
 /// points are skipped; without a point the frame is empty.

@@ -18,12 +18,6 @@ struct TorqueSource {
   /// Encoders, sensors, supply, clock, calibration: names of parts whose fault changes this estimate.
   /// Sources that list the same name can fail together.
   std::vector<std::string> depends_on;
-
-  template <class Self, class Visit>
-  static void visit_fields(Self& self, Visit&& visit) {
-    visit("name", self.name);
-    visit("depends_on", self.depends_on);
-  }
 };
 
 struct RedundancySettings {
@@ -53,8 +47,7 @@ struct FusedTorque {
 /// t the valid estimates, s their error bars at this tick, R the correlation of their errors. w are
 /// the weights >= 0 with sum 1 of the smallest variance. Since the weights are not negative, the
 /// result lies between the estimates; since a smaller set of sources has a larger minimum, the
-/// error bar never becomes narrower when a source is lost. A source whose error bar is more than 10^100
-/// times the smallest one has no weight.
+/// error bar never becomes narrower when a source is lost.
 ///
 /// A source is left out only if it reports itself invalid: a fault, a value that is not finite, an
 /// error bar that is not finite or not positive. Valid sources that disagree are all used: which of them is wrong is not decided here
@@ -90,10 +83,21 @@ class Redundancy {
  private:
   using Row = std::array<double, kMaxSources>;
 
+  /// The smallest variance in units of the smallest error bar, and with which weights it is reached.
+  /// @param precision smallest error bar divided by that of each source; 0 if it is not valid
+  /// @param u output: weights divided by `precision`
+  double minimise(SourceSet valid, const Row& precision, Row& u) const noexcept;
+  /// The same over the chosen sources; those whose weight would become negative leave the set.
+  double minimise_over(SourceSet& chosen, const Row& precision, Row& u) const noexcept;
+  /// The source of `others` with which the variance would decrease most, as a set; empty: none.
+  [[nodiscard]] SourceSet entering(SourceSet others, const Row& precision, const Row& u,
+                                   double variance) const noexcept;
+
   RedundancySettings settings_;
   std::vector<std::string> parts_;
   std::array<PartSet, kMaxSources> parts_of_{};
   std::array<Row, kMaxSources> correlation_{};
+  std::vector<double> inverses_;  ///< one for each set of sources
   double last_Nm_ = 0.0;
 };
 

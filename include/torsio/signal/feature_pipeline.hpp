@@ -31,12 +31,13 @@ struct FeatureSpec {
 /// Raw channels of one tick -> features of one tick. Parsed once; `step` allocates nothing.
 ///
 /// An expression is built from channel names, numbers (a unit may follow: `10Hz`, `0.3deg`),
-/// `+ - * / ^`, parentheses and the functions `rate lowpass lag stop sign tanh sin cos atan abs sqrt
+/// `+ - * / ^`, parentheses and the functions `rate lowpass lag stop dahl sign tanh sin cos atan abs sqrt
 /// exp min max`.
 /// Equal sub-expressions are evaluated once. `rate(x)` is the backward difference over one sample,
 /// `lowpass(x, f)` a second-order Butterworth filter re-discretised for the sample rate that starts
 /// in the steady state of its first input, `lag(x, n)` the value n samples ago (before there is
-/// one, the oldest), `stop(x, r)` the stop operator s <- clip(s + change of x, +-r) that starts at 0. docs/expressions.md describes the whole language.
+/// one, the oldest), `stop(x, r)` the stop operator s <- clip(s + change of x, +-r) that starts at 0,
+/// `dahl(x, d)` the friction of Dahl over its level. docs/expressions.md describes the whole language.
 ///
 /// Finite raw values can still give a feature that is not finite (`x / y`). Its effect is limited:
 /// a low-pass returns it without changing its state, a rate is finite again one sample later, a lag

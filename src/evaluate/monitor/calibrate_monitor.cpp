@@ -28,10 +28,10 @@ std::size_t samples_of(double seconds, double rate_Hz) {
   return static_cast<std::size_t>(std::ceil(seconds * rate_Hz - 1e-9));
 }
 
-/// The correlation of the errors in units of their error bars, where the torque was measured.
-class ErrorCorrelation {
+/// The errors in units of their error bars, where the torque was measured.
+class ErrorMoments {
  public:
-  explicit ErrorCorrelation(std::size_t sources) : sources_(sources), sums_(sources * sources) {}
+  explicit ErrorMoments(std::size_t sources) : sources_(sources), sums_(sources * sources) {}
 
   void add(const std::vector<SourceRun>& runs, std::span<const double> measured_Nm) {
     std::vector<double> errors(sources_);
@@ -48,7 +48,18 @@ class ErrorCorrelation {
     }
   }
 
-  [[nodiscard]] std::vector<double> rows() const {
+  /// Root mean squares; 1 where the torque was not measured.
+  [[nodiscard]] std::vector<double> sizes() const {
+    std::vector<double> sizes(sources_, 1.0);
+    for (std::size_t i = 0; i < sources_ && samples_ > 0; ++i)
+      if (const double square = sums_[i * sources_ + i] / static_cast<double>(samples_);
+          square > 0.0)
+        sizes[i] = std::sqrt(square);
+    return sizes;
+  }
+
+  /// Row by row; empty where the torque was not measured.
+  [[nodiscard]] std::vector<double> correlation() const {
     if (samples_ == 0) return {};
     std::vector<double> rows(sums_.size(), 1.0);
     for (std::size_t i = 0; i < sources_; ++i)
@@ -269,7 +280,7 @@ class SignalStatistics {
   std::size_t longest_gap_ = 0;
 };
 
-void check_arguments(const std::vector<Estimator>& sources, const MonitorPlan& plan,
+void check_arguments(const std::vector<SourceModel>& sources, const MonitorPlan& plan,
                      const Dataset& fault_free, const CalibrationOptions& options) {
   if (!(options.false_alarms_per_hour > 0.0) || !std::isfinite(options.false_alarms_per_hour))
     throw UsageError({.place = "wanted rate of false alarms",
@@ -277,10 +288,40 @@ void check_arguments(const std::vector<Estimator>& sources, const MonitorPlan& p
                       .found = fmt::format("{}", options.false_alarms_per_hour)});
   if (sources.size() != plan.sources.size() || sources.empty())
     throw Error({.place = "calibration of a monitor",
-                 .expected = "one estimator for each source of the plan",
+                 .expected = "one model for each source of the plan",
                  .found = fmt::format("{} and {}", sources.size(), plan.sources.size())});
   if (fault_free.records.empty())
     throw Error({.place = "calibration of a monitor", .problem = "there is no recording"});
+}
+
+using Recorded = std::vector<std::vector<SourceRun>>;
+
+Recorded run_all(const std::vector<SourceModel>& sources, const Dataset& fault_free,
+                 const Progress& progress, double done) {
+  const TorqueSources combined(sources);
+  Recorded recorded;
+  for (const DatasetRecord& record : fault_free.records) {
+    report_progress(progress,
+                    done + 0.5 * static_cast<double>(recorded.size()) /
+                               static_cast<double>(fault_free.records.size()),
+                    "calibration of the monitor");
+    recorded.push_back(run_sources(combined, record.recording));
+  }
+  return recorded;
+}
+
+ErrorMoments moments_of(const Recorded& recorded, const Dataset& fault_free, std::size_t sources) {
+  ErrorMoments moments(sources);
+  for (std::size_t r = 0; r < recorded.size(); ++r) {
+    const Recording& recording = fault_free.records[r].recording;
+    if (!recording.has(fault_free.target)) continue;
+    const Channel& measured = recording.channel(fault_free.target);
+    std::vector<double> fresh(measured.values);
+    for (std::size_t n = 0; n < fresh.size(); ++n)
+      if (!measured.is_fresh(n)) fresh[n] = kNotMeasured;
+    moments.add(recorded[r], fresh);
+  }
+  return moments;
 }
 
 /// @returns whether the wanted rate is extrapolated
@@ -300,9 +341,9 @@ bool check_rate(const CalibrationOptions& options, double hours) {
 
 }  // namespace
 
-CalibratedMonitor calibrate_monitor(const std::vector<Estimator>& sources, const MonitorPlan& plan,
-                                    const Dataset& fault_free, const CalibrationOptions& options,
-                                    const Progress& progress) {
+CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
+                                    const MonitorPlan& plan, const Dataset& fault_free,
+                                    const CalibrationOptions& options, const Progress& progress) {
   check_arguments(sources, plan, fault_free, options);
   const double rate_Hz = fault_free.sample_rate_Hz();
   CalibratedMonitor result;
@@ -315,32 +356,22 @@ CalibratedMonitor calibrate_monitor(const std::vector<Estimator>& sources, const
   result.false_alarms_per_hour = options.false_alarms_per_hour;
   result.is_extrapolated = check_rate(options, result.hours);
 
-  std::vector<std::vector<SourceRun>> recorded;
-  for (const DatasetRecord& record : fault_free.records) {
-    report_progress(
-        progress,
-        static_cast<double>(recorded.size()) / static_cast<double>(fault_free.records.size()),
-        "calibration of the monitor");
-    recorded.push_back(run_sources(sources, record.recording));
-  }
-
-  ErrorCorrelation correlation(sources.size());
   SignalStatistics signals(plan.signals, rate_Hz);
+  for (const DatasetRecord& record : fault_free.records) signals.see(record.recording);
+  std::vector<SourceModel> scaled = sources;
+  Recorded recorded = run_all(scaled, fault_free, progress, 0.0);
+  // The error bars first, since a filter of the friction uses them.
+  const ErrorMoments moments = moments_of(recorded, fault_free, sources.size());
+  result.error_bar_factors = moments.sizes();
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    result.error_bar_factors[i] *= scaled[i].error_bar_factor;
+    scaled[i].error_bar_factor = result.error_bar_factors[i];
+  }
+  recorded = run_all(scaled, fault_free, progress, 0.5);
   std::vector<double> guarded(sources.size(), 0.0);
-  for (std::size_t r = 0; r < recorded.size(); ++r) {
-    const std::vector<SourceRun>& runs = recorded[r];
-    const Recording& recording = fault_free.records[r].recording;
-    if (recording.has(fault_free.target)) {
-      const Channel& measured = recording.channel(fault_free.target);
-      std::vector<double> fresh(measured.values);
-      for (std::size_t n = 0; n < fresh.size(); ++n)
-        if (!measured.is_fresh(n)) fresh[n] = kNotMeasured;
-      correlation.add(runs, fresh);
-    }
+  for (const std::vector<SourceRun>& runs : recorded)
     for (std::size_t i = 0; i < runs.size(); ++i)
       guarded[i] += static_cast<double>(runs[i].guarded);
-    signals.see(recording);
-  }
   for (std::size_t i = 0; i < sources.size(); ++i) {
     result.guarded_share.push_back(guarded[i] / static_cast<double>(samples));
     if (result.guarded_share[i] > kLargestGuardedShare)
@@ -350,7 +381,8 @@ CalibratedMonitor calibrate_monitor(const std::vector<Estimator>& sources, const
                                         100.0 * result.guarded_share[i]),
                    .advice = "train its model on recordings that cover this motion and load"});
   }
-  result.redundancy.correlation = result.monitor.correlation = correlation.rows();
+  result.redundancy.correlation = result.monitor.correlation =
+      moments_of(recorded, fault_free, sources.size()).correlation();
   result.monitor.signals = signals.limits();
   for (const TorqueSource& source : plan.sources) result.monitor.sources.push_back(source.name);
 

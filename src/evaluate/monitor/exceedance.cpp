@@ -7,6 +7,13 @@
 #include "numerics/quantile.hpp"
 
 namespace torsio {
+namespace {
+
+constexpr std::size_t kLeastForShape = 30;
+constexpr double kLeastShape = -0.4;
+constexpr double kLargestShape = 0.25;
+
+}  // namespace
 
 std::vector<double> persisting(std::span<const double> values, std::size_t window) {
   std::vector<double> result(values.size());
@@ -36,18 +43,31 @@ void BlockMaxima::add(std::span<const double> values) {
 double BlockMaxima::threshold(double share) const {
   if (maxima_.empty()) return 0.0;
   const double high = quantile(maxima_, 0.9);
-  double excess = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
   std::size_t above = 0;
   for (const double maximum : maxima_) {
     if (!(maximum > high)) continue;
-    excess += maximum - high;
+    sum += maximum - high;
+    squares += (maximum - high) * (maximum - high);
     ++above;
   }
   const double floor = 1.05 * largest_;
   if (above == 0) return floor;
-  const double mean = excess / static_cast<double>(above);
-  const double observed = static_cast<double>(above) / static_cast<double>(maxima_.size());
-  return std::max(floor, high + mean * std::log(std::max(observed / share, 1.0)));
+  const auto count = static_cast<double>(above);
+  const double mean = sum / count;
+  const double variance = squares / count - mean * mean;
+  const double ratio = count / (share * static_cast<double>(maxima_.size()));
+  if (!(ratio > 1.0)) return floor;
+  // Moments of the generalised Pareto distribution (Hosking and Wallis 1987).
+  const bool has_shape = above >= kLeastForShape && variance > 0.0;
+  const double shape =
+      has_shape ? std::clamp(0.5 * (1.0 - mean * mean / variance), kLeastShape, kLargestShape)
+                : 0.0;
+  const double scale = mean * (1.0 - shape);
+  const double excess = std::abs(shape) < 1e-6 ? scale * std::log(ratio)
+                                               : scale / shape * (std::pow(ratio, shape) - 1.0);
+  return std::max(floor, high + excess);
 }
 
 }  // namespace torsio

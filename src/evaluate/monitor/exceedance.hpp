@@ -24,8 +24,9 @@ class BlockMaxima {
   [[nodiscard]] std::size_t size() const noexcept { return maxima_.size(); }
   [[nodiscard]] double largest() const noexcept { return largest_; }
 
-  /// The threshold that is exceeded in a share `share` of the blocks: u + b ln(p / share) with u the 90 %
-  /// quantile of the maxima, p the share of those above it, b their mean excess; at least 1.05 times
+  /// The threshold that is exceeded in a share `share` of the blocks: u + s/xi ((p / share)^xi - 1), the
+  /// generalised Pareto tail of the maxima above their 90 % quantile u (p the share of those; shape xi and
+  /// scale s by moments, xi limited to -0.4 to 0.25, and 0 for fewer than 30 of them); at least 1.05 times
   /// the largest one. 0 if there is no block.
   [[nodiscard]] double threshold(double share) const;
 

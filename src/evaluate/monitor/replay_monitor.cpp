@@ -79,7 +79,7 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
   replay.estimated.faults.reserve(samples);
   const DenormalsOff denormals_off;
   monitored.reset();
-  monitored.monitor().reset(-std::numeric_limits<double>::infinity());
+  monitored.monitor().reset(recording.time_s(0) - 1.0);
   Findings findings;
   for (std::size_t n = 0; n < samples; ++n) {
     if (n % kSamplesPerReport == 0)

@@ -1,27 +1,45 @@
 #include "evaluate/monitor/source_run.hpp"
 
+#include <algorithm>
+#include <span>
 #include <utility>
 
 #include "torsio/core/realtime.hpp"
-#include "torsio/evaluate/estimate_recording.hpp"
 
 namespace torsio {
+namespace {
 
-std::vector<SourceRun> run_sources(const std::vector<Estimator>& sources,
-                                   const Recording& recording) {
-  std::vector<SourceRun> runs;
-  for (const Estimator& source : sources) {
-    const std::string& target = source.settings().target;
-    const EstimatedRecording estimated = estimate_recording(source, recording);
-    SourceRun run{.value_Nm = estimated.channels.channel(estimate_channel(target)).values,
-                  .std_dev_Nm = estimated.channels.channel(error_bar_channel(target)).values};
-    for (std::size_t n = 0; n < run.value_Nm.size(); ++n) {
-      const Fault fault = estimated.faults[n];
-      if (fault == Fault::none) continue;
-      run.std_dev_Nm[n] = kNotMeasured;
-      if (fault != Fault::warming_up) ++run.guarded;
+/// A zero that was subtracted from the recording is not subtracted again.
+void take_zeros(TorqueSources& sources, const Recording& recording) {
+  for (const ZeroRule& zero : recording.zeros)
+    if (std::ranges::find(sources.raw_inputs(), zero.channel) != sources.raw_inputs().end())
+      sources.set_zero(zero.channel, 0.0);
+}
+
+}  // namespace
+
+std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recording) {
+  take_zeros(sources, recording);
+  std::vector<const std::vector<double>*> channels;
+  for (const std::string& name : sources.raw_inputs())
+    channels.push_back(&recording.channel(name).values);
+  std::vector<double> raw(channels.size());
+  std::vector<SourceRun> runs(sources.size());
+  for (SourceRun& run : runs) {
+    run.value_Nm.reserve(recording.size());
+    run.std_dev_Nm.reserve(recording.size());
+  }
+  const DenormalsOff denormals_off;
+  sources.reset();
+  for (std::size_t n = 0; n < recording.size(); ++n) {
+    for (std::size_t k = 0; k < channels.size(); ++k) raw[k] = (*channels[k])[n];
+    const std::span<const Estimate> estimates = sources.step(raw);
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      const Fault fault = estimates[i].fault;
+      runs[i].value_Nm.push_back(estimates[i].value);
+      runs[i].std_dev_Nm.push_back(fault == Fault::none ? estimates[i].std_dev : kNotMeasured);
+      if (fault != Fault::none && fault != Fault::warming_up) ++runs[i].guarded;
     }
-    runs.push_back(std::move(run));
   }
   return runs;
 }

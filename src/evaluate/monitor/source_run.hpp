@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "torsio/data/recording.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_sources.hpp"
 
 namespace torsio {
 
@@ -20,8 +20,7 @@ struct SourceRun {
   }
 };
 
-/// All sources over a recording, each from `reset()`. @throws Error if a channel is missing.
-[[nodiscard]] std::vector<SourceRun> run_sources(const std::vector<Estimator>& sources,
-                                                 const Recording& recording);
+/// All sources over a recording, from `reset()`. @throws Error if a channel is missing.
+[[nodiscard]] std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recording);
 
 }  // namespace torsio

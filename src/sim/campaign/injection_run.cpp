@@ -176,7 +176,7 @@ class Injections {
       outcome.kind = Outcome::Kind::unreached;
       of.is_done = true;
     }
-    if (of.drawn.failed_model) of.monitor.monitored().fail_model(*of.drawn.failed_model);
+    if (of.drawn.failed_model) of.monitor.monitored().sources().fail_model(*of.drawn.failed_model);
     if (run_.fault.onset == FaultOnset::sensors || run_.fault.onset == FaultOnset::start)
       of.sound = of.monitor;
     if (run_.fault.onset == FaultOnset::injection) of.onset_tick = of.start_tick;

@@ -29,10 +29,17 @@ DataSheet other_specimen(const DataSheet& joint, unsigned serial) {
 
 }  // namespace
 
+std::vector<SourceModel> SimulatedMonitor::models() const {
+  std::vector<SourceModel> models;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    models.push_back(sources[i].model());
+    models.back().error_bar_factor = calibrated.error_bar_factors.at(i);
+  }
+  return models;
+}
+
 MonitoredTorque SimulatedMonitor::monitored() const {
-  std::vector<Estimator> sources;
-  for (const ModelFile& model : models) sources.push_back(make_estimator(model));
-  return {std::move(sources), calibrated.redundancy, calibrated.monitor};
+  return {TorqueSources(models()), calibrated.redundancy, calibrated.monitor};
 }
 
 SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCalibration& settings,
@@ -40,7 +47,8 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
   const MonitorRecipe recipe = monitor_recipe(joint);
   std::uint64_t seed = settings.seed;
   const auto work = [&](const DataSheet& sheet, double duration_s) {
-    return duty_recording(sheet, {.seed = seed++, .duration_s = duration_s}, progress);
+    return with_source_delay(
+        duty_recording(sheet, {.seed = seed++, .duration_s = duration_s}, progress));
   };
   Dataset own;
   add(own, work(joint, settings.training_s), Role::train);
@@ -53,8 +61,8 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
   }
   SimulatedMonitor result;
   for (const SourceRecipe& source : recipe.sources)
-    result.models.push_back(
-        fit_source(source, source.source.name == "spring" ? other : own, progress).file);
+    result.sources.push_back(
+        fit_source(source, source.source.name == "spring" ? other : own, progress));
   own = {};
   other = {};
 
@@ -63,8 +71,8 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
       std::ceil(settings.fault_free_hours * kSecondsPerHour / kRecording_s));
   for (std::size_t i = 0; i < recordings; ++i)
     add(fault_free, work(joint, kRecording_s), Role::validation);
-  std::vector<Estimator> sources;
-  for (const ModelFile& model : result.models) sources.push_back(make_estimator(model));
+  std::vector<SourceModel> sources;
+  for (const FittedSource& source : result.sources) sources.push_back(source.model());
   result.calibrated = calibrate_monitor(
       sources, recipe.plan, fault_free,
       {.false_alarms_per_hour = settings.false_alarms_per_hour, .extrapolate = true}, progress);

@@ -2,9 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
 #include <utility>
+
+#include "model/linear/linear.hpp"
+#include "torsio/fit/train_model.hpp"
 
 namespace torsio {
 namespace {
@@ -23,15 +29,23 @@ std::string speed(const std::string& angle) {
 }
 std::string acceleration(const std::string& angle) { return fmt::format("rate({})", speed(angle)); }
 
-/// Dry friction of a body that is driven at this angle: presliding over `sliding_rad`, a part of it in
-/// proportion to the load.
-Expressions friction(const std::string& angle, double sliding_rad, const std::string& load) {
+double encoder_step(const SheetValue& bits) { return kTurn_rad / std::exp2(bits.value); }
+
+/// Dry friction of a body that is driven at this angle, a part of it in proportion to the load: Dahl's with
+/// distances around that of the presliding, which the load lengthens. The noise of the encoder is no motion:
+/// a play of some of its steps takes it away.
+Expressions friction(const std::string& angle, double sliding_rad, const std::string& load,
+                     double encoder_step_rad) {
   Expressions terms;
-  for (const double share : {0.5, 2.0}) {
-    const std::string stop = fmt::format("stop({}, {:.6g})", angle, share * sliding_rad);
-    terms.push_back(delayed(stop));
-    terms.push_back(delayed(fmt::format("{} * abs({})", stop, load)));
+  const std::string moved = fmt::format("{0} - stop({0}, {1:.6g})", angle, 2.5 * encoder_step_rad);
+  for (const double share : {0.5, 1.0, 2.0}) {
+    const std::string state = fmt::format("dahl({}, {:.6g})", moved, share * sliding_rad);
+    terms.push_back(delayed(state));
+    terms.push_back(delayed(fmt::format("{} * abs({})", state, load)));
   }
+  // The load is what is left of the drive's torque: less where friction acts against it.
+  terms.push_back(delayed(fmt::format("dahl({}, {:.6g})^2 * {}", moved, sliding_rad, load)));
+  terms.push_back(delayed(fmt::format("tanh(rate({}) / 3)", angle)));
   terms.push_back(speed(angle));
   return terms;
 }
@@ -69,6 +83,16 @@ SourceRecipe linear(TorqueSource source, Expressions inputs,
           .features = {.inputs = std::move(inputs), .definitions = std::move(definitions)}};
 }
 
+/// A drive: its torque, then its friction.
+SourceRecipe drive(TorqueSource source, Expressions torque, const Expressions& friction,
+                   std::vector<ChannelDefinition> definitions = {}) {
+  const std::size_t count = friction.size();
+  SourceRecipe recipe =
+      linear(std::move(source), with(std::move(torque), friction), std::move(definitions));
+  recipe.friction_inputs = count;
+  return recipe;
+}
+
 SourceRecipe gear(TorqueSource source, const ChannelDefinition& twist, double break_away_rad,
                   const std::string& input) {
   SourceRecipe recipe = linear(std::move(source), gear_terms(twist.name, break_away_rad), {twist});
@@ -101,10 +125,11 @@ MonitorRecipe series_elastic(const DataSheet& sheet) {
   const std::string current = "motor_current_A";
   MonitorRecipe recipe;
   recipe.sources.push_back(
-      linear({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
-             with({delayed(current), acceleration(motor)},
-                  friction(motor, sheet.friction.bristle_rad.value, current)),
-             {}));
+      drive({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
+            {delayed(current), acceleration(motor)},
+            friction(motor, sheet.friction.bristle_rad.value, current,
+                     encoder_step(sheet.sensors.motor_encoder_bits)),
+            {}));
   recipe.sources.push_back(
       gear({"gear", {"motor_encoder", "gear_encoder", "gear"}}, twist, break_away_rad, motor));
   recipe.sources.push_back(spring({"spring", {"gear_encoder", "joint_encoder", "spring"}},
@@ -120,29 +145,28 @@ MonitorRecipe series_elastic(const DataSheet& sheet) {
 
 MonitorRecipe harmonic_drive(const DataSheet& sheet) {
   const double tube_ratio = std::get<TubeSheet>(sheet.first).ratio.value;
-  const GearSheet& drive = std::get<GearSheet>(sheet.second);
+  const GearSheet& strain_wave = std::get<GearSheet>(sheet.second);
   const std::string motor = "motor_angle_rad";
   const std::string wave = "wave_generator_angle_rad";
   const std::string torque = "motor_torque_Nm";
   const ChannelDefinition tube{"tube_twist_rad",
                                fmt::format("{} / {} - {}", motor, tube_ratio, wave)};
-  const ChannelDefinition twist{"gear_twist_rad",
-                                fmt::format("{} / {} - joint_angle_rad", wave, drive.ratio.value)};
+  const ChannelDefinition twist{
+      "gear_twist_rad", fmt::format("{} / {} - joint_angle_rad", wave, strain_wave.ratio.value)};
   const double sliding_rad = sheet.friction.bristle_rad.value;
+  const double wave_step_rad = encoder_step(sheet.sensors.middle_encoder_bits);
   MonitorRecipe recipe;
   recipe.sources.push_back(
-      linear({"current",
-              {"current_sensor", "motor_encoder", "wave_encoder", "torque_constant", "friction"}},
-             with({delayed(torque), acceleration(motor), acceleration(wave), speed(motor)},
-                  friction(wave, sliding_rad, torque)),
-             {}));
+      drive({"current",
+             {"current_sensor", "motor_encoder", "wave_encoder", "torque_constant", "friction"}},
+            {delayed(torque), acceleration(motor), acceleration(wave), speed(motor)},
+            friction(wave, sliding_rad, torque, wave_step_rad), {}));
   recipe.sources.push_back(gear({"gear", {"wave_encoder", "joint_encoder", "gear"}}, twist,
-                                drive.break_away_rad.value, wave));
+                                strain_wave.break_away_rad.value, wave));
   recipe.sources.push_back(
-      linear({"spring", {"motor_encoder", "wave_encoder", "spring", "friction"}},
-             with({delayed(tube.name), rate_of(tube.name), acceleration(wave)},
-                  friction(wave, sliding_rad, tube.name)),
-             {tube}));
+      drive({"spring", {"motor_encoder", "wave_encoder", "spring", "friction"}},
+            {delayed(tube.name), rate_of(tube.name), acceleration(wave)},
+            friction(wave, sliding_rad, tube.name, wave_step_rad), {tube}));
   recipe.plan.signals = {
       encoder(motor, wave), encoder(wave, motor),      encoder("joint_angle_rad", wave),
       {.name = torque},     {.name = tube.expression}, {.name = twist.expression}};
@@ -155,10 +179,11 @@ MonitorRecipe elastomer(const DataSheet& sheet) {
   const std::string twist = "spring_deflection_rad";
   MonitorRecipe recipe;
   recipe.sources.push_back(
-      linear({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
-             with({delayed(current), acceleration(motor)},
-                  friction(motor, sheet.friction.bristle_rad.value, current)),
-             {}));
+      drive({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
+            {delayed(current), acceleration(motor)},
+            friction(motor, sheet.friction.bristle_rad.value, current,
+                     encoder_step(sheet.sensors.motor_encoder_bits)),
+            {}));
   recipe.sources.push_back(spring({"spring", {"twist_sensor", "spring"}}, twist, ""));
   recipe.plan.signals = {encoder(motor), {.name = twist}, {.name = current}};
   return recipe;
@@ -171,10 +196,11 @@ MonitorRecipe rubber_clutch(const DataSheet& sheet) {
   const ChannelDefinition deflection{"spring_deflection_rad", "input_angle_rad - joint_angle_rad"};
   MonitorRecipe recipe;
   recipe.sources.push_back(
-      linear({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
-             with({delayed(current), acceleration(input)},
-                  friction(input, sheet.friction.bristle_rad.value / ratio, current)),
-             {}));
+      drive({"current", {"current_sensor", "motor_encoder", "torque_constant", "friction"}},
+            {delayed(current), acceleration(input)},
+            friction(input, sheet.friction.bristle_rad.value / ratio, current,
+                     encoder_step(sheet.sensors.motor_encoder_bits) / ratio),
+            {}));
   recipe.sources.push_back(spring({"spring", {"motor_encoder", "joint_encoder", "spring"}},
                                   deflection.name, "joint_angle_rad", {deflection}));
   recipe.plan.signals = {encoder(input, "joint_angle_rad"),
@@ -212,16 +238,87 @@ std::string with_kinematic_error(const SourceRecipe& recipe, const ChannelDefini
   return corrected;
 }
 
+/// Work is rougher than a training recording of minutes. These models are linear or continue linearly: the
+/// monitor has limits of its own for signals, and compares the sources.
+void widen(EstimatorSettings& settings) {
+  constexpr double kShare = 0.5;
+  constexpr double kSteps = 3.0;
+  for (std::size_t i = 0; i < settings.ranges.lowest.size(); ++i) {
+    const double wider = kShare * (settings.ranges.highest[i] - settings.ranges.lowest[i]);
+    settings.ranges.lowest[i] -= wider;
+    settings.ranges.highest[i] += wider;
+  }
+  for (double& step : settings.disturbances.largest_step) step *= kSteps;
+}
+
+/// The inputs [begin, end) of a linear model, with or without its bias.
+ModelFile part_of(const ModelFile& whole, std::size_t begin, std::size_t end, bool has_bias) {
+  ModelFile part = whole;
+  const auto cut = [&](auto& values) {
+    values = {values.begin() + static_cast<std::ptrdiff_t>(begin),
+              values.begin() + static_cast<std::ptrdiff_t>(end)};
+  };
+  EstimatorSettings& settings = part.settings;
+  cut(settings.features.inputs);
+  cut(settings.ranges.lowest);
+  cut(settings.ranges.highest);
+  cut(settings.fallback.slope);
+  if (!has_bias) settings.fallback.intercept = 0.0;
+  const auto channels = [](const EstimatorSettings& of) {
+    return FeaturePipeline(of.features, of.sample_rate_Hz).raw_inputs();
+  };
+  const std::vector<std::string> before = channels(whole.settings);
+  std::vector<double> largest_step;
+  for (const std::string& channel : channels(settings)) {
+    const auto place = std::ranges::find(before, channel) - before.begin();
+    largest_step.push_back(
+        whole.settings.disturbances.largest_step.at(static_cast<std::size_t>(place)));
+  }
+  settings.disturbances.largest_step = std::move(largest_step);
+  const Matrix& all = whole.parameters.get<Linear::Parameters>().coefficients.values;
+  Matrix values(1, 1 + end - begin);
+  values(0, 0) = has_bias ? all(0, 0) : 0.0;
+  for (std::size_t i = begin; i < end; ++i) values(0, 1 + i - begin) = all(0, 1 + i);
+  part.parameters = Linear::Parameters{.coefficients = {.values = std::move(values)}};
+  return part;
+}
+
 }  // namespace
 
-TrainedModel fit_source(const SourceRecipe& recipe, const Dataset& dataset,
+SourceModel FittedSource::model() const {
+  SourceModel model{.torque = make_estimator(torque)};
+  if (friction) model.friction = make_estimator(*friction);
+  return model;
+}
+
+Recording with_source_delay(const Recording& recording) {
+  constexpr std::string_view kTorque = "torque_Nm";
+  FeaturePipeline delay({.inputs = {delayed(std::string(kTorque))}, .definitions = {}},
+                        recording.sample_rate_Hz());
+  Recording result(recording.name(), recording.sample_rate_Hz(), recording.time_s(0));
+  result.source = recording.source;
+  for (Channel channel : recording.channels()) {
+    if (channel.name == kTorque)
+      for (double& value : channel.values) value = delay.step({&value, 1})[0];
+    result.add(std::move(channel));
+  }
+  return result;
+}
+
+FittedSource fit_source(const SourceRecipe& recipe, const Dataset& dataset,
                         const Progress& progress) {
   ModelChoice choice{
       .family = recipe.family, .options = recipe.options, .features = recipe.features};
   for (ChannelDefinition& definition : choice.features.definitions)
     if (definition.name == recipe.gear_twist)
       definition.expression = with_kinematic_error(recipe, definition, dataset, progress);
-  return train_model(dataset, choice, kSeed, progress);
+  ModelFile whole = train_model(dataset, choice, kSeed, progress).file;
+  widen(whole.settings);
+  if (recipe.friction_inputs == 0) return {.torque = whole, .friction = {}};
+  const std::size_t inputs = choice.features.inputs.size();
+  const std::size_t first = inputs - recipe.friction_inputs;
+  return {.torque = part_of(whole, 0, first, true),
+          .friction = part_of(whole, first, inputs, false)};
 }
 
 MonitorRecipe monitor_recipe(const DataSheet& sheet) {

@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "support/error_message.hpp"
@@ -18,11 +20,11 @@ using testing::HasSubstr;
 
 CalibratedMonitor calibrated(double minutes, const CalibrationOptions& options = {}) {
   const TwoTorques joint;
-  return calibrate_monitor(joint.estimators(), TwoTorques::plan(),
+  return calibrate_monitor(joint.models(), TwoTorques::plan(),
                            TwoTorques::fault_free(60.0 * minutes), options);
 }
 MonitoredTorque monitored(const CalibratedMonitor& monitor) {
-  return {TwoTorques().estimators(), monitor.redundancy, monitor.monitor};
+  return {TorqueSources(TwoTorques().models()), monitor.redundancy, monitor.monitor};
 }
 
 TEST(CalibrateMonitor, ChoosesThresholdsAboveTheFaultFreeDifferences) {
@@ -78,7 +80,8 @@ TEST(CalibrateMonitor, MeasuresTheCorrelationOfTheErrorsWhereTheTorqueIsKnown) {
   EXPECT_NEAR(rows[1], 0.0, 0.05);  // independent noise
   // Twice the same sensor has the correlation 1, taken a little towards none.
   const TwoTorques joint;
-  const std::vector<Estimator> twice{make_estimator(joint.spring), make_estimator(joint.spring)};
+  const std::vector<SourceModel> twice{{.torque = make_estimator(joint.spring)},
+                                       {.torque = make_estimator(joint.spring)}};
   const CalibratedMonitor same = calibrate_monitor(
       twice, TwoTorques::plan(), TwoTorques::fault_free(300.0), {.false_alarms_per_hour = 40.0});
   EXPECT_NEAR(same.redundancy.correlation[1], 0.95, 1e-6);
@@ -87,9 +90,8 @@ TEST(CalibrateMonitor, MeasuresTheCorrelationOfTheErrorsWhereTheTorqueIsKnown) {
 TEST(CalibrateMonitor, TakesTheLimitsOfSignalsFromTheDataUnlessTheyAreGiven) {
   MonitorPlan plan = TwoTorques::plan();
   plan.signals[1].highest = 50.0;
-  const CalibratedMonitor monitor =
-      calibrate_monitor(TwoTorques().estimators(), plan, TwoTorques::fault_free(300.0),
-                        {.false_alarms_per_hour = 40.0});
+  const CalibratedMonitor monitor = calibrate_monitor(
+      TwoTorques().models(), plan, TwoTorques::fault_free(300.0), {.false_alarms_per_hour = 40.0});
   const MonitoredSignal& spring = monitor.monitor.signals[0];
   EXPECT_GT(spring.highest, 0.5);
   EXPECT_LT(spring.highest, 0.8);
@@ -103,39 +105,49 @@ TEST(CalibrateMonitor, RefusesWhatItCannotUse) {
   const TwoTorques joint;
   const Dataset sound = TwoTorques::fault_free(300.0);
   const CalibrationOptions options{.false_alarms_per_hour = 40.0};
-  const auto message = [&](const std::vector<Estimator>& sources, const MonitorPlan& plan,
+  const auto message = [&](const std::vector<SourceModel>& sources, const MonitorPlan& plan,
                            const Dataset& dataset, const CalibrationOptions& with) {
-    return test::error_message([&] { calibrate_monitor(sources, plan, dataset, with); });
+    return test::error_message(
+        [&] { static_cast<void>(calibrate_monitor(sources, plan, dataset, with)); });
   };
-  EXPECT_THAT(message({make_estimator(joint.spring)}, TwoTorques::plan(), sound, options),
-              HasSubstr("one estimator for each source of the plan"));
-  EXPECT_THAT(message(joint.estimators(), TwoTorques::plan(), {}, options),
-              HasSubstr("there is no recording"));
   EXPECT_THAT(
-      message(joint.estimators(), TwoTorques::plan(), sound, {.false_alarms_per_hour = 0.0}),
-      HasSubstr("a positive number per hour"));
-  EXPECT_THAT(message(joint.estimators(), TwoTorques::plan(), TwoTorques::fault_free(50.0),
+      message({{.torque = make_estimator(joint.spring)}}, TwoTorques::plan(), sound, options),
+      HasSubstr("one model for each source of the plan"));
+  EXPECT_THAT(message(joint.models(), TwoTorques::plan(), {}, options),
+              HasSubstr("there is no recording"));
+  EXPECT_THAT(message(joint.models(), TwoTorques::plan(), sound, {.false_alarms_per_hour = 0.0}),
+              HasSubstr("a positive number per hour"));
+  EXPECT_THAT(message(joint.models(), TwoTorques::plan(), TwoTorques::fault_free(50.0),
                       {.false_alarms_per_hour = 1e4}),
               HasSubstr("at least 100 s without a fault"));
   MonitorPlan other = TwoTorques::plan();
   other.signals.push_back({.name = "gear_angle_rad"});
-  EXPECT_THAT(message(joint.estimators(), other, sound, options), HasSubstr("gear_angle_rad"));
+  EXPECT_THAT(message(joint.models(), other, sound, options), HasSubstr("gear_angle_rad"));
   ModelFile narrow = joint.spring;
   narrow.settings.ranges = {.lowest = {-0.2}, .highest = {0.2}};
-  EXPECT_THAT(message({make_estimator(narrow), make_estimator(joint.current)}, TwoTorques::plan(),
-                      sound, options),
-              HasSubstr("% of the samples with a fault"));
+  EXPECT_THAT(
+      message({{.torque = make_estimator(narrow)}, {.torque = make_estimator(joint.current)}},
+              TwoTorques::plan(), sound, options),
+      HasSubstr("% of the samples with a fault"));
 }
 
 TEST(ReplayMonitor, ReportsARecordingThatItCannotArm) {
   const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
-  const MonitorReplay replay =
-      replay_monitor(monitored(monitor), TwoTorques::recording(5.0, 5, 2.0, 0.0));
-  EXPECT_FALSE(replay.watching_from_s < 0.2) << "a wrong gain never looks sound for long";
+  Recording without_spring("log", 1000.0);
+  const Recording sound = TwoTorques::recording(5.0, 5);
+  for (Channel channel : sound.channels()) {
+    if (channel.name == "spring_deflection_rad") std::ranges::fill(channel.values, kNotMeasured);
+    without_spring.add(std::move(channel));
+  }
+  const MonitorReplay replay = replay_monitor(monitored(monitor), without_spring);
+  EXPECT_TRUE(std::isnan(replay.watching_from_s));
+  EXPECT_TRUE(replay.events.empty());
+  EXPECT_THAT(replays_text({replay}, monitor.monitor), HasSubstr("was never armed"));
   Recording slow("slow", 500.0);
   slow.add({.name = "spring_deflection_rad", .values = {0.0}});
-  EXPECT_THAT(test::error_message([&] { replay_monitor(monitored(monitor), slow); }),
-              testing::AllOf(HasSubstr("1000 Hz"), HasSubstr("--rate")));
+  EXPECT_THAT(
+      test::error_message([&] { static_cast<void>(replay_monitor(monitored(monitor), slow)); }),
+      testing::AllOf(HasSubstr("1000 Hz"), HasSubstr("--rate")));
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
-#include "torsio/files/model_file.hpp"
+#include "torsio/sim/campaign/torque_sources.hpp"
 
 namespace torsio {
 
@@ -25,9 +25,11 @@ struct SimulatedCalibration {
 
 /// Sources, their models and the limits of their monitor.
 struct SimulatedMonitor {
-  std::vector<ModelFile> models;
+  std::vector<FittedSource> sources;
   CalibratedMonitor calibrated;
 
+  /// With the error bars of the calibration.
+  [[nodiscard]] std::vector<SourceModel> models() const;
   [[nodiscard]] MonitoredTorque monitored() const;
 };
 

@@ -1,14 +1,17 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
+#include "torsio/estimate/torque_sources.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
-#include "torsio/fit/train_model.hpp"
+#include "torsio/files/model_file.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
@@ -24,6 +27,16 @@ struct SourceRecipe {
   /// the twist that makes torque.
   std::string gear_twist = {};
   std::string gear_input = {};
+  /// Of a drive: the number of its last inputs, which are its friction; 0: none is separated.
+  std::size_t friction_inputs = 0;
+};
+
+/// A fitted source, with its friction as a model of its own where the recipe separates it.
+struct FittedSource {
+  ModelFile torque;
+  std::optional<ModelFile> friction;
+
+  [[nodiscard]] SourceModel model() const;
 };
 
 /// The estimates of an actuator's torque that its sensors permit, and the signals to watch.
@@ -41,10 +54,15 @@ struct MonitorRecipe {
 };
 [[nodiscard]] MonitorRecipe monitor_recipe(const DataSheet& sheet);
 
+/// The same recording with the delay of the sources in its `torque_Nm`. Models that are trained on a torque
+/// without it make up for the delay with rates of their inputs, each in its own way, and disagree while
+/// the torque changes fast.
+[[nodiscard]] Recording with_source_delay(const Recording& recording);
+
 /// @param dataset the torque of a load cell, in records with the role train; records with the role
 /// validation give the error bar
 /// @throws Error as `train_model`
-[[nodiscard]] TrainedModel fit_source(const SourceRecipe& recipe, const Dataset& dataset,
+[[nodiscard]] FittedSource fit_source(const SourceRecipe& recipe, const Dataset& dataset,
                                       const Progress& progress = {});
 
 }  // namespace torsio

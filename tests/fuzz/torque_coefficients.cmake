@@ -1,0 +1,1 @@
+torsio_fuzzer(torque_coefficients torsio_readers)
