@@ -22,7 +22,7 @@ std::array<Estimate, 3> estimates(double t_s) {
 }
 
 /// Errors of gear and spring have opposite signs: they share an encoder.
-const std::vector<double> kCorrelation{1.0, 0.2, 0.1, 0.2, 1.0, -0.3, 0.1, -0.3, 1.0};
+std::vector<double> error_correlation() { return {1.0, 0.2, 0.1, 0.2, 1.0, -0.3, 0.1, -0.3, 1.0}; }
 
 /// Nanoseconds of `step(n, estimates)`; the inputs are computed before.
 template <class Step>
@@ -47,7 +47,7 @@ Row redundancy_step() {
       {.sources = {{.name = "current", .depends_on = {"current_sensor"}},
                    {.name = "gear", .depends_on = {"motor_encoder", "gear_encoder"}},
                    {.name = "spring", .depends_on = {"gear_encoder", "joint_encoder"}}},
-       .correlation = kCorrelation});
+       .correlation = error_correlation()});
   return row_of(
       [&](const std::array<Estimate, 3>& sources) { return redundancy.step(sources).value_Nm; });
 }
@@ -57,7 +57,7 @@ Row monitor_step() {
   MonitorSettings settings{.sources = {"current", "gear", "spring"},
                            .signals = {},
                            .pairs = {},
-                           .correlation = kCorrelation};
+                           .correlation = error_correlation()};
   for (const char* name : {"a", "b", "c", "d", "e", "f", "g", "h"})
     settings.signals.push_back({.name = name,
                                 .lowest = -10.0,

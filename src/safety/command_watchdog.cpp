@@ -62,7 +62,6 @@ CommandWatchdog::State CommandWatchdog::step(std::int64_t now_ns, const Command&
     state_ = State::running;
     reason_ = Reason::none;
     fed_ns_ = command.written_ns;
-    well_ns_ = now_ns;
     fault = Fault::none;  // faults before the start do not count
   } else if (state_ == State::running && is_fresh) {
     fed_ns_ = std::max(fed_ns_, command.written_ns);

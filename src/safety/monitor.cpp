@@ -1,92 +1,15 @@
 #include "torsio/safety/monitor.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "error_correlation.hpp"
-#include "torsio/core/error.hpp"
+#include "monitor_settings.hpp"
 #include "valid_source.hpp"
 
 namespace torsio {
 namespace {
-
-// Written so that NaN is not allowed, here and below: no comparison with it is true.
-bool is_positive(double value) noexcept { return value > 0.0; }
-
-[[noreturn]] void refuse(std::string place, std::string expected, std::string found) {
-  throw Error({.place = "monitor: " + std::move(place),
-               .expected = std::move(expected),
-               .found = std::move(found)});
-}
-
-void require(bool holds, std::string_view place, std::string_view expected, double found) {
-  if (!holds) refuse(std::string(place), std::string(expected), fmt::format("{}", found));
-}
-
-void check_names(const MonitorSettings& settings) {
-  const auto check_each = [](const auto& list, std::size_t most, std::string_view what,
-                             const auto& name_of) {
-    if (list.size() > most)
-      refuse(std::string(what), fmt::format("at most {}", most), fmt::format("{}", list.size()));
-    for (std::size_t i = 0; i < list.size(); ++i)
-      for (std::size_t j = 0; j <= i; ++j)
-        if (name_of(list[i]).empty() || (i != j && name_of(list[i]) == name_of(list[j])))
-          refuse(std::string(what), "names of their own", fmt::format("'{}'", name_of(list[i])));
-  };
-  check_each(settings.sources, Monitor::kMaxSources, "sources",
-             [](const std::string& name) -> const std::string& { return name; });
-  check_each(settings.signals, Monitor::kMaxSignals, "signals",
-             [](const MonitoredSignal& signal) -> const std::string& { return signal.name; });
-}
-
-void check(const MonitoredSignal& signal) {
-  require(signal.lowest < signal.highest, signal.name, "a lowest value below the highest",
-          signal.lowest);
-  require(is_positive(signal.largest_rate), signal.name + ": largest_rate", "above 0",
-          signal.largest_rate);
-  require(is_positive(signal.longest_age_s), signal.name + ": longest_age_s", "above 0",
-          signal.longest_age_s);
-  require(signal.turn >= 0.0 && std::isfinite(signal.turn), signal.name + ": turn",
-          "0 or the turn of its encoder", signal.turn);
-  require(is_positive(signal.largest_hidden_travel), signal.name + ": largest_hidden_travel",
-          "above 0", signal.largest_hidden_travel);
-}
-
-void check(const PairLimits& pair, std::size_t sources) {
-  const std::string place = fmt::format("pair {}, {}", pair.first, pair.second);
-  if (pair.first >= sources || pair.second >= sources || pair.first == pair.second)
-    refuse(place, fmt::format("two different sources of {}", sources), place);
-  require(is_positive(pair.factor) && std::isfinite(pair.factor), place + ": factor",
-          "a positive number", pair.factor);
-  require(is_positive(pair.ceiling_Nm), place + ": ceiling_Nm", "above 0", pair.ceiling_Nm);
-  require(pair.floor_Nm >= 0.0 && pair.floor_Nm <= pair.ceiling_Nm, place + ": floor_Nm",
-          "0 to the ceiling", pair.floor_Nm);
-  require(pair.drift_allowance > 0.0 && pair.drift_allowance < 1.0, place + ": drift_allowance",
-          "between 0 and 1", pair.drift_allowance);
-  require(is_positive(pair.drift_limit_s), place + ": drift_limit_s", "above 0",
-          pair.drift_limit_s);
-}
-
-void check_times(const MonitorSettings& settings) {
-  require(is_positive(settings.sample_period_s) && settings.sample_period_s <= 1.0,
-          "sample_period_s", "above 0, at most 1", settings.sample_period_s);
-  require(settings.persistence_s >= 0.0 && std::isfinite(settings.persistence_s), "persistence_s",
-          "0 or more", settings.persistence_s);
-  require(settings.release_share > 0.0 && settings.release_share <= 1.0, "release_share",
-          "above 0, at most 1", settings.release_share);
-  require(settings.longest_loss_s >= 0.0, "longest_loss_s", "0 or more", settings.longest_loss_s);
-  require(settings.longest_fault_s >= 0.0, "longest_fault_s", "0 or more",
-          settings.longest_fault_s);
-  require(is_positive(settings.largest_novelty), "largest_novelty", "above 0",
-          settings.largest_novelty);
-  require(settings.proof_s >= 0.0 && std::isfinite(settings.proof_s), "proof_s", "0 or more",
-          settings.proof_s);
-  require(settings.spike_memory_s >= 0.0, "spike_memory_s", "0 or more", settings.spike_memory_s);
-  require(settings.longest_overrun > 0, "longest_overrun", "1 or more", 0.0);
-  require(settings.spikes_in_a_row > 0, "spikes_in_a_row", "1 or more", 0.0);
-}
 
 /// An input of the source was not measured.
 bool is_lost(Fault fault) noexcept {
@@ -110,35 +33,11 @@ bool lasts_longer(std::uint32_t samples, double period_s, double longest_s) noex
 
 }  // namespace
 
-std::array<MonitorAction, kMonitorChecks> MonitorSettings::default_actions() noexcept {
-  std::array<MonitorAction, kMonitorChecks> actions{};
-  actions.fill(MonitorAction::stop);
-  actions[static_cast<std::size_t>(MonitorCheck::source_lost)] = MonitorAction::warn;
-  actions[static_cast<std::size_t>(MonitorCheck::novelty)] = MonitorAction::warn;
-  return actions;
-}
-
 Monitor::Monitor(MonitorSettings settings) : settings_(std::move(settings)) {
-  check_names(settings_);
-  check_times(settings_);
-  for (const MonitoredSignal& signal : settings_.signals) check(signal);
-  if (settings_.pairs.size() > kMaxPairs)
-    refuse("pairs", fmt::format("at most {}", kMaxPairs),
-           fmt::format("{}", settings_.pairs.size()));
-  for (const PairLimits& pair : settings_.pairs) check(pair, settings_.sources.size());
+  detail::check(settings_);
+  companion_ = detail::companions(settings_.signals);
   correlation_ =
       detail::error_correlation(settings_.correlation, settings_.sources.size(), "monitor");
-  for (std::size_t i = 0; i < settings_.signals.size(); ++i) {
-    const MonitoredSignal& signal = settings_.signals[i];
-    companion_[i] = static_cast<std::uint8_t>(i);
-    if (signal.moves_with.empty()) continue;
-    const auto found =
-        std::ranges::find(settings_.signals, signal.moves_with, &MonitoredSignal::name);
-    if (found == settings_.signals.end() || found->name == signal.name)
-      refuse(signal.name + ": moves_with", "another signal",
-             fmt::format("'{}'", signal.moves_with));
-    companion_[i] = static_cast<std::uint8_t>(found - settings_.signals.begin());
-  }
 }
 
 void Monitor::clear() noexcept {
@@ -409,45 +308,6 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
   for (std::size_t i = 0; i < settings_.pairs.size(); ++i) check_pair(i, sources);
   decide(t_s);
   return state_;
-}
-
-std::string_view name(MonitorCheck check) noexcept {
-  switch (check) {
-    case MonitorCheck::disagreement: return "disagreement";
-    case MonitorCheck::drift: return "drift";
-    case MonitorCheck::sign: return "sign";
-    case MonitorCheck::source_lost: return "source_lost";
-    case MonitorCheck::source_fault: return "source_fault";
-    case MonitorCheck::redundancy_lost: return "redundancy_lost";
-    case MonitorCheck::novelty: return "novelty";
-    case MonitorCheck::not_finite: return "not_finite";
-    case MonitorCheck::stale: return "stale";
-    case MonitorCheck::range: return "range";
-    case MonitorCheck::rate: return "rate";
-    case MonitorCheck::wrap: return "wrap";
-    case MonitorCheck::frozen: return "frozen";
-    case MonitorCheck::period: return "period";
-  }
-  return "unknown";
-}
-
-std::string_view name(MonitorAction action) noexcept {
-  switch (action) {
-    case MonitorAction::off: return "off";
-    case MonitorAction::warn: return "warn";
-    case MonitorAction::stop: return "stop";
-  }
-  return "unknown";
-}
-
-std::string_view name(Monitor::State state) noexcept {
-  switch (state) {
-    case Monitor::State::unproven: return "unproven";
-    case Monitor::State::ready: return "ready";
-    case Monitor::State::watching: return "watching";
-    case Monitor::State::stopped: return "stopped";
-  }
-  return "unknown";
 }
 
 }  // namespace torsio

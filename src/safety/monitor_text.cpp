@@ -63,4 +63,43 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
   return {};
 }
 
+std::string_view name(MonitorCheck check) noexcept {
+  switch (check) {
+    case MonitorCheck::disagreement: return "disagreement";
+    case MonitorCheck::drift: return "drift";
+    case MonitorCheck::sign: return "sign";
+    case MonitorCheck::source_lost: return "source_lost";
+    case MonitorCheck::source_fault: return "source_fault";
+    case MonitorCheck::redundancy_lost: return "redundancy_lost";
+    case MonitorCheck::novelty: return "novelty";
+    case MonitorCheck::not_finite: return "not_finite";
+    case MonitorCheck::stale: return "stale";
+    case MonitorCheck::range: return "range";
+    case MonitorCheck::rate: return "rate";
+    case MonitorCheck::wrap: return "wrap";
+    case MonitorCheck::frozen: return "frozen";
+    case MonitorCheck::period: return "period";
+  }
+  return "unknown";
+}
+
+std::string_view name(MonitorAction action) noexcept {
+  switch (action) {
+    case MonitorAction::off: return "off";
+    case MonitorAction::warn: return "warn";
+    case MonitorAction::stop: return "stop";
+  }
+  return "unknown";
+}
+
+std::string_view name(Monitor::State state) noexcept {
+  switch (state) {
+    case Monitor::State::unproven: return "unproven";
+    case Monitor::State::ready: return "ready";
+    case Monitor::State::watching: return "watching";
+    case Monitor::State::stopped: return "stopped";
+  }
+  return "unknown";
+}
+
 }  // namespace torsio

@@ -120,7 +120,7 @@ double Redundancy::minimise(SourceSet valid, const Row& precision, Row& u) const
   for (const double p : precision) square += p * p;
   for (std::size_t i = 0; i < kMaxSources; ++i) u[i] = precision[i] / square;
   SourceSet chosen = valid;
-  double variance = 0.0;
+  double variance = kNotMeasured;
   // Bounded: rounding could otherwise let one source enter and leave again without end.
   for (std::size_t rounds = 3 * kMaxSources; rounds > 0;) {
     variance = minimise_over(chosen, precision, u);

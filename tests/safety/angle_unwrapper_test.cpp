@@ -95,6 +95,15 @@ TEST(AngleUnwrapper, AnUnknownTurnRemainsUnknownUntilTheNextStart) {
   EXPECT_EQ(unwrapper.step(1.0).fault, Fault::zero_not_set);
 }
 
+// A value that would be plausible again is a guess as well.
+TEST(AngleUnwrapper, AnUnknownTurnDoesNotBecomeKnownByItself) {
+  AngleUnwrapper unwrapper = encoder();
+  ASSERT_TRUE(unwrapper.start(0.0, 0.0, 1.0));
+  for (int n = 0; n < 5; ++n) (void)unwrapper.step(kNaN);
+  EXPECT_EQ(unwrapper.step(2.0).fault, Fault::zero_not_set);
+  EXPECT_EQ(unwrapper.step(0.5).fault, Fault::zero_not_set);
+}
+
 TEST(AngleUnwrapper, FindsTheTurnThatACoarseAngleMeans) {
   for (const double error_rad : {-3.9375, -1.0, 0.0, 2.0, 3.9375})
     for (const double turns : {-3.0, 0.0, 5.0}) {

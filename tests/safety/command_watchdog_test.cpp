@@ -125,6 +125,67 @@ TEST(CommandWatchdog, StopsWhenAsked) {
   EXPECT_EQ(name(loop.dog.reason()), "requested");
 }
 
+TEST(CommandWatchdog, ACommandIsValidForLessThanTheTimeOut) {
+  Loop loop;
+  loop.dog.arm(loop.now_ns);
+  const std::int64_t written_ns = loop.now_ns + 1;
+  const auto at = [&](std::int64_t age_ns) {
+    return loop.dog.step(written_ns + age_ns, {.written_ns = written_ns, .is_valid = true});
+  };
+  EXPECT_EQ(at(18 * kTick), State::waiting) << "as old as the time-out";
+  loop.dog.arm(loop.now_ns);
+  EXPECT_EQ(at(18 * kTick - 1), State::running);
+  EXPECT_EQ(at(18 * kTick - 1), State::running) << "twice at the same time";
+  EXPECT_EQ(at(18 * kTick), State::stopped);
+  EXPECT_EQ(loop.dog.reason(), Reason::command_lost);
+}
+
+TEST(CommandWatchdog, ItsClockBeginsWhenItIsArmed) {
+  Loop loop;
+  loop.dog.arm(loop.now_ns);
+  EXPECT_EQ(loop.dog.step(loop.now_ns - 1, {}), State::stopped);
+  EXPECT_EQ(loop.dog.reason(), Reason::clock);
+}
+
+TEST(CommandWatchdog, CountsNoFaultBeforeItRuns) {
+  Loop loop;
+  loop.dog = CommandWatchdog({.longest_fault_s = 0.005});
+  loop.dog.stop();
+  EXPECT_EQ(loop.dog.state(), State::disarmed) << "nothing to stop";
+  loop.dog.arm(loop.now_ns);
+  for (int n = 0; n < 100; ++n) static_cast<void>(loop.step({}, Fault::diverged));
+  EXPECT_EQ(loop.with_fresh_command(Fault::diverged), State::running);
+  for (int n = 0; n < 4; ++n)
+    EXPECT_EQ(loop.with_fresh_command(Fault::diverged), State::running) << n;
+  EXPECT_EQ(loop.with_fresh_command(Fault::diverged), State::stopped);
+  EXPECT_EQ(loop.dog.reason(), Reason::fault);
+  loop.dog.stop();
+  EXPECT_EQ(loop.dog.reason(), Reason::fault) << "the first reason";
+  loop.dog.arm(loop.now_ns);
+  EXPECT_EQ(loop.with_fresh_command(), State::running);
+  EXPECT_EQ(loop.dog.reason(), Reason::none);
+}
+
+TEST(CommandWatchdog, TakesTimesUpToAnHour) {
+  EXPECT_EQ(test::error_message([] { CommandWatchdog({.timeout_s = 3600.0}); }), "");
+  EXPECT_EQ(test::error_message([] { CommandWatchdog({.timeout_s = 3601.0}); }),
+            "command watchdog: timeout_s: expected above 0, at most 3600, found 3601");
+}
+
+TEST(CommandWatchdog, NamesItsStatesAndReasons) {
+  EXPECT_EQ(name(State::disarmed), "disarmed");
+  EXPECT_EQ(name(State::waiting), "waiting");
+  EXPECT_EQ(name(State::running), "running");
+  EXPECT_EQ(name(State::stopped), "stopped");
+  EXPECT_EQ(name(static_cast<State>(9)), "stopped");
+  EXPECT_EQ(name(static_cast<Reason>(9)), "requested");
+  EXPECT_EQ(name(Reason::none), "none");
+  EXPECT_EQ(name(Reason::command_lost), "command_lost");
+  EXPECT_EQ(name(Reason::fault), "fault");
+  EXPECT_EQ(name(Reason::clock), "clock");
+  EXPECT_EQ(name(Reason::requested), "requested");
+}
+
 TEST(CommandWatchdog, RefusesTimesThatAreNone) {
   const auto refusal = [](const CommandWatchdog::Settings& settings) {
     return test::error_message([&] { CommandWatchdog dog(settings); });

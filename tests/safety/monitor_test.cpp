@@ -109,6 +109,15 @@ TEST(Monitor, WatchesOnlyAfterTheProofAndWhenItIsArmed) {
   EXPECT_TRUE(loop.monitor.arm(loop.t_s)) << "without effect";
 }
 
+TEST(Monitor, AFindingBeforeTheProofDoesNotStopAfterIt) {
+  Loop loop;
+  loop.signals[0].value = kNaN;
+  loop.step_for(10);
+  loop.signals[0].value = 0.0;
+  loop.start();
+  EXPECT_EQ(loop.step(), State::watching);
+}
+
 TEST(Monitor, NeedsNoProofOfNoTime) {
   MonitorSettings settings = joint();
   settings.proof_s = 0.0;
@@ -188,6 +197,34 @@ TEST(Monitor, AResetEmptiesWhatWasCounted) {
   EXPECT_EQ(loop.monitor.active(), 0U);
   (void)loop.step();
   EXPECT_EQ(loop.monitor.active(), bit(MonitorCheck::disagreement));
+}
+
+TEST(Monitor, AResetBeginsEveryCountAgain) {
+  Loop loop;
+  loop.start();
+  loop.sources[1].fault = Fault::input_not_finite;
+  loop.step_for(400);
+  loop.monitor.reset(loop.t_s);
+  loop.step_for(400);
+  EXPECT_EQ(loop.monitor.latest().action, MonitorAction::warn) << "400 ms, not 800";
+  loop.sources[1].fault = Fault::none;
+  loop.sources[0].value = 9.0;
+  loop.step_for(10);
+  EXPECT_EQ(loop.monitor.disagreeing().size(), 2U);
+  loop.monitor.reset(loop.t_s);
+  EXPECT_TRUE(loop.monitor.disagreeing().empty());
+  loop.sources[0].value = 0.0;
+  loop.start();
+  loop.step_for(100);
+  loop.monitor.reset(loop.t_s);
+  EXPECT_EQ(loop.step(), State::unproven) << "the proof too";
+  (void)loop.step(1.6e-3);
+  (void)loop.step(1.6e-3);
+  loop.monitor.reset(loop.t_s);
+  (void)loop.step();
+  (void)loop.step(1.6e-3);
+  (void)loop.step(1.6e-3);
+  EXPECT_EQ(loop.monitor.active(), 0U) << "two late ticks, not four";
 }
 
 TEST(Monitor, StopsFromOutsideInEveryState) {
@@ -350,7 +387,7 @@ TEST(Monitor, PassesOverOneSpike) {
 }
 
 TEST(Monitor, StopsOnSpikesThatAreRepeated) {
-  for (const int good : {0, 1, 5, 19}) {
+  for (const int good : {0, 1, 5, 20}) {
     Loop loop;
     loop.start();
     loop.signals[2].value = 0.0;
@@ -457,6 +494,17 @@ TEST(Monitor, RecognisesAWrapOfAnEncoder) {
       "gear_angle_rad changed by 2, a turn of its encoder");
 }
 
+TEST(Monitor, AWrapIsWithinATenthOfATurn) {
+  MonitorSettings settings = joint();
+  settings.signals[1] = {.name = "gear_angle_rad", .turn = 10.0};
+  for (const double change : {9.0, 9.125}) {
+    Loop loop(settings);
+    loop.start();
+    loop.signals[1].value = change;
+    EXPECT_EQ(loop.ticks_to_stop(100), change == 9.0 ? -1 : 2) << change;
+  }
+}
+
 TEST(Monitor, AWrapComesBeforeTheRateThatItIs) {
   MonitorSettings settings = joint();
   settings.signals[1].turn = 2.0;
@@ -511,6 +559,16 @@ TEST(Monitor, ASignalThatChangesIsNotFrozenHoweverFarItsCompanionMoves) {
     if (n % 14 == 0) loop.signals[1].value += 1e-9;
     (void)loop.step();
   }
+  EXPECT_TRUE(loop.monitor.is_watching());
+}
+
+TEST(Monitor, NothingIsFrozenWithoutACompanion) {
+  MonitorSettings settings = joint();
+  settings.signals[2].largest_hidden_travel = 0.1;
+  Loop loop(settings);
+  loop.start();
+  loop.signals[0].value = 0.5;
+  loop.step_for(10);
   EXPECT_TRUE(loop.monitor.is_watching());
 }
 
@@ -612,6 +670,17 @@ TEST(Monitor, StopsWithOneValidSourceLeft) {
     EXPECT_EQ(loop.reason(), MonitorCheck::redundancy_lost);
     EXPECT_EQ(loop.text(), "1 valid torques are left, at least 2 are needed");
   }
+}
+
+TEST(Monitor, TwoSourcesHaveNoneToLose) {
+  MonitorSettings settings = joint();
+  settings.sources = {"gear", "spring"};
+  settings.pairs.resize(1);
+  Loop loop(settings);
+  loop.start();
+  loop.sources[0].fault = Fault::input_not_finite;
+  EXPECT_EQ(loop.ticks_to_stop(), 1);
+  EXPECT_EQ(loop.reason(), MonitorCheck::redundancy_lost);
 }
 
 TEST(Monitor, ASingleSourceHasNoRedundancyToLose) {
@@ -988,6 +1057,40 @@ TEST(Monitor, StopsAtOneTickThatIsAsLateAsThree) {
   loop.step_for(5);
   EXPECT_EQ(loop.step(3.6e-3), State::stopped);
   EXPECT_EQ(loop.text(), "the loop was called after 0.0036 s, limit 0.0035 s");
+}
+
+// Periods of 2^-10 s, so that nothing is rounded.
+TEST(Monitor, TheLimitsOfThePeriodAreAllowed) {
+  constexpr double kExact_s = 0x1p-10;
+  MonitorSettings settings = joint();
+  settings.sample_period_s = kExact_s;
+  Loop loop(settings);
+  loop.t_s = 0.0;
+  for (int n = 0; n < 100; ++n) (void)loop.step(1.5 * kExact_s);
+  EXPECT_EQ(loop.monitor.active(), 0U);
+  (void)loop.step(3.5 * kExact_s);
+  EXPECT_EQ(loop.monitor.active(), 0U) << "one late tick";
+  (void)loop.step(3.5 * kExact_s);
+  (void)loop.step(3.5 * kExact_s);
+  EXPECT_EQ(loop.monitor.active(), bit(MonitorCheck::period)) << "three";
+  EXPECT_EQ(loop.monitor.latest().limit, 1.5 * kExact_s);
+  (void)loop.step(kExact_s);
+  (void)loop.step(3.625 * kExact_s);
+  EXPECT_EQ(loop.monitor.latest().limit, 3.5 * kExact_s);
+}
+
+TEST(Monitor, TheLimitOfADriftIsAllowed) {
+  MonitorSettings settings = with_drift();
+  settings.sample_period_s = 0x1p-10;
+  settings.pairs[0].drift_limit_s = 0x1p-9;  // eight times what one tick adds
+  settings.persistence_s = 1.0;
+  action(settings, MonitorCheck::period) = MonitorAction::off;
+  Loop loop(settings);
+  loop.sources[0].value = 0.5;
+  loop.step_for(8);
+  EXPECT_EQ(loop.monitor.active(), 0U);
+  (void)loop.step();
+  EXPECT_EQ(loop.monitor.active(), bit(MonitorCheck::drift));
 }
 
 TEST(Monitor, AFirstTickWithoutATimeIsNoFirstTick) {

@@ -196,6 +196,20 @@ TEST(Redundancy, LeavesOutExactlyTheSourcesThatReportThemselvesInvalid) {
   }
 }
 
+// The error of an invalid source is correlated with that of the best one, which another valid source
+// without a weight must not bring into use.
+TEST(Redundancy, AnInvalidSourceHasNoPartInTheWeights) {
+  RedundancySettings settings = anonymous_sources(3);
+  settings.correlation = {1.0, 0.5, 0.5, 0.5, 1.0, 0.9, 0.5, 0.9, 1.0};
+  Redundancy redundancy(settings);
+  const FusedTorque fused =
+      redundancy.step(std::array{Estimate{.value = 9.0, .std_dev = 1.0, .fault = Fault::diverged},
+                                 torque(1.0, 1.0), torque(3.0, 10.0)});
+  EXPECT_EQ(fused.value_Nm, 1.0);
+  EXPECT_DOUBLE_EQ(fused.std_dev_Nm, 1.0);
+  EXPECT_EQ(fused.used, 0b110U);
+}
+
 TEST(Redundancy, UsesValidSourcesHoweverMuchTheyDisagree) {
   Redundancy redundancy(three_sources());
   const FusedTorque fused =

@@ -15,6 +15,7 @@ namespace torsio {
 namespace {
 
 constexpr double kRecording_s = 600.0;
+constexpr std::size_t kTemperatures = 8;  ///< of the training: each recording has its own
 constexpr double kSecondsPerHour = 3600.0;
 
 void add(Dataset& dataset, Recording recording, Role role) {
@@ -51,7 +52,8 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
         duty_recording(sheet, {.seed = seed++, .duration_s = duration_s}, progress));
   };
   Dataset own;
-  add(own, work(joint, settings.training_s), Role::train);
+  for (std::size_t i = 0; i < kTemperatures; ++i)
+    add(own, work(joint, settings.training_s / static_cast<double>(kTemperatures)), Role::train);
   Dataset other;
   add(other, work(other_specimen(joint, settings.spring_serial), settings.training_s), Role::train);
   for (int i = 0; i < 4; ++i) {

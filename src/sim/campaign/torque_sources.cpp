@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "model/linear/linear.hpp"
+#include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/fit/train_model.hpp"
 
 namespace torsio {
@@ -251,14 +252,16 @@ void widen(EstimatorSettings& settings) {
   for (double& step : settings.disturbances.largest_step) step *= kSteps;
 }
 
-/// The inputs [begin, end) of a linear model, with or without its bias.
-ModelFile part_of(const ModelFile& whole, std::size_t begin, std::size_t end, bool has_bias) {
+/// The inputs [begin, end) of a linear model under their names in `inputs`, with or without its bias.
+ModelFile part_of(const ModelFile& whole, const Expressions& inputs, std::size_t begin,
+                  std::size_t end, bool has_bias) {
   ModelFile part = whole;
   const auto cut = [&](auto& values) {
     values = {values.begin() + static_cast<std::ptrdiff_t>(begin),
               values.begin() + static_cast<std::ptrdiff_t>(end)};
   };
   EstimatorSettings& settings = part.settings;
+  settings.features.inputs = inputs;
   cut(settings.features.inputs);
   cut(settings.ranges.lowest);
   cut(settings.ranges.highest);
@@ -281,6 +284,64 @@ ModelFile part_of(const ModelFile& whole, std::size_t begin, std::size_t end, bo
   for (std::size_t i = begin; i < end; ++i) values(0, 1 + i - begin) = all(0, 1 + i);
   part.parameters = Linear::Parameters{.coefficients = {.values = std::move(values)}};
   return part;
+}
+
+constexpr std::string_view kFactor = "friction_factor_1";
+
+/// Every record has a temperature of its own: the factor of its friction that explains it best.
+std::vector<double> friction_factors(const FittedSource& drive, const Dataset& dataset) {
+  std::vector<double> factors;
+  for (const DatasetRecord& record : dataset.records) {
+    const auto values = [&](const ModelFile& model) {
+      return estimate_recording(make_estimator(model), record.recording)
+          .channels.channel(estimate_channel(model.settings.target))
+          .values;
+    };
+    const std::vector<double> torque_Nm = values(drive.torque);
+    const std::vector<double> friction_Nm = values(*drive.friction);
+    const std::vector<double>& measured_Nm = record.recording.channel(dataset.target).values;
+    double product = 0.0;
+    double square = 0.0;
+    for (std::size_t n = 0; n < torque_Nm.size(); ++n) {
+      product += friction_Nm[n] * (measured_Nm[n] - torque_Nm[n]);
+      square += friction_Nm[n] * friction_Nm[n];
+    }
+    factors.push_back(square > 0.0 ? std::clamp(product / square, 0.3, 3.0) : 1.0);
+  }
+  // Their mean is 1: the friction of the model is that of the mean temperature.
+  double mean = 0.0;
+  for (const double factor : factors) mean += factor / static_cast<double>(factors.size());
+  for (double& factor : factors) factor /= mean;
+  return factors;
+}
+
+/// A drive whose friction has another factor in each record: the coefficients for given factors and the
+/// factors for given coefficients, in turns.
+FittedSource fit_drive(const SourceRecipe& recipe, ModelChoice choice, const Dataset& dataset,
+                       const Progress& progress) {
+  constexpr int kTurns = 4;
+  const Expressions inputs = choice.features.inputs;
+  const std::size_t first = inputs.size() - recipe.friction_inputs;
+  for (std::size_t i = first; i < inputs.size(); ++i)
+    choice.features.inputs[i] = fmt::format("{} * {}", kFactor, inputs[i]);
+  std::vector<double> factors(dataset.records.size(), 1.0);
+  FittedSource fitted{
+      .torque = ModelFile{.card = {}, .settings = {}, .parameters = Linear::Parameters{}},
+      .friction = {}};
+  for (int turn = 0; turn < kTurns; ++turn) {
+    Dataset scaled = dataset;
+    for (std::size_t r = 0; r < factors.size(); ++r) {
+      Recording& recording = scaled.records[r].recording;
+      recording.add({.name = std::string(kFactor),
+                     .values = std::vector<double>(recording.size(), factors[r])});
+    }
+    ModelFile whole = train_model(scaled, choice, kSeed, progress).file;
+    widen(whole.settings);
+    fitted.torque = part_of(whole, inputs, 0, first, true);
+    fitted.friction = part_of(whole, inputs, first, inputs.size(), false);
+    factors = friction_factors(fitted, dataset);
+  }
+  return fitted;
 }
 
 }  // namespace
@@ -312,13 +373,10 @@ FittedSource fit_source(const SourceRecipe& recipe, const Dataset& dataset,
   for (ChannelDefinition& definition : choice.features.definitions)
     if (definition.name == recipe.gear_twist)
       definition.expression = with_kinematic_error(recipe, definition, dataset, progress);
-  ModelFile whole = train_model(dataset, choice, kSeed, progress).file;
-  widen(whole.settings);
-  if (recipe.friction_inputs == 0) return {.torque = whole, .friction = {}};
-  const std::size_t inputs = choice.features.inputs.size();
-  const std::size_t first = inputs - recipe.friction_inputs;
-  return {.torque = part_of(whole, 0, first, true),
-          .friction = part_of(whole, first, inputs, false)};
+  if (recipe.friction_inputs > 0) return fit_drive(recipe, choice, dataset, progress);
+  FittedSource fitted{.torque = train_model(dataset, choice, kSeed, progress).file, .friction = {}};
+  widen(fitted.torque.settings);
+  return fitted;
 }
 
 MonitorRecipe monitor_recipe(const DataSheet& sheet) {
