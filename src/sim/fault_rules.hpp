@@ -29,7 +29,7 @@ struct FaultRule {
 [[nodiscard]] std::string_view common_part_name(std::string_view part, const DataSheet& sheet);
 
 [[nodiscard]] double second_stage_stiffness(const DataSheet& sheet);  ///< [Nm/rad]
-/// Of a stop [Nm/rad]: the bench's steps still follow.
+/// The largest stiffness of a stop [Nm/rad] that the bench's steps follow.
 [[nodiscard]] double stiffest_stop(const DataSheet& sheet);
 
 /// Null if it has no such fault.

@@ -112,7 +112,7 @@ class InjectionText {
     read_amount(amount, *rule, fault);
   }
 
-  /// Of an amount without a kind. Null if it is no number.
+  /// The rule for an amount without a kind. Null if it is not a number.
   [[nodiscard]] static const FaultRule* default_rule(std::string_view amount,
                                                      std::string_view part) {
     const bool is_number = !amount.empty() && (amount.front() == '-' || amount.front() == '+' ||

@@ -54,8 +54,15 @@ inline MonitorSettings joint_monitor() {
           .correlation = {}};
 }
 
+/// Sources without friction.
+inline TorqueSources torque_sources(std::vector<Estimator> estimators) {
+  std::vector<SourceModel> models;
+  for (Estimator& estimator : estimators) models.push_back({.torque = std::move(estimator)});
+  return TorqueSources(std::move(models));
+}
+
 inline MonitoredTorque monitored_joint() {
-  return MonitoredTorque(joint_sources(), joint_redundancy(), joint_monitor());
+  return {torque_sources(joint_sources()), joint_redundancy(), joint_monitor()};
 }
 
 }  // namespace torsio::test

@@ -16,19 +16,18 @@ struct DutySettings {
       0.7;                   ///< largest torque of the lever, as a share of `DutyLimits::torque_Nm`
   double speed_share = 0.5;  ///< largest speed over the rated one
   double impacts_per_min = 4.0;
-  double coldest_K =
-      273.15 + 10.0;  ///< of the lubricant: random at the start, then another an hour
+  double coldest_K = 273.15 + 10.0;  ///< lubricant: random at the start, then another per hour
   double hottest_K = 273.15 + 40.0;
-  double least_friction = 0.9;  ///< factor by which friction ages, slowly, at random
-  double most_friction = 1.2;
+  double min_friction = 0.9;  ///< factor by which friction ages, slowly, at random
+  double max_friction = 1.2;
 };
 
 /// What the work of a joint does not exceed.
 struct DutyLimits {
   /// Torque between the stages and the joint: the rated one, or 0.6 of the static torque of a clutch.
   double torque_Nm = 0.0;
-  double range_rad = 0.0;           ///< of the joint, to either side
-  double bandwidth_rad_s = 0.0;     ///< of the position loop
+  double range_rad = 0.0;           ///< angle of the joint, to either side
+  double bandwidth_rad_s = 0.0;     ///< bandwidth of the position loop
   double load_inertia_kg_m2 = 0.0;  ///< largest inertia of the load, which the loop still carries
 };
 [[nodiscard]] DutyLimits duty_limits(const DataSheet& sheet);

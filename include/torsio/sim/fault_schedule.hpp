@@ -40,7 +40,7 @@ struct ScheduledFault {
   std::optional<double> duration_s = {};  ///< none: to the end; afterwards there is no fault
   double amount = 0.0;                 ///< depends on the kind; for a sensor in its channel's unit
   double over_s = 0.0;                 ///< drift of a part
-  double every_s = 0.0;                ///< of repeated spikes; 0: one
+  double every_s = 0.0;                ///< period of repeated spikes; 0: one spike
   double stop_stiffness_Nm_rad = 0.0;  ///< bottom
   std::string place = {};              ///< where it was read, for messages
 };

@@ -11,9 +11,9 @@
 namespace torsio {
 namespace {
 
-// Of a sheet's values.
-constexpr double kClutchShare = 0.6;     // of its static torque: it must not slip
-constexpr double kInertialShare = 0.05;  // of the torque, for the acceleration of the load
+// Shares of a sheet's values.
+constexpr double kClutchShare = 0.6;     // share of its static torque: it must not slip
+constexpr double kInertialShare = 0.05;  // share of the torque, for the acceleration of the load
 constexpr double kInertiaRatio =
     3.0;  // largest inertia of joint and load over the reflected rotor's
 constexpr double kStiffInertiaRatio = 1.5;  // where rotor and load are nearly rigid
@@ -21,8 +21,8 @@ constexpr double kRange_rad = 2.4;
 constexpr double kRubberRange_rad = 1.0;
 constexpr double kLeverAt1Nm_m = 0.13;  // length: grows with the cube root of the torque
 
-constexpr double kSlowestShare = 0.02;       // of the rated speed
-constexpr double kShortestWay_share = 0.02;  // of the range
+constexpr double kSlowestShare = 0.02;       // share of the rated speed
+constexpr double kShortestWay_share = 0.02;  // share of the range
 constexpr double kReachTop_s = 0.3;          // a bare joint reaches its top speed in this time
 constexpr double kShortestRest_s = 0.1;
 constexpr double kShortRest_s = 2.0;
@@ -34,9 +34,9 @@ constexpr double kWeightChange_s = 1.0;
 constexpr double kShortestImpact_s = 5e-3;
 constexpr double kLongestImpact_s = 50e-3;
 constexpr double kImpactGap_s = 3.0;
-constexpr double kImpactReserve = 0.2;    // of the torque, for what still swings
+constexpr double kImpactReserve = 0.2;    // share of the torque, for what still swings
 constexpr double kLeastImpact = 0.03;     // share of the torque under which there is none
-constexpr double kLargestResponse = 1.8;  // of an undamped spring to a half-sine
+constexpr double kLargestResponse = 1.8;  // response of an undamped spring to a half-sine
 constexpr double kConditionTime_s = 1200.0;
 constexpr std::size_t kHourTicks = 3600 * static_cast<std::size_t>(kBenchRate_Hz);
 
@@ -85,7 +85,7 @@ Duty::Duty(const DataSheet& sheet, const DutySettings& settings, std::uint64_t s
   next_weight_ = ticks_between(kShortestWeight_s, kLongestWeight_s);
   next_impact_ = ticks_between(0.0, 2.0 * kImpactGap_s);
   temperature_K_ = between(settings_.coldest_K, settings_.hottest_K);
-  wear_ = between(settings_.least_friction, settings_.most_friction);
+  wear_ = between(settings_.min_friction, settings_.max_friction);
 }
 
 double Duty::between(double lowest, double highest) noexcept {
@@ -182,7 +182,7 @@ double Duty::since_impact_s() const noexcept {
 void Duty::step_condition() noexcept {
   if (tick_ % kHourTicks == 0) {
     wanted_K_ = between(temperature_K_, settings_.hottest_K);
-    wanted_wear_ = between(settings_.least_friction, settings_.most_friction);
+    wanted_wear_ = between(settings_.min_friction, settings_.max_friction);
     if (tick_ != 0 && random_.uniform() < 0.5)
       wanted_K_ = between(settings_.coldest_K, settings_.hottest_K);
   }

@@ -16,7 +16,7 @@ namespace torsio {
 /// positions, rests, loads that change while it rests, a lubricant that warms, friction that ages, and
 /// impacts. Everything is bounded (`DutyLimits`), and depends on the seed alone.
 ///
-/// An impact is a half-sine of the external torque. On the spring of stiffness k with inertia J behind it
+/// An impact is a half-sine of the external torque. On a spring of stiffness k with inertia J at its output
 /// the torque of a pulse of amplitude A and duration T is at most A min(1.8, 2 T sqrt(k / J) / π), so that
 /// A follows from the torque that is left below the limit.
 class Duty {
@@ -25,13 +25,15 @@ class Duty {
 
   /// The first move begins here: where a joint at rest under its load has its rotor.
   void start_at(double joint_rad) noexcept { wanted_rad_ = joint_rad; }
-  /// Call once a tick, 1 kHz; afterwards the values below are those of this tick.
+  /// Call once per tick, 1 kHz; afterwards the values below are those of this tick.
   void step();
 
-  [[nodiscard]] double wanted_rad() const noexcept { return wanted_rad_; }  ///< of the joint
+  [[nodiscard]] double wanted_rad() const noexcept {
+    return wanted_rad_;
+  }  ///< reference of the joint
   [[nodiscard]] const Load& load() const noexcept { return load_; }
   [[nodiscard]] double temperature_K() const noexcept { return temperature_K_; }
-  /// Of temperature and age.
+  /// The factor from temperature and age.
   [[nodiscard]] double friction_factor() const noexcept { return friction_factor_; }
   /// The friction factor is a new one at this tick.
   [[nodiscard]] bool is_condition_new() const noexcept { return tick_ % kConditionTicks == 1; }
@@ -74,7 +76,7 @@ class Duty {
   Load load_;
   Weight from_;
   Weight to_;
-  std::size_t weight_tick_ = 0;  ///< of the change
+  std::size_t weight_tick_ = 0;  ///< tick at which the change began
   std::size_t next_weight_ = 0;  ///< tick from which the next rest changes it
   std::size_t next_impact_ = 0;
   std::size_t impact_tick_ = 0;   ///< at which the last one began

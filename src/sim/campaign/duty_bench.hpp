@@ -18,7 +18,7 @@ namespace torsio {
 /// One joint on a `DutyBench`.
 struct DutyLane {
   DataSheet sheet;
-  std::uint64_t seed = 1;  ///< of its work and of the noise of its sensors
+  std::uint64_t seed = 1;  ///< seed of its work and of the noise of its sensors
   DutySettings settings = {};
   FaultSchedule faults = {};
   bool is_loop_sound = false;  ///< faults of its sensors do not reach the position loop
@@ -27,7 +27,7 @@ struct DutyLane {
 /// The sheet with the bench of `duty_recording`: a load cell of 1 kHz without latency, a log of 1 kHz.
 [[nodiscard]] DataSheet with_duty_bench(DataSheet sheet);
 
-/// Of the `Duty` of a lane with this seed.
+/// The seed of the `Duty` of a lane with this seed.
 [[nodiscard]] std::uint64_t duty_seed(std::uint64_t seed);
 
 /// Joints at work side by side, 1 kHz, each with its own plant, sensors, position loop, work and faults.

@@ -27,15 +27,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kVersion = 1;  // of the results of units
+constexpr int kVersion = 1;  // version of the results of units
 constexpr std::size_t kInjectionsAUnit = 32;
 constexpr std::size_t kJointsAUnit = 16;
-constexpr double kUnit_h = 1.0;  // of each joint
+constexpr double kUnit_h = 1.0;  // hours of each joint
 constexpr double kTicksAnHour = 3600.0 * kBenchRate_Hz;
 constexpr double kLowLoad = 0.05;  // share of the largest torque
 constexpr double kLargestGain = 1e-3;
-constexpr double kMostHours = 1e6;
-constexpr std::size_t kMostInjections = 1'000'000;
+constexpr double kMaxHours = 1e6;
+constexpr std::size_t kMaxInjections = 1'000'000;
 
 /// Sizes over the rated torque, and the ends of their ranges.
 struct SizeRange {
@@ -71,11 +71,10 @@ void check(const CampaignSettings& settings, const std::vector<CampaignGroup>& g
                       .found = fmt::format("{:g}", found)});
   };
   const auto hours = [&](const char* what, double value) {
-    require(value >= 0.0 && value <= kMostHours, what, fmt::format("0 to {:g} h", kMostHours),
-            value);
+    require(value >= 0.0 && value <= kMaxHours, what, fmt::format("0 to {:g} h", kMaxHours), value);
   };
   const auto count = [&](const char* what, std::size_t value) {
-    require(value <= kMostInjections, what, fmt::format("at most {}", kMostInjections),
+    require(value <= kMaxInjections, what, fmt::format("at most {}", kMaxInjections),
             static_cast<double>(value));
   };
   require(!groups.empty(), "groups", "at least one", 0.0);

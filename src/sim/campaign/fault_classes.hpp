@@ -25,13 +25,13 @@ enum class FaultOnset {
 struct DrawnFault {
   std::vector<ScheduledFault> faults = {};
   std::optional<std::size_t> failed_model = {};  ///< index of the source
-  std::size_t late_ticks = 0;  ///< of the loop: one step in place of so many; 0: on time
+  std::size_t late_ticks = 0;  ///< the loop makes one step in place of so many; 0: on time
 };
 
 /// A class of faults of one actuator.
 struct FaultClass {
   std::string name;  ///< "freeze gear_angle_rad"
-  int row = 0;       ///< of the table in docs/faults.md
+  int row = 0;       ///< number in the table of docs/faults.md
   FaultOnset onset = FaultOnset::sensors;
   double limit_s = 0.02;  ///< largest latency
   bool must_stop = true;  ///< false: the monitor must not stop

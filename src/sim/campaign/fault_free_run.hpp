@@ -21,9 +21,9 @@ struct FaultFreeOutcome {
 };
 
 struct FaultFreeRun {
-  std::vector<DataSheet> sheets;  ///< one a joint
+  std::vector<DataSheet> sheets;  ///< one per joint
   const JointMonitor& monitor;    ///< copied for each joint
-  std::uint64_t seed = 1;         ///< of the first joint; the next ones have the next ones
+  std::uint64_t seed = 1;         ///< seed of the first joint; the next joints have the next seeds
   DutySettings settings = {};
   std::size_t ticks = 0;
   bool is_electrical = false;

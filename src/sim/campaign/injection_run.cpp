@@ -16,11 +16,11 @@ namespace {
 constexpr double kSettle_s = 2.0;  // filters and memory of the sources
 constexpr double kLatestStart_s = 4.0;
 constexpr double kWindow_s = 20.0;      // in which the disagreement must reach its limit
-constexpr double kSmallWindow_s = 5.0;  // of a small one, which need not
+constexpr double kSmallWindow_s = 5.0;  // a small one need not reach it
 constexpr double kMissed_s = 1.0;
 constexpr double kNearImpact_s = 0.1;
 constexpr double kSearchImpact_s = 30.0;
-constexpr int kMostAttempts = 8;
+constexpr int kMaxAttempts = 8;
 constexpr double kLargerAgain = 1.5;
 constexpr std::size_t kNearImpactEvery = 4;  // injections, of which one is put near an impact
 constexpr double kImpactsPerMin = 12.0;
@@ -31,7 +31,7 @@ std::size_t ticks_of(double time_s) {
   return static_cast<std::size_t>(std::lround(time_s * kBenchRate_Hz));
 }
 
-/// Of one attempt of one injection.
+/// The seed of one attempt of one injection.
 std::uint64_t attempt_seed(std::uint64_t seed, std::size_t index, int attempt) {
   Random random(seed + 0x9e3779b97f4a7c15U * (index + 1));
   for (int i = 1; i < attempt; ++i) static_cast<void>(random.bits());
@@ -92,7 +92,7 @@ struct Attempt {
   JointMonitor monitor;
   std::optional<JointMonitor> sound;  ///< with the sound signals, since the injection
   std::optional<std::size_t> onset_tick = {};
-  std::size_t late_steps = 0;  ///< of the loop since an overrun began
+  std::size_t late_steps = 0;  ///< steps of the loop since an overrun began
   int watched_ticks = 0;       ///< after the onset of a fault at power-up
   bool was_watching = false;   ///< at the injection
   bool is_done = false;
@@ -123,7 +123,7 @@ class Injections {
   /// Counts the next attempt.
   bool is_to_repeat(Trial& trial) const {
     if (trial.outcome.kind != Outcome::Kind::unreached || run_.size != 0.0) return false;
-    if (trial.outcome.attempts == kMostAttempts) return false;
+    if (trial.outcome.attempts == kMaxAttempts) return false;
     ++trial.outcome.attempts;
     return true;
   }

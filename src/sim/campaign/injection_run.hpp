@@ -34,10 +34,11 @@ struct InjectionRun {
   const DataSheet& sheet;
   const JointMonitor& monitor;  ///< copied for each joint
   const FaultClass& fault;
-  std::uint64_t seed = 1;  ///< of the class of this joint
+  std::uint64_t seed = 1;  ///< seed of the class of this joint
   std::size_t first = 0;   ///< index of the first injection
   std::size_t count = 1;
-  double limit_share = 0.2;  ///< of the rated torque: the disagreement from which latency counts
+  double limit_share =
+      0.2;  ///< share of the rated torque: the disagreement from which latency counts
   /// Nominal size of all; 0: random, 0.25 to 1, and again with a larger one where the disagreement did
   /// not reach the limit.
   double size = 0.0;

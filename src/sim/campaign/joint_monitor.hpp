@@ -12,7 +12,7 @@ namespace torsio {
 /// A `MonitoredTorque` that is fed with the sensors of a simulated joint and armed as soon as it is ready.
 class JointMonitor {
  public:
-  /// @throws Error if an input of the monitor is no channel of this actuator's sensors.
+  /// @throws Error if an input of the monitor is not a channel of this actuator's sensors.
   JointMonitor(MonitoredTorque monitored, const DataSheet& sheet, bool is_electrical = false);
 
   /// @param current_factor of the measured current; 1 but for the twin of a drifting torque constant

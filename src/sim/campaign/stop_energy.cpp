@@ -31,7 +31,9 @@ double stop_energy_gain(const DataSheet& sheet, const PlantState& state, const L
   const Brake::Parameters brake = brake_parameters(sheet);
   Load load = at_stop;
   load.external_torque_Nm = 0.0;
-  Plant plant(plant_parameters(sheet));
+  const PlantParameters parameters = plant_parameters(sheet);
+  // The brake's bristle is stiffer than what the usual steps follow.
+  Plant plant(parameters, 0.25 * std::min(Plant::step_limit(parameters), Plant::kDefaultStep_s));
   plant.use(brake);
   plant.set_brake(false);
   if (plant.reset(state) != Fault::none) return kNotMeasured;

@@ -7,8 +7,8 @@
 
 namespace torsio {
 
-/// Results of units of work, one JSON document a line, so that an interrupted campaign goes on. The first
-/// line says what campaign it is. A last line without its end, of a run that was killed, is cut off.
+/// Results of units of work, one JSON document per line, so that an interrupted campaign continues. The first
+/// line identifies the campaign. A last line without its end, of a run that was killed, is cut off.
 class UnitFile {
  public:
   /// @param path empty: nothing is kept

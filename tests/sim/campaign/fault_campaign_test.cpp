@@ -104,7 +104,8 @@ TEST(Injections, AModelThatFailsStops) {
   for (const InjectionOutcome& of : outcomes("model not finite", 0, 8)) {
     EXPECT_EQ(of.kind, InjectionOutcome::Kind::detected);
     EXPECT_LE(of.latency_ticks, 20);
-    EXPECT_EQ(of.check, static_cast<int>(MonitorCheck::redundancy_lost));  // of two sources
+    EXPECT_EQ(of.check,
+              static_cast<int>(MonitorCheck::redundancy_lost));  // one of two sources is left
   }
 }
 
@@ -157,6 +158,11 @@ TEST(StopEnergy, DoesNotIncreaseFromAMotionUnderLoad) {
                                         .joint_speed_rad_s = 0.5},
                                        load);
   EXPECT_LT(gain, 1e-3);
+}
+
+TEST(StopEnergy, IsDefinedForEveryActuator) {
+  for (const DataSheet& sheet : data_sheets())
+    EXPECT_LT(stop_energy_gain(sheet, {.rotor_speed_rad_s = 1.0}, {}), 1e-3) << sheet.name;
 }
 
 TEST(FaultCampaign, DetectsWhatItInjectsAndBoundsWhatItMisses) {

@@ -20,7 +20,7 @@ inline MonitoredTorque toy_monitor() {
     return MonitoredSignal{
         .name = std::move(name), .longest_age_s = 1.5e-3, .turn = 6.283185307179586};
   };
-  return {std::move(sources),
+  return {torque_sources(std::move(sources)),
           {.sources = {{"gear", {"motor_encoder", "gear_encoder"}},
                        {"spring", {"gear_encoder", "joint_encoder"}}},
            .correlation = {}},

@@ -26,10 +26,10 @@ struct CampaignGroup {
 
 struct CampaignSettings {
   std::uint64_t seed = 1;
-  std::size_t injections = 300;           ///< of each class and group
-  std::size_t injections_of_a_size = 60;  ///< of each smaller size of a class and group
-  double fault_free_hours = 1000.0;       ///< of joints at work, of all groups together
-  /// Of other specimens under little load, of all groups together (docs/faults.md 5).
+  std::size_t injections = 300;           ///< count per class and group
+  std::size_t injections_of_a_size = 60;  ///< count per smaller size, class and group
+  double fault_free_hours = 1000.0;       ///< joints at work, all groups together
+  /// Other specimens under little load, all groups together (docs/faults.md 5).
   double low_load_hours = 70.0;
   std::vector<std::string> classes = {};  ///< only those whose name begins so; empty: all
   std::size_t threads = 0;                ///< 0: as many as the machine has
@@ -51,7 +51,7 @@ struct Latencies {
 struct ClassResult {
   std::string name;
   std::string group = {};
-  int row = 0;  ///< of the table in docs/faults.md
+  int row = 0;  ///< number in the table of docs/faults.md
   bool must_stop =
       true;  ///< false: a single spike; `detected` are stops, of which there must be none
   std::size_t injected = 0;
@@ -89,7 +89,7 @@ struct FaultFreeResult {
   double joint_hours = 0.0;  ///< during which the monitor watched
   double simulated_hours = 0.0;
   std::size_t false_alarms = 0;
-  double upper_95 = kNotMeasured;  ///< of the false alarms an hour
+  double upper_95 = kNotMeasured;  ///< bound of the false alarms per hour
   std::size_t impacts = 0;
   std::map<std::string, std::size_t> causes = {};  ///< "disagreement current spring"
 };
@@ -99,7 +99,7 @@ struct CampaignResult {
   std::vector<ClassResult> classes = {};
   std::vector<SizeResult> sizes = {};
   std::vector<FaultFreeResult> fault_free = {};
-  FaultFreeResult work = {};  ///< of all groups together
+  FaultFreeResult work = {};  ///< all groups together
   FaultFreeResult low_load = {};
 };
 
