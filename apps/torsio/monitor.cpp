@@ -9,6 +9,7 @@
 
 #include "data_flags.hpp"
 #include "monitor_calibrate.hpp"
+#include "monitor_simulated.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
@@ -26,22 +27,23 @@ struct MonitorFlags {
   std::string plot;
   bool calibrate = false;
   CalibrateFlags calibration;
+  SimulatedMonitorFlags simulated;
   DataFlags data;
   JsonOutput json;
 };
 
-void replay(MonitorFlags& flags) {
+std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
+                                                     torsio::MonitorSettings& settings) {
   if (flags.files.size() < 2)
     throw torsio::UsageError(
         {.place = "torsio monitor",
-         .expected = "a monitor file and recordings",
+         .expected = "a monitor file and recordings, or --actuator",
          .found = fmt::format("{} files", flags.files.size()),
          .advice = "torsio monitor joint.monitor.json log.csv; a monitor file is written with "
                    "torsio monitor --calibrate"});
   const std::string monitor_file = flags.files.front();
   flags.data.recordings.assign(flags.files.begin() + 1, flags.files.end());
   flags.data.check_outputs({flags.output, flags.plot, flags.json.destination}, {monitor_file});
-  require_ending("--output", flags.output, {".csv", ".gz"});
   const torsio::MonitoredTorque monitored =
       torsio::load_monitor(monitor_file, {.serial = flags.serial});
   const std::filesystem::path model = std::filesystem::path(monitor_file).parent_path() /
@@ -50,10 +52,30 @@ void replay(MonitorFlags& flags) {
   ProgressBar progress;
   const torsio::Dataset dataset =
       flags.data.load_inputs(monitored.raw_inputs(), progress.listener());
+  settings = monitored.monitor().settings();
   std::vector<torsio::MonitorReplay> replays;
   for (const torsio::DatasetRecord& record : dataset.records)
     replays.push_back(torsio::replay_monitor(monitored, record.recording, progress.listener()));
-  const torsio::MonitorSettings& settings = monitored.monitor().settings();
+  return replays;
+}
+
+std::vector<torsio::MonitorReplay> replay_joint(MonitorFlags& flags,
+                                                torsio::MonitorSettings& settings) {
+  if (flags.files.size() > 1)
+    throw torsio::UsageError({.place = "torsio monitor --actuator",
+                              .expected = "at most a monitor file",
+                              .found = fmt::format("{} files", flags.files.size())});
+  const std::string monitor_file = flags.files.empty() ? "" : flags.files.front();
+  flags.data.check_outputs({flags.output, flags.plot, flags.json.destination}, {monitor_file});
+  return {replay_simulated(flags.simulated, monitor_file, settings)};
+}
+
+void replay(MonitorFlags& flags) {
+  require_ending("--output", flags.output, {".csv", ".gz"});
+  torsio::MonitorSettings settings;
+  const std::vector<torsio::MonitorReplay> replays = flags.simulated.actuators.empty()
+                                                         ? replay_recordings(flags, settings)
+                                                         : replay_joint(flags, settings);
   if (!flags.output.empty()) {
     std::vector<torsio::EstimatedRecording> estimated;
     for (const torsio::MonitorReplay& each : replays) estimated.push_back(each.estimated);
@@ -66,7 +88,19 @@ void replay(MonitorFlags& flags) {
 }
 
 void run(MonitorFlags& flags) {
+  flags.simulated.campaign.seed = flags.simulated.seed;
+  if (flags.simulated.is_campaign || flags.simulated.accuracy_runs > 0) {
+    DataFlags().check_outputs({flags.json.destination});
+    return flags.simulated.is_campaign ? run_campaign(flags.simulated, flags.json)
+                                       : run_accuracy(flags.simulated, flags.json);
+  }
   if (!flags.calibrate) return replay(flags);
+  if (flags.output.empty())
+    throw torsio::UsageError({.place = "--calibrate",
+                              .expected = "-o FILE, the monitor file to write",
+                              .found = "none"});
+  if (!flags.simulated.actuators.empty())
+    return calibrate_simulated(flags.simulated, flags.output, flags.json);
   flags.data.recordings = flags.files;
   flags.calibration.device_serial = flags.serial;
   flags.calibration.output = flags.output;
@@ -87,8 +121,7 @@ void add_monitor(CLI::App& app) {
       "             -o joint.monitor.json\n"
       "docs/safety.md has the checks, what each detects, and what none detects.");
   verb->add_option("FILES", flags->files,
-                   "a monitor file and recordings; with --calibrate: recordings without a fault")
-      ->required();
+                   "a monitor file and recordings; with --calibrate: recordings without a fault");
   flags->data.add_model_mapping(*verb);
   verb->add_option("-o,--output", flags->output,
                    "CSV file with the torques and the state of the monitor; with --calibrate: the "
@@ -115,6 +148,50 @@ void add_monitor(CLI::App& app) {
                  "permit a smaller rate than the recordings support; the file then states it");
   verb->add_option("--valid-until", calibration.valid_until,
                    "last day of the calibration, as 2027-11-22; later the file is refused");
+  SimulatedMonitorFlags& simulated = flags->simulated;
+  verb->add_option(
+          "--actuator", simulated.actuators,
+          "a simulated joint at work in place of recordings; with --campaign and --accuracy "
+          "several, separated by commas (default: one of each)")
+      ->delimiter(',');
+  verb->add_option(
+      "--monitors", simulated.monitors,
+      "folder with the monitors of simulated joints; one that is missing is calibrated and "
+      "written there");
+  verb->add_option("--fault-free-calibration-hours", simulated.fault_free_hours,
+                   "work of a simulated joint from which its thresholds are chosen")
+      ->capture_default_str();
+  verb->add_option("--inject", simulated.injections,
+                   "a fault: kt=-20%@3s, gear_angle=1deg@2s, current=gain:-20%@2s, "
+                   "motor_angle=freeze@2s..4s; more than once")
+      ->allow_extra_args(false);
+  verb->add_option("--faults", simulated.faults, "YAML file with a schedule of faults");
+  verb->add_option("--duration", simulated.duration, "of the work of a simulated joint")
+      ->capture_default_str();
+  verb->add_flag("--campaign", simulated.is_campaign,
+                 "random faults in simulated joints, and joints at work without a fault");
+  verb->add_option("--accuracy", simulated.accuracy_runs,
+                   "errors of the combined torque in so many runs of each simulated joint");
+  torsio::CampaignSettings& campaign = simulated.campaign;
+  verb->add_option("--injections", campaign.injections, "of each class and actuator")
+      ->capture_default_str();
+  verb->add_option("--fault-free-hours", campaign.fault_free_hours,
+                   "of joints at work, of all actuators together")
+      ->capture_default_str();
+  verb->add_option("--low-load-hours", campaign.low_load_hours,
+                   "of other specimens under little load")
+      ->capture_default_str();
+  verb->add_option("--classes", campaign.classes,
+                   "only those whose name begins so, separated by commas")
+      ->delimiter(',');
+  verb->add_option("--threads", campaign.threads, "0: as many as the machine has")
+      ->capture_default_str();
+  verb->add_option(
+      "--resume", campaign.resume,
+      "file to which results are appended; a campaign that was stopped continues with it");
+  verb->add_flag("--electrical", campaign.is_electrical,
+                 "the motors have windings, an inverter and current control");
+  add_seed(*verb, simulated.seed, "of the work of simulated joints, and of a campaign");
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
   verb->callback([flags] { run(*flags); });

@@ -135,6 +135,55 @@ std::string replays_json(const std::vector<MonitorReplay>& replays,
   return json_text(document);
 }
 
+std::string accuracy_text(const std::vector<FusedAccuracy>& actuators) {
+  TextTable table;
+  table.header({"actuator", "combined Nm", "each source Nm", "best", "ratio to best",
+                "largest ratio", "ratio without one", "in 1 sd %", "in 2 sd %"});
+  for (const FusedAccuracy& of : actuators) {
+    std::string each;
+    for (std::size_t i = 0; i < of.sources.size(); ++i)
+      each += fmt::format("{}{} {:.3g}", i > 0 ? ", " : "", of.sources[i], of.source_rmse_Nm[i]);
+    std::string without;
+    for (const AccuracyWithout& one : of.without)
+      without +=
+          fmt::format("{}{} {:.3f}", without.empty() ? "" : ", ", one.source, one.mean_ratio);
+    table.row({of.actuator, fmt::format("{:.3g}", of.fused_rmse_Nm), each, of.best,
+               fmt::format("{:.3f}", of.mean_ratio), fmt::format("{:.3f}", of.largest_ratio),
+               without.empty() ? "-" : without, fmt::format("{:.1f}", 100.0 * of.within_std_dev),
+               fmt::format("{:.1f}", 100.0 * of.within_2_std_dev)});
+  }
+  return table.text() +
+         "root mean square errors against the torque on the load side; ratio to best: combined "
+         "over the "
+         "source that had the smallest error in earlier runs\n";
+}
+
+std::string accuracy_json(const std::vector<FusedAccuracy>& actuators) {
+  Json document{{"actuators", Json::array()}};
+  for (const FusedAccuracy& of : actuators) {
+    Json sources = Json::array();
+    for (std::size_t i = 0; i < of.sources.size(); ++i)
+      sources.push_back(
+          {{"source", of.sources[i]}, {"rmse_Nm", json_number(of.source_rmse_Nm[i])}});
+    Json without = Json::array();
+    for (const AccuracyWithout& one : of.without)
+      without.push_back({{"source", one.source},
+                         {"mean_ratio", json_number(one.mean_ratio)},
+                         {"largest_ratio", json_number(one.largest_ratio)}});
+    document["actuators"].push_back({{"actuator", of.actuator},
+                                     {"runs", of.runs},
+                                     {"rmse_Nm", json_number(of.fused_rmse_Nm)},
+                                     {"sources", std::move(sources)},
+                                     {"best", of.best},
+                                     {"mean_ratio", json_number(of.mean_ratio)},
+                                     {"largest_ratio", json_number(of.largest_ratio)},
+                                     {"within_std_dev", json_number(of.within_std_dev)},
+                                     {"within_2_std_dev", json_number(of.within_2_std_dev)},
+                                     {"without", std::move(without)}});
+  }
+  return json_text(document);
+}
+
 std::string replay_svg(const MonitorReplay& replay, const MonitorSettings& settings) {
   const std::vector<double> time_s = times(replay.estimated.channels);
   return svg_plot(curves_of(replay, settings, time_s, 0, time_s.size()), {"t [s]", "torque [Nm]"},

@@ -180,7 +180,7 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
   const auto index = static_cast<std::uint8_t>(i);
   const double period_s = settings_.sample_period_s;
   const bool lost = is_lost(estimate.fault) || !std::isfinite(estimate.value);
-  // A source that warms up is not used yet, which is no fault: a friction state settles with the motion.
+  // A source that warms up is not used yet, and no fault is reported: a friction state settles with the motion.
   const bool is_warming_up = estimate.fault == Fault::warming_up;
   const bool faulty = !lost && !is_warming_up && !detail::is_valid(estimate);
   const bool is_novel = estimate.novelty > settings_.largest_novelty;

@@ -103,7 +103,7 @@ TEST(MonitoredTorque, AnExpressionIsAsOldAsItsOldestChannel) {
       MonitorSettings settings = test::joint_monitor();
       settings.signals = {{.name = "gear_angle_rad - joint_angle_rad", .longest_age_s = 0.01}};
       Joint joint;
-      joint.torque = MonitoredTorque(test::joint_sources(), test::joint_redundancy(), settings);
+      joint.torque = MonitoredTorque(test::torque_sources(test::joint_sources()), test::joint_redundancy(), settings);
       joint.channel("gear_angle_rad").age_s = joint.channel("joint_angle_rad").age_s = 0.004;
       joint.start();
       joint.channel(late).age_s = age_s;
@@ -145,7 +145,7 @@ TEST(MonitoredTorque, StopsOnAnotherNumberOfSamples) {
     Joint joint;
     MonitorSettings settings = test::joint_monitor();
     if (!has_signals) settings.signals.clear();
-    joint.torque = MonitoredTorque(test::joint_sources(), test::joint_redundancy(), settings);
+    joint.torque = MonitoredTorque(test::torque_sources(test::joint_sources()), test::joint_redundancy(), settings);
     joint.start();
     joint.raw.pop_back();
     const FusedTorque fused = joint.step();
@@ -242,7 +242,7 @@ TEST(MonitoredTorque, RefusesPartsThatDoNotFit) {
     RedundancySettings redundancy = test::joint_redundancy();
     MonitorSettings monitor = test::joint_monitor();
     change(sources, redundancy, monitor);
-    return test::error_message([&] { MonitoredTorque(sources, redundancy, monitor); });
+    return test::error_message([&] { MonitoredTorque(test::torque_sources(sources), redundancy, monitor); });
   };
   EXPECT_EQ(refusal([](auto&, auto&, auto&) {}), "");
   const std::string counts =

@@ -57,7 +57,7 @@ TEST(Expression, ComputesSineCosineAndArcTangent) {
 TEST(Expression, StopFollowsChangesUpToItsThreshold) {
   FeaturePipeline features = pipeline({"stop(x, 0.5)"});
   const auto step = [&](double x) { return features.step(std::vector{x})[0]; };
-  EXPECT_EQ(step(10.0), 0.0);  // the first value is no change
+  EXPECT_EQ(step(10.0), 0.0);  // the first value has no predecessor
   EXPECT_EQ(step(10.25), 0.25);
   EXPECT_EQ(step(12.0), 0.5);
   EXPECT_EQ(step(11.75), 0.25);

@@ -69,7 +69,7 @@ class MonitoredTorque {
   std::vector<double> source_values_;
   std::vector<double> signal_values_;
   std::vector<SignalSample> signals_;
-  std::vector<double> row_;  ///< of the history
+  std::vector<double> row_;  ///< a row of the history
   History history_;
 };
 

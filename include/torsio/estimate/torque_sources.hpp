@@ -46,7 +46,7 @@ class FrictionFilter {
 
  private:
   Settings settings_;
-  double samples_;        ///< of a correlation time
+  double samples_;        ///< samples in a correlation time
   double process_noise_;  ///< a sample
   double factor_ = 1.0;
   double variance_ = 0.0;
@@ -63,12 +63,11 @@ struct SourceModel {
 
 /// Several estimates of one torque from one row of channels.
 ///
-/// A source with friction gives t + phi f with the variance c² s² + var(phi) f², c the factor of its error
-/// bar; phi follows the mean of the
-/// other valid sources (weights 1 / variance).
+/// A source with friction gives t + phi f with the variance c² s² + var(phi) f², c the factor of its
+/// error bar s; phi follows the mean of the other valid sources (weights 1 / variance).
 class TorqueSources {
  public:
-  /// @throws Error if there is none, if their sample rates differ, or if a target is no torque in Nm.
+  /// @throws Error if there is none, if their sample rates differ, or if a target is not a torque in Nm.
   explicit TorqueSources(std::vector<SourceModel> sources);
 
   [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept { return raw_inputs_; }
@@ -89,7 +88,7 @@ class TorqueSources {
   std::span<const Estimate> step(std::span<const double> raw) noexcept TORSIO_REALTIME;
   [[nodiscard]] std::span<const Estimate> estimates() const noexcept { return estimates_; }
 
-  /// Of a source that has one; else 1.
+  /// The factor on the friction of this source; 1 for a source without.
   [[nodiscard]] double friction_factor(std::size_t source) const noexcept;
   void set_friction_factor(std::size_t source, double factor, double std_dev) noexcept;
 

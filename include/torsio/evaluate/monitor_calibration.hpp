@@ -39,13 +39,13 @@ struct CalibratedPair {
 
 struct CalibratedMonitor {
   /// Per source, for `SourceModel::error_bar_factor`: the root mean square of its errors in units of their
-  /// bars, where the torque was measured; else that of the model as it was.
+  /// standard deviations, where the torque was measured; else the factor that the model had.
   std::vector<double> error_bar_factors;
   RedundancySettings redundancy;
   MonitorSettings monitor;
   std::vector<CalibratedPair> pairs;
   std::vector<double> guarded_share;  ///< per source: share of the samples with a fault
-  double hours = 0.0;                 ///< of fault-free recordings
+  double hours = 0.0;                 ///< length of the fault-free recordings
   double false_alarms_per_hour = 0.0;
   bool is_extrapolated = false;
 };

@@ -25,15 +25,15 @@ struct MonitoredModel {
 /// The models of one source.
 struct MonitoredSource {
   MonitoredModel torque;
-  MonitoredModel friction = {};  ///< of a drive; without a file: none
+  MonitoredModel friction = {};  ///< friction of a drive; without a file: none
   double error_bar_factor = 1.0;
   bool operator==(const MonitoredSource&) const = default;
 };
 
 /// Sources, limits and what the limits rest on. Plain data.
 struct MonitorFile {
-  std::string device_serial;           ///< actuator that was calibrated; empty: any
-  std::string valid_until;             ///< the last day, as 2027-11-22; empty: no end
+  std::string device_serial;            ///< actuator that was calibrated; empty: any
+  std::string valid_until;              ///< the last day, as 2027-11-22; empty: no end
   std::vector<MonitoredSource> models;  ///< one for each source
   RedundancySettings redundancy;
   MonitorSettings monitor;
@@ -50,14 +50,14 @@ struct MonitorFile {
 /// Writes a monitor file (JSON, docs/safety.md) completely or not at all.
 void save_monitor(const std::filesystem::path& path, const MonitorFile& file);
 
-/// @throws Error naming the entry: not JSON, another version, an entry that is missing, unknown or not
-/// of its kind, or numbers that `Redundancy` or `Monitor` refuse.
+/// @throws Error naming the entry: not JSON, another version, an entry that is missing, unknown or
+/// another kind of value, or numbers that `Redundancy` or `Monitor` refuse.
 [[nodiscard]] MonitorFile read_monitor(const std::filesystem::path& path);
 
 /// The conditions under which a robot uses a monitor file.
 struct MonitorFileOptions {
-  double rate_Hz = kNotMeasured;  ///< of the loop; NaN: that of the file
-  std::string serial = {};        ///< of the device; empty: any
+  double rate_Hz = kNotMeasured;  ///< rate of the loop; NaN: that of the file
+  std::string serial = {};        ///< serial number of the device; empty: any
   std::string today = {};         ///< as 2026-11-22; empty: by the clock of the machine
 };
 

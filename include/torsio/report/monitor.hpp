@@ -5,6 +5,7 @@
 
 #include "torsio/evaluate/monitor_calibration.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
+#include "torsio/sim/campaign/fused_accuracy.hpp"
 
 namespace torsio {
 
@@ -17,6 +18,10 @@ namespace torsio {
                                        const MonitorSettings& settings);
 [[nodiscard]] std::string replays_json(const std::vector<MonitorReplay>& replays,
                                        const MonitorSettings& settings);
+/// One row per actuator: errors of the combined torque and of its sources.
+[[nodiscard]] std::string accuracy_text(const std::vector<FusedAccuracy>& actuators);
+[[nodiscard]] std::string accuracy_json(const std::vector<FusedAccuracy>& actuators);
+
 /// The torque of every source and the combined one over time, as an SVG picture.
 [[nodiscard]] std::string replay_svg(const MonitorReplay& replay, const MonitorSettings& settings);
 

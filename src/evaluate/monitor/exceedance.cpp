@@ -17,7 +17,7 @@ constexpr double kLargestShape = 0.25;
 
 std::vector<double> persisting(std::span<const double> values, std::size_t window) {
   std::vector<double> result(values.size());
-  std::deque<std::size_t> rising;  // of the window, each smaller than the later ones
+  std::deque<std::size_t> rising;  // samples of the window, each smaller than the later ones
   for (std::size_t n = 0; n < values.size(); ++n) {
     while (!rising.empty() && !(values[rising.back()] < values[n])) rising.pop_back();
     rising.push_back(n);

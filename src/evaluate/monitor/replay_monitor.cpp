@@ -102,7 +102,11 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
     if (replay.events.empty() || replay.events.back().check != monitor.reason().check)
       replay.events.push_back(monitor.reason());
     const Redundancy& redundancy = monitored.redundancy();
-    replay.suspects = redundancy.names(redundancy.suspects(monitor.disagreeing()));
+    // A part of all sources, such as the supply, is one of every pair and explains nothing.
+    PartSet of_all = ~PartSet{0};
+    for (std::size_t i = 0; i < monitored.sources().size(); ++i) of_all &= redundancy.parts_of(i);
+    replay.suspects =
+        redundancy.names(redundancy.suspects(monitor.disagreeing()) & ~of_all);
   }
   for (const std::string& name : monitored.raw_inputs())
     replay.estimated.channels.add({.name = name, .values = recording.channel(name).values});

@@ -8,6 +8,7 @@
 
 #include "core/report_progress.hpp"
 #include "torsio/data/dataset.hpp"
+#include "torsio/files/monitor_file.hpp"
 #include "torsio/sim/campaign.hpp"
 #include "torsio/sim/campaign/torque_sources.hpp"
 
@@ -15,7 +16,7 @@ namespace torsio {
 namespace {
 
 constexpr double kRecording_s = 600.0;
-constexpr std::size_t kTemperatures = 8;  ///< of the training: each recording has its own
+constexpr std::size_t kTemperatures = 8;  ///< training recordings, each at its own
 constexpr double kSecondsPerHour = 3600.0;
 
 void add(Dataset& dataset, Recording recording, Role role) {
@@ -41,6 +42,35 @@ std::vector<SourceModel> SimulatedMonitor::models() const {
 
 MonitoredTorque SimulatedMonitor::monitored() const {
   return {TorqueSources(models()), calibrated.redundancy, calibrated.monitor};
+}
+
+void save_simulated_monitor(const std::filesystem::path& path, const SimulatedMonitor& monitor,
+                            const std::string& device_serial) {
+  constexpr std::string_view kEnding = ".monitor.json";
+  std::string stem = path.filename().string();
+  if (stem.ends_with(kEnding)) stem.resize(stem.size() - kEnding.size());
+  const auto saved = [&](ModelFile model, const std::string& source) {
+    model.card.device_serial = device_serial;
+    const std::string name = fmt::format("{}.{}.safetensors", stem, source);
+    save_model(path.parent_path() / name, model);
+    return MonitoredModel{.file = name, .hash = model_hash(path.parent_path() / name)};
+  };
+  MonitorFile file;
+  file.device_serial = device_serial;
+  file.redundancy = monitor.calibrated.redundancy;
+  file.monitor = monitor.calibrated.monitor;
+  file.fault_free_hours = monitor.calibrated.hours;
+  file.false_alarms_per_hour = monitor.calibrated.false_alarms_per_hour;
+  file.is_extrapolated = monitor.calibrated.is_extrapolated;
+  for (std::size_t i = 0; i < monitor.sources.size(); ++i) {
+    const FittedSource& source = monitor.sources[i];
+    const std::string& name = file.redundancy.sources[i].name;
+    MonitoredSource models{.torque = saved(source.torque, name),
+                           .error_bar_factor = monitor.calibrated.error_bar_factors[i]};
+    if (source.friction) models.friction = saved(*source.friction, name + "_friction");
+    file.models.push_back(std::move(models));
+  }
+  save_monitor(path, file);
 }
 
 SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCalibration& settings,

@@ -33,8 +33,8 @@ std::string acceleration(const std::string& angle) { return fmt::format("rate({}
 double encoder_step(const SheetValue& bits) { return kTurn_rad / std::exp2(bits.value); }
 
 /// Dry friction of a body that is driven at this angle, a part of it in proportion to the load: Dahl's with
-/// distances around that of the presliding, which the load lengthens. The noise of the encoder is no motion:
-/// a play of some of its steps takes it away.
+/// distances around that of the presliding, which the load lengthens. A play of some
+/// steps of the encoder removes its noise, which would count as motion.
 Expressions friction(const std::string& angle, double sliding_rad, const std::string& load,
                      double encoder_step_rad) {
   Expressions terms;

@@ -52,7 +52,7 @@ TEST(CalibrateMonitor, FindsAFaultAndNamesWhatExplainsIt) {
   EXPECT_LT(replay.stopped_at_s, 4.30);
   ASSERT_FALSE(replay.events.empty());
   EXPECT_EQ(replay.events.back().check, MonitorCheck::disagreement);
-  EXPECT_THAT(replay.suspects, testing::UnorderedElementsAre("encoder", "clock", "current_sensor"));
+  EXPECT_THAT(replay.suspects, testing::UnorderedElementsAre("encoder", "current_sensor"));
   const std::string text = replays_text({replay}, monitor.monitor);
   EXPECT_THAT(text, HasSubstr("stopped at 4.2"));
   EXPECT_THAT(text, HasSubstr("the torques of spring and current differ by"));

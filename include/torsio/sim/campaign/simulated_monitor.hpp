@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,7 @@ namespace torsio {
 /// the truth.
 struct SimulatedCalibration {
   std::uint64_t seed = 1000;
-  double training_s = 1200.0;     ///< of each training recording, with the torque of a load cell
+  double training_s = 2400.0;     ///< length of the training recordings together, with a load cell
   double fault_free_hours = 3.2;  ///< for the thresholds
   double false_alarms_per_hour = 1e-4;
   /// Specimen whose spring was calibrated; the joint's own is another one, or has another variant.
@@ -32,6 +33,11 @@ struct SimulatedMonitor {
   [[nodiscard]] std::vector<SourceModel> models() const;
   [[nodiscard]] MonitoredTorque monitored() const;
 };
+
+/// Writes the monitor file and, beside it, its models as NAME.SOURCE.safetensors, NAME the part of the file's
+/// name before ".monitor.json". @throws Error if one cannot be written.
+void save_simulated_monitor(const std::filesystem::path& path, const SimulatedMonitor& monitor,
+                            const std::string& device_serial);
 
 /// Trains the sources of the joint on recordings at work (`duty_recording`), the spring on those of
 /// another specimen, with error bars from recordings of this one at other temperatures, and chooses

@@ -22,12 +22,12 @@ struct SourceRecipe {
   std::string family;
   std::map<std::string, std::string> options;
   FeatureSpec features;
-  /// Of a gear: the name of its twist among the definitions, and the angle of its input. The kinematic
+  /// The name of a gear's twist among the definitions, and the angle of its input. The kinematic
   /// error over that angle is fitted first and added to the twist, so that its hysteresis is one of
   /// the twist that makes torque.
   std::string gear_twist = {};
   std::string gear_input = {};
-  /// Of a drive: the number of its last inputs, which are its friction; 0: none is separated.
+  /// The number of a drive's last inputs, which are its friction; 0: none is separated.
   std::size_t friction_inputs = 0;
 };
 
@@ -55,7 +55,7 @@ struct MonitorRecipe {
 [[nodiscard]] MonitorRecipe monitor_recipe(const DataSheet& sheet);
 
 /// The same recording with the delay of the sources in its `torque_Nm`. Models that are trained on a torque
-/// without it make up for the delay with rates of their inputs, each in its own way, and disagree while
+/// without it compensate the delay with rates of their inputs, each in its own way, and disagree while
 /// the torque changes fast.
 [[nodiscard]] Recording with_source_delay(const Recording& recording);
 
