@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "torsio/control/joint_stop.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/safety/command_watchdog.hpp"
 #include "torsio/safety/monitor.hpp"
@@ -37,16 +36,6 @@ int run() {
   settings.pairs = {{.first = 0, .second = 1, .factor = 4.0, .floor_Nm = 3.0}};
   torsio::Monitor monitor(settings);  // throws if a limit is not valid
   torsio::CommandWatchdog watchdog({.timeout_s = 0.018});
-  torsio::JointStop stop(
-      {.drive = torsio::series_elastic_joint(torsio::data_sheet("dfki-50")).drive,
-       .speed_rad_s = 1.0,
-       .deceleration_rad_s2 = 5.0,
-       .brake_static_Nm = 100.0,
-       .brake_sliding_Nm = 80.0,
-       .brake_engage_s = 0.02,
-       .brake_release_s = 0.04,
-       .load_Nm = 20.0},
-      1000.0);
   for (int tick = 0; tick < 2500; ++tick) {
     const double t_s = 1e-3 * tick;
     const std::int64_t now_ns = std::int64_t{1'000'000} * tick;
@@ -65,13 +54,12 @@ int run() {
     const auto state =
         watchdog.step(now_ns, {.written_ns = now_ns, .is_valid = true}, torque.fault);
     const bool may_move = monitor.is_watching() && state == torsio::CommandWatchdog::State::running;
-    if (tick > 101 && !may_move) stop.trigger(torsio::StopCategory::power_off);
-    const double wanted_A = may_move ? torque.value_Nm / kTorquePerCurrent_Nm_A : 0.0;
-    const auto command = stop.step(wanted_A, {}, torque.fault);  // {}: the joint is at rest here
-    if (tick % 500 == 0 || (tick > 101 && !may_move && tick % 50 == 0))
+    // No torque and a closed brake unless both permit motion; `JointStop` stops in a controlled way.
+    const double current_A = may_move ? torque.value_Nm / kTorquePerCurrent_Nm_A : 0.0;
+    if (tick % 250 == 0)
       std::printf("t = %.2f s: %6.2f Nm +- %.2f, current %5.2f A, monitor %s, brake %s\n", t_s,
-                  torque.value_Nm, torque.std_dev_Nm, command.current_A,
-                  name(monitor.state()).data(), command.is_brake_open ? "open" : "closed");
+                  torque.value_Nm, torque.std_dev_Nm, current_A, name(monitor.state()).data(),
+                  may_move ? "open" : "closed");
   }
   std::printf("at %.3f s: %s\n", monitor.reason().t_s,
               describe(monitor.reason(), settings).c_str());

@@ -247,6 +247,12 @@ TEST_F(MainJob, RunsTheExamples) {
   EXPECT_EQ(limits.exit_code, 0) << limits.err;
   EXPECT_NE(limits.out.find("limit position, stop running"), std::string::npos);
   EXPECT_NE(limits.out.find("stop off, at rest: yes"), std::string::npos) << limits.out;
+  const Outcome monitored = shell(std::string(TORSIO_EXAMPLES) + "/example_09_monitored_joint");
+  EXPECT_EQ(monitored.exit_code, 0) << monitored.err;
+  EXPECT_NE(monitored.out.find("monitor watching, brake open"), std::string::npos);
+  EXPECT_NE(monitored.out.find("monitor stopped, brake closed"), std::string::npos);
+  EXPECT_NE(monitored.out.find("the torques of spring and current differ by"), std::string::npos)
+      << monitored.out;
   const Outcome own = shell(std::string(TORSIO_EXAMPLES) + "/example_02_own_model");
   EXPECT_EQ(own.exit_code, 0) << own.err;
   EXPECT_NE(own.out.find("outside_training_range"), std::string::npos) << own.out;

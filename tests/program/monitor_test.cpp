@@ -1,0 +1,117 @@
+// A monitor that is calibrated, replayed and refused, as a user calls it.
+#include <nlohmann/json.hpp>
+
+#include "program/program.hpp"
+
+namespace torsio::test {
+namespace {
+
+class MonitorVerb : public Program {
+ protected:
+  /// Two models, a monitor of them, a sound recording and one with a fault at 10 s.
+  void calibrate() {
+    ASSERT_EQ(
+        shell("{torsio} simulate dfki-50 sweep --duration 60s --lever 0.24m -o a.csv").exit_code,
+        0);
+    ASSERT_EQ(
+        torsio("simulate dfki-50 sweep --duration 60s --lever 0.2m --seed 2 -o b.csv").exit_code,
+        0);
+    ASSERT_EQ(
+        torsio("simulate dfki-50 sweep --duration 60s --lever 0.2m --seed 3 -o c.csv").exit_code,
+        0);
+    ASSERT_EQ(torsio("fit a.csv b.csv --model grey_box --set residual=none -o spring.safetensors")
+                  .exit_code,
+              0);
+    ASSERT_EQ(
+        torsio("fit a.csv b.csv --model linear --set rates=true -o current.safetensors --inputs "
+               "'lowpass(motor_current_A, 20Hz), tanh(lowpass(rate(motor_angle_rad), 20Hz) / 2), "
+               "lowpass(rate(motor_angle_rad), 20Hz)'")
+            .exit_code,
+        0);
+    const Outcome outcome = torsio(kCalibrate + "--false-alarms-per-hour 200");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("spring, current"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("surely detected Nm"), std::string::npos) << outcome.out;
+  }
+  void expect_refused(const std::string& call, int exit_code, const std::string& text) {
+    const Outcome outcome = torsio(call);
+    EXPECT_EQ(outcome.exit_code, exit_code) << call << "\n" << outcome.err;
+    EXPECT_NE(outcome.err.find(text), std::string::npos) << call << "\n" << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+  }
+
+  const std::string kCalibrate =
+      "monitor --calibrate b.csv c.csv -o j.monitor.json --source "
+      "spring=spring.safetensors:gear_encoder+joint_encoder --source "
+      "current=current.safetensors:current_sensor --device-serial J-07 --valid-until 2099-01-01 ";
+};
+
+TEST_F(MonitorVerb, FindsAFaultInARecordingAndPassesASoundOne) {
+  calibrate();
+  const Outcome sound = torsio("monitor j.monitor.json c.csv -o torque.csv --json sound.json");
+  ASSERT_EQ(sound.exit_code, 0) << sound.err;
+  EXPECT_NE(sound.out.find("c: no stop from"), std::string::npos) << sound.out;
+  EXPECT_TRUE(nlohmann::json::parse(contents("sound.json"))
+                  .at("recordings")
+                  .at(0)
+                  .at("stopped_at_s")
+                  .is_null());
+  const std::string csv = contents("torque.csv");
+  EXPECT_NE(
+      csv.substr(0, csv.find('\n')).find("spring_torque_Nm,current_torque_Nm,monitor_state_1"),
+      std::string::npos)
+      << csv.substr(0, csv.find('\n'));
+
+  ASSERT_EQ(shell("printf 'faults:\n  - {sensor: joint_angle_rad, fault: jump, at: 20s, by: "
+                  "2deg}\n' > f.yaml")
+                .exit_code,
+            0);
+  ASSERT_EQ(
+      torsio(
+          "simulate dfki-50 sweep --duration 30s --lever 0.2m --seed 3 --faults f.yaml -o bad.csv")
+          .exit_code,
+      0);
+  const Outcome bad = torsio("monitor j.monitor.json bad.csv --plot stop.svg --json -");
+  ASSERT_EQ(bad.exit_code, 0) << bad.err;
+  const auto row = nlohmann::json::parse(bad.out).at("recordings").at(0);
+  EXPECT_GE(row.at("stopped_at_s"), 20.0);
+  EXPECT_LE(row.at("stopped_at_s"), 20.02);
+  EXPECT_FALSE(row.at("events").empty());
+  EXPECT_NE(contents("stop.svg").find("<svg"), std::string::npos);
+}
+
+TEST_F(MonitorVerb, RefusesWhatDoesNotBelongTogether) {
+  calibrate();
+  expect_refused(kCalibrate + "--false-alarms-per-hour 1", 1, "support no smaller one");
+  expect_refused("monitor j.monitor.json c.csv --device-serial J-08", 1, "'J-07'");
+  expect_refused("monitor j.monitor.json", kCallWasWrong, "a monitor file and recordings");
+  expect_refused("monitor --calibrate c.csv -o x.json", kCallWasWrong, "--source");
+  expect_refused("monitor --calibrate c.csv --source spring=spring.safetensors", kCallWasWrong,
+                 "-o FILE");
+  expect_refused("monitor --calibrate c.csv --source spring -o x.json", kCallWasWrong,
+                 "NAME=MODEL");
+  expect_refused(kCalibrate + "--signal no_such_channel_rad", 1, "no_such_channel_rad");
+  ASSERT_EQ(shell("cut -d, -f1-3 c.csv > short.csv").exit_code, 0);
+  expect_refused("monitor j.monitor.json short.csv", 1, "short.csv");
+  ASSERT_EQ(shell("cp j.monitor.json keep.json; sed -i s/2099-01-01/2020-01-01/ j.monitor.json")
+                .exit_code,
+            0);
+  expect_refused("monitor j.monitor.json c.csv", 1, "expired on 2020-01-01");
+  ASSERT_EQ(
+      shell("cp keep.json j.monitor.json; cp current.safetensors spring.safetensors").exit_code, 0);
+  expect_refused("monitor j.monitor.json c.csv", 1, "hash");
+}
+
+TEST_F(MonitorVerb, RefusesFaultsThatASimulatedJointCannotHave) {
+  expect_refused("monitor --actuator no-such-joint", kCallWasWrong, "dfki-50");
+  expect_refused("monitor --actuator elastomer --inject joint_angle=1deg@2s", kCallWasWrong,
+                 "joint_angle");
+  expect_refused("monitor --actuator dfki-50 --inject kt=-20%", kCallWasWrong, "kt");
+  expect_refused("monitor --actuator dfki-50 --inject kt=-20%@3s --duration 1parsec", kCallWasWrong,
+                 "--duration");
+  expect_refused("monitor x.json y.json --actuator dfki-50", kCallWasWrong,
+                 "at most a monitor file");
+}
+
+}  // namespace
+}  // namespace torsio::test

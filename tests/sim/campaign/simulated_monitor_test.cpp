@@ -1,0 +1,97 @@
+#include "torsio/sim/campaign/simulated_monitor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "support/temporary_folder.hpp"
+#include "torsio/evaluate/monitor_replay.hpp"
+#include "torsio/files/monitor_file.hpp"
+#include "torsio/report/monitor.hpp"
+#include "torsio/sim/campaign.hpp"
+#include "torsio/sim/campaign/fused_accuracy.hpp"
+#include "torsio/sim/campaign/torque_sources.hpp"
+
+namespace torsio {
+namespace {
+
+/// Shorter recordings than a real calibration needs.
+SimulatedCalibration short_calibration() {
+  return {.training_s = 160.0, .fault_free_hours = 0.1, .false_alarms_per_hour = 1.0};
+}
+
+TEST(SimulatedMonitor, FindsAFaultOfEachSensorOfASeriesElasticJoint) {
+  const DataSheet sheet = data_sheet("dfki-50#07");
+  const SimulatedMonitor monitor = calibrate_simulated(sheet, short_calibration());
+  ASSERT_EQ(monitor.sources.size(), 3U);
+  EXPECT_TRUE(monitor.sources[0].friction.has_value());
+  EXPECT_TRUE(monitor.calibrated.is_extrapolated);
+  const auto replay = [&](const std::string& injection) {
+    DutyRun work{.seed = 77, .duration_s = 12.0};
+    if (!injection.empty()) work.faults.faults = {parse_injection(injection, sheet)};
+    return replay_monitor(monitor.monitored(), duty_recording(sheet, work));
+  };
+  EXPECT_TRUE(std::isnan(replay("").stopped_at_s));
+  for (const std::string injection :
+       {"motor_angle=nan@8s", "gear_angle=0.1deg@8s", "joint_angle=2deg@8s", "current=3A@8s"}) {
+    const MonitorReplay found = replay(injection);
+    EXPECT_GE(found.stopped_at_s, 8.0) << injection;
+    EXPECT_LE(found.stopped_at_s, 8.02) << injection;
+  }
+
+  // From its files it is the same.
+  const TemporaryFolder folder;
+  save_simulated_monitor(folder.path("joint.monitor.json"), monitor, full_name(sheet));
+  EXPECT_EQ(folder.files(), 5U) << "three torques, one friction, the monitor";
+  const MonitoredTorque loaded =
+      load_monitor(folder.path("joint.monitor.json"), {.serial = full_name(sheet)});
+  const Recording log = duty_recording(sheet, {.seed = 5, .duration_s = 3.0});
+  const auto torque = [&](const MonitoredTorque& of) {
+    return replay_monitor(of, log).estimated.channels.channel("estimated_torque_Nm").values;
+  };
+  EXPECT_EQ(torque(loaded), torque(monitor.monitored()));
+
+  const FusedAccuracy accuracy = fused_accuracy(sheet, loaded, 2, 9, 10.0);
+  EXPECT_EQ(accuracy.sources.size(), 3U);
+  EXPECT_GT(accuracy.fused_rmse_Nm, 0.0);
+  EXPECT_LT(accuracy.fused_rmse_Nm, accuracy.source_rmse_Nm[0]);
+  EXPECT_GT(accuracy.mean_ratio, 0.3);
+  EXPECT_LT(accuracy.mean_ratio, 1.5);
+  EXPECT_EQ(accuracy.without.size(), 3U);
+  EXPECT_GT(accuracy.within_2_std_dev, accuracy.within_std_dev);
+  EXPECT_NE(accuracy_text({accuracy}).find("dfki-50#07"), std::string::npos);
+  EXPECT_NE(accuracy_json({accuracy}).find("\"within_2_std_dev\""), std::string::npos);
+}
+
+TEST(MonitorRecipe, EveryActuatorHasSourcesFromItsLoggedChannels) {
+  for (const DataSheet& sheet : data_sheets()) {
+    const MonitorRecipe recipe = monitor_recipe(sheet);
+    EXPECT_GE(recipe.sources.size(), 2U) << sheet.name;
+    EXPECT_EQ(recipe.sources.size(), recipe.plan.sources.size());
+    const Recording log = duty_recording(sheet, {.seed = 1, .duration_s = 0.1});
+    for (const SourceRecipe& source : recipe.sources)
+      for (const std::string& channel : FeaturePipeline(source.features, 1000.0).raw_inputs())
+        EXPECT_TRUE(log.has(channel)) << sheet.name << ": " << channel;
+    for (const MonitoredSignal& signal : recipe.plan.signals)
+      for (const std::string& channel : channels_of(signal.name))
+        EXPECT_TRUE(log.has(channel)) << sheet.name << ": " << channel;
+  }
+}
+
+TEST(SourceDelay, IsThatOfAnInputOfTheSources) {
+  Recording log("log", 1000.0);
+  std::vector<double> step(100, 0.0);
+  for (std::size_t n = 50; n < step.size(); ++n) step[n] = 1.0;
+  log.add({.name = "torque_Nm", .values = step});
+  log.add({.name = "motor_current_A", .values = step});
+  const Recording delayed = with_source_delay(log);
+  EXPECT_EQ(delayed.channel("motor_current_A").values, step);
+  FeaturePipeline input({.inputs = {"lag(lowpass(motor_current_A, 100Hz), 1)"}, .definitions = {}},
+                        1000.0);
+  for (std::size_t n = 0; n < step.size(); ++n)
+    EXPECT_EQ(delayed.channel("torque_Nm").values[n], input.step({&step[n], 1})[0]) << n;
+}
+
+}  // namespace
+}  // namespace torsio
