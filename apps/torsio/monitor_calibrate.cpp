@@ -57,6 +57,18 @@ SourceFlag source_of(const std::string& text) {
   return flag;
 }
 
+/// A model that states no device may be used on any. @throws torsio::Error for one of another device.
+torsio::ModelFile model_of(const std::string& path, const std::string& device_serial) {
+  torsio::ModelFile model = torsio::load_model(path);
+  const std::string& serial = model.card.device_serial;
+  if (!serial.empty() && !device_serial.empty() && serial != device_serial)
+    throw torsio::Error({.place = path + ": device_serial",
+                         .expected = "'" + device_serial + "'",
+                         .found = "'" + serial + "'",
+                         .advice = "calibrate the monitor with the models of this joint"});
+  return model;
+}
+
 /// The models of a source, as the file names them: relative to its folder.
 torsio::MonitoredModel named(const std::string& model, const std::filesystem::path& folder) {
   if (model.empty()) return {};
@@ -91,13 +103,12 @@ void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
       std::filesystem::absolute(flags.output).lexically_normal().parent_path();
   for (const std::string& text : flags.sources) {
     SourceFlag flag = source_of(text);
-    const torsio::ModelFile model = torsio::load_model(flag.model, flags.device_serial);
+    const torsio::ModelFile model = model_of(flag.model, flags.device_serial);
     torsio::SourceModel source{.torque = torsio::make_estimator(model)};
     if (models.empty()) data.use_model_mapping(model.card.mapping, flag.model);
     models.push_back(flag.model);
     if (!flag.friction.empty()) {
-      source.friction =
-          torsio::make_estimator(torsio::load_model(flag.friction, flags.device_serial));
+      source.friction = torsio::make_estimator(model_of(flag.friction, flags.device_serial));
       models.push_back(flag.friction);
     }
     sources.push_back(std::move(source));

@@ -1,6 +1,7 @@
 #include "torsio/estimate/torque_sources.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -112,7 +113,7 @@ TorqueSources::TorqueSources(std::vector<SourceModel> sources) : estimates_(sour
 void TorqueSources::set_zero(std::string_view channel, double value) {
   if (std::ranges::find(raw_inputs_, channel) == raw_inputs_.end())
     throw UsageError({.place = "set_zero",
-                      .expected = "a channel of the sources",
+                      .expected = fmt::format("one of {}", fmt::join(raw_inputs_, ", ")),
                       .found = fmt::format("'{}'", channel),
                       .advice = did_you_mean(channel, raw_inputs_)});
   const auto set = [&](Fed& fed) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -110,18 +111,19 @@ ordered_json actions_json(const MonitorSettings& settings) {
 /// A check that is not named keeps its default.
 void read_actions(const std::map<std::string, std::string>& actions, MonitorSettings& settings,
                   const std::string& place) {
-  for (const auto& [check, action] : actions) {
+  constexpr std::array kActions{MonitorAction::off, MonitorAction::warn, MonitorAction::stop};
+  for (const auto& entry : actions) {
+    const std::string& check = entry.first;
     std::size_t index = 0;
     while (index < kMonitorChecks && name(static_cast<MonitorCheck>(index)) != check) ++index;
     if (index == kMonitorChecks)
       throw Error({.place = place, .expected = "a check", .found = fmt::format("'{}'", check)});
-    const auto known = {MonitorAction::off, MonitorAction::warn, MonitorAction::stop};
-    const auto found =
-        std::ranges::find_if(known, [&](MonitorAction each) { return name(each) == action; });
-    if (found == known.end())
+    const auto* const found = std::ranges::find_if(
+        kActions, [&entry](MonitorAction each) { return name(each) == entry.second; });
+    if (found == kActions.end())
       throw Error({.place = fmt::format("{}/{}", place, check),
                    .expected = "off, warn or stop",
-                   .found = fmt::format("'{}'", action)});
+                   .found = fmt::format("'{}'", entry.second)});
     settings.actions[index] = *found;
   }
 }
@@ -317,7 +319,13 @@ MonitoredTorque load_monitor(const std::filesystem::path& path, const MonitorFil
                    .expected = fmt::format("the model of the calibration, hash {}", model.hash),
                    .found = "hash " + hash,
                    .advice = "restore the model file, or calibrate the monitor again"});
-    return make_estimator(load_model(name), rate_Hz);
+    ModelFile loaded = load_model(name);
+    const std::string& serial = loaded.card.device_serial;
+    if (!serial.empty() && !options.serial.empty() && serial != options.serial)
+      throw Error({.place = name.string() + ": device_serial",
+                   .expected = fmt::format("'{}'", options.serial),
+                   .found = fmt::format("'{}'", serial)});
+    return make_estimator(loaded, rate_Hz);
   };
   std::vector<SourceModel> sources;
   for (const MonitoredSource& models : file.models) {

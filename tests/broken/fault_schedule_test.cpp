@@ -94,7 +94,8 @@ INSTANTIATE_TEST_SUITE_P(
             "MisspeltFault",
             gear("fault: freze, at: 1s"),
             {"line 2 (faults[0].fault): expected one of freeze, jump, drift, sign_flip, quantised, "
-             "dropout, nan, found 'freze'",
+             "dropout, nan, "
+             "gain, spike, wrap, zero, found 'freze'",
              "Did you mean 'freeze'?"}},
         BadSchedule{"ASensorCannotBreak", gear("fault: break, at: 1s"), {"expected one of freeze"}},
         BadSchedule{"APartCannotFreeze",

@@ -103,7 +103,8 @@ TEST(MonitoredTorque, AnExpressionIsAsOldAsItsOldestChannel) {
       MonitorSettings settings = test::joint_monitor();
       settings.signals = {{.name = "gear_angle_rad - joint_angle_rad", .longest_age_s = 0.01}};
       Joint joint;
-      joint.torque = MonitoredTorque(test::torque_sources(test::joint_sources()), test::joint_redundancy(), settings);
+      joint.torque = MonitoredTorque(test::torque_sources(test::joint_sources()),
+                                     test::joint_redundancy(), settings);
       joint.channel("gear_angle_rad").age_s = joint.channel("joint_angle_rad").age_s = 0.004;
       joint.start();
       joint.channel(late).age_s = age_s;
@@ -145,7 +146,8 @@ TEST(MonitoredTorque, StopsOnAnotherNumberOfSamples) {
     Joint joint;
     MonitorSettings settings = test::joint_monitor();
     if (!has_signals) settings.signals.clear();
-    joint.torque = MonitoredTorque(test::torque_sources(test::joint_sources()), test::joint_redundancy(), settings);
+    joint.torque = MonitoredTorque(test::torque_sources(test::joint_sources()),
+                                   test::joint_redundancy(), settings);
     joint.start();
     joint.raw.pop_back();
     const FusedTorque fused = joint.step();
@@ -242,34 +244,34 @@ TEST(MonitoredTorque, RefusesPartsThatDoNotFit) {
     RedundancySettings redundancy = test::joint_redundancy();
     MonitorSettings monitor = test::joint_monitor();
     change(sources, redundancy, monitor);
-    return test::error_message([&] { MonitoredTorque(test::torque_sources(sources), redundancy, monitor); });
+    return test::error_message(
+        [&] { MonitoredTorque(test::torque_sources(sources), redundancy, monitor); });
   };
   EXPECT_EQ(refusal([](auto&, auto&, auto&) {}), "");
   const std::string counts =
-      "monitored torque: expected one estimator for each source of the redundancy and of the "
+      "monitored torque: expected one model for each source of the redundancy and of the "
       "monitor, found ";
   EXPECT_EQ(refusal([](auto& s, auto&, auto&) { s.pop_back(); }),
-            counts + "2 estimators, 3 and 3 sources");
+            counts + "2 models, 3 and 3 sources");
   EXPECT_EQ(refusal([](auto& s, auto&, auto&) { s.clear(); }),
-            counts + "0 estimators, 3 and 3 sources");
+            "torque sources: expected at least one model, found none");
   EXPECT_EQ(refusal([](auto&, auto& r, auto&) { r.sources.pop_back(); }),
-            counts + "3 estimators, 2 and 3 sources");
+            counts + "3 models, 2 and 3 sources");
   EXPECT_EQ(refusal([](auto&, auto&, auto& m) {
               m.sources.pop_back();
               m.pairs.resize(1);
             }),
-            counts + "3 estimators, 3 and 2 sources");
+            counts + "3 models, 3 and 2 sources");
   EXPECT_EQ(refusal([](auto&, auto&, auto& m) { std::swap(m.sources[0], m.sources[1]); }),
             "monitored torque: expected source 1 to be 'current', found 'gear' in the monitor");
   EXPECT_EQ(refusal([](auto& s, auto&, auto&) {
               s[1] = test::proportional_source("gear_angle_rad", 1.0, 1000.0, "force_N");
             }),
-            "monitored torque: expected a torque in Nm as target of 'gear', found 'force_N'");
+            "torque sources: expected models with a torque in Nm as target, found 'force_N'");
   EXPECT_EQ(refusal([](auto& s, auto&, auto&) {
               s[2] = test::proportional_source("gear_angle_rad", 1.0, 500.0);
             }),
-            "monitored torque: expected a sample rate of 1000 Hz as of 'current', found 500 Hz of "
-            "'spring'");
+            "torque sources: expected models with a sample rate of 1000 Hz, found 500 Hz");
   EXPECT_EQ(refusal([](auto&, auto&, auto& m) { m.sample_period_s = 0.002; }),
             "monitored torque: expected a monitor with the period of the sources, 0.001 s, found "
             "0.002 s");

@@ -90,9 +90,10 @@ TEST_F(MonitorVerb, RefusesWhatDoesNotBelongTogether) {
                  "-o FILE");
   expect_refused("monitor --calibrate c.csv --source spring -o x.json", kCallWasWrong,
                  "NAME=MODEL");
-  expect_refused(kCalibrate + "--signal no_such_channel_rad", 1, "no_such_channel_rad");
+  expect_refused(kCalibrate + "--false-alarms-per-hour 200 --signal no_such_channel_rad", 1,
+                 "no_such_channel_rad");
   ASSERT_EQ(shell("cut -d, -f1-3 c.csv > short.csv").exit_code, 0);
-  expect_refused("monitor j.monitor.json short.csv", 1, "short.csv");
+  expect_refused("monitor j.monitor.json short.csv", 1, "short: there is no channel");
   ASSERT_EQ(shell("cp j.monitor.json keep.json; sed -i s/2099-01-01/2020-01-01/ j.monitor.json")
                 .exit_code,
             0);

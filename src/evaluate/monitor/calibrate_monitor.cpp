@@ -387,13 +387,14 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
   for (const TorqueSource& source : plan.sources) result.monitor.sources.push_back(source.name);
 
   std::vector<PairStatistics> pairs;
-  for (std::uint8_t i = 0; i < sources.size(); ++i)
-    for (std::uint8_t j = i + 1; j < sources.size(); ++j)
-      pairs.emplace_back(PairLimits{.first = i, .second = j},
-                         result.redundancy.correlation.empty()
-                             ? 0.0
-                             : result.redundancy.correlation[i * sources.size() + j],
-                         rate_Hz, result.monitor.persistence_s);
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    for (std::size_t j = i + 1; j < sources.size(); ++j)
+      pairs.emplace_back(
+          PairLimits{.first = static_cast<std::uint8_t>(i), .second = static_cast<std::uint8_t>(j)},
+          result.redundancy.correlation.empty()
+              ? 0.0
+              : result.redundancy.correlation[i * sources.size() + j],
+          rate_Hz, result.monitor.persistence_s);
   for (PairStatistics& pair : pairs) {
     for (const std::vector<SourceRun>& runs : recorded) pair.see_spread(runs);
     for (const std::vector<SourceRun>& runs : recorded) pair.see_differences(runs);

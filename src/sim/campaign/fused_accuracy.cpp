@@ -6,6 +6,7 @@
 
 #include "core/report_progress.hpp"
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/sim/campaign.hpp"
 #include "torsio/sim/campaign/torque_sources.hpp"
@@ -95,7 +96,10 @@ FusedAccuracy fused_accuracy(const DataSheet& sheet, const MonitoredTorque& moni
     DutyRun work{.seed = seed + r, .duration_s = duration_s};
     work.settings.impacts_per_min = 0.0;
     const Run run = run_once(with_source_delay(duty_recording(sheet, work, progress)), monitored);
-    if (run.samples == 0) continue;
+    if (run.samples == 0)
+      throw Error({.place = result.actuator,
+                   .problem = "in a run the sources were never all valid",
+                   .advice = "make the runs longer: friction settles with the motion"});
     if (r < first_runs) {
       for (std::size_t i = 0; i < count; ++i) chosen_on[i] += run.squares[i];
       continue;

@@ -86,8 +86,9 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
     add(own, work(joint, settings.training_s / static_cast<double>(kTemperatures)), Role::train);
   Dataset other;
   add(other, work(other_specimen(joint, settings.spring_serial), settings.training_s), Role::train);
-  for (int i = 0; i < 4; ++i) {
-    const Recording validation = work(joint, kRecording_s);
+  constexpr int kValidations = 4;
+  for (int i = 0; i < kValidations; ++i) {
+    const Recording validation = work(joint, settings.training_s / kValidations);
     add(own, validation, Role::validation);
     add(other, validation, Role::validation);
   }
@@ -99,10 +100,10 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
   other = {};
 
   Dataset fault_free;
-  const auto recordings = static_cast<std::size_t>(
-      std::ceil(settings.fault_free_hours * kSecondsPerHour / kRecording_s));
+  const double fault_free_s = settings.fault_free_hours * kSecondsPerHour;
+  const auto recordings = static_cast<std::size_t>(std::ceil(fault_free_s / kRecording_s));
   for (std::size_t i = 0; i < recordings; ++i)
-    add(fault_free, work(joint, kRecording_s), Role::validation);
+    add(fault_free, work(joint, fault_free_s / static_cast<double>(recordings)), Role::validation);
   std::vector<SourceModel> sources;
   for (const FittedSource& source : result.sources) sources.push_back(source.model());
   result.calibrated = calibrate_monitor(

@@ -153,8 +153,8 @@ MonitorRecipe series_elastic(const DataSheet& sheet) {
 }
 
 MonitorRecipe harmonic_drive(const DataSheet& sheet) {
-  const double tube_ratio = std::get<TubeSheet>(sheet.first).ratio.value;
-  const GearSheet& strain_wave = std::get<GearSheet>(sheet.second);
+  const auto tube_ratio = std::get<TubeSheet>(sheet.first).ratio.value;
+  const auto& strain_wave = std::get<GearSheet>(sheet.second);
   const std::string motor = "motor_angle_rad";
   const std::string wave = "wave_generator_angle_rad";
   const std::string torque = "motor_torque_Nm";
