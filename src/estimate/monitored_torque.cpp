@@ -80,6 +80,7 @@ MonitoredTorque::MonitoredTorque(TorqueSources sources, const RedundancySettings
 std::vector<std::size_t> MonitoredTorque::places_of(
     const std::vector<std::string>& channels) const {
   std::vector<std::size_t> places;
+  places.reserve(channels.size());
   for (const std::string& channel : channels)
     places.push_back(
         static_cast<std::size_t>(std::ranges::find(raw_inputs_, channel) - raw_inputs_.begin()));

@@ -83,6 +83,7 @@ TorqueSources::Fed TorqueSources::fed(Estimator estimator) {
                  .expected = fmt::format("models with a sample rate of {} Hz", sample_rate_Hz_),
                  .found = fmt::format("{} Hz", rate_Hz)});
   std::vector<std::size_t> places;
+  places.reserve(estimator.raw_inputs().size());
   for (const std::string& name : estimator.raw_inputs()) {
     const auto found = std::ranges::find(raw_inputs_, name);
     places.push_back(static_cast<std::size_t>(found - raw_inputs_.begin()));

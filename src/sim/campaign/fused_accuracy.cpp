@@ -16,8 +16,8 @@ namespace {
 
 /// Sums over one run.
 struct Run {
-  std::vector<double> squares;          ///< of the sources' errors
-  std::vector<double> without_squares;  ///< of the combined torque's, without this source
+  std::vector<double> squares;          ///< errors of the sources, squared
+  std::vector<double> without_squares;  ///< the same without this source
   double fused_squares = 0.0;
   std::size_t samples = 0;
   std::size_t within = 0;

@@ -28,8 +28,8 @@ struct FusedAccuracy {
   std::vector<double> source_rmse_Nm;  ///< means of the runs
   double fused_rmse_Nm = 0.0;          ///< likewise
   std::string best;  ///< source with the smallest error in the first runs, not counted here
-  double mean_ratio =
-      kNotMeasured;  ///< of the combined torque's error to that of `best`, mean of the runs
+  /// The error of the combined torque over that of `best`: mean and largest of the runs.
+  double mean_ratio = kNotMeasured;
   double largest_ratio = kNotMeasured;
   double within_std_dev = 0.0;  ///< share of the samples whose error is within the error bar
   double within_2_std_dev = 0.0;
