@@ -54,6 +54,7 @@ std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
       flags.data.load_inputs(monitored.raw_inputs(), progress.listener());
   settings = monitored.monitor().settings();
   std::vector<torsio::MonitorReplay> replays;
+  replays.reserve(dataset.records.size());
   for (const torsio::DatasetRecord& record : dataset.records)
     replays.push_back(torsio::replay_monitor(monitored, record.recording, progress.listener()));
   return replays;
@@ -78,6 +79,7 @@ void replay(MonitorFlags& flags) {
                                                          : replay_joint(flags, settings);
   if (!flags.output.empty()) {
     std::vector<torsio::EstimatedRecording> estimated;
+    estimated.reserve(replays.size());
     for (const torsio::MonitorReplay& each : replays) estimated.push_back(each.estimated);
     torsio::write_estimates(estimated, flags.output);
   }

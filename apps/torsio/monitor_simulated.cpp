@@ -119,6 +119,7 @@ void run_campaign(const SimulatedMonitorFlags& flags, const JsonOutput& json) {
 
 void run_accuracy(const SimulatedMonitorFlags& flags, const JsonOutput& json) {
   std::vector<torsio::FusedAccuracy> rows;
+  rows.reserve(actuators_of(flags).size());
   for (const std::string& name : actuators_of(flags)) {
     const torsio::DataSheet sheet = torsio::find_data_sheet(name);
     const torsio::MonitoredTorque monitor = monitored(flags, sheet);

@@ -44,7 +44,8 @@ struct Node {
   Operation operation = Operation::constant;
   std::uint32_t left = 0;   ///< operand; for a channel its index in `channels()`
   std::uint32_t right = 0;  ///< second operand; the first again where there is one only
-  double parameter = 0.0;   ///< value of a constant, cut-off in Hz, lag in samples, threshold of a stop, distance of dahl
+  double parameter =
+      0.0;  ///< value of a constant, cut-off in Hz, lag in samples, threshold of a stop, distance of dahl
 };
 
 /// The kind of motion that an expression depends on: none (constants), a rate, or something else.

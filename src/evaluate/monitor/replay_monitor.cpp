@@ -105,8 +105,7 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
     // A part of all sources, such as the supply, is one of every pair and explains nothing.
     PartSet of_all = ~PartSet{0};
     for (std::size_t i = 0; i < monitored.sources().size(); ++i) of_all &= redundancy.parts_of(i);
-    replay.suspects =
-        redundancy.names(redundancy.suspects(monitor.disagreeing()) & ~of_all);
+    replay.suspects = redundancy.names(redundancy.suspects(monitor.disagreeing()) & ~of_all);
   }
   for (const std::string& name : monitored.raw_inputs())
     replay.estimated.channels.add({.name = name, .values = recording.channel(name).values});
