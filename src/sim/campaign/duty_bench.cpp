@@ -55,7 +55,7 @@ DutyBench::Lane::Lane(const DutyLane& from, double run_s)
       has_faults(!from.faults.faults.empty()),
       is_loop_sound(from.is_loop_sound) {}
 
-DutyBench::DutyBench(std::vector<DutyLane> lanes, const Options& options)
+DutyBench::DutyBench(const std::vector<DutyLane>& lanes, const Options& options)
     : plants_(sheets_of(lanes), drive_seeds(lanes, options.is_electrical), options.is_single),
       commands_(lanes.size()),
       loads_(lanes.size()) {

@@ -40,8 +40,8 @@ class DutyBench {
   };
   /// @param lanes of one kind, as `PlantBatch` requires
   /// @throws Error if a plant refuses its start, UsageError as `FaultInjector`.
-  explicit DutyBench(std::vector<DutyLane> lanes, const Options& options);
-  explicit DutyBench(std::vector<DutyLane> lanes) : DutyBench(std::move(lanes), Options{}) {}
+  explicit DutyBench(const std::vector<DutyLane>& lanes, const Options& options);
+  explicit DutyBench(const std::vector<DutyLane>& lanes) : DutyBench(lanes, Options{}) {}
 
   [[nodiscard]] std::size_t size() const noexcept { return lanes_.size(); }
   [[nodiscard]] double time_s() const noexcept;

@@ -41,13 +41,13 @@ DutyPlants::DutyPlants(std::span<const DataSheet> sheets,
 Fault DutyPlants::reset(std::size_t lane, double joint_angle_rad, const Load& load) noexcept {
   if (auto* const batch = std::get_if<PlantBatch>(&plants_))
     return batch->reset(lane, joint_angle_rad, load);
-  return std::get<0>(plants_)[lane].reset(joint_angle_rad, load);
+  return (*std::get_if<0>(&plants_))[lane].reset(joint_angle_rad, load);
 }
 
 Fault DutyPlants::set_condition(std::size_t lane, const PlantCondition& condition) noexcept {
   if (auto* const batch = std::get_if<PlantBatch>(&plants_))
     return batch->set_condition(lane, condition);
-  return std::get<0>(plants_)[lane].set_condition(condition);
+  return (*std::get_if<0>(&plants_))[lane].set_condition(condition);
 }
 
 Fault DutyPlants::step(std::span<const PlantCommand> commands, std::span<const Load> loads,
@@ -55,7 +55,7 @@ Fault DutyPlants::step(std::span<const PlantCommand> commands, std::span<const L
   if (auto* const batch = std::get_if<PlantBatch>(&plants_))
     return batch->step(commands, loads, dt_s);
   Fault worst = Fault::none;
-  std::vector<Plant>& plants = std::get<0>(plants_);
+  std::vector<Plant>& plants = *std::get_if<0>(&plants_);
   for (std::size_t lane = 0; lane < plants.size(); ++lane) {
     const Fault fault = plants[lane].step(commands[lane], loads[lane], dt_s);
     if (fault != Fault::none) worst = fault;
@@ -68,12 +68,12 @@ SensedPlant DutyPlants::sensed(std::size_t lane) const noexcept {
     return {.state = batch->state(lane),
             .second_twist_rad = batch->second_twist(lane),
             .current_A = batch->current(lane)};
-  return torsio::sensed(std::get<0>(plants_)[lane]);
+  return torsio::sensed((*std::get_if<0>(&plants_))[lane]);
 }
 
 PlantTorques DutyPlants::torques(std::size_t lane) const noexcept {
   if (const auto* const batch = std::get_if<PlantBatch>(&plants_)) return batch->torques(lane);
-  return std::get<0>(plants_)[lane].torques();
+  return (*std::get_if<0>(&plants_))[lane].torques();
 }
 
 const Plant* DutyPlants::single(std::size_t lane) const noexcept {

@@ -30,7 +30,7 @@ using Json = nlohmann::ordered_json;
 constexpr int kVersion = 1;  // version of the results of units
 constexpr std::size_t kInjectionsAUnit = 32;
 constexpr std::size_t kJointsAUnit = 16;
-constexpr double kUnit_h = 1.0;  // hours of each joint
+constexpr double kUnitHours = 1.0;  // hours of each joint
 constexpr double kTicksAnHour = 3600.0 * kBenchRate_Hz;
 constexpr double kLowLoad = 0.05;  // share of the largest torque
 constexpr double kLargestGain = 1e-3;
@@ -148,7 +148,7 @@ std::vector<WorkUnit> units_of(const std::vector<Group>& groups, const CampaignS
   }
   const auto joints = [&](double hours) {
     return static_cast<std::size_t>(
-        std::ceil(hours / kUnit_h / static_cast<double>(groups.size()) - 1e-9));
+        std::ceil(hours / kUnitHours / static_cast<double>(groups.size()) - 1e-9));
   };
   for (std::size_t g = 0; g < groups.size(); ++g) {
     add_parts({.name = groups[g].of->name + ": work", .kind = WorkUnit::Kind::work, .group = g},
@@ -221,7 +221,7 @@ std::string done(const WorkUnit& unit, const Group& group, const CampaignSetting
   }
   FaultFreeRun run{.sheets = {},
                    .monitor = group.monitor,
-                   .ticks = static_cast<std::size_t>(kUnit_h * kTicksAnHour),
+                   .ticks = static_cast<std::size_t>(kUnitHours * kTicksAnHour),
                    .is_electrical = settings.is_electrical};
   const bool is_low = unit.kind == WorkUnit::Kind::low_load;
   run.seed = unit_seed(settings.seed, of.name, is_low ? "low load" : "work") + unit.first;

@@ -44,7 +44,7 @@ FaultFreeOutcome run_fault_free(const FaultFreeRun& run) {
     lanes.push_back({.sheet = run.sheets[i], .seed = run.seed + i, .settings = run.settings});
   std::vector<JointMonitor> monitors(lanes.size(), run.monitor);
   std::vector<std::array<Measurement, kBlock>> blocks(lanes.size());
-  DutyBench bench(std::move(lanes), {.is_electrical = run.is_electrical});
+  DutyBench bench(lanes, {.is_electrical = run.is_electrical});
   FaultFreeOutcome outcome;
   for (std::size_t tick = 0; tick < run.ticks;) {
     const double start_s = bench.time_s();

@@ -109,12 +109,14 @@ class Injections {
     std::vector<Trial> trials(run_.count);
     for (std::size_t i = 0; i < trials.size(); ++i) trials[i].index = run_.first + i;
     std::vector<Trial*> open;
+    open.reserve(trials.size());
     for (Trial& trial : trials) open.push_back(&trial);
     while (!open.empty()) {
       attempt(open);
       std::erase_if(open, [this](Trial* trial) { return !is_to_repeat(*trial); });
     }
     std::vector<Outcome> outcomes;
+    outcomes.reserve(trials.size());
     for (const Trial& trial : trials) outcomes.push_back(trial.outcome);
     return outcomes;
   }
@@ -136,7 +138,7 @@ class Injections {
       attempts.emplace_back(run_, *trial);
       lanes.push_back(attempts.back().lane(run_));
     }
-    DutyBench bench(std::move(lanes), {.is_electrical = run_.is_electrical});
+    DutyBench bench(lanes, {.is_electrical = run_.is_electrical});
     std::size_t left = attempts.size();
     for (std::size_t tick = 0; left > 0; ++tick) {
       bench.sense();
@@ -228,7 +230,7 @@ class Injections {
   }
 
   // Not to be armed is right as long as the sensor is not; to watch is wrong from the onset on.
-  void decide_start(std::size_t tick, Attempt& of, Outcome& outcome) const {
+  static void decide_start(std::size_t tick, Attempt& of, Outcome& outcome) {
     const ScheduledFault& fault = of.drawn.faults.front();
     const bool is_faulty = static_cast<double>(tick) < *fault.duration_s * kBenchRate_Hz;
     const Monitor& monitor = of.monitor.monitor();

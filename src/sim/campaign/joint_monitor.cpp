@@ -20,6 +20,7 @@ JointMonitor::JointMonitor(MonitoredTorque monitored, const DataSheet& sheet, bo
     const auto found = std::ranges::find(channels, name, &SensedChannel::name);
     if (found == channels.end()) {
       std::vector<std::string> known;
+      known.reserve(channels.size());
       for (const SensedChannel& channel : channels) known.emplace_back(channel.name);
       throw Error({.place = "monitor of " + sheet.name,
                    .expected = "inputs that its sensors measure: " + joined(known),
