@@ -10,6 +10,6 @@ namespace torsio {
 /// @returns the largest gain of the energy of joint, springs and load, over the energy that is in motion and
 /// in the springs at the start; NaN if the plant refuses the state
 [[nodiscard]] double stop_energy_gain(const DataSheet& sheet, const PlantState& state,
-                                      const Load& load);
+                                      const Load& at_stop);
 
 }  // namespace torsio
