@@ -64,12 +64,14 @@ MonitoredTorque::MonitoredTorque(TorqueSources sources, const RedundancySettings
   for (const std::string& name : signal_pipeline_.raw_inputs())
     if (std::ranges::find(raw_inputs_, name) == raw_inputs_.end()) raw_inputs_.push_back(name);
   signal_places_ = places_of(signal_pipeline_.raw_inputs());
-  longest_age_s_.assign(raw_inputs_.size(), std::numeric_limits<double>::infinity());
+  guards_.resize(raw_inputs_.size());
   for (const MonitoredSignal& signal : monitor.signals) {
     const std::vector<std::string> channels = channels_of(signal.name);
     channels_of_signal_.push_back(places_of(channels));
-    if (channels.size() == 1 && channels.front() == signal.name)
-      longest_age_s_[channels_of_signal_.back().front()] = signal.longest_age_s;
+    if (channels.size() != 1 || channels.front() != signal.name) continue;
+    ChannelGuard& guard = guards_[channels_of_signal_.back().front()];
+    guard.longest_age_s = signal.longest_age_s;
+    guard.largest_step = signal.largest_rate * monitor.sample_period_s;
   }
   row_.resize(history_columns().size());
   const double rows = std::ceil(kHistory_s / monitor.sample_period_s);
@@ -111,6 +113,24 @@ void MonitoredTorque::reset() noexcept {
   sources_.reset();
   redundancy_.reset();
   signal_pipeline_.reset();
+  for (ChannelGuard& guard : guards_) {
+    guard.last = kNotMeasured;
+    guard.held = 0;
+  }
+}
+
+double MonitoredTorque::guarded(ChannelGuard& guard, const SignalSample& sample) const noexcept {
+  const bool is_fresh = sample.age_s >= 0.0 && sample.age_s <= guard.longest_age_s;
+  if (!is_fresh || !std::isfinite(sample.value)) return kNotMeasured;
+  const double step = std::abs(sample.value - guard.last);
+  if (step > guard.largest_step * (guard.held + 1) &&
+      guard.held + 1 < monitor_.settings().spikes_in_a_row) {
+    ++guard.held;
+    return guard.last;
+  }
+  guard.held = 0;
+  guard.last = sample.value;
+  return sample.value;
 }
 
 FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw) noexcept {
@@ -121,8 +141,7 @@ FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw)
     return redundancy_.step({});
   }
   for (std::size_t k = 0; k < source_values_.size(); ++k) {
-    const bool is_fresh = raw[k].age_s >= 0.0 && raw[k].age_s <= longest_age_s_[k];
-    source_values_[k] = is_fresh ? raw[k].value : kNotMeasured;
+    source_values_[k] = guarded(guards_[k], raw[k]);
   }
   const std::span<const Estimate> estimates = sources_.step(source_values_);
   const FusedTorque fused = redundancy_.step(estimates);

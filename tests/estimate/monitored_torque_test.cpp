@@ -224,6 +224,24 @@ TEST(MonitoredTorque, SubtractsAZeroFromSourcesAndSignals) {
   EXPECT_THROW(joint.torque.set_zero("joint_angle_rad", kNaN), UsageError);
 }
 
+TEST(MonitoredTorque, OneSpikeDoesNotReachTheSourcesButASecondSampleDoes) {
+  MonitorSettings settings = test::joint_monitor();
+  settings.signals.push_back({.name = "motor_current_A", .largest_rate = 1000.0});
+  Joint joint;
+  joint.torque = MonitoredTorque(test::torque_sources(test::joint_sources()),
+                                 test::joint_redundancy(), settings);
+  joint.step_for(10);
+  const double sound_Nm = joint.torque.estimates()[0].value;
+  joint.raw[0].value += 50.0;  // the current: 1 A in a tick is the most that it can
+  (void)joint.step();
+  EXPECT_EQ(joint.torque.estimates()[0].value, sound_Nm);
+  (void)joint.step();
+  EXPECT_EQ(joint.torque.estimates()[0].value, sound_Nm + 500.0);
+  joint.raw[0].value = kNaN;
+  (void)joint.step();
+  EXPECT_EQ(joint.torque.estimates()[0].fault, Fault::input_not_finite);
+}
+
 TEST(MonitoredTorque, AResetMakesARunRepeatable) {
   Joint joint;
   const FusedTorque first = joint.step();

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -36,6 +38,9 @@ class MonitoredTorque {
   /// `monitor().reset(t_s)`, with which the next step begins the history again.
   void reset() noexcept;
 
+  /// A sample that changes faster than a signal that is this channel alone can (`largest_rate`) is replaced by
+  /// the one before it for the sources, in fewer than `spikes_in_a_row` samples: their filters would spread one
+  /// spike over many ticks.
   /// @param raw one sample for each of `raw_inputs()`. A channel older than the longest age of a
   /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite.
   /// Another number of samples is a stop of the monitor.
@@ -55,6 +60,14 @@ class MonitoredTorque {
   }
 
  private:
+  /// The limits of a channel that is a signal, and its last sample.
+  struct ChannelGuard {
+    double longest_age_s = std::numeric_limits<double>::infinity();
+    double largest_step = std::numeric_limits<double>::infinity();  ///< from sample to sample
+    double last = kNotMeasured;
+    std::uint32_t held = 0;  ///< samples in a row that were replaced
+  };
+  [[nodiscard]] double guarded(ChannelGuard& guard, const SignalSample& sample) const noexcept;
   [[nodiscard]] std::vector<std::size_t> places_of(const std::vector<std::string>& channels) const;
   void record(double t_s, const FusedTorque& fused, std::span<const SignalSample> raw) noexcept;
 
@@ -65,7 +78,7 @@ class MonitoredTorque {
   std::vector<std::string> raw_inputs_;  ///< first those of the sources
   std::vector<std::size_t> signal_places_;
   std::vector<std::vector<std::size_t>> channels_of_signal_;  ///< places in `raw`
-  std::vector<double> longest_age_s_;                         ///< per channel
+  std::vector<ChannelGuard> guards_;                          ///< per channel
   std::vector<double> source_values_;
   std::vector<double> signal_values_;
   std::vector<SignalSample> signals_;
