@@ -36,7 +36,7 @@ class YamlValue {
   [[nodiscard]] std::vector<std::pair<std::string, YamlValue>> entries() const;
   /// @throws Error for a key that is not listed, with the nearest one that is.
   void allow_only(std::initializer_list<std::string_view> keys) const;
-  void allow_only(std::span<const std::string> keys) const;
+  void allow_only(std::span<const std::string> known) const;
   [[nodiscard]] std::optional<YamlValue> find(std::string_view wanted) const;
   [[nodiscard]] YamlValue at(std::string_view key) const;  ///< @throws Error if missing
 

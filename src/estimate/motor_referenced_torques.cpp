@@ -11,7 +11,7 @@ namespace torsio {
 namespace {
 
 constexpr std::string_view kPlace = "motor-referenced torques";
-constexpr double kSteepness_s_deg = 100.0;  // (16): atan(100 q̇)
+constexpr double kSteepness = 100.0;  // s/deg, (16): atan(100 q̇)
 
 void require_finite(const DeflectionTorque& of, const std::string& name) {
   const auto require_number = [&](double value, const char* coefficient) {
@@ -54,7 +54,7 @@ MotorReferencedTorques::MotorReferencedTorques(const Parameters& parameters)
 }
 
 double MotorReferencedTorques::coulomb_regressor(double joint_speed_rad_s) noexcept {
-  return std::atan(kSteepness_s_deg * deg_from_rad(joint_speed_rad_s));
+  return std::atan(kSteepness * deg_from_rad(joint_speed_rad_s));
 }
 
 MotorReferencedTorques::Output MotorReferencedTorques::step(const JointSample& sample,
