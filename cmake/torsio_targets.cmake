@@ -7,7 +7,8 @@ if(TORSIO_SANITIZE)
   target_compile_options(torsio_build_settings INTERFACE -fsanitize=${TORSIO_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all
     # g++ warns of uninitialised reads in the instrumented <regex>, which the normal one does not have.
-    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>
+    $<$<CXX_COMPILER_ID:Clang>:-fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/cmake/sanitizer_ignored.txt>)
   target_link_options(torsio_build_settings INTERFACE -fsanitize=${TORSIO_SANITIZE})
 endif()
 if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")

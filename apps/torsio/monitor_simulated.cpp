@@ -125,7 +125,7 @@ void run_accuracy(const SimulatedMonitorFlags& flags, const JsonOutput& json) {
     const torsio::MonitoredTorque monitor = monitored(flags, sheet);
     ProgressBar progress;
     rows.push_back(torsio::fused_accuracy(sheet, monitor, flags.accuracy_runs, flags.seed + 5000,
-                                          60.0, progress.listener()));
+                                          180.0, progress.listener()));
   }
   if (json.wants_tables()) print(torsio::accuracy_text(rows));
   json.write(torsio::accuracy_json(rows));
