@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <filesystem>
+#include <numbers>
 #include <utility>
 
 #include "output.hpp"
@@ -16,7 +17,7 @@
 
 namespace {
 
-constexpr double kTurn_rad = 6.283185307179586;
+constexpr double kTurn_rad = 2.0 * std::numbers::pi;
 
 /// NAME=MODEL, NAME=MODEL,FRICTION, each with or without :PART+PART
 struct SourceFlag {
@@ -76,7 +77,7 @@ torsio::MonitoredModel named(const std::string& model, const std::filesystem::pa
           .hash = torsio::model_hash(model)};
 }
 
-/// EXPRESSION, or EXPRESSION with=EXPRESSION: the second one moves with the first one.
+/// EXPRESSION, or "EXPRESSION moves with EXPRESSION".
 torsio::MonitoredSignal signal_of(const std::string& text) {
   constexpr std::string_view kWith = " moves with ";
   const std::size_t at = text.find(kWith);

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -14,12 +16,7 @@
 namespace torsio {
 namespace {
 
-void require_positive(double value, const char* name) {
-  if (value > 0.0 && std::isfinite(value)) return;
-  throw Error({.place = fmt::format("torque sources: {}", name),
-               .expected = "a positive number",
-               .found = fmt::format("{}", value)});
-}
+constexpr std::string_view kPlace = "torque sources";
 
 void check_target(const EstimatorSettings& settings) {
   const auto target = split_channel_name(settings.target);
@@ -33,10 +30,10 @@ void check_target(const EstimatorSettings& settings) {
 
 FrictionFilter::FrictionFilter(const Settings& settings, double sample_rate_Hz)
     : settings_(settings) {
-  require_positive(settings.std_dev_at_start, "std_dev_at_start");
-  require_positive(settings.drift_per_sqrt_s, "drift_per_sqrt_s");
-  require_positive(settings.correlation_s, "correlation_s");
-  require_positive(sample_rate_Hz, "sample rate");
+  require_positive(kPlace, "std_dev_at_start", settings.std_dev_at_start);
+  require_positive(kPlace, "drift_per_sqrt_s", settings.drift_per_sqrt_s);
+  require_positive(kPlace, "correlation_s", settings.correlation_s);
+  require_positive(kPlace, "sample rate", sample_rate_Hz);
   if (!(settings.lowest > 0.0 && settings.lowest < 1.0 && settings.highest > 1.0 &&
         std::isfinite(settings.highest)))
     throw Error({.place = "torque sources: friction",
@@ -97,7 +94,7 @@ TorqueSources::TorqueSources(std::vector<SourceModel> sources) : estimates_(sour
   if (sources.empty())
     throw Error({.place = "torque sources", .expected = "at least one model", .found = "none"});
   for (SourceModel& model : sources) {
-    require_positive(model.error_bar_factor, "error_bar_factor");
+    require_positive(kPlace, "error_bar_factor", model.error_bar_factor);
     Source source{.torque = fed(std::move(model.torque)),
                   .friction = {},
                   .filter = {},
