@@ -26,16 +26,19 @@ std::string percent(double share) { return text(100.0 * share, 1) + " %"; }
 std::string class_table(const CampaignResult& result) {
   TextTable table;
   table.header({"fault", "group", "row", "injected", "detected", "missed <", "p50", "p99",
-                "longest", "limit", "late", "redrawn", "unreached"});
+                "longest", "limit", "late", "brief", "redrawn", "unreached"});
   for (const ClassResult& of : result.classes)
     table.row({of.name + (of.must_stop ? "" : " (must not stop)"), of.group,
                fmt::format("{}", of.row), count(of.injected), count(of.detected),
                of.must_stop ? percent(of.missed_upper_95) : "-", text(of.latency.p50_ms, 0),
                text(of.latency.p99_ms, 0), text(of.latency.longest_ms, 0), text(of.limit_ms, 0),
-               count(of.late), count(of.redrawn), count(of.unreached)});
-  return "Injections whose disagreement reaches 20 % of the rated torque; latencies in ms from "
-         "there,\n"
-         "of signals and the loop from the injection. 95 % bound of the share that is missed.\n\n" +
+               count(of.late), count(of.brief), count(of.redrawn), count(of.unreached)});
+  return "Injections whose disagreement stays at 20 % of the rated torque or more until the limit "
+         "of the\n"
+         "latency; latencies in ms from where it reaches 20 %, of signals and the loop from the\n"
+         "injection. brief: those with a disagreement before that ended by itself sooner than the "
+         "limit.\n"
+         "95 % bound of the share that is missed.\n\n" +
          table.text();
 }
 
@@ -123,6 +126,7 @@ Json json_of(const ClassResult& of) {
           {"latency_ms_max", of.latency.longest_ms},
           {"limit_ms", of.limit_ms},
           {"late", of.late},
+          {"brief", of.brief},
           {"redrawn", of.redrawn},
           {"unreached", of.unreached},
           {"checks", of.checks},

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kLeastForShape = 30;
 constexpr double kLeastShape = -0.4;
-constexpr double kLargestShape = 0.25;
+constexpr double kLargestShape = 0.0;
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/report_progress.hpp"
+#include "evaluate/monitor/source_run.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
@@ -78,6 +79,7 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
       .suspects = {}};
   replay.estimated.faults.reserve(samples);
   const DenormalsOff denormals_off;
+  take_zeros(monitored.sources(), recording);
   monitored.reset();
   monitored.monitor().reset(recording.time_s(0) - 1.0);
   Findings findings;

@@ -7,16 +7,12 @@
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {
-namespace {
 
-/// A zero that was subtracted from the recording is not subtracted again.
 void take_zeros(TorqueSources& sources, const Recording& recording) {
   for (const ZeroRule& zero : recording.zeros)
     if (std::ranges::find(sources.raw_inputs(), zero.channel) != sources.raw_inputs().end())
       sources.set_zero(zero.channel, 0.0);
 }
-
-}  // namespace
 
 std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recording) {
   take_zeros(sources, recording);

@@ -20,6 +20,10 @@ struct SourceRun {
   }
 };
 
+/// A zero that was subtracted from the recording is not subtracted again. Without effect on channels that the
+/// sources do not read.
+void take_zeros(TorqueSources& sources, const Recording& recording);
+
 /// All sources over a recording, from `reset()`. @throws Error if a channel is missing.
 [[nodiscard]] std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recording);
 

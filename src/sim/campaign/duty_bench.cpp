@@ -89,7 +89,8 @@ void DutyBench::act() {
     Lane& lane = lanes_[i];
     lane.duty.step();
     loads_[i] = lane.duty.load();
-    const double current_A = lane.loop.step(lane.duty.wanted_rad(), lane.measured.motor_angle_rad);
+    const Measurement& seen = lane.is_loop_sound ? lane.sound : lane.measured;
+    const double current_A = lane.loop.step(lane.duty.wanted_rad(), seen.motor_angle_rad);
     commands_[i].current_A = lane.is_cut ? 0.0 : current_A;
     if (!lane.has_faults && !lane.duty.is_condition_new()) continue;
     lane.condition =

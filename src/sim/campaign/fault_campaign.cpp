@@ -27,7 +27,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kVersion = 1;  // version of the results of units
+constexpr int kVersion = 2;  // version of the results of units
 constexpr std::size_t kInjectionsAUnit = 32;
 constexpr std::size_t kJointsAUnit = 16;
 constexpr double kUnitHours = 1.0;  // hours of each joint
@@ -180,7 +180,7 @@ Json json_of(const std::vector<InjectionOutcome>& outcomes) {
   Json all = Json::array();
   for (const InjectionOutcome& of : outcomes)
     all.push_back({static_cast<int>(of.kind), of.latency_ticks, of.attempts, of.check,
-                   of.near_impact, of.disagreement, of.energy_gain});
+                   of.near_impact, of.disagreement, of.energy_gain, of.brief});
   return all;
 }
 
@@ -191,6 +191,7 @@ std::vector<InjectionOutcome> outcomes_of(const Json& all) {
                         .latency_ticks = of.at(1),
                         .attempts = of.at(2),
                         .check = of.at(3),
+                        .brief = of.at(7),
                         .near_impact = of.at(4),
                         .disagreement = of.at(5),
                         .energy_gain = of.at(6).is_null() ? kNotMeasured : of.at(6).get<double>()});
@@ -259,6 +260,7 @@ ClassResult class_result(const FaultClass& fault, const std::string& group,
       continue;
     }
     ++result.injected;
+    result.brief += of.brief > 0 ? 1 : 0;
     result.near_impact += of.near_impact ? 1 : 0;
     if (of.kind != Kind::detected && of.kind != Kind::stopped) continue;
     const double latency_ms = 1e3 * of.latency_ticks / kBenchRate_Hz;

@@ -199,7 +199,11 @@ class Classes {
                       .every_s = repeats ? 0.001 * static_cast<double>(2 + random.below(4)) : 0.0});
       };
     };
-    add({.name = "spike", .row = 10, .onset = FaultOnset::injection, .must_stop = false},
+    add({.name = "spike",
+         .row = 10,
+         .onset = FaultOnset::injection,
+         .must_stop = false,
+         .is_loop_sound = true},
         spike(false));
     add({.name = "spikes", .row = 10, .limit_s = kDrift_s}, spike(true));
     const auto simple = [this](FaultKind kind) {
@@ -217,7 +221,7 @@ class Classes {
                         .kind = FaultKind::wrap,
                         .amount = sign(random) * static_cast<double>(1 + random.below(3))});
         });
-    add({.name = "zero at start", .row = 8, .onset = FaultOnset::start},
+    add({.name = "zero at start", .row = 8, .onset = FaultOnset::start, .is_loop_sound = true},
         [encoders = encoders_](Random& random, double) {
           return fault({.what = one_of(encoders, random).channel,
                         .kind = FaultKind::zero,

@@ -75,13 +75,12 @@ struct Attempt {
     return after;
   }
 
-  /// A drive that starts up has its own angle of the rotor.
   [[nodiscard]] DutyLane lane(const InjectionRun& run) const {
     return {.sheet = run.sheet,
             .seed = seed,
             .settings = settings,
             .faults = {drawn.faults},
-            .is_loop_sound = run.fault.onset == FaultOnset::start};
+            .is_loop_sound = run.fault.is_loop_sound};
   }
 
   std::uint64_t seed;
@@ -90,8 +89,9 @@ struct Attempt {
   std::size_t start_tick = 0;
   std::size_t end_tick = 0;
   JointMonitor monitor;
-  std::optional<JointMonitor> sound;  ///< with the sound signals, since the injection
-  std::optional<std::size_t> onset_tick = {};
+  std::optional<JointMonitor> sound;           ///< with the sound signals, since the injection
+  std::optional<std::size_t> onset_tick = {};  ///< of the disagreement in progress
+  bool is_lasting = false;     ///< it has lasted as long as a stop may take, and counts
   std::size_t late_steps = 0;  ///< steps of the loop since an overrun began
   int watched_ticks = 0;       ///< after the onset of a fault at power-up
   bool was_watching = false;   ///< at the injection
@@ -174,6 +174,7 @@ class Injections {
     outcome.disagreement = 0.0;
     outcome.energy_gain = kNotMeasured;
     outcome.near_impact = false;
+    outcome.brief = 0;
     if (!of.was_watching && run_.fault.onset != FaultOnset::start) {
       outcome.kind = Outcome::Kind::unreached;
       of.is_done = true;
@@ -181,9 +182,13 @@ class Injections {
     if (of.drawn.failed_model) of.monitor.monitored().sources().fail_model(*of.drawn.failed_model);
     if (run_.fault.onset == FaultOnset::sensors || run_.fault.onset == FaultOnset::start)
       of.sound = of.monitor;
-    if (run_.fault.onset == FaultOnset::injection) of.onset_tick = of.start_tick;
+    if (run_.fault.onset == FaultOnset::injection) {
+      of.onset_tick = of.start_tick;
+      of.is_lasting = true;
+    }
   }
 
+  // A disagreement that ends by itself sooner than a stop may take is counted, but is no onset.
   void find_onset(const DutyBench& bench, std::size_t lane, std::size_t tick, Attempt& of,
                   Outcome& outcome) const {
     bool is_reached = false;
@@ -201,9 +206,18 @@ class Injections {
       is_reached =
           !(difference < run_.limit_share) || std::abs(plant.second_twist_rad) > largest_twist_rad_;
     }
-    if (is_reached && !of.onset_tick) of.onset_tick = tick;
-    if (of.onset_tick == tick)
+    if (of.is_lasting) return;
+    if (!is_reached) {
+      if (of.onset_tick) ++outcome.brief;
+      of.onset_tick.reset();
+      return;
+    }
+    if (!of.onset_tick) {
+      of.onset_tick = tick;
       outcome.near_impact = bench.duty(lane).since_impact_s() < kNearImpact_s;
+    }
+    of.is_lasting = run_.fault.onset == FaultOnset::start ||
+                    tick - *of.onset_tick >= ticks_of(run_.fault.limit_s);
   }
 
   void decide(const DutyBench& bench, std::size_t lane, std::size_t tick, Attempt& of,
@@ -220,7 +234,7 @@ class Injections {
         outcome.energy_gain = stop_energy_gain(run_.sheet, bench.plants().sensed(lane).state,
                                                bench.duty(lane).load());
       of.is_done = true;
-    } else if (of.onset_tick && tick >= *of.onset_tick + ticks_of(kMissed_s)) {
+    } else if (of.is_lasting && tick >= *of.onset_tick + ticks_of(kMissed_s)) {
       outcome.kind = run_.fault.must_stop ? Outcome::Kind::missed : Outcome::Kind::quiet;
       of.is_done = true;
     } else if (tick >= of.end_tick) {

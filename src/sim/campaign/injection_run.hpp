@@ -22,7 +22,9 @@ struct InjectionOutcome {
   Kind kind = Kind::missed;
   int latency_ticks = 0;  ///< since the onset; 0 before it; of the loop's steps for an overrun
   int attempts = 1;
-  int check = -1;             ///< `MonitorCheck` of the stop
+  int check = -1;  ///< `MonitorCheck` of the stop
+  int brief =
+      0;  ///< disagreements beyond the limit that ended by themselves, sooner than a stop may take
   bool near_impact = false;   ///< the onset is less than 100 ms after the beginning of an impact
   double disagreement = 0.0;  ///< the largest until the stop, over the rated torque
   double energy_gain =

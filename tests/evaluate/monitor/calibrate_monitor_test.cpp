@@ -150,5 +150,18 @@ TEST(ReplayMonitor, ReportsARecordingThatItCannotArm) {
       testing::AllOf(HasSubstr("1000 Hz"), HasSubstr("--rate")));
 }
 
+TEST(ReplayMonitor, TakesTheZerosThatTheMappingSubtracted) {
+  TwoTorques joint;
+  joint.spring.settings.zeroed_channels = {"spring_deflection_rad"};
+  const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  const MonitoredTorque sources(TorqueSources(joint.models()), monitor.redundancy, monitor.monitor);
+  Recording zeroed = TwoTorques::recording(5.0, 5);
+  EXPECT_TRUE(std::isnan(replay_monitor(sources, zeroed).watching_from_s));
+  zeroed.zeros.push_back({.channel = "spring_deflection_rad", .first_s = 1.0});
+  const MonitorReplay replay = replay_monitor(sources, zeroed);
+  EXPECT_LT(replay.watching_from_s, 0.2);
+  EXPECT_TRUE(std::isnan(replay.stopped_at_s));
+}
+
 }  // namespace
 }  // namespace torsio

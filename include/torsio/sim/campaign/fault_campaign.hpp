@@ -46,8 +46,8 @@ struct Latencies {
 
 /// Injections of one class into one group. The disagreement of an injection is the largest difference
 /// between two sources that the fault causes: what changes against a monitor with the sound signals.
-/// Latencies count from where it reaches 20 % of the rated torque, and are 0 if the monitor stopped
-/// before; for a signal that is missing, not finite or wraps, and for the loop, from the injection.
+/// It counts where it stays at 20 % of the rated torque or more for as long as a stop may take; one that ends by
+/// itself sooner is `brief`. Latencies count from where it reaches 20 %, and are 0 if the monitor stopped before; for a signal that is missing, not finite or wraps, and for the loop, from the injection.
 struct ClassResult {
   std::string name;
   std::string group = {};
@@ -57,7 +57,8 @@ struct ClassResult {
   std::size_t injected = 0;
   std::size_t detected = 0;
   std::size_t late = 0;       ///< detected after `limit_ms`
-  std::size_t redrawn = 0;    ///< attempts whose disagreement did not reach 20 %
+  std::size_t redrawn = 0;    ///< attempts whose disagreement did not reach 20 % for so long
+  std::size_t brief = 0;      ///< injections before whose stop, or miss, were brief disagreements
   std::size_t unreached = 0;  ///< not in `injected`: in no attempt
   double limit_ms = 0.0;
   double missed_upper_95 = 1.0;  ///< bound of the share that is missed
