@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -219,6 +220,7 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   // Finite inputs can still overflow a product or leave a root's domain; differences and lags hold
   // such a value for some ticks, so the next usable tick starts afresh.
   poisoned_ = !all_finite(features);
+  start_std_dev_ = pipeline_.is_settled() ? 0.0 : start_std_dev_now();
   if (poisoned_) {
     interrupt(1.0);
     ++missed_;
@@ -297,6 +299,7 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
       out.std_dev = std_dev;
     }
     if (!memory_error_.is_zero()) out.std_dev = std::hypot(out.std_dev, memory_error_.bound());
+    if (start_std_dev_ > 0.0) out.std_dev = std::hypot(out.std_dev, start_std_dev_);
   } else {
     out.value = fallback_value(features);
     // The fallback's residuals are evidence only where it was fitted.
@@ -343,6 +346,14 @@ double EstimatorCore::fallback_value(Features features) const noexcept {
   for (std::size_t i = 0; i < features.size(); ++i)
     value += settings_.fallback.slope[i] * features[i];
   return std::isfinite(value) ? value : last_value_;
+}
+
+double EstimatorCore::start_std_dev_now() const noexcept {
+  const std::span<const double> errors = pipeline_.state_errors();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < errors.size(); ++i)
+    if (errors[i] > 0.0) sum += std::abs(settings_.fallback.slope[i]) * errors[i];
+  return sum / std::numbers::sqrt3;
 }
 
 double EstimatorCore::residual_std_at(double value) const noexcept {

@@ -149,6 +149,7 @@ std::span<const Estimate> TorqueSources::step(std::span<const double> raw) noexc
     estimate.std_dev *= source.error_bar_factor;
     if (source.friction) {
       const Estimate friction = source.friction->step(raw);
+      estimate.std_dev = std::hypot(estimate.std_dev, source.friction->estimator.start_std_dev());
       source.without_friction = estimate;
       source.friction_Nm = friction.value;
       const double spread_Nm = source.filter->std_dev() * friction.value;

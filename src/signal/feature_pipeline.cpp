@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -50,35 +51,48 @@ class DelayLine {
 /// s <- clip(s + change of the input, +-threshold): the deflection of a spring whose far end slips.
 class StopOperator {
  public:
-  explicit StopOperator(double threshold) : threshold_(threshold) {}
+  explicit StopOperator(double threshold) : threshold_(threshold) { reset(); }
 
   void reset() noexcept {
-    state_ = lowest_ = highest_ = 0.0;
+    state_ = 0.0;
+    lowest_ = -threshold_;
+    highest_ = threshold_;
     has_last_ = false;
   }
 
   /// A value that is not finite is returned and leaves the state.
   double step(double input) noexcept {
     if (!std::isfinite(input)) return input;
-    if (has_last_) state_ = std::clamp(state_ + (input - last_), -threshold_, threshold_);
     if (has_last_) {
-      lowest_ = std::min(lowest_, input);
-      highest_ = std::max(highest_, input);
-    } else {
-      lowest_ = highest_ = input;
+      const double change = input - last_;
+      state_ = clipped(state_ + change);
+      lowest_ = clipped(lowest_ + change);
+      highest_ = clipped(highest_ + change);
     }
     last_ = input;
     has_last_ = true;
     return state_;
   }
   /// Whether the input has moved so far that the state no longer depends on that at the start.
-  [[nodiscard]] bool is_settled() const noexcept { return highest_ - lowest_ >= 2.0 * threshold_; }
+  [[nodiscard]] bool is_settled() const noexcept {
+    return highest_ - lowest_ <= kRounding * threshold_;
+  }
+  /// Bound of the error of the state, with an input whose errors are at most `input_error`.
+  [[nodiscard]] double error(double input_error) const noexcept {
+    const double own = std::max(highest_ - state_, state_ - lowest_);
+    return std::min(2.0 * threshold_, own + 2.0 * input_error);
+  }
 
  private:
+  static constexpr double kRounding = 1e-9;
+  [[nodiscard]] double clipped(double state) const noexcept {
+    return std::clamp(state, -threshold_, threshold_);
+  }
+
   double threshold_;
-  double lowest_ = 0.0;
-  double highest_ = 0.0;
   double state_ = 0.0;
+  double lowest_ = 0.0;  ///< the state, had it begun at one end; likewise the other
+  double highest_ = 0.0;
   double last_ = 0.0;
   bool has_last_ = false;
 };
@@ -92,6 +106,7 @@ class DahlOperator {
   void reset() noexcept {
     state_ = 0.0;
     travel_ = 0.0;
+    largest_input_error_ = 0.0;
     has_last_ = false;
   }
 
@@ -109,10 +124,19 @@ class DahlOperator {
   }
   /// Whether what is left of the unknown state at the start is below 5 %.
   [[nodiscard]] bool is_settled() const noexcept { return travel_ >= 3.0 * distance_; }
+  /// Bound of the error of the state, with an input whose errors are at most `input_error` now. By what they
+  /// were at most, the travel may be shorter.
+  [[nodiscard]] double error(double input_error) noexcept {
+    largest_input_error_ = std::max(largest_input_error_, input_error);
+    const double sure = std::max(0.0, travel_ - 2.0 * largest_input_error_);
+    const double start = 1.0 + 4.0 * largest_input_error_ / distance_;
+    return std::min(2.0, start * std::exp(-sure / distance_) + 4.0 * input_error / distance_);
+  }
 
  private:
   double distance_;
   double travel_ = 0.0;
+  double largest_input_error_ = 0.0;
   double state_ = 0.0;
   double last_ = 0.0;
   bool has_last_ = false;
@@ -148,6 +172,8 @@ struct FeaturePipeline::Program {
   /// @returns by how many samples the operation settles later than its operands.
   std::size_t add(const Node& node, std::uint32_t target);
   [[nodiscard]] double run(const Instruction& instruction) noexcept TORSIO_REALTIME;
+  void bound_errors() noexcept TORSIO_REALTIME;
+  [[nodiscard]] double error_of(const Instruction& instruction) noexcept TORSIO_REALTIME;
 
   FeatureSpec spec;
   double sample_rate_Hz;
@@ -168,6 +194,9 @@ struct FeaturePipeline::Program {
   std::size_t settling_samples = 0;
   std::size_t seen = 0;
   bool has_travelled = false;  ///< every operator has forgotten its state at the start
+  std::vector<double>
+      errors;  ///< of the values, by unknown states at the start; then of the features
+  std::vector<double> feature_errors;
 
   [[nodiscard]] bool have_travelled() const noexcept {
     const auto is_settled = [](const auto& of) { return of.is_settled(); };
@@ -223,6 +252,8 @@ void FeaturePipeline::Program::compile(const ExpressionGraph& graph,
   has_travelled = stops.empty() && dahls.empty();
   feature_sources = input_nodes;
   features.resize(input_nodes.size());
+  errors.resize(nodes.size());
+  feature_errors.resize(input_nodes.size());
 }
 
 std::size_t FeaturePipeline::Program::add(const Node& node, std::uint32_t target) {
@@ -274,6 +305,36 @@ double FeaturePipeline::Program::run(const Instruction& instruction) noexcept {
     case Operation::dahl: return dahls[instruction.state].step(left);
     default: return computed(instruction.operation, left, values[instruction.right]);
   }
+}
+
+double FeaturePipeline::Program::error_of(const Instruction& instruction) noexcept {
+  const double left = errors[instruction.left];
+  const double right = errors[instruction.right];
+  switch (instruction.operation) {
+    case Operation::stop: return stops[instruction.state].error(left);
+    case Operation::dahl: return dahls[instruction.state].error(left);
+    case Operation::rate: return left == 0.0 ? 0.0 : std::numeric_limits<double>::infinity();
+    case Operation::lowpass:
+    case Operation::lag: return left;
+    default: break;
+  }
+  if (left == 0.0 && right == 0.0) return 0.0;
+  double largest = 0.0;
+  for (const double from_left : {-left, left})
+    for (const double from_right : {-right, right}) {
+      const double corner = computed(instruction.operation, values[instruction.left] + from_left,
+                                     values[instruction.right] + from_right);
+      const double error = std::abs(corner - values[instruction.target]);
+      if (!(error <= largest)) largest = error;
+    }
+  return largest;
+}
+
+void FeaturePipeline::Program::bound_errors() noexcept {
+  for (const Instruction& instruction : instructions)
+    errors[instruction.target] = error_of(instruction);
+  for (std::size_t i = 0; i < feature_errors.size(); ++i)
+    feature_errors[i] = errors[feature_sources[i]];
 }
 
 FeaturePipeline::FeaturePipeline(FeatureSpec spec, double sample_rate_Hz)
@@ -343,12 +404,27 @@ std::span<const double> FeaturePipeline::step(std::span<const double> raw) noexc
   for (std::size_t i = 0; i < program.features.size(); ++i)
     program.features[i] = program.values[program.feature_sources[i]];
   if (program.seen < program.settling_samples) ++program.seen;
-  if (!program.has_travelled) program.has_travelled = program.have_travelled();
+  if (!program.has_travelled) {
+    program.has_travelled = program.have_travelled();
+    if (program.has_travelled) {
+      std::ranges::fill(program.feature_errors, 0.0);
+    } else {
+      program.bound_errors();
+    }
+  }
   return program.features;
 }
 
+bool FeaturePipeline::are_filters_settled() const noexcept {
+  return program_->seen == program_->settling_samples;
+}
+
 bool FeaturePipeline::is_settled() const noexcept {
-  return program_->seen == program_->settling_samples && program_->has_travelled;
+  return are_filters_settled() && program_->has_travelled;
+}
+
+std::span<const double> FeaturePipeline::state_errors() const noexcept {
+  return program_->feature_errors;
 }
 
 std::vector<std::string> channels_of(std::string_view expression) {

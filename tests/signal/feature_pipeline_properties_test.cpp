@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -132,6 +133,38 @@ RC_GTEST_PROP(SplitInputsLaw, UndoesJoining, (std::uint64_t seed)) {
     joined += (i > 0 ? " , " : "") + parts.back();
   }
   RC_ASSERT(split_inputs(joined) == parts);
+}
+
+// A pipeline that has seen the past of a joint, and one that begins in the middle of it.
+RC_GTEST_PROP(FeaturePipeline, TheErrorOfAnUnknownStateIsWithinItsBound, (std::uint64_t seed)) {
+  Random random(seed);
+  const FeatureSpec spec{
+      .inputs = {"stop(a, 0.5)", "dahl(a, 0.25)", "dahl(a, 0.3) * abs(b)", "dahl(a, 0.4)^2 * b",
+                 "dahl(a - stop(a, 0.1), 0.5)", "3 * stop(a, 0.2) - b * dahl(a, 0.1)",
+                 "tanh(5 * stop(a, 0.7))"},
+      .definitions = {}};
+  FeaturePipeline whole(spec, kRate_Hz);
+  double a = 0.0;
+  const double largest_step = random.uniform();
+  const auto next = [&] {
+    a += largest_step * (random.uniform() - 0.5);
+    return std::vector{a, 4.0 * random.uniform() - 2.0};
+  };
+  for (int n = 0; n < 300 || !whole.is_settled(); ++n) static_cast<void>(whole.step(next()));
+  FeaturePipeline begun(spec, kRate_Hz);
+  for (int n = 0; n < 1000; ++n) {
+    const std::vector<double> raw = next();
+    const auto expected = whole.step(raw);
+    const auto found = begun.step(raw);
+    if (begun.is_settled()) break;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      if (std::abs(found[i] - expected[i]) > begun.state_errors()[i] + 1e-6)
+        RC_FAIL(spec.inputs[i] + " after " + std::to_string(n) + " steps");
+  }
+  while (!begun.is_settled()) static_cast<void>(begun.step(next()));
+  for (const double error : begun.state_errors()) RC_ASSERT(error == 0.0);
+  begun.reset();
+  RC_ASSERT(!begun.is_settled());
 }
 
 }  // namespace

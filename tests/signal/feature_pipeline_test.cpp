@@ -1,5 +1,6 @@
 #include "torsio/signal/feature_pipeline.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -80,6 +81,21 @@ TEST(Expression, DahlFrictionApproachesItsLevelOverADistance) {
   EXPECT_DOUBLE_EQ(step(3.25), -1.0 + (2.0 - std::exp(-1.0)) * std::exp(-0.5));
   EXPECT_TRUE(std::isnan(step(std::numeric_limits<double>::quiet_NaN())));
   EXPECT_NEAR(step(-100.0), -1.0, 1e-12);
+}
+
+TEST(Expression, TheBoundOfAnUnknownStateShrinksWithTheMotion) {
+  FeaturePipeline features =
+      pipeline({"stop(x, 0.5)", "dahl(x, 0.25)", "2 * stop(x, 0.5)", "rate(stop(x, 0.5))", "x"});
+  const auto errors = [&](double x) {
+    static_cast<void>(features.step(std::vector{x}));
+    return std::vector(features.state_errors().begin(), features.state_errors().end());
+  };
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(errors(0.0), testing::ElementsAre(0.5, 1.0, 1.0, kNone, 0.0));
+  // The state is 0.2 and has been between -0.5 and 0.5: it is between -0.3 and 0.5 now.
+  EXPECT_THAT(errors(0.2),
+              testing::Pointwise(testing::DoubleEq(), {0.5, std::exp(-0.8), 1.0, kNone, 0.0}));
+  EXPECT_THAT(errors(1.0), testing::Each(0.0));
 }
 
 TEST(Expression, FrictionHasSettledAfterAMotionThatForgetsItsStart) {

@@ -34,7 +34,8 @@ namespace torsio {
 /// - `outside_training_range`: a feature is beyond the border, or a raw input has changed by more than
 ///   `kJumpFactor` times its largest step in training; linear fallback, without error bar: there is
 ///   no evidence.
-/// - `warming_up`: filters have not settled since `reset()`, a long gap or a jump; linear fallback.
+/// - `warming_up`: filters have not settled since `reset()`, a long gap or a jump; linear fallback. An unknown
+///   state of `stop` or `dahl` in the inputs is no fault, but is contained in the error bar.
 /// - `recovering`: inputs that the memory of the model has not received can still change its output by
 ///   more than its error bar (`MemoryError`); linear fallback.
 /// - a fault that the model reported, or `model_not_finite` (the model is then reset); linear
@@ -81,6 +82,8 @@ class BasicEstimator {
 
   /// Whether filters and differentiators have settled, so that the model's value is used.
   [[nodiscard]] bool is_settled() const noexcept { return core_.is_settled(); }
+  /// What the unknown states of `stop` and `dahl` in the inputs add to the error bar at present.
+  [[nodiscard]] double start_std_dev() const noexcept { return core_.start_std_dev(); }
 
   /// From now on the ticks do not come at the sample rate (or do again): `Fault::wrong_rate`, unless
   /// neither the features nor the model depend on past samples.

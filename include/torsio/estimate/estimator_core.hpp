@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <span>
@@ -50,7 +51,14 @@ class EstimatorCore {
   [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept {
     return pipeline_.raw_inputs();
   }
-  [[nodiscard]] bool is_settled() const noexcept { return pipeline_.is_settled(); }
+  /// Whether the filters have settled, and what is unknown of a hysteresis at the start has a bound.
+  [[nodiscard]] bool is_settled() const noexcept {
+    return pipeline_.are_filters_settled() && std::isfinite(start_std_dev_);
+  }
+  /// The standard deviation that the unknown states of `stop` and `dahl` at the start cause: sum of
+  /// |slope| e / sqrt(3), with the slopes of the fallback and the bounds e of the features, all values of
+  /// which are taken as equally likely. 0 once they are forgotten. Contained in the error bar.
+  [[nodiscard]] double start_std_dev() const noexcept { return start_std_dev_; }
 
   void set_zero(std::string_view channel, double value);
   [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept {
@@ -97,6 +105,7 @@ class EstimatorCore {
   [[nodiscard]] Estimate blended(Features features, double value, double std_dev,
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
+  [[nodiscard]] double start_std_dev_now() const noexcept;
   [[nodiscard]] double residual_std_at(double value) const noexcept;
   /// The first input could not be used for so many ticks, the last ones of `excluded_ticks_`.
   void interrupt(double ticks) noexcept;
@@ -128,6 +137,7 @@ class EstimatorCore {
   std::vector<double> previous_raw_;  ///< raw inputs of the last tick; NaN: none
   std::vector<double> jump_limits_;   ///< the largest change of a raw input in a tick
   std::vector<double> limited_;       ///< features
+  double start_std_dev_ = 0.0;
   MemoryError memory_error_{{}, 0.0, 1.0, 0.0};
 };
 

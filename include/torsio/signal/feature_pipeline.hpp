@@ -79,7 +79,14 @@ class FeaturePipeline {
   std::span<const double> step(std::span<const double> raw) noexcept TORSIO_REALTIME;
 
   /// Whether `settling_samples()` steps were made since `reset()`.
+  [[nodiscard]] bool are_filters_settled() const noexcept;
+  /// Whether the states of `stop` and `dahl` have forgotten those at `reset()`, too.
   [[nodiscard]] bool is_settled() const noexcept;
+  /// The largest error of each feature that the unknown states of `stop` and `dahl` at `reset()` can cause:
+  /// what is left of a state is bounded, and each operation is evaluated at the corners of its operands. A
+  /// low-pass and a lag are taken as immediate. 0 once it is settled; infinite where there is no bound (the
+  /// rate of such a state).
+  [[nodiscard]] std::span<const double> state_errors() const noexcept;
 
  private:
   struct Program;

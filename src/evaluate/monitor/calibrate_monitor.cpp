@@ -131,7 +131,7 @@ class PairStatistics {
       seen = 0;
     }
   }
-  void set_allowance() { pair_.drift_allowance = std::clamp(1.2 * largest_mean_, 0.5, 0.95); }
+  void set_allowance() { pair_.drift_allowance = std::clamp(1.2 * largest_mean_, 0.75, 0.95); }
 
   void see_sums(const std::vector<SourceRun>& runs, double rate_Hz) {
     double up_s = 0.0;
