@@ -148,6 +148,9 @@ void add_monitor(CLI::App& app) {
       ->capture_default_str();
   verb->add_flag("--extrapolate", calibration.extrapolate,
                  "permit a smaller rate than the recordings support; the file then states it");
+  verb->add_option("--least-threshold", calibration.least_threshold,
+                   "no pair of sources has a smaller one, as 1.4Nm; for what the recordings do not "
+                   "contain, as another temperature");
   verb->add_option("--valid-until", calibration.valid_until,
                    "last day of the calibration, as 2027-11-22; later the file is refused");
   SimulatedMonitorFlags& simulated = flags->simulated;

@@ -10,6 +10,7 @@
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/files/monitor_file.hpp"
@@ -132,7 +133,12 @@ void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
   const torsio::Dataset dataset = data.load_inputs(channels, progress.listener());
   const torsio::CalibratedMonitor calibrated = torsio::calibrate_monitor(
       sources, plan, dataset,
-      {.false_alarms_per_hour = flags.false_alarms_per_hour, .extrapolate = flags.extrapolate},
+      {.false_alarms_per_hour = flags.false_alarms_per_hour,
+       .extrapolate = flags.extrapolate,
+       .least_threshold_Nm =
+           flags.least_threshold.empty()
+               ? 0.0
+               : torsio::si_quantity(flags.least_threshold, "Nm", "--least-threshold")},
       progress.listener());
   for (std::size_t i = 0; i < sources.size(); ++i)
     file.models[i].error_bar_factor = calibrated.error_bar_factors[i];

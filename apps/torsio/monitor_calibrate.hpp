@@ -15,6 +15,7 @@ struct CalibrateFlags {
   std::string valid_until;
   double false_alarms_per_hour = 1.0;
   bool extrapolate = false;
+  std::string least_threshold;  ///< with unit; empty: none
 };
 
 /// Writes a monitor file from fault-free recordings.

@@ -24,6 +24,9 @@ struct CalibrationOptions {
   /// T hours without a fault support no rate below 3 / T (95 %). A smaller one is refused, or, with
   /// this, extrapolated from the tail of the differences and labelled so.
   bool extrapolate = false;
+  /// No pair has a smaller threshold, however well its sources agree in these recordings: what they do not
+  /// contain, as another temperature or age, makes them differ more.
+  double least_threshold_Nm = 0.0;
 };
 
 /// The limits of one pair of sources, in words of the data.

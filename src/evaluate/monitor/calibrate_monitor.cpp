@@ -113,8 +113,9 @@ class PairStatistics {
   }
 
   /// @param share of the blocks in which the pair may exceed its threshold
-  void set_thresholds(double share) {
-    pair_.floor_Nm = small_.threshold(share);
+  /// @param least_Nm the smallest threshold
+  void set_thresholds(double share, double least_Nm) {
+    pair_.floor_Nm = std::max(small_.threshold(share), least_Nm);
     pair_.factor = std::max(large_.threshold(share), 1.0);
   }
 
@@ -286,6 +287,10 @@ void check_arguments(const std::vector<SourceModel>& sources, const MonitorPlan&
     throw UsageError({.place = "wanted rate of false alarms",
                       .expected = "a positive number per hour",
                       .found = fmt::format("{}", options.false_alarms_per_hour)});
+  if (!(options.least_threshold_Nm >= 0.0) || !std::isfinite(options.least_threshold_Nm))
+    throw UsageError({.place = "smallest threshold of a monitor",
+                      .expected = "0 Nm or more",
+                      .found = fmt::format("{} Nm", options.least_threshold_Nm)});
   if (sources.size() != plan.sources.size() || sources.empty())
     throw Error({.place = "calibration of a monitor",
                  .expected = "one model for each source of the plan",
@@ -408,7 +413,7 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
                    .expected = fmt::format("at least {} s without a fault",
                                            kBlock_s * static_cast<double>(kLeastBlocks)),
                    .found = fmt::format("{:.0f} s", static_cast<double>(samples) / rate_Hz)});
-    pair.set_thresholds(share);
+    pair.set_thresholds(share, options.least_threshold_Nm);
     for (const std::vector<SourceRun>& runs : recorded) pair.see_drift(runs, rate_Hz);
     pair.set_allowance();
     for (const std::vector<SourceRun>& runs : recorded) pair.see_sums(runs, rate_Hz);

@@ -18,6 +18,7 @@ constexpr double kLatestStart_s = 4.0;
 constexpr double kWindow_s = 20.0;      // in which the disagreement must reach its limit
 constexpr double kSmallWindow_s = 5.0;  // a small one need not reach it
 constexpr double kMissed_s = 1.0;
+constexpr double kPause_s = 0.01;  // after which a disagreement has ended
 constexpr double kNearImpact_s = 0.1;
 constexpr double kSearchImpact_s = 30.0;
 constexpr int kMaxAttempts = 8;
@@ -91,6 +92,7 @@ struct Attempt {
   JointMonitor monitor;
   std::optional<JointMonitor> sound;           ///< with the sound signals, since the injection
   std::optional<std::size_t> onset_tick = {};  ///< of the disagreement in progress
+  std::size_t reached_tick = 0;                ///< the last one in which it was at the limit
   bool is_lasting = false;     ///< it has lasted as long as a stop may take, and counts
   std::size_t late_steps = 0;  ///< steps of the loop since an overrun began
   int watched_ticks = 0;       ///< after the onset of a fault at power-up
@@ -206,18 +208,18 @@ class Injections {
       is_reached =
           !(difference < run_.limit_share) || std::abs(plant.second_twist_rad) > largest_twist_rad_;
     }
-    if (of.is_lasting) return;
-    if (!is_reached) {
-      if (of.onset_tick) ++outcome.brief;
-      of.onset_tick.reset();
-      return;
-    }
-    if (!of.onset_tick) {
-      of.onset_tick = tick;
+    if (is_reached) of.reached_tick = tick;
+    if (is_reached && !of.onset_tick) of.onset_tick = tick;
+    if (of.onset_tick == tick)
       outcome.near_impact = bench.duty(lane).since_impact_s() < kNearImpact_s;
+    if (of.is_lasting || !of.onset_tick) return;
+    if (is_reached) {
+      of.is_lasting = run_.fault.onset == FaultOnset::start ||
+                      tick - *of.onset_tick >= ticks_of(run_.fault.limit_s);
+    } else if (tick - of.reached_tick > ticks_of(kPause_s)) {
+      ++outcome.brief;
+      of.onset_tick.reset();
     }
-    of.is_lasting = run_.fault.onset == FaultOnset::start ||
-                    tick - *of.onset_tick >= ticks_of(run_.fault.limit_s);
   }
 
   void decide(const DutyBench& bench, std::size_t lane, std::size_t tick, Attempt& of,

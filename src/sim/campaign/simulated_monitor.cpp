@@ -108,7 +108,10 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
   for (const FittedSource& source : result.sources) sources.push_back(source.model());
   result.calibrated = calibrate_monitor(
       sources, recipe.plan, fault_free,
-      {.false_alarms_per_hour = settings.false_alarms_per_hour, .extrapolate = true}, progress);
+      {.false_alarms_per_hour = settings.false_alarms_per_hour,
+       .extrapolate = true,
+       .least_threshold_Nm = settings.least_threshold_share * duty_limits(joint).torque_Nm},
+      progress);
   return result;
 }
 

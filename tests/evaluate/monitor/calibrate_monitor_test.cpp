@@ -101,6 +101,15 @@ TEST(CalibrateMonitor, TakesTheLimitsOfSignalsFromTheDataUnlessTheyAreGiven) {
   EXPECT_EQ(monitor.monitor.signals[1].highest, 50.0);
 }
 
+TEST(CalibrateMonitor, NoThresholdIsBelowTheSmallestOne) {
+  const CalibratedMonitor free = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  const double least_Nm = 2.0 * free.monitor.pairs[0].floor_Nm;
+  const CalibratedMonitor limited =
+      calibrated(5.0, {.false_alarms_per_hour = 40.0, .least_threshold_Nm = least_Nm});
+  EXPECT_EQ(limited.monitor.pairs[0].floor_Nm, least_Nm);
+  EXPECT_GE(limited.pairs[0].typical_threshold_Nm, least_Nm);
+}
+
 TEST(CalibrateMonitor, RefusesWhatItCannotUse) {
   const TwoTorques joint;
   const Dataset sound = TwoTorques::fault_free(300.0);
@@ -115,6 +124,8 @@ TEST(CalibrateMonitor, RefusesWhatItCannotUse) {
       HasSubstr("one model for each source of the plan"));
   EXPECT_THAT(message(joint.models(), TwoTorques::plan(), {}, options),
               HasSubstr("there is no recording"));
+  EXPECT_THAT(message(joint.models(), TwoTorques::plan(), sound, {.least_threshold_Nm = -1.0}),
+              HasSubstr("smallest threshold"));
   EXPECT_THAT(message(joint.models(), TwoTorques::plan(), sound, {.false_alarms_per_hour = 0.0}),
               HasSubstr("a positive number per hour"));
   EXPECT_THAT(message(joint.models(), TwoTorques::plan(), TwoTorques::fault_free(50.0),

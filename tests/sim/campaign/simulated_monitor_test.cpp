@@ -10,6 +10,7 @@
 #include "torsio/files/monitor_file.hpp"
 #include "torsio/report/monitor.hpp"
 #include "torsio/sim/campaign.hpp"
+#include "torsio/sim/campaign/fault_campaign.hpp"
 #include "torsio/sim/campaign/fused_accuracy.hpp"
 #include "torsio/sim/campaign/torque_sources.hpp"
 
@@ -93,6 +94,30 @@ TEST(SourceDelay, IsThatOfAnInputOfTheSources) {
                         1000.0);
   for (std::size_t n = 0; n < step.size(); ++n)
     EXPECT_EQ(delayed.channel("torque_Nm").values[n], input.step({&step[n], 1})[0]) << n;
+}
+
+// The campaign of docs/results/fault_campaign.txt on a small scale.
+TEST(SimulatedMonitor, MissesNoFaultAndGivesNoFalseAlarmInTwoHours) {
+  const DataSheet sheet = data_sheet("dfki-28#07");
+  const SimulatedMonitor monitor =
+      calibrate_simulated(sheet, {.training_s = 800.0, .fault_free_hours = 1.0});
+  const CampaignResult result = run_fault_campaign(
+      {{.name = full_name(sheet), .sheet = sheet, .monitor = [&] { return monitor.monitored(); }}},
+      {.seed = 11,
+       .injections = 8,
+       .injections_of_a_size = 0,
+       .fault_free_hours = 2.0,
+       .low_load_hours = 1.0});
+  EXPECT_EQ(result.classes.size(), 22U);
+  for (const ClassResult& of : result.classes) {
+    EXPECT_EQ(of.injected, 8U) << of.name;
+    EXPECT_EQ(of.detected, of.must_stop ? 8U : 0U) << of.name;
+    EXPECT_EQ(of.late, 0U) << of.name << ": " << of.latency.longest_ms << " ms";
+    EXPECT_EQ(of.stops_with_gain, 0U) << of.name;
+  }
+  EXPECT_GT(result.work.joint_hours, 1.9);
+  EXPECT_EQ(result.work.false_alarms, 0U);
+  EXPECT_EQ(result.low_load.false_alarms, 0U);
 }
 
 }  // namespace

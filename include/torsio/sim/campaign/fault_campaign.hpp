@@ -46,7 +46,7 @@ struct Latencies {
 
 /// Injections of one class into one group. The disagreement of an injection is the largest difference
 /// between two sources that the fault causes: what changes against a monitor with the sound signals.
-/// It counts where it stays at 20 % of the rated torque or more for as long as a stop may take; one that ends by
+/// It counts where it stays at 20 % of the rated torque or more, but for pauses of up to 10 ms, for as long as a stop may take; one that ends by
 /// itself sooner is `brief`. Latencies count from where it reaches 20 %, and are 0 if the monitor stopped before; for a signal that is missing, not finite or wraps, and for the loop, from the injection.
 struct ClassResult {
   std::string name;
