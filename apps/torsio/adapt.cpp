@@ -20,7 +20,7 @@ struct AdaptFlags {
   std::vector<std::string> test;
   double held_out = 0.3;
   std::string embargo = "1s";
-  std::string method = "nlms";
+  std::string method = "auto";
   std::vector<std::string> settings;
   std::string output;
   std::string device_serial;
@@ -54,7 +54,7 @@ void run(AdaptFlags& flags) {
   require_model_file(flags.output);
   const auto settings = torsio::adaptation_settings(flags.method, parse_settings(flags.settings));
   const torsio::ModelFile file = torsio::load_model(flags.model);
-  torsio::require_last_layer(file.parameters);  // before recordings are read
+  torsio::require_adaptable(file.parameters);  // before recordings are read
   ProgressBar progress;
   const torsio::Dataset dataset = load(flags, file, progress.listener());
   warn_of_seen_recordings(file, dataset);
@@ -66,8 +66,9 @@ void run(AdaptFlags& flags) {
   const torsio::AdaptationScore& held_out = adapted.held_out.back();
   if (held_out.adapted.rmse > held_out.frozen.rmse)
     remark(
-        "warning: on the held-out samples the adapted weights are worse than the frozen ones; try "
-        "a smaller step_size (initial_covariance for rls), or comparison_s as long as a cycle");
+        "warning: on the held-out samples the adapted model is worse than the frozen one; try a "
+        "smaller step_size (rls: initial_covariance, em: more component_samples), or comparison_s "
+        "as long as a cycle");
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, adapted.file);  // last: untouched unless all else succeeded
   remark(flags.output + " written");
@@ -78,7 +79,9 @@ void run(AdaptFlags& flags) {
 void add_adapt(CLI::App& app) {
   auto flags = std::make_shared<AdaptFlags>();
   CLI::App* verb = app.add_subcommand(
-      "adapt", "replay recordings through a network and adapt its last layer to them");
+      "adapt",
+      "replay recordings through a model and adapt it to them: the last layer of a network, a "
+      "mixture, or the coefficients of a grey box");
   verb->footer(
       "Example: torsio adapt joint.safetensors other_specimen.csv -o other_joint.safetensors\n"
       "         torsio adapt joint.safetensors warm.csv --test warm2.csv --method rls\n"
@@ -88,7 +91,7 @@ void add_adapt(CLI::App& app) {
       "for\n"
       "the scores.\n" +
       settings_list());
-  verb->add_option("MODEL", flags->model, "model file of an mlp, lstm or gru")->required();
+  verb->add_option("MODEL", flags->model, "model file of an mlp, lstm, gru, dgmm or grey_box")->required();
   flags->data.add_recordings(*verb, "recordings to adapt to, in this order, or a manifest");
   flags->data.add_model_mapping(*verb);
   CLI::Option* test =
@@ -102,7 +105,8 @@ void add_adapt(CLI::App& app) {
   verb->add_option(
           "--method", flags->method,
           "nlms: cheap and robust; rls: converges in fewer samples, its cost is quadratic in the "
-          "last layer's width")
+          "number of weights; em: of a dgmm; auto: nlms for a network, rls for a grey_box, em for a "
+          "dgmm")
       ->capture_default_str();
   verb->add_option("--set", flags->settings, "set an option, option=value; listed below")
       ->allow_extra_args(false);

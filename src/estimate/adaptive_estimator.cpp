@@ -3,9 +3,9 @@
 namespace torsio {
 
 AdaptiveEstimator::AdaptiveEstimator(const EstimatorSettings& settings,
-                                     const AnyModel::Parameters& network,
+                                     const AnyModel::Parameters& base,
                                      const AdaptationSettings& adaptation)
-    : estimator_(settings, AdaptiveModel({.network = network,
+    : estimator_(settings, AdaptiveModel({.base = base,
                                           .adaptation = adaptation,
                                           .sample_period_s = 1.0 / settings.sample_rate_Hz})) {}
 
@@ -21,7 +21,7 @@ Estimate AdaptiveEstimator::step(std::span<const double> raw) noexcept {
 }
 
 UpdateOutcome AdaptiveEstimator::learn(const ReferenceSample& reference) noexcept {
-  LastLayerAdapter& adapter = estimator_.model().adapter();
+  ModelAdapter& adapter = estimator_.model().adapter();
   if (last_fault_ == Fault::none) return adapter.learn(reference);
   return adapter.pass_over(last_fault_ == Fault::warming_up ? UpdateOutcome::warming_up
                                                             : UpdateOutcome::no_estimate);

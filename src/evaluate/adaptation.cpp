@@ -43,7 +43,7 @@ class Replay {
       channels_.push_back(&record.recording.channel(input).values);
   }
 
-  /// @param frozen the estimates of the frozen network for the same recording.
+  /// @param frozen the estimates of the frozen model for the same recording.
   void run(const Prediction& frozen, Tally& own, Tally& together, const Progress& progress) {
     const std::size_t samples = record_.recording.size();
     const DenormalsOff denormals_off;
@@ -102,7 +102,7 @@ void require_role(const Dataset& dataset, Role role, const char* what, const cha
        .advice = "Give longer recordings, or a model that was trained on such ones."});
 }
 
-/// Both networks on what nothing was learned from: each recording, then all of them.
+/// Both models on what nothing was learned from: each recording, then all of them.
 std::vector<AdaptationScore> held_out_scores(const SplitScore& frozen, const SplitScore& adapted) {
   std::vector<AdaptationScore> scores;
   for (std::size_t i = 0; i < frozen.recordings.size(); ++i)
@@ -117,15 +117,14 @@ void note_adaptation(ModelCard& card, const AdaptationSettings& settings,
   const auto note = [&](const std::string& key, auto value) {
     card.options["adaptation." + key] = fmt::format("{}", value);
   };
-  const bool is_rls = settings.rule == AdaptationRule::rls;
-  note("method", is_rls ? "rls" : "nlms");
+  note("method", name(settings.rule));
   note("updates", counts.updates());
   note("roll_backs", counts.roll_backs);
   note("largest_change", settings.largest_change);
-  if (is_rls) {
-    note("forgetting", settings.forgetting);
-    note("initial_covariance", settings.initial_covariance);
-  } else {
+  if (settings.rule != AdaptationRule::nlms) note("forgetting", settings.forgetting);
+  if (settings.rule == AdaptationRule::em) note("component_samples", settings.component_samples);
+  if (settings.rule == AdaptationRule::rls) note("initial_covariance", settings.initial_covariance);
+  if (settings.rule == AdaptationRule::nlms) {
     note("step_size", settings.step_size);
     note("leak", settings.leak);
   }
@@ -142,11 +141,13 @@ std::span<const OptionInfo> adaptation_options() { return options_of<AdaptationS
 
 AdaptationSettings adaptation_settings(const std::string& method,
                                        const std::map<std::string, std::string>& given) {
-  if (method != "nlms" && method != "rls")
-    throw UsageError(
-        {.place = "adaptation method", .expected = "nlms or rls", .found = '"' + method + '"'});
+  const auto* const rule = std::ranges::find(kAdaptationRules, method);
+  if (rule == kAdaptationRules.end())
+    throw UsageError({.place = "adaptation method",
+                      .expected = "auto, nlms, rls or em",
+                      .found = '"' + method + '"'});
   auto settings = filled<AdaptationSettings>(Options(adaptation_options(), given));
-  settings.rule = method == "rls" ? AdaptationRule::rls : AdaptationRule::nlms;
+  settings.rule = static_cast<AdaptationRule>(rule - kAdaptationRules.begin());
   return settings;
 }
 
@@ -155,7 +156,9 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
   dataset.check();
   refuse_seen_test_records(dataset);
   const Estimator frozen = make_estimator(model, dataset.sample_rate_Hz());
-  AdaptiveEstimator adaptive(frozen.settings(), model.parameters, settings);
+  AdaptiveEstimator adaptive(frozen.settings(),
+                             model.parameters.at_sample_period(1.0 / dataset.sample_rate_Hz()),
+                             settings);
   require_role(dataset, Role::train, "adapt to", "Name recordings to adapt to.");
   require_role(dataset, Role::test, "score on", "Name held-out recordings with --test.");
   for (const std::string& channel : frozen.settings().zeroed_channels)
@@ -174,11 +177,11 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
   }
   adapted.as_it_ran.push_back(together.score(""));
   adapted.counts = adaptive.adapter().counts();
-  if (adapted.as_it_ran.back().adapted.samples == 0)
-    refuse_unusable(adapted.counts, dataset.target);
+  if (adapted.counts.updates() == 0) refuse_unusable(adapted.counts, dataset.target);
   adapted.relative_change = adaptive.adapter().relative_change();
-  adapted.file.parameters = adaptive.adapted();
-  note_adaptation(adapted.file.card, settings, adapted.counts, dataset);
+  adapted.file.parameters =
+      adaptive.adapted().at_sample_period(1.0 / model.settings.sample_rate_Hz);
+  note_adaptation(adapted.file.card, adaptive.adapter().settings(), adapted.counts, dataset);
 
   const TrainingData lessons = training_data(dataset, model.settings.features, Role::train);
   ResidualTable residuals = residual_table(AnyModel(adapted.file.parameters), lessons);

@@ -1,80 +1,62 @@
 #include "torsio/model/adaptive_model.hpp"
 
 #include <string>
-#include <vector>
 
-#include "model/network/gru.hpp"
-#include "model/network/lstm.hpp"
-#include "model/network/mlp.hpp"
+#include "model/grey_box/grey_box_adapter.hpp"
+#include "model/mixture/dgmm_adapter.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/model/network/last_layer_adapter.hpp"
 
 namespace torsio {
 namespace {
 
 static_assert(Model<AdaptiveModel>);
 
-/// Calls `use` with the scaling and the dense layers of a network; not at all with other families.
-template <class Parameters, class Use>
-void with_network(Parameters& parameters, const Use& use) {
-  if (auto* const mlp = parameters.template get_if<Mlp::Parameters>())
-    use(mlp->scaling, mlp->layers);
-  else if (auto* const lstm = parameters.template get_if<Lstm::Parameters>())
-    use(lstm->scaling, lstm->head);
-  else if (auto* const gru = parameters.template get_if<Gru::Parameters>())
-    use(gru->scaling, gru->head);
-}
-
-LastLayerAdapter adapter_of(const AdaptiveModel::Parameters& parameters) {
-  double target_scale = 1.0;
-  with_network(parameters.network,
-               [&](const NetworkScaling& scaling, const std::vector<DenseLayer>& /*layers*/) {
-                 target_scale = scaling.target_scale;
-               });
-  return {parameters.adaptation, require_last_layer(parameters.network), target_scale,
-          parameters.sample_period_s};
+std::unique_ptr<ModelAdapter> adapter_of(const AdaptiveModel::Parameters& parameters) {
+  require_adaptable(parameters.base);
+  if (const auto* const own = parameters.base.get_if<Dgmm::Parameters>())
+    return std::make_unique<DgmmAdapter>(parameters.adaptation, *own, parameters.sample_period_s);
+  if (const auto* const own = parameters.base.get_if<GreyBox::Parameters>())
+    return std::make_unique<GreyBoxAdapter>(parameters.adaptation, *own,
+                                            parameters.sample_period_s);
+  return last_layer_adapter(parameters.adaptation, parameters.base, parameters.sample_period_s);
 }
 
 }  // namespace
 
-const DenseLayer* last_layer(const AnyModel::Parameters& parameters) noexcept {
-  const DenseLayer* last = nullptr;
-  with_network(parameters,
-               [&](const NetworkScaling& /*scaling*/, const std::vector<DenseLayer>& layers) {
-                 if (!layers.empty()) last = &layers.back();
-               });
-  return last;
-}
-
-const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters) {
-  if (const DenseLayer* const last = last_layer(parameters)) return *last;
+void require_adaptable(const AnyModel::Parameters& parameters) {
+  const bool is_adaptable = parameters.get_if<Dgmm::Parameters>() != nullptr ||
+                            parameters.get_if<GreyBox::Parameters>() != nullptr ||
+                            has_last_layer(parameters);
+  if (is_adaptable) return;
   throw UsageError({.place = "adaptation",
-                    .expected = "a network: mlp, lstm or gru",
+                    .expected = "a single network (mlp, lstm, gru), a dgmm or a grey_box",
                     .found = std::string(parameters.family()),
-                    .advice = "Only a single network has a last layer to adapt: fit one, without "
-                              "members. Other families are fitted again."});
+                    .advice = "Fit one of these, without members. Other families are fitted "
+                              "again."});
 }
 
 AdaptiveModel::AdaptiveModel(const Parameters& parameters)
-    : network_(parameters.network),
+    : model_(parameters.base),
       adapter_(adapter_of(parameters)),
       sample_period_s_(parameters.sample_period_s) {}
 
-AdaptiveModel::Parameters AdaptiveModel::parameters() const {
-  return {network_.parameters(), adapter_.settings(), sample_period_s_};
+AdaptiveModel::AdaptiveModel(const AdaptiveModel& other)
+    : model_(other.model_),
+      adapter_(other.adapter_->copy()),
+      sample_period_s_(other.sample_period_s_) {}
+
+AdaptiveModel& AdaptiveModel::operator=(const AdaptiveModel& other) {
+  if (this != &other) *this = AdaptiveModel(other);
+  return *this;
 }
 
-Estimate AdaptiveModel::step(Features features) noexcept {
-  Estimate estimate = network_.step(features);
-  estimate.value = adapter_.step(network_.last_layer_input(), estimate.value);
-  return estimate;
+AdaptiveModel::Parameters AdaptiveModel::parameters() const {
+  return {model_.parameters(), adapter_->settings(), sample_period_s_};
 }
 
 AnyModel::Parameters AdaptiveModel::adapted() const {
-  AnyModel::Parameters parameters = network_.parameters();
-  with_network(parameters, [&](NetworkScaling& /*scaling*/, std::vector<DenseLayer>& layers) {
-    layers.back() = adapter_.adapted();
-  });
-  return parameters;
+  return adapter_->adapted(model_.parameters());
 }
 
 }  // namespace torsio

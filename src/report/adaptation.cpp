@@ -32,6 +32,11 @@ Json scores_json(const std::vector<AdaptationScore>& scores) {
   return list;
 }
 
+std::string part_of(std::string_view family) {
+  if (family == "dgmm") return "mixture";
+  return family == "grey_box" ? "coefficients" : "last layer";
+}
+
 const std::string& method_of(const AdaptedModel& adapted) {
   return adapted.file.card.options.at("adaptation.method");
 }
@@ -95,12 +100,13 @@ std::string adaptation_text(const AdaptedModel& adapted, const std::string& mode
   add_rows(table, "as it ran", adapted.as_it_ran);
   add_rows(table, "held out", adapted.held_out);
   return fmt::format(
-      "last layer of {} ({}) adapted by {}, errors in {}\n\n{}\n"
+      "{} of {} ({}) adapted by {}, errors in {}\n\n{}\n"
       "as it ran: the error before each update; held out: after the last one, on samples that "
       "were\nnot used for the adaptation\n\n"
       "updates {}, of them limited to the largest change {}; skipped: {}\n"
-      "roll-backs to the frozen weights {}{}; weights changed by {:.2g} % of their norm\n",
-      model, adapted.file.parameters.family(), method_of(adapted),
+      "roll-backs to the frozen model {}{}; change of the parameters {:.2g} %\n",
+      part_of(adapted.file.parameters.family()), model, adapted.file.parameters.family(),
+      method_of(adapted),
       unit_label(adapted.file.settings.target), table.text(), counts.updates(),
       counts.of(UpdateOutcome::limited), skipped_text(counts), counts.roll_backs,
       counts.covariance_resets == 0

@@ -118,11 +118,11 @@ TEST(AdaptiveEstimator, WaitsForItsZeros) {
   EXPECT_EQ(adaptive.learn({.value = 1.0}), UpdateOutcome::updated);
 }
 
-TEST(AdaptiveEstimator, RefusesFamiliesWithoutALastLayer) {
+TEST(AdaptiveEstimator, RefusesFamiliesThatItCannotAdapt) {
   EXPECT_THAT(error_message([] {
                 AdaptiveEstimator(test::example_settings(), example<Polynomial>().parameters(), {});
               }),
-              HasSubstr("expected a network: mlp, lstm or gru, found polynomial"));
+              HasSubstr("a dgmm or a grey_box, found polynomial"));
   EXPECT_THAT(error_message([] {
                 AdaptiveEstimator(test::example_settings(), example<GruEnsemble>().parameters(),
                                   {});

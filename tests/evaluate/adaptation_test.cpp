@@ -185,7 +185,7 @@ TEST(AdaptationSettings, AreCheckedAgainstTheirTable) {
   EXPECT_EQ(adaptation_settings("rls", {{"forgetting", "0.99"}}).forgetting, 0.99);
   EXPECT_EQ(adaptation_settings("rls", {}).rule, AdaptationRule::rls);
   EXPECT_THAT(error_message([] { (void)adaptation_settings("lms", {}); }),
-              HasSubstr("expected nlms or rls"));
+              HasSubstr("expected auto, nlms, rls or em"));
   EXPECT_THAT(error_message([] {
                 (void)adaptation_settings("nlms", {{"step_size", "2"}});
               }),

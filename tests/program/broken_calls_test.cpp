@@ -209,10 +209,10 @@ TEST_F(BrokenCalls, OfAdaptationSayWhatIsMissingAndLeaveTheOutputUntouched) {
   expect_error(torsio("adapt"), kCallWasWrong, "MODEL");
   expect_error(torsio("adapt m.safetensors"), kCallWasWrong, "at least one recording");
   expect_error(torsio("adapt linear.safetensors a.csv -o old.safetensors"), kCallWasWrong,
-               "expected a network: mlp, lstm or gru, found linear");
+               "expected a single network (mlp, lstm, gru), a dgmm or a grey_box, found linear");
   expect_error(torsio("adapt nowhere.safetensors a.csv"), kWorkFailed, "nowhere");
   expect_error(torsio("adapt m.safetensors nowhere.csv"), kWorkFailed, "nowhere");
-  expect_error(torsio(call + "--method lms"), kCallWasWrong, "nlms or rls");
+  expect_error(torsio(call + "--method lms"), kCallWasWrong, "auto, nlms, rls or em");
   expect_error(torsio(call + "--set step_size=2"), kCallWasWrong, "option step_size");
   expect_error(torsio(call + "--set mu=1"), kCallWasWrong, "one of step_size");
   expect_error(torsio(call + "--set step_size"), kCallWasWrong, "option=value");

@@ -158,7 +158,9 @@ TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
               0U);
     const AdaptationCounts counts = estimator.adapter().counts();
     for (std::size_t outcome = 0; outcome < kUpdateOutcomes; ++outcome)
-      EXPECT_GT(counts.outcomes[outcome], 0U) << name(static_cast<UpdateOutcome>(outcome));
+      // A layer is restored at once.
+      EXPECT_EQ(counts.outcomes[outcome] > 0U,
+                outcome != static_cast<std::size_t>(UpdateOutcome::rolling_back)) << name(static_cast<UpdateOutcome>(outcome));
     EXPECT_GT(counts.roll_backs, 0U);
     EXPECT_EQ(heap_calls_during([&] { estimator.forget(); }), 0U);
   }

@@ -12,19 +12,20 @@
 
 namespace torsio {
 
-/// An `Estimator` around a network whose last layer is trained further during operation, from a
-/// reference sensor as long as there is one. Each tick:
+/// An `Estimator` around a model that is trained further during operation (the last layer of a
+/// network, a mixture, the coefficients of a grey box), from a reference sensor as long as there is
+/// one. Each tick:
 ///
-///     const Estimate torque = estimator.step(raw);         // weights before this tick's reference
+///     const Estimate torque = estimator.step(raw);         // before this tick's reference
 ///     estimator.learn({.value = load_cell_Nm, .age_s = age_s});
 ///
-/// Where the estimate comes from a guard and not from the network (`fault` is not `none`), nothing
+/// Where the estimate comes from a guard and not from the model (`fault` is not `none`), nothing
 /// is learned. Nothing is allocated after construction.
 class AdaptiveEstimator {
  public:
-  /// @param network of a model file (`ModelFile::parameters`). @throws Error as `Estimator` and
+  /// @param base of a model file (`ModelFile::parameters`). @throws Error as `Estimator` and
   /// `AdaptiveModel`.
-  AdaptiveEstimator(const EstimatorSettings& settings, const AnyModel::Parameters& network,
+  AdaptiveEstimator(const EstimatorSettings& settings, const AnyModel::Parameters& base,
                     const AdaptationSettings& adaptation);
 
   [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept {
@@ -34,9 +35,9 @@ class AdaptiveEstimator {
   /// As for the estimator.
   void set_zero(std::string_view channel, double value) { estimator_.set_zero(channel, value); }
 
-  /// Resets filters and hidden state; the adapted weights are kept.
+  /// Resets filters and the state of the model; what was learned is kept.
   void reset() noexcept;
-  /// Returns to the frozen network.
+  /// Returns to the frozen model.
   void forget() noexcept { estimator_.model().adapter().reset(); }
   void pause() noexcept { estimator_.model().adapter().pause(); }
   void resume() noexcept { estimator_.model().adapter().resume(); }
@@ -46,10 +47,10 @@ class AdaptiveEstimator {
   /// model's target.
   UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
 
-  [[nodiscard]] const LastLayerAdapter& adapter() const noexcept {
+  [[nodiscard]] const ModelAdapter& adapter() const noexcept {
     return estimator_.model().adapter();
   }
-  /// The network as it is now, for a model file.
+  /// The model as it is now, for a model file.
   [[nodiscard]] AnyModel::Parameters adapted() const { return estimator_.model().adapted(); }
 
  private:

@@ -1,57 +1,63 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 
 #include "torsio/core/realtime.hpp"
 #include "torsio/model/any_model.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
-#include "torsio/model/network/last_layer_adapter.hpp"
+#include "torsio/model/common/model_adapter.hpp"
 
 namespace torsio {
 
-/// The last layer of a network's parameters, or null if the family is none of `mlp`, `lstm`, `gru`.
-[[nodiscard]] const DenseLayer* last_layer(const AnyModel::Parameters& parameters) noexcept;
-/// The same. @throws UsageError where there is none.
-const DenseLayer& require_last_layer(const AnyModel::Parameters& parameters);
+/// @throws UsageError unless the family can be adapted: `mlp`, `lstm`, `gru`, `dgmm` or `grey_box`.
+void require_adaptable(const AnyModel::Parameters& parameters);
 
-/// A network whose last layer can be adapted while it runs: a `Model`, so that it can be used
-/// within an estimator's guards (`AdaptiveEstimator`).
+/// A model that can be adapted while it runs (the last layer of a network, a mixture, the
+/// coefficients of a grey box): a `Model`, so that it can be used within an estimator's guards
+/// (`AdaptiveEstimator`).
 class AdaptiveModel {
  public:
   struct Parameters {
-    AnyModel::Parameters network;
+    AnyModel::Parameters base;
     AdaptationSettings adaptation;
     double sample_period_s = 0.0;
   };
 
-  /// @throws Error as the network's own family and `LastLayerAdapter`, or UsageError if the family
-  /// has no last layer.
+  /// @throws Error as the model's own family and its adapter, or as `require_adaptable`.
   explicit AdaptiveModel(const Parameters& parameters);
+  AdaptiveModel(const AdaptiveModel& other);
+  AdaptiveModel& operator=(const AdaptiveModel& other);
+  AdaptiveModel(AdaptiveModel&&) noexcept = default;
+  AdaptiveModel& operator=(AdaptiveModel&&) noexcept = default;
+  ~AdaptiveModel() = default;
 
-  /// The parameters of the frozen network.
+  /// The parameters of the frozen model.
   [[nodiscard]] Parameters parameters() const;
-  [[nodiscard]] std::size_t input_count() const noexcept { return network_.input_count(); }
-  [[nodiscard]] std::size_t parameter_count() const noexcept { return network_.parameter_count(); }
+  [[nodiscard]] std::size_t input_count() const noexcept { return model_.input_count(); }
+  [[nodiscard]] std::size_t parameter_count() const noexcept { return model_.parameter_count(); }
 
   [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const {
-    return network_.memory(ranges);
+    return model_.memory(ranges);
   }
 
-  /// Resets the hidden state; the adapted weights are kept (`adapter().reset()` resets them).
-  void reset() noexcept { network_.reset(); }
-  /// The value of the adapted weights.
-  Estimate step(Features features) noexcept TORSIO_REALTIME;
+  /// Resets the model's state; what was learned is kept (`adapter().reset()` resets it).
+  void reset() noexcept { model_.reset(); }
+  /// The estimate of the adapted parameters.
+  Estimate step(Features features) noexcept TORSIO_REALTIME {
+    return adapter_->step(model_, features, model_.step(features));
+  }
 
-  [[nodiscard]] LastLayerAdapter& adapter() noexcept { return adapter_; }
-  [[nodiscard]] const LastLayerAdapter& adapter() const noexcept { return adapter_; }
+  [[nodiscard]] ModelAdapter& adapter() noexcept { return *adapter_; }
+  [[nodiscard]] const ModelAdapter& adapter() const noexcept { return *adapter_; }
 
-  /// The network with the present weights: an ordinary model, to be saved.
+  /// The model with the present parameters: an ordinary one, to be saved.
   [[nodiscard]] AnyModel::Parameters adapted() const;
 
  private:
-  AnyModel network_;
-  LastLayerAdapter adapter_;
+  AnyModel model_;
+  std::unique_ptr<ModelAdapter> adapter_;
   double sample_period_s_;
 };
 

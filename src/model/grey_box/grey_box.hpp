@@ -221,6 +221,9 @@ class GreyBox {
   void reset() noexcept { terms_.reset(); }
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
+  /// As of the last `step`.
+  [[nodiscard]] const GreyBoxTerms& terms() const noexcept { return terms_; }
+
   /// s_i / r_i, then v_j in the first input's unit.
   [[nodiscard]] std::span<const double> state() const noexcept { return terms_.state(); }
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME {

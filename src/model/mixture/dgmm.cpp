@@ -69,11 +69,14 @@ std::size_t Dgmm::parameter_count() const noexcept {
 }
 
 Estimate Dgmm::step(Features features) noexcept {
+  return estimate_of(forward_.query(features), features);
+}
+
+Estimate Dgmm::estimate_of(const Conditional& given, Features features) const noexcept {
   const LinearClamp& clamp = parameters_.clamp;
   double line = clamp.intercept;
   for (std::size_t j = 0; j < features.size(); ++j) line += clamp.slope[j] * features[j];
-  return guarded(forward_.query(features), line, parameters_.mixture.centre[0], clamp.width,
-                 clamp.thin_log_density);
+  return guarded(given, line, parameters_.mixture.centre[0], clamp.width, clamp.thin_log_density);
 }
 
 Estimate Dgmm::invert(double target, Features features) noexcept {

@@ -75,6 +75,10 @@ class Dgmm {
   void reset() noexcept {}
   Estimate step(Features features) noexcept TORSIO_REALTIME;
 
+  /// The estimate of a conditional distribution of the target: limited as that of `step`.
+  [[nodiscard]] Estimate estimate_of(const Conditional& given,
+                                     Features features) const noexcept TORSIO_REALTIME;
+
   /// The first input for which the target would be `target`, the other inputs as in `features`
   /// (`features[0]` is ignored): E[input 0 | target, inputs 1...], with error bar and novelty as in
   /// `step`. Without density there, the value of the linear model is returned with

@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -69,114 +68,173 @@ void sort_into_blocks(const GaussianMixture& mixture, std::span<const std::size_
   sort_into_blocks(mixture, given, order.subspan(half));
 }
 
-// The parameters of one component in the order of the packed rows.
-std::vector<double> conditional_parameters(const GaussianMixture& mixture, std::size_t component,
-                                           std::span<const std::size_t> given, std::size_t output) {
-  const std::size_t dimension = mixture.dimension();
-  const auto n = static_cast<Eigen::Index>(given.size());
-  const auto covariance = mixture.covariances.row(component);
-  Eigen::MatrixXd inner(n, n);
-  Eigen::VectorXd cross(n);
-  for (Eigen::Index r = 0; r < n; ++r) {
-    const std::size_t row = given[static_cast<std::size_t>(r)] * dimension;
-    cross(r) = covariance[row + output];
-    for (Eigen::Index c = 0; c < n; ++c)
-      inner(r, c) = covariance[row + given[static_cast<std::size_t>(c)]];
+// The parameters of one component in the order of the packed rows, on the stack and, for a number
+// of inputs known at compile time, in registers. @returns false if the given quantities have no
+// positive definite covariance.
+template <std::size_t kFixed>
+bool conditional_parameters(double weight, const double* mean, const double* covariance,
+                            std::size_t inputs, std::size_t output, double* parameters) noexcept {
+  constexpr std::size_t kMost = kFixed > 0 ? kFixed : kMaxMixtureQuantities;
+  const std::size_t n = kFixed > 0 ? kFixed : inputs;
+  const std::size_t dimension = n + 1;
+  const auto quantity = [output](std::size_t j) { return j < output ? j : j + 1; };
+  std::array<std::array<double, kMost>, kMost> factor;  // Cholesky, then its inverse
+  double log_determinant_half = 0.0;
+  for (std::size_t r = 0; r < n; ++r) {
+    for (std::size_t c = 0; c <= r; ++c) {
+      double sum = covariance[quantity(r) * dimension + quantity(c)];
+      for (std::size_t k = 0; k < c; ++k) sum -= factor[r][k] * factor[c][k];
+      if (c < r) {
+        factor[r][c] = sum / factor[c][c];
+      } else {
+        if (!(sum > 0.0 && std::isfinite(sum))) return false;
+        factor[r][r] = std::sqrt(sum);
+      }
+    }
+    log_determinant_half += std::log(factor[r][r]);
   }
-  const Eigen::LLT<Eigen::MatrixXd> cholesky(inner);
-  if (cholesky.info() != Eigen::Success)
-    throw Error({.place = fmt::format("mixture: component {}", component),
-                 .problem = "bad covariance",
-                 .expected = "one whose given quantities have a positive definite part",
-                 .found = fmt::format("none when quantity {} is the output", output)});
-  const Eigen::MatrixXd whitening =
-      cholesky.matrixL().solve(Eigen::MatrixXd::Identity(n, n)) / std::numbers::sqrt2;
-  const Eigen::VectorXd slope = cholesky.solve(cross);
-  const double log_determinant_half = cholesky.matrixLLT().diagonal().array().log().sum();
-
-  std::vector<double> parameters;
-  parameters.reserve(exact_rows(given.size()));
-  for (const std::size_t quantity : given) parameters.push_back(mixture.means(component, quantity));
-  for (Eigen::Index r = 0; r < n; ++r)
-    for (Eigen::Index c = 0; c <= r; ++c) parameters.push_back(whitening(r, c));
-  parameters.push_back(std::log(mixture.weights[component]) - log_determinant_half -
-                       0.5 * static_cast<double>(n) * std::log(2.0 * std::numbers::pi));
-  parameters.push_back(mixture.means(component, output));
-  parameters.insert(parameters.end(), slope.begin(), slope.end());
+  for (std::size_t c = 0; c < n; ++c) {
+    factor[c][c] = 1.0 / factor[c][c];
+    for (std::size_t r = c + 1; r < n; ++r) {
+      double sum = 0.0;
+      for (std::size_t k = c; k < r; ++k) sum += factor[r][k] * factor[k][c];
+      factor[r][c] = -sum / factor[r][r];
+    }
+  }
+  std::array<double, kMost> white;  // L^-1 S^ZY
+  for (std::size_t r = 0; r < n; ++r) {
+    white[r] = 0.0;
+    for (std::size_t c = 0; c <= r; ++c)
+      white[r] += factor[r][c] * covariance[quantity(c) * dimension + output];
+  }
+  double* next = parameters;
+  for (std::size_t j = 0; j < n; ++j) *next++ = mean[quantity(j)];
+  for (std::size_t r = 0; r < n; ++r)
+    for (std::size_t c = 0; c <= r; ++c) *next++ = factor[r][c] / std::numbers::sqrt2;
+  *next++ = std::log(weight) - log_determinant_half -
+            0.5 * static_cast<double>(n) * std::log(2.0 * std::numbers::pi);
+  *next++ = mean[output];
+  for (std::size_t c = 0; c < n; ++c) {
+    double slope = 0.0;
+    for (std::size_t r = c; r < n; ++r) slope += factor[r][c] * white[r];
+    *next++ = slope;
+  }
+  double variance = covariance[output * dimension + output];
+  for (std::size_t r = 0; r < n; ++r) variance -= white[r] * white[r];
   // The Schur complement of a positive definite matrix is positive; with rounding it may not be.
-  const double variance = covariance[output * dimension + output] - slope.dot(cross);
-  parameters.push_back(std::max(variance, std::numeric_limits<double>::min()));
-  return parameters;
+  *next = std::max(variance, std::numeric_limits<double>::min());
+  return true;
+}
+
+bool conditional_parameters_of(double weight, const double* mean, const double* covariance,
+                               std::size_t inputs, std::size_t output,
+                               double* parameters) noexcept {
+  switch (inputs) {
+    case 1: return conditional_parameters<1>(weight, mean, covariance, inputs, output, parameters);
+    case 2: return conditional_parameters<2>(weight, mean, covariance, inputs, output, parameters);
+    case 3: return conditional_parameters<3>(weight, mean, covariance, inputs, output, parameters);
+    case 4: return conditional_parameters<4>(weight, mean, covariance, inputs, output, parameters);
+    default: return conditional_parameters<0>(weight, mean, covariance, inputs, output, parameters);
+  }
 }
 
 }  // namespace
 
-MixtureRegression::MixtureRegression(const GaussianMixture& mixture, std::size_t output) {
+MixtureRegression::MixtureRegression(const GaussianMixture& mixture, std::size_t output,
+                                     std::size_t reserve)
+    : output_(output) {
   check(mixture);
   if (mixture.dimension() < 2 || output >= mixture.dimension())
     throw Error({.place = "mixture regression",
                  .expected = "two quantities or more and an output among them",
                  .found = fmt::format("{} quantities, output {}", mixture.dimension(), output)});
-  pack(mixture, output);
+  pack(mixture, reserve);
   // The first call of a kernel asks for the machine's instruction sets: here, not in the loop.
   static_cast<void>(query(input_centre_));
 }
 
-void MixtureRegression::pack(const GaussianMixture& mixture, std::size_t output) {
+void MixtureRegression::pack(const GaussianMixture& mixture, std::size_t reserve) {
   std::vector<std::size_t> given;
   for (std::size_t j = 0; j < mixture.dimension(); ++j) {
-    if (j == output) continue;
+    if (j == output_) continue;
     given.push_back(j);
     input_centre_.push_back(mixture.centre[j]);
     input_scale_.push_back(mixture.scale[j]);
   }
   inputs_ = given.size();
   components_ = mixture.size();
-  output_centre_ = mixture.centre[output];
-  output_scale_ = mixture.scale[output];
+  output_centre_ = mixture.centre[output_];
+  output_scale_ = mixture.scale[output_];
 
   std::vector<std::size_t> order(components_);
   std::iota(order.begin(), order.end(), std::size_t{0});
   sort_into_blocks(mixture, given, order);
 
-  const std::size_t slots = blocks_of(components_, kScanLanes) * kScanLanes;
-  const std::size_t offset_row = scan_rows(inputs_) - 1;
+  const std::size_t capacity = components_ + reserve;
+  const std::size_t slots = blocks_of(capacity, kScanLanes) * kScanLanes;
+  few_blocks_ =
+      std::max(kAlwaysExact, blocks_of(components_, kScanLanes) * (kScanLanes / kExactLanes) / 4);
   scan_.assign(slots * scan_rows(inputs_), 0.0F);
   rounded_.assign(slots * rounded_rows(inputs_), 0.0F);
   exact_.assign(slots * exact_rows(inputs_), 0.0);
-  const auto store = [&](std::size_t slot, std::size_t row, double value) {
-    const std::size_t lane = slot % kScanLanes;
-    const std::size_t block = slot / kScanLanes;
-    const std::size_t exact_block = slot / kExactLanes * exact_rows(inputs_);
-    float* const rounded = rounded_.data() + block * rounded_rows(inputs_) * kScanLanes + lane;
-    exact_[(exact_block + row) * kExactLanes + slot % kExactLanes] = value;
-    rounded[row * kScanLanes] = static_cast<float>(value);
-    if (row < inputs_) rounded[(exact_rows(inputs_) + row) * kScanLanes] = lost_to_float(value);
-    if (row <= offset_row)
-      scan_[(block * scan_rows(inputs_) + row) * kScanLanes + lane] = static_cast<float>(value);
-  };
-  largest_offset_ = -kInfinity;
-  for (std::size_t slot = 0; slot < slots; ++slot) {
-    if (slot >= components_) {
-      store(slot, offset_row, -kInfinity);
-      continue;
-    }
-    const std::vector<double> parameters =
-        conditional_parameters(mixture, order[slot], given, output);
-    double whitening_square = 0.0;
-    for (std::size_t row = 0; row < parameters.size(); ++row) {
-      store(slot, row, parameters[row]);
-      if (row < inputs_) largest_mean_ = std::max(largest_mean_, std::abs(parameters[row]));
-      if (row >= inputs_ && row < offset_row) whitening_square += parameters[row] * parameters[row];
-    }
-    largest_whitening_ = std::max(largest_whitening_, std::sqrt(whitening_square));
-    largest_offset_ = std::max(largest_offset_, parameters[offset_row]);
-  }
+  for (std::size_t slot = components_; slot < slots; ++slot)
+    store(slot, scan_rows(inputs_) - 1, -kInfinity);
+  component_at_ = order;
+  for (std::size_t slot = components_; slot < slots; ++slot) component_at_.push_back(slot);
+  slot_of_.resize(slots);
+  for (std::size_t slot = 0; slot < slots; ++slot) slot_of_[component_at_[slot]] = slot;
+  parameters_.resize(exact_rows(inputs_));
+  bounds_.offset = -kInfinity;
+  for (std::size_t i = 0; i < components_; ++i)
+    if (!set(i, mixture.weights[i], mixture.means.row(i), mixture.covariances.row(i)))
+      throw Error({.place = fmt::format("mixture: component {}", i),
+                   .problem = "bad covariance",
+                   .expected = "one whose given quantities have a positive definite part",
+                   .found = fmt::format("none when quantity {} is the output", output_)});
+  slot_of_.resize(capacity);
+  first_bounds_ = bounds_;
   standardised_.resize(inputs_);
   scan_input_.resize(2 * inputs_);
   scan_log_weights_.resize(slots);
   log_weights_.resize(slots);
   candidates_.resize(slots / kExactLanes);
+}
+
+void MixtureRegression::store(std::size_t slot, std::size_t row, double value) noexcept {
+  const std::size_t lane = slot % kScanLanes;
+  const std::size_t block = slot / kScanLanes;
+  const std::size_t exact_block = slot / kExactLanes * exact_rows(inputs_);
+  float* const rounded = rounded_.data() + block * rounded_rows(inputs_) * kScanLanes + lane;
+  exact_[(exact_block + row) * kExactLanes + slot % kExactLanes] = value;
+  rounded[row * kScanLanes] = static_cast<float>(value);
+  if (row < inputs_) rounded[(exact_rows(inputs_) + row) * kScanLanes] = lost_to_float(value);
+  if (row < scan_rows(inputs_))
+    scan_[(block * scan_rows(inputs_) + row) * kScanLanes + lane] = static_cast<float>(value);
+}
+
+void MixtureRegression::store(std::size_t slot, std::span<const double> parameters) noexcept {
+  const std::size_t offset_row = scan_rows(inputs_) - 1;
+  double whitening_square = 0.0;
+  for (std::size_t row = 0; row < parameters.size(); ++row) {
+    store(slot, row, parameters[row]);
+    if (row < inputs_) bounds_.mean = std::max(bounds_.mean, std::abs(parameters[row]));
+    if (row >= inputs_ && row < offset_row) whitening_square += parameters[row] * parameters[row];
+  }
+  bounds_.whitening = std::max(bounds_.whitening, std::sqrt(whitening_square));
+  bounds_.offset = std::max(bounds_.offset, parameters[offset_row]);
+}
+
+bool MixtureRegression::set(std::size_t component, double weight, std::span<const double> mean,
+                            std::span<const double> covariance) noexcept {
+  if (!(weight > 0.0) || !conditional_parameters_of(weight, mean.data(), covariance.data(), inputs_,
+                                                    output_, parameters_.data()))
+    return false;
+  store(slot_of_[component], parameters_);
+  return true;
+}
+
+void MixtureRegression::remove(std::size_t component) noexcept {
+  store(slot_of_[component], scan_rows(inputs_) - 1, -kInfinity);
 }
 
 void MixtureRegression::standardise(Features inputs) noexcept {
@@ -189,7 +247,8 @@ void MixtureRegression::standardise(Features inputs) noexcept {
 
 Conditional MixtureRegression::physical(const Conditional& standardised) const noexcept {
   return {output_centre_ + output_scale_ * standardised.mean,
-          output_scale_ * output_scale_ * standardised.variance, standardised.log_density};
+          output_scale_ * output_scale_ * standardised.variance,
+          standardised.log_density - log_total_};
 }
 
 // Below this log weight no component can matter. A float32 log weight of one that can, whose
@@ -197,14 +256,14 @@ Conditional MixtureRegression::physical(const Conditional& standardised) const n
 // are rounded, and so is each operation on w.
 double MixtureRegression::threshold(double largest) const noexcept {
   const auto count = static_cast<double>(inputs_);
-  const double cut = kNegligible + std::log(static_cast<double>(components_));
-  double reach = largest_mean_;
-  for (const double z : standardised_) reach = std::max(reach, std::abs(z) + largest_mean_);
-  const double distance = std::sqrt(std::max(0.0, largest_offset_ - largest + cut));
-  const double shift = kRounding * reach * std::sqrt(count) * largest_whitening_;
+  const double cut = kNegligible + std::log(static_cast<double>(slot_of_.size()));
+  double reach = bounds_.mean;
+  for (const double z : standardised_) reach = std::max(reach, std::abs(z) + bounds_.mean);
+  const double distance = std::sqrt(std::max(0.0, bounds_.offset - largest + cut));
+  const double shift = kRounding * reach * std::sqrt(count) * bounds_.whitening;
   const double error =
       2.0 * distance * shift + shift * shift +
-      kRounding * (std::abs(largest_offset_) + (2.0 * count + 4.0) * distance * distance);
+      kRounding * (std::abs(bounds_.offset) + (2.0 * count + 4.0) * distance * distance);
   return largest - cut - 2.0 * error;
 }
 
@@ -213,9 +272,9 @@ double MixtureRegression::threshold(double largest) const noexcept {
 bool MixtureRegression::float_is_enough(double largest) const noexcept {
   constexpr double kGood = 5e-5;
   constexpr double kHeavy = 5.0;  // lighter than e^-5, an error counts for less than a hundredth
-  const double square = std::max(0.0, largest_offset_ - largest + kHeavy);
+  const double square = std::max(0.0, bounds_.offset - largest + kHeavy);
   const double operations = 2.0 * static_cast<double>(inputs_) + 4.0;
-  return 0.5 * kRounding * (std::abs(largest) + std::abs(largest_offset_) + operations * square) <
+  return 0.5 * kRounding * (std::abs(largest) + std::abs(bounds_.offset) + operations * square) <
          kGood;
 }
 
@@ -229,21 +288,72 @@ Conditional MixtureRegression::query(Features inputs) noexcept {
       mixture_kernels::select(scan_log_weights_.data(), candidates_.size(),
                               static_cast<float>(threshold(top)), largest, candidates_.data());
   bytes_read_ = scan_.size() * sizeof(float);
+  last_largest_ = largest;
+  last_blocks_ = count;
+  last_lanes_ = kExactLanes;
 
-  const bool few = count <= std::max(kAlwaysExact, candidates_.size() / 4);
-  if (few || !float_is_enough(top)) {
+  if (count <= few_blocks_ || !float_is_enough(top)) {
     bytes_read_ += count * exact_rows(inputs_) * kExactLanes * sizeof(double);
-    return physical(mixture_kernels::finish(exact_.data(), inputs_, standardised_.data(),
-                                            candidates_.data(), count, log_weights_.data()));
+    const Conditional found =
+        mixture_kernels::finish(exact_.data(), inputs_, standardised_.data(), candidates_.data(),
+                                count, log_weights_.data());
+    last_log_density_ = found.log_density;
+    return physical(found);
   }
   std::size_t pairs = 0;  // the larger blocks that hold the candidates
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t pair = candidates_[k] / (kScanLanes / kExactLanes);
     if (pairs == 0 || candidates_[pairs - 1] != pair) candidates_[pairs++] = pair;
   }
+  last_blocks_ = pairs;
+  last_lanes_ = kScanLanes;
   bytes_read_ += pairs * rounded_rows(inputs_) * kScanLanes * sizeof(float);
-  return physical(mixture_kernels::finish_rounded(rounded_.data(), inputs_, scan_input_.data(),
-                                                  candidates_.data(), pairs, best, largest));
+  const Conditional found = mixture_kernels::finish_rounded(
+      rounded_.data(), inputs_, scan_input_.data(), candidates_.data(), pairs, best, largest);
+  last_log_density_ = found.log_density;
+  return physical(found);
+}
+
+double MixtureRegression::log_weight(std::size_t slot) const noexcept {
+  const double* const block =
+      exact_.data() + slot / kExactLanes * exact_rows(inputs_) * kExactLanes + slot % kExactLanes;
+  double square = 0.0;
+  std::size_t row = inputs_;
+  for (std::size_t r = 0; r < inputs_; ++r) {
+    double white = 0.0;
+    for (std::size_t c = 0; c <= r; ++c, ++row)
+      white += block[row * kExactLanes] * (standardised_[c] - block[c * kExactLanes]);
+    square += white * white;
+  }
+  return block[row * kExactLanes] - square;
+}
+
+std::size_t MixtureRegression::heaviest(double least, std::span<Share> found) const noexcept {
+  // Of a float32 log weight: what `threshold` allows for is far smaller where weights matter.
+  constexpr double kMargin = 0.1;
+  const double lightest = static_cast<double>(last_largest_) + std::log(least) - kMargin;
+  auto limit = static_cast<float>(lightest);
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < last_blocks_; ++k) {
+    const std::size_t first = candidates_[k] * last_lanes_;
+    for (std::size_t slot = first; slot < first + last_lanes_; ++slot) {
+      const float weight = scan_log_weights_[slot];
+      if (!(weight >= limit) || std::isinf(weight)) continue;
+      const bool is_full = count == found.size();
+      std::size_t at = is_full ? count - 1 : count++;
+      for (; at > 0 && found[at - 1].log_weight < static_cast<double>(weight); --at)
+        found[at] = found[at - 1];
+      found[at] = {.component = slot, .log_weight = static_cast<double>(weight)};
+      if (count == found.size())
+        limit = std::max(limit, static_cast<float>(found[count - 1].log_weight));
+    }
+  }
+  for (Share& each : found.first(count)) {
+    each.log_weight = log_weight(each.component);
+    each.share = std::exp(each.log_weight - last_log_density_);
+    each.component = component_at_[each.component];
+  }
+  return count;
 }
 
 void MixtureRegression::query(const Matrix& inputs, std::span<Conditional> results) noexcept {
@@ -252,13 +362,14 @@ void MixtureRegression::query(const Matrix& inputs, std::span<Conditional> resul
 
 Conditional MixtureRegression::query_exact(Features inputs) const noexcept {
   const std::size_t rows = exact_rows(inputs_);
+  const std::size_t capacity = slot_of_.size();
   const auto parameter = [&](std::size_t component, std::size_t row) {
     return exact_[(component / kExactLanes * rows + row) * kExactLanes + component % kExactLanes];
   };
   const auto centred = [&](std::size_t component, std::size_t j) {
     return (inputs[j] - input_centre_[j]) / input_scale_[j] - parameter(component, j);
   };
-  const auto log_weight = [&](std::size_t component) {
+  const auto log_weight_of = [&](std::size_t component) {
     double square = 0.0;
     std::size_t row = inputs_;
     for (std::size_t r = 0; r < inputs_; ++r) {
@@ -278,20 +389,20 @@ Conditional MixtureRegression::query_exact(Features inputs) const noexcept {
   };
 
   double largest = -kInfinity;
-  for (std::size_t i = 0; i < components_; ++i) largest = std::max(largest, log_weight(i));
+  for (std::size_t i = 0; i < capacity; ++i) largest = std::max(largest, log_weight_of(i));
   double total = 0.0;
   double mean = 0.0;
-  for (std::size_t i = 0; i < components_; ++i) {
-    const double weight = std::exp(log_weight(i) - largest);
+  for (std::size_t i = 0; i < capacity; ++i) {
+    const double weight = std::exp(log_weight_of(i) - largest);
     total += weight;
     mean += weight * output_mean(i);
   }
   mean /= total;
   double variance = 0.0;
-  for (std::size_t i = 0; i < components_; ++i) {
+  for (std::size_t i = 0; i < capacity; ++i) {
     const double deviation = output_mean(i) - mean;
     variance +=
-        std::exp(log_weight(i) - largest) * (parameter(i, rows - 1) + deviation * deviation);
+        std::exp(log_weight_of(i) - largest) * (parameter(i, rows - 1) + deviation * deviation);
   }
   return physical({mean, variance / total, largest + std::log(total)});
 }

@@ -1,11 +1,11 @@
-#include "model/network/adaptation_kernels.hpp"
+#include "model/common/adaptation_kernels.hpp"
 
 #include <algorithm>
 
 // Highway compiles this file once for each instruction set; the order of its headers matters.
 // clang-format off
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "model/network/adaptation_kernels.cpp"
+#define HWY_TARGET_INCLUDE "model/common/adaptation_kernels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 // clang-format on

@@ -1,4 +1,4 @@
-#include "torsio/model/network/moving_comparison.hpp"
+#include "torsio/model/common/moving_comparison.hpp"
 
 #include <algorithm>
 

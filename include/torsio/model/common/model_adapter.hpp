@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "torsio/core/realtime.hpp"
+#include "torsio/model/common/adaptation.hpp"
+#include "torsio/model/common/model.hpp"
+#include "torsio/model/common/moving_comparison.hpp"
+
+namespace torsio {
+
+class AnyModel;
+class AnyParameters;
+
+/// Adapts some parameters of a model to a reference, sample by sample: what the adapters of all
+/// families have in common. A family adds its parameters and how they follow an error (`update`).
+///
+/// Guards: no update in the dead zone, beyond the largest error, or by a reference that is stale,
+/// frozen, saturated or no number; back to the frozen parameters when the RMSE over the last
+/// `comparison_s` exceeds that of the frozen model on the same samples. Samples whose reference is
+/// beyond the largest error of both do not count there.
+///
+/// Source: specification 3.4. Nothing is allocated after construction.
+class ModelAdapter {
+ public:
+  virtual ~ModelAdapter() = default;
+  [[nodiscard]] virtual std::unique_ptr<ModelAdapter> copy() const = 0;
+
+  /// `rule` and `largest_error` are never `automatic` and NaN here.
+  [[nodiscard]] const AdaptationSettings& settings() const noexcept { return settings_; }
+
+  /// Returns to the frozen parameters, all at once, and resets the counters.
+  void reset() noexcept TORSIO_REALTIME;
+
+  /// While paused, references are ignored; the adapted parameters stay in use.
+  void pause() noexcept { paused_ = true; }
+  void resume() noexcept { paused_ = false; }
+  [[nodiscard]] bool is_paused() const noexcept { return paused_; }
+
+  /// @param model the frozen one after its step. @param frozen what that returned.
+  /// @returns the estimate with the adapted parameters, or `frozen` if something is not finite.
+  virtual Estimate step(const AnyModel& model, Features features,
+                        const Estimate& frozen) noexcept TORSIO_REALTIME = 0;
+
+  /// Trains on the reference of the last step. Call it in every tick, with NaN where there is no
+  /// reference.
+  UpdateOutcome learn(const ReferenceSample& reference) noexcept TORSIO_REALTIME;
+  /// Counts a tick whose estimate was not the model's: `warming_up` or `no_estimate`.
+  UpdateOutcome pass_over(UpdateOutcome reason) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] const AdaptationCounts& counts() const noexcept { return counts_; }
+  /// How far the parameters are from the frozen ones; 0 without updates. What it is relative to is
+  /// stated by the adapter.
+  [[nodiscard]] virtual double relative_change() const noexcept = 0;
+  /// @param base the frozen parameters. @returns those with what was learned: an ordinary model.
+  [[nodiscard]] virtual AnyParameters adapted(AnyParameters base) const = 0;
+
+ protected:
+  /// @param automatic what `AdaptationRule::automatic` means for this family.
+  /// @param target_scale the spread of the target in training, its unit.
+  /// @throws Error if a setting is out of range.
+  ModelAdapter(const AdaptationSettings& settings, AdaptationRule automatic, double target_scale,
+               double sample_period_s);
+  ModelAdapter(const ModelAdapter&) = default;
+  ModelAdapter& operator=(const ModelAdapter&) = default;
+
+  [[nodiscard]] double target_scale() const noexcept { return target_scale_; }
+
+  /// The values of a step; without one, nothing is learned from the reference.
+  void begin_step() noexcept { has_step_ = false; }
+  void end_step(double frozen_value, double adapted_value) noexcept;
+  void count_covariance_reset() noexcept { ++counts_.covariance_resets; }
+
+ private:
+  /// One update. @param error reference - adapted value, in spreads of the target.
+  [[nodiscard]] virtual UpdateOutcome update(double error) noexcept = 0;
+  /// Returns to the frozen parameters; with many of them in the next steps, a bounded number in each.
+  virtual void restore() noexcept = 0;
+  /// Ends what `restore` has begun.
+  virtual void restore_at_once() noexcept {}
+
+  [[nodiscard]] UpdateOutcome outcome_of(const ReferenceSample& reference) noexcept;
+  /// Why a reference must not be used; `updated` if it may be.
+  [[nodiscard]] UpdateOutcome doubt_about(const ReferenceSample& reference) const noexcept;
+  void compare(double adapted_error, double frozen_error) noexcept;
+  void roll_back() noexcept;
+  UpdateOutcome counted(UpdateOutcome outcome) noexcept;
+
+  AdaptationSettings settings_;
+  double target_scale_;
+  std::size_t frozen_after_ticks_;
+  double frozen_value_ = 0.0;   ///< at the last step
+  double adapted_value_ = 0.0;  ///< at the last step
+  bool has_step_ = false;
+  double last_reference_ = kNotMeasured;
+  std::size_t unchanged_ticks_ = 0;
+  detail::MovingComparison comparison_;
+  AdaptationCounts counts_;
+  bool paused_ = false;
+};
+
+namespace detail {
+
+/// @throws UsageError naming the rules that a family has, if `rule` is none of them.
+void require_rule(AdaptationRule rule, bool is_supported, const std::string& family,
+                  const std::string& supported);
+
+}  // namespace detail
+
+}  // namespace torsio
