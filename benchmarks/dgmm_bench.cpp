@@ -1,3 +1,5 @@
+#include "dgmm_bench.hpp"
+
 #include <cmath>
 #include <vector>
 
@@ -8,12 +10,15 @@
 #include "torsio/core/random.hpp"
 
 namespace torsio::bench {
+
 namespace {
 
 constexpr std::size_t kSamples = 216000;
 constexpr std::size_t kQueries = 100000;
 constexpr std::size_t kFewQueries = 1000;
 constexpr std::size_t kInputs = 3;
+
+}  // namespace
 
 // A lever moved back and forth on a spring with friction, with growing amplitude: torque, deflection,
 // deflection rate, joint speed. Numbers without unit, all of the order of one.
@@ -37,6 +42,8 @@ Matrix spring_samples(std::size_t count, std::uint64_t seed) {
   return samples;
 }
 
+namespace {
+
 // Any number of them is spread over the whole record.
 Matrix query_inputs(std::size_t count) {
   const Matrix samples = spring_samples(kSamples, 2);
@@ -58,10 +65,21 @@ GaussianMixture learned(const Matrix& samples, const OnlineMixtureSettings& sett
 constexpr OnlineMixtureSettings kFull{.components = 5000, .novelty_distance = 0.1};
 constexpr OnlineMixtureSettings kHundred{.components = 100, .novelty_distance = 0.3};
 
+constexpr OnlineMixtureSettings kThreeHundred{.components = 300, .novelty_distance = 0.25};
+
+}  // namespace
+
 const GaussianMixture& full_mixture() {
   static const GaussianMixture mixture = learned(spring_samples(kSamples, 1), kFull);
   return mixture;
 }
+
+const GaussianMixture& small_mixture() {
+  static const GaussianMixture mixture = learned(spring_samples(kSamples, 1), kThreeHundred);
+  return mixture;
+}
+
+namespace {
 
 double mean_query_bytes(MixtureRegression& regression, const Matrix& inputs) {
   double sum = 0.0;

@@ -7,6 +7,11 @@ namespace torsio::bench {
 Row dgmm_5000_query();
 Row dgmm_100k_batch();
 Row dgmm_online_216k();
+Row dgmm_learn_300();
+Row dgmm_learn_300_worst();
+Row dgmm_learn_5000();
+Row dgmm_learn_5000_worst();
+Row grey_box_learn();
 Row em_k100_iteration();
 Row csv_load();
 Row simulate_dfki_120();

@@ -91,7 +91,8 @@ void add_adapt(CLI::App& app) {
       "for\n"
       "the scores.\n" +
       settings_list());
-  verb->add_option("MODEL", flags->model, "model file of an mlp, lstm, gru, dgmm or grey_box")->required();
+  verb->add_option("MODEL", flags->model, "model file of an mlp, lstm, gru, dgmm or grey_box")
+      ->required();
   flags->data.add_recordings(*verb, "recordings to adapt to, in this order, or a manifest");
   flags->data.add_model_mapping(*verb);
   CLI::Option* test =
@@ -105,7 +106,8 @@ void add_adapt(CLI::App& app) {
   verb->add_option(
           "--method", flags->method,
           "nlms: cheap and robust; rls: converges in fewer samples, its cost is quadratic in the "
-          "number of weights; em: of a dgmm; auto: nlms for a network, rls for a grey_box, em for a "
+          "number of weights; em: of a dgmm; auto: nlms for a network, rls for a grey_box, em for "
+          "a "
           "dgmm")
       ->capture_default_str();
   verb->add_option("--set", flags->settings, "set an option, option=value; listed below")

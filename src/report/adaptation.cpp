@@ -106,8 +106,7 @@ std::string adaptation_text(const AdaptedModel& adapted, const std::string& mode
       "updates {}, of them limited to the largest change {}; skipped: {}\n"
       "roll-backs to the frozen model {}{}; change of the parameters {:.2g} %\n",
       part_of(adapted.file.parameters.family()), model, adapted.file.parameters.family(),
-      method_of(adapted),
-      unit_label(adapted.file.settings.target), table.text(), counts.updates(),
+      method_of(adapted), unit_label(adapted.file.settings.target), table.text(), counts.updates(),
       counts.of(UpdateOutcome::limited), skipped_text(counts), counts.roll_backs,
       counts.covariance_resets == 0
           ? ""

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -198,6 +200,104 @@ TEST(AdaptationSettings, AreCheckedAgainstTheirTable) {
   EXPECT_EQ(adaptation_settings("nlms", {{"saturation", "40"}}).saturation, 40.0);
   EXPECT_EQ(adaptation_settings("nlms", {}).step_size, AdaptationSettings{}.step_size);
 }
+
+// ---- a mixture and a grey box -------------------------------------------------------------------
+
+const ModelFile& bench_model_of(const std::string& family) {
+  static std::map<std::string, ModelFile> models;
+  if (const auto known = models.find(family); known != models.end()) return known->second;
+  const Dataset dataset = test::bench_dataset();
+  ModelChoice choice{.family = family, .options = {}, .features = resolve_inputs(dataset, {})};
+  if (family == "dgmm") choice.options = {{"components", "60"}};
+  if (family == "grey_box") choice.options = {{"passive", "true"}};
+  return models.emplace(family, train_model(dataset, choice, 1).file).first->second;
+}
+
+/// The same joint, whose spring has become softer or stiffer.
+Dataset changed_stiffness(double by,
+                          const std::function<double(std::size_t, double)>& sensor = {}) {
+  Dataset dataset;
+  const test::BenchOptions lesson{.stiffness_Nm_rad = 500.0 * by, .samples = 60000, .seed = 5};
+  add_record(dataset, bench_recording("lesson", lesson), Role::train);
+  if (sensor) {
+    const Recording given = dataset.records[0].recording;
+    Recording changed("lesson", 1000.0);
+    for (const char* name : {"gear_angle_rad", "joint_angle_rad"}) changed.add(given.channel(name));
+    Channel torque = given.channel("torque_Nm");
+    for (std::size_t n = 0; n < torque.values.size(); ++n)
+      torque.values[n] = sensor(n, torque.values[n]);
+    changed.add(std::move(torque));
+    dataset.records[0].recording = std::move(changed);
+  }
+  add_record(
+      dataset,
+      bench_recording(
+          "exam",
+          {.stiffness_Nm_rad = 500.0 * by, .amplitude_rad = 0.027, .samples = 8000, .seed = 6}),
+      Role::test);
+  return dataset;
+}
+
+class AdaptFamily : public testing::TestWithParam<const char*> {};
+
+TEST_P(AdaptFamily, FollowsAChangeOfStiffnessOfATenth) {
+  for (const double by : {0.9, 1.1}) {
+    const AdaptedModel adapted =
+        adapt_model(bench_model_of(GetParam()), changed_stiffness(by), settings_for("auto"));
+    const AdaptationScore& exam = adapted.held_out.back();
+    EXPECT_LT(exam.adapted.rmse, 0.6 * exam.frozen.rmse) << by;
+    EXPECT_EQ(adapted.counts.roll_backs, 0U);
+  }
+}
+
+TEST_P(AdaptFamily, IsDeterministicAndTheFileHasTheScores) {
+  const Dataset dataset = changed_stiffness(1.1);
+  const AdaptedModel one = adapt_model(bench_model_of(GetParam()), dataset, {});
+  const AdaptedModel two = adapt_model(bench_model_of(GetParam()), dataset, {});
+  EXPECT_EQ(model_bytes(one.file), model_bytes(two.file));
+  EXPECT_EQ(one.counts, two.counts);
+  EXPECT_EQ(one.file.card.options.at("adaptation.method"),
+            GetParam() == std::string("dgmm") ? "em" : "rls");
+  const TemporaryFolder folder;
+  save_model(folder.path("adapted.safetensors"), one.file);
+  const SplitScore score = evaluate(
+      make_estimator(load_model(folder.path("adapted.safetensors")), 1000.0), dataset, Role::test);
+  EXPECT_EQ(score.together.metrics.rmse, one.held_out.back().adapted.rmse);
+}
+
+TEST_P(AdaptFamily, SaturatedAndStuckSensorsAndGapsAreCountedAndOtherUnitsAreRefused) {
+  constexpr double kEnd_Nm = 8.0;
+  const auto broken = [](std::size_t n, double torque) {
+    if (n >= 20000 && n < 25000) return 3.0;           // stuck
+    if (n >= 30000 && n < 35000) return std::nan("");  // not measured
+    return std::clamp(torque, -kEnd_Nm, kEnd_Nm);
+  };
+  AdaptationSettings settings = settings_for("auto");
+  settings.saturation = kEnd_Nm;
+  const AdaptedModel adapted =
+      adapt_model(bench_model_of(GetParam()), changed_stiffness(1.0, broken), settings);
+  EXPECT_GT(adapted.counts.of(UpdateOutcome::reference_saturated), 1000U);
+  EXPECT_EQ(adapted.counts.of(UpdateOutcome::reference_not_finite), 5000U);
+  EXPECT_EQ(adapted.counts.of(UpdateOutcome::reference_stale), 4800U);
+  EXPECT_LT(adapted.held_out.back().adapted.rmse, 1.1 * adapted.held_out.back().frozen.rmse);
+
+  const auto millis = [](std::size_t, double torque) { return 1000.0 * (torque + 40.0); };
+  EXPECT_THAT(error_message([&] {
+                (void)adapt_model(bench_model_of(GetParam()), changed_stiffness(1.0, millis), {});
+              }),
+              HasSubstr("no sample could be used for the adaptation"));
+  const auto stuck = [](std::size_t, double) { return 3.0; };
+  EXPECT_THAT(error_message([&] {
+                AdaptationSettings strict = settings_for("auto");
+                strict.sensor_std = 100.0;
+                (void)adapt_model(bench_model_of(GetParam()), changed_stiffness(1.0, stuck),
+                                  strict);
+              }),
+              HasSubstr("reference_stale"));
+}
+
+INSTANTIATE_TEST_SUITE_P(, AdaptFamily, testing::Values("dgmm", "grey_box"),
+                         [](const auto& family) { return std::string(family.param); });
 
 // ---- the experiment of docs/adaptation.md -------------------------------------------------------
 

@@ -160,10 +160,51 @@ TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
     for (std::size_t outcome = 0; outcome < kUpdateOutcomes; ++outcome)
       // A layer is restored at once.
       EXPECT_EQ(counts.outcomes[outcome] > 0U,
-                outcome != static_cast<std::size_t>(UpdateOutcome::rolling_back)) << name(static_cast<UpdateOutcome>(outcome));
+                outcome != static_cast<std::size_t>(UpdateOutcome::rolling_back))
+          << name(static_cast<UpdateOutcome>(outcome));
     EXPECT_GT(counts.roll_backs, 0U);
     EXPECT_EQ(heap_calls_during([&] { estimator.forget(); }), 0U);
   }
+}
+
+/// The parameters of a mixture and of a grey box for the channels of `example_settings`.
+template <class Family>
+class AdaptedInPlace : public testing::Test {};
+using InPlace = testing::Types<Dgmm, GreyBox>;
+TYPED_TEST_SUITE(AdaptedInPlace, InPlace);
+
+TYPED_TEST(AdaptedInPlace, NeverTouchesTheHeapOnAnyPath) {
+  EstimatorSettings settings = test::example_settings();
+  settings.zeroed_channels.clear();
+  const auto parameters = example<TypeParam>().parameters();
+  Estimator frozen(settings, AnyModel(example<TypeParam>()));
+  AdaptiveEstimator estimator(settings, parameters,
+                              {.forgetting = 0.9,
+                               .initial_covariance = 1.0,
+                               .trace_cap = 100.0,
+                               .component_samples = 1.0,
+                               .sensor_std = 0.01,
+                               .saturation = 100.0,
+                               .largest_change = 0.02,
+                               .comparison_s = 0.5});
+  EXPECT_EQ(heap_calls_during([&] {
+              for (int n = 0; n < 8000; ++n) {
+                const std::array raw{0.1 * std::sin(0.01 * n), 0.0};
+                const double output = estimator.step(raw).value;
+                (void)estimator.learn(troublesome(n, output, frozen.step(raw).value));
+                if (n == 2000) estimator.pause();
+                if (n == 2100) estimator.resume();
+              }
+              (void)estimator.step(std::array{kNaN, 0.0});
+              (void)estimator.learn({.value = 1.0});
+              estimator.reset();
+            }),
+            0U);
+  const AdaptationCounts counts = estimator.adapter().counts();
+  EXPECT_GT(counts.of(UpdateOutcome::updated), 0U);
+  EXPECT_GT(counts.of(UpdateOutcome::limited), 0U);
+  EXPECT_GT(counts.roll_backs, 0U);
+  EXPECT_EQ(heap_calls_during([&] { estimator.forget(); }), 0U);
 }
 
 TYPED_TEST(EveryFamily, AnEstimatorAroundItNeverTouchesTheHeapOnAnyPath) {

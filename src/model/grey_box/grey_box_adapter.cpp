@@ -67,18 +67,16 @@ GreyBoxAdapter::GreyBoxAdapter(const AdaptationSettings& settings, const GreyBox
     : ModelAdapter(settings, AdaptationRule::rls, spread_of(base), sample_period_s),
       place_(base.terms.columns(), kNone),
       rise_(rises(base)),
-      weights_(
-          (detail::require_rule(this->settings().rule, this->settings().rule != AdaptationRule::em,
-                                "grey box", "auto, rls or nlms"),
-           add_terms(base, settings.largest_change), this->settings()),
-          active_.size()) {
+      weights_(this->settings(), add_terms(base, settings.largest_change)) {
+  detail::require_rule(this->settings().rule, this->settings().rule != AdaptationRule::em,
+                       "grey box", "auto, rls or nlms");
   pools_.resize(rise_.size());
   if (!rise_.empty())
     for (double& sum : rise_)
       if (place_[0] != kNone) sum /= active_[place_[0]].scale;
 }
 
-void GreyBoxAdapter::add_terms(const GreyBox::Parameters& base, double largest_change) {
+std::size_t GreyBoxAdapter::add_terms(const GreyBox::Parameters& base, double largest_change) {
   const GreyBoxTerms::Structure& terms = base.terms;
   const Matrix& values = base.coefficients.values;
   const auto add_group = [&](std::size_t first, std::size_t end, bool may_be_bounded) {
@@ -99,6 +97,7 @@ void GreyBoxAdapter::add_terms(const GreyBox::Parameters& base, double largest_c
   add_group(terms.first_relaxation(), terms.first_slope(), true);
   for (std::size_t column = terms.first_slope(); column < terms.columns(); ++column)
     add_group(column, column + 1, true);
+  return active_.size();
 }
 
 Estimate GreyBoxAdapter::step(const AnyModel& model, Features features,

@@ -67,7 +67,8 @@ class GreyBoxAdapter final : public ModelAdapter {
   };
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-  void add_terms(const GreyBox::Parameters& base, double largest_change);
+  /// @returns how many there are.
+  std::size_t add_terms(const GreyBox::Parameters& base, double largest_change);
   [[nodiscard]] UpdateOutcome update(double error) noexcept override;
   void restore() noexcept override { weights_.reset(); }
   [[nodiscard]] bool make_ascending(std::span<double> deviation) noexcept;
