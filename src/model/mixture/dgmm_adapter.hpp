@@ -52,8 +52,8 @@ class DgmmAdapter final : public ModelAdapter {
  public:
   /// How many components learn from one sample.
   struct Limits {
-    std::size_t components = 8;
-    double least_share = 0.01;
+    std::size_t components = 6;
+    double least_share = 0.02;
   };
   static constexpr double kLeastCovariance = 0.02;  ///< kappa
 

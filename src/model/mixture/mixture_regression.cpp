@@ -79,26 +79,34 @@ bool conditional_parameters(double weight, const double* mean, const double* cov
   const std::size_t dimension = n + 1;
   const auto quantity = [output](std::size_t j) { return j < output ? j : j + 1; };
   std::array<std::array<double, kMost>, kMost> factor;  // Cholesky, then its inverse
+  std::array<double, kMost> inverse;                    // of its diagonal
   double log_determinant_half = 0.0;
+  double diagonal = 1.0;
   for (std::size_t r = 0; r < n; ++r) {
     for (std::size_t c = 0; c <= r; ++c) {
       double sum = covariance[quantity(r) * dimension + quantity(c)];
       for (std::size_t k = 0; k < c; ++k) sum -= factor[r][k] * factor[c][k];
       if (c < r) {
-        factor[r][c] = sum / factor[c][c];
+        factor[r][c] = sum * inverse[c];
       } else {
         if (!(sum > 0.0 && std::isfinite(sum))) return false;
-        factor[r][r] = std::sqrt(sum);
+        const double root = std::sqrt(sum);
+        factor[r][r] = root;
+        inverse[r] = 1.0 / root;
+        diagonal *= root;
       }
     }
-    log_determinant_half += std::log(factor[r][r]);
+    // Few logarithms, as long as the product cannot leave the range of a double.
+    if (r + 1 < n && diagonal > 1e-100 && diagonal < 1e100) continue;
+    log_determinant_half += std::log(diagonal);
+    diagonal = 1.0;
   }
   for (std::size_t c = 0; c < n; ++c) {
-    factor[c][c] = 1.0 / factor[c][c];
+    factor[c][c] = inverse[c];
     for (std::size_t r = c + 1; r < n; ++r) {
       double sum = 0.0;
       for (std::size_t k = c; k < r; ++k) sum += factor[r][k] * factor[k][c];
-      factor[r][c] = -sum / factor[r][r];
+      factor[r][c] = -sum * inverse[r];
     }
   }
   std::array<double, kMost> white;  // L^-1 S^ZY
@@ -110,7 +118,7 @@ bool conditional_parameters(double weight, const double* mean, const double* cov
   double* next = parameters;
   for (std::size_t j = 0; j < n; ++j) *next++ = mean[quantity(j)];
   for (std::size_t r = 0; r < n; ++r)
-    for (std::size_t c = 0; c <= r; ++c) *next++ = factor[r][c] / std::numbers::sqrt2;
+    for (std::size_t c = 0; c <= r; ++c) *next++ = factor[r][c] * (0.5 * std::numbers::sqrt2);
   *next++ = std::log(weight) - log_determinant_half -
             0.5 * static_cast<double>(n) * std::log(2.0 * std::numbers::pi);
   *next++ = mean[output];
@@ -177,8 +185,7 @@ void MixtureRegression::pack(const GaussianMixture& mixture, std::size_t reserve
   scan_.assign(slots * scan_rows(inputs_), 0.0F);
   rounded_.assign(slots * rounded_rows(inputs_), 0.0F);
   exact_.assign(slots * exact_rows(inputs_), 0.0);
-  for (std::size_t slot = components_; slot < slots; ++slot)
-    store(slot, scan_rows(inputs_) - 1, -kInfinity);
+  for (std::size_t slot = components_; slot < slots; ++slot) clear(slot);
   component_at_ = order;
   for (std::size_t slot = components_; slot < slots; ++slot) component_at_.push_back(slot);
   slot_of_.resize(slots);
@@ -200,28 +207,42 @@ void MixtureRegression::pack(const GaussianMixture& mixture, std::size_t reserve
   candidates_.resize(slots / kExactLanes);
 }
 
-void MixtureRegression::store(std::size_t slot, std::size_t row, double value) noexcept {
+void MixtureRegression::clear(std::size_t slot) noexcept {
+  const std::size_t row = scan_rows(inputs_) - 1;  // the offset
   const std::size_t lane = slot % kScanLanes;
   const std::size_t block = slot / kScanLanes;
-  const std::size_t exact_block = slot / kExactLanes * exact_rows(inputs_);
-  float* const rounded = rounded_.data() + block * rounded_rows(inputs_) * kScanLanes + lane;
-  exact_[(exact_block + row) * kExactLanes + slot % kExactLanes] = value;
-  rounded[row * kScanLanes] = static_cast<float>(value);
-  if (row < inputs_) rounded[(exact_rows(inputs_) + row) * kScanLanes] = lost_to_float(value);
-  if (row < scan_rows(inputs_))
-    scan_[(block * scan_rows(inputs_) + row) * kScanLanes + lane] = static_cast<float>(value);
+  constexpr float kNone = -std::numeric_limits<float>::infinity();
+  scan_[(block * scan_rows(inputs_) + row) * kScanLanes + lane] = kNone;
+  rounded_[(block * rounded_rows(inputs_) + row) * kScanLanes + lane] = kNone;
+  exact_[(slot / kExactLanes * exact_rows(inputs_) + row) * kExactLanes + slot % kExactLanes] =
+      -kInfinity;
 }
 
 void MixtureRegression::store(std::size_t slot, std::span<const double> parameters) noexcept {
-  const std::size_t offset_row = scan_rows(inputs_) - 1;
+  const std::size_t scanned = scan_rows(inputs_);
+  const std::size_t lane = slot % kScanLanes;
+  const std::size_t block = slot / kScanLanes;
+  float* const scan = scan_.data() + block * scanned * kScanLanes + lane;
+  float* const rounded = rounded_.data() + block * rounded_rows(inputs_) * kScanLanes + lane;
+  float* const lost = rounded + exact_rows(inputs_) * kScanLanes;
+  double* const exact =
+      exact_.data() + slot / kExactLanes * exact_rows(inputs_) * kExactLanes + slot % kExactLanes;
   double whitening_square = 0.0;
   for (std::size_t row = 0; row < parameters.size(); ++row) {
-    store(slot, row, parameters[row]);
-    if (row < inputs_) bounds_.mean = std::max(bounds_.mean, std::abs(parameters[row]));
-    if (row >= inputs_ && row < offset_row) whitening_square += parameters[row] * parameters[row];
+    const double value = parameters[row];
+    const auto narrow = static_cast<float>(value);
+    exact[row * kExactLanes] = value;
+    rounded[row * kScanLanes] = narrow;
+    if (row < scanned) scan[row * kScanLanes] = narrow;
+    if (row < inputs_) {
+      lost[row * kScanLanes] = static_cast<float>(value - static_cast<double>(narrow));
+      bounds_.mean = std::max(bounds_.mean, std::abs(value));
+    } else if (row + 1 < scanned) {
+      whitening_square += value * value;
+    }
   }
   bounds_.whitening = std::max(bounds_.whitening, std::sqrt(whitening_square));
-  bounds_.offset = std::max(bounds_.offset, parameters[offset_row]);
+  bounds_.offset = std::max(bounds_.offset, parameters[scanned - 1]);
 }
 
 bool MixtureRegression::set(std::size_t component, double weight, std::span<const double> mean,
@@ -233,9 +254,7 @@ bool MixtureRegression::set(std::size_t component, double weight, std::span<cons
   return true;
 }
 
-void MixtureRegression::remove(std::size_t component) noexcept {
-  store(slot_of_[component], scan_rows(inputs_) - 1, -kInfinity);
-}
+void MixtureRegression::remove(std::size_t component) noexcept { clear(slot_of_[component]); }
 
 void MixtureRegression::standardise(Features inputs) noexcept {
   for (std::size_t j = 0; j < inputs_; ++j) {

@@ -106,7 +106,7 @@ class MixtureRegression {
   };
 
   void pack(const GaussianMixture& mixture, std::size_t reserve);
-  void store(std::size_t slot, std::size_t row, double value) noexcept;
+  void clear(std::size_t slot) noexcept;
   void store(std::size_t slot, std::span<const double> parameters) noexcept;
   [[nodiscard]] double log_weight(std::size_t slot) const noexcept;
   void standardise(Features inputs) noexcept;
