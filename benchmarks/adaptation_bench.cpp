@@ -74,7 +74,7 @@ LearnTimes time_mixture(std::size_t components) {
       });
   if (missed > 0) throw std::logic_error("a sample was passed over: nothing was measured");
   const double mean = static_cast<double>(operations) / kLearned;
-  return {mean_s, mean_s * static_cast<double>(std::max(most, adapter.most_operations())) / mean};
+  return {mean_s, mean_s * static_cast<double>(std::max(most, adapter.max_operations())) / mean};
 }
 
 const LearnTimes& mixture_times(std::size_t components) {

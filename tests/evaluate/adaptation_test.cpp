@@ -267,7 +267,7 @@ TEST_P(AdaptFamily, IsDeterministicAndTheFileHasTheScores) {
 
 TEST_P(AdaptFamily, SaturatedAndStuckSensorsAndGapsAreCountedAndOtherUnitsAreRefused) {
   constexpr double kEnd_Nm = 8.0;
-  const auto broken = [](std::size_t n, double torque) {
+  const auto broken = [kEnd_Nm](std::size_t n, double torque) {
     if (n >= 20000 && n < 25000) return 3.0;           // stuck
     if (n >= 30000 && n < 35000) return std::nan("");  // not measured
     return std::clamp(torque, -kEnd_Nm, kEnd_Nm);

@@ -20,7 +20,7 @@ namespace torsio {
 /// phi_c are the terms (`GreyBoxTerms`), S the spread of the target: that of a torque which is
 /// uniform over the elastic curve. g_c is the largest |coefficient| of the group of the term: the
 /// curve, all slips, all branches, or the term itself (slopes and friction of other inputs). Terms
-/// of a group that is 0 stay out of the model. d follows the error by `LinearUpdate`, and is then
+/// whose group is 0 are left out. d follows the error by `LinearUpdate`, and is then
 /// brought back into its bounds:
 ///
 ///     |d_c| <= rho                      (`largest_change`)
@@ -56,7 +56,7 @@ class GreyBoxAdapter final : public ModelAdapter {
   struct Term {
     std::size_t column = 0;
     double scale = 0.0;   ///< g_c
-    double lowest = 0.0;  ///< of d_c
+    double lowest = 0.0;  ///< bound of d_c
     bool is_non_negative = false;
   };
   /// Neighbours of the curve that have been pooled.
@@ -74,7 +74,7 @@ class GreyBoxAdapter final : public ModelAdapter {
   [[nodiscard]] bool make_ascending(std::span<double> deviation) noexcept;
 
   std::vector<Term> active_;
-  std::vector<std::size_t> place_;  ///< of each column among the active ones, or kNone
+  std::vector<std::size_t> place_;  ///< index of each column among the active ones, or kNone
   /// Per knot of the curve: sum of the least rises so far over the schedule, in units of g; empty if the
   /// curve need not ascend.
   std::vector<double> rise_;

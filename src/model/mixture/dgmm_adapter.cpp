@@ -272,7 +272,7 @@ AnyParameters DgmmAdapter::adapted(AnyParameters base) const {
   return base;
 }
 
-std::size_t DgmmAdapter::most_operations() const noexcept {
+std::size_t DgmmAdapter::max_operations() const noexcept {
   const std::size_t inputs = sample_.size() - 1;
   const std::size_t each =
       inputs * (inputs + 5) + 12 + move_operations(sample_.size()) + 2 * set_operations(inputs);

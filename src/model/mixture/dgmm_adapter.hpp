@@ -17,7 +17,7 @@ namespace torsio {
 ///
 /// The sample x~ = [target; inputs], standardised, is divided among the components by the
 /// responsibilities pi_i of the inputs, as in a query. A component of count n_i (samples that it
-/// stands for) takes its share:
+/// represents) takes its share:
 ///
 ///     n <- (1 - pi (1 - lambda)) n + pi,   eta = pi / n,   d = x~ - mu
 ///     mu <- mu + eta d
@@ -81,13 +81,13 @@ class DgmmAdapter final : public ModelAdapter {
 
   /// Components now.
   [[nodiscard]] std::size_t size() const noexcept { return base_.size() + added_; }
-  /// Components that were replaced for want of room.
+  /// Components that were replaced because there was no room.
   [[nodiscard]] std::size_t replaced() const noexcept { return replaced_; }
   /// Floating-point operations, comparisons included, of the last step and its `learn` beyond the
   /// queries: a count of the algorithm, not a measurement.
   [[nodiscard]] std::size_t operations() const noexcept { return operations_; }
   /// No step takes more.
-  [[nodiscard]] std::size_t most_operations() const noexcept;
+  [[nodiscard]] std::size_t max_operations() const noexcept;
 
  private:
   [[nodiscard]] UpdateOutcome update(double error) noexcept override;
@@ -108,7 +108,7 @@ class DgmmAdapter final : public ModelAdapter {
   MixtureRegression regression_;
   double novelty_square_ = 0.0;
 
-  std::vector<double> first_counts_;  ///< of the components of the base
+  std::vector<double> first_counts_;  ///< n of the components of the base
   double first_total_ = 0.0;
   std::vector<double> counts_;  ///< n, with room for new components
   double total_ = 0.0;
@@ -124,7 +124,7 @@ class DgmmAdapter final : public ModelAdapter {
   std::size_t touched_count_ = 0;
   bool is_restoring_ = false;
 
-  double log_density_ = 0.0;  ///< of the inputs at the last step
+  double log_density_ = 0.0;  ///< density of the inputs at the last step
   double adapted_value_ = 0.0;
   std::vector<MixtureRegression::Share> shares_;
   std::vector<double> sample_;  ///< x~

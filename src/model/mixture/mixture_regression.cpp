@@ -68,8 +68,8 @@ void sort_into_blocks(const GaussianMixture& mixture, std::span<const std::size_
   sort_into_blocks(mixture, given, order.subspan(half));
 }
 
-// The parameters of one component in the order of the packed rows, on the stack and, for a number
-// of inputs known at compile time, in registers. @returns false if the given quantities have no
+// The parameters of one component in the order of the packed rows, on the stack and, for a number of
+// inputs that is known at compile time, in registers. @returns false if the given quantities have no
 // positive definite covariance.
 template <std::size_t kFixed>
 bool conditional_parameters(double weight, const double* mean, const double* covariance,
@@ -79,7 +79,7 @@ bool conditional_parameters(double weight, const double* mean, const double* cov
   const std::size_t dimension = n + 1;
   const auto quantity = [output](std::size_t j) { return j < output ? j : j + 1; };
   std::array<std::array<double, kMost>, kMost> factor;  // Cholesky, then its inverse
-  std::array<double, kMost> inverse;                    // of its diagonal
+  std::array<double, kMost> inverse;                    // reciprocals of its diagonal
   double log_determinant_half = 0.0;
   double diagonal = 1.0;
   for (std::size_t r = 0; r < n; ++r) {
@@ -348,7 +348,7 @@ double MixtureRegression::log_weight(std::size_t slot) const noexcept {
 }
 
 std::size_t MixtureRegression::heaviest(double least, std::span<Share> found) const noexcept {
-  // Of a float32 log weight: what `threshold` allows for is far smaller where weights matter.
+  // Error of a float32 log weight: what `threshold` allows for is far smaller where weights matter.
   constexpr double kMargin = 0.1;
   const double lightest = static_cast<double>(last_largest_) + std::log(least) - kMargin;
   auto limit = static_cast<float>(lightest);

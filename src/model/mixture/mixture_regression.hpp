@@ -67,7 +67,7 @@ class MixtureRegression {
 
   /// Replaces a component, or adds one that was reserved. Queries are exact for the new parameters.
   /// @param weight relative to the sum given to `set_total`. @param mean, covariance as in
-  /// `GaussianMixture`. @returns false, without effect, if they are no component.
+  /// `GaussianMixture`. @returns false, without effect, if the covariance is not positive definite.
   bool set(std::size_t component, double weight, std::span<const double> mean,
            std::span<const double> covariance) noexcept TORSIO_REALTIME;
   /// Takes a component out of the queries.
@@ -137,7 +137,7 @@ class MixtureRegression {
   std::size_t last_lanes_ = 0;
   double last_log_density_ = 0.0;  ///< without `log_total_`
   float last_largest_ = 0.0F;
-  std::vector<double> parameters_;  ///< of one component
+  std::vector<double> parameters_;  ///< parameters of one component
   std::vector<double> standardised_;
   detail::AlignedVector<float> scan_input_;
   detail::AlignedVector<float> scan_log_weights_;

@@ -36,7 +36,7 @@ class LinearUpdate {
   Sums set() noexcept TORSIO_REALTIME;
   [[nodiscard]] std::span<double> regressor() noexcept { return std::span(x_).first(weights_); }
 
-  /// @returns false if P was no covariance because of rounding: it starts again, W is as it was.
+  /// @returns false if rounding has made P indefinite: it starts again, W is as it was.
   bool update(double error) noexcept TORSIO_REALTIME;
 
   /// W - W0
