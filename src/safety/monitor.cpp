@@ -25,6 +25,7 @@ bool is_wrap(double change, double turn) noexcept {
 }
 
 constexpr double kLatePeriods = 1.5;
+constexpr std::uint32_t kQuarters = 4;  // of a sample
 
 /// Whether so many samples in a row are longer than a time; rounding does not make them longer.
 bool lasts_longer(std::uint32_t samples, double period_s, double longest_s) noexcept {
@@ -185,7 +186,14 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
   const bool faulty = !lost && !is_warming_up && !detail::is_valid(estimate);
   const bool is_novel = estimate.novelty > settings_.largest_novelty;
   state.lost = lost ? state.lost + 1 : 0;
-  state.faulty = faulty ? state.faulty + 1 : 0;
+  const auto is_faulty_for_long = [&] {
+    return lasts_longer(state.faulty / kQuarters, period_s, settings_.longest_fault_s);
+  };
+  if (!faulty) {
+    state.faulty -= std::min(state.faulty, 1U);
+  } else if (!is_faulty_for_long()) {
+    state.faulty += kQuarters;
+  }
   state.novel = is_novel ? state.novel + 1 : 0;
   constexpr auto kLost = static_cast<std::size_t>(MonitorCheck::source_lost);
   const bool too_long = settings_.actions[kLost] != MonitorAction::off &&
@@ -197,11 +205,11 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
           .second = index,
           .value = state.lost * period_s,
           .limit = settings_.longest_loss_s});
-  if (lasts_longer(state.faulty, period_s, settings_.longest_fault_s))
+  if (faulty && is_faulty_for_long())
     find({.check = MonitorCheck::source_fault,
           .first = index,
           .second = index,
-          .value = state.faulty * period_s,
+          .value = state.faulty / kQuarters * period_s,
           .limit = settings_.longest_fault_s});
   if (lasts_longer(state.novel, period_s, settings_.persistence_s))
     find({.check = MonitorCheck::novelty,
@@ -228,6 +236,7 @@ void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexc
   if (!detail::is_valid(first) || !detail::is_valid(second)) return;
   const double period_s = settings_.sample_period_s;
   const double limit_Nm = threshold(pair, first.std_dev, second.std_dev);
+  if (!(limit_Nm <= pair.largest_armed_Nm)) is_threshold_too_large_ = true;
   const double difference_Nm = first.value - second.value;
   const double release_Nm = state.disagrees ? settings_.release_share * limit_Nm : limit_Nm;
   state.beyond = std::abs(difference_Nm) <= release_Nm ? 0 : state.beyond + 1;
@@ -271,7 +280,7 @@ void Monitor::decide(double t_s) noexcept {
     return;
   }
   // Before it is armed every finding begins the proof again, warnings included.
-  if (active_ != 0) {
+  if (active_ != 0 || is_threshold_too_large_) {
     silent_since_s_ = kNotMeasured;
     state_ = State::unproven;
     return;
@@ -285,6 +294,7 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
   t_s_ = t_s;
   active_ = 0;
   disagreeing_count_ = 0;
+  is_threshold_too_large_ = false;
   stop_found_ = {};
   check_period(t_s);
   if (sources.size() != settings_.sources.size() || signals.size() != settings_.signals.size()) {

@@ -14,7 +14,7 @@ namespace torsio {
 namespace {
 
 constexpr double kSettle_s = 2.0;  // filters and memory of the sources
-constexpr double kLatestStart_s = 4.0;
+constexpr double kLatestStart_s = 20.0;
 constexpr double kWindow_s = 20.0;      // in which the disagreement must reach its limit
 constexpr double kSmallWindow_s = 5.0;  // a small one need not reach it
 constexpr double kMissed_s = 1.0;

@@ -110,7 +110,8 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
       sources, recipe.plan, fault_free,
       {.false_alarms_per_hour = settings.false_alarms_per_hour,
        .extrapolate = true,
-       .least_threshold_Nm = settings.least_threshold_share * duty_limits(joint).torque_Nm},
+       .least_threshold_Nm = settings.least_threshold_share * duty_limits(joint).torque_Nm,
+       .required_Nm = settings.required_share * duty_limits(joint).torque_Nm},
       progress);
   return result;
 }
