@@ -51,6 +51,7 @@ int run(int argc, char** argv) {
   add_adapt(app);
   add_import(app);
   add_monitor(app);
+  add_transfer(app);
   add_track(app);
   add_tune_loop(app);
   add_reproduce(app);

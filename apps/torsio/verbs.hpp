@@ -18,6 +18,7 @@ void add_attribute(CLI::App& app);
 void add_import(CLI::App& app);
 void add_monitor(CLI::App& app);
 void add_track(CLI::App& app);
+void add_transfer(CLI::App& app);
 void add_tune_loop(CLI::App& app);
 void add_reproduce(CLI::App& app);
 void add_unpack(CLI::App& app);

@@ -25,11 +25,12 @@ namespace {
 /// Least squares of coefficients with a prior around those of the base.
 class PriorFit {
  public:
+  /// @param sizes of the columns, at least
   /// @param is_free one for each; 0: remains >= 0
-  PriorFit(std::vector<double> base, std::vector<std::uint8_t> is_free)
+  PriorFit(std::vector<double> base, std::vector<double> sizes, std::vector<std::uint8_t> is_free)
       : base_(std::move(base)),
         is_free_(std::move(is_free)),
-        largest_(base_.size(), 0.0),
+        largest_(std::move(sizes)),
         equations_(base_.size()) {}
 
   /// @param error of the base at this sample: measured - estimated
@@ -45,8 +46,7 @@ class PriorFit {
   [[nodiscard]] std::vector<double> solution(double prior) const {
     NormalEquations equations = equations_;
     for (std::size_t j = 0; j < base_.size(); ++j) {
-      const double size = largest_[j] > 0.0 ? largest_[j] : 1.0;
-      const double weight = prior * static_cast<double>(equations.rows) * size * size;
+      const double weight = prior * static_cast<double>(equations.rows) * largest_[j] * largest_[j];
       equations.product(j, j) += weight;
       equations.projection[j] += weight * base_[j];
     }
@@ -89,9 +89,22 @@ void set_first_row(CoefficientSchedule& schedule, const std::vector<double>& val
   std::ranges::copy(values, schedule.values.row(0).begin());
 }
 
-Linear::Parameters refit(Linear::Parameters linear, const TrainingData& data, double prior) {
+/// Largest size of each input; 1 for one that did not vary.
+std::vector<double> sizes_of(const FeatureRanges& ranges) {
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < ranges.lowest.size(); ++i) {
+    const double size = std::max(std::abs(ranges.lowest[i]), std::abs(ranges.highest[i]));
+    sizes.push_back(size > 0.0 ? size : 1.0);
+  }
+  return sizes;
+}
+
+Linear::Parameters refit(Linear::Parameters linear, const FeatureRanges& ranges,
+                         const TrainingData& data, double prior) {
   const std::size_t columns = linear.coefficients.values.columns;
-  PriorFit fit(first_row(linear.coefficients), std::vector<std::uint8_t>(columns, 1));
+  std::vector<double> sizes = sizes_of(ranges);
+  sizes.insert(sizes.begin(), 1.0);
+  PriorFit fit(first_row(linear.coefficients), sizes, std::vector<std::uint8_t>(columns, 1));
   std::vector<double> row(columns, 1.0);
   each_error(data, AnyModel(linear), kNoStep, [&](Features features, double error, auto /*layer*/) {
     std::ranges::copy(features, row.begin() + 1);
@@ -101,12 +114,19 @@ Linear::Parameters refit(Linear::Parameters linear, const TrainingData& data, do
   return linear;
 }
 
-GreyBox::Parameters refit(GreyBox::Parameters box, const TrainingData& data, double prior) {
+GreyBox::Parameters refit(GreyBox::Parameters box, const FeatureRanges& ranges,
+                          const TrainingData& data, double prior) {
   const std::vector<double> base = first_row(box.coefficients);
   std::vector<std::uint8_t> is_free(base.size(), 1);
   for (std::size_t j = box.terms.first_slip(); j < box.terms.first_slope(); ++j)
     is_free[j] = base[j] < 0.0 ? 1 : 0;
-  PriorFit fit(base, is_free);
+  // Hats, slips and tanh are at most 1; a branch is at most the deflection.
+  const std::vector<double> inputs = sizes_of(ranges);
+  std::vector<double> sizes(base.size(), 1.0);
+  for (std::size_t j = box.terms.first_relaxation(); j < box.terms.first_slope(); ++j)
+    sizes[j] = inputs[0];
+  std::ranges::copy(inputs, sizes.begin() + static_cast<std::ptrdiff_t>(box.terms.first_slope()));
+  PriorFit fit(base, sizes, is_free);
   GreyBoxTerms terms(box.terms);
   std::vector<double> row(base.size());
   const auto move = [&](Features features, bool is_first) {
@@ -130,7 +150,8 @@ Parameters refit_layer(Parameters network, std::vector<DenseLayer> Parameters::*
   const std::size_t inputs = last.weights.columns;
   std::vector<double> base(last.weights.values.begin(), last.weights.values.end());
   base.push_back(static_cast<double>(last.bias.front()));
-  PriorFit fit(base, std::vector<std::uint8_t>(base.size(), 1));
+  PriorFit fit(base, std::vector<double>(base.size(), 1.0),
+               std::vector<std::uint8_t>(base.size(), 1));
   std::vector<double> row(base.size(), 1.0);
   each_error(data, AnyModel(network), kNoStep,
              [&](Features /*features*/, double error, std::span<const float> layer) {
@@ -219,22 +240,24 @@ Dgmm::Parameters refit(Dgmm::Parameters dgmm, const TrainingData& data, double p
 }  // namespace
 
 std::vector<double> refit_priors(const AnyModel::Parameters& base) {
-  const std::vector<double> ridge{1e-5, 1e-4, 1e-3, 1e-2, 1e-1};
+  const std::vector<double> ridge{1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4};
   if (const auto* const own = base.get_if<Linear::Parameters>())
     return own->coefficients.scheduled ? std::vector<double>{} : ridge;
   if (const auto* const own = base.get_if<GreyBox::Parameters>())
     return own->coefficients.scheduled ? std::vector<double>{} : ridge;
-  if (base.get_if<Dgmm::Parameters>() != nullptr) return {2.0, 8.0, 32.0};
+  if (base.get_if<Dgmm::Parameters>() != nullptr) return {64.0, 16.0, 4.0};
   if (base.get_if<Mlp::Parameters>() != nullptr || base.get_if<Lstm::Parameters>() != nullptr ||
       base.get_if<Gru::Parameters>() != nullptr)
     return ridge;
   return {};
 }
 
-AnyModel::Parameters refitted(const AnyModel::Parameters& base, const TrainingData& data,
-                              double prior) {
-  if (const auto* const own = base.get_if<Linear::Parameters>()) return refit(*own, data, prior);
-  if (const auto* const own = base.get_if<GreyBox::Parameters>()) return refit(*own, data, prior);
+AnyModel::Parameters refitted(const AnyModel::Parameters& base, const FeatureRanges& ranges,
+                              const TrainingData& data, double prior) {
+  if (const auto* const own = base.get_if<Linear::Parameters>())
+    return refit(*own, ranges, data, prior);
+  if (const auto* const own = base.get_if<GreyBox::Parameters>())
+    return refit(*own, ranges, data, prior);
   if (const auto* const own = base.get_if<Dgmm::Parameters>()) return refit(*own, data, prior);
   if (const auto* const own = base.get_if<Mlp::Parameters>())
     return refit_layer(*own, &Mlp::Parameters::layers, data, prior);

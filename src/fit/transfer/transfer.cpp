@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <string_view>
@@ -26,53 +25,31 @@ constexpr std::size_t kLeastSamples = 50;
 constexpr double kWidestScale = 30.0;  // of the search for a scale of the inputs, either way
 constexpr std::size_t kScales = 40;    // on a logarithmic grid, then refined
 constexpr int kRefinements = 20;
+constexpr double kClearly = 0.95;
 constexpr std::string_view kPlace = "transfer";
 
-bool is_name_letter(char letter) {
-  return std::isalnum(static_cast<unsigned char>(letter)) != 0 || letter == '_';
-}
-
-/// The names in an expression that are not functions.
-std::vector<std::string> names_in(const std::string& expression) {
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < expression.size();) {
-    if (!is_name_letter(expression[i])) {
-      ++i;
-      continue;
-    }
-    const std::size_t begin = i;
-    while (i < expression.size() && is_name_letter(expression[i])) ++i;
-    const bool is_number = std::isdigit(static_cast<unsigned char>(expression[begin])) != 0;
-    const std::size_t next = expression.find_first_not_of(' ', i);
-    const bool is_function = next != std::string::npos && expression[next] == '(';
-    if (!is_number && !is_function) names.push_back(expression.substr(begin, i - begin));
-  }
-  return names;
-}
-
-bool is_linear_in_its_names(const std::string& expression) {
+bool is_linear(const std::string& expression) {
   constexpr std::array kOther{"stop(", "dahl(", "sign(", "tanh(", "sin(", "cos(", "atan(",
                               "abs(",  "sqrt(", "exp(",  "min(",  "max(", "^"};
   return std::ranges::none_of(
       kOther, [&](const char* other) { return expression.find(other) != std::string::npos; });
 }
 
-/// Whether an input scales with the deflection, which is the first one.
-bool scales_with_first(const std::vector<std::string>& inputs, std::size_t input) {
-  if (input == 0) return true;
-  if (!is_linear_in_its_names(inputs[input])) return false;
-  const std::vector<std::string> first = names_in(inputs[0]);
-  const std::vector<std::string> own = names_in(inputs[input]);
-  return !own.empty() && std::ranges::all_of(first, [&](const std::string& name) {
-    return std::ranges::find(own, name) != own.end();
-  }) && own.size() == first.size();
+std::vector<std::string> channels_of_input(const EstimatorSettings& settings, std::size_t input) {
+  const FeatureSpec spec{.inputs = {settings.features.inputs[input]},
+                         .definitions = settings.features.definitions};
+  std::vector<std::string> channels = FeaturePipeline(spec, settings.sample_rate_Hz).raw_inputs();
+  std::ranges::sort(channels);
+  return channels;
 }
 
+/// Inputs that are linear in the channels of the deflection, which is the first one, scale with it.
 void scale_inputs(EstimatorSettings& settings, double scale) {
   if (scale == 1.0) return;
+  const std::vector<std::string> first = channels_of_input(settings, 0);
   std::vector<std::string> scaled = settings.features.inputs;
   for (std::size_t i = 0; i < scaled.size(); ++i)
-    if (scales_with_first(settings.features.inputs, i))
+    if (i == 0 || (is_linear(scaled[i]) && channels_of_input(settings, i) == first))
       scaled[i] = fmt::format("({}) * {}", scaled[i], scale);
   settings.features.inputs = std::move(scaled);
 }
@@ -304,8 +281,8 @@ class Transfer {
   [[nodiscard]] AnyModel::Parameters parameters_of(const TransferTrial& of, bool is_final) const {
     AnyModel::Parameters parameters = with_output(base_.parameters, of.map.gain, of.map.offset);
     if (of.prior == 0.0) return parameters;
-    return refitted(parameters, with_use(data_with(of.map.input_scale), 0, end_of_fit(is_final)),
-                    of.prior);
+    return refitted(parameters, base_.settings.ranges,
+                    with_use(data_with(of.map.input_scale), 0, end_of_fit(is_final)), of.prior);
   }
 
   [[nodiscard]] double held_out_rmse(const TransferTrial& of) const {
@@ -338,7 +315,8 @@ class Transfer {
                          .map = result.trials[m].map,
                          .prior = prior};
         of.held_out_rmse = held_out_rmse(of);
-        if (!(of.held_out_rmse < best.held_out_rmse)) continue;
+        // A weaker prior must be clearly better: the held-out part is of the same motion.
+        if (!(of.held_out_rmse < kClearly * best.held_out_rmse)) continue;
         best = of;
         refit_from_ = result.trials[m].method;
       }
@@ -356,7 +334,9 @@ class Transfer {
     EstimatorSettings& settings = file.settings;
     settings.fallback = fresh.fallback;
     settings.residuals = fresh.residuals;
-    settings.disturbances.largest_step = fresh.disturbances.largest_step;
+    std::vector<double>& steps = settings.disturbances.largest_step;
+    for (std::size_t k = 0; k < steps.size(); ++k)
+      steps[k] = std::max(steps[k], fresh.disturbances.largest_step[k]);
     settings.disturbances.largest_travel =
         std::max(settings.disturbances.largest_travel, fresh.disturbances.largest_travel);
     for (std::size_t i = 0; i < settings.ranges.lowest.size(); ++i) {
