@@ -28,8 +28,10 @@ constexpr double kBase_s = 540.0;
 constexpr double kTest_s = 180.0;
 constexpr double kOffset_s = 1.0;                   // 100 samples
 constexpr double kNew_s = 20.0;                     // for our methods
-constexpr std::array kLoads{0.15, 0.3, 0.4, 0.55};  // of the rated torque
+constexpr std::array kLoads{0.15, 0.3, 0.4, 0.55};  // shares of the rated torque
 constexpr double kTestLoad = 0.45;
+constexpr std::size_t kShown = 4000;  // samples in the picture
+constexpr std::size_t kShownEvery = 4;
 constexpr const char* kBase = "dfki-300#03";
 constexpr double kMass_kg = 9.0;
 constexpr double kGravity_m_s2 = 9.81;
@@ -67,7 +69,7 @@ TrainedModel base_model(const StudyOptions& options, std::uint64_t seed, const P
 }
 
 /// Means over the repeats for one joint.
-struct Bars {
+struct JointErrors {
   std::vector<std::pair<std::string, std::pair<RunningMean, RunningMean>>> of;  ///< RMSE, STD
 
   void add(const std::string& method, const Metrics& metrics) {
@@ -86,19 +88,24 @@ std::string loop_plot(const std::string& joint, const ModelFile& transferred,
                       const Recording& recording) {
   const EstimatedRecording estimated = estimate_recording(make_estimator(transferred), recording);
   std::vector<double> deflection_deg;
-  for (std::size_t n = 0; n < recording.size(); ++n)
-    deflection_deg.push_back(deg_from_rad(recording.channel("gear_angle_rad").values[n] -
-                                          recording.channel("joint_angle_rad").values[n]));
-  return svg_plot(
-      {{.label = "measured", .x = deflection_deg, .y = recording.channel("torque_Nm").values},
-       {.label = "base with offset (14)",
-        .x = deflection_deg,
-        .y = estimated.channels.channel(estimate_channel("torque_Nm")).values}},
-      {"deflection [deg]", "torque [Nm]"}, joint);
+  std::vector<double> measured_Nm;
+  std::vector<double> estimated_Nm;
+  for (std::size_t n = 0; n < std::min(recording.size(), kShown); n += kShownEvery) {
+    const auto at = [n](const Recording& of, const std::string& channel) {
+      return of.channel(channel).values[n];
+    };
+    deflection_deg.push_back(
+        deg_from_rad(at(recording, "gear_angle_rad") - at(recording, "joint_angle_rad")));
+    measured_Nm.push_back(at(recording, "torque_Nm"));
+    estimated_Nm.push_back(at(estimated.channels, estimate_channel("torque_Nm")));
+  }
+  return svg_plot({{.label = "measured", .x = deflection_deg, .y = measured_Nm},
+                   {.label = "base with offset (14)", .x = deflection_deg, .y = estimated_Nm}},
+                  {"deflection [deg]", "torque [Nm]"}, joint);
 }
 
 void add_joint(const std::string& joint, const ModelFile& base, const StudyOptions& options,
-               std::uint64_t seed, Bars& bars, std::vector<std::string>* plots) {
+               std::uint64_t seed, JointErrors& errors, std::vector<std::string>* plots) {
   Dataset dataset;
   Recording recording = sweep(joint, kTestLoad, options.is_quick ? 60.0 : kTest_s, seed);
   const std::size_t samples = recording.size();
@@ -112,13 +119,13 @@ void add_joint(const std::string& joint, const ModelFile& base, const StudyOptio
   dataset.records[0].segments[0].end = at(kNew_s);
   const TransferOptions ours{.ratios = transfer_ratios(data_sheet(kBase), data_sheet(joint))};
   const TransferEvaluation evaluation = evaluate_transfer(base, dataset, ours, seed);
-  bars.add("base as it is", evaluation.find("none")->test.metrics);
-  bars.add("offset of 100 samples, (12) to (14)", papers.find("offset")->test.metrics);
+  errors.add("base as it is", evaluation.find("none")->test.metrics);
+  errors.add("offset of 100 samples, (12) to (14)", papers.find("offset")->test.metrics);
   for (const char* const method : {"gain_offset", "data_sheets", "scaled", "refit"})
-    bars.add(fmt::format("{} of {:g} s", method, kNew_s), evaluation.find(method)->test.metrics);
-  bars.add(fmt::format("chosen of {:g} s", kNew_s), evaluation.chosen().test.metrics);
+    errors.add(fmt::format("{} of {:g} s", method, kNew_s), evaluation.find(method)->test.metrics);
+  errors.add(fmt::format("chosen of {:g} s", kNew_s), evaluation.chosen().test.metrics);
   if (const auto* const own = evaluation.find("own"))
-    bars.add(fmt::format("own model of {:g} s", kNew_s), own->test.metrics);
+    errors.add(fmt::format("own model of {:g} s", kNew_s), own->test.metrics);
   if (plots != nullptr)
     plots->push_back(loop_plot(joint, papers.transfer.best().file, dataset.records[0].recording));
 }
@@ -135,7 +142,7 @@ Study transfer_000(const StudyOptions& options, const Progress& progress) {
           kNew_s),
       .unit = "Nm",
       .options = options};
-  std::vector<Bars> bars(kJoints.size());
+  std::vector<JointErrors> errors(kJoints.size());
   std::vector<std::string> plots;
   for (const char* const joint : kJoints) study.plants.push_back(study_plant(joint));
   for (std::size_t k = 0; k < options.repeats; ++k) {
@@ -143,11 +150,11 @@ Study transfer_000(const StudyOptions& options, const Progress& progress) {
     const ModelFile base =
         base_model(options, seed, nth_of(progress, k, options.repeats, "base")).file;
     for (std::size_t j = 0; j < kJoints.size(); ++j)
-      add_joint(kJoints[j], base, options, seed + 50 + j, bars[j], k == 0 ? &plots : nullptr);
+      add_joint(kJoints[j], base, options, seed + 50 + j, errors[j], k == 0 ? &plots : nullptr);
   }
   QuantityTable table;
   for (std::size_t j = 0; j < kJoints.size(); ++j)
-    for (const auto& [method, means] : bars[j].of) {
+    for (const auto& [method, means] : errors[j].of) {
       const std::string condition = j == 0 ? fmt::format("{}, new load", kJoints[j]) : kJoints[j];
       table.rows.push_back({.condition = condition,
                             .quantity = "RMSE, " + method,

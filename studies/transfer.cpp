@@ -24,8 +24,8 @@ constexpr double kNew_s = 10.0;
 constexpr double kReference_s = 60.0;
 constexpr unsigned kFirstSpecimen = 11;
 constexpr std::size_t kSpecimens = 5;
-constexpr double kWalkShare = 0.2;   // of the rated torque: its peaks reach 0.45 of it
-constexpr double kSweepShare = 0.4;  // of the rated torque, of the lever of a test
+constexpr double kWalkShare = 0.2;   // share of the rated torque: its peaks reach 0.45
+constexpr double kSweepShare = 0.4;  // share of the rated torque, of the lever in a test
 constexpr double kMass_kg = 9.0;
 constexpr double kGravity_m_s2 = 9.81;
 
@@ -100,7 +100,7 @@ Dataset new_joint(const std::string& actuator, unsigned serial, double chirp_s,
   return dataset;
 }
 
-/// Of the model itself: in a locked joint no guard has seen a moving one.
+/// Error of the model itself: guards that were trained on a locked joint exclude a moving one.
 double unguarded_rmse(const ModelFile& file, const Dataset& dataset) {
   return evaluate(AnyModel(file.parameters),
                   training_data(dataset, file.settings.features, Role::test))

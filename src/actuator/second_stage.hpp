@@ -6,7 +6,7 @@
 
 namespace torsio {
 
-/// Of the spring, or of the gear of a harmonic drive [Nm/rad].
+/// Stiffness of the spring, or of the gear of a harmonic drive [Nm/rad].
 [[nodiscard]] inline double second_stage_stiffness(const DataSheet& sheet) {
   return std::visit([](const auto& stage) { return stage.stiffness_Nm_rad.value; }, sheet.second);
 }

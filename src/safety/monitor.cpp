@@ -25,7 +25,7 @@ bool is_wrap(double change, double turn) noexcept {
 }
 
 constexpr double kLatePeriods = 1.5;
-constexpr std::uint32_t kQuarters = 4;  // of a sample
+constexpr std::uint32_t kQuarters = 4;  // parts of a sample
 
 /// Whether so many samples in a row are longer than a time; rounding does not make them longer.
 bool lasts_longer(std::uint32_t samples, double period_s, double longest_s) noexcept {

@@ -745,7 +745,8 @@ TEST(Monitor, StopsOnASourceWhoseModelFailsForLong) {
     loop.sources[0] = {.std_dev = 0.1};
     loop.step_for(60);
     loop.sources[0] = faulty;
-    EXPECT_EQ(loop.ticks_to_stop(), 16) << "four samples without a fault make up for one with it";
+    EXPECT_EQ(loop.ticks_to_stop(), 16)
+        << "four samples without a fault compensate for one with it";
     EXPECT_EQ(loop.reason(), MonitorCheck::source_fault);
     EXPECT_EQ(loop.monitor.reason().first, 0);
     EXPECT_EQ(loop.monitor.reason().second, 0);

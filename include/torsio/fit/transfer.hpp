@@ -32,7 +32,7 @@ struct TransferMap {
 
 /// What the data sheets of both joints give.
 struct TransferRatios {
-  double stiffness = 1.0;  ///< of the new joint over that of the base
+  double stiffness = 1.0;  ///< stiffness of the new joint over that of the base
   double torque = 1.0;     ///< likewise, rated
 };
 [[nodiscard]] TransferRatios transfer_ratios(const DataSheet& base, const DataSheet& joint);
@@ -80,8 +80,8 @@ struct TransferResult {
 ///
 ///     sum_n (y_n - phi_n c)^2 + prior N sum_j m_j^2 (c_j - c_0j)^2
 ///
-/// over the coefficients of a linear model, of a grey box (slip forces and branches that are >= 0 remain so) and
-/// of the last layer of a network; in a Gaussian mixture it is the maximum a posteriori of means and covariances
+/// over the coefficients of a linear model, of a grey box (slip forces and branches that are >= 0 remain so) and the
+/// weights in the last layer of a network; in a Gaussian mixture it is the maximum a posteriori of means and covariances
 /// with that many samples of the base in each component (Gauvain & Lee 1994). The weight is chosen with the
 /// method. Source: paper 000 section 5.4 for `offset`; the others are ours.
 /// @throws Error if an input or the target is missing or constant, or there are fewer than 50 samples; UsageError if

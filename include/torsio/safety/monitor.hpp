@@ -78,7 +78,7 @@ struct MonitorSettings {
   double persistence_s = 5e-3;  ///< how long a difference must exceed its threshold
   double release_share = 0.8;   ///< below this share of the threshold, it has ended
   double longest_loss_s = 0.5;  ///< how long a lost source is only a warning
-  /// How long a source may report a fault of its model or range. A sample without one makes up for a quarter of
+  /// How long a source may report a fault of its model or range. Four samples without one compensate for
   /// one with it, so that a fault that comes and goes is found as well.
   double longest_fault_s = 0.015;
   double largest_novelty = std::numeric_limits<double>::infinity();

@@ -21,7 +21,7 @@ constexpr std::size_t kLeastBlocks = 10;
 constexpr double kSecondsPerHour = 3600.0;
 constexpr double kLargestGuardedShare = 0.01;
 constexpr double kArmedShare = 0.8;    // threshold that is armed, over the required disagreement
-constexpr double kRangeMargin = 0.25;  // of the range in the recordings, on either side
+constexpr double kRangeMargin = 0.25;  // margin on either side, over the range in the recordings
 constexpr double kDriftWindow_s = 60.0;
 /// The correlation is known only from a finite record: it is taken a little towards none.
 constexpr double kCorrelationShare = 0.95;

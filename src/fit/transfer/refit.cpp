@@ -164,7 +164,7 @@ Parameters refit_layer(Parameters network, std::vector<DenseLayer> Parameters::*
   return network;
 }
 
-/// What the data say about one component.
+/// Moments of the data, in proportion to their share in one component.
 struct Moments {
   double count = 0.0;
   Eigen::VectorXd sum;

@@ -13,6 +13,7 @@
 #include "core/report_progress.hpp"
 #include "fit/common/guards.hpp"
 #include "fit/common/model_run.hpp"
+#include "fit/common/training_rules.hpp"
 #include "fit/transfer/output_map.hpp"
 #include "fit/transfer/refit.hpp"
 #include "torsio/core/error.hpp"
@@ -22,8 +23,9 @@ namespace torsio {
 namespace {
 
 constexpr std::size_t kLeastSamples = 50;
-constexpr double kWidestScale = 30.0;  // of the search for a scale of the inputs, either way
-constexpr std::size_t kScales = 40;    // on a logarithmic grid, then refined
+constexpr double kWidestScale =
+    30.0;  // end of the search for a scale of the inputs; its inverse is the other
+constexpr std::size_t kScales = 40;  // on a logarithmic grid, then refined
 constexpr int kRefinements = 20;
 constexpr double kClearly = 0.95;
 constexpr std::string_view kPlace = "transfer";
@@ -149,6 +151,7 @@ class Transfer {
                                            base.settings.target),
                    .found = fmt::format("{}", samples),
                    .advice = "record the new joint for longer"});
+    require_trainable(all_);
     samples_ = samples;
     fitted_ =
         samples - static_cast<std::size_t>(options.held_out_share * static_cast<double>(samples));

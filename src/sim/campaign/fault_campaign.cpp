@@ -217,7 +217,7 @@ Json json_of(const FaultFreeOutcome& of) {
           {"alarms", of.alarms}};
 }
 
-/// Of a joint under little load: evenly between its bounds, whatever the number of joints.
+/// Factor on the hysteresis of a joint under little load: evenly between its bounds, for any number of joints.
 double hysteresis_factor(std::size_t joint) {
   constexpr double kGolden = 0.6180339887498949;
   const double share = std::fmod(kGolden * static_cast<double>(joint + 1), 1.0);
