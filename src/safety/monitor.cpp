@@ -12,9 +12,9 @@ namespace torsio {
 namespace {
 
 /// An input of the source was not measured.
-bool is_lost(Fault fault) noexcept {
-  return fault == Fault::input_not_finite || fault == Fault::input_count_wrong ||
-         fault == Fault::zero_not_set;
+bool is_lost(const Estimate& source) noexcept {
+  return source.fault == Fault::input_not_finite || source.fault == Fault::input_count_wrong ||
+         source.fault == Fault::zero_not_set || !std::isfinite(source.value);
 }
 
 /// A change is a wrap of the encoder if it is a turn or several of them up to a tenth of a turn.
@@ -180,7 +180,7 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
   SourceState& state = source_states_[i];
   const auto index = static_cast<std::uint8_t>(i);
   const double period_s = settings_.sample_period_s;
-  const bool lost = is_lost(estimate.fault) || !std::isfinite(estimate.value);
+  const bool lost = is_lost(estimate);
   // A source that warms up is not used yet, and no fault is reported: a friction state settles with the motion.
   const bool is_warming_up = estimate.fault == Fault::warming_up;
   const bool faulty = !lost && !is_warming_up && !detail::is_valid(estimate);
@@ -306,15 +306,14 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
     return state_;
   }
   for (std::size_t i = 0; i < signals.size(); ++i) check_signal(i, signals);
-  std::size_t valid = 0;
+  std::size_t left = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     check_source(i, sources[i]);
-    if (detail::is_valid(sources[i])) ++valid;
+    if (!is_lost(sources[i]) && sources[i].fault != Fault::warming_up) ++left;
   }
-  if (sources.size() > 1 && valid < 2)
-    find({.check = MonitorCheck::redundancy_lost,
-          .value = static_cast<double>(valid),
-          .limit = 2.0});
+  if (sources.size() > 1 && left < 2)
+    find(
+        {.check = MonitorCheck::redundancy_lost, .value = static_cast<double>(left), .limit = 2.0});
   for (std::size_t i = 0; i < settings_.pairs.size(); ++i) check_pair(i, sources);
   decide(t_s);
   return state_;

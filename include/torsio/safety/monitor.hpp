@@ -21,7 +21,7 @@ enum class MonitorCheck : std::uint8_t {
   sign,             ///< they have opposite signs, each beyond half the threshold of their pair
   source_lost,      ///< an input of a source is missing, stale or not a number
   source_fault,     ///< a source has inputs outside its range, or its model failed
-  redundancy_lost,  ///< fewer than two sources of several are valid
+  redundancy_lost,  ///< fewer than two sources of several have inputs and have settled
   novelty,          ///< the inputs of a source are unlike those of its training
   not_finite,       ///< a signal is NaN or infinite
   stale,            ///< a signal has not been measured for too long

@@ -291,6 +291,10 @@ void check_arguments(const std::vector<SourceModel>& sources, const MonitorPlan&
     throw UsageError({.place = "wanted rate of false alarms",
                       .expected = "a positive number per hour",
                       .found = fmt::format("{}", options.false_alarms_per_hour)});
+  if (!(options.persistence_s > 0.0) || !std::isfinite(options.persistence_s))
+    throw UsageError({.place = "persistence of a difference",
+                      .expected = "more than 0 s",
+                      .found = fmt::format("{} s", options.persistence_s)});
   if (!(options.required_Nm > 0.0))
     throw UsageError({.place = "disagreement that a monitor has to find",
                       .expected = "more than 0 Nm",
@@ -362,7 +366,7 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
   CalibratedMonitor result;
   result.redundancy.sources = plan.sources;
   result.monitor.sample_period_s = 1.0 / rate_Hz;
-  result.monitor.persistence_s = std::max(result.monitor.persistence_s, 2.0 / rate_Hz);
+  result.monitor.persistence_s = std::max(options.persistence_s, 2.0 / rate_Hz);
   std::size_t samples = 0;
   for (const DatasetRecord& record : fault_free.records) samples += record.recording.size();
   result.hours = static_cast<double>(samples) / rate_Hz / kSecondsPerHour;

@@ -97,8 +97,8 @@ bool is_wanted(const CampaignSettings& settings, const std::string& name) {
 double limit_share(const MonitoredTorque& monitored, const DataSheet& sheet) {
   const std::vector<PairLimits>& pairs = monitored.monitor().settings().pairs;
   if (pairs.size() != 1) return kRequiredShare;
-  return std::max(kRequiredShare,
-                  2.0 * pairs.front().largest_armed_Nm / sheet.rating.torque_Nm.value);
+  const double hidden_Nm = 2.2 * pairs.front().floor_Nm;
+  return std::max(kRequiredShare, hidden_Nm / sheet.rating.torque_Nm.value);
 }
 
 std::vector<Group> groups_of(const std::vector<CampaignGroup>& from,
