@@ -21,6 +21,7 @@ struct DriftFlags {
   std::string model;
   DataFlags data;
   std::vector<std::string> calibration;
+  double gear_ratio = 0.0;
   std::string serial;
   std::size_t campaign = 0;
   torsio::DriftCampaignSettings settings;
@@ -65,6 +66,7 @@ void run(DriftFlags& flags) {
     of_calibration.recordings = flags.calibration;
     calibration = of_calibration.load({}, {}, progress.listener());
     options.calibration = &calibration;
+    options.gear_ratio = flags.gear_ratio;
   }
   const torsio::Drift drift = torsio::detect_drift(file, dataset, options, progress.listener());
   if (flags.json.wants_tables()) print(torsio::drift_text(drift, file.settings.target));
@@ -82,16 +84,20 @@ void add_drift(CLI::App& app) {
   verb->footer(
       "Example: torsio drift joint.safetensors today.csv\n"
       "Gain and stiffness apart, from the twist of the gear:\n"
-      "  torsio drift joint.safetensors today.csv --calibration then1.csv then2.csv\n"
+      "  torsio drift joint.safetensors today.csv --calibration then1.csv then2.csv --gear-ratio "
+      "120\n"
       "docs/drift.md has the method, its limits and what it cannot decide.");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit");
   flags->data.add_recordings(*verb,
                              "recordings of today with the inputs and the torque, or a manifest");
   flags->data.add_model_mapping(*verb);
   flags->data.add_initialise(*verb);
-  verb->add_option("--calibration", flags->calibration,
-                   "recordings of the calibration, from which a second source of the torque is "
-                   "calibrated");
+  verb->add_option(
+      "--calibration", flags->calibration,
+      "recordings of the calibration, with motor and gear angle: gain of the load cell and "
+      "stiffness of the spring are then separated");
+  verb->add_option("--gear-ratio", flags->gear_ratio,
+                   "motor_angle_rad over gear_angle_rad, for --calibration");
   verb->add_option("--device-serial", flags->serial,
                    "serial number of the joint; a model of another one is refused");
   verb->add_option("--campaign", flags->campaign,

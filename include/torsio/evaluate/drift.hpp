@@ -19,7 +19,7 @@ enum class DriftVerdict : std::uint8_t { not_changed, changed, undetermined };
 /// One property of a joint, in the recordings against the model.
 struct DriftQuantity {
   std::string name;              ///< "zero", "stiffness or gain", "friction", ...
-  std::string unit;              ///< of all values but `relative`
+  std::string unit;              ///< unit of all values but `relative`
   double before = kNotMeasured;  ///< value of the model; NaN: the model has none
   double change = kNotMeasured;  ///< now less `before`
   double lowest = kNotMeasured;  ///< 95 % interval of `change`
@@ -32,7 +32,8 @@ struct DriftQuantity {
   std::string reason = {};  ///< why it is undetermined
 };
 
-enum class DriftAdvice : std::uint8_t { none, set_zero, calibrate, record_more };
+/// `other_motion`: the error is larger than at the calibration, but none of the changes explains it.
+enum class DriftAdvice : std::uint8_t { none, set_zero, calibrate, other_motion, record_more };
 [[nodiscard]] std::string_view name(DriftAdvice advice) noexcept;
 
 /// What has changed since the calibration of a model (docs/drift.md).
@@ -41,20 +42,22 @@ struct Drift {
   std::size_t samples = 0;                  ///< measured and compared
   std::size_t outside_samples = 0;          ///< left out: outside the range of the training
   double effective_samples = kNotMeasured;  ///< N / (1 + 2 sum r_k) of the remaining residual
-  double calibration_rmse = kNotMeasured;   ///< of the model file, in the target's unit
-  double rmse = kNotMeasured;               ///< of the model on these recordings
+  double calibration_rmse = kNotMeasured;   ///< error of the model file, in the target's unit
+  double rmse = kNotMeasured;               ///< error of the model in these recordings
   double zeroed_rmse = kNotMeasured;        ///< the same less its mean in each recording
   double corrected_rmse = kNotMeasured;     ///< with all changes above corrected
-  DriftVerdict joint = DriftVerdict::undetermined;  ///< of the quantities of the joint together
+  DriftVerdict joint = DriftVerdict::undetermined;  ///< all quantities of the joint together
   DriftAdvice advice = DriftAdvice::none;
 };
 
 struct DriftOptions {
-  std::size_t resamples = 400;  ///< of the bootstrap, at least 100
-  std::uint64_t seed = 1;       ///< of the bootstrap
-  /// Recordings of the time of the calibration, from which a second source of the torque (the twist of
-  /// the gear, the current of the motor) is calibrated; without them, stiffness and gain are one.
+  std::size_t resamples = 400;  ///< number of records of the bootstrap, at least 100
+  std::uint64_t seed = 1;       ///< seed of the bootstrap
+  /// Recordings of the time of the calibration (role train), from which the torque over the twist of the
+  /// gear is learned as a second source; without them, stiffness and gain are one.
   const Dataset* calibration = nullptr;
+  double gear_ratio =
+      kNotMeasured;  ///< ratio of `motor_angle_rad` over `gear_angle_rad`; needed for it
 };
 
 /// Compares the torque of recordings (role test) with a model of it: generalised least squares of
@@ -69,6 +72,10 @@ struct DriftOptions {
 /// may have in each direction. A quantity has changed if its 95 % interval lies outside of what a joint
 /// without a change shows, has not changed if the interval is inside of the smallest change that counts,
 /// and is undetermined otherwise.
+/// With `calibration` and `gear_ratio`, the same is done with a grey box over the twist of the gear,
+/// motor_angle_rad / ratio - gear_angle_rad. A gain g of the load cell scales the torque over both twists:
+/// g is the scale over the gear, the change of the stiffness is s - g, that of the friction f - g. A gear that
+/// itself became softer is not distinguished from a gain.
 /// @throws Error if the recordings have too few measured samples, a torque that is constant or does not
 /// follow, another unit, or a motion without deflection; as `predict`; UsageError for an option;
 /// Cancelled.

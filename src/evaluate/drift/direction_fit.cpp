@@ -48,7 +48,7 @@ double own_square(const Eigen::MatrixXd& gram, std::size_t j,
   return std::max(0.0, square - with.dot(among.fullPivLu().solve(with)));
 }
 
-/// Columns that can be told apart, in their order.
+/// Columns that do not explain each other, in their order.
 std::vector<std::size_t> separable(const Eigen::MatrixXd& gram) {
   std::vector<std::size_t> kept;
   for (std::size_t j = 0; j < static_cast<std::size_t>(gram.cols()); ++j) {

@@ -16,6 +16,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/evaluate.hpp"
 #include "torsio/fit/common/training_data.hpp"
+#include "torsio/fit/train_model.hpp"
 
 namespace torsio {
 namespace {
@@ -23,7 +24,7 @@ namespace {
 // Thresholds: chosen on the seeds of `--campaign` from 1000 on, which are not those of the results
 // (docs/drift.md).
 constexpr double kQuantile = 1.96;         // 95 %
-constexpr double kModelErrorShare = 0.3;   // of the calibration's residual, in one direction
+constexpr double kModelErrorShare = 0.3;   // share of the residual of the calibration
 constexpr double kScaleTolerance = 0.012;  // a load cell that was remounted
 constexpr double kSmallestScale = 0.03;
 constexpr double kFrictionTolerance = 0.04;
@@ -41,7 +42,12 @@ constexpr double kManyOutside = 0.5;
 constexpr double kReversal = 0.05;  // over the range of the training
 constexpr std::size_t kLeastReversals = 2;
 constexpr double kLeastFriction = 0.5;  // loop of the model over its error
+constexpr double kExplained = 0.8;      // error with the changes corrected over that without
 constexpr double kWorthFactor = 1.5;    // error now over that of the calibration
+
+constexpr const char* kZero = "zero";
+constexpr const char* kScale = "stiffness or gain";
+constexpr const char* kFriction = "friction";
 
 struct Compared {
   std::vector<double> x;
@@ -135,10 +141,57 @@ double calibration_rmse(const ModelFile& model) {
   if (const auto found = model.card.metrics.find("rmse");
       found != model.card.metrics.end() && std::isfinite(found->second))
     return found->second;
-  std::vector<double> bars;
-  for (const double bar : model.settings.residuals.std_dev)
-    if (std::isfinite(bar)) bars.push_back(bar);
-  return bars.empty() ? kNotMeasured : root_mean_square(bars);
+  std::vector<double> errors;
+  for (const double error : model.settings.residuals.std_dev)
+    if (std::isfinite(error)) errors.push_back(error);
+  return errors.empty() ? kNotMeasured : root_mean_square(errors);
+}
+
+/// The verdict on a change whose 95 % interval is `change` +- `half_width`.
+void decide(DriftQuantity& of, double change, double half_width) {
+  of.change = change;
+  of.lowest = change - half_width;
+  of.highest = change + half_width;
+  of.relative = std::isfinite(of.before) ? change / of.before : kNotMeasured;
+  of.verdict = DriftVerdict::undetermined;
+  of.reason.clear();
+  if (std::abs(change) - half_width > of.tolerance) {
+    of.verdict = DriftVerdict::changed;
+  } else if (std::abs(change) + half_width < of.smallest) {
+    of.verdict = DriftVerdict::not_changed;
+  } else if (half_width > of.smallest - of.tolerance) {
+    of.reason = "these recordings show too little of it";
+  } else {
+    of.reason = "near the limit: record longer";
+  }
+}
+
+void conclude(Drift& drift) {
+  bool is_certain = true;
+  bool has_changed = false;
+  bool has_new_zero = false;
+  for (const DriftQuantity& of : drift.quantities) {
+    if (!of.is_of_joint) {
+      has_new_zero |= of.name == kZero && of.verdict == DriftVerdict::changed;
+      continue;
+    }
+    is_certain &= of.verdict != DriftVerdict::undetermined;
+    has_changed |= of.verdict == DriftVerdict::changed;
+  }
+  drift.joint = has_changed  ? DriftVerdict::changed
+                : is_certain ? DriftVerdict::not_changed
+                             : DriftVerdict::undetermined;
+  drift.advice = DriftAdvice::none;
+  const double worth = kWorthFactor * drift.calibration_rmse;
+  if (drift.zeroed_rmse > worth) {
+    drift.advice = drift.corrected_rmse < kExplained * drift.zeroed_rmse
+                       ? DriftAdvice::calibrate
+                       : DriftAdvice::other_motion;
+  } else if (drift.rmse > worth || has_new_zero) {
+    drift.advice = DriftAdvice::set_zero;
+  } else if (!is_certain && !has_changed) {
+    drift.advice = DriftAdvice::record_more;
+  }
 }
 
 /// The comparison of all recordings.
@@ -268,18 +321,7 @@ class Comparison {
       result.reason = "too few independent samples: record longer";
       return result;
     }
-    const double half_width = kQuantile * error;
-    result.lowest = (change - half_width) * scale;
-    result.highest = (change + half_width) * scale;
-    if (std::abs(change) - half_width > tolerance) {
-      result.verdict = DriftVerdict::changed;
-    } else if (std::abs(change) + half_width < smallest) {
-      result.verdict = DriftVerdict::not_changed;
-    } else if (half_width > smallest - tolerance) {
-      result.reason = "the motion shows too little of it";
-    } else {
-      result.reason = "near the limit: record longer";
-    }
+    decide(result, change * scale, kQuantile * error * scale);
     return result;
   }
 
@@ -287,7 +329,7 @@ class Comparison {
     double largest = 0.0;
     for (const double torque : parts_.elastic) largest = std::max(largest, std::abs(torque));
     DriftQuantity result =
-        quantity("zero", unit_label(model_.settings.target), kNotMeasured, fit, 0, model_error,
+        quantity(kZero, unit_label(model_.settings.target), kNotMeasured, fit, 0, model_error,
                  kZeroTolerance * largest, 2.0 * kZeroTolerance * largest);
     result.is_of_joint = false;
     return result;
@@ -297,15 +339,15 @@ class Comparison {
     double mean = 0.0;
     for (const double slope : parts_.stiffness) mean += slope;
     mean /= static_cast<double>(parts_.stiffness.size());
-    return quantity("stiffness or gain", unit_label(model_.settings.target) + "/rad", mean, fit, 1,
-                    model_error, kScaleTolerance, kSmallestScale);
+    return quantity(kScale, unit_label(model_.settings.target) + "/rad", mean, fit, 1, model_error,
+                    kScaleTolerance, kSmallestScale);
   }
 
   [[nodiscard]] DriftQuantity friction(const DirectionFit& fit, double model_error) const {
     double level = 0.0;
     for (const double torque : parts_.friction) level += std::abs(torque);
     level /= static_cast<double>(parts_.friction.size());
-    DriftQuantity result = quantity("friction", unit_label(model_.settings.target), level, fit, 2,
+    DriftQuantity result = quantity(kFriction, unit_label(model_.settings.target), level, fit, 2,
                                     model_error, kFrictionTolerance, kSmallestFriction);
     if (level < kLeastFriction * model_error) {
       result.verdict = DriftVerdict::undetermined;
@@ -324,33 +366,6 @@ class Comparison {
     return result;
   }
 
-  static void conclude(Drift& drift) {
-    bool is_certain = true;
-    bool has_changed = false;
-    bool has_new_zero = false;
-    for (const DriftQuantity& of : drift.quantities) {
-      if (!of.is_of_joint) {
-        has_new_zero |= of.verdict == DriftVerdict::changed;
-        continue;
-      }
-      is_certain &= of.verdict != DriftVerdict::undetermined;
-      has_changed |= of.verdict == DriftVerdict::changed;
-    }
-    if (has_changed) {
-      drift.joint = DriftVerdict::changed;
-    } else if (is_certain) {
-      drift.joint = DriftVerdict::not_changed;
-    }
-    const double worth = kWorthFactor * drift.calibration_rmse;
-    if (drift.zeroed_rmse > worth) {
-      drift.advice = DriftAdvice::calibrate;
-    } else if (drift.rmse > worth || has_new_zero) {
-      drift.advice = DriftAdvice::set_zero;
-    } else if (!is_certain && !has_changed) {
-      drift.advice = DriftAdvice::record_more;
-    }
-  }
-
   const ModelFile& model_;
   const DriftOptions& options_;
   std::vector<Compared> runs_;
@@ -362,6 +377,77 @@ class Comparison {
   std::vector<double> residual_;
   Matrix columns_;
 };
+
+DriftQuantity* find(Drift& drift, std::string_view quantity) {
+  const auto found = std::ranges::find(drift.quantities, quantity, &DriftQuantity::name);
+  return found == drift.quantities.end() ? nullptr : &*found;
+}
+
+double half_width(const DriftQuantity& of) { return 0.5 * (of.highest - of.lowest); }
+
+/// Takes the relative change of the gain out of a quantity that it scales.
+void subtract_gain(DriftQuantity& of, const DriftQuantity& gain) {
+  if (!std::isfinite(of.lowest)) return;
+  const std::string reason = of.verdict == DriftVerdict::undetermined ? of.reason : "";
+  decide(of, of.change - gain.change * of.before,
+         std::hypot(half_width(of), half_width(gain) * of.before));
+  if (of.name != kFriction || reason.empty()) return;
+  of.verdict = DriftVerdict::undetermined;
+  of.reason = reason;
+}
+
+void require_gear(const Dataset& dataset, const char* which) {
+  for (const DatasetRecord& record : dataset.records)
+    for (const char* channel : {"motor_angle_rad", "gear_angle_rad"})
+      if (!record.recording.has(channel))
+        throw Error({.place = record.recording.name(),
+                     .problem = fmt::format("gain and stiffness cannot be separated: {}", which),
+                     .expected = "motor_angle_rad and gear_angle_rad",
+                     .found = fmt::format("no {}", channel),
+                     .advice = "Leave out the calibration: both are then reported as one."});
+}
+
+/// Gain of the load cell and stiffness of the spring, by the twist of the gear.
+void separate_gain(Drift& drift, const Dataset& dataset, const DriftOptions& options,
+                   const Progress& progress) {
+  if (!(options.gear_ratio > 0.0) || !std::isfinite(options.gear_ratio))
+    throw UsageError({.place = "gear ratio",
+                      .expected = "a finite number above 0, which separates gain and stiffness",
+                      .found = fmt::format("{}", options.gear_ratio)});
+  require_gear(*options.calibration, "a recording of the calibration has no twist of the gear");
+  require_gear(dataset, "a new recording has no twist of the gear");
+  const FeatureSpec twist{
+      .inputs = {fmt::format("lowpass(motor_angle_rad / {} - gear_angle_rad, 10Hz)",
+                             options.gear_ratio)},
+      .definitions = {}};
+  Dataset trained = *options.calibration;
+  trained.target = dataset.target;
+  const ModelFile gear =
+      train_model(trained, {.family = "grey_box", .features = twist}, options.seed, progress).file;
+  Drift of_gear = Comparison(gear, dataset, options, progress).drift();
+  const DriftQuantity& over_gear = *find(of_gear, kScale);
+  DriftQuantity gain{.name = "gain",
+                     .unit = "1",
+                     .before = 1.0,
+                     .tolerance = kScaleTolerance,
+                     .smallest = kSmallestScale,
+                     .is_of_joint = false,
+                     .reason = over_gear.reason};
+  if (std::isfinite(over_gear.lowest))
+    decide(gain, over_gear.relative, half_width(over_gear) / std::abs(over_gear.before));
+  if (!(half_width(gain) < kSmallestScale)) {
+    gain.verdict = DriftVerdict::undetermined;
+    gain.reason = "the twist of the gear does not determine it";
+    drift.quantities.push_back(std::move(gain));
+    return;
+  }
+  DriftQuantity& stiffness = *find(drift, kScale);
+  stiffness.name = "stiffness";
+  subtract_gain(stiffness, gain);
+  subtract_gain(*find(drift, kFriction), gain);
+  drift.quantities.push_back(std::move(gain));
+  conclude(drift);
+}
 
 }  // namespace
 
@@ -403,7 +489,9 @@ Drift detect_drift(const ModelFile& model, const Dataset& dataset, const DriftOp
            .found = mistake,
            .advice = "Check the units of the recording, or give the mapping of the training."});
   }
-  return Comparison(model, dataset, options, progress).drift();
+  Drift drift = Comparison(model, dataset, options, progress).drift();
+  if (options.calibration != nullptr) separate_gain(drift, dataset, options, progress);
+  return drift;
 }
 
 }  // namespace torsio

@@ -19,14 +19,14 @@ struct TorqueParts {
   std::vector<double> stiffness;  ///< dE/dx
   std::vector<double> friction;   ///< H
   double middle = 0.0;            ///< x0: where E is 0; NaN: nowhere
-  double error_rms = 0.0;         ///< of the fit
+  double error_rms = 0.0;         ///< root mean square error of the fit
 };
 
 /// The samples of one recording, in the order of time.
 struct PartsRun {
   std::span<const double> x;
   const Matrix* features = nullptr;
-  std::span<const double> output;  ///< of the model
+  std::span<const double> output;  ///< output of the model
   std::vector<std::size_t> rows;   ///< samples that are compared
 };
 

@@ -17,7 +17,7 @@ struct DriftCampaignSettings {
   /// Names for `data_sheet`, without serial number; they take turns. Empty: the series-elastic
   /// actuators.
   std::vector<std::string> actuators = {};
-  std::string family = "grey_box";  ///< of the models
+  std::string family = "grey_box";  ///< family of the models
   std::size_t threads = 0;          ///< 0: as many as the machine has
   /// Results are appended to this file, and those that are in it are not simulated again; empty: none.
   std::string resume = {};
@@ -28,7 +28,7 @@ struct DriftSpecimen {
   std::string actuator;
   std::string changed = {};        ///< "stiffness", "friction", or empty: nothing
   double amount = 0.0;             ///< relative change
-  double estimate = kNotMeasured;  ///< of it
+  double estimate = kNotMeasured;  ///< its estimate
   bool is_found = false;           ///< the quantity that was changed is reported as changed
   bool is_other_found = false;     ///< another quantity of the joint is reported as changed
   bool is_undetermined = false;    ///< the joint cannot be determined
