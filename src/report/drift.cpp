@@ -61,6 +61,10 @@ std::string advice_sentence(const Drift& drift) {
     case DriftAdvice::set_zero:
       return "A new calibration is not worth it: set the zero of the torque again.";
     case DriftAdvice::calibrate: return "A new calibration is worth it.";
+    case DriftAdvice::other_motion:
+      return "The model is less accurate in this motion than at its calibration, and no change "
+             "above "
+             "explains\nit: calibrate with this motion, too.";
     case DriftAdvice::record_more: break;
   }
   return "No need for a new calibration was found; record more for a certain answer.";

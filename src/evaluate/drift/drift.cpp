@@ -24,7 +24,7 @@ namespace {
 // Thresholds: chosen on the seeds of `--campaign` from 1000 on, which are not those of the results
 // (docs/drift.md).
 constexpr double kQuantile = 1.96;         // 95 %
-constexpr double kModelErrorShare = 0.3;   // share of the residual of the calibration
+constexpr double kModelErrorShare = 0.3;   // share of the remaining residual
 constexpr double kScaleTolerance = 0.012;  // a load cell that was remounted
 constexpr double kSmallestScale = 0.03;
 constexpr double kFrictionTolerance = 0.04;
@@ -229,8 +229,7 @@ class Comparison {
     drift.samples = residual_.size();
     drift.effective_samples = fit.effective_samples;
     drift.corrected_rmse = root_mean_square(fit.residual);
-    const double model_error =
-        std::isfinite(drift.calibration_rmse) ? drift.calibration_rmse : drift.corrected_rmse;
+    const double model_error = drift.corrected_rmse;
     drift.quantities = {zero(fit, model_error), scale(fit, model_error), friction(fit, model_error),
                         backlash(fit, model_error)};
     conclude(drift);
@@ -465,6 +464,7 @@ std::string_view name(DriftAdvice advice) noexcept {
     case DriftAdvice::none: return "none";
     case DriftAdvice::set_zero: return "set the zero";
     case DriftAdvice::calibrate: return "calibrate";
+    case DriftAdvice::other_motion: return "other motion";
     case DriftAdvice::record_more: break;
   }
   return "record more";
