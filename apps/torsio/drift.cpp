@@ -20,8 +20,6 @@ namespace {
 struct DriftFlags {
   std::string model;
   DataFlags data;
-  std::vector<std::string> calibration;
-  double gear_ratio = 0.0;
   std::string serial;
   std::size_t campaign = 0;
   torsio::DriftCampaignSettings settings;
@@ -49,9 +47,7 @@ void run(DriftFlags& flags) {
                               .expected = "MODEL REC..., or --campaign N",
                               .found = "no model file",
                               .advice = "torsio drift joint.safetensors today.csv"});
-  std::vector<std::string> read{flags.model};
-  read.insert(read.end(), flags.calibration.begin(), flags.calibration.end());
-  flags.data.check_outputs({flags.json.destination}, read);
+  flags.data.check_outputs({flags.json.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model, flags.serial);
   flags.data.target = file.settings.target;
   flags.data.use_model_mapping(file.card.mapping, flags.model);
@@ -59,16 +55,7 @@ void run(DriftFlags& flags) {
   const torsio::Dataset dataset = flags.data.load_as_test(progress.listener());
   warn_of_seen_recordings(file, dataset);
   warn_of_missing_zeros(file, dataset);
-  torsio::DriftOptions options;
-  torsio::Dataset calibration;
-  if (!flags.calibration.empty()) {
-    DataFlags of_calibration = flags.data;
-    of_calibration.recordings = flags.calibration;
-    calibration = of_calibration.load({}, {}, progress.listener());
-    options.calibration = &calibration;
-    options.gear_ratio = flags.gear_ratio;
-  }
-  const torsio::Drift drift = torsio::detect_drift(file, dataset, options, progress.listener());
+  const torsio::Drift drift = torsio::detect_drift(file, dataset, {}, progress.listener());
   if (flags.json.wants_tables()) print(torsio::drift_text(drift, file.settings.target));
   flags.json.write(torsio::drift_json(drift, file.settings.target));
 }
@@ -83,21 +70,12 @@ void add_drift(CLI::App& app) {
                                       "is a new one worth it");
   verb->footer(
       "Example: torsio drift joint.safetensors today.csv\n"
-      "Gain and stiffness apart, from the twist of the gear:\n"
-      "  torsio drift joint.safetensors today.csv --calibration then1.csv then2.csv --gear-ratio "
-      "120\n"
       "docs/drift.md has the method, its limits and what it cannot decide.");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit");
   flags->data.add_recordings(*verb,
                              "recordings of today with the inputs and the torque, or a manifest");
   flags->data.add_model_mapping(*verb);
   flags->data.add_initialise(*verb);
-  verb->add_option(
-      "--calibration", flags->calibration,
-      "recordings of the calibration, with motor and gear angle: gain of the load cell and "
-      "stiffness of the spring are then separated");
-  verb->add_option("--gear-ratio", flags->gear_ratio,
-                   "motor_angle_rad over gear_angle_rad, for --calibration");
   verb->add_option("--device-serial", flags->serial,
                    "serial number of the joint; a model of another one is refused");
   verb->add_option("--campaign", flags->campaign,

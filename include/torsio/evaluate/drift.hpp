@@ -53,11 +53,6 @@ struct Drift {
 struct DriftOptions {
   std::size_t resamples = 400;  ///< number of records of the bootstrap, at least 100
   std::uint64_t seed = 1;       ///< seed of the bootstrap
-  /// Recordings of the time of the calibration (role train), from which the torque over the twist of the
-  /// gear is learned as a second source; without them, stiffness and gain are one.
-  const Dataset* calibration = nullptr;
-  double gear_ratio =
-      kNotMeasured;  ///< ratio of `motor_angle_rad` over `gear_angle_rad`; needed for it
 };
 
 /// Compares the torque of recordings (role test) with a model of it: generalised least squares of
@@ -72,10 +67,6 @@ struct DriftOptions {
 /// may have in each direction. A quantity has changed if its 95 % interval lies outside of what a joint
 /// without a change shows, has not changed if the interval is inside of the smallest change that counts,
 /// and is undetermined otherwise.
-/// With `calibration` and `gear_ratio`, the same is done with a grey box over the twist of the gear,
-/// motor_angle_rad / ratio - gear_angle_rad. A gain g of the load cell scales the torque over both twists:
-/// g is the scale over the gear, the change of the stiffness is s - g, that of the friction f - g. A gear that
-/// itself became softer is not distinguished from a gain.
 /// @throws Error if the recordings have too few measured samples, a torque that is constant or does not
 /// follow, another unit, or a motion without deflection; as `predict`; UsageError for an option;
 /// Cancelled.

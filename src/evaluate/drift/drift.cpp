@@ -16,7 +16,6 @@
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/evaluate.hpp"
 #include "torsio/fit/common/training_data.hpp"
-#include "torsio/fit/train_model.hpp"
 
 namespace torsio {
 namespace {
@@ -89,6 +88,21 @@ void check_torque(const Compared& of) {
                .advice = "Check the load cell, its amplifier and its cable, and record again."});
 }
 
+[[noreturn]] void refuse_short(const Recording& recording, std::string found) {
+  throw Error(
+      {.place = recording.name(),
+       .problem = "too short to compare it with the model",
+       .expected = fmt::format("at least {} and {} measured samples after the model has settled",
+                               seconds(kLeastDuration_s), kLeastSamples),
+       .found = std::move(found),
+       .advice = "Record about a minute of slow motion in both directions."});
+}
+
+void check_length(const Recording& recording) {
+  const double measured_s = static_cast<double>(recording.size()) / recording.sample_rate_Hz();
+  if (measured_s < kLeastDuration_s) refuse_short(recording, seconds(measured_s));
+}
+
 Compared compare(const ModelFile& model, const DatasetRecord& record, const Dataset& dataset,
                  Sequence sequence) {
   const Recording& recording = record.recording;
@@ -114,7 +128,6 @@ Compared compare(const ModelFile& model, const DatasetRecord& record, const Data
       of.rows.push_back(n);
     }
   }
-  const double measured_s = static_cast<double>(recording.size()) / recording.sample_rate_Hz();
   if (static_cast<double>(of.outside) >
       kManyOutside * static_cast<double>(of.outside + of.rows.size()))
     throw Error(
@@ -124,14 +137,8 @@ Compared compare(const ModelFile& model, const DatasetRecord& record, const Data
          .found = fmt::format("{} of {} samples with a fault of the model", of.outside,
                               of.outside + of.rows.size()),
          .advice = "torsio estimate states the faults; record a motion as in the training."});
-  if (of.rows.size() < kLeastSamples || measured_s < kLeastDuration_s)
-    throw Error(
-        {.place = recording.name(),
-         .problem = "too short to compare it with the model",
-         .expected = fmt::format("at least {} and {} measured samples after the model has settled",
-                                 seconds(kLeastDuration_s), kLeastSamples),
-         .found = fmt::format("{} and {} samples", seconds(measured_s), of.rows.size()),
-         .advice = "Record about a minute of slow motion in both directions."});
+  if (of.rows.size() < kLeastSamples)
+    refuse_short(recording, fmt::format("{} samples", of.rows.size()));
   check_torque(of);
   return of;
 }
@@ -377,77 +384,6 @@ class Comparison {
   Matrix columns_;
 };
 
-DriftQuantity* find(Drift& drift, std::string_view quantity) {
-  const auto found = std::ranges::find(drift.quantities, quantity, &DriftQuantity::name);
-  return found == drift.quantities.end() ? nullptr : &*found;
-}
-
-double half_width(const DriftQuantity& of) { return 0.5 * (of.highest - of.lowest); }
-
-/// Takes the relative change of the gain out of a quantity that it scales.
-void subtract_gain(DriftQuantity& of, const DriftQuantity& gain) {
-  if (!std::isfinite(of.lowest)) return;
-  const std::string reason = of.verdict == DriftVerdict::undetermined ? of.reason : "";
-  decide(of, of.change - gain.change * of.before,
-         std::hypot(half_width(of), half_width(gain) * of.before));
-  if (of.name != kFriction || reason.empty()) return;
-  of.verdict = DriftVerdict::undetermined;
-  of.reason = reason;
-}
-
-void require_gear(const Dataset& dataset, const char* which) {
-  for (const DatasetRecord& record : dataset.records)
-    for (const char* channel : {"motor_angle_rad", "gear_angle_rad"})
-      if (!record.recording.has(channel))
-        throw Error({.place = record.recording.name(),
-                     .problem = fmt::format("gain and stiffness cannot be separated: {}", which),
-                     .expected = "motor_angle_rad and gear_angle_rad",
-                     .found = fmt::format("no {}", channel),
-                     .advice = "Leave out the calibration: both are then reported as one."});
-}
-
-/// Gain of the load cell and stiffness of the spring, by the twist of the gear.
-void separate_gain(Drift& drift, const Dataset& dataset, const DriftOptions& options,
-                   const Progress& progress) {
-  if (!(options.gear_ratio > 0.0) || !std::isfinite(options.gear_ratio))
-    throw UsageError({.place = "gear ratio",
-                      .expected = "a finite number above 0, which separates gain and stiffness",
-                      .found = fmt::format("{}", options.gear_ratio)});
-  require_gear(*options.calibration, "a recording of the calibration has no twist of the gear");
-  require_gear(dataset, "a new recording has no twist of the gear");
-  const FeatureSpec twist{
-      .inputs = {fmt::format("lowpass(motor_angle_rad / {} - gear_angle_rad, 10Hz)",
-                             options.gear_ratio)},
-      .definitions = {}};
-  Dataset trained = *options.calibration;
-  trained.target = dataset.target;
-  const ModelFile gear =
-      train_model(trained, {.family = "grey_box", .features = twist}, options.seed, progress).file;
-  Drift of_gear = Comparison(gear, dataset, options, progress).drift();
-  const DriftQuantity& over_gear = *find(of_gear, kScale);
-  DriftQuantity gain{.name = "gain",
-                     .unit = "1",
-                     .before = 1.0,
-                     .tolerance = kScaleTolerance,
-                     .smallest = kSmallestScale,
-                     .is_of_joint = false,
-                     .reason = over_gear.reason};
-  if (std::isfinite(over_gear.lowest))
-    decide(gain, over_gear.relative, half_width(over_gear) / std::abs(over_gear.before));
-  if (!(half_width(gain) < kSmallestScale)) {
-    gain.verdict = DriftVerdict::undetermined;
-    gain.reason = "the twist of the gear does not determine it";
-    drift.quantities.push_back(std::move(gain));
-    return;
-  }
-  DriftQuantity& stiffness = *find(drift, kScale);
-  stiffness.name = "stiffness";
-  subtract_gain(stiffness, gain);
-  subtract_gain(*find(drift, kFriction), gain);
-  drift.quantities.push_back(std::move(gain));
-  conclude(drift);
-}
-
 }  // namespace
 
 std::string_view name(DriftVerdict verdict) noexcept {
@@ -478,6 +414,7 @@ Drift detect_drift(const ModelFile& model, const Dataset& dataset, const DriftOp
                       .expected = fmt::format("at least {}", kLeastResamples),
                       .found = fmt::format("{}", options.resamples)});
   for (const DatasetRecord& record : dataset.records) {
+    check_length(record.recording);
     const std::string mistake = unit_doubt(record.recording, model.settings);
     if (!mistake.empty())
       throw Error(
@@ -489,9 +426,7 @@ Drift detect_drift(const ModelFile& model, const Dataset& dataset, const DriftOp
            .found = mistake,
            .advice = "Check the units of the recording, or give the mapping of the training."});
   }
-  Drift drift = Comparison(model, dataset, options, progress).drift();
-  if (options.calibration != nullptr) separate_gain(drift, dataset, options, progress);
-  return drift;
+  return Comparison(model, dataset, options, progress).drift();
 }
 
 }  // namespace torsio
