@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
   add_check(app);
   add_fit(app);
   add_evaluate(app);
+  add_drift(app);
   add_estimate(app);
   add_compare(app);
   add_crossvalidate(app);

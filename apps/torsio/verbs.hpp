@@ -8,6 +8,7 @@
 void add_simulate(CLI::App& app);
 void add_check(CLI::App& app);
 void add_fit(CLI::App& app);
+void add_drift(CLI::App& app);
 void add_estimate(CLI::App& app);
 void add_evaluate(CLI::App& app);
 void add_compare(CLI::App& app);
