@@ -13,12 +13,14 @@ Study slow_loops_002(const StudyOptions& options, const Progress& progress);
 Study collision_002(const StudyOptions& options, const Progress& progress);
 Study models_003(const StudyOptions& options, const Progress& progress);
 Study redundancy_000(const StudyOptions& options, const Progress& progress);
+Study transfer_000(const StudyOptions& options, const Progress& progress);
 Study brake_000(const StudyOptions& options, const Progress& progress);
 Study torque_tracking_000(const StudyOptions& options, const Progress& progress);
 Study encoders_004(const StudyOptions& options, const Progress& progress);
 Study torque_levels_004(const StudyOptions& options, const Progress& progress);
 Study impedances_004(const StudyOptions& options, const Progress& progress);
 Study tubes_004(const StudyOptions& options, const Progress& progress);
+Study few_data_transfer(const StudyOptions& options, const Progress& progress);
 Study model_comparison(const StudyOptions& options, const Progress& progress);
 Study public_benchmarks(const StudyOptions& options, const Progress& progress);
 

@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
   add_check(app);
   add_fit(app);
   add_evaluate(app);
+  add_drift(app);
   add_estimate(app);
   add_compare(app);
   add_crossvalidate(app);
@@ -51,6 +52,7 @@ int run(int argc, char** argv) {
   add_adapt(app);
   add_import(app);
   add_monitor(app);
+  add_transfer(app);
   add_track(app);
   add_tune_loop(app);
   add_reproduce(app);

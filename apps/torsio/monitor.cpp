@@ -184,7 +184,7 @@ void add_monitor(CLI::App& app) {
                    "of joints at work, of all actuators together")
       ->capture_default_str();
   verb->add_option("--low-load-hours", campaign.low_load_hours,
-                   "of other specimens under little load")
+                   "of joints under little load whose spring has another hysteresis than its model")
       ->capture_default_str();
   verb->add_option("--classes", campaign.classes,
                    "only those whose name begins so, separated by commas")

@@ -8,6 +8,7 @@
 void add_simulate(CLI::App& app);
 void add_check(CLI::App& app);
 void add_fit(CLI::App& app);
+void add_drift(CLI::App& app);
 void add_estimate(CLI::App& app);
 void add_evaluate(CLI::App& app);
 void add_compare(CLI::App& app);
@@ -18,6 +19,7 @@ void add_attribute(CLI::App& app);
 void add_import(CLI::App& app);
 void add_monitor(CLI::App& app);
 void add_track(CLI::App& app);
+void add_transfer(CLI::App& app);
 void add_tune_loop(CLI::App& app);
 void add_reproduce(CLI::App& app);
 void add_unpack(CLI::App& app);

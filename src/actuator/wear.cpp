@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "actuator/stage_wear.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -16,10 +17,10 @@ constexpr double kStiffnessLost = 0.1;
 constexpr double kFrictionGained = 1.0;
 constexpr double kPlayGained = 2.0;
 
-/// What age does to a stage, value by value.
+/// What wear does to a stage, value by value.
 class Ageing {
  public:
-  explicit Ageing(double age) : age_(age) {}
+  explicit Ageing(const StageWear& wear) : wear_(wear) {}
 
   void operator()(SpringSheet& spring) const {
     soften(spring.stiffness_Nm_rad);
@@ -32,7 +33,7 @@ class Ageing {
     rub(spring.load_friction);
     rub(spring.break_away_rad);
     rub(spring.knee_rad);
-    scale(spring.half_gap_rad, 1.0 + kPlayGained * age_);
+    scale(spring.half_gap_rad, wear_.play);
   }
   void operator()(ElastomerSheet& coupling) const {
     soften(coupling.stiffness_Nm_rad);
@@ -57,14 +58,14 @@ class Ageing {
 
  private:
   static void scale(SheetValue& value, double factor) { value = assumed(value.value * factor); }
-  void soften(SheetValue& value) const { scale(value, 1.0 - kStiffnessLost * age_); }
-  void rub(SheetValue& value) const { scale(value, 1.0 + kFrictionGained * age_); }
+  void soften(SheetValue& value) const { scale(value, wear_.stiffness); }
+  void rub(SheetValue& value) const { scale(value, wear_.friction); }
   template <class Values>
   void rub(Values& values) const {
     for (SheetValue& value : values) rub(value);
   }
 
-  double age_;
+  StageWear wear_;
 };
 
 void require(bool holds, const char* what, std::string expected, double found) {
@@ -104,9 +105,18 @@ double friction_factor(double temperature_K) noexcept {
 DataSheet aged(const DataSheet& sheet, double age) {
   DataSheet old = sheet;
   if (age == 0.0) return old;  // the tags stay
-  std::visit(Ageing(age), old.first);
-  std::visit(Ageing(age), old.second);
+  const Ageing ageing({.stiffness = 1.0 - kStiffnessLost * age,
+                       .friction = 1.0 + kFrictionGained * age,
+                       .play = 1.0 + kPlayGained * age});
+  std::visit(ageing, old.first);
+  std::visit(ageing, old.second);
   return old;
+}
+
+DataSheet worn(const DataSheet& sheet, const StageWear& wear) {
+  DataSheet changed = sheet;
+  std::visit(Ageing(wear), changed.second);
+  return changed;
 }
 
 }  // namespace torsio

@@ -73,6 +73,9 @@ MonitoredTorque::MonitoredTorque(TorqueSources sources, const RedundancySettings
     guard.longest_age_s = signal.longest_age_s;
     guard.largest_step = signal.largest_rate * monitor.sample_period_s;
   }
+  for (std::size_t k = 0; k < guards_.size(); ++k)
+    guards_[k].largest_step =
+        std::min(guards_[k].largest_step, sources_.largest_step(raw_inputs_[k]));
   row_.resize(history_columns().size());
   const double rows = std::ceil(kHistory_s / monitor.sample_period_s);
   history_ = History(static_cast<std::size_t>(rows), row_.size());
@@ -115,6 +118,7 @@ void MonitoredTorque::reset() noexcept {
   signal_pipeline_.reset();
   for (ChannelGuard& guard : guards_) {
     guard.last = kNotMeasured;
+    guard.change = 0.0;
     guard.held = 0;
   }
 }
@@ -126,8 +130,10 @@ double MonitoredTorque::guarded(ChannelGuard& guard, const SignalSample& sample)
   if (step > guard.largest_step * (guard.held + 1) &&
       guard.held + 1 < monitor_.settings().spikes_in_a_row) {
     ++guard.held;
-    return guard.last;
+    return guard.last + guard.held * guard.change;
   }
+  const double change = (sample.value - guard.last) / (guard.held + 1);
+  guard.change = std::isfinite(change) ? change : 0.0;
   guard.held = 0;
   guard.last = sample.value;
   return sample.value;

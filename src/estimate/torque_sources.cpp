@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string_view>
 #include <utility>
 
@@ -122,6 +123,21 @@ void TorqueSources::set_zero(std::string_view channel, double value) {
     set(source.torque);
     if (source.friction) set(*source.friction);
   }
+}
+
+double TorqueSources::largest_step(std::string_view channel) const {
+  double largest = std::numeric_limits<double>::infinity();
+  const auto see = [&](const Fed& fed) {
+    const std::vector<double>& steps = fed.estimator.settings().disturbances.largest_step;
+    const std::vector<std::string>& names = fed.estimator.raw_inputs();
+    for (std::size_t k = 0; k < steps.size(); ++k)
+      if (names[k] == channel) largest = std::min(largest, detail::kJumpFactor * steps[k]);
+  };
+  for (const Source& source : sources_) {
+    see(source.torque);
+    if (source.friction) see(*source.friction);
+  }
+  return largest;
 }
 
 void TorqueSources::reset() noexcept {

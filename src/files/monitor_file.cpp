@@ -74,6 +74,7 @@ ordered_json pair_json(const PairLimits& pair, const std::vector<std::string>& s
           {"factor", pair.factor},
           {"floor_Nm", pair.floor_Nm},
           {"ceiling_Nm", limit(pair.ceiling_Nm)},
+          {"largest_armed_Nm", limit(pair.largest_armed_Nm)},
           {"drift_allowance", pair.drift_allowance},
           {"drift_limit_s", limit(pair.drift_limit_s)}};
 }
@@ -90,13 +91,14 @@ std::uint8_t source_index(const std::vector<std::string>& sources, const std::st
 
 PairLimits pair_of(const JsonObject& object, const std::vector<std::string>& sources,
                    const std::string& place) {
-  object.allow_only(
-      {"first", "second", "factor", "floor_Nm", "ceiling_Nm", "drift_allowance", "drift_limit_s"});
+  object.allow_only({"first", "second", "factor", "floor_Nm", "ceiling_Nm", "largest_armed_Nm",
+                     "drift_allowance", "drift_limit_s"});
   return {.first = source_index(sources, object.text("first"), place),
           .second = source_index(sources, object.text("second"), place),
           .factor = object.number("factor"),
           .floor_Nm = object.number("floor_Nm"),
           .ceiling_Nm = limit_of(object, "ceiling_Nm", kInfinity),
+          .largest_armed_Nm = limit_of(object, "largest_armed_Nm", kInfinity),
           .drift_allowance = object.number("drift_allowance"),
           .drift_limit_s = limit_of(object, "drift_limit_s", kInfinity)};
 }

@@ -26,16 +26,18 @@ std::string percent(double share) { return text(100.0 * share, 1) + " %"; }
 std::string class_table(const CampaignResult& result) {
   TextTable table;
   table.header({"fault", "group", "row", "injected", "detected", "missed <", "p50", "p99",
-                "longest", "limit", "late", "brief", "redrawn", "unreached"});
+                "longest", "limit", "from", "late", "brief", "redrawn", "unreached"});
   for (const ClassResult& of : result.classes)
     table.row({of.name + (of.must_stop ? "" : " (must not stop)"), of.group,
                fmt::format("{}", of.row), count(of.injected), count(of.detected),
                of.must_stop ? percent(of.missed_upper_95) : "-", text(of.latency.p50_ms, 0),
                text(of.latency.p99_ms, 0), text(of.latency.longest_ms, 0), text(of.limit_ms, 0),
-               count(of.late), count(of.brief), count(of.redrawn), count(of.unreached)});
-  return "Injections whose disagreement stays at 20 % of the rated torque or more until the limit "
-         "of the\n"
-         "latency; latencies in ms from where it reaches 20 %, of signals and the loop from the\n"
+               percent(of.limit_share), count(of.late), count(of.brief), count(of.redrawn),
+               count(of.unreached)});
+  return "Injections whose disagreement stays at `from` of the rated torque or more until the "
+         "limit of "
+         "the\nlatency; latencies in ms from where it reaches that, of signals and the loop from "
+         "the\n"
          "injection. brief: those with a disagreement before that ended by itself sooner than the "
          "limit.\n"
          "95 % bound of the share that is missed.\n\n" +
@@ -101,7 +103,7 @@ std::string fault_free_table(const CampaignResult& result) {
   TextTable table;
   table.header({"work", "group", "joint-hours", "impacts", "false alarms", "an hour <", "causes"});
   const auto add = [&](const FaultFreeResult& of, std::string group) {
-    table.row({of.is_low_load ? "little load, other specimens" : "work", std::move(group),
+    table.row({of.is_low_load ? "little load, other hysteresis" : "work", std::move(group),
                text(of.joint_hours, 2), count(of.impacts), count(of.false_alarms),
                std::isnan(of.upper_95) ? "-" : fmt::format("{:.2g}", of.upper_95),
                causes_text(of)});
@@ -125,6 +127,7 @@ Json json_of(const ClassResult& of) {
           {"latency_ms_p99", of.latency.p99_ms},
           {"latency_ms_max", of.latency.longest_ms},
           {"limit_ms", of.limit_ms},
+          {"limit_share", of.limit_share},
           {"late", of.late},
           {"brief", of.brief},
           {"redrawn", of.redrawn},

@@ -12,9 +12,9 @@ namespace torsio {
 namespace {
 
 /// An input of the source was not measured.
-bool is_lost(Fault fault) noexcept {
-  return fault == Fault::input_not_finite || fault == Fault::input_count_wrong ||
-         fault == Fault::zero_not_set;
+bool is_lost(const Estimate& source) noexcept {
+  return source.fault == Fault::input_not_finite || source.fault == Fault::input_count_wrong ||
+         source.fault == Fault::zero_not_set || !std::isfinite(source.value);
 }
 
 /// A change is a wrap of the encoder if it is a turn or several of them up to a tenth of a turn.
@@ -25,6 +25,7 @@ bool is_wrap(double change, double turn) noexcept {
 }
 
 constexpr double kLatePeriods = 1.5;
+constexpr std::uint32_t kQuarters = 4;  // parts of a sample
 
 /// Whether so many samples in a row are longer than a time; rounding does not make them longer.
 bool lasts_longer(std::uint32_t samples, double period_s, double longest_s) noexcept {
@@ -179,13 +180,20 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
   SourceState& state = source_states_[i];
   const auto index = static_cast<std::uint8_t>(i);
   const double period_s = settings_.sample_period_s;
-  const bool lost = is_lost(estimate.fault) || !std::isfinite(estimate.value);
+  const bool lost = is_lost(estimate);
   // A source that warms up is not used yet, and no fault is reported: a friction state settles with the motion.
   const bool is_warming_up = estimate.fault == Fault::warming_up;
   const bool faulty = !lost && !is_warming_up && !detail::is_valid(estimate);
   const bool is_novel = estimate.novelty > settings_.largest_novelty;
   state.lost = lost ? state.lost + 1 : 0;
-  state.faulty = faulty ? state.faulty + 1 : 0;
+  const auto is_faulty_for_long = [&] {
+    return lasts_longer(state.faulty / kQuarters, period_s, settings_.longest_fault_s);
+  };
+  if (!faulty) {
+    state.faulty -= std::min(state.faulty, 1U);
+  } else if (!is_faulty_for_long()) {
+    state.faulty += kQuarters;
+  }
   state.novel = is_novel ? state.novel + 1 : 0;
   constexpr auto kLost = static_cast<std::size_t>(MonitorCheck::source_lost);
   const bool too_long = settings_.actions[kLost] != MonitorAction::off &&
@@ -197,11 +205,11 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
           .second = index,
           .value = state.lost * period_s,
           .limit = settings_.longest_loss_s});
-  if (lasts_longer(state.faulty, period_s, settings_.longest_fault_s))
+  if (faulty && is_faulty_for_long())
     find({.check = MonitorCheck::source_fault,
           .first = index,
           .second = index,
-          .value = state.faulty * period_s,
+          .value = state.faulty / kQuarters * period_s,
           .limit = settings_.longest_fault_s});
   if (lasts_longer(state.novel, period_s, settings_.persistence_s))
     find({.check = MonitorCheck::novelty,
@@ -228,6 +236,7 @@ void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexc
   if (!detail::is_valid(first) || !detail::is_valid(second)) return;
   const double period_s = settings_.sample_period_s;
   const double limit_Nm = threshold(pair, first.std_dev, second.std_dev);
+  if (!(limit_Nm <= pair.largest_armed_Nm)) is_threshold_too_large_ = true;
   const double difference_Nm = first.value - second.value;
   const double release_Nm = state.disagrees ? settings_.release_share * limit_Nm : limit_Nm;
   state.beyond = std::abs(difference_Nm) <= release_Nm ? 0 : state.beyond + 1;
@@ -271,7 +280,7 @@ void Monitor::decide(double t_s) noexcept {
     return;
   }
   // Before it is armed every finding begins the proof again, warnings included.
-  if (active_ != 0) {
+  if (active_ != 0 || is_threshold_too_large_) {
     silent_since_s_ = kNotMeasured;
     state_ = State::unproven;
     return;
@@ -285,6 +294,7 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
   t_s_ = t_s;
   active_ = 0;
   disagreeing_count_ = 0;
+  is_threshold_too_large_ = false;
   stop_found_ = {};
   check_period(t_s);
   if (sources.size() != settings_.sources.size() || signals.size() != settings_.signals.size()) {
@@ -296,15 +306,14 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
     return state_;
   }
   for (std::size_t i = 0; i < signals.size(); ++i) check_signal(i, signals);
-  std::size_t valid = 0;
+  std::size_t left = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     check_source(i, sources[i]);
-    if (detail::is_valid(sources[i])) ++valid;
+    if (!is_lost(sources[i]) && sources[i].fault != Fault::warming_up) ++left;
   }
-  if (sources.size() > 1 && valid < 2)
-    find({.check = MonitorCheck::redundancy_lost,
-          .value = static_cast<double>(valid),
-          .limit = 2.0});
+  if (sources.size() > 1 && left < 2)
+    find(
+        {.check = MonitorCheck::redundancy_lost, .value = static_cast<double>(left), .limit = 2.0});
   for (std::size_t i = 0; i < settings_.pairs.size(); ++i) check_pair(i, sources);
   decide(t_s);
   return state_;

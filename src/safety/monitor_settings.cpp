@@ -62,6 +62,8 @@ void check_pair(const PairLimits& pair, std::size_t sources) {
   require(is_positive(pair.factor) && std::isfinite(pair.factor), place + ": factor",
           "a positive number", pair.factor);
   require(is_positive(pair.ceiling_Nm), place + ": ceiling_Nm", "above 0", pair.ceiling_Nm);
+  require(pair.largest_armed_Nm >= pair.floor_Nm, place + ": largest_armed_Nm", "at least floor_Nm",
+          pair.largest_armed_Nm);
   require(pair.floor_Nm >= 0.0 && pair.floor_Nm <= pair.ceiling_Nm, place + ": floor_Nm",
           "0 to the ceiling", pair.floor_Nm);
   require(pair.drift_allowance > 0.0 && pair.drift_allowance < 1.0, place + ": drift_allowance",

@@ -194,8 +194,7 @@ struct FeaturePipeline::Program {
   std::size_t settling_samples = 0;
   std::size_t seen = 0;
   bool has_travelled = false;  ///< every operator has forgotten its state at the start
-  std::vector<double>
-      errors;  ///< of the values, by unknown states at the start; then of the features
+  std::vector<double> errors;  ///< errors of the values, by unknown states at the start
   std::vector<double> feature_errors;
 
   [[nodiscard]] bool have_travelled() const noexcept {

@@ -162,10 +162,6 @@ double stiffest_stop(const DataSheet& sheet) {
   return Plant::stiffest_stop(plant, std::min(Plant::step_limit(plant), Plant::kDefaultStep_s));
 }
 
-double second_stage_stiffness(const DataSheet& sheet) {
-  return std::visit([](const auto& stage) { return stage.stiffness_Nm_rad.value; }, sheet.second);
-}
-
 std::vector<std::string> fault_sensors(const DataSheet& sheet) {
   std::vector<std::string> names;
   for (const SensedChannel& channel : sensed_channels(sheet)) names.emplace_back(channel.name);

@@ -28,7 +28,6 @@ struct FaultRule {
 /// The part's name in `FaultRule::part`, whatever this actuator calls it; empty: no part of it.
 [[nodiscard]] std::string_view common_part_name(std::string_view part, const DataSheet& sheet);
 
-[[nodiscard]] double second_stage_stiffness(const DataSheet& sheet);  ///< [Nm/rad]
 /// The largest stiffness of a stop [Nm/rad] that the bench's steps follow.
 [[nodiscard]] double stiffest_stop(const DataSheet& sheet);
 

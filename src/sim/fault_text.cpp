@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "actuator/second_stage.hpp"
 #include "core/trimmed.hpp"
 #include "data/names.hpp"
 #include "fault_rules.hpp"

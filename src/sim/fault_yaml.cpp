@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "actuator/second_stage.hpp"
 #include "data/names.hpp"
 #include "data/yaml_reader.hpp"
 #include "fault_rules.hpp"

@@ -18,6 +18,7 @@ namespace {
 constexpr std::string_view kActuators = "dfki-*";
 constexpr double kSweepSpeed_rad_s = rad_from_deg(10.0);
 constexpr double kSweepAcceleration_rad_s2 = rad_from_deg(30.0);
+constexpr double kShortChirp_s = 10.0;
 constexpr double kHold_rad = rad_from_deg(90.0);
 
 /// The lever with its mass. @throws UsageError if it is too heavy.
@@ -112,6 +113,19 @@ BenchProgram random_walk(const DataSheet& sheet, const ExperimentSpec& spec) {
   return torque_tracking(sheet, spec, torque_walk(torque_amplitude(sheet, spec), spec.seed));
 }
 
+/// What a new joint is asked to do when a model of another one is transferred to it.
+BenchProgram short_chirp(const DataSheet& sheet, const ExperimentSpec& spec) {
+  const Chirp reference(
+      {.amplitude = spec.torque_amplitude_Nm.value_or(0.5 * sheet.rating.torque_Nm.value),
+       .start_Hz = 0.05,
+       .end_Hz = 0.3,
+       .duration_s = spec.duration_s.value_or(kShortChirp_s)},
+      kBenchRate_Hz);
+  BenchProgram program = torque_tracking(sheet, spec, reference);
+  program.duration_s = kShortChirp_s;
+  return program;
+}
+
 constexpr auto kTable = std::to_array<ExperimentEntry>({
     {.info = {.name = "sweep",
               .actuators = kActuators,
@@ -138,6 +152,14 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .has_lever = true,
      .highest_torque_share = 1.0,
      .program = chirp},
+    {.info = {.name = "short-chirp",
+              .actuators = kActuators,
+              .description =
+                  "as chirp, of half the rated torque, 0.05 to 0.3 Hz in its duration of "
+                  "10 s or another",
+              .amplitude_unit = "Nm"},
+     .highest_torque_share = 1.0,
+     .program = short_chirp},
     {.info = {.name = "random-walk",
               .actuators = kActuators,
               .description = "as chirp, the torque being noise below 1 Hz with the same RMS",

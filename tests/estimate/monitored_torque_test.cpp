@@ -242,6 +242,43 @@ TEST(MonitoredTorque, OneSpikeDoesNotReachTheSourcesButASecondSampleDoes) {
   EXPECT_EQ(joint.torque.estimates()[0].fault, Fault::input_not_finite);
 }
 
+TEST(MonitoredTorque, ASpikeDuringAMotionIsReplacedByTheMotion) {
+  MonitorSettings settings = test::joint_monitor();
+  settings.signals.push_back({.name = "motor_current_A", .largest_rate = 1000.0});
+  Joint joint;
+  joint.torque = {test::torque_sources(test::joint_sources()), test::joint_redundancy(), settings};
+  double torque_Nm = 0.0;
+  const auto move = [&] { joint.set_torque(torque_Nm += 0.02); };
+  for (int n = 0; n < 60; ++n) {
+    move();
+    (void)joint.step();
+  }
+  move();
+  joint.channel("motor_current_A").value += 50.0;
+  (void)joint.step();
+  EXPECT_NEAR(joint.torque.estimates()[0].value, torque_Nm, 1e-9);
+  move();
+  (void)joint.step();
+  EXPECT_NEAR(joint.torque.estimates()[0].value, torque_Nm, 1e-9);
+}
+
+TEST(MonitoredTorque, AStepThatIsAJumpForASourceIsASpikeAsWell) {
+  std::vector<Estimator> sources = test::joint_sources();
+  EstimatorSettings settings = sources[0].settings();
+  settings.disturbances.largest_step = {0.5};
+  sources[0] = {settings, sources[0].model()};
+  TorqueSources of = test::torque_sources(sources);
+  EXPECT_EQ(of.largest_step("motor_current_A"), 1.0);
+  EXPECT_EQ(of.largest_step("gear_angle_rad"), std::numeric_limits<double>::infinity());
+  Joint joint;
+  joint.torque = {std::move(of), test::joint_redundancy(), test::joint_monitor()};
+  joint.start();
+  joint.channel("motor_current_A").value += 1.5;
+  (void)joint.step();
+  EXPECT_EQ(joint.torque.estimates()[0].fault, Fault::none);
+  EXPECT_NEAR(joint.torque.estimates()[0].value, 5.0, 1e-9);
+}
+
 TEST(MonitoredTorque, AResetMakesARunRepeatable) {
   Joint joint;
   const FusedTorque first = joint.step();

@@ -43,8 +43,12 @@ struct Written {
                              .turn = 0.5,
                              .moves_with = "spring_deflection_rad",
                              .largest_hidden_travel = 0.1}};
-    file.monitor.pairs = {
-        {.first = 0, .second = 1, .factor = 4.5, .floor_Nm = 0.75, .drift_limit_s = 3.0}};
+    file.monitor.pairs = {{.first = 0,
+                           .second = 1,
+                           .factor = 4.5,
+                           .floor_Nm = 0.75,
+                           .largest_armed_Nm = 2.5,
+                           .drift_limit_s = 3.0}};
     file.monitor.actions[static_cast<std::size_t>(MonitorCheck::novelty)] = MonitorAction::off;
     file.fault_free_hours = 2.5;
     file.false_alarms_per_hour = 2.0;
@@ -79,6 +83,7 @@ TEST(MonitorFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.monitor.signals[0].longest_age_s, std::numeric_limits<double>::infinity());
   EXPECT_EQ(read.monitor.signals[1].moves_with, "spring_deflection_rad");
   EXPECT_EQ(read.monitor.pairs[0].factor, 4.5);
+  EXPECT_EQ(read.monitor.pairs[0].largest_armed_Nm, 2.5);
   EXPECT_EQ(read.monitor.pairs[0].ceiling_Nm, std::numeric_limits<double>::infinity());
   EXPECT_EQ(read.monitor.actions, written.file.monitor.actions);
   save_monitor(written.folder.path("again.json"), read);

@@ -62,4 +62,11 @@ inline Dataset bench_dataset() {
   return dataset;
 }
 
+/// One recording, for training.
+inline Dataset one_recording(const BenchOptions& options = {}) {
+  Dataset dataset;
+  add_record(dataset, bench_recording("joint", options), Role::train);
+  return dataset;
+}
+
 }  // namespace torsio::test

@@ -35,7 +35,7 @@ namespace torsio {
 ///   `kJumpFactor` times its largest step in training; linear fallback, without error bar: there is
 ///   no evidence.
 /// - `warming_up`: filters have not settled since `reset()`, a long gap or a jump; linear fallback. An unknown
-///   state of `stop` or `dahl` in the inputs is no fault, but is contained in the error bar.
+///   state of `stop` or `dahl` in the inputs is not a fault, but is contained in the error bar.
 /// - `recovering`: inputs that the memory of the model has not received can still change its output by
 ///   more than its error bar (`MemoryError`); linear fallback.
 /// - a fault that the model reported, or `model_not_finite` (the model is then reset); linear

@@ -57,7 +57,7 @@ class EstimatorCore {
   }
   /// The standard deviation that the unknown states of `stop` and `dahl` at the start cause: sum of
   /// |slope| e / sqrt(3), with the slopes of the fallback and the bounds e of the features, all values of
-  /// which are taken as equally likely. 0 once they are forgotten. Contained in the error bar.
+  /// which are taken as equally likely. 0 once they have decayed. Contained in the error bar.
   [[nodiscard]] double start_std_dev() const noexcept { return start_std_dev_; }
 
   void set_zero(std::string_view channel, double value);

@@ -38,8 +38,8 @@ class MonitoredTorque {
   /// `monitor().reset(t_s)`, with which the next step begins the history again.
   void reset() noexcept;
 
-  /// A sample that changes faster than a signal that is this channel alone can (`largest_rate`) is replaced by
-  /// the one before it for the sources, in fewer than `spikes_in_a_row` samples: their filters would spread one
+  /// A sample that changes faster than a signal that is this channel alone can (`largest_rate`), or in a step that is
+  /// a jump for a source, is replaced for the sources by what the two before it lead to, in fewer than `spikes_in_a_row` samples: their filters would spread one
   /// spike over many ticks.
   /// @param raw one sample for each of `raw_inputs()`. A channel older than the longest age of a
   /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite.
@@ -65,6 +65,7 @@ class MonitoredTorque {
     double longest_age_s = std::numeric_limits<double>::infinity();
     double largest_step = std::numeric_limits<double>::infinity();  ///< from sample to sample
     double last = kNotMeasured;
+    double change = 0.0;     ///< per sample, of the last ones that were not replaced
     std::uint32_t held = 0;  ///< samples in a row that were replaced
   };
   [[nodiscard]] double guarded(ChannelGuard& guard, const SignalSample& sample) const noexcept;

@@ -76,6 +76,9 @@ class TorqueSources {
 
   /// As the estimators'. @throws UsageError for an unknown channel or a value that is not finite.
   void set_zero(std::string_view channel, double value);
+  /// The largest change of a channel from one sample to the next that no source takes for a jump; infinite for
+  /// one that they do not read.
+  [[nodiscard]] double largest_step(std::string_view channel) const;
   void reset() noexcept;
   /// To prove that a monitor stops: until `reset` this source reports a model without a finite output.
   /// Without effect if there is no such source.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,12 @@ struct CalibrationOptions {
   /// No pair has a smaller threshold, however well its sources agree in these recordings: what they do not
   /// contain, as another temperature or age, makes them differ more.
   double least_threshold_Nm = 0.0;
+  /// How long a difference must exceed its threshold; at least two samples. The filters of the sources spread one
+  /// wrong sample over their settling time.
+  double persistence_s = MonitorSettings().persistence_s;
+  /// A disagreement that has to be found: the monitor is not ready while error bars make a threshold larger than
+  /// 0.8 times this (but never at less than 1.1 times the threshold of small error bars).
+  double required_Nm = std::numeric_limits<double>::infinity();
 };
 
 /// The limits of one pair of sources, in words of the data.

@@ -21,7 +21,7 @@ enum class MonitorCheck : std::uint8_t {
   sign,             ///< they have opposite signs, each beyond half the threshold of their pair
   source_lost,      ///< an input of a source is missing, stale or not a number
   source_fault,     ///< a source has inputs outside its range, or its model failed
-  redundancy_lost,  ///< fewer than two sources of several are valid
+  redundancy_lost,  ///< fewer than two sources of several have inputs and have settled
   novelty,          ///< the inputs of a source are unlike those of its training
   not_finite,       ///< a signal is NaN or infinite
   stale,            ///< a signal has not been measured for too long
@@ -59,6 +59,9 @@ struct PairLimits {
   double factor = 6.0;
   double floor_Nm = 0.0;
   double ceiling_Nm = std::numeric_limits<double>::infinity();
+  /// While the error bars make the threshold larger than this, the monitor is not ready: the pair could not find
+  /// what it has to.
+  double largest_armed_Nm = std::numeric_limits<double>::infinity();
   /// For the cumulative sum: the share of the threshold that is not counted, and the sum in seconds
   /// times threshold at which it reports.
   double drift_allowance = 0.75;
@@ -72,10 +75,12 @@ struct MonitorSettings {
   /// Correlation of the sources' errors, row by row; empty: none.
   std::vector<double> correlation;
   std::array<MonitorAction, kMonitorChecks> actions = default_actions();
-  double persistence_s = 5e-3;     ///< how long a difference must exceed its threshold
-  double release_share = 0.8;      ///< below this share of the threshold, it has ended
-  double longest_loss_s = 0.5;     ///< how long a lost source is only a warning
-  double longest_fault_s = 0.015;  ///< how long a source may report a fault of its model or range
+  double persistence_s = 5e-3;  ///< how long a difference must exceed its threshold
+  double release_share = 0.8;   ///< below this share of the threshold, it has ended
+  double longest_loss_s = 0.5;  ///< how long a lost source is only a warning
+  /// How long a source may report a fault of its model or range. Four samples without one compensate for
+  /// one with it, so that a fault that comes and goes is found as well.
+  double longest_fault_s = 0.015;
   double largest_novelty = std::numeric_limits<double>::infinity();
   double sample_period_s = 1e-3;
   std::uint32_t longest_overrun = 3;  ///< so many late ticks in a row are a fault
@@ -122,6 +127,8 @@ struct SignalSample {
 /// - sign: t_i and t_j have opposite signs and min(|t_i|, |t_j|) > h / 2 for `persistence_s`.
 /// - frozen: the signal keeps exactly one value while its companion travels further than
 ///   `largest_hidden_travel`; at rest there is no travel.
+///
+/// The monitor is not ready while a pair's h > largest_armed, as long as the friction of a drive is unknown.
 ///
 /// Every comparison is written so that NaN is a fault. Source: specification 3.9 for the residuals; Page
 /// 1954 for the cumulative sum; states and checks are ours.
@@ -174,8 +181,8 @@ class Monitor {
     bool has_last = false;
   };
   struct SourceState {
-    std::uint32_t lost = 0;  ///< samples in a row, here and below
-    std::uint32_t faulty = 0;
+    std::uint32_t lost = 0;    ///< samples in a row, here and below
+    std::uint32_t faulty = 0;  ///< quarters of samples, less one for each without a fault
     std::uint32_t novel = 0;
   };
   struct PairState {
@@ -215,6 +222,7 @@ class Monitor {
   double t_s_ = 0.0;
   std::uint32_t late_ = 0;
   double silent_since_s_ = kNotMeasured;
+  bool is_threshold_too_large_ = false;  ///< in this tick, of a pair
   double reset_t_s_ = -std::numeric_limits<double>::infinity();
 };
 

@@ -20,6 +20,8 @@ constexpr double kBlock_s = 10.0;
 constexpr std::size_t kLeastBlocks = 10;
 constexpr double kSecondsPerHour = 3600.0;
 constexpr double kLargestGuardedShare = 0.01;
+constexpr double kArmedShare = 0.8;    // threshold that is armed, over the required disagreement
+constexpr double kRangeMargin = 0.25;  // margin on either side, over the range in the recordings
 constexpr double kDriftWindow_s = 60.0;
 /// The correlation is known only from a finite record: it is taken a little towards none.
 constexpr double kCorrelationShare = 0.95;
@@ -114,8 +116,10 @@ class PairStatistics {
 
   /// @param share of the blocks in which the pair may exceed its threshold
   /// @param least_Nm the smallest threshold
-  void set_thresholds(double share, double least_Nm) {
+  /// @param required_Nm see `CalibrationOptions`
+  void set_thresholds(double share, double least_Nm, double required_Nm) {
     pair_.floor_Nm = std::max(small_.threshold(share), least_Nm);
+    pair_.largest_armed_Nm = std::max(kArmedShare * required_Nm, 1.1 * pair_.floor_Nm);
     pair_.factor = std::max(large_.threshold(share), 1.0);
   }
 
@@ -224,7 +228,7 @@ class SignalStatistics {
     for (std::size_t i = 0; i < limits.size(); ++i) {
       const State& state = states_[i];
       MonitoredSignal& signal = limits[i];
-      const double margin = 0.1 * (state.highest - state.lowest);
+      const double margin = kRangeMargin * (state.highest - state.lowest);
       if (std::isinf(signal.lowest)) signal.lowest = state.lowest - margin;
       if (std::isinf(signal.highest)) signal.highest = state.highest + margin;
       if (!(signal.lowest < signal.highest))
@@ -287,6 +291,14 @@ void check_arguments(const std::vector<SourceModel>& sources, const MonitorPlan&
     throw UsageError({.place = "wanted rate of false alarms",
                       .expected = "a positive number per hour",
                       .found = fmt::format("{}", options.false_alarms_per_hour)});
+  if (!(options.persistence_s > 0.0) || !std::isfinite(options.persistence_s))
+    throw UsageError({.place = "persistence of a difference",
+                      .expected = "more than 0 s",
+                      .found = fmt::format("{} s", options.persistence_s)});
+  if (!(options.required_Nm > 0.0))
+    throw UsageError({.place = "disagreement that a monitor has to find",
+                      .expected = "more than 0 Nm",
+                      .found = fmt::format("{} Nm", options.required_Nm)});
   if (!(options.least_threshold_Nm >= 0.0) || !std::isfinite(options.least_threshold_Nm))
     throw UsageError({.place = "smallest threshold of a monitor",
                       .expected = "0 Nm or more",
@@ -354,7 +366,7 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
   CalibratedMonitor result;
   result.redundancy.sources = plan.sources;
   result.monitor.sample_period_s = 1.0 / rate_Hz;
-  result.monitor.persistence_s = std::max(result.monitor.persistence_s, 2.0 / rate_Hz);
+  result.monitor.persistence_s = std::max(options.persistence_s, 2.0 / rate_Hz);
   std::size_t samples = 0;
   for (const DatasetRecord& record : fault_free.records) samples += record.recording.size();
   result.hours = static_cast<double>(samples) / rate_Hz / kSecondsPerHour;
@@ -413,7 +425,7 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
                    .expected = fmt::format("at least {} s without a fault",
                                            kBlock_s * static_cast<double>(kLeastBlocks)),
                    .found = fmt::format("{:.0f} s", static_cast<double>(samples) / rate_Hz)});
-    pair.set_thresholds(share, options.least_threshold_Nm);
+    pair.set_thresholds(share, options.least_threshold_Nm, options.required_Nm);
     for (const std::vector<SourceRun>& runs : recorded) pair.see_drift(runs, rate_Hz);
     pair.set_allowance();
     for (const std::vector<SourceRun>& runs : recorded) pair.see_sums(runs, rate_Hz);

@@ -27,8 +27,8 @@ class BlockMaxima {
   /// The threshold that is exceeded in a share `share` of the blocks: u + s/xi ((p / share)^xi - 1), the
   /// generalised Pareto tail of the maxima above their 90 % quantile u (p the share of those; shape xi and
   /// scale s by moments, xi limited to -0.4 to 0, and 0 for fewer than 30 of them); at least 1.05 times the
-  /// largest one. 0 if there is no block. Differences of torques are bounded: their tail is no heavier than
-  /// an exponential one (xi = 0), and a larger xi is an error of its estimate.
+  /// largest one. 0 if there is no block. Differences of torques are bounded: an exponential
+  /// tail (xi = 0) is the heaviest one, and a larger xi is an error of its estimate.
   [[nodiscard]] double threshold(double share) const;
 
  private:

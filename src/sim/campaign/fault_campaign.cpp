@@ -27,12 +27,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kVersion = 2;  // version of the results of units
+constexpr int kVersion = 3;  // version of the results of units
 constexpr std::size_t kInjectionsAUnit = 32;
 constexpr std::size_t kJointsAUnit = 16;
 constexpr double kUnitHours = 1.0;  // hours of each joint
 constexpr double kTicksAnHour = 3600.0 * kBenchRate_Hz;
 constexpr double kLowLoad = 0.05;  // share of the largest torque
+constexpr double kRequiredShare = 0.2;
+constexpr double kHysteresisSpread = 0.25;
 constexpr double kLargestGain = 1e-3;
 constexpr double kMaxHours = 1e6;
 constexpr std::size_t kMaxInjections = 1'000'000;
@@ -50,6 +52,7 @@ struct Group {
   const CampaignGroup* of;
   JointMonitor monitor;
   std::vector<FaultClass> classes;
+  double limit_share;  ///< see `ClassResult`
 };
 
 struct WorkUnit {
@@ -90,6 +93,14 @@ bool is_wanted(const CampaignSettings& settings, const std::string& name) {
                              [&](const std::string& begin) { return name.starts_with(begin); });
 }
 
+/// Two sources that are within their threshold of each other may hide as much again.
+double limit_share(const MonitoredTorque& monitored, const DataSheet& sheet) {
+  const std::vector<PairLimits>& pairs = monitored.monitor().settings().pairs;
+  if (pairs.size() != 1) return kRequiredShare;
+  const double hidden_Nm = 2.2 * pairs.front().floor_Nm;
+  return std::max(kRequiredShare, hidden_Nm / sheet.rating.torque_Nm.value);
+}
+
 std::vector<Group> groups_of(const std::vector<CampaignGroup>& from,
                              const CampaignSettings& settings) {
   std::vector<Group> groups;
@@ -101,8 +112,9 @@ std::vector<Group> groups_of(const std::vector<CampaignGroup>& from,
     for (const FaultClass& fault : all) known.push_back(fault.name);
     std::erase_if(all, [&](const FaultClass& fault) { return !is_wanted(settings, fault.name); });
     classes += all.size();
+    const double share = limit_share(monitored, of.sheet);
     groups.push_back({&of, JointMonitor(std::move(monitored), of.sheet, settings.is_electrical),
-                      std::move(all)});
+                      std::move(all), share});
   }
   if (classes == 0 && settings.injections > 0) {
     std::ranges::sort(known);
@@ -205,6 +217,13 @@ Json json_of(const FaultFreeOutcome& of) {
           {"alarms", of.alarms}};
 }
 
+/// Factor on the hysteresis of a joint under little load: evenly between its bounds, for any number of joints.
+double hysteresis_factor(std::size_t joint) {
+  constexpr double kGolden = 0.6180339887498949;
+  const double share = std::fmod(kGolden * static_cast<double>(joint + 1), 1.0);
+  return 1.0 + kHysteresisSpread * (2.0 * share - 1.0);
+}
+
 std::string done(const WorkUnit& unit, const Group& group, const CampaignSettings& settings) {
   const CampaignGroup& of = *group.of;
   if (unit.kind == WorkUnit::Kind::injections || unit.kind == WorkUnit::Kind::sizes) {
@@ -216,6 +235,7 @@ std::string done(const WorkUnit& unit, const Group& group, const CampaignSetting
                                                      fmt::format("{} {}", fault.name, unit.size)),
                                    .first = unit.first,
                                    .count = unit.count,
+                                   .limit_share = group.limit_share,
                                    .size = unit.size,
                                    .is_electrical = settings.is_electrical}))
         .dump();
@@ -231,8 +251,8 @@ std::string done(const WorkUnit& unit, const Group& group, const CampaignSetting
     run.settings.impacts_per_min = 0.0;
   }
   for (std::size_t i = 0; i < unit.count; ++i)
-    run.sheets.push_back(
-        is_low ? zeroed_specimen(of.sheet, static_cast<unsigned>(100 + unit.first + i)) : of.sheet);
+    run.sheets.push_back(is_low ? with_hysteresis(of.sheet, hysteresis_factor(unit.first + i))
+                                : of.sheet);
   return json_of(run_fault_free(run)).dump();
 }
 
@@ -243,12 +263,13 @@ Latencies latencies_of(const std::vector<double>& all_ms) {
           .longest_ms = *std::ranges::max_element(all_ms)};
 }
 
-ClassResult class_result(const FaultClass& fault, const std::string& group,
+ClassResult class_result(const FaultClass& fault, const Group& group,
                          const std::vector<InjectionOutcome>& outcomes) {
   using Kind = InjectionOutcome::Kind;
   ClassResult result{.name = fault.name,
-                     .group = group,
+                     .group = group.of->name,
                      .row = fault.row,
+                     .limit_share = group.limit_share,
                      .must_stop = fault.must_stop,
                      .limit_ms = 1e3 * fault.limit_s};
   std::vector<double> all_ms;
@@ -339,7 +360,7 @@ class Merge {
       for (std::size_t c = 0; c < groups_[g].classes.size(); ++c) {
         const FaultClass& fault = groups_[g].classes[c];
         const auto injected = outcomes(WorkUnit::Kind::injections, g, c);
-        if (!injected.empty()) all.classes.push_back(class_result(fault, group, injected));
+        if (!injected.empty()) all.classes.push_back(class_result(fault, groups_[g], injected));
         const auto sized = outcomes(WorkUnit::Kind::sizes, g, c);
         if (!sized.empty()) add_sizes(all.sizes, fault.name, group, sized);
       }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <variant>
 
+#include "actuator/second_stage.hpp"
 #include "joint_monitor.hpp"
 #include "sim/fault_rules.hpp"
 #include "sim/plant/plant.hpp"

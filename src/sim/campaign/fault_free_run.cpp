@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <utility>
+#include <variant>
 
-#include "actuator/specimen_spread.hpp"
 #include "duty_bench.hpp"
 
 namespace torsio {
@@ -73,14 +73,24 @@ FaultFreeOutcome run_fault_free(const FaultFreeRun& run) {
   return outcome;
 }
 
-DataSheet zeroed_specimen(const DataSheet& sheet, unsigned serial) {
-  DataSheet specimen = sheet;
-  specimen.serial = serial;
-  spread_specimen(specimen);
-  for (SheetValue* zero : {&specimen.sensors.motor_zero_rad, &specimen.sensors.middle_zero_rad,
-                           &specimen.sensors.joint_zero_rad, &specimen.sensors.twist_zero_rad})
-    *zero = assumed(0.0);
-  return specimen;
+DataSheet with_hysteresis(const DataSheet& sheet, double factor) {
+  DataSheet changed = sheet;
+  const auto scale = [factor](SheetValue& value) { value = assumed(factor * value.value); };
+  std::visit(
+      [&](auto& stage) {
+        if constexpr (requires { stage.load_friction; }) {
+          scale(stage.friction_Nm);
+          scale(stage.load_friction);
+        } else if constexpr (requires { stage.hysteresis_rad; }) {
+          scale(stage.hysteresis_rad);
+        } else if constexpr (requires { stage.slip_Nm.value; }) {
+          scale(stage.slip_Nm);
+        } else {
+          for (SheetValue& slip_Nm : stage.slip_Nm) scale(slip_Nm);
+        }
+      },
+      changed.second);
+  return changed;
 }
 
 }  // namespace torsio

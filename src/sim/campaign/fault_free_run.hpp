@@ -32,7 +32,7 @@ struct FaultFreeRun {
 /// After a false alarm the monitor is reset and armed again.
 [[nodiscard]] FaultFreeOutcome run_fault_free(const FaultFreeRun& run);
 
-/// Another specimen of this joint (specification 4.6), with encoders whose zeros were set.
-[[nodiscard]] DataSheet zeroed_specimen(const DataSheet& sheet, unsigned serial);
+/// The joint with other inner friction of its second stage, by this factor.
+[[nodiscard]] DataSheet with_hysteresis(const DataSheet& sheet, double factor);
 
 }  // namespace torsio

@@ -14,7 +14,7 @@ namespace torsio {
 namespace {
 
 constexpr double kSettle_s = 2.0;  // filters and memory of the sources
-constexpr double kLatestStart_s = 4.0;
+constexpr double kLatestStart_s = 20.0;
 constexpr double kWindow_s = 20.0;      // in which the disagreement must reach its limit
 constexpr double kSmallWindow_s = 5.0;  // a small one need not reach it
 constexpr double kMissed_s = 1.0;
@@ -91,7 +91,7 @@ struct Attempt {
   std::size_t end_tick = 0;
   JointMonitor monitor;
   std::optional<JointMonitor> sound;           ///< with the sound signals, since the injection
-  std::optional<std::size_t> onset_tick = {};  ///< of the disagreement in progress
+  std::optional<std::size_t> onset_tick = {};  ///< begin of the disagreement in progress
   std::size_t reached_tick = 0;                ///< the last one in which it was at the limit
   bool is_lasting = false;     ///< it has lasted as long as a stop may take, and counts
   std::size_t late_steps = 0;  ///< steps of the loop since an overrun began
@@ -190,7 +190,7 @@ class Injections {
     }
   }
 
-  // A disagreement that ends by itself sooner than a stop may take is counted, but is no onset.
+  // A disagreement that ends by itself sooner than a stop may take is counted, but is not an onset.
   void find_onset(const DutyBench& bench, std::size_t lane, std::size_t tick, Attempt& of,
                   Outcome& outcome) const {
     bool is_reached = false;

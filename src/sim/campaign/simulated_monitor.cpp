@@ -18,6 +18,7 @@ namespace {
 constexpr double kRecording_s = 600.0;
 constexpr std::size_t kTemperatures = 8;  ///< training recordings, each at its own
 constexpr double kSecondsPerHour = 3600.0;
+constexpr double kPersistence_s = 8e-3;  // low-passes of 100 Hz spread a spike over some 6 ms
 
 void add(Dataset& dataset, Recording recording, Role role) {
   const std::size_t samples = recording.size();
@@ -110,7 +111,9 @@ SimulatedMonitor calibrate_simulated(const DataSheet& joint, const SimulatedCali
       sources, recipe.plan, fault_free,
       {.false_alarms_per_hour = settings.false_alarms_per_hour,
        .extrapolate = true,
-       .least_threshold_Nm = settings.least_threshold_share * duty_limits(joint).torque_Nm},
+       .least_threshold_Nm = settings.least_threshold_share * duty_limits(joint).torque_Nm,
+       .persistence_s = kPersistence_s,
+       .required_Nm = settings.required_share * duty_limits(joint).torque_Nm},
       progress);
   return result;
 }

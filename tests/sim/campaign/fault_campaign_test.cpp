@@ -104,8 +104,7 @@ TEST(Injections, AModelThatFailsStops) {
   for (const InjectionOutcome& of : outcomes("model not finite", 0, 8)) {
     EXPECT_EQ(of.kind, InjectionOutcome::Kind::detected);
     EXPECT_LE(of.latency_ticks, 20);
-    EXPECT_EQ(of.check,
-              static_cast<int>(MonitorCheck::redundancy_lost));  // one of two sources is left
+    EXPECT_EQ(of.check, static_cast<int>(MonitorCheck::source_fault));
   }
 }
 

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "torsio/core/matrix.hpp"
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+
+/// Least squares of a residual on directions of change.
+struct DirectionFit {
+  std::vector<double> coefficients;     ///< 0 where the direction was left out
+  std::vector<double> standard_errors;  ///< NaN where it was left out, or too few blocks are there
+  /// Length of each column without what the other columns explain, over the square root of the samples.
+  std::vector<double> own_rms;
+  std::vector<double> residual;
+  double effective_samples = kNotMeasured;
+};
+
+/// A column of which the others explain all but `kLeastOwnShare` of its length is left out, the last first.
+inline constexpr double kLeastOwnShare = 0.02;
+[[nodiscard]] DirectionFit fit_directions(const Matrix& columns, std::span<const double> residual,
+                                          std::size_t resamples, std::uint64_t seed);
+
+}  // namespace torsio

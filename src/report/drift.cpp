@@ -1,0 +1,182 @@
+#include "torsio/report/drift.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "report/result_parts.hpp"
+#include "torsio/core/units.hpp"
+#include "torsio/report/json_text.hpp"
+#include "torsio/report/text_table.hpp"
+
+namespace torsio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-";
+}
+std::string signed_number(double value) {
+  return std::isfinite(value) ? fmt::format("{:+.3g}", value) : "-";
+}
+
+std::string verdict_of(const DriftQuantity& of) {
+  return of.reason.empty() ? std::string(name(of.verdict))
+                           : fmt::format("{}: {}", name(of.verdict), of.reason);
+}
+
+/// The interval, in per cent where there is a value to compare it with.
+std::string interval(const DriftQuantity& of) {
+  if (!std::isfinite(of.lowest)) return "-";
+  const bool is_relative = std::isfinite(of.relative);
+  const double scale = is_relative ? 100.0 / of.before : 1.0;
+  return fmt::format("{:+.3g} to {:+.3g} {}", scale * of.lowest, scale * of.highest,
+                     is_relative ? "%" : of.unit);
+}
+
+std::string healthy(const DriftQuantity& of) {
+  return std::isfinite(of.before) ? fmt::format("{:.3g} %", 100.0 * of.tolerance / of.before)
+                                  : fmt::format("{:.3g} {}", of.tolerance, of.unit);
+}
+
+std::string joint_sentence(const Drift& drift) {
+  std::string changed;
+  for (const DriftQuantity& of : drift.quantities)
+    if (of.is_of_joint && of.verdict == DriftVerdict::changed)
+      changed += fmt::format("{}{}", changed.empty() ? "" : ", ", of.name);
+  switch (drift.joint) {
+    case DriftVerdict::changed:
+      return fmt::format("The joint has changed since the calibration: {}.", changed);
+    case DriftVerdict::not_changed: return "The joint has not changed since the calibration.";
+    case DriftVerdict::undetermined: break;
+  }
+  return "These recordings do not determine whether the joint has changed.";
+}
+
+std::string advice_sentence(const Drift& drift) {
+  switch (drift.advice) {
+    case DriftAdvice::none:
+      return "A new calibration is not worth it: the model is as accurate as at its calibration.";
+    case DriftAdvice::set_zero:
+      return "A new calibration is not worth it: set the zero of the torque again.";
+    case DriftAdvice::calibrate: return "A new calibration is worth it.";
+    case DriftAdvice::other_motion:
+      return "The model is less accurate in this motion than at its calibration, and no change "
+             "above "
+             "explains\nit: calibrate with this motion, too.";
+    case DriftAdvice::record_more: break;
+  }
+  return "No need for a new calibration was found; record more for a certain answer.";
+}
+
+std::string share(std::size_t count, std::size_t of) { return fmt::format("{} of {}", count, of); }
+
+}  // namespace
+
+std::string drift_text(const Drift& drift, const std::string& target) {
+  TextTable table;
+  table.header(
+      {"quantity", "model", "unit", "change", "%", "95 % interval", "tolerance", "verdict"});
+  for (const DriftQuantity& of : drift.quantities)
+    table.row({of.name, number(of.before), of.unit, signed_number(of.change),
+               signed_number(100.0 * of.relative), interval(of), healthy(of), verdict_of(of)});
+  const std::string unit = unit_label(target);
+  std::string text = fmt::format(
+      "{}\n\n{}tolerance: largest change of a joint that has not changed, its load cell remounted "
+      "included\n\n",
+      joint_sentence(drift), table.text());
+  text += fmt::format(
+      "RMSE of the model: {} {} at its calibration, {} {} now, {} {} with the zero set, {} {} with "
+      "all\nchanges above corrected. {}\n",
+      number(drift.calibration_rmse), unit, number(drift.rmse), unit, number(drift.zeroed_rmse),
+      unit, number(drift.corrected_rmse), unit, advice_sentence(drift));
+  text += fmt::format("{} samples compared, {:.0f} of them independent", drift.samples,
+                      drift.effective_samples);
+  if (drift.outside_samples > 0)
+    text += fmt::format("; {} left out, with a fault of the model", drift.outside_samples);
+  return text + "\n";
+}
+
+std::string drift_json(const Drift& drift, const std::string& target) {
+  Json quantities = Json::array();
+  for (const DriftQuantity& of : drift.quantities)
+    quantities.push_back({{"name", of.name},
+                          {"unit", text_or_null(of.unit)},
+                          {"before", json_number(of.before)},
+                          {"change", json_number(of.change)},
+                          {"lowest", json_number(of.lowest)},
+                          {"highest", json_number(of.highest)},
+                          {"relative", json_number(of.relative)},
+                          {"tolerance", json_number(of.tolerance)},
+                          {"smallest", json_number(of.smallest)},
+                          {"is_of_joint", of.is_of_joint},
+                          {"verdict", name(of.verdict)},
+                          {"reason", text_or_null(of.reason)}});
+  return json_text(Json{{"target", target},
+                        {"unit", unit_label(target)},
+                        {"joint", name(drift.joint)},
+                        {"advice", name(drift.advice)},
+                        {"quantities", std::move(quantities)},
+                        {"calibration_rmse", json_number(drift.calibration_rmse)},
+                        {"rmse", json_number(drift.rmse)},
+                        {"zeroed_rmse", json_number(drift.zeroed_rmse)},
+                        {"corrected_rmse", json_number(drift.corrected_rmse)},
+                        {"samples", drift.samples},
+                        {"outside_samples", drift.outside_samples},
+                        {"effective_samples", json_number(drift.effective_samples)}});
+}
+
+std::string drift_campaign_text(const DriftCampaignResult& result) {
+  TextTable table;
+  table.header({"actuator", "changed", "specimens", "found", "another one", "undetermined",
+                "in the 95 % interval"});
+  for (const DriftCampaignRow& of : result.rows)
+    table.row({of.actuator, of.changed.empty() ? "nothing" : of.changed,
+               fmt::format("{}", of.specimens),
+               of.changed.empty() ? "-" : fmt::format("{}", of.found),
+               fmt::format("{}", of.other_found), fmt::format("{}", of.undetermined),
+               of.changed.empty() ? "-" : fmt::format("{}", of.covered)});
+  return fmt::format(
+      "{}another one: a quantity is reported that has not changed. undetermined: neither a change "
+      "nor "
+      "none.\n\nchanged specimens found: {}; share that is missed: at most {:.3g} %\n"
+      "false alarms: {} specimens without a change; share: at most {:.3g} %\n"
+      "bounds: one-sided, 95 % (Clopper-Pearson)\n",
+      table.text(), share(result.found, result.changed), 100.0 * result.missed_upper_95,
+      share(result.false_alarms, result.healthy), 100.0 * result.false_upper_95);
+}
+
+std::string drift_campaign_json(const DriftCampaignResult& result) {
+  Json rows = Json::array();
+  for (const DriftCampaignRow& of : result.rows)
+    rows.push_back({{"actuator", of.actuator},
+                    {"changed", text_or_null(of.changed)},
+                    {"specimens", of.specimens},
+                    {"found", of.found},
+                    {"other_found", of.other_found},
+                    {"undetermined", of.undetermined},
+                    {"covered", of.covered}});
+  Json specimens = Json::array();
+  for (const DriftSpecimen& of : result.specimens)
+    specimens.push_back({{"actuator", of.actuator},
+                         {"changed", text_or_null(of.changed)},
+                         {"amount", of.amount},
+                         {"scale", json_number(of.scale)},
+                         {"friction", json_number(of.friction)},
+                         {"backlash_rad", json_number(of.backlash_rad)},
+                         {"found", of.is_found},
+                         {"other_found", of.is_other_found},
+                         {"undetermined", of.is_undetermined}});
+  return json_text(Json{{"seed", result.seed},
+                        {"rows", std::move(rows)},
+                        {"changed", result.changed},
+                        {"found", result.found},
+                        {"missed_upper_95", result.missed_upper_95},
+                        {"healthy", result.healthy},
+                        {"false_alarms", result.false_alarms},
+                        {"false_upper_95", result.false_upper_95},
+                        {"specimens", std::move(specimens)}});
+}
+
+}  // namespace torsio

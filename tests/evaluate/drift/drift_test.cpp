@@ -1,0 +1,203 @@
+#include "torsio/evaluate/drift.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "actuator/stage_wear.hpp"
+#include "support/error_message.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/fit/train_model.hpp"
+#include "torsio/report/drift.hpp"
+#include "torsio/sim/campaign/drift_campaign.hpp"
+#include "torsio/sim/experiment.hpp"
+
+namespace torsio::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kActuator = "dfki-50#11";
+
+void record(Dataset& dataset, const DataSheet& sheet, const ExperimentSpec& spec, Role role) {
+  Recording recording = simulate(sheet, spec);
+  const std::size_t samples = recording.size();
+  dataset.records.push_back({std::move(recording), whole_record(samples, role)});
+}
+
+Dataset recorded(const DataSheet& sheet, std::uint64_t seed, Role role) {
+  Dataset dataset;
+  for (const double lever_m : {0.10, 0.17, 0.24})
+    record(dataset, sheet, {.experiment = "sweep", .seed = seed++, .lever_m = lever_m}, role);
+  record(dataset, sheet, {.experiment = "random-walk", .seed = seed}, role);
+  return dataset;
+}
+
+const Dataset& calibration() {
+  static const Dataset data = recorded(data_sheet(kActuator), 1, Role::train);
+  return data;
+}
+
+const ModelFile& model() {
+  static const ModelFile file =
+      train_model(calibration(),
+                  {.family = "grey_box", .features = resolve_inputs(calibration(), {})}, 1)
+          .file;
+  return file;
+}
+
+/// Today: another lever, noise of other seeds, warmer.
+Dataset today(const DataSheet& sheet) {
+  Dataset dataset;
+  record(dataset, sheet,
+         {.experiment = "sweep",
+          .seed = 51,
+          .lever_m = 0.21,
+          .inclination_rad = 0.3,
+          .conditions = {.temperature_K = 303.15}},
+         Role::test);
+  record(dataset, sheet, {.experiment = "random-walk", .seed = 52}, Role::test);
+  return dataset;
+}
+
+/// The dataset with another torque.
+Dataset with_torque(const Dataset& from, const std::function<double(double)>& torque) {
+  Dataset dataset = from;
+  for (DatasetRecord& record : dataset.records) {
+    Recording changed(record.recording.name(), record.recording.sample_rate_Hz());
+    for (Channel channel : record.recording.channels()) {
+      if (channel.name == dataset.target)
+        for (double& value : channel.values) value = torque(value);
+      changed.add(std::move(channel));
+    }
+    record.recording = std::move(changed);
+  }
+  return dataset;
+}
+
+const DriftQuantity& of(const Drift& drift, const std::string& name) {
+  for (const DriftQuantity& quantity : drift.quantities)
+    if (quantity.name == name) return quantity;
+  throw std::out_of_range(name);
+}
+
+TEST(Drift, AJointThatHasNotChangedIsReportedAsSuch) {
+  const Drift drift = detect_drift(model(), today(data_sheet(kActuator)));
+  EXPECT_EQ(drift.joint, DriftVerdict::not_changed);
+  for (const char* name : {"stiffness or gain", "friction", "backlash", "zero"})
+    EXPECT_EQ(of(drift, name).verdict, DriftVerdict::not_changed) << name;
+  EXPECT_EQ(drift.advice, DriftAdvice::none);
+  EXPECT_NEAR(of(drift, "stiffness or gain").before, 600.0, 100.0);
+  EXPECT_THAT(drift_text(drift, "torque_Nm"), HasSubstr("The joint has not changed"));
+}
+
+TEST(Drift, FindsAChangeOfTheStiffness) {
+  const Drift drift =
+      detect_drift(model(), today(worn(data_sheet(kActuator), {.stiffness = 0.95})));
+  const DriftQuantity& stiffness = of(drift, "stiffness or gain");
+  EXPECT_EQ(stiffness.verdict, DriftVerdict::changed);
+  EXPECT_NEAR(stiffness.relative, -0.05, 0.01);
+  EXPECT_LT(stiffness.lowest, -0.05 * stiffness.before);
+  EXPECT_GT(stiffness.highest, -0.05 * stiffness.before);
+  EXPECT_EQ(of(drift, "friction").verdict, DriftVerdict::not_changed);
+  EXPECT_EQ(drift.joint, DriftVerdict::changed);
+  EXPECT_EQ(drift.advice, DriftAdvice::calibrate);
+  EXPECT_LT(drift.corrected_rmse, 0.5 * drift.zeroed_rmse);
+}
+
+TEST(Drift, FindsAChangeOfTheFriction) {
+  const Drift drift = detect_drift(model(), today(worn(data_sheet(kActuator), {.friction = 1.3})));
+  EXPECT_EQ(of(drift, "friction").verdict, DriftVerdict::changed);
+  EXPECT_NEAR(of(drift, "friction").relative, 0.3, 0.05);
+  EXPECT_EQ(of(drift, "stiffness or gain").verdict, DriftVerdict::not_changed);
+}
+
+TEST(Drift, FindsMorePlay) {
+  const Drift drift = detect_drift(model(), today(worn(data_sheet(kActuator), {.play = 8.0})));
+  EXPECT_EQ(of(drift, "backlash").verdict, DriftVerdict::changed);
+  EXPECT_NEAR(of(drift, "backlash").change, 7.0 * 2.6e-4, 7.0 * 1.3e-4);
+  EXPECT_NE(of(drift, "friction").verdict, DriftVerdict::changed);
+}
+
+TEST(Drift, ANewZeroIsNoChangeOfTheJoint) {
+  const Dataset moved =
+      with_torque(today(data_sheet(kActuator)), [](double torque) { return torque + 0.5; });
+  const Drift drift = detect_drift(model(), moved);
+  EXPECT_EQ(of(drift, "zero").verdict, DriftVerdict::changed);
+  EXPECT_NEAR(of(drift, "zero").change, 0.5, 0.1);
+  EXPECT_EQ(drift.joint, DriftVerdict::not_changed);
+  EXPECT_EQ(drift.advice, DriftAdvice::set_zero);
+}
+
+TEST(Drift, AMotionInOneDirectionDoesNotDetermineTheFriction) {
+  Dataset part = today(data_sheet(kActuator));
+  part.records.erase(part.records.begin() + 1, part.records.end());
+  Recording& recording = part.records.front().recording;
+  Recording cut(recording.name(), recording.sample_rate_Hz());
+  for (Channel channel : recording.channels()) {
+    channel.values.resize(9'000);  // the sweep has not reversed
+    if (!channel.fresh.empty()) channel.fresh.resize(9'000);
+    cut.add(std::move(channel));
+  }
+  recording = std::move(cut);
+  part.records.front().segments = whole_record(9'000, Role::test);
+  const Drift drift = detect_drift(model(), part);
+  EXPECT_EQ(of(drift, "friction").verdict, DriftVerdict::undetermined);
+  EXPECT_FALSE(of(drift, "friction").reason.empty());
+  EXPECT_NE(drift.joint, DriftVerdict::changed);
+}
+
+TEST(Drift, AModelWithoutALoopDoesNotDetermineTheFriction) {
+  const ModelFile line =
+      train_model(calibration(),
+                  {.family = "linear",
+                   .features = {.inputs = {"gear_angle_rad - joint_angle_rad"}, .definitions = {}}},
+                  1)
+          .file;
+  const Drift drift = detect_drift(line, today(data_sheet(kActuator)));
+  EXPECT_EQ(of(drift, "friction").verdict, DriftVerdict::undetermined);
+  EXPECT_THAT(of(drift, "friction").reason, HasSubstr("no hysteresis loop"));
+}
+
+TEST(Drift, RefusesWhatCannotBeCompared) {
+  const Dataset sound = today(data_sheet(kActuator));
+  const auto message = [](const Dataset& data) {
+    return error_message([&] { (void)detect_drift(model(), data); });
+  };
+  EXPECT_THAT(message(with_torque(sound, [](double) { return 3.0; })),
+              HasSubstr("the torque does not follow the motion"));
+  EXPECT_THAT(message(with_torque(sound, [](double torque) { return torque * 57.29577951308232; })),
+              HasSubstr("units"));
+  EXPECT_THAT(
+      message(with_torque(sound, [](double) { return std::numeric_limits<double>::quiet_NaN(); })),
+      HasSubstr("torque_Nm"));
+  Dataset brief = sound;
+  for (DatasetRecord& each : brief.records) {
+    Recording cut(each.recording.name(), each.recording.sample_rate_Hz());
+    for (Channel channel : each.recording.channels()) {
+      channel.values.resize(100);
+      if (!channel.fresh.empty()) channel.fresh.resize(100);
+      cut.add(std::move(channel));
+    }
+    each.recording = std::move(cut);
+    each.segments = whole_record(100, Role::test);
+  }
+  EXPECT_THAT(message(brief), HasSubstr("too short"));
+  EXPECT_THROW((void)detect_drift(model(), sound, {.resamples = 10}), UsageError);
+}
+
+TEST(DriftCampaign, FindsTheChangesAndDoesNotDependOnTheThreads) {
+  const DriftCampaignResult one = run_drift_campaign({.seed = 7, .specimens = 2, .threads = 1});
+  EXPECT_EQ(one.found, 2);
+  EXPECT_EQ(one.false_alarms, 0);
+  EXPECT_NEAR(one.missed_upper_95, 1.0 - std::sqrt(0.05), 1e-6);
+  const DriftCampaignResult two = run_drift_campaign({.seed = 7, .specimens = 2, .threads = 2});
+  EXPECT_EQ(drift_campaign_json(one), drift_campaign_json(two));
+}
+
+}  // namespace
+}  // namespace torsio::test

@@ -1,0 +1,199 @@
+#include "torsio/fit/transfer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "model/grey_box/grey_box.hpp"
+#include "model/linear/linear.hpp"
+#include "support/bench_dataset.hpp"
+#include "support/error_message.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/fit/train_model.hpp"
+
+namespace torsio {
+namespace {
+
+using test::BenchOptions;
+using testing::HasSubstr;
+
+const std::vector<std::string> kFamilies{"linear", "grey_box", "dgmm", "mlp", "lstm", "gru"};
+
+std::map<std::string, std::string> small(const std::string& family) {
+  if (family == "grey_box") return {{"residual", "none"}};
+  if (family == "dgmm") return {{"components", "40"}, {"em_iterations", "2"}};
+  if (family == "mlp") return {{"epochs", "20"}, {"layers", "8"}};
+  if (family == "lstm" || family == "gru") return {{"epochs", "2"}, {"layers", "4"}};
+  return {};
+}
+
+ModelFile base_model(const std::string& family, const BenchOptions& bench = {}) {
+  return train_model(test::one_recording(bench),
+                     {.family = family,
+                      .options = small(family),
+                      .features = {.inputs = {"spring_deflection_rad",
+                                              "lowpass(rate(spring_deflection_rad), 10Hz)"},
+                                   .definitions = {{"spring_deflection_rad",
+                                                    "gear_angle_rad - joint_angle_rad"}}}},
+                     1)
+      .file;
+}
+
+std::vector<double> estimates(const ModelFile& file, const Recording& recording) {
+  std::vector<double> values;
+  Estimator estimator = make_estimator(file);
+  std::vector<double> raw(estimator.raw_inputs().size());
+  for (std::size_t n = 0; n < recording.size(); ++n) {
+    for (std::size_t k = 0; k < raw.size(); ++k)
+      raw[k] = recording.channel(estimator.raw_inputs()[k]).values[n];
+    values.push_back(estimator.step(raw).value);
+  }
+  return values;
+}
+
+Recording with_scaled_deflection(const Recording& recording, double scale) {
+  Recording scaled(recording.name(), recording.sample_rate_Hz());
+  for (Channel channel : recording.channels()) {
+    if (channel.name == "gear_angle_rad" || channel.name == "joint_angle_rad")
+      for (double& value : channel.values) value *= scale;
+    scaled.add(std::move(channel));
+  }
+  return scaled;
+}
+
+double rmse_of(const ModelFile& file, const Dataset& dataset) {
+  const Recording& recording = dataset.records[0].recording;
+  const std::vector<double> values = estimates(file, recording);
+  const std::vector<double>& target = recording.channel("torque_Nm").values;
+  double sum = 0.0;
+  for (std::size_t n = 100; n < values.size(); ++n) sum += std::pow(values[n] - target[n], 2);
+  return std::sqrt(sum / static_cast<double>(values.size() - 100));
+}
+
+class MappedFamily : public testing::TestWithParam<std::string> {};
+
+TEST_P(MappedFamily, IsTheBaseOfScaledInputsWithGainAndOffset) {
+  const ModelFile base = base_model(GetParam());
+  const TransferMap map{.input_scale = 0.5, .gain = 3.0, .offset = -2.0};
+  const ModelFile file = mapped(base, map);
+  const Recording recording = test::one_recording({.seed = 9}).records[0].recording;
+  const std::vector<double> whole = estimates(base, recording);
+  const std::vector<double> doubled = estimates(file, with_scaled_deflection(recording, 2.0));
+  ASSERT_GT(whole.size(), 200U);
+  for (std::size_t n = 200; n < whole.size(); ++n)
+    ASSERT_NEAR(doubled[n], 3.0 * whole[n] - 2.0, 1e-4 * (1.0 + std::abs(doubled[n]))) << n;
+  EXPECT_EQ(file.settings.fallback.residual_std, 3.0 * base.settings.fallback.residual_std);
+}
+
+TEST_P(MappedFamily, ComesCloserToANewJointThanTheBase) {
+  const ModelFile base = base_model(GetParam());
+  const Dataset joint =
+      test::one_recording({.stiffness_Nm_rad = 250.0, .offset_Nm = 2.0, .seed = 4});
+  const TransferResult result = transfer_model(base, joint);
+  ASSERT_EQ(result.trials.size(), 5U) << "none, offset, gain_offset, scaled, refit";
+  const double before = rmse_of(base, joint);
+  const double after = rmse_of(result.best().file, joint);
+  EXPECT_LT(after, 0.5 * before);
+  EXPECT_LE(result.best().held_out_rmse, result.trials[0].held_out_rmse);
+}
+
+INSTANTIATE_TEST_SUITE_P(Families, MappedFamily, testing::ValuesIn(kFamilies),
+                         [](const auto& of) { return of.param; });
+
+TEST(Transfer, TheOffsetIsTheMeanErrorOfTheFirstSamples) {
+  const ModelFile base = base_model("linear");
+  const Dataset joint = test::one_recording({.offset_Nm = 5.0, .friction_Nm = 0.0, .seed = 4});
+  const TransferResult result =
+      transfer_model(base, joint, {.method = TransferMethod::offset, .offset_samples = 100});
+  ASSERT_EQ(result.trials.size(), 1U);
+  EXPECT_EQ(result.best().map.gain, 1.0);
+  EXPECT_EQ(result.best().map.input_scale, 1.0);
+  EXPECT_NEAR(result.best().map.offset, 5.0, 0.6);
+}
+
+TEST(Transfer, DataSheetsGiveScaleAndGain) {
+  const ModelFile base = base_model("linear", {.friction_Nm = 0.0, .noise_Nm = 0.0});
+  const Dataset joint = test::one_recording(
+      {.stiffness_Nm_rad = 250.0, .friction_Nm = 0.0, .noise_Nm = 0.0, .seed = 4});
+  const TransferResult result =
+      transfer_model(base, joint,
+                     {.method = TransferMethod::data_sheets,
+                      .ratios = TransferRatios{.stiffness = 0.5, .torque = 0.25}});
+  EXPECT_DOUBLE_EQ(result.best().map.input_scale, 2.0);
+  EXPECT_DOUBLE_EQ(result.best().map.gain, 0.25);
+  EXPECT_LT(rmse_of(result.best().file, joint), 0.01);
+  const TransferRatios ratios = transfer_ratios(data_sheet("dfki-300"), data_sheet("dfki-120"));
+  EXPECT_NEAR(ratios.stiffness, 19.8 / 39.3, 1e-12);
+  EXPECT_DOUBLE_EQ(ratios.torque, 0.4);
+}
+
+TEST(Transfer, ARefitKeepsSlipForcesPositive) {
+  const ModelFile base =
+      train_model(test::one_recording({.friction_Nm = 0.3}),
+                  {.family = "grey_box",
+                   .options = {{"residual", "none"}, {"passive", "true"}},
+                   .features = {.inputs = {"gear_angle_rad - joint_angle_rad"}, .definitions = {}}},
+                  1)
+          .file;
+  // Without friction the least squares alone would make some of them negative.
+  const Dataset joint =
+      test::one_recording({.stiffness_Nm_rad = 300.0, .friction_Nm = 0.0, .seed = 8});
+  const TransferResult result = transfer_model(base, joint, {.method = TransferMethod::refit});
+  const auto& box = result.best().file.parameters.get<GreyBox::Parameters>();
+  for (std::size_t j = box.terms.first_slip(); j < box.terms.first_slope(); ++j)
+    EXPECT_GE(box.coefficients.values(0, j), 0.0);
+}
+
+TEST(Transfer, TheBaseStaysAsItWas) {
+  const ModelFile base = base_model("dgmm");
+  const std::vector<std::byte> before = model_bytes(base);
+  static_cast<void>(transfer_model(base, test::one_recording({.stiffness_Nm_rad = 250.0})));
+  EXPECT_EQ(model_bytes(base), before);
+}
+
+TEST(Transfer, TheResultIsAModelFile) {
+  const ModelFile base = base_model("grey_box");
+  const TransferResult result = transfer_model(base, test::one_recording({.seed = 5}));
+  for (const TransferTrial& trial : result.trials) {
+    const std::vector<std::byte> bytes = model_bytes(trial.file);
+    EXPECT_EQ(model_bytes(parse_model(bytes, "transferred")), bytes) << name(trial.method);
+  }
+}
+
+TEST(Transfer, RefusesWhatItCannotUse) {
+  const ModelFile base = base_model("linear");
+  const Dataset joint = test::one_recording({.seed = 4});
+  const auto message = [&](const ModelFile& from, const Dataset& dataset,
+                           const TransferOptions& options = {}) {
+    return test::error_message([&] { static_cast<void>(transfer_model(from, dataset, options)); });
+  };
+  EXPECT_THAT(message(base, test::one_recording({.samples = 150})), HasSubstr("at least 50"));
+  Dataset dead = joint;
+  Recording recording("dead", 1000.0);
+  for (Channel channel : dead.records[0].recording.channels()) {
+    if (channel.name == "torque_Nm") std::ranges::fill(channel.values, 1.0);
+    recording.add(std::move(channel));
+  }
+  dead.records[0].recording = recording;
+  EXPECT_THAT(message(base, dead), HasSubstr("a target that changes"));
+  Dataset other = joint;
+  Recording without("log", 1000.0);
+  for (const Channel& channel : joint.records[0].recording.channels())
+    if (channel.name != "gear_angle_rad") without.add(channel);
+  other.records[0].recording = without;
+  EXPECT_THAT(message(base, other), HasSubstr("gear_angle_rad"));
+  EXPECT_THAT(message(base, joint, {.method = TransferMethod::data_sheets}),
+              HasSubstr("rated torque of both joints"));
+  EXPECT_THAT(message(base, joint, {.held_out_share = 1.0}), HasSubstr("held-out share"));
+  EXPECT_THAT(message(base_model("polynomial"), joint), HasSubstr("family polynomial"));
+  EXPECT_THAT(test::error_message([&] { static_cast<void>(mapped(base, {.gain = -1.0})); }),
+              HasSubstr("a positive scale and gain"));
+}
+
+}  // namespace
+}  // namespace torsio
