@@ -1272,6 +1272,7 @@ TEST(Monitor, RefusesPairsThatAreNotValid) {
             "monitor: pair 0, 2: floor_Nm: expected 0 to the ceiling, found 4.5");
   EXPECT_EQ(of_pair([](auto& p) { p.largest_armed_Nm = 0.5; }),
             "monitor: pair 0, 2: largest_armed_Nm: expected at least floor_Nm, found 0.5");
+  EXPECT_EQ(of_pair([](auto& p) { p.largest_armed_Nm = p.floor_Nm; }), "");
   EXPECT_EQ(of_pair([](auto& p) { p.floor_Nm = p.ceiling_Nm; }), "");
   EXPECT_EQ(of_pair([](auto& p) { p.floor_Nm = 0.0; }), "");
   EXPECT_EQ(of_pair([](auto& p) { p.drift_allowance = 0.0; }),
