@@ -209,7 +209,7 @@ void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
     find({.check = MonitorCheck::source_fault,
           .first = index,
           .second = index,
-          .value = state.faulty / kQuarters * period_s,
+          .value = static_cast<double>(state.faulty) / kQuarters * period_s,
           .limit = settings_.longest_fault_s});
   if (lasts_longer(state.novel, period_s, settings_.persistence_s))
     find({.check = MonitorCheck::novelty,

@@ -719,6 +719,27 @@ TEST(Monitor, StopsOnASourceWhoseModelFailsAgainAndAgain) {
   EXPECT_TRUE(stops(3));
 }
 
+TEST(Monitor, AFaultThatLastedForLongIsCompensatedAsSoonAsAShorterOne) {
+  MonitorSettings settings = joint();
+  settings.actions[static_cast<std::size_t>(MonitorCheck::source_fault)] = MonitorAction::warn;
+  Loop loop(settings);
+  loop.start();
+  const auto warns_after = [&] {
+    loop.sources[0].fault = Fault::outside_training_range;
+    for (int ticks = 1; ticks < 100; ++ticks) {
+      (void)loop.step();
+      if ((loop.monitor.active() & bit(MonitorCheck::source_fault)) != 0) return ticks;
+    }
+    return 0;
+  };
+  EXPECT_EQ(warns_after(), 16);
+  loop.step_for(1000);
+  loop.sources[0].fault = Fault::none;
+  loop.step_for(64);
+  EXPECT_EQ(warns_after(), 16);
+  EXPECT_TRUE(loop.monitor.is_watching());
+}
+
 TEST(Monitor, IsNotReadyWhileErrorBarsMakeAThresholdTooLarge) {
   MonitorSettings settings = joint();
   for (PairLimits& pair : settings.pairs) {
@@ -1251,6 +1272,7 @@ TEST(Monitor, RefusesPairsThatAreNotValid) {
             "monitor: pair 0, 2: floor_Nm: expected 0 to the ceiling, found 4.5");
   EXPECT_EQ(of_pair([](auto& p) { p.largest_armed_Nm = 0.5; }),
             "monitor: pair 0, 2: largest_armed_Nm: expected at least floor_Nm, found 0.5");
+  EXPECT_EQ(of_pair([](auto& p) { p.largest_armed_Nm = p.floor_Nm; }), "");
   EXPECT_EQ(of_pair([](auto& p) { p.floor_Nm = p.ceiling_Nm; }), "");
   EXPECT_EQ(of_pair([](auto& p) { p.floor_Nm = 0.0; }), "");
   EXPECT_EQ(of_pair([](auto& p) { p.drift_allowance = 0.0; }),

@@ -151,7 +151,7 @@ TEST(Simulate, RefusesWhatTheBenchCannotDo) {
   EXPECT_NE(test::refusal_of({.actuator = "dfki-51"}).find("dfki-28, dfki-50, dfki-120, dfki-300"),
             std::string::npos);
   EXPECT_NE(test::refusal_of({.experiment = "swep"})
-                .find("one of sweep, static-cycle, hold, chirp, random-walk"),
+                .find("one of sweep, static-cycle, hold, chirp, short-chirp, random-walk"),
             std::string::npos);
   EXPECT_NE(test::refusal_of({.lever_m = 0.8}).find("at most the 50 Nm that dfki-50 is rated for"),
             std::string::npos);

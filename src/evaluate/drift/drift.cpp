@@ -306,10 +306,10 @@ class Comparison {
   }
 
   /// The change in units of `before`, with the verdict.
-  [[nodiscard]] DriftQuantity quantity(std::string of, std::string unit, double before,
-                                       const DirectionFit& fit, std::size_t column,
-                                       double model_error, double tolerance,
-                                       double smallest) const {
+  [[nodiscard]] static DriftQuantity quantity(std::string of, std::string unit, double before,
+                                              const DirectionFit& fit, std::size_t column,
+                                              double model_error, double tolerance,
+                                              double smallest) {
     DriftQuantity result{.name = std::move(of), .unit = std::move(unit), .before = before};
     const double scale = std::isfinite(before) ? before : 1.0;
     result.tolerance = tolerance * scale;

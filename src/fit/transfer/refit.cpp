@@ -240,7 +240,7 @@ Dgmm::Parameters refit(Dgmm::Parameters dgmm, const TrainingData& data, double p
 }  // namespace
 
 std::vector<double> refit_priors(const AnyModel::Parameters& base) {
-  const std::vector<double> ridge{1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4};
+  std::vector<double> ridge{1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4};
   if (const auto* const own = base.get_if<Linear::Parameters>())
     return own->coefficients.scheduled ? std::vector<double>{} : ridge;
   if (const auto* const own = base.get_if<GreyBox::Parameters>())

@@ -25,6 +25,7 @@ struct Seeds {
 
 std::vector<DataSheet> sheets_of(const std::vector<DutyLane>& lanes) {
   std::vector<DataSheet> sheets;
+  sheets.reserve(lanes.size());
   for (const DutyLane& lane : lanes) sheets.push_back(lane.sheet);
   return sheets;
 }
