@@ -51,8 +51,8 @@ void refuse_not_positive(double value, const char* setting) {
   if (!(value > 0.0 && std::isfinite(value))) refuse(setting, "a positive number", value);
 }
 
-AdaptationSettings checked(AdaptationSettings settings, AdaptationRule automatic,
-                           double target_scale) {
+AdaptationSettings checked(AdaptationSettings settings, AdaptationRule rule,
+                           double initial_covariance, double target_scale) {
   refuse_not_positive(target_scale, "target_scale");
   AdaptationSettings::visit_options(settings, [](auto given, const StatedRange& stated) {
     const auto value = static_cast<double>(given);
@@ -65,7 +65,8 @@ AdaptationSettings checked(AdaptationSettings settings, AdaptationRule automatic
   });
   if (!(settings.oldest_reference_s >= 0.0))
     refuse("oldest_reference_s", "at least 0", settings.oldest_reference_s);
-  if (settings.rule == AdaptationRule::automatic) settings.rule = automatic;
+  if (settings.rule == AdaptationRule::automatic) settings.rule = rule;
+  if (std::isnan(settings.initial_covariance)) settings.initial_covariance = initial_covariance;
   if (std::isnan(settings.largest_error)) settings.largest_error = target_scale;
   return settings;
 }
@@ -90,10 +91,10 @@ void detail::require_rule(AdaptationRule rule, bool is_supported, const std::str
                     .found = std::string(name(rule))});
 }
 
-ModelAdapter::ModelAdapter(const AdaptationSettings& settings, AdaptationRule automatic,
+ModelAdapter::ModelAdapter(const AdaptationSettings& settings, const Defaults& defaults,
                            double target_scale, double sample_period_s)
     : settings_((refuse_not_positive(sample_period_s, "sample_period_s"),
-                 checked(settings, automatic, target_scale))),
+                 checked(settings, defaults.rule, defaults.initial_covariance, target_scale))),
       target_scale_(target_scale),
       frozen_after_ticks_(ticks_in(settings.frozen_after_s, sample_period_s,
                                    std::numeric_limits<std::size_t>::max())),
@@ -152,9 +153,10 @@ UpdateOutcome ModelAdapter::outcome_of(const ReferenceSample& reference) noexcep
 UpdateOutcome ModelAdapter::doubt_about(const ReferenceSample& reference) const noexcept {
   if (!has_step_) return UpdateOutcome::no_estimate;
   if (!std::isfinite(reference.value)) return UpdateOutcome::reference_not_finite;
+  // First: at the end of its range a sensor does not change either.
+  if (std::abs(reference.value) >= settings_.saturation) return UpdateOutcome::reference_saturated;
   if (!(reference.age_s <= settings_.oldest_reference_s) || unchanged_ticks_ >= frozen_after_ticks_)
     return UpdateOutcome::reference_stale;
-  if (std::abs(reference.value) >= settings_.saturation) return UpdateOutcome::reference_saturated;
   return UpdateOutcome::updated;
 }
 

@@ -64,7 +64,7 @@ std::vector<double> rises(const GreyBox::Parameters& base) {
 
 GreyBoxAdapter::GreyBoxAdapter(const AdaptationSettings& settings, const GreyBox::Parameters& base,
                                double sample_period_s)
-    : ModelAdapter(settings, AdaptationRule::rls, spread_of(base), sample_period_s),
+    : ModelAdapter(settings, {AdaptationRule::rls, 0.05}, spread_of(base), sample_period_s),
       place_(base.terms.columns(), kNone),
       rise_(rises(base)),
       weights_(this->settings(), add_terms(base, settings.largest_change)) {

@@ -57,7 +57,7 @@ constexpr std::size_t move_operations(std::size_t dimension) {
 
 DgmmAdapter::DgmmAdapter(const AdaptationSettings& settings, const Dgmm::Parameters& base,
                          double sample_period_s, const Limits& limits)
-    : ModelAdapter(settings, AdaptationRule::em, base.mixture.scale.at(0), sample_period_s),
+    : ModelAdapter(settings, {AdaptationRule::em}, base.mixture.scale.at(0), sample_period_s),
       base_(base.mixture),
       thin_log_density_(base.clamp.thin_log_density),
       limits_(

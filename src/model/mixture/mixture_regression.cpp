@@ -80,8 +80,8 @@ bool conditional_parameters(double weight, const double* mean, const double* cov
   const auto quantity = [output](std::size_t j) { return j < output ? j : j + 1; };
   std::array<std::array<double, kMost>, kMost> factor;  // Cholesky, then its inverse
   std::array<double, kMost> inverse;                    // reciprocals of its diagonal
-  double log_determinant_half = 0.0;
-  double diagonal = 1.0;
+  double log_scale = 0.0;    // ln of weight / root of the determinant is this + ln `scale`
+  double scale = weight;
   for (std::size_t r = 0; r < n; ++r) {
     for (std::size_t c = 0; c <= r; ++c) {
       double sum = covariance[quantity(r) * dimension + quantity(c)];
@@ -93,13 +93,13 @@ bool conditional_parameters(double weight, const double* mean, const double* cov
         const double root = std::sqrt(sum);
         factor[r][r] = root;
         inverse[r] = 1.0 / root;
-        diagonal *= root;
+        scale *= inverse[r];
       }
     }
-    // Few logarithms, as long as the product cannot leave the range of a double.
-    if (r + 1 < n && diagonal > 1e-100 && diagonal < 1e100) continue;
-    log_determinant_half += std::log(diagonal);
-    diagonal = 1.0;
+    // One logarithm, as long as the product cannot leave the range of a double.
+    if (scale > 1e-100 && scale < 1e100) continue;
+    log_scale += std::log(scale);
+    scale = 1.0;
   }
   for (std::size_t c = 0; c < n; ++c) {
     factor[c][c] = inverse[c];
@@ -119,8 +119,8 @@ bool conditional_parameters(double weight, const double* mean, const double* cov
   for (std::size_t j = 0; j < n; ++j) *next++ = mean[quantity(j)];
   for (std::size_t r = 0; r < n; ++r)
     for (std::size_t c = 0; c <= r; ++c) *next++ = factor[r][c] * (0.5 * std::numbers::sqrt2);
-  *next++ = std::log(weight) - log_determinant_half -
-            0.5 * static_cast<double>(n) * std::log(2.0 * std::numbers::pi);
+  constexpr double kLogTwoPi = 1.8378770664093454836;
+  *next++ = log_scale + std::log(scale) - 0.5 * static_cast<double>(n) * kLogTwoPi;
   *next++ = mean[output];
   for (std::size_t c = 0; c < n; ++c) {
     double slope = 0.0;

@@ -45,7 +45,7 @@ void with_network(Parameters& parameters, const Use& use) {
 
 LastLayerAdapter::LastLayerAdapter(const AdaptationSettings& settings, const DenseLayer& last,
                                    double target_scale, double sample_period_s)
-    : ModelAdapter(settings, AdaptationRule::nlms, target_scale, sample_period_s),
+    : ModelAdapter(settings, {AdaptationRule::nlms}, target_scale, sample_period_s),
       frozen_(last),
       bound_(settings.largest_change * length_of(last)),
       features_(last.weights.columns),

@@ -32,7 +32,8 @@ struct AdaptationSettings {
   double leak = 1e-5;                   ///< NLMS: gamma, share of W - W0
   double regularisation = 1e-3;         ///< NLMS: epsilon
   double forgetting = 0.9995;           ///< RLS, EM: lambda
-  double initial_covariance = 1e-3;     ///< RLS: delta, P starts as delta I
+  /// RLS: delta, P starts as delta I. NaN: 0.001 for a network, 0.05 for a grey box.
+  double initial_covariance = kNotMeasured;
   double trace_cap = 1.0;               ///< RLS: tr P over that of delta I
   double component_samples = 200.0;     ///< EM: what a component of the base counts for on average
   std::size_t new_components = 32;      ///< EM: at most so many in addition to those of the base
@@ -70,7 +71,8 @@ struct AdaptationSettings {
     visit(self.initial_covariance, {.name = "initial_covariance",
                                     .minimum = 1e-12,
                                     .maximum = 1e12,
-                                    .help = "rls: larger learns faster at first"});
+                                    .help = "rls: larger learns faster at first; auto: 0.001 for a network, "
+                                            "0.05 for a grey box"});
     visit(self.trace_cap, {.name = "trace_cap",
                            .minimum = 1.0,
                            .maximum = 1e12,

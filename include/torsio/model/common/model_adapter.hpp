@@ -28,7 +28,7 @@ class ModelAdapter {
   virtual ~ModelAdapter() = default;
   [[nodiscard]] virtual std::unique_ptr<ModelAdapter> copy() const = 0;
 
-  /// `rule` and `largest_error` are never `automatic` and NaN here.
+  /// No setting is automatic here: neither `rule` nor, as NaN, another one.
   [[nodiscard]] const AdaptationSettings& settings() const noexcept { return settings_; }
 
   /// Returns to the frozen parameters, all at once, and resets the counters.
@@ -58,10 +58,14 @@ class ModelAdapter {
   [[nodiscard]] virtual AnyParameters adapted(AnyParameters base) const = 0;
 
  protected:
-  /// @param automatic what `AdaptationRule::automatic` means for this family.
+  /// Settings of a family in place of those that are automatic.
+  struct Defaults {
+    AdaptationRule rule = AdaptationRule::nlms;
+    double initial_covariance = 1e-3;
+  };
   /// @param target_scale the spread of the target in training, its unit.
   /// @throws Error if a setting is out of range.
-  ModelAdapter(const AdaptationSettings& settings, AdaptationRule automatic, double target_scale,
+  ModelAdapter(const AdaptationSettings& settings, const Defaults& defaults, double target_scale,
                double sample_period_s);
   ModelAdapter(const ModelAdapter&) = default;
   ModelAdapter& operator=(const ModelAdapter&) = default;
