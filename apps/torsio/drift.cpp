@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "data_flags.hpp"
 #include "model_doubts.hpp"
@@ -21,6 +23,7 @@ struct DriftFlags {
   std::string model;
   DataFlags data;
   std::string serial;
+  std::string reference;
   std::size_t campaign = 0;
   torsio::DriftCampaignSettings settings;
   JsonOutput json;
@@ -47,7 +50,9 @@ void run(DriftFlags& flags) {
                               .expected = "MODEL REC..., or --campaign N",
                               .found = "no model file",
                               .advice = "torsio drift joint.safetensors today.csv"});
-  flags.data.check_outputs({flags.json.destination}, {flags.model});
+  std::vector<std::string> models{flags.model};
+  if (!flags.reference.empty()) models.push_back(flags.reference);
+  flags.data.check_outputs({flags.json.destination}, models);
   const torsio::ModelFile file = torsio::load_model(flags.model, flags.serial);
   flags.data.target = file.settings.target;
   flags.data.use_model_mapping(file.card.mapping, flags.model);
@@ -55,7 +60,18 @@ void run(DriftFlags& flags) {
   const torsio::Dataset dataset = flags.data.load_as_test(progress.listener());
   warn_of_seen_recordings(file, dataset);
   warn_of_missing_zeros(file, dataset);
-  const torsio::Drift drift = torsio::detect_drift(file, dataset, {}, progress.listener());
+  torsio::DriftOptions options;
+  std::optional<torsio::ModelFile> reference;
+  if (!flags.reference.empty()) {
+    reference = torsio::load_model(flags.reference, flags.serial);
+    if (reference->card.mapping != file.card.mapping)
+      throw torsio::UsageError({.place = flags.reference,
+                                .expected = "the mapping of " + flags.model,
+                                .found = "another one",
+                                .advice = "Train both models from the same recordings."});
+    options.reference = &*reference;
+  }
+  const torsio::Drift drift = torsio::detect_drift(file, dataset, options, progress.listener());
   if (flags.json.wants_tables()) print(torsio::drift_text(drift, file.settings.target));
   flags.json.write(torsio::drift_json(drift, file.settings.target));
 }
@@ -76,6 +92,9 @@ void add_drift(CLI::App& app) {
                              "recordings of today with the inputs and the torque, or a manifest");
   flags->data.add_model_mapping(*verb);
   flags->data.add_initialise(*verb);
+  verb->add_option("--reference", flags->reference,
+                   "model of the same torque from the motor current or the twist of the gear: it "
+                   "separates the gain of the torque sensor from the stiffness");
   verb->add_option("--device-serial", flags->serial,
                    "serial number of the joint; a model of another one is refused");
   verb->add_option("--campaign", flags->campaign,

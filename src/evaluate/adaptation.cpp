@@ -10,6 +10,8 @@
 #include "evaluate/fit_and_score.hpp"
 #include "fit/common/guards.hpp"
 #include "fit/common/option_fields.hpp"
+#include "fit/common/reference_check.hpp"
+#include "fit/common/training_rules.hpp"
 #include "numerics/metrics_accumulator.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
@@ -30,6 +32,12 @@ struct Tally {
     return {std::move(recording), frozen.metrics(), adapted.metrics()};
   }
 };
+
+bool is_lesson(const DatasetRecord& record, std::size_t sample) {
+  return std::ranges::any_of(record.segments, [sample](const Segment& segment) {
+    return segment.role == Role::train && segment.begin <= sample && sample < segment.end;
+  });
+}
 
 /// One record through the adaptive estimator.
 class Replay {
@@ -57,7 +65,7 @@ class Replay {
       std::ranges::transform(channels_, raw_.begin(),
                              [n](const std::vector<double>* values) { return (*values)[n]; });
       const Estimate output = adaptive_.step(raw_);
-      if (!is_lesson(n)) continue;
+      if (!is_lesson(record_, n)) continue;
       if (output.fault == Fault::none && target_.is_fresh(n))
         for (Tally* tally : {&own, &together}) {
           tally->adapted.add(output.value, target_.values[n]);
@@ -68,12 +76,6 @@ class Replay {
   }
 
  private:
-  [[nodiscard]] bool is_lesson(std::size_t sample) const {
-    return std::ranges::any_of(record_.segments, [sample](const Segment& segment) {
-      return segment.role == Role::train && segment.begin <= sample && sample < segment.end;
-    });
-  }
-
   AdaptiveEstimator& adaptive_;
   const DatasetRecord& record_;
   const Channel& target_;
@@ -102,6 +104,25 @@ void require_role(const Dataset& dataset, Role role, const char* what, const cha
        .advice = "Give longer recordings, or a model that was trained on such ones."});
 }
 
+/// A reference of another unit or sign, or of a sensor that does not measure, is refused as a whole: the
+/// guards of the adaptation examine one sample at a time. What they pass over, a sensor that is stuck or at
+/// its limit for a while, is left to them.
+void require_plausible(const DatasetRecord& record, const std::string& target,
+                       const Prediction& frozen) {
+  const Channel& channel = record.recording.channel(target);
+  std::vector<double> estimated;
+  std::vector<double> measured;
+  for (std::size_t n = 0; n < channel.values.size(); ++n) {
+    if (!is_lesson(record, n) || !channel.is_fresh(n) || !std::isfinite(channel.values[n]) ||
+        frozen.estimates[n].fault != Fault::none)
+      continue;
+    if (!measured.empty() && channel.values[n] == measured.back()) continue;
+    estimated.push_back(frozen.estimates[n].value);
+    measured.push_back(channel.values[n]);
+  }
+  require_plausible_reference(record.recording.name() + ": " + target, {estimated, measured});
+}
+
 /// Both models on what nothing was learned from: each recording, then all of them.
 std::vector<AdaptationScore> held_out_scores(const SplitScore& frozen, const SplitScore& adapted) {
   std::vector<AdaptationScore> scores;
@@ -128,11 +149,7 @@ void note_adaptation(ModelCard& card, const AdaptationSettings& settings,
     note("step_size", settings.step_size);
     note("leak", settings.leak);
   }
-  for (const DatasetRecord& record : dataset.records)
-    if (record.has_role(Role::train) &&
-        std::ranges::find(card.training_files, record.recording.source) ==
-            card.training_files.end())
-      card.training_files.push_back(record.recording.source);
+  add_training_files(card, dataset);
 }
 
 }  // namespace
@@ -163,6 +180,8 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
   require_role(dataset, Role::test, "score on", "Name held-out recordings with --test.");
   for (const std::string& channel : frozen.settings().zeroed_channels)
     adaptive.set_zero(channel, 0.0);  // a loaded recording had its own subtracted already
+  const TrainingData lessons = training_data(dataset, model.settings.features, Role::train);
+  require_trainable(lessons);
   AdaptedModel adapted{.file = model};
   Tally together;
   const std::size_t parts = dataset.records.size() + 2;
@@ -171,6 +190,7 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
     if (!record.has_role(Role::train)) continue;
     Tally own;
     const Prediction output = predict(frozen, record.recording);
+    require_plausible(record, dataset.target, output);
     Replay(adaptive, record, dataset.target)
         .run(output, own, together, part_of(progress, i, parts, "adapting"));
     adapted.as_it_ran.push_back(own.score(record.recording.name()));
@@ -183,9 +203,6 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
       adaptive.adapted().at_sample_period(1.0 / model.settings.sample_rate_Hz);
   note_adaptation(adapted.file.card, adaptive.adapter().settings(), adapted.counts, dataset);
 
-  const TrainingData lessons = training_data(dataset, model.settings.features, Role::train);
-  ResidualTable residuals = residual_table(AnyModel(adapted.file.parameters), lessons);
-  if (!residuals.std_dev.empty()) adapted.file.settings.residuals = std::move(residuals);
   const SplitScore before =
       evaluate(frozen, dataset, Role::test, part_of(progress, parts - 2, parts, "frozen"));
   const SplitScore after = evaluate(make_estimator(adapted.file, dataset.sample_rate_Hz()), dataset,
@@ -194,6 +211,13 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
     throw Error({.problem = "no held-out sample could be scored",
                  .advice = "Hold out more: --test recordings, or a larger --held-out share."});
   adapted.held_out = held_out_scores(before, after);
+  // Errors on what was learned are too small for an error bar, and where nothing was learned those of
+  // the frozen model remain.
+  ResidualTable residuals = residual_table(AnyModel(adapted.file.parameters), lessons);
+  if (!residuals.std_dev.empty()) {
+    widen_to(residuals, after.together.metrics.rmse);
+    adapted.file.settings.residuals = larger_of(model.settings.residuals, residuals);
+  }
   note_held_out_scores(adapted.file.card, {{.family = {}, .score = after.together}});
   return adapted;
 }

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "core/report_progress.hpp"
+#include "evaluate/fit_and_score.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/train_model.hpp"
 
 namespace torsio {
@@ -26,6 +29,20 @@ double rmse_of(const TransferEvaluation& evaluation, std::string_view method) {
   return found == nullptr ? kNotMeasured : found->test.metrics.rmse;
 }
 
+/// The options of the fit, without the entries of a transfer or an adaptation.
+std::map<std::string, std::string> fit_options(const ModelCard& card) {
+  std::map<std::string, std::string> options = card.options;
+  std::erase_if(options, [](const auto& of) { return of.first.find('.') != std::string::npos; });
+  return options;
+}
+
+void require_positive_time(double seconds) {
+  if (!(seconds > 0.0) || !std::isfinite(seconds))
+    throw UsageError({.place = "time of the new data that is used",
+                      .expected = "more than 0 s",
+                      .found = fmt::format("{} s", seconds)});
+}
+
 }  // namespace
 
 const TransferEvaluation::OfMethod* TransferEvaluation::find(
@@ -41,20 +58,23 @@ TransferEvaluation evaluate_transfer(const ModelFile& base, const Dataset& datas
     throw UsageError({.place = "transfer",
                       .problem = "no part of the recordings is left to score the methods on",
                       .advice = "Give longer recordings, or use less of them."});
+  refuse_seen_test_records(dataset);
   TransferEvaluation evaluation{.seconds = training_seconds(dataset),
                                 .transfer = transfer_model(base, dataset, options, progress)};
   evaluation.notes = evaluation.transfer.notes;
-  for (const TransferTrial& trial : evaluation.transfer.trials)
-    evaluation.methods.push_back(
-        {.method = std::string(name(trial.method)),
-         .held_out_rmse = trial.held_out_rmse,
-         .test = evaluate(make_estimator(trial.file), dataset, Role::test, progress).together});
+  for (TransferTrial& trial : evaluation.transfer.trials) {
+    const Score test = evaluate(make_estimator(trial.file), dataset, Role::test, progress).together;
+    note_held_out_scores(trial.file.card, {{.family = {}, .score = test}});
+    evaluation.methods.push_back({.method = std::string(name(trial.method)),
+                                  .held_out_rmse = trial.held_out_rmse,
+                                  .test = test});
+  }
   try {
     const TrainedModel own =
         train_model(dataset,
                     {.family = base.card.fitted_as.empty() ? std::string(base.parameters.family())
                                                            : base.card.fitted_as,
-                     .options = base.card.options,
+                     .options = fit_options(base.card),
                      .features = base.settings.features},
                     seed, progress);
     evaluation.methods.push_back(
@@ -101,6 +121,7 @@ TransferCurve transfer_curve(const ModelFile& base, const Dataset& dataset,
 }
 
 Dataset with_training_time(Dataset dataset, double seconds) {
+  require_positive_time(seconds);
   auto left = static_cast<std::size_t>(std::llround(seconds * dataset.sample_rate_Hz()));
   for (DatasetRecord& record : dataset.records) {
     for (Segment& segment : record.segments) {
@@ -114,10 +135,7 @@ Dataset with_training_time(Dataset dataset, double seconds) {
 }
 
 void hold_out_after(Dataset& dataset, double seconds) {
-  if (!(seconds > 0.0) || !std::isfinite(seconds))
-    throw UsageError({.place = "time of the new data that is used",
-                      .expected = "more than 0 s",
-                      .found = fmt::format("{} s", seconds)});
+  require_positive_time(seconds);
   for (DatasetRecord& record : dataset.records) {
     const std::size_t samples = record.recording.size();
     const auto used =

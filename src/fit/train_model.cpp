@@ -44,13 +44,7 @@ ModelCard card_for(const Dataset& dataset, const ModelChoice& choice, const Opti
   card.options = options.values();
   card.seed = seed;
   card.zeros = training_zeros(dataset);
-  for (const DatasetRecord& record : dataset.records) {
-    if (!record.has_role(Role::train)) continue;
-    Source source = record.recording.source;
-    if (source.file.empty()) source.file = record.recording.name();  // made in memory
-    if (std::ranges::find(card.training_files, source) == card.training_files.end())
-      card.training_files.push_back(std::move(source));
-  }
+  add_training_files(card, dataset);
   return card;
 }
 

@@ -36,8 +36,9 @@ std::string interval(const DriftQuantity& of) {
 }
 
 std::string healthy(const DriftQuantity& of) {
-  return std::isfinite(of.before) ? fmt::format("{:.3g} %", 100.0 * of.tolerance / of.before)
-                                  : fmt::format("{:.3g} {}", of.tolerance, of.unit);
+  return std::isfinite(of.before) && of.before != 0.0
+             ? fmt::format("{:.3g} %", 100.0 * of.tolerance / of.before)
+             : fmt::format("{:.3g} {}", of.tolerance, of.unit);
 }
 
 std::string joint_sentence(const Drift& drift) {
@@ -55,19 +56,31 @@ std::string joint_sentence(const Drift& drift) {
 }
 
 std::string advice_sentence(const Drift& drift) {
+  if (!std::isfinite(drift.calibration_rmse))
+    return "The model file states no error: whether a new calibration is worth it cannot be "
+           "determined.";
+  const std::string ratio =
+      fmt::format("With the zero set, the error is {:.2g} times that of the calibration",
+                  drift.zeroed_rmse / drift.calibration_rmse);
   switch (drift.advice) {
-    case DriftAdvice::none:
-      return "A new calibration is not worth it: the model is as accurate as at its calibration.";
+    case DriftAdvice::none: return ratio + ": a new calibration is not worth it.";
     case DriftAdvice::set_zero:
-      return "A new calibration is not worth it: set the zero of the torque again.";
-    case DriftAdvice::calibrate: return "A new calibration is worth it.";
+      return ratio + ": set the zero of the torque again; a new calibration is not worth it.";
+    case DriftAdvice::calibrate:
+      return ratio + ", and the changes above explain it:\na new calibration is worth it.";
     case DriftAdvice::other_motion:
-      return "The model is less accurate in this motion than at its calibration, and no change "
-             "above "
-             "explains\nit: calibrate with this motion, too.";
+      return ratio +
+             ", and none of the changes above explains it. Possible causes are another\n"
+             "motion or temperature than in the calibration, a delay of the torque, and a zero "
+             "that "
+             "drifts: `torsio check`\nfinds the latter two; else calibrate with this motion, too.";
+    case DriftAdvice::check_sensor:
+      return "The gain of the torque sensor has changed: check it before a new calibration, which "
+             "would "
+             "contain its error.";
     case DriftAdvice::record_more: break;
   }
-  return "No need for a new calibration was found; record more for a certain answer.";
+  return ratio + "; record more for a certain answer.";
 }
 
 std::string share(std::size_t count, std::size_t of) { return fmt::format("{} of {}", count, of); }
@@ -87,7 +100,8 @@ std::string drift_text(const Drift& drift, const std::string& target) {
       "included\n\n",
       joint_sentence(drift), table.text());
   text += fmt::format(
-      "RMSE of the model: {} {} at its calibration, {} {} now, {} {} with the zero set, {} {} with "
+      "RMSE of the model: {} {} according to its file, {} {} now, {} {} with the zero set, {} {} "
+      "with "
       "all\nchanges above corrected. {}\n",
       number(drift.calibration_rmse), unit, number(drift.rmse), unit, number(drift.zeroed_rmse),
       unit, number(drift.corrected_rmse), unit, advice_sentence(drift));
@@ -137,14 +151,21 @@ std::string drift_campaign_text(const DriftCampaignResult& result) {
                of.changed.empty() ? "-" : fmt::format("{}", of.found),
                fmt::format("{}", of.other_found), fmt::format("{}", of.undetermined),
                of.changed.empty() ? "-" : fmt::format("{}", of.covered)});
+  std::size_t undetermined_changed = 0;
+  std::size_t undetermined_healthy = 0;
+  for (const DriftCampaignRow& of : result.rows)
+    (of.changed.empty() ? undetermined_healthy : undetermined_changed) += of.undetermined;
   return fmt::format(
       "{}another one: a quantity is reported that has not changed. undetermined: neither a change "
       "nor "
-      "none.\n\nchanged specimens found: {}; share that is missed: at most {:.3g} %\n"
+      "none.\n\nchanged specimens found, with the right sign: {}; share that is missed: at most "
+      "{:.3g} %\n"
       "false alarms: {} specimens without a change; share: at most {:.3g} %\n"
-      "bounds: one-sided, 95 % (Clopper-Pearson)\n",
+      "bounds: one-sided, 95 % (Clopper-Pearson)\n"
+      "undetermined: {} with a change, {} without one\n",
       table.text(), share(result.found, result.changed), 100.0 * result.missed_upper_95,
-      share(result.false_alarms, result.healthy), 100.0 * result.false_upper_95);
+      share(result.false_alarms, result.healthy), 100.0 * result.false_upper_95,
+      share(undetermined_changed, result.changed), share(undetermined_healthy, result.healthy));
 }
 
 std::string drift_campaign_json(const DriftCampaignResult& result) {

@@ -169,14 +169,19 @@ std::string score_line(const ModelFile& model) {
   return fmt::format("errors on {}: {}\n", model.card.held_out, text);
 }
 
-std::string adaptation_lines(const ModelCard& card) {
-  constexpr std::string_view kAdaptation = "adaptation.";
+/// @param begin of the options that a transfer or an adaptation has noted.
+std::string noted_options(const ModelCard& card, std::string_view begin, std::string_view title) {
   std::string text;
   for (const auto& [option, value] : card.options)
-    if (option.starts_with(kAdaptation))
-      text += fmt::format("{}{} {}", text.empty() ? "adapted with " : ", ",
-                          in_words(option.substr(kAdaptation.size())), value);
+    if (option.starts_with(begin))
+      text += fmt::format("{} {}", text.empty() ? title : ",",
+                          in_words(option.substr(begin.size())) + " " + value);
   return text.empty() ? text : text + "\n";
+}
+
+std::string adaptation_lines(const ModelCard& card) {
+  return noted_options(card, "transfer.", "transferred with") +
+         noted_options(card, "adaptation.", "adapted with");
 }
 
 std::string mapping_lines(const ModelCard& card) {

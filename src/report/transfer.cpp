@@ -53,11 +53,21 @@ std::string advice(const TransferEvaluation& evaluation, const std::string& unit
   if (own == nullptr) return {};
   const double transferred = evaluation.chosen().test.metrics.rmse;
   const double alone = own->test.metrics.rmse;
-  return fmt::format(
+  std::string text = fmt::format(
       "With {:g} s of new data the transferred model has an RMSE of {} {}, a model of these data "
-      "alone {} {}: {}\n",
+      "alone {} {}{}: {}\n",
       evaluation.seconds, error_text(transferred), unit, error_text(alone), unit,
+      guarded_share(own->test) > 0.0
+          ? fmt::format(" ({:.0f} % of the samples are outside of its range)",
+                        100.0 * guarded_share(own->test))
+          : "",
       transferred < alone ? "the base helps." : "the base does not help; use `torsio fit`.");
+  const OfMethod* const base = evaluation.find(name(TransferMethod::none));
+  if (base != nullptr && base->test.metrics.rmse < transferred)
+    text += fmt::format(
+        "The base as it is has an RMSE of only {} {}: these new data are too few for {}.\n",
+        error_text(base->test.metrics.rmse), unit, evaluation.chosen().method);
+  return text;
 }
 
 std::string curve_table(const TransferCurve& curve, const std::string& unit) {

@@ -25,6 +25,7 @@ using test::add_record;
 using test::bench_recording;
 using test::dump;
 using test::error_message;
+using testing::AllOf;
 using testing::HasSubstr;
 
 /// A small network of the bench whose torque is the reference.
@@ -172,7 +173,22 @@ TEST(AdaptModel, RefusesWhatItCannotLearnFrom) {
   EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), no_lesson, {}); }),
               HasSubstr("nothing to adapt to"));
   EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), other_specimen(20), {}); }),
-              HasSubstr("no sample could be used for the adaptation"));
+              HasSubstr("nothing to use with role train"));
+  for (const auto& [sensor, problem] : std::map<std::string, std::function<double(double)>>{
+           {"a target that changes", [](double) { return 3.0; }},
+           {"the opposite sign", [](double torque) { return -torque; }},
+           {"of another size", [](double torque) { return 1000.0 * torque; }}}) {
+    Dataset broken = other_specimen();
+    Recording changed("lesson", 1000.0);
+    for (Channel channel : broken.records[0].recording.channels()) {
+      if (channel.name == "torque_Nm")
+        std::ranges::transform(channel.values, channel.values.begin(), problem);
+      changed.add(std::move(channel));
+    }
+    broken.records[0].recording = std::move(changed);
+    EXPECT_THAT(error_message([&] { (void)adapt_model(bench_model(), broken, {}); }),
+                HasSubstr(sensor));
+  }
   EXPECT_THAT(error_message([&] { hold_out_ends(no_exam, 0.99, 1.0); }),
               HasSubstr("lesson: a training block"));
   EXPECT_THAT(error_message([&] { hold_out_ends(no_exam, 1.0, 1.0); }), HasSubstr("--held-out"));
@@ -281,19 +297,18 @@ TEST_P(AdaptFamily, SaturatedAndStuckSensorsAndGapsAreCountedAndOtherUnitsAreRef
   EXPECT_EQ(adapted.counts.of(UpdateOutcome::reference_stale), 4800U);
   EXPECT_LT(adapted.held_out.back().adapted.rmse, 1.1 * adapted.held_out.back().frozen.rmse);
 
-  const auto millis = [](std::size_t, double torque) { return 1000.0 * (torque + 40.0); };
-  EXPECT_THAT(error_message([&] {
-                (void)adapt_model(bench_model_of(GetParam()), changed_stiffness(1.0, millis), {});
-              }),
-              HasSubstr("no sample could be used for the adaptation"));
+  const auto refusal = [](const Dataset& dataset, const AdaptationSettings& strict) {
+    return error_message([&] { (void)adapt_model(bench_model_of(GetParam()), dataset, strict); });
+  };
+  const auto millis = [](std::size_t, double torque) { return 1000.0 * torque; };
+  EXPECT_THAT(refusal(changed_stiffness(1.0, millis), {}), HasSubstr("of another size"));
   const auto stuck = [](std::size_t, double) { return 3.0; };
-  EXPECT_THAT(error_message([&] {
-                AdaptationSettings strict = settings_for("auto");
-                strict.sensor_std = 100.0;
-                (void)adapt_model(bench_model_of(GetParam()), changed_stiffness(1.0, stuck),
-                                  strict);
-              }),
-              HasSubstr("reference_stale"));
+  EXPECT_THAT(refusal(changed_stiffness(1.0, stuck), {}), HasSubstr("a target that changes"));
+  AdaptationSettings noisy = settings_for("auto");
+  noisy.sensor_std = 100.0;
+  EXPECT_THAT(
+      refusal(changed_stiffness(1.0), noisy),
+      AllOf(HasSubstr("no sample could be used for the adaptation"), HasSubstr("dead_zone")));
 }
 
 INSTANTIATE_TEST_SUITE_P(, AdaptFamily, testing::Values("dgmm", "grey_box"),

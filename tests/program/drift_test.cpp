@@ -37,7 +37,8 @@ TEST_F(DriftVerb, ReportsAnAgedJointAndNotASoundOne) {
   simulate("dfki-50#11 sweep --lever 0.21m --seed 6 --age 0.6 -o old.csv");
   const Outcome aged = torsio("drift joint.safetensors old.csv --json drift.json");
   EXPECT_EQ(aged.exit_code, 0) << aged.err;
-  EXPECT_NE(aged.out.find("A new calibration is worth it."), std::string::npos) << aged.out;
+  EXPECT_NE(aged.out.find("explain it:\na new calibration is worth it."), std::string::npos)
+      << aged.out;
   const auto document = nlohmann::json::parse(contents("drift.json"));
   EXPECT_EQ(document.at("joint"), "changed");
   EXPECT_EQ(document.at("advice"), "calibrate");
@@ -72,7 +73,9 @@ TEST_F(DriftVerb, RunsACampaignThatContinues) {
   const std::string call = "drift --campaign 2 --seed 3 --resume units.jsonl --json ";
   const Outcome first = torsio(call + "first.json");
   EXPECT_EQ(first.exit_code, 0) << first.err;
-  EXPECT_NE(first.out.find("changed specimens found: 2 of 2"), std::string::npos) << first.out;
+  EXPECT_NE(first.out.find("changed specimens found, with the right sign: 2 of 2"),
+            std::string::npos)
+      << first.out;
   const std::string units = contents("units.jsonl");
   EXPECT_EQ(torsio(call + "second.json").exit_code, 0);
   EXPECT_EQ(contents("first.json"), contents("second.json"));

@@ -33,7 +33,15 @@ struct DriftQuantity {
 };
 
 /// `other_motion`: the error is larger than at the calibration, but none of the changes explains it.
-enum class DriftAdvice : std::uint8_t { none, set_zero, calibrate, other_motion, record_more };
+/// `check_sensor`: the gain of the torque sensor has changed, and a calibration would contain it.
+enum class DriftAdvice : std::uint8_t {
+  none,
+  set_zero,
+  calibrate,
+  other_motion,
+  record_more,
+  check_sensor
+};
 [[nodiscard]] std::string_view name(DriftAdvice advice) noexcept;
 
 /// What has changed since the calibration of a model (docs/drift.md).
@@ -44,7 +52,7 @@ struct Drift {
   double effective_samples = kNotMeasured;  ///< N / (1 + 2 sum r_k) of the remaining residual
   double calibration_rmse = kNotMeasured;   ///< error of the model file, in the target's unit
   double rmse = kNotMeasured;               ///< error of the model in these recordings
-  double zeroed_rmse = kNotMeasured;        ///< the same less its mean in each recording
+  double zeroed_rmse = kNotMeasured;        ///< the same less its mean
   double corrected_rmse = kNotMeasured;     ///< with all changes above corrected
   DriftVerdict joint = DriftVerdict::undetermined;  ///< all quantities of the joint together
   DriftAdvice advice = DriftAdvice::none;
@@ -53,6 +61,9 @@ struct Drift {
 struct DriftOptions {
   std::size_t resamples = 400;  ///< number of records of the bootstrap, at least 100
   std::uint64_t seed = 1;       ///< seed of the bootstrap
+  /// A model of the same torque from the motor current or the twist of the gear: it separates the gain
+  /// of the torque sensor from the stiffness. Null: they are one quantity.
+  const ModelFile* reference = nullptr;
 };
 
 /// Compares the torque of recordings (role test) with a model of it: generalised least squares of

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -11,6 +12,8 @@
 #include "core/report_progress.hpp"
 #include "evaluate/drift/direction_fit.hpp"
 #include "evaluate/drift/torque_parts.hpp"
+#include "evaluate/drift/verdicts.hpp"
+#include "fit/common/reference_check.hpp"
 #include "torsio/check/check.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -35,18 +38,11 @@ constexpr double kZeroTolerance = 0.002;  // over the largest torque of the mode
 
 constexpr std::size_t kLeastSamples = 200;
 constexpr double kLeastDuration_s = 5.0;
-constexpr double kLeastTravel = 0.1;     // over the range of the training
-constexpr double kLeastFollowing = 0.1;  // spread of the torque over that of the model
+constexpr double kLeastTravel = 0.1;  // over the range of the training
 constexpr double kManyOutside = 0.5;
 constexpr double kReversal = 0.05;  // over the range of the training
 constexpr std::size_t kLeastReversals = 2;
 constexpr double kLeastFriction = 0.5;  // loop of the model over its error
-constexpr double kExplained = 0.8;      // error with the changes corrected over that without
-constexpr double kWorthFactor = 1.5;    // error now over that of the calibration
-
-constexpr const char* kZero = "zero";
-constexpr const char* kScale = "stiffness or gain";
-constexpr const char* kFriction = "friction";
 
 struct Compared {
   std::vector<double> x;
@@ -67,25 +63,13 @@ double root_mean_square(std::span<const double> values) {
 std::string seconds(double value) { return fmt::format("{:.3g} s", value); }
 
 void check_torque(const Compared& of) {
-  const auto value = [&](std::size_t n) { return of.target->values[n]; };
-  double lowest = value(of.rows.front());
-  double highest = lowest;
-  double least = of.output[of.rows.front()];
-  double most = least;
+  std::vector<double> estimated;
+  std::vector<double> measured;
   for (const std::size_t n : of.rows) {
-    lowest = std::min(lowest, value(n));
-    highest = std::max(highest, value(n));
-    least = std::min(least, of.output[n]);
-    most = std::max(most, of.output[n]);
+    estimated.push_back(of.output[n]);
+    measured.push_back(of.target->values[n]);
   }
-  if (highest - lowest > kLeastFollowing * (most - least)) return;
-  throw Error({.place = of.recording->name() + ": " + of.target->name,
-               .problem = "the torque does not follow the motion",
-               .expected = fmt::format("values that vary by about {:.3g}, as those of the model",
-                                       most - least),
-               .found = highest > lowest ? fmt::format("{:.3g}", highest - lowest)
-                                         : fmt::format("the constant {:.6g}", lowest),
-               .advice = "Check the load cell, its amplifier and its cable, and record again."});
+  require_plausible_reference(of.recording->name() + ": " + of.target->name, {estimated, measured});
 }
 
 [[noreturn]] void refuse_short(const Recording& recording, std::string found) {
@@ -154,53 +138,6 @@ double calibration_rmse(const ModelFile& model) {
   return errors.empty() ? kNotMeasured : root_mean_square(errors);
 }
 
-/// The verdict on a change whose 95 % interval is `change` +- `half_width`.
-void decide(DriftQuantity& of, double change, double half_width) {
-  of.change = change;
-  of.lowest = change - half_width;
-  of.highest = change + half_width;
-  of.relative = std::isfinite(of.before) ? change / of.before : kNotMeasured;
-  of.verdict = DriftVerdict::undetermined;
-  of.reason.clear();
-  if (std::abs(change) - half_width > of.tolerance) {
-    of.verdict = DriftVerdict::changed;
-  } else if (std::abs(change) + half_width < of.smallest) {
-    of.verdict = DriftVerdict::not_changed;
-  } else if (half_width > of.smallest - of.tolerance) {
-    of.reason = "these recordings show too little of it";
-  } else {
-    of.reason = "near the limit: record longer";
-  }
-}
-
-void conclude(Drift& drift) {
-  bool is_certain = true;
-  bool has_changed = false;
-  bool has_new_zero = false;
-  for (const DriftQuantity& of : drift.quantities) {
-    if (!of.is_of_joint) {
-      has_new_zero |= of.name == kZero && of.verdict == DriftVerdict::changed;
-      continue;
-    }
-    is_certain &= of.verdict != DriftVerdict::undetermined;
-    has_changed |= of.verdict == DriftVerdict::changed;
-  }
-  drift.joint = has_changed  ? DriftVerdict::changed
-                : is_certain ? DriftVerdict::not_changed
-                             : DriftVerdict::undetermined;
-  drift.advice = DriftAdvice::none;
-  const double worth = kWorthFactor * drift.calibration_rmse;
-  if (drift.zeroed_rmse > worth) {
-    drift.advice = drift.corrected_rmse < kExplained * drift.zeroed_rmse
-                       ? DriftAdvice::calibrate
-                       : DriftAdvice::other_motion;
-  } else if (drift.rmse > worth || has_new_zero) {
-    drift.advice = DriftAdvice::set_zero;
-  } else if (!is_certain && !has_changed) {
-    drift.advice = DriftAdvice::record_more;
-  }
-}
-
 /// The comparison of all recordings.
 class Comparison {
  public:
@@ -219,6 +156,7 @@ class Comparison {
     const FeatureRanges& ranges = model.settings.ranges;
     lowest_ = ranges.lowest.front();
     highest_ = ranges.highest.front();
+    if (output_falls()) mirror();
     observe_motion();
     std::vector<PartsRun> parts;
     for (const Compared& run : runs_)
@@ -246,6 +184,31 @@ class Comparison {
  private:
   [[nodiscard]] double half() const { return 0.5 * (highest_ - lowest_); }
 
+  /// Whether the torque falls with x, as where the deflection is counted the other way.
+  [[nodiscard]] bool output_falls() const {
+    double covariance = 0.0;
+    for (const Compared& run : runs_) {
+      const auto count = static_cast<double>(run.rows.size());
+      double x = 0.0;
+      double y = 0.0;
+      for (const std::size_t n : run.rows) {
+        x += run.x[n] / count;
+        y += run.output[n] / count;
+      }
+      for (const std::size_t n : run.rows) covariance += (run.x[n] - x) * (run.output[n] - y);
+    }
+    return covariance < 0.0;
+  }
+
+  /// Counts x the other way, so that friction and stiffness are positive.
+  void mirror() {
+    for (Compared& run : runs_)
+      for (double& value : run.x) value = -value;
+    std::swap(lowest_, highest_);
+    lowest_ = -lowest_;
+    highest_ = -highest_;
+  }
+
   void observe_motion() {
     double least = runs_.front().x.front();
     double most = least;
@@ -270,21 +233,17 @@ class Comparison {
   }
 
   void collect(Drift& drift) {
-    double zeroed = 0.0;
     for (const Compared& run : runs_) {
-      double mean = 0.0;
-      const std::size_t first = residual_.size();
-      for (const std::size_t n : run.rows) {
+      for (const std::size_t n : run.rows)
         residual_.push_back(run.target->values[n] - run.output[n]);
-        mean += residual_.back();
-      }
-      mean /= static_cast<double>(run.rows.size());
-      for (std::size_t n = first; n < residual_.size(); ++n)
-        zeroed += (residual_[n] - mean) * (residual_[n] - mean);
       drift.outside_samples += run.outside;
     }
+    const auto count = static_cast<double>(residual_.size());
+    const double mean = std::accumulate(residual_.begin(), residual_.end(), 0.0) / count;
     drift.rmse = root_mean_square(residual_);
-    drift.zeroed_rmse = std::sqrt(zeroed / static_cast<double>(residual_.size()));
+    double zeroed = 0.0;
+    for (const double error : residual_) zeroed += (error - mean) * (error - mean);
+    drift.zeroed_rmse = std::sqrt(zeroed / count);
   }
 
   void build_columns() {
@@ -324,7 +283,10 @@ class Comparison {
     result.change = change * scale;
     result.relative = std::isfinite(before) ? change : kNotMeasured;
     if (!std::isfinite(error)) {
-      result.reason = "too few independent samples: record longer";
+      result.reason = fmt::format(
+          "the remaining error changes slowly, {:.0f} independent samples: record more, or fit a "
+          "model with a smaller error",
+          fit.effective_samples);
       return result;
     }
     decide(result, change * scale, kQuantile * error * scale);
@@ -335,8 +297,8 @@ class Comparison {
     double largest = 0.0;
     for (const double torque : parts_.elastic) largest = std::max(largest, std::abs(torque));
     DriftQuantity result =
-        quantity(kZero, unit_label(model_.settings.target), kNotMeasured, fit, 0, model_error,
-                 kZeroTolerance * largest, 2.0 * kZeroTolerance * largest);
+        quantity(drift_names::kZero, unit_label(model_.settings.target), kNotMeasured, fit, 0,
+                 model_error, kZeroTolerance * largest, 2.0 * kZeroTolerance * largest);
     result.is_of_joint = false;
     return result;
   }
@@ -345,16 +307,17 @@ class Comparison {
     double mean = 0.0;
     for (const double slope : parts_.stiffness) mean += slope;
     mean /= static_cast<double>(parts_.stiffness.size());
-    return quantity(kScale, unit_label(model_.settings.target) + "/rad", mean, fit, 1, model_error,
-                    kScaleTolerance, kSmallestScale);
+    return quantity(drift_names::kScale, unit_label(model_.settings.target) + "/rad", mean, fit, 1,
+                    model_error, kScaleTolerance, kSmallestScale);
   }
 
   [[nodiscard]] DriftQuantity friction(const DirectionFit& fit, double model_error) const {
     double level = 0.0;
     for (const double torque : parts_.friction) level += std::abs(torque);
     level /= static_cast<double>(parts_.friction.size());
-    DriftQuantity result = quantity(kFriction, unit_label(model_.settings.target), level, fit, 2,
-                                    model_error, kFrictionTolerance, kSmallestFriction);
+    DriftQuantity result =
+        quantity(drift_names::kFriction, unit_label(model_.settings.target), level, fit, 2,
+                 model_error, kFrictionTolerance, kSmallestFriction);
     if (level < kLeastFriction * model_error) {
       result.verdict = DriftVerdict::undetermined;
       result.reason = "the model has no hysteresis loop above its error: fit one that has";
@@ -401,6 +364,7 @@ std::string_view name(DriftAdvice advice) noexcept {
     case DriftAdvice::set_zero: return "set the zero";
     case DriftAdvice::calibrate: return "calibrate";
     case DriftAdvice::other_motion: return "other motion";
+    case DriftAdvice::check_sensor: return "check the sensor";
     case DriftAdvice::record_more: break;
   }
   return "record more";
@@ -426,7 +390,17 @@ Drift detect_drift(const ModelFile& model, const Dataset& dataset, const DriftOp
            .found = mistake,
            .advice = "Check the units of the recording, or give the mapping of the training."});
   }
-  return Comparison(model, dataset, options, progress).drift();
+  Drift drift = Comparison(model, dataset, options, progress).drift();
+  if (options.reference != nullptr) {
+    if (options.reference->settings.target != model.settings.target)
+      throw UsageError({.place = "reference of the drift",
+                        .expected = "a model of " + model.settings.target,
+                        .found = "one of " + options.reference->settings.target});
+    DriftOptions alone = options;
+    alone.reference = nullptr;
+    separate_gain(drift, detect_drift(*options.reference, dataset, alone, progress));
+  }
+  return drift;
 }
 
 }  // namespace torsio

@@ -53,14 +53,11 @@ void widen_for_physics(FeatureRanges& ranges, const AnyModel& model) {
   }
 }
 
-/// Scales the table to a root mean square of `rmse` over its regions, which have about equally many
-/// samples.
-void widen_to(ResidualTable& table, double rmse) {
-  double sum = 0.0;
-  for (const double std_dev : table.std_dev) sum += std_dev * std_dev;
-  const double usual = std::sqrt(sum / static_cast<double>(table.std_dev.size()));
-  if (!(rmse > usual)) return;
-  for (double& std_dev : table.std_dev) std_dev *= rmse / usual;
+/// The error bar at a value.
+double std_dev_at(const ResidualTable& table, double value) {
+  const auto inner = std::span(table.edges).subspan(1, table.std_dev.size() - 1);
+  return table
+      .std_dev[static_cast<std::size_t>(std::ranges::upper_bound(inner, value) - inner.begin())];
 }
 
 }  // namespace
@@ -127,6 +124,33 @@ ResidualTable residual_table(AnyModel model, const TrainingData& data) {
     table.std_dev.push_back(std::max(rms, std::numeric_limits<double>::min()));
     begin = end;
     if (begin == all.size()) break;
+  }
+  return table;
+}
+
+// The regions have about equally many samples.
+void widen_to(ResidualTable& table, double rmse) {
+  double sum = 0.0;
+  for (const double std_dev : table.std_dev) sum += std_dev * std_dev;
+  const double usual = std::sqrt(sum / static_cast<double>(table.std_dev.size()));
+  if (!(rmse > usual)) return;
+  for (double& std_dev : table.std_dev) std_dev *= rmse / usual;
+}
+
+ResidualTable larger_of(const ResidualTable& first, const ResidualTable& second) {
+  if (first.std_dev.empty()) return second;
+  if (second.std_dev.empty()) return first;
+  ResidualTable table;
+  std::ranges::set_union(first.edges, second.edges, std::back_inserter(table.edges));
+  // Edges that differ by rounding only are one.
+  const double least = 1e-9 * (table.edges.back() - table.edges.front());
+  const auto last = std::ranges::unique(table.edges, [least](double edge, double next) {
+                      return next - edge <= least;
+                    }).begin();
+  table.edges.erase(last, table.edges.end());
+  for (std::size_t i = 1; i < table.edges.size(); ++i) {
+    const double middle = 0.5 * (table.edges[i - 1] + table.edges[i]);
+    table.std_dev.push_back(std::max(std_dev_at(first, middle), std_dev_at(second, middle)));
   }
   return table;
 }

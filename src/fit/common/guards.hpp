@@ -27,6 +27,13 @@ inline constexpr std::size_t kMaxResidualRegions = 16;
 /// in the loop. Empty where there are fewer than 50 samples.
 [[nodiscard]] ResidualTable residual_table(AnyModel model, const TrainingData& data);
 
+/// Error bars that are at least those of both tables, over the regions of both; outside of its own, a
+/// table has the value of its nearest region.
+[[nodiscard]] ResidualTable larger_of(const ResidualTable& first, const ResidualTable& second);
+
+/// Scales the table to a root mean square of at least `rmse` over its regions.
+void widen_to(ResidualTable& table, double rmse);
+
 /// The estimator settings around a fitted model in its file. The residual table is from
 /// `validation` where given (training residuals are too small for a model with many parameters).
 /// Otherwise it is from training, scaled up to `held_out_rmse` where the fit has computed that and

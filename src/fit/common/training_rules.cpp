@@ -80,6 +80,16 @@ std::vector<ZeroRule> training_zeros(const Dataset& dataset) {
   return first == nullptr ? std::vector<ZeroRule>{} : first->zeros;
 }
 
+void add_training_files(ModelCard& card, const Dataset& dataset) {
+  for (const DatasetRecord& record : dataset.records) {
+    if (!record.has_role(Role::train)) continue;
+    Source source = record.recording.source;
+    if (source.file.empty()) source.file = record.recording.name();  // made in memory
+    if (std::ranges::find(card.training_files, source) == card.training_files.end())
+      card.training_files.push_back(std::move(source));
+  }
+}
+
 void require_trainable(const TrainingData& data) {
   const Range target =
       range_of(data, [](const Sequence& sequence, std::size_t n) { return sequence.target[n]; });

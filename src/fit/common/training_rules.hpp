@@ -5,6 +5,7 @@
 
 #include "torsio/data/dataset.hpp"
 #include "torsio/data/recording.hpp"
+#include "torsio/files/model_file.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 // The rules by which recordings are refused before a model is fitted. `train_model` applies them,
@@ -19,6 +20,9 @@ inline constexpr double kLargestValue = 1e140;
 /// The zeros of the training records: a model expects a channel zeroed or not, never both.
 /// @throws Error naming the recordings that disagree.
 [[nodiscard]] std::vector<ZeroRule> training_zeros(const Dataset& dataset);
+
+/// Adds the sources of the records with the role train, each once.
+void add_training_files(ModelCard& card, const Dataset& dataset);
 
 /// @throws Error if the target or every input is constant over the usable samples, or if the target
 /// or an input has values (or a range of values) that cannot be squared.

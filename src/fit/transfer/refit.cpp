@@ -120,6 +120,11 @@ GreyBox::Parameters refit(GreyBox::Parameters box, const FeatureRanges& ranges,
   std::vector<std::uint8_t> is_free(base.size(), 1);
   for (std::size_t j = box.terms.first_slip(); j < box.terms.first_slope(); ++j)
     is_free[j] = base[j] < 0.0 ? 1 : 0;
+  // Friction of a rate that dissipates continues to dissipate.
+  for (std::size_t l = 0; l < box.terms.inputs(); ++l)
+    if (data.inputs[l].is_rate)
+      for (const std::size_t j : {box.terms.first_slope() + l, box.terms.first_coulomb() + l})
+        is_free[j] = base[j] < 0.0 ? 1 : 0;
   // Hats, slips and tanh are at most 1; a branch is at most the deflection.
   const std::vector<double> inputs = sizes_of(ranges);
   std::vector<double> sizes(base.size(), 1.0);

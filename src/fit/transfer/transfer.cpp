@@ -13,6 +13,7 @@
 #include "core/report_progress.hpp"
 #include "fit/common/guards.hpp"
 #include "fit/common/model_run.hpp"
+#include "fit/common/reference_check.hpp"
 #include "fit/common/training_rules.hpp"
 #include "fit/transfer/output_map.hpp"
 #include "fit/transfer/refit.hpp"
@@ -137,6 +138,18 @@ Line line_of(const Pairs& pairs) {
   return {.gain = gain, .offset = y - gain * x, .error = yy - 2.0 * gain * xy + gain * gain * xx};
 }
 
+void note_transfer(ModelCard& card, const TransferTrial& of, const Dataset& dataset) {
+  const auto note = [&](const std::string& key, auto value) {
+    card.options["transfer." + key] = fmt::format("{}", value);
+  };
+  note("method", name(of.method));
+  note("input_scale", of.map.input_scale);
+  note("gain", of.map.gain);
+  note("offset", of.map.offset);
+  if (of.prior > 0.0) note("prior", of.prior);
+  add_training_files(card, dataset);
+}
+
 class Transfer {
  public:
   Transfer(const ModelFile& base, const Dataset& dataset, const TransferOptions& options,
@@ -152,6 +165,8 @@ class Transfer {
                    .found = fmt::format("{}", samples),
                    .advice = "record the new joint for longer"});
     require_trainable(all_);
+    const Pairs pairs = pairs_of(base.parameters, all_);
+    require_plausible_reference(base.settings.target, {pairs.estimated, pairs.measured});
     samples_ = samples;
     fitted_ =
         samples - static_cast<std::size_t>(options.held_out_share * static_cast<double>(samples));
@@ -170,8 +185,10 @@ class Transfer {
     if (options_.method)
       std::erase_if(result.trials,
                     [&](const TransferTrial& of) { return of.method != *options_.method; });
-    const auto least = std::ranges::min_element(result.trials, {}, &TransferTrial::held_out_rmse);
-    result.chosen = static_cast<std::size_t>(least - result.trials.begin());
+    // A method with more freedom must be clearly better: the held-out part is of the same motion.
+    for (std::size_t i = 1; i < result.trials.size(); ++i)
+      if (result.trials[i].held_out_rmse < kClearly * result.trials[result.chosen].held_out_rmse)
+        result.chosen = i;
     for (TransferTrial& of : result.trials) of.file = file_of(of);
     return result;
   }
@@ -336,7 +353,7 @@ class Transfer {
         file.settings.features, data, AnyModel(file.parameters), nullptr, of.held_out_rmse);
     EstimatorSettings& settings = file.settings;
     settings.fallback = fresh.fallback;
-    settings.residuals = fresh.residuals;
+    settings.residuals = larger_of(settings.residuals, fresh.residuals);
     std::vector<double>& steps = settings.disturbances.largest_step;
     for (std::size_t k = 0; k < steps.size(); ++k)
       steps[k] = std::max(steps[k], fresh.disturbances.largest_step[k]);
@@ -349,6 +366,7 @@ class Transfer {
     file.card.device_serial.clear();
     file.card.metrics.clear();
     file.card.held_out.clear();
+    note_transfer(file.card, of, dataset_);
     return file;
   }
 

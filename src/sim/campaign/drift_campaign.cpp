@@ -27,7 +27,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kVersion = 1;  // version of the results of units
+constexpr int kVersion = 2;  // version of the results of units
 constexpr std::size_t kMaxSpecimens = 100'000;
 constexpr double kTemperatureSpread_K = 10.0;
 constexpr double kZeroSpread = 0.01;  // over the range of the load cell
@@ -142,11 +142,12 @@ DriftSpecimen outcome(const Drift& drift, DriftSpecimen specimen) {
     if (of.name == "backlash") specimen.backlash_rad = of.change;
     const bool is_it = (is_scale && specimen.changed == kStiffness) || of.name == specimen.changed;
     const bool is_reported = of.verdict == DriftVerdict::changed;
+    const bool is_of_right_sign = of.relative * specimen.amount > 0.0;
     if (!is_it) {
       specimen.is_other_found |= is_reported;
       continue;
     }
-    specimen.is_found = is_reported;
+    specimen.is_found = is_reported && is_of_right_sign;
     specimen.estimate = of.relative;
     specimen.is_covered =
         of.lowest <= specimen.amount * of.before && specimen.amount * of.before <= of.highest;
@@ -155,13 +156,19 @@ DriftSpecimen outcome(const Drift& drift, DriftSpecimen specimen) {
   return specimen;
 }
 
+/// A serial number of a specimen; it differs with the seed.
+std::uint64_t specimen_number(std::uint64_t seed, std::size_t number) {
+  constexpr std::uint64_t kSpecimens = 9999;
+  return 1 + text_hash(fmt::format("drift specimen {} {}", seed, number)) % kSpecimens;
+}
+
 /// The specimen with that number, after a change and, another one, without.
 std::array<DriftSpecimen, 2> examined(const DriftCampaignSettings& settings, std::size_t number) {
   const std::vector<std::string> actuators = actuators_of(settings);
   const std::string& actuator = actuators[number % actuators.size()];
   Random random(text_hash(fmt::format("drift {} {}", settings.seed, number)));
   const DataSheet sheet =
-      data_sheet(fmt::format("{}#{}", actuator, 1000 * (settings.seed % 1000) + number % 1000));
+      data_sheet(fmt::format("{}#{}", actuator, specimen_number(settings.seed, number)));
   const ModelFile model = calibrated(sheet, settings.family, random);
   const auto examine = [&](const DataSheet& now, DriftSpecimen specimen, bool is_remounted) {
     const double temperature_K = OperatingConditions::kReference_K +

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "actuator/stage_wear.hpp"
+#include "evaluate/drift/verdicts.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -116,6 +117,116 @@ TEST(Drift, FindsAChangeOfTheFriction) {
   EXPECT_EQ(of(drift, "stiffness or gain").verdict, DriftVerdict::not_changed);
 }
 
+TEST(Drift, ADeflectionThatIsCountedTheOtherWayGivesTheSame) {
+  const ModelFile mirrored =
+      train_model(calibration(),
+                  {.family = "grey_box",
+                   .features = {.inputs = {"joint_angle_rad - gear_angle_rad"}, .definitions = {}}},
+                  1)
+          .file;
+  const Drift healthy = detect_drift(mirrored, today(data_sheet(kActuator)));
+  EXPECT_EQ(healthy.joint, DriftVerdict::not_changed);
+  EXPECT_NEAR(of(healthy, "stiffness or gain").before, 600.0, 100.0);
+  const Drift softer =
+      detect_drift(mirrored, today(worn(data_sheet(kActuator), {.stiffness = 0.95})));
+  EXPECT_EQ(of(softer, "stiffness or gain").verdict, DriftVerdict::changed);
+  EXPECT_NEAR(of(softer, "stiffness or gain").relative, -0.05, 0.01);
+  EXPECT_EQ(of(softer, "friction").verdict, DriftVerdict::not_changed);
+}
+
+TEST(Drift, TheErrorWithoutTheZeroIsNeverBelowTheCorrectedOne) {
+  Dataset data = today(data_sheet(kActuator));
+  // Each recording has its own zero.
+  data.records[0].recording =
+      with_torque(data, [](double t) { return t + 0.4; }).records[0].recording;
+  const Drift drift = detect_drift(model(), data);
+  EXPECT_GE(drift.zeroed_rmse, drift.corrected_rmse);
+}
+
+TEST(Drift, StatesTheRatioOfTheErrors) {
+  ModelFile file = model();
+  const Drift drift = detect_drift(file, today(data_sheet(kActuator)));
+  EXPECT_THAT(drift_text(drift, "torque_Nm"), HasSubstr("times that of the calibration: a new"));
+  file.card.metrics.clear();
+  file.settings.residuals = {};
+  const Drift unknown = detect_drift(file, today(data_sheet(kActuator)));
+  EXPECT_THAT(drift_text(unknown, "torque_Nm"), HasSubstr("cannot be determined"));
+}
+
+/// Quantities of a comparison, as far as `separate_gain` uses them.
+Drift compared(double scale, double half_width, double before) {
+  DriftQuantity both{.name = "stiffness or gain",
+                     .unit = "Nm/rad",
+                     .before = before,
+                     .tolerance = 0.012 * before,
+                     .smallest = 0.03 * before};
+  decide(both, scale * before, half_width * before);
+  Drift drift{.quantities = {both},
+              .calibration_rmse = 0.1,
+              .rmse = 0.1,
+              .zeroed_rmse = 0.1,
+              .corrected_rmse = 0.1};
+  conclude(drift);
+  return drift;
+}
+
+TEST(Drift, AReferenceSeparatesTheGainOfTheSensorFromTheStiffness) {
+  Drift gain = compared(0.08, 0.005, 600.0);
+  EXPECT_EQ(gain.joint, DriftVerdict::changed);
+  separate_gain(gain, compared(0.079, 0.006, 15000.0));
+  EXPECT_EQ(of(gain, "gain of the torque sensor").verdict, DriftVerdict::changed);
+  EXPECT_NEAR(of(gain, "gain of the torque sensor").relative, 0.079, 1e-12);
+  EXPECT_EQ(of(gain, "stiffness").verdict, DriftVerdict::not_changed);
+  EXPECT_NEAR(of(gain, "stiffness").relative, 0.001, 1e-9);
+  EXPECT_NEAR(of(gain, "stiffness").highest - of(gain, "stiffness").change,
+              600.0 * std::hypot(0.005, 0.006), 1e-9);
+  EXPECT_EQ(gain.joint, DriftVerdict::not_changed);
+  EXPECT_EQ(gain.advice, DriftAdvice::check_sensor);
+  EXPECT_THAT(drift_text(gain, "torque_Nm"), HasSubstr("check it before a new calibration"));
+
+  Drift stiffness = compared(-0.08, 0.005, 600.0);
+  separate_gain(stiffness, compared(0.001, 0.006, 15000.0));
+  EXPECT_EQ(of(stiffness, "gain of the torque sensor").verdict, DriftVerdict::not_changed);
+  EXPECT_EQ(of(stiffness, "stiffness").verdict, DriftVerdict::changed);
+  EXPECT_EQ(stiffness.joint, DriftVerdict::changed);
+}
+
+TEST(Drift, APoorReferenceLeavesTheSumToTheJoint) {
+  Drift drift = compared(0.08, 0.005, 600.0);
+  separate_gain(drift, compared(0.05, 0.13, 15000.0));
+  EXPECT_EQ(of(drift, "stiffness").verdict, DriftVerdict::undetermined);
+  EXPECT_EQ(of(drift, "gain of the torque sensor").verdict, DriftVerdict::undetermined);
+  EXPECT_EQ(drift.joint, DriftVerdict::changed);
+  Drift without = compared(0.08, 0.005, 600.0);
+  Drift unknown = compared(kNotMeasured, kNotMeasured, 15000.0);
+  unknown.quantities[0].reason = "too little";
+  separate_gain(without, unknown);
+  EXPECT_EQ(of(without, "stiffness").reason, "too little");
+  EXPECT_EQ(without.joint, DriftVerdict::changed);
+}
+
+TEST(Drift, AModelOfTheGearIsAReference) {
+  const auto with_gear = [](const std::vector<std::string>& inputs) {
+    return train_model(calibration(),
+                       {.family = "linear", .features = {.inputs = inputs, .definitions = {}}}, 1)
+        .file;
+  };
+  const ModelFile gear =
+      with_gear({"lowpass(motor_angle_rad / 120 - gear_angle_rad, 100Hz)",
+                 "stop(lowpass(motor_angle_rad / 120 - gear_angle_rad, 100Hz), 1e-4)"});
+  const Drift drift = detect_drift(model(), today(data_sheet(kActuator)), {.reference = &gear});
+  EXPECT_TRUE(std::isfinite(of(drift, "gain of the torque sensor").highest));
+  EXPECT_LT(of(drift, "gain of the torque sensor").lowest, 0.0);
+  EXPECT_GT(of(drift, "gain of the torque sensor").highest, 0.0);
+  const ModelFile other = [&] {
+    ModelFile file = gear;
+    file.settings.target = "motor_current_A";
+    return file;
+  }();
+  EXPECT_THROW((void)detect_drift(model(), today(data_sheet(kActuator)), {.reference = &other}),
+               UsageError);
+}
+
 TEST(Drift, FindsMorePlay) {
   const Drift drift = detect_drift(model(), today(worn(data_sheet(kActuator), {.play = 8.0})));
   EXPECT_EQ(of(drift, "backlash").verdict, DriftVerdict::changed);
@@ -170,6 +281,8 @@ TEST(Drift, RefusesWhatCannotBeCompared) {
   };
   EXPECT_THAT(message(with_torque(sound, [](double) { return 3.0; })),
               HasSubstr("the torque does not follow the motion"));
+  EXPECT_THAT(message(with_torque(sound, [](double torque) { return -torque; })),
+              HasSubstr("the opposite sign"));
   EXPECT_THAT(message(with_torque(sound, [](double torque) { return torque * 57.29577951308232; })),
               HasSubstr("units"));
   EXPECT_THAT(
@@ -197,6 +310,13 @@ TEST(DriftCampaign, FindsTheChangesAndDoesNotDependOnTheThreads) {
   EXPECT_NEAR(one.missed_upper_95, 1.0 - std::sqrt(0.05), 1e-6);
   const DriftCampaignResult two = run_drift_campaign({.seed = 7, .specimens = 2, .threads = 2});
   EXPECT_EQ(drift_campaign_json(one), drift_campaign_json(two));
+}
+
+TEST(DriftCampaign, TakesAnySeedAndOthersHaveOtherSpecimens) {
+  const DriftCampaignResult one = run_drift_campaign({.seed = 4242, .specimens = 1});
+  const DriftCampaignResult two = run_drift_campaign({.seed = 5242, .specimens = 1});
+  EXPECT_EQ(one.specimens.size(), 2U);
+  EXPECT_NE(one.specimens[1].scale, two.specimens[1].scale);
 }
 
 }  // namespace

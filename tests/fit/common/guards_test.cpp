@@ -106,6 +106,16 @@ TEST(Guards, RegionsNeverSplitEqualOutputs) {
   EXPECT_LT(table.std_dev.front(), 1e-9);
 }
 
+TEST(Guards, TheLargerOfTwoTablesIsThatAtEachValue) {
+  const ResidualTable first{.edges = {-10.0, 0.0, 10.0}, .std_dev = {1.0, 3.0}};
+  const ResidualTable second{.edges = {-2.0, 2.0, 4.0}, .std_dev = {2.0, 5.0}};
+  const ResidualTable both = larger_of(first, second);
+  EXPECT_EQ(both.edges, (std::vector{-10.0, -2.0, 0.0, 2.0, 4.0, 10.0}));
+  EXPECT_EQ(both.std_dev, (std::vector{2.0, 2.0, 3.0, 5.0, 5.0}));
+  EXPECT_EQ(larger_of(first, {}).std_dev, first.std_dev);
+  EXPECT_EQ(larger_of({}, second).edges, second.edges);
+}
+
 TEST(Guards, FillTheSettingsAndPreferValidationData) {
   const TrainingData training = test::noisy_spring();
   TrainingData validation = training;

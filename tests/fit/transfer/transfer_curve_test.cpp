@@ -49,6 +49,13 @@ TEST(HoldOutAfter, SplitsEachRecording) {
               HasSubstr("more than 0 s"));
 }
 
+TEST(WithTrainingTime, IsPositive) {
+  for (const double seconds : {0.0, -5.0, std::nan("")})
+    EXPECT_THAT(
+        test::error_message([&] { static_cast<void>(with_training_time(new_joint(), seconds)); }),
+        HasSubstr("more than 0 s"));
+}
+
 TEST(WithTrainingTime, CutsTheTrainingOnly) {
   const Dataset dataset = with_training_time(new_joint(), 1.5);
   ASSERT_EQ(dataset.records[0].segments.size(), 2U);
@@ -70,6 +77,18 @@ TEST(EvaluateTransfer, ScoresEveryMethodAndTheNewDataAlone) {
   EXPECT_EQ(json["methods"].size(), 6U);
   EXPECT_EQ(json["chosen"], evaluation.chosen().method);
   EXPECT_TRUE(json["base_helps_until_s"].is_null());
+}
+
+TEST(EvaluateTransfer, TheFileHasTheScoresOfItsTest) {
+  const TransferEvaluation evaluation = evaluate_transfer(base_model(), new_joint(), {}, 1);
+  EXPECT_EQ(evaluation.transfer.best().file.card.metrics.at("rmse"),
+            evaluation.chosen().test.metrics.rmse);
+}
+
+TEST(EvaluateTransfer, ATransferredModelCanBeTheBaseOfAnotherTransfer) {
+  const ModelFile first = evaluate_transfer(base_model(), new_joint(), {}, 1).transfer.best().file;
+  const TransferEvaluation evaluation = evaluate_transfer(first, new_joint(), {}, 1);
+  EXPECT_NE(evaluation.find("own"), nullptr);
 }
 
 TEST(EvaluateTransfer, NeedsSomethingToScoreOn) {

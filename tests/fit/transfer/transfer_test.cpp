@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -147,6 +148,83 @@ TEST(Transfer, ARefitKeepsSlipForcesPositive) {
   const auto& box = result.best().file.parameters.get<GreyBox::Parameters>();
   for (std::size_t j = box.terms.first_slip(); j < box.terms.first_slope(); ++j)
     EXPECT_GE(box.coefficients.values(0, j), 0.0);
+}
+
+TEST(Transfer, ARefitKeepsTheFrictionOfARatePositive) {
+  const std::map<std::string, std::string> passive{{"residual", "none"}, {"passive", "true"}};
+  const FeatureSpec features{
+      .inputs = {"gear_angle_rad - joint_angle_rad", "rate(gear_angle_rad - joint_angle_rad)"},
+      .definitions = {}};
+  const ModelFile base =
+      train_model(test::one_recording({.friction_Nm = 0.3}),
+                  {.family = "grey_box", .options = passive, .features = features}, 1)
+          .file;
+  // A torque that drives the motion: less than that of the spring where it moves upwards.
+  Dataset joint = test::one_recording({.stiffness_Nm_rad = 300.0, .friction_Nm = 0.0, .seed = 8});
+  const Recording given = joint.records[0].recording;
+  Recording driven(given.name(), given.sample_rate_Hz());
+  const std::vector<double>& gear = given.channel("gear_angle_rad").values;
+  for (Channel channel : given.channels()) {
+    if (channel.name == "torque_Nm")
+      for (std::size_t n = 1; n < gear.size(); ++n)
+        channel.values[n] -= 2.0 * std::tanh(1e3 * (gear[n] - gear[n - 1]) / 0.01);
+    driven.add(std::move(channel));
+  }
+  joint.records[0].recording = std::move(driven);
+  const TransferResult result = transfer_model(base, joint, {.method = TransferMethod::refit});
+  const auto& before = base.parameters.get<GreyBox::Parameters>();
+  const auto& box = result.best().file.parameters.get<GreyBox::Parameters>();
+  for (const std::size_t j : {box.terms.first_slope() + 1, box.terms.first_coulomb() + 1}) {
+    EXPECT_GE(before.coefficients.values(0, j), 0.0);
+    EXPECT_GE(box.coefficients.values(0, j), 0.0);
+  }
+}
+
+TEST(Transfer, RefusesATorqueThatCannotBeThatOfTheJoint) {
+  const ModelFile base = base_model("linear");
+  const auto refusal = [&](const std::function<double(std::size_t, double)>& sensor) {
+    Dataset joint = test::one_recording({.stiffness_Nm_rad = 300.0, .seed = 8});
+    const Recording given = joint.records[0].recording;
+    Recording changed(given.name(), given.sample_rate_Hz());
+    for (Channel channel : given.channels()) {
+      if (channel.name == "torque_Nm")
+        for (std::size_t n = 0; n < channel.values.size(); ++n)
+          channel.values[n] = sensor(n, channel.values[n]);
+      changed.add(std::move(channel));
+    }
+    joint.records[0].recording = std::move(changed);
+    return test::error_message([&] { static_cast<void>(transfer_model(base, joint)); });
+  };
+  EXPECT_THAT(refusal([](std::size_t, double torque) { return 1000.0 * torque; }),
+              HasSubstr("of another size"));
+  EXPECT_THAT(refusal([](std::size_t, double torque) { return -torque; }),
+              HasSubstr("the opposite sign"));
+  EXPECT_THAT(refusal([](std::size_t n, double torque) { return n < 1000 ? torque : 1.0; }),
+              HasSubstr("does not change in a part of the motion"));
+}
+
+TEST(Transfer, TheFileStatesTheTransferAndItsRecordings) {
+  Dataset joint = test::one_recording({.stiffness_Nm_rad = 300.0, .seed = 8});
+  joint.records[0].recording.source.file = "new_joint.csv";
+  const ModelFile base = base_model("linear");
+  const TransferResult result =
+      transfer_model(base, joint, {.method = TransferMethod::gain_offset});
+  const ModelCard& card = result.best().file.card;
+  EXPECT_EQ(card.options.at("transfer.method"), "gain_offset");
+  EXPECT_TRUE(card.options.contains("transfer.gain"));
+  EXPECT_EQ(card.training_files.size(), base.card.training_files.size() + 1);
+}
+
+TEST(Transfer, ErrorBarsAreAtLeastThoseOfTheBase) {
+  // New data in a small part of the range: nothing is known of the errors elsewhere.
+  const ModelFile base = base_model("linear");
+  Dataset joint = test::one_recording({.amplitude_rad = 0.004, .seed = 8});
+  const TransferResult result = transfer_model(base, joint, {.method = TransferMethod::offset});
+  const ResidualTable& before = base.settings.residuals;
+  const ResidualTable& after = result.best().file.settings.residuals;
+  EXPECT_NEAR(after.edges.front(), before.edges.front() + result.best().map.offset, 1e-9);
+  EXPECT_GE(after.std_dev.front(), before.std_dev.front());
+  EXPECT_GE(after.std_dev.back(), before.std_dev.back());
 }
 
 TEST(Transfer, TheBaseStaysAsItWas) {
