@@ -80,7 +80,7 @@ bool conditional_parameters(double weight, const double* mean, const double* cov
   const auto quantity = [output](std::size_t j) { return j < output ? j : j + 1; };
   std::array<std::array<double, kMost>, kMost> factor;  // Cholesky, then its inverse
   std::array<double, kMost> inverse;                    // reciprocals of its diagonal
-  double log_scale = 0.0;    // ln of weight / root of the determinant is this + ln `scale`
+  double log_scale = 0.0;  // ln of weight / root of the determinant is this + ln `scale`
   double scale = weight;
   for (std::size_t r = 0; r < n; ++r) {
     for (std::size_t c = 0; c <= r; ++c) {
