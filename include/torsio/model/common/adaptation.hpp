@@ -28,10 +28,10 @@ inline constexpr std::array<std::string_view, 4> kAdaptationRules{"auto", "nlms"
 /// states.
 struct AdaptationSettings {
   AdaptationRule rule = AdaptationRule::automatic;
-  double step_size = 0.003;             ///< NLMS: mu; docs/decisions/0015
-  double leak = 1e-5;                   ///< NLMS: gamma, share of W - W0
-  double regularisation = 1e-3;         ///< NLMS: epsilon
-  double forgetting = 0.9995;           ///< RLS, EM: lambda
+  double step_size = 0.003;      ///< NLMS: mu; docs/decisions/0015
+  double leak = 1e-5;            ///< NLMS: gamma, share of W - W0
+  double regularisation = 1e-3;  ///< NLMS: epsilon
+  double forgetting = 0.9995;    ///< RLS, EM: lambda
   /// RLS: delta, P starts as delta I. NaN: 0.001 for a network, 0.05 for a grey box.
   double initial_covariance = kNotMeasured;
   double trace_cap = 1.0;               ///< RLS: tr P over that of delta I
@@ -68,11 +68,12 @@ struct AdaptationSettings {
                             .minimum = 0.9,
                             .maximum = 1.0,
                             .help = "rls, em: weight of the past at each update"});
-    visit(self.initial_covariance, {.name = "initial_covariance",
-                                    .minimum = 1e-12,
-                                    .maximum = 1e12,
-                                    .help = "rls: larger learns faster at first; auto: 0.001 for a network, "
-                                            "0.05 for a grey box"});
+    visit(self.initial_covariance,
+          {.name = "initial_covariance",
+           .minimum = 1e-12,
+           .maximum = 1e12,
+           .help = "rls: larger learns faster at first; auto: 0.001 for a network, "
+                   "0.05 for a grey box"});
     visit(self.trace_cap, {.name = "trace_cap",
                            .minimum = 1.0,
                            .maximum = 1e12,
