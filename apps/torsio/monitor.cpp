@@ -1,10 +1,13 @@
 #include "torsio/report/monitor.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "data_flags.hpp"
@@ -32,6 +35,54 @@ struct MonitorFlags {
   JsonOutput json;
 };
 
+/// What a call does, and the options that it uses.
+struct Mode {
+  std::string_view name;
+  std::vector<std::string_view> options;
+};
+
+Mode mode_of(const MonitorFlags& flags) {
+  const SimulatedMonitorFlags& simulated = flags.simulated;
+  if (simulated.is_campaign)
+    return {"--campaign",
+            {"--campaign", "--actuator", "--monitors", "--fault-free-calibration-hours",
+             "--injections", "--fault-free-hours", "--low-load-hours", "--classes", "--threads",
+             "--resume", "--electrical", "--seed", "--json"}};
+  if (simulated.accuracy_runs > 0)
+    return {"--accuracy",
+            {"--accuracy", "--actuator", "--monitors", "--fault-free-calibration-hours", "--seed",
+             "--json"}};
+  const bool is_simulated = !simulated.actuators.empty();
+  if (flags.calibrate && is_simulated)
+    return {"--calibrate --actuator",
+            {"--calibrate", "--actuator", "--fault-free-calibration-hours",
+             "--false-alarms-per-hour", "--output", "--json"}};
+  if (flags.calibrate)
+    return {"--calibrate",
+            {"FILES", "--calibrate", "--mapping", "--rate", "--output", "--device-serial",
+             "--source", "--signal", "--false-alarms-per-hour", "--extrapolate",
+             "--least-threshold", "--required", "--persistence", "--valid-until", "--json"}};
+  if (is_simulated)
+    return {"--actuator",
+            {"FILES", "--actuator", "--monitors", "--fault-free-calibration-hours", "--inject",
+             "--faults", "--duration", "--seed", "--output", "--plot", "--json"}};
+  return {"a monitor file with recordings",
+          {"FILES", "--mapping", "--rate", "--output", "--plot", "--device-serial", "--json"}};
+}
+
+/// @throws torsio::UsageError for an option that this call would not use.
+void check_options(const CLI::App& verb, const MonitorFlags& flags) {
+  const Mode mode = mode_of(flags);
+  for (const CLI::Option* option : verb.get_options()) {
+    const std::string name = option->get_name();
+    if (option->empty() || std::ranges::find(mode.options, name) != mode.options.end()) continue;
+    throw torsio::UsageError(
+        {.place = fmt::format("torsio monitor {}", mode.name),
+         .expected = fmt::format("only what it uses: {}", fmt::join(mode.options, ", ")),
+         .found = name});
+  }
+}
+
 std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
                                                      torsio::MonitorSettings& settings) {
   if (flags.files.size() < 2)
@@ -46,8 +97,14 @@ std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
   flags.data.check_outputs({flags.output, flags.plot, flags.json.destination}, {monitor_file});
   const torsio::MonitoredTorque monitored =
       torsio::load_monitor(monitor_file, {.serial = flags.serial});
-  const std::filesystem::path model = std::filesystem::path(monitor_file).parent_path() /
-                                      torsio::read_monitor(monitor_file).models.front().torque.file;
+  const torsio::MonitorFile file = torsio::read_monitor(monitor_file);
+  if (flags.serial.empty() && !file.device_serial.empty())
+    remark(
+        fmt::format("the monitor is that of device {}; --device-serial checks that the recordings "
+                    "are of it\n",
+                    file.device_serial));
+  const std::filesystem::path model =
+      std::filesystem::path(monitor_file).parent_path() / file.models.front().torque.file;
   flags.data.use_model_mapping(torsio::load_model(model).card.mapping, model.string());
   ProgressBar progress;
   const torsio::Dataset dataset =
@@ -89,7 +146,8 @@ void replay(MonitorFlags& flags) {
   flags.json.write(torsio::replays_json(replays, settings));
 }
 
-void run(MonitorFlags& flags) {
+void run(const CLI::App& verb, MonitorFlags& flags) {
+  check_options(verb, flags);
   flags.simulated.campaign.seed = flags.simulated.seed;
   if (flags.simulated.is_campaign || flags.simulated.accuracy_runs > 0) {
     DataFlags().check_outputs({flags.json.destination});
@@ -101,8 +159,11 @@ void run(MonitorFlags& flags) {
     throw torsio::UsageError({.place = "--calibrate",
                               .expected = "-o FILE, the monitor file to write",
                               .found = "none"});
-  if (!flags.simulated.actuators.empty())
+  if (!flags.simulated.actuators.empty()) {
+    if (!verb.get_option("--false-alarms-per-hour")->empty())
+      flags.simulated.false_alarms_per_hour = flags.calibration.false_alarms_per_hour;
     return calibrate_simulated(flags.simulated, flags.output, flags.json);
+  }
   flags.data.recordings = flags.files;
   flags.calibration.device_serial = flags.serial;
   flags.calibration.output = flags.output;
@@ -139,18 +200,29 @@ void add_monitor(CLI::App& app) {
           "NAME=MODEL or NAME=MODEL:PART+PART: a model file that estimates the torque, and "
           "the parts on which it depends")
       ->allow_extra_args(false);
-  verb->add_option("--signal", calibration.signals,
-                   "a channel or expression to watch, or 'A moves with B'; default: every channel "
-                   "of the sources")
+  verb->add_option(
+          "--signal", calibration.signals,
+          "a channel or expression to watch, or 'A moves with B' for one that cannot remain "
+          "at one value while B moves; default: every channel of the sources, each angle with the "
+          "one before it in the drive, and the deflection")
       ->allow_extra_args(false);
   verb->add_option("--false-alarms-per-hour", calibration.false_alarms_per_hour,
-                   "wanted rate; T hours of recordings support 3 / T or more")
+                   "wanted rate; T hours of recordings support 3 / T or more; of a simulated joint "
+                   "1e-4, extrapolated, unless it is given")
       ->capture_default_str();
   verb->add_flag("--extrapolate", calibration.extrapolate,
                  "permit a smaller rate than the recordings support; the file then states it");
   verb->add_option("--least-threshold", calibration.least_threshold,
                    "no pair of sources has a smaller one, as 1.4Nm; for what the recordings do not "
                    "contain, as another temperature");
+  verb->add_option(
+      "--required", calibration.required,
+      "disagreement that has to be found, as 8Nm: the monitor is not ready while error bars "
+      "make a threshold larger than 0.8 times this (default: no limit)");
+  verb->add_option(
+      "--persistence", calibration.persistence,
+      "how long a difference must exceed its threshold, as 8ms (default: 5ms); filters of the "
+      "sources spread a spike over their settling time");
   verb->add_option("--valid-until", calibration.valid_until,
                    "last day of the calibration, as 2027-11-22; later the file is refused");
   SimulatedMonitorFlags& simulated = flags->simulated;
@@ -199,5 +271,5 @@ void add_monitor(CLI::App& app) {
   add_seed(*verb, simulated.seed, "of the work of simulated joints, and of a campaign");
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
-  verb->callback([flags] { run(*flags); });
+  verb->callback([flags, verb] { run(*verb, *flags); });
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <numbers>
 #include <utility>
@@ -89,6 +90,31 @@ torsio::MonitoredSignal signal_of(const std::string& text) {
   return signal;
 }
 
+/// Every channel, angles with the one before them in the drive, and the deflection.
+std::vector<torsio::MonitoredSignal> default_signals(const std::vector<std::string>& channels) {
+  const auto has = [&](std::string_view name) {
+    return std::ranges::find(channels, name) != channels.end();
+  };
+  const std::string motor = "motor_angle_rad";
+  const std::string gear = "gear_angle_rad";
+  const std::string joint = "joint_angle_rad";
+  std::vector<torsio::MonitoredSignal> signals;
+  for (const std::string& channel : channels) {
+    torsio::MonitoredSignal signal = signal_of(channel);
+    if (channel == gear && has(motor)) signal.moves_with = motor;
+    if (channel == motor && has(gear)) signal.moves_with = gear;
+    if (channel == joint && (has(gear) || has(motor))) signal.moves_with = has(gear) ? gear : motor;
+    signals.push_back(std::move(signal));
+  }
+  if (has(gear) && has(joint)) signals.push_back({.name = gear + " - " + joint});
+  return signals;
+}
+
+/// With its unit, or the value of an option that is not given.
+double quantity_or(const std::string& text, const char* unit, const char* option, double value) {
+  return text.empty() ? value : torsio::si_quantity(text, unit, option);
+}
+
 }  // namespace
 
 void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
@@ -122,8 +148,7 @@ void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
   require_writable(flags.output);
   for (const std::string& text : flags.signals) plan.signals.push_back(signal_of(text));
   std::vector<std::string> channels = torsio::TorqueSources(sources).raw_inputs();
-  if (plan.signals.empty())
-    for (const std::string& channel : channels) plan.signals.push_back(signal_of(channel));
+  if (plan.signals.empty()) plan.signals = default_signals(channels);
   for (const torsio::MonitoredSignal& signal : plan.signals)
     for (const std::string& channel : torsio::channels_of(signal.name)) channels.push_back(channel);
   std::ranges::sort(channels);
@@ -131,15 +156,14 @@ void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
 
   ProgressBar progress;
   const torsio::Dataset dataset = data.load_inputs(channels, progress.listener());
-  const torsio::CalibratedMonitor calibrated = torsio::calibrate_monitor(
-      sources, plan, dataset,
-      {.false_alarms_per_hour = flags.false_alarms_per_hour,
-       .extrapolate = flags.extrapolate,
-       .least_threshold_Nm =
-           flags.least_threshold.empty()
-               ? 0.0
-               : torsio::si_quantity(flags.least_threshold, "Nm", "--least-threshold")},
-      progress.listener());
+  torsio::CalibrationOptions options{.false_alarms_per_hour = flags.false_alarms_per_hour,
+                                     .extrapolate = flags.extrapolate};
+  options.least_threshold_Nm = quantity_or(flags.least_threshold, "Nm", "--least-threshold", 0.0);
+  options.persistence_s =
+      quantity_or(flags.persistence, "s", "--persistence", options.persistence_s);
+  options.required_Nm = quantity_or(flags.required, "Nm", "--required", options.required_Nm);
+  const torsio::CalibratedMonitor calibrated =
+      torsio::calibrate_monitor(sources, plan, dataset, options, progress.listener());
   for (std::size_t i = 0; i < sources.size(); ++i)
     file.models[i].error_bar_factor = calibrated.error_bar_factors[i];
   file.redundancy = calibrated.redundancy;

@@ -16,6 +16,8 @@ struct CalibrateFlags {
   double false_alarms_per_hour = 1.0;
   bool extrapolate = false;
   std::string least_threshold;  ///< with unit; empty: none
+  std::string required;         ///< likewise
+  std::string persistence;      ///< with unit; empty: that of the library
 };
 
 /// Writes a monitor file from fault-free recordings.

@@ -19,13 +19,18 @@
 
 namespace {
 
+constexpr std::uint64_t kAccuracySeed = 5000;  // no recording of a calibration has such a seed
+constexpr double kAccuracyRun_s = 180.0;
+
+torsio::SimulatedCalibration calibration(const SimulatedMonitorFlags& flags) {
+  return {.fault_free_hours = flags.fault_free_hours,
+          .false_alarms_per_hour = flags.false_alarms_per_hour};
+}
+
 torsio::SimulatedMonitor calibrated(const SimulatedMonitorFlags& flags,
                                     const torsio::DataSheet& sheet) {
   ProgressBar progress;
-  return torsio::calibrate_simulated(sheet,
-                                     {.fault_free_hours = flags.fault_free_hours,
-                                      .false_alarms_per_hour = flags.false_alarms_per_hour},
-                                     progress.listener());
+  return torsio::calibrate_simulated(sheet, calibration(flags), progress.listener());
 }
 
 /// Letters that every file system takes.
@@ -107,7 +112,8 @@ void run_campaign(const SimulatedMonitorFlags& flags, const JsonOutput& json) {
                                 .sheet = sheet,
                                 .monitor = [torque = monitored(flags, sheet)] { return torque; }};
     const std::filesystem::path file = std::filesystem::path(flags.monitors) / file_name(sheet);
-    if (!flags.monitors.empty()) group.monitor_hash = torsio::model_hash(file);
+    group.monitor_hash = flags.monitors.empty() ? torsio::calibration_hash(calibration(flags))
+                                                : torsio::model_hash(file);
     groups.push_back(std::move(group));
   }
   ProgressBar progress;
@@ -124,8 +130,9 @@ void run_accuracy(const SimulatedMonitorFlags& flags, const JsonOutput& json) {
     const torsio::DataSheet sheet = torsio::find_data_sheet(name);
     const torsio::MonitoredTorque monitor = monitored(flags, sheet);
     ProgressBar progress;
-    rows.push_back(torsio::fused_accuracy(sheet, monitor, flags.accuracy_runs, flags.seed + 5000,
-                                          180.0, progress.listener()));
+    rows.push_back(torsio::fused_accuracy(sheet, monitor, flags.accuracy_runs,
+                                          flags.seed + kAccuracySeed, kAccuracyRun_s,
+                                          progress.listener()));
   }
   if (json.wants_tables()) print(torsio::accuracy_text(rows));
   json.write(torsio::accuracy_json(rows));

@@ -120,21 +120,26 @@ void MonitoredTorque::reset() noexcept {
     guard.last = kNotMeasured;
     guard.change = 0.0;
     guard.held = 0;
+    guard.missed = 0;
   }
 }
 
 double MonitoredTorque::guarded(ChannelGuard& guard, const SignalSample& sample) const noexcept {
   const bool is_fresh = sample.age_s >= 0.0 && sample.age_s <= guard.longest_age_s;
-  if (!is_fresh || !std::isfinite(sample.value)) return kNotMeasured;
-  const double step = std::abs(sample.value - guard.last);
-  if (step > guard.largest_step * (guard.held + 1) &&
+  if (!is_fresh || !std::isfinite(sample.value)) {
+    ++guard.missed;
+    return kNotMeasured;
+  }
+  const double periods = static_cast<double>(guard.missed) + guard.held + 1.0;
+  const double change = sample.value - guard.last;
+  if (std::abs(change) > guard.largest_step * periods &&
       guard.held + 1 < monitor_.settings().spikes_in_a_row) {
     ++guard.held;
-    return guard.last + guard.held * guard.change;
+    return guard.missed > 0 ? kNotMeasured : guard.last + guard.held * guard.change;
   }
-  const double change = (sample.value - guard.last) / (guard.held + 1);
-  guard.change = std::isfinite(change) ? change : 0.0;
+  guard.change = std::isfinite(change) ? change / periods : 0.0;
   guard.held = 0;
+  guard.missed = 0;
   guard.last = sample.value;
   return sample.value;
 }
@@ -146,11 +151,14 @@ FusedTorque MonitoredTorque::step(double t_s, std::span<const SignalSample> raw)
     sources_.refuse(Fault::input_count_wrong);
     return redundancy_.step({});
   }
+  bool has_replaced_input = false;
   for (std::size_t k = 0; k < source_values_.size(); ++k) {
     source_values_[k] = guarded(guards_[k], raw[k]);
+    has_replaced_input |= guards_[k].held > 0 && guards_[k].missed == 0;
   }
   const std::span<const Estimate> estimates = sources_.step(source_values_);
-  const FusedTorque fused = redundancy_.step(estimates);
+  FusedTorque fused = redundancy_.step(estimates);
+  fused.has_replaced_input = has_replaced_input;
   // The memory of an expression continues with the last number of a channel that is none now.
   for (std::size_t k = 0; k < signal_places_.size(); ++k) {
     const double value = raw[signal_places_[k]].value;

@@ -17,12 +17,12 @@
 namespace torsio {
 namespace {
 
-constexpr std::string_view kPlace = "torque sources";
+const std::string kPlace = "torque sources";
 
 void check_target(const EstimatorSettings& settings) {
   const auto target = split_channel_name(settings.target);
   if (target && target->unit->si_suffix == "Nm") return;
-  throw Error({.place = "torque sources",
+  throw Error({.place = kPlace,
                .expected = "models with a torque in Nm as target",
                .found = fmt::format("'{}'", settings.target)});
 }
@@ -37,7 +37,7 @@ FrictionFilter::FrictionFilter(const Settings& settings, double sample_rate_Hz)
   require_positive(kPlace, "sample rate", sample_rate_Hz);
   if (!(settings.lowest > 0.0 && settings.lowest < 1.0 && settings.highest > 1.0 &&
         std::isfinite(settings.highest)))
-    throw Error({.place = "torque sources: friction",
+    throw Error({.place = kPlace + ": friction",
                  .expected = "bounds above 0 that contain 1",
                  .found = fmt::format("{} to {}", settings.lowest, settings.highest)});
   samples_ = std::max(1.0, settings.correlation_s * sample_rate_Hz);
@@ -77,7 +77,7 @@ TorqueSources::Fed TorqueSources::fed(Estimator estimator) {
   const double rate_Hz = estimator.settings().sample_rate_Hz;
   if (sample_rate_Hz_ == 0.0) sample_rate_Hz_ = rate_Hz;
   if (rate_Hz != sample_rate_Hz_)
-    throw Error({.place = "torque sources",
+    throw Error({.place = kPlace,
                  .expected = fmt::format("models with a sample rate of {} Hz", sample_rate_Hz_),
                  .found = fmt::format("{} Hz", rate_Hz)});
   std::vector<std::size_t> places;
@@ -93,7 +93,7 @@ TorqueSources::Fed TorqueSources::fed(Estimator estimator) {
 
 TorqueSources::TorqueSources(std::vector<SourceModel> sources) : estimates_(sources.size()) {
   if (sources.empty())
-    throw Error({.place = "torque sources", .expected = "at least one model", .found = "none"});
+    throw Error({.place = kPlace, .expected = "at least one model", .found = "none"});
   for (SourceModel& model : sources) {
     require_positive(kPlace, "error_bar_factor", model.error_bar_factor);
     Source source{.torque = fed(std::move(model.torque)),

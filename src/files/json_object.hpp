@@ -40,12 +40,13 @@ class JsonObject {
              .advice = did_you_mean(key, std::vector<std::string>(keys.begin(), keys.end()))});
   }
 
+  [[nodiscard]] bool has(const char* key) const { return object_.contains(key); }
   [[nodiscard]] std::string text(const char* key) const {
     return text_of(member(key), place_of(key));
   }
   /// Empty where there is none: a file of an earlier release.
   [[nodiscard]] std::string optional_text(const char* key) const {
-    return object_.contains(key) ? text(key) : std::string();
+    return has(key) ? text(key) : std::string();
   }
   [[nodiscard]] double number(const char* key) const {
     return number_of(member(key), place_of(key));

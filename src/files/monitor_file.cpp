@@ -39,6 +39,10 @@ double limit_of(const JsonObject& object, const char* key, double none) {
   const double value = object.number(key);
   return std::isnan(value) ? none : value;
 }
+/// The default where there is none: a file of an earlier release.
+void read_optional(const JsonObject& object, const char* key, double& value) {
+  if (object.has(key)) value = limit_of(object, key, kInfinity);
+}
 
 std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -172,10 +176,13 @@ ordered_json monitor_json(const MonitorFile& file) {
   document["release_share"] = monitor.release_share;
   document["longest_loss_s"] = limit(monitor.longest_loss_s);
   document["longest_fault_s"] = limit(monitor.longest_fault_s);
+  document["longest_warm_up_s"] = limit(monitor.longest_warm_up_s);
   document["largest_novelty"] = limit(monitor.largest_novelty);
   document["longest_overrun"] = monitor.longest_overrun;
   document["spikes_in_a_row"] = monitor.spikes_in_a_row;
+  document["spike_memory_s"] = limit(monitor.spike_memory_s);
   document["proof_s"] = monitor.proof_s;
+  document["longest_command_age_s"] = limit(monitor.longest_command_age_s);
   return document;
 }
 
@@ -193,13 +200,19 @@ void check_version(const JsonObject& document, const std::string& place) {
 }
 
 MonitorFile file_of(const JsonObject& document, const std::string& place) {
-  document.allow_only(
-      {"format",          "format_version",  "torsio_version",   "device_serial",
-       "valid_until",     "sample_period_s", "fault_free_hours", "false_alarms_per_hour",
-       "is_extrapolated", "recordings",      "sources",          "correlation",
-       "signals",         "pairs",           "actions",          "persistence_s",
-       "release_share",   "longest_loss_s",  "longest_fault_s",  "largest_novelty",
-       "longest_overrun", "spikes_in_a_row", "proof_s"});
+  document.allow_only({"format",           "format_version",
+                       "torsio_version",   "device_serial",
+                       "valid_until",      "sample_period_s",
+                       "fault_free_hours", "false_alarms_per_hour",
+                       "is_extrapolated",  "recordings",
+                       "sources",          "correlation",
+                       "signals",          "pairs",
+                       "actions",          "persistence_s",
+                       "release_share",    "longest_loss_s",
+                       "longest_fault_s",  "longest_warm_up_s",
+                       "largest_novelty",  "longest_overrun",
+                       "spikes_in_a_row",  "spike_memory_s",
+                       "proof_s",          "longest_command_age_s"});
   MonitorFile file;
   file.device_serial = document.text("device_serial");
   file.valid_until = document.text("valid_until");
@@ -239,6 +252,9 @@ MonitorFile file_of(const JsonObject& document, const std::string& place) {
   monitor.longest_overrun = count("longest_overrun");
   monitor.spikes_in_a_row = count("spikes_in_a_row");
   monitor.proof_s = document.number("proof_s");
+  read_optional(document, "longest_warm_up_s", monitor.longest_warm_up_s);
+  read_optional(document, "spike_memory_s", monitor.spike_memory_s);
+  read_optional(document, "longest_command_age_s", monitor.longest_command_age_s);
   return file;
 }
 
@@ -292,12 +308,12 @@ MonitorFile read_monitor(const std::filesystem::path& path) {
 MonitoredTorque load_monitor(const std::filesystem::path& path, const MonitorFileOptions& options) {
   const std::string place = path.string();
   const MonitorFile file = read_monitor(path);
-  if (!options.serial.empty() && !file.device_serial.empty() &&
-      options.serial != file.device_serial)
+  if (!options.serial.empty() && options.serial != file.device_serial)
     throw Error(
         {.place = place,
          .expected = fmt::format("the monitor of device '{}'", options.serial),
-         .found = fmt::format("that of '{}'", file.device_serial),
+         .found = file.device_serial.empty() ? std::string("one that states no device")
+                                             : fmt::format("that of '{}'", file.device_serial),
          .advice = "the limits of a monitor hold for the joint on which they were calibrated"});
   if (!file.valid_until.empty()) {
     const std::string today = today_of(options);

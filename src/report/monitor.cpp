@@ -61,33 +61,74 @@ std::string plot_of_stop(const MonitorReplay& replay, const MonitorSettings& set
 }
 
 std::string verdict(const MonitorReplay& replay) {
-  if (std::isnan(replay.watching_from_s))
-    return "was never armed: its checks were not silent for long enough";
+  if (std::isnan(replay.watching_from_s)) return "was never ready, and not armed";
   if (std::isnan(replay.stopped_at_s))
     return fmt::format("no stop from {:.3f} s to the end", replay.watching_from_s);
   return fmt::format("stopped at {:.3f} s", replay.stopped_at_s);
+}
+
+/// Why it was never ready.
+std::string not_ready_text(const MonitorReplay& replay, const MonitorSettings& settings) {
+  std::string text;
+  if (replay.threshold_too_large_s > 0.0)
+    text += fmt::format(
+        "  for {:.3f} s the error bars made a threshold larger than its largest_armed_Nm\n",
+        replay.threshold_too_large_s);
+  for (const MonitorReplay::NotReady& of : replay.not_ready)
+    text += fmt::format("  for {:.3f} s  {}: {}\n", of.present_s, name(of.event.check),
+                        describe(of.event, settings));
+  if (text.empty())
+    text = fmt::format("  no check found anything, but for less than {:.3g} s\n", settings.proof_s);
+  return text;
+}
+
+/// The checks of a calibrated monitor that cannot find anything.
+std::vector<std::string> checks_without_limit(const MonitorSettings& monitor) {
+  std::vector<std::string> checks;
+  const auto none = [&](const auto& has) { return std::ranges::none_of(monitor.signals, has); };
+  if (none([](const MonitoredSignal& signal) { return !signal.moves_with.empty(); }))
+    checks.emplace_back("frozen (no signal moves with another)");
+  if (none([](const MonitoredSignal& signal) { return signal.turn > 0.0; }))
+    checks.emplace_back("wrap (no angle with a turn)");
+  if (std::isinf(monitor.largest_novelty)) checks.emplace_back("novelty");
+  const auto has_no_limit = [](const PairLimits& pair) {
+    return std::isinf(pair.largest_armed_Nm);
+  };
+  if (std::ranges::any_of(monitor.pairs, has_no_limit))
+    checks.emplace_back("error bars that are too wide to begin (no disagreement is required)");
+  return checks;
 }
 
 }  // namespace
 
 std::string calibration_text(const CalibratedMonitor& calibrated) {
   TextTable table;
-  table.header({"pair", "largest difference Nm", "threshold Nm", "surely detected Nm"});
+  table.header({"pair", "largest difference Nm", "threshold Nm", "detected in these states Nm"});
   for (const CalibratedPair& pair : calibrated.pairs)
     table.row({fmt::format("{}, {}", pair.first, pair.second),
                fmt::format("{:.3g}", pair.largest_difference_Nm),
                fmt::format("{:.3g}", pair.typical_threshold_Nm),
-               fmt::format("{:.3g}", pair.surely_detected_Nm)});
+               fmt::format("{:.3g}", pair.detected_in_these_states_Nm)});
+  std::string notes;
+  if (const auto checks = checks_without_limit(calibrated.monitor); !checks.empty())
+    notes += fmt::format("without a limit: {}\n", fmt::join(checks, ", "));
+  for (const CalibratedPair& pair : calibrated.pairs)
+    if (pair.is_factor_from_floor)
+      notes += fmt::format(
+          "{}, {}: the error bars hardly change in these recordings; the factor of the threshold "
+          "is "
+          "its floor over their median\n",
+          pair.first, pair.second);
   return fmt::format(
       "{:.3g} h without a fault, thresholds for {:.3g} false alarms per hour{}\n{}"
-      "largest difference: in these recordings; threshold: its median; surely detected: a fault "
-      "that "
-      "changes the difference by so much\n",
+      "largest difference: in these recordings; threshold: its median; detected: a fault that "
+      "changes "
+      "the difference by so much, in any of the states of these recordings\n{}",
       calibrated.hours, calibrated.false_alarms_per_hour,
       calibrated.is_extrapolated
           ? fmt::format(" (extrapolated: the recordings support {:.3g})", 3.0 / calibrated.hours)
           : "",
-      table.text());
+      table.text(), notes);
 }
 
 std::string calibration_json(const CalibratedMonitor& calibrated) {
@@ -100,7 +141,8 @@ std::string calibration_json(const CalibratedMonitor& calibrated) {
                                  {"second", pair.second},
                                  {"largest_difference_Nm", pair.largest_difference_Nm},
                                  {"threshold_Nm", pair.typical_threshold_Nm},
-                                 {"surely_detected_Nm", pair.surely_detected_Nm}});
+                                 {"detected_in_these_states_Nm", pair.detected_in_these_states_Nm},
+                                 {"is_factor_from_floor", pair.is_factor_from_floor}});
   return json_text(document);
 }
 
@@ -109,6 +151,7 @@ std::string replays_text(const std::vector<MonitorReplay>& replays,
   std::string text;
   for (const MonitorReplay& replay : replays) {
     text += fmt::format("{}: {}\n", replay.estimated.channels.name(), verdict(replay));
+    if (std::isnan(replay.watching_from_s)) text += not_ready_text(replay, settings);
     for (const MonitorEvent& event : replay.events)
       text += fmt::format("  {:.3f} s  {}  {}: {}\n", event.t_s, name(event.action),
                           name(event.check), describe(event, settings));
@@ -126,11 +169,18 @@ std::string replays_json(const std::vector<MonitorReplay>& replays,
   for (const MonitorReplay& replay : replays) {
     Json events = Json::array();
     for (const MonitorEvent& event : replay.events) events.push_back(event_json(event, settings));
+    Json not_ready = Json::array();
+    for (const MonitorReplay::NotReady& of : replay.not_ready) {
+      not_ready.push_back(event_json(of.event, settings));
+      not_ready.back()["present_s"] = of.present_s;
+    }
     document["recordings"].push_back({{"recording", replay.estimated.channels.name()},
                                       {"watching_from_s", json_number(replay.watching_from_s)},
                                       {"stopped_at_s", json_number(replay.stopped_at_s)},
                                       {"events", std::move(events)},
-                                      {"suspects", replay.suspects}});
+                                      {"suspects", replay.suspects},
+                                      {"not_ready", std::move(not_ready)},
+                                      {"threshold_too_large_s", replay.threshold_too_large_s}});
   }
   return json_text(document);
 }

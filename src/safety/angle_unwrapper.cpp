@@ -50,7 +50,9 @@ bool AngleUnwrapper::start(double raw_rad, double expected_rad, double tolerance
 
 AngleUnwrapper::Output AngleUnwrapper::step(double raw_rad) noexcept {
   if (!is_started_) return {.angle_rad = angle_rad_, .fault = Fault::zero_not_set};
-  const double possible_rad = ++periods_ * settings_.largest_change_rad;
+  // Counted until any turn is possible, and no further: a count that overflows would begin again.
+  if (periods_ * settings_.largest_change_rad < settings_.turn_rad) ++periods_;
+  const double possible_rad = periods_ * settings_.largest_change_rad;
   const Output held{.angle_rad = angle_rad_, .fault = Fault::input_not_finite};
   if (!(std::abs(raw_rad) <= settings_.turn_rad)) return held;
   const double distance_rad = std::abs(std::remainder(raw_rad - angle_rad_, settings_.turn_rad));

@@ -21,6 +21,14 @@ std::int64_t checked_ns(double timeout_s) {
   return std::llround(timeout_s * 1e9);
 }
 
+std::int64_t checked_ahead_ns(double longest_ahead_s) {
+  if (!(longest_ahead_s >= 0.0 && longest_ahead_s <= kLongest_s))
+    throw Error({.place = "command watchdog: longest_ahead_s",
+                 .expected = fmt::format("0 to {}", kLongest_s),
+                 .found = fmt::format("{}", longest_ahead_s)});
+  return std::llround(longest_ahead_s * 1e9);
+}
+
 double checked_s(double longest_fault_s) {
   if (!(longest_fault_s > 0.0))
     throw Error({.place = "command watchdog: longest_fault_s",
@@ -33,6 +41,7 @@ double checked_s(double longest_fault_s) {
 
 CommandWatchdog::CommandWatchdog(const Settings& settings)
     : timeout_ns_(checked_ns(settings.timeout_s)),
+      longest_ahead_ns_(checked_ahead_ns(settings.longest_ahead_s)),
       longest_fault_s_(checked_s(settings.longest_fault_s)) {}
 
 void CommandWatchdog::arm(std::int64_t now_ns) noexcept {
@@ -54,17 +63,19 @@ CommandWatchdog::State CommandWatchdog::step(std::int64_t now_ns, const Command&
                                              Fault fault) noexcept {
   if (now_ns < last_ns_) stop_because(Reason::clock);
   last_ns_ = now_ns;
-  // A command from the future is as invalid as one from the past: it would remain valid for too
-  // long.
+  const std::int64_t distance_ns = detail::distance_ns(now_ns, command.written_ns);
   const bool is_fresh =
-      command.is_valid && detail::distance_ns(now_ns, command.written_ns) < timeout_ns_;
+      command.is_valid &&
+      (command.written_ns > now_ns ? distance_ns <= longest_ahead_ns_ : distance_ns < timeout_ns_);
+  // One from the future would remain valid for too long.
+  const std::int64_t written_ns = std::min(command.written_ns, now_ns);
   if (state_ == State::waiting && is_fresh && command.written_ns > armed_ns_) {
     state_ = State::running;
     reason_ = Reason::none;
-    fed_ns_ = command.written_ns;
+    fed_ns_ = written_ns;
     fault = Fault::none;  // faults before the start do not count
   } else if (state_ == State::running && is_fresh) {
-    fed_ns_ = std::max(fed_ns_, command.written_ns);
+    fed_ns_ = std::max(fed_ns_, written_ns);
   }
   if (state_ == State::running) run(now_ns, fault);
   return state_;

@@ -11,7 +11,8 @@ namespace torsio::detail {
 namespace {
 
 /// Cholesky factorisation in place, lower triangle.
-/// @returns the smallest pivot, which is not positive (or NaN) where the matrix is not positive definite
+/// @returns the smallest pivot, which is not positive (or NaN) where the matrix is not positive
+/// definite
 double factorise(SquareMatrix& matrix, std::size_t count) noexcept {
   double smallest = matrix[0][0];
   for (std::size_t j = 0; j < count; ++j) {

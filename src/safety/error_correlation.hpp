@@ -17,8 +17,8 @@ using SquareMatrix =
 [[nodiscard]] SquareMatrix error_correlation(const std::vector<double>& rows, std::size_t count,
                                              std::string_view place);
 
-/// The inverses of the correlation of each set of the sources: element [(set * count + i) * count + j],
-/// bit i of `set` is source i; 0 where i or j is not in the set.
+/// The inverses of the correlation of each set of the sources: element [(set * count + i) * count +
+/// j], bit i of `set` is source i; 0 where i or j is not in the set.
 [[nodiscard]] std::vector<double> inverses(const SquareMatrix& correlation, std::size_t count);
 
 }  // namespace torsio::detail

@@ -6,6 +6,7 @@
 
 #include "error_correlation.hpp"
 #include "monitor_settings.hpp"
+#include "pair_difference.hpp"
 #include "valid_source.hpp"
 
 namespace torsio {
@@ -46,19 +47,25 @@ void Monitor::clear() noexcept {
   source_states_ = {};
   pair_states_ = {};
   disagreeing_count_ = 0;
+  findings_count_ = 0;
+  is_threshold_too_large_ = false;
   active_ = 0;
   late_ = 0;
   silent_since_s_ = kNotMeasured;
 }
 
 bool Monitor::arm(double command_written_s) noexcept {
-  if (state_ == State::ready && std::isfinite(command_written_s) && command_written_s > reset_t_s_)
-    state_ = State::watching;
+  // Written so that NaN is refused. A loop may arm before its next tick.
+  const bool is_fresh = command_written_s > reset_t_s_ &&
+                        t_s_ - command_written_s <= settings_.longest_command_age_s &&
+                        command_written_s - t_s_ <= settings_.sample_period_s * (1.0 + 1e-6);
+  if (state_ == State::ready && is_fresh) state_ = State::watching;
   return is_watching();
 }
 
 void Monitor::reset(double t_s) noexcept {
   clear();
+  if (!std::isnan(last_t_s_)) before_reset_s_ = last_t_s_;
   last_t_s_ = kNotMeasured;
   // A reset at an unknown time: no command is newer.
   reset_t_s_ = std::isfinite(t_s) ? t_s : std::numeric_limits<double>::infinity();
@@ -80,6 +87,7 @@ void Monitor::find(const MonitorEvent& found) noexcept {
   const std::uint32_t bit = std::uint32_t{1} << check;
   active_ |= bit;
   latest_ = event;
+  if (findings_count_ < kMaxFindings) findings_[findings_count_++] = event;
   if (event.action == MonitorAction::stop && stop_found_.action == MonitorAction::off)
     stop_found_ = event;
 }
@@ -88,7 +96,11 @@ void Monitor::check_period(double t_s) noexcept {
   const double period_s = t_s - last_t_s_;
   const bool is_first = std::isnan(last_t_s_);
   last_t_s_ = t_s;
-  if (is_first && std::isfinite(t_s)) return;
+  if (is_first && std::isfinite(t_s)) {
+    const bool is_of_this_clock = reset_t_s_ >= before_reset_s_ && reset_t_s_ <= t_s;
+    if (!is_of_this_clock && std::isfinite(reset_t_s_)) reset_t_s_ = t_s;
+    return;
+  }
   const double late_s = kLatePeriods * settings_.sample_period_s;
   const double longest_s = late_s + (settings_.longest_overrun - 1) * settings_.sample_period_s;
   const bool advances = period_s > 0.0;
@@ -121,6 +133,11 @@ void Monitor::check_change(std::size_t i, const SignalSample& sample) noexcept {
   state.within = 0;
   if (++state.beyond < settings_.spikes_in_a_row) return;
   if (wraps) {
+    // Reported once: a wrap that only warns, or before the joint is armed, would otherwise not end.
+    for (std::size_t k = 0; k < settings_.signals.size(); ++k)
+      if (k == i || companion_[k] == i) signal_states_[k].companion = kNotMeasured;
+    state.last = sample.value;
+    state.last_t_s = t_s_;
     find({.check = MonitorCheck::wrap,
           .first = index,
           .second = index,
@@ -176,55 +193,59 @@ void Monitor::check_signal(std::size_t i, std::span<const SignalSample> signals)
   check_frozen(i);
 }
 
-void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
-  SourceState& state = source_states_[i];
-  const auto index = static_cast<std::uint8_t>(i);
-  const double period_s = settings_.sample_period_s;
-  const bool lost = is_lost(estimate);
-  // A source that warms up is not used yet, and no fault is reported: a friction state settles with the motion.
-  const bool is_warming_up = estimate.fault == Fault::warming_up;
-  const bool faulty = !lost && !is_warming_up && !detail::is_valid(estimate);
-  const bool is_novel = estimate.novelty > settings_.largest_novelty;
-  state.lost = lost ? state.lost + 1 : 0;
-  const auto is_faulty_for_long = [&] {
-    return lasts_longer(state.faulty / kQuarters, period_s, settings_.longest_fault_s);
+bool Monitor::count(std::uint32_t& quarters, bool is_present, double longest_s) const noexcept {
+  const auto is_too_long = [&] {
+    return lasts_longer(quarters / kQuarters, settings_.sample_period_s, longest_s);
   };
-  if (!faulty) {
-    state.faulty -= std::min(state.faulty, 1U);
-  } else if (!is_faulty_for_long()) {
-    state.faulty += kQuarters;
-  }
-  state.novel = is_novel ? state.novel + 1 : 0;
-  constexpr auto kLost = static_cast<std::size_t>(MonitorCheck::source_lost);
-  const bool too_long = settings_.actions[kLost] != MonitorAction::off &&
-                        lasts_longer(state.lost, period_s, settings_.longest_loss_s);
-  if (lost)
-    find({.check = MonitorCheck::source_lost,
-          .action = too_long ? MonitorAction::stop : MonitorAction::off,
-          .first = index,
-          .second = index,
-          .value = state.lost * period_s,
-          .limit = settings_.longest_loss_s});
-  if (faulty && is_faulty_for_long())
-    find({.check = MonitorCheck::source_fault,
-          .first = index,
-          .second = index,
-          .value = static_cast<double>(state.faulty) / kQuarters * period_s,
-          .limit = settings_.longest_fault_s});
-  if (lasts_longer(state.novel, period_s, settings_.persistence_s))
-    find({.check = MonitorCheck::novelty,
-          .first = index,
-          .second = index,
-          .value = estimate.novelty,
-          .limit = settings_.largest_novelty});
+  if (!is_present)
+    quarters -= std::min(quarters, 1U);
+  else if (!is_too_long())  // so that a long one is compensated as soon as a shorter one
+    quarters += kQuarters;
+  return is_present && is_too_long();
 }
 
-double Monitor::threshold(const PairLimits& pair, double first_Nm,
-                          double second_Nm) const noexcept {
-  const double variance = first_Nm * first_Nm + second_Nm * second_Nm -
-                          2.0 * correlation_[pair.first][pair.second] * first_Nm * second_Nm;
-  // A square that overflows is not a number; in this order it gives the floor, the narrowest one.
-  return std::min(std::max(pair.floor_Nm, pair.factor * std::sqrt(variance)), pair.ceiling_Nm);
+void Monitor::check_source(std::size_t i, const Estimate& estimate) noexcept {
+  SourceState& state = source_states_[i];
+  const auto found = [&](MonitorCheck check, MonitorAction action, std::uint32_t quarters,
+                         double limit_s) {
+    const auto index = static_cast<std::uint8_t>(i);
+    find({.check = check,
+          .action = action,
+          .first = index,
+          .second = index,
+          .value = static_cast<double>(quarters) / kQuarters * settings_.sample_period_s,
+          .limit = limit_s});
+  };
+  const bool lost = is_lost(estimate);
+  // A source that warms up is not used, but has not failed: it ends by itself.
+  const bool is_warming_up = estimate.fault == Fault::warming_up;
+  const bool faulty = !lost && !is_warming_up && !detail::is_valid(estimate);
+  const bool is_lost_for_long = count(state.lost, lost, settings_.longest_loss_s);
+  constexpr auto kLost = static_cast<std::size_t>(MonitorCheck::source_lost);
+  if (lost)
+    found(MonitorCheck::source_lost,
+          is_lost_for_long && settings_.actions[kLost] != MonitorAction::off ? MonitorAction::stop
+                                                                             : MonitorAction::off,
+          state.lost, settings_.longest_loss_s);
+  if (count(state.faulty, faulty, settings_.longest_fault_s))
+    found(MonitorCheck::source_fault, MonitorAction::off, state.faulty, settings_.longest_fault_s);
+  if (count(state.warming_up, is_warming_up && !lost, settings_.longest_warm_up_s))
+    found(MonitorCheck::source_fault, MonitorAction::off, state.warming_up,
+          settings_.longest_warm_up_s);
+  check_novelty(i, estimate);
+}
+
+void Monitor::check_novelty(std::size_t i, const Estimate& estimate) noexcept {
+  SourceState& state = source_states_[i];
+  const bool is_novel = estimate.novelty > settings_.largest_novelty;
+  state.novel = is_novel ? state.novel + 1 : 0;
+  if (!lasts_longer(state.novel, settings_.sample_period_s, settings_.persistence_s)) return;
+  const auto index = static_cast<std::uint8_t>(i);
+  find({.check = MonitorCheck::novelty,
+        .first = index,
+        .second = index,
+        .value = estimate.novelty,
+        .limit = settings_.largest_novelty});
 }
 
 void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexcept {
@@ -235,8 +256,11 @@ void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexc
   // What was counted is kept: a source that is lost now and then would otherwise never disagree.
   if (!detail::is_valid(first) || !detail::is_valid(second)) return;
   const double period_s = settings_.sample_period_s;
-  const double limit_Nm = threshold(pair, first.std_dev, second.std_dev);
-  if (!(limit_Nm <= pair.largest_armed_Nm)) is_threshold_too_large_ = true;
+  const double wanted_Nm = detail::threshold_without_ceiling(
+      pair, detail::difference_std_dev(first.std_dev, second.std_dev,
+                                       correlation_[pair.first][pair.second]));
+  const double limit_Nm = std::min(wanted_Nm, pair.ceiling_Nm);
+  if (!(wanted_Nm <= pair.largest_armed_Nm)) is_threshold_too_large_ = true;
   const double difference_Nm = first.value - second.value;
   const double release_Nm = state.disagrees ? settings_.release_share * limit_Nm : limit_Nm;
   state.beyond = std::abs(difference_Nm) <= release_Nm ? 0 : state.beyond + 1;
@@ -258,15 +282,8 @@ void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexc
     disagreeing_[disagreeing_count_++] = {pair.first, pair.second};
     found(MonitorCheck::disagreement, difference_Nm, limit_Nm);
   }
-  const double share = difference_Nm / limit_Nm;
-  // Limited, so that a difference that has ended is not reported for long; 0 / 0 counts as 0.
-  const auto summed = [&](double sum_s, double excess) {
-    const double next_s = sum_s + (excess - pair.drift_allowance) * period_s;
-    return std::min(std::max(0.0, next_s), 2.0 * pair.drift_limit_s);
-  };
-  state.drift_up_s = summed(state.drift_up_s, share);
-  state.drift_down_s = summed(state.drift_down_s, -share);
-  const double drift_s = std::max(state.drift_up_s, state.drift_down_s);
+  detail::add_to_drift(state.drift, difference_Nm / limit_Nm, pair, period_s);
+  const double drift_s = std::max(state.drift.up_s, state.drift.down_s);
   if (!(drift_s <= pair.drift_limit_s)) found(MonitorCheck::drift, drift_s, pair.drift_limit_s);
 }
 
@@ -294,6 +311,7 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
   t_s_ = t_s;
   active_ = 0;
   disagreeing_count_ = 0;
+  findings_count_ = 0;
   is_threshold_too_large_ = false;
   stop_found_ = {};
   check_period(t_s);

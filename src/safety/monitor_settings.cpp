@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "own_names.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -31,10 +32,8 @@ void check_names(const MonitorSettings& settings) {
                              const auto& name_of) {
     if (list.size() > most)
       refuse(std::string(what), fmt::format("at most {}", most), fmt::format("{}", list.size()));
-    for (std::size_t i = 0; i < list.size(); ++i)
-      for (std::size_t j = 0; j <= i; ++j)
-        if (name_of(list[i]).empty() || (i != j && name_of(list[i]) == name_of(list[j])))
-          refuse(std::string(what), "names of their own", fmt::format("'{}'", name_of(list[i])));
+    if (const std::string* name = detail::first_not_own(list, name_of))
+      refuse(std::string(what), "names of their own", fmt::format("'{}'", *name));
   };
   check_each(settings.sources, Monitor::kMaxSources, "sources",
              [](const std::string& name) -> const std::string& { return name; });
@@ -82,6 +81,10 @@ void check_times(const MonitorSettings& settings) {
   require(settings.longest_loss_s >= 0.0, "longest_loss_s", "0 or more", settings.longest_loss_s);
   require(settings.longest_fault_s >= 0.0, "longest_fault_s", "0 or more",
           settings.longest_fault_s);
+  require(settings.longest_warm_up_s >= 0.0, "longest_warm_up_s", "0 or more",
+          settings.longest_warm_up_s);
+  require(is_positive(settings.longest_command_age_s), "longest_command_age_s", "above 0",
+          settings.longest_command_age_s);
   require(is_positive(settings.largest_novelty), "largest_novelty", "above 0",
           settings.largest_novelty);
   require(settings.proof_s >= 0.0 && std::isfinite(settings.proof_s), "proof_s", "0 or more",

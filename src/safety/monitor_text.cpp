@@ -18,7 +18,7 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
   switch (event.check) {
     case MonitorCheck::disagreement:
       return fmt::format("the torques of {} and {} differ by {:.3g} Nm, more than {:.3g} Nm",
-                         source(event.first), source(event.second), value, limit);
+                         source(event.first), source(event.second), std::abs(value), limit);
     case MonitorCheck::drift:
       return fmt::format(
           "the torques of {} and {} have differed for too long: cumulative sum {:.3g} s, limit "
@@ -26,7 +26,7 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
           source(event.first), source(event.second), value, limit);
     case MonitorCheck::sign:
       return fmt::format("the torques of {} and {} have opposite signs and differ by {:.3g} Nm",
-                         source(event.first), source(event.second), value);
+                         source(event.first), source(event.second), std::abs(value));
     case MonitorCheck::source_lost:
       return fmt::format("an input of the torque of {} has not been measured for {:.3g} s",
                          source(event.first), value);
@@ -59,6 +59,7 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
                          signal(event.first), signal(event.second), value, limit);
     case MonitorCheck::period:
       return fmt::format("the loop was called after {:.3g} s, limit {:.3g} s", value, limit);
+    case MonitorCheck::requested: return "a stop was requested";
   }
   return {};
 }
@@ -79,6 +80,7 @@ std::string_view name(MonitorCheck check) noexcept {
     case MonitorCheck::wrap: return "wrap";
     case MonitorCheck::frozen: return "frozen";
     case MonitorCheck::period: return "period";
+    case MonitorCheck::requested: return "requested";
   }
   return "unknown";
 }

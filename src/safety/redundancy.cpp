@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "error_correlation.hpp"
+#include "own_names.hpp"
 #include "torsio/core/error.hpp"
 #include "valid_source.hpp"
 
@@ -18,12 +19,11 @@ void check_sources(const std::vector<TorqueSource>& sources) {
     throw Error({.place = "redundancy",
                  .expected = fmt::format("1 to {} sources", Redundancy::kMaxSources),
                  .found = fmt::format("{}", sources.size())});
-  for (std::size_t i = 0; i < sources.size(); ++i)
-    for (std::size_t j = 0; j <= i; ++j)
-      if (sources[i].name.empty() || (i != j && sources[i].name == sources[j].name))
-        throw Error({.place = "redundancy",
-                     .expected = "sources with names of their own",
-                     .found = fmt::format("'{}'", sources[i].name)});
+  const auto name_of = [](const TorqueSource& source) -> const std::string& { return source.name; };
+  if (const std::string* name = detail::first_not_own(sources, name_of))
+    throw Error({.place = "redundancy",
+                 .expected = "sources with names of their own",
+                 .found = fmt::format("'{}'", *name)});
 }
 
 }  // namespace
@@ -64,10 +64,11 @@ PartSet Redundancy::suspects(std::span<const std::array<std::uint8_t, 2>> pairs)
   return common;
 }
 
-// With p_i = s_min / s_i and u_i = w_i / p_i the weights minimise u'Ru under u >= 0 and p'u = 1, where
-// no number is large: an error bar may have any size, and the inverses of R are computed beforehand.
-// An active-set method (Lawson & Hanson 1974): at the solution Ru = var p for every source with a weight,
-// and Ru >= var p for every other one. It begins with the solution without correlation.
+// With p_i = s_min / s_i and u_i = w_i / p_i the weights minimise u'Ru under u >= 0 and p'u = 1,
+// where no number is large: an error bar may have any size, and the inverses of R are computed
+// beforehand. An active-set method (Lawson & Hanson 1974): at the solution Ru = var p for every
+// source with a weight, and Ru >= var p for every other one. It begins with the solution without
+// correlation.
 
 double Redundancy::minimise_over(SourceSet& chosen, const Row& precision, Row& u) const noexcept {
   const std::size_t count = settings_.sources.size();

@@ -96,7 +96,8 @@ TEST(MonitoredTorque, AnOldChannelIsNotMeasuredForTheSourcesEither) {
   }
 }
 
-// The age of an expression is that of its oldest channel; no time at all, or one in the future, is worse.
+// The age of an expression is that of its oldest channel; no time at all, or one in the future, is
+// worse.
 TEST(MonitoredTorque, AnExpressionIsAsOldAsItsOldestChannel) {
   for (const std::string late : {"gear_angle_rad", "joint_angle_rad"})
     for (const double age_s : {0.02, -0.001, kNaN}) {
@@ -260,6 +261,63 @@ TEST(MonitoredTorque, ASpikeDuringAMotionIsReplacedByTheMotion) {
   move();
   (void)joint.step();
   EXPECT_NEAR(joint.torque.estimates()[0].value, torque_Nm, 1e-9);
+}
+
+/// The current may change by 1 A in a tick.
+Joint with_limited_current() {
+  MonitorSettings settings = test::joint_monitor();
+  settings.signals.push_back({.name = "motor_current_A", .largest_rate = 1000.0});
+  Joint joint;
+  joint.torque = {test::torque_sources(test::joint_sources()), test::joint_redundancy(), settings};
+  return joint;
+}
+
+// The change over a gap was once compared with that of one tick, and an old value given to the
+// sources.
+TEST(MonitoredTorque, TheChangeOverAGapIsNoSpike) {
+  for (const bool is_stale : {false, true}) {
+    Joint joint = with_limited_current();
+    joint.step_for(10);
+    SignalSample& current = joint.channel("motor_current_A");
+    for (int n = 1; n <= 5; ++n) {
+      current = {.value = is_stale ? 0.5 : kNaN, .age_s = is_stale ? -1.0 : 0.0};
+      (void)joint.step();
+    }
+    current = {.value = 0.5 + 0.9 * 6.0};
+    EXPECT_FALSE(joint.step().has_replaced_input);
+    EXPECT_NEAR(joint.torque.estimates()[0].value, 10.0 * current.value, 1e-9);
+    // From here on the motion counts again: a spike is replaced along it.
+    current.value += 0.9;
+    (void)joint.step();
+    const double next_A = current.value + 0.9;
+    current.value += 90.0;
+    EXPECT_TRUE(joint.step().has_replaced_input);
+    EXPECT_NEAR(joint.torque.estimates()[0].value, 10.0 * next_A, 1e-9);
+  }
+}
+
+TEST(MonitoredTorque, ASpikeAfterAGapIsAMissingSample) {
+  Joint joint = with_limited_current();
+  joint.step_for(10);
+  SignalSample& current = joint.channel("motor_current_A");
+  current.value = kNaN;
+  (void)joint.step();
+  current.value = 50.0;
+  EXPECT_FALSE(joint.step().has_replaced_input);
+  EXPECT_EQ(joint.torque.estimates()[0].fault, Fault::input_not_finite);
+  current.value = 0.5;
+  (void)joint.step();
+  EXPECT_EQ(joint.torque.estimates()[0].fault, Fault::none);
+  EXPECT_NEAR(joint.torque.estimates()[0].value, 5.0, 1e-9);
+}
+
+TEST(MonitoredTorque, ReportsThatAChannelWasReplaced) {
+  Joint joint = with_limited_current();
+  joint.step_for(10);
+  EXPECT_FALSE(joint.step().has_replaced_input);
+  joint.channel("motor_current_A").value += 50.0;
+  EXPECT_TRUE(joint.step().has_replaced_input);
+  EXPECT_FALSE(joint.step().has_replaced_input) << "the second sample is taken";
 }
 
 TEST(MonitoredTorque, AStepThatIsAJumpForASourceIsASpikeAsWell) {

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
@@ -91,6 +92,65 @@ TEST(MonitorFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(again), {}), written.text());
 }
 
+TEST(MonitorFile, KeepsEverySetting) {
+  Written written;
+  MonitorSettings& settings = written.file.monitor;
+  settings.pairs[0].ceiling_Nm = 9.0;
+  settings.pairs[0].drift_allowance = 0.8;
+  settings.persistence_s = 0.006;
+  settings.release_share = 0.7;
+  settings.longest_loss_s = 0.4;
+  settings.longest_fault_s = 0.017;
+  settings.longest_warm_up_s = 3.0;
+  settings.largest_novelty = 4.0;
+  settings.longest_overrun = 4;
+  settings.spikes_in_a_row = 3;
+  settings.spike_memory_s = 0.05;
+  settings.proof_s = 0.07;
+  settings.longest_command_age_s = 0.25;
+  save_monitor(written.path, written.file);
+  const MonitorSettings read = read_monitor(written.path).monitor;
+  const auto numbers = [](const MonitorSettings& of) {
+    return std::vector<double>{of.pairs[0].factor,
+                               of.pairs[0].floor_Nm,
+                               of.pairs[0].ceiling_Nm,
+                               of.pairs[0].largest_armed_Nm,
+                               of.pairs[0].drift_allowance,
+                               of.pairs[0].drift_limit_s,
+                               of.signals[1].longest_age_s,
+                               of.signals[1].turn,
+                               of.signals[1].largest_hidden_travel,
+                               of.persistence_s,
+                               of.release_share,
+                               of.longest_loss_s,
+                               of.longest_fault_s,
+                               of.longest_warm_up_s,
+                               of.largest_novelty,
+                               of.sample_period_s,
+                               static_cast<double>(of.longest_overrun),
+                               static_cast<double>(of.spikes_in_a_row),
+                               of.spike_memory_s,
+                               of.proof_s,
+                               of.longest_command_age_s};
+  };
+  EXPECT_EQ(numbers(read), numbers(settings));
+  EXPECT_EQ(read.actions, settings.actions);
+  EXPECT_EQ(read.sources, settings.sources);
+  EXPECT_EQ(read.correlation, settings.correlation);
+}
+
+TEST(MonitorFile, OfAnEarlierReleaseHasTheDefaultsOfWhatItLacks) {
+  const Written written;
+  for (const char* const entry :
+       {" \"longest_warm_up_s\": 10.0,\n", " \"spike_memory_s\": 0.02,\n"})
+    written.replace(entry, "");
+  written.replace(",\n \"longest_command_age_s\": 1.0", "");
+  const MonitorSettings read = read_monitor(written.path).monitor;
+  EXPECT_EQ(read.longest_warm_up_s, 10.0);
+  EXPECT_EQ(read.spike_memory_s, 0.02);
+  EXPECT_EQ(read.longest_command_age_s, 1.0);
+}
+
 TEST(MonitorFile, BuildsTheMonitorOfARobot) {
   const Written written;
   MonitoredTorque monitored =
@@ -113,6 +173,12 @@ TEST(MonitorFile, IsRefusedOnAnotherDeviceAfterItsLastDayAndAtAnotherRate) {
   EXPECT_THAT(written.refusal({.today = "2027-03-02"}), HasSubstr("expired on 2027-03-01"));
   EXPECT_THAT(written.refusal({.rate_Hz = 500.0, .today = "2026-11-22"}), HasSubstr("1000 Hz"));
   EXPECT_EQ(written.refusal({.serial = "J-07", .today = "2027-03-01"}), "");
+  Written of_none;
+  of_none.file.device_serial = "";
+  save_monitor(of_none.path, of_none.file);
+  EXPECT_THAT(of_none.refusal({.serial = "J-07", .today = "2026-11-22"}),
+              HasSubstr("one that states no device"));
+  EXPECT_EQ(of_none.refusal(), "");
   // Without a date in the options the clock of the machine counts.
   written.replace("2027-03-01", "2020-03-01");
   EXPECT_THAT(written.refusal({}), HasSubstr("expired on 2020-03-01"));

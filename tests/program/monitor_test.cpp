@@ -28,10 +28,11 @@ class MonitorVerb : public Program {
                "lowpass(rate(motor_angle_rad), 20Hz)'")
             .exit_code,
         0);
-    const Outcome outcome = torsio(kCalibrate + "--false-alarms-per-hour 200");
+    const Outcome outcome =
+        torsio(kCalibrate + "--false-alarms-per-hour 200 --required 60Nm --persistence 8ms");
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
     EXPECT_NE(outcome.out.find("spring, current"), std::string::npos) << outcome.out;
-    EXPECT_NE(outcome.out.find("surely detected Nm"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("detected in these states Nm"), std::string::npos) << outcome.out;
   }
   void expect_refused(const std::string& call, int exit_code, const std::string& text) {
     const Outcome outcome = torsio(call);
@@ -50,6 +51,10 @@ TEST_F(MonitorVerb, FindsAFaultInARecordingAndPassesASoundOne) {
   calibrate();
   const Outcome sound = torsio("monitor j.monitor.json c.csv -o torque.csv --json sound.json");
   ASSERT_EQ(sound.exit_code, 0) << sound.err;
+  EXPECT_NE(sound.err.find("the monitor is that of device J-07"), std::string::npos) << sound.err;
+  const auto file = nlohmann::json::parse(contents("j.monitor.json"));
+  EXPECT_EQ(file.at("persistence_s"), 0.008);
+  EXPECT_FALSE(file.at("pairs").at(0).at("largest_armed_Nm").is_null());
   EXPECT_NE(sound.out.find("c: no stop from"), std::string::npos) << sound.out;
   EXPECT_TRUE(nlohmann::json::parse(contents("sound.json"))
                   .at("recordings")
@@ -101,6 +106,22 @@ TEST_F(MonitorVerb, RefusesWhatDoesNotBelongTogether) {
   ASSERT_EQ(
       shell("cp keep.json j.monitor.json; cp current.safetensors spring.safetensors").exit_code, 0);
   expect_refused("monitor j.monitor.json c.csv", 1, "hash");
+}
+
+// Options that a call does not use were once ignored: a fault that was not injected read as one
+// that was missed.
+TEST_F(MonitorVerb, RefusesOptionsThatACallDoesNotUse) {
+  for (const char* const call :
+       {"monitor j.json log.csv --inject kt=-20%@3s", "monitor j.json log.csv --faults f.yaml",
+        "monitor j.json log.csv --extrapolate",
+        "monitor --calibrate --actuator dfki-50 -o x.json --extrapolate",
+        "monitor --calibrate --actuator dfki-50 -o x.json --valid-until 2027-01-01",
+        "monitor --calibrate --actuator dfki-50 -o x.json log.csv",
+        "monitor --calibrate log.csv -o x.json --source a=b --plot x.svg",
+        "monitor --campaign --plot x.svg", "monitor --campaign log.csv",
+        "monitor --campaign -o x.csv", "monitor --accuracy 1 --inject kt=-20%@3s",
+        "monitor --actuator dfki-50 --device-serial J-07"})
+    expect_refused(call, kCallWasWrong, "only what it uses");
 }
 
 TEST_F(MonitorVerb, RefusesFaultsThatASimulatedJointCannotHave) {

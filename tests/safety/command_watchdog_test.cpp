@@ -93,6 +93,28 @@ TEST(CommandWatchdog, IsNotFedFromTheFuture) {
   EXPECT_LT(ticks, 20);
 }
 
+// Stamps that are ahead once kept the joint running for as long again.
+TEST(CommandWatchdog, ACommandFromTheNearFutureDoesNotCountForLonger) {
+  for (const std::int64_t ahead_ns : {5 * kTick, 17 * kTick}) {
+    Loop loop;
+    loop.start();
+    int ticks = 0;
+    while (loop.step({.written_ns = loop.now_ns + kTick + ahead_ns, .is_valid = true}) ==
+           State::running)
+      ++ticks;
+    EXPECT_LT(ticks, 20) << ahead_ns;
+  }
+  // Two periods ahead, it counts as one of now.
+  Loop loop;
+  loop.start();
+  const CommandWatchdog::Command last = {.written_ns = loop.now_ns + 3 * kTick, .is_valid = true};
+  const std::int64_t seen_ns = loop.now_ns + kTick;
+  ASSERT_EQ(loop.step(last), State::running);
+  while (loop.step({}) == State::running) {
+  }
+  EXPECT_EQ(loop.now_ns - seen_ns, 18 * kTick);
+}
+
 TEST(CommandWatchdog, StopsWhereTheClockRunsBackwards) {
   Loop loop;
   loop.start();
@@ -194,6 +216,10 @@ TEST(CommandWatchdog, RefusesTimesThatAreNone) {
   for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), 1e9})
     EXPECT_NE(refusal({.timeout_s = bad}), "") << bad;
   EXPECT_NE(refusal({.longest_fault_s = 0.0}), "");
+  EXPECT_EQ(refusal({.longest_ahead_s = 0.0}), "");
+  for (const double bad : {-1e-3, std::numeric_limits<double>::quiet_NaN(), 1e9})
+    EXPECT_EQ(refusal({.longest_ahead_s = bad}).find("command watchdog: longest_ahead_s"), 0U)
+        << bad;
 }
 
 // 100 cases of 10^4 ticks: whatever is sent, it runs only on an arming and a valid command since,

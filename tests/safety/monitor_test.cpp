@@ -72,7 +72,8 @@ struct Loop {
     ASSERT_EQ(monitor.state(), State::ready);
     ASSERT_TRUE(monitor.arm(t_s));
   }
-  /// @returns ticks until it is stopped, the one that stops included; -1 if it does not within `most`
+  /// @returns ticks until it is stopped, the one that stops included; -1 if it does not within
+  /// `most`
   int ticks_to_stop(int most = 5000) {
     for (int n = 1; n <= most; ++n)
       if (step() == State::stopped) return n;
@@ -180,6 +181,41 @@ TEST(Monitor, IsNotArmedAfterAResetAtAnUnknownTime) {
   EXPECT_TRUE(loop.monitor.arm(loop.t_s));
 }
 
+TEST(Monitor, IsArmedOnlyWithACommandOfNow) {
+  Loop loop;
+  loop.step_for(60);
+  EXPECT_FALSE(loop.monitor.arm(loop.t_s - 1.001)) << "written long ago";
+  EXPECT_FALSE(loop.monitor.arm(loop.t_s + 1.1e-3)) << "from the future";
+  EXPECT_FALSE(loop.monitor.arm(-kInfinity));
+  EXPECT_TRUE(loop.monitor.arm(loop.t_s + 1e-3)) << "before the next tick";
+  Loop young;
+  young.step_for(60);
+  EXPECT_TRUE(young.monitor.arm(young.t_s - 0.999));
+}
+
+// `reset(0.0)` once made every command since time 0 a fresh one.
+TEST(Monitor, AResetWithATimeOfAnotherClockCountsFromTheNextTick) {
+  for (const double reset_s : {0.0, 1e6}) {
+    Loop loop;
+    loop.start();
+    loop.monitor.stop(loop.t_s);
+    const double old_s = loop.t_s;
+    loop.monitor.reset(reset_s);
+    loop.monitor.reset(reset_s);
+    loop.step_for(60);
+    ASSERT_EQ(loop.monitor.state(), State::ready);
+    EXPECT_FALSE(loop.monitor.arm(old_s)) << reset_s;
+    EXPECT_FALSE(loop.monitor.arm(old_s + kPeriod_s)) << "of the first tick";
+    EXPECT_TRUE(loop.monitor.arm(old_s + 1.5 * kPeriod_s));
+  }
+  Loop restarted;  // the clock begins again
+  restarted.start();
+  restarted.monitor.reset(restarted.t_s);
+  restarted.t_s = 0.0;
+  restarted.step_for(60);
+  EXPECT_TRUE(restarted.monitor.arm(restarted.t_s));
+}
+
 TEST(Monitor, AResetEmptiesWhatWasCounted) {
   Loop loop;
   loop.start();
@@ -232,6 +268,9 @@ TEST(Monitor, StopsFromOutsideInEveryState) {
   loop.monitor.stop(1.5);
   EXPECT_EQ(loop.monitor.state(), State::stopped);
   EXPECT_EQ(loop.monitor.reason().action, MonitorAction::off) << "no finding";
+  EXPECT_EQ(loop.reason(), MonitorCheck::requested);
+  EXPECT_EQ(loop.text(), "a stop was requested");
+  EXPECT_EQ(loop.monitor.latest().check, MonitorCheck::requested) << "nothing was found yet";
   EXPECT_EQ(loop.monitor.reason().t_s, 1.5);
   loop.monitor.stop(2.5);
   EXPECT_EQ(loop.monitor.reason().t_s, 1.5) << "the first stop is the reason";
@@ -259,6 +298,36 @@ TEST(Monitor, KeepsTheFirstFindingAsReasonAndTheLatestApart) {
   loop.step_for(3);
   EXPECT_EQ(loop.monitor.reason().t_s, stopped_s);
   EXPECT_EQ(loop.monitor.latest().t_s, loop.t_s);
+}
+
+TEST(Monitor, ListsTheFindingsOfATick) {
+  Loop loop;
+  EXPECT_TRUE(loop.monitor.findings().empty());
+  loop.start();
+  loop.signals[1].value = kNaN;
+  loop.signals[2].age_s = kNaN;
+  loop.sources[2].fault = Fault::input_not_finite;
+  (void)loop.step();
+  ASSERT_EQ(loop.monitor.findings().size(), 3U);
+  EXPECT_EQ(loop.monitor.findings()[0].check, MonitorCheck::not_finite);
+  EXPECT_EQ(loop.monitor.findings()[1].check, MonitorCheck::stale);
+  EXPECT_EQ(loop.monitor.findings()[2].check, MonitorCheck::source_lost);
+  EXPECT_EQ(loop.monitor.findings()[2].first, 2);
+  EXPECT_EQ(loop.monitor.findings()[2].t_s, loop.t_s);
+  loop.monitor.reset(loop.t_s);
+  EXPECT_TRUE(loop.monitor.findings().empty());
+  // 28 pairs have more findings than are kept.
+  MonitorSettings settings;
+  for (char name = 'a'; settings.sources.size() < Monitor::kMaxSources; ++name)
+    settings.sources.emplace_back(1, name);
+  for (std::uint8_t i = 0; i < Monitor::kMaxSources; ++i)
+    for (std::uint8_t j = 0; j < i; ++j) settings.pairs.push_back({.first = i, .second = j});
+  settings.persistence_s = 0.0;
+  Loop many(settings);
+  for (std::size_t i = 0; i < many.sources.size(); ++i)
+    many.sources[i].value = (i % 2 == 0 ? 10.0 : -10.0) * static_cast<double>(i + 1);
+  (void)many.step();
+  EXPECT_EQ(many.monitor.findings().size(), Monitor::kMaxFindings);
 }
 
 TEST(Monitor, EachCheckIsOffWarnsOrStops) {
@@ -494,6 +563,33 @@ TEST(Monitor, RecognisesAWrapOfAnEncoder) {
       "gear_angle_rad changed by 2, a turn of its encoder");
 }
 
+// It was once compared with the angle before the wrap until the joint had moved by a tenth of a
+// turn.
+TEST(Monitor, AWrapIsFoundOnce) {
+  MonitorSettings settings = joint();
+  settings.signals[0].turn = 2.0;
+  Loop unarmed(settings);
+  (void)unarmed.step();
+  unarmed.signals[0].value = 2.0;
+  unarmed.step_for(2);
+  EXPECT_EQ(unarmed.monitor.active(), bit(MonitorCheck::wrap));
+  (void)unarmed.step();
+  EXPECT_EQ(unarmed.monitor.active(), 0U);
+  unarmed.step_for(30);
+  unarmed.start();
+  action(settings, MonitorCheck::wrap) = MonitorAction::warn;
+  Loop warned(settings);
+  warned.start();
+  for (const double value : {2.0, 0.0}) {
+    warned.signals[0].value = value;
+    warned.step_for(2);
+    EXPECT_NE(warned.monitor.latest().t_s, 0.0);
+    (void)warned.step();
+    EXPECT_EQ(warned.monitor.active(), 0U);
+  }
+  EXPECT_TRUE(warned.monitor.is_watching());
+}
+
 TEST(Monitor, AWrapIsWithinATenthOfATurn) {
   MonitorSettings settings = joint();
   settings.signals[1] = {.name = "gear_angle_rad", .turn = 10.0};
@@ -628,16 +724,56 @@ TEST(Monitor, ASourceThatWarmsUpIsNotUsedAndNoFinding) {
   EXPECT_EQ(loop.ticks_to_stop(), 1) << "fewer than two are left";
 }
 
-TEST(Monitor, ALossThatEndsIsNotCounted) {
+TEST(Monitor, ALossThatEndsIsCompensatedByFourTimesItsLength) {
+  const auto stops = [](int good) {
+    Loop loop;
+    loop.start();
+    for (int n = 0; n < 10; ++n) {
+      loop.sources[2].fault = Fault::input_not_finite;
+      loop.step_for(400);
+      loop.sources[2].fault = Fault::none;
+      loop.step_for(good);
+    }
+    return !loop.monitor.is_watching();
+  };
+  EXPECT_TRUE(stops(1)) << "one good sample ends no loss";
+  EXPECT_TRUE(stops(800));
+  EXPECT_FALSE(stops(1600));
+}
+
+TEST(Monitor, ALossThatLastedForLongIsCompensatedAsSoonAsAShorterOne) {
   Loop loop;
+  loop.sources[2].fault = Fault::input_not_finite;
+  loop.step_for(5000);
+  EXPECT_EQ(loop.monitor.latest().action, MonitorAction::stop) << "not armed: nothing to stop";
+  loop.sources[2].fault = Fault::none;
+  loop.step_for(2004);
   loop.start();
-  for (int n = 0; n < 10; ++n) {
-    loop.sources[2].fault = Fault::input_not_finite;
-    loop.step_for(500);
-    loop.sources[2].fault = Fault::none;
-    (void)loop.step();
-  }
-  EXPECT_TRUE(loop.monitor.is_watching());
+  loop.sources[2].fault = Fault::input_not_finite;
+  EXPECT_EQ(loop.ticks_to_stop(), 501);
+}
+
+// A source that warmed up for ever was once no finding: its pairs remained without a comparison.
+TEST(Monitor, ASourceMayNotWarmUpForEver) {
+  MonitorSettings settings = joint();
+  settings.longest_warm_up_s = 1.0;
+  Loop loop(settings);
+  loop.start();
+  loop.sources[2].fault = Fault::warming_up;
+  EXPECT_EQ(loop.ticks_to_stop(), 1001);
+  EXPECT_EQ(loop.reason(), MonitorCheck::source_fault);
+  EXPECT_EQ(loop.monitor.reason().first, 2);
+  EXPECT_EQ(loop.monitor.reason().limit, 1.0);
+  Loop unarmed(settings);
+  unarmed.sources[2].fault = Fault::warming_up;
+  unarmed.step_for(1100);
+  EXPECT_EQ(unarmed.monitor.state(), State::unproven);
+  // Warm-up without a number is a loss, which has a limit of its own.
+  Loop lost(settings);
+  lost.start();
+  lost.sources[2] = {.value = kNaN, .std_dev = 0.1, .fault = Fault::warming_up};
+  EXPECT_EQ(lost.ticks_to_stop(), 501);
+  EXPECT_EQ(lost.reason(), MonitorCheck::source_lost);
 }
 
 TEST(Monitor, ALossCanBeOffOrStopAtOnce) {
@@ -759,6 +895,29 @@ TEST(Monitor, IsNotReadyWhileErrorBarsMakeAThresholdTooLarge) {
   EXPECT_TRUE(loop.monitor.is_watching());
 }
 
+// The ceiling limits the threshold in use, and does not hide that the error bars are too wide to
+// begin.
+TEST(Monitor, ACeilingDoesNotMakeItReady) {
+  MonitorSettings settings = joint();
+  for (PairLimits& pair : settings.pairs) {
+    pair.ceiling_Nm = 2.0;
+    pair.largest_armed_Nm = 3.0;
+  }
+  Loop loop(settings);
+  loop.sources[1].std_dev = 5.0;
+  loop.step_for(200);
+  EXPECT_EQ(loop.monitor.state(), State::unproven);
+  EXPECT_TRUE(loop.monitor.is_threshold_too_large());
+  EXPECT_EQ(loop.monitor.active(), 0U);
+  loop.sources[1].std_dev = 0.1;
+  loop.start();
+  EXPECT_FALSE(loop.monitor.is_threshold_too_large());
+  loop.sources[1].std_dev = 5.0;
+  loop.sources[1].value = 2.1;
+  EXPECT_EQ(loop.ticks_to_stop(), 6);
+  EXPECT_EQ(loop.monitor.reason().limit, 2.0);
+}
+
 // docs/faults.md 14
 TEST(Monitor, StopsOnASourceWhoseModelFailsForLong) {
   for (const Estimate& faulty :
@@ -842,7 +1001,7 @@ TEST(Monitor, StopsOnSourcesThatDisagreeForLongerThanThePersistence) {
   EXPECT_EQ(
       describe({.check = MonitorCheck::disagreement, .second = 2, .value = -1.01, .limit = 1.0},
                joint()),
-      "the torques of current and spring differ by -1.01 Nm, more than 1 Nm");
+      "the torques of current and spring differ by 1.01 Nm, more than 1 Nm");
 }
 
 TEST(Monitor, ADifferenceThatEndsInTimeIsNone) {
@@ -894,7 +1053,7 @@ TEST(Monitor, TheThresholdFollowsTheErrorBarsBetweenFloorAndCeiling) {
   EXPECT_NEAR(threshold_of(limits, 0.01, 0.01), 1.0, 1e-6);
   EXPECT_NEAR(threshold_of(limits, 3.0, 4.0), 4.0, 1e-6);
   EXPECT_NEAR(threshold_of(limits, 0.3, 0.4, {1.0, 0.5, 0.5, 1.0}), 5.0 * std::sqrt(0.13), 1e-6);
-  EXPECT_NEAR(threshold_of(limits, 0.3, 0.4, {1.0, -0.5, -0.5, 1.0}), 4.0 * 1.0, 0.97)
+  EXPECT_NEAR(threshold_of(limits, 0.3, 0.4, {1.0, -0.5, -0.5, 1.0}), 5.0 * std::sqrt(0.37), 1e-6)
       << "wider with errors of opposite sign";
   EXPECT_NEAR(threshold_of({.factor = 2.0, .floor_Nm = 0.0}, 3.0, 4.0), 10.0, 1e-5);
   EXPECT_NEAR(threshold_of(limits, 1e200, 1e200), 4.0, 1e-6);
@@ -977,7 +1136,7 @@ TEST(Monitor, RecognisesASourceWithTheWrongSign) {
   }
   EXPECT_EQ(
       describe({.check = MonitorCheck::sign, .second = 1, .value = -1.2, .limit = 1.0}, joint()),
-      "the torques of current and gear have opposite signs and differ by -1.2 Nm");
+      "the torques of current and gear have opposite signs and differ by 1.2 Nm");
 }
 
 TEST(Monitor, ASmallTorqueHasNoWrongSign) {
@@ -1178,7 +1337,8 @@ TEST(Monitor, NamesItsChecksActionsAndStates) {
   ASSERT_EQ(checks.size(), kMonitorChecks);
   for (std::size_t i = 0; i < kMonitorChecks; ++i)
     EXPECT_EQ(name(static_cast<MonitorCheck>(i)), checks[i]);
-  EXPECT_EQ(name(static_cast<MonitorCheck>(kMonitorChecks)), "unknown");
+  EXPECT_EQ(name(MonitorCheck::requested), "requested");
+  EXPECT_EQ(name(static_cast<MonitorCheck>(kMonitorChecks + 1)), "unknown");
   EXPECT_EQ(name(MonitorAction::off), "off");
   EXPECT_EQ(name(MonitorAction::warn), "warn");
   EXPECT_EQ(name(MonitorAction::stop), "stop");
@@ -1195,7 +1355,7 @@ TEST(Monitor, DescribesAnEventOfOtherSettings) {
             "? is not a finite number");
   EXPECT_EQ(describe({.check = MonitorCheck::sign, .first = 3, .second = 4, .value = 1.0}, joint()),
             "the torques of ? and ? have opposite signs and differ by 1 Nm");
-  EXPECT_EQ(describe({.check = static_cast<MonitorCheck>(kMonitorChecks)}, joint()), "");
+  EXPECT_EQ(describe({.check = static_cast<MonitorCheck>(kMonitorChecks + 1)}, joint()), "");
 }
 
 std::string refusal(const std::function<void(MonitorSettings&)>& change) {
@@ -1308,6 +1468,10 @@ TEST(Monitor, RefusesTimesThatAreNotValid) {
         {-1e-9});
   check(&S::longest_fault_s, "longest_fault_s: expected 0 or more, found ", {0.0, kInfinity},
         {-1e-9});
+  check(&S::longest_warm_up_s, "longest_warm_up_s: expected 0 or more, found ", {0.0, kInfinity},
+        {-1e-9});
+  check(&S::longest_command_age_s, "longest_command_age_s: expected above 0, found ",
+        {1e-3, kInfinity}, {0.0});
   check(&S::largest_novelty, "largest_novelty: expected above 0, found ", {0.1, kInfinity}, {0.0});
   check(&S::proof_s, "proof_s: expected 0 or more, found ", {0.0, 10.0}, {-1e-9, kInfinity});
   check(&S::spike_memory_s, "spike_memory_s: expected 0 or more, found ", {0.0, kInfinity},
@@ -1336,7 +1500,8 @@ TEST(Monitor, OneLateTickIsEnoughForALimitOfOne) {
 
 // --- properties ---------------------------------------------------------------------------------
 
-// Whatever number of any input is NaN in whatever tick: a stop if it watches, no arming if it does not.
+// Whatever number of any input is NaN in whatever tick: a stop if it watches, no arming if it does
+// not.
 RC_GTEST_PROP(Monitor, NeverWatchesWithNaN, ()) {
   Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
   MonitorSettings settings = joint();
@@ -1358,6 +1523,25 @@ RC_GTEST_PROP(Monitor, NeverWatchesWithNaN, ()) {
   RC_ASSERT(!loop.monitor.arm(1e9));
 }
 
+// The same with the default settings, for NaN that lasts: NaN in any number but a novelty.
+RC_GTEST_PROP(Monitor, StopsOnNaNWithTheDefaultSettings, ()) {
+  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Loop loop;
+  const bool watching = random.uniform() < 0.5;
+  if (watching) loop.start();
+  loop.step_for(static_cast<int>(40.0 * random.uniform()));
+  const auto place = static_cast<std::size_t>(13.0 * random.uniform());
+  if (place < 3) loop.sources[place].value = kNaN;
+  if (place >= 3 && place < 6) loop.sources[place - 3].std_dev = kNaN;
+  if (place >= 6 && place < 9) loop.signals[place - 6].value = kNaN;
+  if (place >= 9 && place < 12) loop.signals[place - 9].age_s = kNaN;
+  const std::size_t most = place < 3 ? 501 : place < 6 ? 16 : 1;
+  for (std::size_t n = 0; n < most; ++n) (void)loop.step(place == 12 ? kNaN : kPeriod_s);
+  RC_ASSERT(!loop.monitor.is_watching());
+  RC_ASSERT(watching == (loop.monitor.state() == State::stopped));
+  RC_ASSERT(!loop.monitor.arm(loop.t_s));
+}
+
 // 10^4 ticks of anything: what was stopped watches again only after a reset, a proof and an arming
 // with a command written since.
 RC_GTEST_PROP(Monitor, IsLatchedUnderAnyInputs, ()) {
@@ -1367,10 +1551,33 @@ RC_GTEST_PROP(Monitor, IsLatchedUnderAnyInputs, ()) {
   bool was_reset = true;
   double silent_s = 0.0;
   State last = State::unproven;
+  const auto any = [&] {
+    constexpr std::array kNumbers{kNaN, kInfinity, -kInfinity, 0.0, -1.0, 30.0, 1e200};
+    return kNumbers[random.below(kNumbers.size())];
+  };
+  int disturbed = 0;  // ticks for which this disturbance lasts
   for (int n = 0; n < 10'000; ++n) {
-    const bool is_bad = random.uniform() < 0.002;
-    loop.signals[0].value = is_bad ? kNaN : 0.0;
-    loop.sources[1].value = random.uniform() < 0.002 ? 30.0 : 0.0;
+    if (disturbed > 0 && --disturbed == 0) {
+      for (Estimate& source : loop.sources) source = {.value = 0.0, .std_dev = 0.1};
+      for (SignalSample& sample : loop.signals) sample = {.value = 0.0};
+      loop.signals[2].value = 300.0;
+    }
+    if (disturbed == 0 && random.uniform() < 0.004) {
+      disturbed = 1 + static_cast<int>(random.below(20));
+      const std::size_t which = random.below(3);
+      switch (random.below(5)) {
+        case 0: loop.sources[which].value = any(); break;
+        case 1: loop.sources[which].std_dev = any(); break;
+        case 2:
+          loop.sources[which].fault =
+              random.uniform() < 0.5 ? Fault::input_not_finite : Fault::outside_training_range;
+          break;
+        case 3: loop.signals[which].value = any(); break;
+        default: loop.signals[which].age_s = any(); break;
+      }
+    }
+    const bool is_bad = std::ranges::any_of(
+        loop.signals, [](const SignalSample& of) { return !std::isfinite(of.value); });
     if (random.uniform() < 0.001) loop.monitor.stop(loop.t_s);
     if (random.uniform() < 0.02) {
       reset_s = loop.t_s;
@@ -1381,19 +1588,21 @@ RC_GTEST_PROP(Monitor, IsLatchedUnderAnyInputs, ()) {
     }
     if (random.uniform() < 0.2) {
       const double written_s = loop.t_s + 0.05 * (random.uniform() - 0.5);
-      const bool may = last == State::watching || (last == State::ready && written_s > reset_s);
+      const bool is_fresh = written_s > reset_s && written_s <= loop.t_s + kPeriod_s;
+      const bool may = last == State::watching || (last == State::ready && is_fresh);
       RC_ASSERT(loop.monitor.arm(written_s) == (may && loop.monitor.state() != State::stopped));
     }
     const bool was_watching = loop.monitor.is_watching();
     const bool was_stopped = loop.monitor.state() == State::stopped;
-    last = loop.step();
-    silent_s = loop.monitor.active() == 0 ? silent_s + kPeriod_s : 0.0;
+    const double period_s = random.uniform() < 0.002 ? random.uniform() * 0.1 : kPeriod_s;
+    last = loop.step(period_s);
+    silent_s = loop.monitor.active() == 0 ? silent_s + period_s : 0.0;
     if (was_stopped) {
       RC_ASSERT(last == State::stopped);
       was_reset = false;
     }
     if (last == State::watching) RC_ASSERT(was_watching && was_reset);
-    if (last == State::ready) RC_ASSERT(silent_s >= 0.05);
+    if (last == State::ready) RC_ASSERT(silent_s >= 0.05 - 1e-9);
     if (was_watching && is_bad) RC_ASSERT(last == State::stopped);
   }
 }

@@ -17,13 +17,14 @@
 
 namespace torsio {
 
-/// The sources of a joint's torque, their combination and their monitor, fed with the channels of the
-/// drive. A monitored signal is an expression of these channels ("gear_angle_rad - joint_angle_rad");
-/// its age is that of the oldest channel in it.
+/// The sources of a joint's torque, their combination and their monitor, fed with the channels of
+/// the drive. A monitored signal is an expression of these channels ("gear_angle_rad -
+/// joint_angle_rad"); its age is that of the oldest channel in it.
 class MonitoredTorque {
  public:
   /// @param sources one for each of `redundancy.sources`, in that order
-  /// @throws Error if these do not fit together, or as `Redundancy`, `Monitor` and `FeaturePipeline` do.
+  /// @throws Error if these do not fit together, or as `Redundancy`, `Monitor` and
+  /// `FeaturePipeline` do.
   MonitoredTorque(TorqueSources sources, const RedundancySettings& redundancy,
                   const MonitorSettings& monitor);
 
@@ -38,12 +39,14 @@ class MonitoredTorque {
   /// `monitor().reset(t_s)`, with which the next step begins the history again.
   void reset() noexcept;
 
-  /// A sample that changes faster than a signal that is this channel alone can (`largest_rate`), or in a step that is
-  /// a jump for a source, is replaced for the sources by what the two before it lead to, in fewer than `spikes_in_a_row` samples: their filters would spread one
-  /// spike over many ticks.
+  /// A sample that changes faster than a signal that is this channel alone can (`largest_rate`), or
+  /// in a step that is a jump for a source, is not given to the sources, for fewer than
+  /// `spikes_in_a_row` samples in a row: their filters would spread one spike over many ticks. They
+  /// get the linear extrapolation of the two before it (`FusedTorque::has_replaced_input`), or after
+  /// a gap, over which nothing is extrapolated, a missing sample.
   /// @param raw one sample for each of `raw_inputs()`. A channel older than the longest age of a
-  /// signal that is this channel alone is not measured for the sources: their fault is input_not_finite.
-  /// Another number of samples is a stop of the monitor.
+  /// signal that is this channel alone is not measured for the sources: their fault is
+  /// input_not_finite. Another number of samples is a stop of the monitor.
   FusedTorque step(double t_s, std::span<const SignalSample> raw) noexcept TORSIO_REALTIME;
 
   [[nodiscard]] Monitor& monitor() noexcept { return monitor_; }
@@ -65,8 +68,9 @@ class MonitoredTorque {
     double longest_age_s = std::numeric_limits<double>::infinity();
     double largest_step = std::numeric_limits<double>::infinity();  ///< from sample to sample
     double last = kNotMeasured;
-    double change = 0.0;     ///< per sample, of the last ones that were not replaced
-    std::uint32_t held = 0;  ///< samples in a row that were replaced
+    double change = 0.0;       ///< per sample, of the last ones that were not replaced
+    std::uint32_t held = 0;    ///< samples that were not given to the sources since `last`
+    std::uint64_t missed = 0;  ///< samples without a value since `last`
   };
   [[nodiscard]] double guarded(ChannelGuard& guard, const SignalSample& sample) const noexcept;
   [[nodiscard]] std::vector<std::size_t> places_of(const std::vector<std::string>& channels) const;

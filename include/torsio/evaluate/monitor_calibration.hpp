@@ -25,14 +25,15 @@ struct CalibrationOptions {
   /// T hours without a fault support no rate below 3 / T (95 %). A smaller one is refused, or, with
   /// this, extrapolated from the tail of the differences and labelled so.
   bool extrapolate = false;
-  /// No pair has a smaller threshold, however well its sources agree in these recordings: what they do not
-  /// contain, as another temperature or age, makes them differ more.
+  /// No pair has a smaller threshold, however well its sources agree in these recordings: what they
+  /// do not contain, as another temperature or age, makes them differ more.
   double least_threshold_Nm = 0.0;
-  /// How long a difference must exceed its threshold; at least two samples. The filters of the sources spread one
-  /// wrong sample over their settling time.
+  /// How long a difference must exceed its threshold; at least two samples. The filters of the
+  /// sources spread one wrong sample over their settling time.
   double persistence_s = MonitorSettings().persistence_s;
-  /// A disagreement that has to be found: the monitor is not ready while error bars make a threshold larger than
-  /// 0.8 times this (but never at less than 1.1 times the threshold of small error bars).
+  /// A disagreement that has to be found: the monitor is not ready while error bars make a
+  /// threshold larger than 0.8 times this (but never at less than 1.1 times the threshold of small
+  /// error bars).
   double required_Nm = std::numeric_limits<double>::infinity();
 };
 
@@ -42,14 +43,20 @@ struct CalibratedPair {
   std::string second;
   double largest_difference_Nm = 0.0;  ///< in the fault-free recordings
   double typical_threshold_Nm = 0.0;   ///< median over the recordings
-  /// A fault that changes the difference by this is found in any of the recorded states, even where
-  /// the fault-free difference has the opposite sign: largest difference and largest threshold.
-  double surely_detected_Nm = 0.0;
+  /// A fault that changes the difference by this is found in any of the states of these recordings,
+  /// even where the fault-free difference has the opposite sign: largest difference and largest
+  /// threshold. In a state with wider error bars the threshold is larger, up to 1.25 times the
+  /// largest one here.
+  double detected_in_these_states_Nm = 0.0;
+  /// Error bars were above their median in fewer than ten blocks: the factor is the floor over the
+  /// median.
+  bool is_factor_from_floor = false;
 };
 
 struct CalibratedMonitor {
-  /// Per source, for `SourceModel::error_bar_factor`: the root mean square of its errors in units of their
-  /// standard deviations, where the torque was measured; else the factor that the model had.
+  /// Per source, for `SourceModel::error_bar_factor`: the root mean square of its errors in
+  /// units of their standard deviations, where the torque was measured; else the factor that the model
+  /// had.
   std::vector<double> error_bar_factors;
   RedundancySettings redundancy;
   MonitorSettings monitor;
@@ -63,21 +70,25 @@ struct CalibratedMonitor {
 /// The limits of a monitor from fault-free recordings of the joint.
 ///
 /// - Pair of sources: with d the difference and s its standard deviation from the error bars, h =
-///   max(floor, factor s). The floor comes from |d| where s is below its median, the factor from |d| / s
-///   where it is above. Of each statistic, reduced to what persists for `persistence_s`, the maxima of
-///   blocks of 10 s have a generalised Pareto tail above their 90 % quantile, which gives the threshold
-///   for the wanted rate, at least 1.05 times the largest one observed.
-/// - Error bars and correlation of the sources' errors: where the recordings have the measured torque.
-/// - Signals: range with a tenth of its width on either side; 1.5 times the largest rate; 1.5 times the
-///   longest gap between fresh samples (at least a sample); twice the longest travel of a companion
-///   without a change.
-/// - Drift: what is allowed is 1.2 times the largest mean of |d| / h over a minute, at least half.
+///   min(max(floor, factor s), ceiling). |d| and |d| / s are reduced to what persists for
+///   `persistence_s`; the floor comes from the first where s is at most its median, the factor from
+///   the second where it is above. The maxima of blocks of 10 s have a generalised Pareto tail
+///   above their 90 % quantile, which gives the threshold for the wanted rate, at least 1.05 times
+///   the largest one observed. The ceiling is 1.25 times the largest threshold since the pair was
+///   first narrow enough to be armed: error bars that grow further do not make the pair blind.
+/// - Error bars and correlation of the sources' errors: where the recordings have the measured
+///   torque.
+/// - Signals: range with a quarter of its width on either side; 1.5 times the largest rate; 1.5
+///   times the longest gap between fresh samples (at least a sample); twice the longest travel of a
+///   companion without a change.
+/// - Drift: what is allowed is 1.2 times the largest size of a mean of d / h over a minute, limited
+///   to 0.75 to 0.95; the limit is 3 times the largest cumulative sum, at least 1 s.
 ///
-/// The sum over checks of signals is not part of the wanted rate: their limits have margins instead.
-/// Form: ours; tails: Pickands 1975, their moments Hosking and Wallis 1987.
+/// The sum over checks of signals is not part of the wanted rate: their limits have margins
+/// instead. Form: ours; tails: Pickands 1975, their moments Hosking and Wallis 1987.
 /// @throws Error if the recordings lack a channel, are shorter than ten blocks, cannot support the
-/// wanted rate, or if a source has a fault in more than 1 % of the samples; UsageError for a rate that
-/// is not positive; Cancelled.
+/// wanted rate, or if a source has a fault in more than 1 % of the samples; UsageError for a rate
+/// that is not positive; Cancelled.
 [[nodiscard]] CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
                                                   const MonitorPlan& plan,
                                                   const Dataset& fault_free,

@@ -43,8 +43,8 @@ struct MonitorFile {
   std::vector<Source> recordings;               ///< the fault-free ones
 };
 
-/// 16 hexadecimal digits that identify the bytes of a model file. Not cryptographic: it finds a file
-/// that was replaced or changed by mistake.
+/// 16 hexadecimal digits that identify the bytes of a model file. Not cryptographic: it finds a
+/// file that was replaced or changed by mistake.
 [[nodiscard]] std::string model_hash(const std::filesystem::path& model);
 
 /// Writes a monitor file (JSON, docs/safety.md) completely or not at all.
@@ -57,14 +57,16 @@ void save_monitor(const std::filesystem::path& path, const MonitorFile& file);
 /// The conditions under which a robot uses a monitor file.
 struct MonitorFileOptions {
   double rate_Hz = kNotMeasured;  ///< rate of the loop; NaN: that of the file
-  std::string serial = {};        ///< serial number of the device; empty: any
-  std::string today = {};         ///< as 2026-11-22; empty: by the clock of the machine
+  /// Serial number of the device, which the file must then state; empty: a monitor of any device is
+  /// taken.
+  std::string serial = {};
+  std::string today = {};  ///< as 2026-11-22; empty: by the clock of the machine
 };
 
 /// Reads a monitor file and its models, for the robot.
 /// @throws Error as `read_monitor` and `load_model`; also if the file belongs to another device or
-/// has expired, if a model is not the one that the limits were calibrated with, or for a loop at another
-/// rate, for which the limits do not hold.
+/// has expired, if a model is not the one that the limits were calibrated with, or for a loop at
+/// another rate, for which the limits do not hold.
 [[nodiscard]] MonitoredTorque load_monitor(const std::filesystem::path& path,
                                            const MonitorFileOptions& options = {});
 

@@ -26,6 +26,10 @@ class CommandWatchdog {
   struct Settings {
     /// How long a command is valid. At 1 kHz, a late tick included, it expires within 20 ms.
     double timeout_s = 0.018;
+    /// By how much its time may be ahead of the clock of the loop: two periods at 1 kHz, for a
+    /// command that is written while a tick begins. One that is further ahead is refused, and none
+    /// counts for longer than `timeout_s` from now.
+    double longest_ahead_s = 0.002;
     /// How long the loop may continue with a fault, such as an inverse on its linear fallback.
     double longest_fault_s = std::numeric_limits<double>::infinity();
   };
@@ -38,7 +42,7 @@ class CommandWatchdog {
   /// The reason of the last stop.
   enum class Reason : std::uint8_t { none, command_lost, fault, clock, requested };
 
-  /// @throws Error if a time is not positive.
+  /// @throws Error if a time is not positive, or `longest_ahead_s` negative.
   explicit CommandWatchdog(const Settings& settings);
 
   /// The operator confirms that the joint may move. Without effect while it is running.
@@ -58,6 +62,7 @@ class CommandWatchdog {
   void run(std::int64_t now_ns, Fault fault) noexcept;
 
   std::int64_t timeout_ns_;
+  std::int64_t longest_ahead_ns_;
   double longest_fault_s_;
   State state_ = State::disarmed;
   Reason reason_ = Reason::none;

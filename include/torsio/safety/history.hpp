@@ -15,8 +15,8 @@ class History {
   /// @throws Error if there is no row or column, or more than 10^7 numbers.
   History(std::size_t rows, std::size_t columns);
 
-  /// Keeps a row, in place of the oldest one. A row of another size, and every row after `freeze`, is
-  /// ignored.
+  /// Keeps a row, in place of the oldest one. A row of another size, and every row after `freeze`,
+  /// is ignored.
   void record(std::span<const double> row) noexcept TORSIO_REALTIME;
   /// Keeps what is recorded until `reset`.
   void freeze() noexcept { is_frozen_ = true; }

@@ -30,8 +30,9 @@ enum class MonitorCheck : std::uint8_t {
   wrap,             ///< an angle changed by a turn of its encoder
   frozen,           ///< a signal does not change while one that is connected to it moves
   period,           ///< the loop is late, or its clock runs backwards
+  requested,        ///< none of these: a stop from outside, or nothing was found
 };
-inline constexpr std::size_t kMonitorChecks = 14;
+inline constexpr std::size_t kMonitorChecks = 14;  ///< without `requested`, which has no action
 
 /// What happens when a check finds something.
 enum class MonitorAction : std::uint8_t { off, warn, stop };
@@ -44,7 +45,8 @@ struct MonitoredSignal {
   double largest_rate = std::numeric_limits<double>::infinity();  ///< in its unit per second
   double longest_age_s = std::numeric_limits<double>::infinity();
   double turn = 0.0;  ///< by which its encoder wraps around; 0: it does not
-  /// A signal that cannot move without this one: "gear_angle_rad" of "motor_angle_rad". Empty: none.
+  /// A signal that cannot move without this one: "gear_angle_rad" of "motor_angle_rad". Empty:
+  /// none.
   std::string moves_with = {};
   /// How far that one may move, in its unit, without a change of this one.
   double largest_hidden_travel = std::numeric_limits<double>::infinity();
@@ -59,8 +61,8 @@ struct PairLimits {
   double factor = 6.0;
   double floor_Nm = 0.0;
   double ceiling_Nm = std::numeric_limits<double>::infinity();
-  /// While the error bars make the threshold larger than this, the monitor is not ready: the pair could not find
-  /// what it has to.
+  /// While the error bars would make the threshold larger than this without the ceiling, the
+  /// monitor is not ready: the pair could miss the disagreement that it has to detect.
   double largest_armed_Nm = std::numeric_limits<double>::infinity();
   /// For the cumulative sum: the share of the threshold that is not counted, and the sum in seconds
   /// times threshold at which it reports.
@@ -77,18 +79,21 @@ struct MonitorSettings {
   std::array<MonitorAction, kMonitorChecks> actions = default_actions();
   double persistence_s = 5e-3;  ///< how long a difference must exceed its threshold
   double release_share = 0.8;   ///< below this share of the threshold, it has ended
-  double longest_loss_s = 0.5;  ///< how long a lost source is only a warning
-  /// How long a source may report a fault of its model or range. Four samples without one compensate for
-  /// one with it, so that a fault that comes and goes is found as well.
+  /// How long a lost source is only a warning, how long a source may report a fault of its model or
+  /// range, and how long one may warm up (then it is a `source_fault`). Of each, four samples
+  /// without it compensate for one with it, so that one that comes and goes is found as well.
+  double longest_loss_s = 0.5;
   double longest_fault_s = 0.015;
+  double longest_warm_up_s = 10.0;
   double largest_novelty = std::numeric_limits<double>::infinity();
   double sample_period_s = 1e-3;
   std::uint32_t longest_overrun = 3;  ///< so many late ticks in a row are a fault
-  /// So many samples beyond range or rate are a fault: one is passed over. Those before count if the
-  /// samples between were good for `spike_memory_s` at most.
+  /// So many samples beyond range or rate are a fault: one is passed over. Those before count if
+  /// the samples between were good for `spike_memory_s` at most.
   std::uint32_t spikes_in_a_row = 2;
   double spike_memory_s = 0.02;
   double proof_s = 0.05;  ///< how long every check must be silent before the joint may move
+  double longest_command_age_s = 1.0;  ///< age of a command that arms
 
   /// stop, but warn for source_lost (which stops after `longest_loss_s`) and novelty.
   static std::array<MonitorAction, kMonitorChecks> default_actions() noexcept;
@@ -97,11 +102,11 @@ struct MonitorSettings {
 /// A finding of a monitor, in numbers.
 struct MonitorEvent {
   double t_s = 0.0;
-  MonitorCheck check = MonitorCheck::disagreement;
-  MonitorAction action = MonitorAction::off;
-  std::uint8_t first = 0;   ///< index of the source or signal
-  std::uint8_t second = 0;  ///< the other source of a pair, else equal to `first`
-  double value = 0.0;       ///< what was found, and its limit
+  MonitorCheck check = MonitorCheck::requested;
+  MonitorAction action = MonitorAction::off;  ///< off: nothing was found
+  std::uint8_t first = 0;                     ///< index of the source or signal
+  std::uint8_t second = 0;                    ///< the other source of a pair, else equal to `first`
+  double value = 0.0;                         ///< what was found, and its limit
   double limit = 0.0;
 };
 
@@ -111,6 +116,14 @@ struct SignalSample {
   double age_s = 0.0;  ///< since its sensor measured it, by the clock of the loop
 };
 
+namespace detail {
+/// Cumulative sums of the difference of a pair, in seconds times threshold.
+struct DriftSums {
+  double up_s = 0.0;
+  double down_s = 0.0;
+};
+}  // namespace detail
+
 /// Decides in every tick whether a joint may move with the torque that its sources estimate.
 ///
 ///     unproven  --every check silent for proof_s, and armed-->  watching
@@ -118,36 +131,42 @@ struct SignalSample {
 ///
 /// A stop is latched: only `reset` ends it, and the joint may move again after the proof and `arm`
 /// with a command that was written after the reset. Valid sources that disagree stop the joint,
-/// without a vote. Only `is_watching()` permits torque; what a stop does is a matter of `JointStop` and of
-/// the brake.
+/// without a vote. Only `is_watching()` permits torque; what a stop does is a matter of `JointStop`
+/// and of the brake.
 ///
-/// - disagreement: |t_i - t_j| > clamp(factor sqrt(s_i^2 + s_j^2 - 2 R_ij s_i s_j), floor, ceiling) =: h for
-///   `persistence_s`, with hysteresis: it ends below `release_share` h.
+/// - disagreement: |t_i - t_j| > clamp(factor sqrt(s_i^2 + s_j^2 - 2 R_ij s_i s_j), floor, ceiling)
+///   =: h for `persistence_s`, with hysteresis: it ends below `release_share` h.
 /// - drift: S <- max(0, S + ((t_i - t_j) / h - drift_allowance) T) > drift_limit_s, on either side.
 /// - sign: t_i and t_j have opposite signs and min(|t_i|, |t_j|) > h / 2 for `persistence_s`.
 /// - frozen: the signal keeps exactly one value while its companion travels further than
 ///   `largest_hidden_travel`; at rest there is no travel.
 ///
-/// The monitor is not ready while a pair's h > largest_armed, as long as the friction of a drive is unknown.
+/// The monitor is not ready while a pair's h, without the ceiling, is above largest_armed, as long
+/// as the friction of a drive is unknown.
 ///
-/// Every comparison is written so that NaN is a fault. Source: specification 3.9 for the residuals; Page
-/// 1954 for the cumulative sum; states and checks are ours.
+/// Every comparison is written so that NaN is a fault, but that of the novelty, which most models do
+/// not have. Source: specification 3.9 for the residuals; Page 1954 for the cumulative sum; states
+/// and checks are ours.
 class Monitor {
  public:
   static constexpr std::size_t kMaxSources = 8;
   static constexpr std::size_t kMaxSignals = 16;
   static constexpr std::size_t kMaxPairs = kMaxSources * (kMaxSources - 1) / 2;
+  static constexpr std::size_t kMaxFindings = 32;  ///< in one tick that are kept
 
   enum class State : std::uint8_t { unproven, ready, watching, stopped };
 
   /// @throws Error if a name, an index or a limit is not valid.
   explicit Monitor(MonitorSettings settings);
 
-  /// The operator permits motion. Without effect unless the state is `ready` and the time of the command
-  /// is finite and later than the last reset. @returns whether it watches now
+  /// The operator permits motion. Without effect unless the state is `ready` and the command was
+  /// written after the last reset, at most `longest_command_age_s` before the last tick and a
+  /// period after it.
+  /// @returns whether it watches now
   bool arm(double command_written_s) noexcept TORSIO_REALTIME;
-  /// Ends a stop. Nothing moves before the proof and `arm`; after a reset at a time that is not finite,
-  /// not before another reset either.
+  /// Ends a stop. Nothing moves before the proof and `arm`; after a reset at a time that is not
+  /// finite, not before another reset either. A time that is not between the ticks before and after
+  /// the reset (another clock) is replaced by that of the tick after it.
   void reset(double t_s) noexcept TORSIO_REALTIME;
   /// A stop from outside.
   void stop(double t_s) noexcept TORSIO_REALTIME;
@@ -161,7 +180,14 @@ class Monitor {
   [[nodiscard]] bool is_watching() const noexcept { return state_ == State::watching; }
   /// Checks that found something in the last tick: bit (int)check.
   [[nodiscard]] std::uint32_t active() const noexcept { return active_; }
-  /// The first finding of the last stop; `action` is off if there was none.
+  /// What was found in the last tick, the first ones if there are more than `kMaxFindings`.
+  [[nodiscard]] std::span<const MonitorEvent> findings() const noexcept {
+    return std::span(findings_).first(findings_count_);
+  }
+  /// In the last tick the error bars made the threshold of a pair larger than its
+  /// `largest_armed_Nm`.
+  [[nodiscard]] bool is_threshold_too_large() const noexcept { return is_threshold_too_large_; }
+  /// The first finding of the last stop; of a stop from outside the check is `requested`.
   [[nodiscard]] const MonitorEvent& reason() const noexcept { return reason_; }
   /// The most recent finding of any check, warnings included.
   [[nodiscard]] const MonitorEvent& latest() const noexcept { return latest_; }
@@ -181,15 +207,16 @@ class Monitor {
     bool has_last = false;
   };
   struct SourceState {
-    std::uint32_t lost = 0;    ///< samples in a row, here and below
-    std::uint32_t faulty = 0;  ///< quarters of samples, less one for each without a fault
-    std::uint32_t novel = 0;
+    // Quarters of samples, less one for each sample without it.
+    std::uint32_t lost = 0;
+    std::uint32_t faulty = 0;
+    std::uint32_t warming_up = 0;
+    std::uint32_t novel = 0;  ///< samples in a row
   };
   struct PairState {
     std::uint32_t beyond = 0;
     std::uint32_t opposite = 0;
-    double drift_up_s = 0.0;
-    double drift_down_s = 0.0;
+    detail::DriftSums drift;
     bool disagrees = false;
   };
 
@@ -200,9 +227,11 @@ class Monitor {
   void check_change(std::size_t i, const SignalSample& sample) noexcept TORSIO_REALTIME;
   void check_frozen(std::size_t i) noexcept TORSIO_REALTIME;
   void check_source(std::size_t i, const Estimate& estimate) noexcept TORSIO_REALTIME;
+  void check_novelty(std::size_t i, const Estimate& estimate) noexcept TORSIO_REALTIME;
+  /// Counts one sample. @returns whether the condition has lasted for too long
+  [[nodiscard]] bool count(std::uint32_t& quarters, bool is_present,
+                           double longest_s) const noexcept TORSIO_REALTIME;
   void check_pair(std::size_t i, std::span<const Estimate> sources) noexcept TORSIO_REALTIME;
-  [[nodiscard]] double threshold(const PairLimits& pair, double first_Nm,
-                                 double second_Nm) const noexcept TORSIO_REALTIME;
   void decide(double t_s) noexcept TORSIO_REALTIME;
 
   MonitorSettings settings_;
@@ -213,6 +242,8 @@ class Monitor {
   std::array<std::array<double, kMaxSources>, kMaxSources> correlation_{};
   std::array<std::array<std::uint8_t, 2>, kMaxPairs> disagreeing_{};
   std::size_t disagreeing_count_ = 0;
+  std::array<MonitorEvent, kMaxFindings> findings_{};
+  std::size_t findings_count_ = 0;
   State state_ = State::unproven;
   MonitorEvent reason_;
   MonitorEvent latest_;
@@ -222,8 +253,9 @@ class Monitor {
   double t_s_ = 0.0;
   std::uint32_t late_ = 0;
   double silent_since_s_ = kNotMeasured;
-  bool is_threshold_too_large_ = false;  ///< in this tick, of a pair
+  bool is_threshold_too_large_ = false;
   double reset_t_s_ = -std::numeric_limits<double>::infinity();
+  double before_reset_s_ = -std::numeric_limits<double>::infinity();  ///< last tick before it
 };
 
 /// The enumerators' own spelling.

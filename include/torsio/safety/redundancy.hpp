@@ -15,8 +15,8 @@ namespace torsio {
 /// One estimate of the joint torque, and what it depends on.
 struct TorqueSource {
   std::string name;  ///< "current", "gear", "spring"
-  /// Encoders, sensors, supply, clock, calibration: names of parts whose fault changes this estimate.
-  /// Sources that list the same name can fail together.
+  /// Encoders, sensors, supply, clock, calibration: names of parts whose fault changes this
+  /// estimate. Sources that list the same name can fail together.
   std::vector<std::string> depends_on;
 };
 
@@ -35,9 +35,12 @@ struct FusedTorque {
   double value_Nm = 0.0;  ///< finite in every case; the last one where no source is valid
   double std_dev_Nm = kNotMeasured;
   SourceSet used = 0;  ///< the valid sources
-  PartSet not_redundant =
-      0;  ///< parts on which every valid source depends: no comparison covers them
+  /// Parts on which every valid source depends: no comparison covers them.
+  PartSet not_redundant = 0;
   Fault fault = Fault::none;  ///< input_not_finite where no source is valid
+  /// A channel had a spike in this tick, and the sources were given an extrapolated sample in its
+  /// place (`MonitoredTorque`; the error bar does not contain this).
+  bool has_replaced_input = false;
 };
 
 /// Combines estimates of one torque by their error bars:
@@ -50,18 +53,18 @@ struct FusedTorque {
 /// error bar never becomes narrower when a source is lost.
 ///
 /// A source is left out only if it reports itself invalid: a fault, a value that is not finite, an
-/// error bar that is not finite or not positive. Valid sources that disagree are all used: which of them is wrong is not decided here
-/// (`Monitor` stops the joint), since two sources with a common part can agree on a wrong torque.
-/// Source: paper 000, section 6.4, compares three estimates; the combination is ours (minimum variance,
-/// as in Maybeck 1979).
+/// error bar that is not finite or not positive. Valid sources that disagree are all used: which of
+/// them is wrong is not decided here (`Monitor` stops the joint), since two sources with a common
+/// part can agree on a wrong torque. Source: paper 000, section 6.4, compares three estimates; the
+/// combination is ours (minimum variance, as in Maybeck 1979).
 class Redundancy {
  public:
   static constexpr std::size_t kMaxSources = 8;
   static constexpr std::size_t kMaxParts = 32;
 
-  /// @throws Error for no sources or more than `kMaxSources`, names that are empty or used twice, parts
-  /// without a name or more than `kMaxParts` of them, or a correlation that is not a correlation matrix (size, ones on the
-  /// diagonal, symmetric, positive definite).
+  /// @throws Error for no sources or more than `kMaxSources`, names that are empty or used twice,
+  /// parts without a name or more than `kMaxParts` of them, or a correlation that is not a
+  /// correlation matrix (size, ones on the diagonal, symmetric, positive definite).
   explicit Redundancy(const RedundancySettings& settings);
 
   /// @param sources one estimate for each source; of another size, none is used
@@ -83,7 +86,8 @@ class Redundancy {
  private:
   using Row = std::array<double, kMaxSources>;
 
-  /// The smallest variance in units of the smallest error bar, and with which weights it is reached.
+  /// The smallest variance in units of the smallest error bar, and with which weights it is
+  /// reached.
   /// @param precision smallest error bar divided by that of each source; 0 if it is not valid
   /// @param u output: weights divided by `precision`
   double minimise(SourceSet valid, const Row& precision, Row& u) const noexcept;

@@ -9,6 +9,7 @@
 #include "evaluate/monitor/exceedance.hpp"
 #include "evaluate/monitor/source_run.hpp"
 #include "numerics/quantile.hpp"
+#include "safety/pair_difference.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
@@ -22,6 +23,7 @@ constexpr double kSecondsPerHour = 3600.0;
 constexpr double kLargestGuardedShare = 0.01;
 constexpr double kArmedShare = 0.8;    // threshold that is armed, over the required disagreement
 constexpr double kRangeMargin = 0.25;  // margin on either side, over the range in the recordings
+constexpr double kCeilingMargin = 1.25;
 constexpr double kDriftWindow_s = 60.0;
 /// The correlation is known only from a finite record: it is taken a little towards none.
 constexpr double kCorrelationShare = 0.95;
@@ -86,68 +88,97 @@ class PairStatistics {
   PairStatistics(PairLimits pair, double correlation, double rate_Hz, double persistence_s)
       : pair_(pair),
         correlation_(correlation),
-        window_(samples_of(persistence_s, rate_Hz)),
+        period_s_(1.0 / rate_Hz),
+        // A difference is found in the sample after those of the persistence.
+        window_(static_cast<std::size_t>(std::floor(persistence_s * rate_Hz + 1e-9))),
         small_(samples_of(kBlock_s, rate_Hz)),
         large_(samples_of(kBlock_s, rate_Hz)) {}
 
   void see_spread(const std::vector<SourceRun>& runs) {
     constexpr std::size_t kEvery = 97;  // the median needs no more
     for (std::size_t n = 0; n < runs[0].value_Nm.size(); n += kEvery)
-      if (runs[pair_.first].is_valid(n) && runs[pair_.second].is_valid(n))
-        spreads_.push_back(spread(runs, n));
+      if (is_valid(runs, n)) spreads_.push_back(spread(runs, n));
   }
 
+  // A difference is found if |d| > floor and |d| > factor s in a whole window. What persists is
+  // therefore taken of each, and one of the two has to be prevented: which one is decided by s at
+  // the end of the window.
   void see_differences(const std::vector<SourceRun>& runs) {
     if (std::isnan(median_Nm_)) median_Nm_ = quantile(spreads_, 0.5);
     const std::size_t samples = runs[0].value_Nm.size();
-    std::vector<double> small(samples, kNotMeasured);
-    std::vector<double> large(samples, kNotMeasured);
+    std::vector<double> sizes(samples, kNotMeasured);
+    std::vector<double> shares(samples, kNotMeasured);
     for (std::size_t n = 0; n < samples; ++n) {
-      if (!runs[pair_.first].is_valid(n) || !runs[pair_.second].is_valid(n)) continue;
-      const double size_Nm = std::abs(difference(runs, n));
-      const double spread_Nm = spread(runs, n);
-      (spread_Nm <= median_Nm_ ? small : large)[n] =
-          spread_Nm <= median_Nm_ ? size_Nm : size_Nm / spread_Nm;
-      largest_Nm_ = std::max(largest_Nm_, size_Nm);
+      if (!is_valid(runs, n)) continue;
+      sizes[n] = std::abs(difference(runs, n));
+      shares[n] = sizes[n] > 0.0 ? sizes[n] / spread(runs, n) : 0.0;
+      largest_Nm_ = std::max(largest_Nm_, sizes[n]);
     }
-    small_.add(persisting(small, window_));
-    large_.add(persisting(large, window_));
+    sizes = persisting(sizes, window_);
+    shares = persisting(shares, window_);
+    for (std::size_t n = 0; n < samples; ++n)
+      (is_valid(runs, n) && spread(runs, n) <= median_Nm_ ? shares : sizes)[n] = kNotMeasured;
+    small_.add(sizes);
+    large_.add(shares);
   }
 
   /// @param share of the blocks in which the pair may exceed its threshold
   /// @param least_Nm the smallest threshold
   /// @param required_Nm see `CalibrationOptions`
   void set_thresholds(double share, double least_Nm, double required_Nm) {
-    pair_.floor_Nm = std::max(small_.threshold(share), least_Nm);
+    const double small_Nm = small_.threshold(share);
+    is_factor_from_floor_ = large_.size() < kLeastBlocks;
+    pair_.floor_Nm = std::max(small_Nm, least_Nm);
     pair_.largest_armed_Nm = std::max(kArmedShare * required_Nm, 1.1 * pair_.floor_Nm);
-    pair_.factor = std::max(large_.threshold(share), 1.0);
+    pair_.factor =
+        std::max(is_factor_from_floor_ ? small_Nm / median_Nm_ : large_.threshold(share), 1.0);
   }
 
-  void see_drift(const std::vector<SourceRun>& runs, double rate_Hz) {
-    const std::size_t window = samples_of(kDriftWindow_s, rate_Hz);
+  /// The largest threshold while the pair is watched, which begins when it is narrow enough to be
+  /// armed.
+  void see_thresholds(const std::vector<SourceRun>& runs) {
+    bool is_watched = false;
+    for (std::size_t n = 0; n < runs[0].value_Nm.size(); ++n) {
+      if (!is_valid(runs, n)) continue;
+      const double threshold_Nm = detail::threshold_without_ceiling(pair_, spread(runs, n));
+      is_watched = is_watched || threshold_Nm <= pair_.largest_armed_Nm;
+      if (is_watched) largest_threshold_Nm_ = std::max(largest_threshold_Nm_, threshold_Nm);
+    }
+  }
+  void set_ceiling(const std::vector<TorqueSource>& sources) {
+    if (largest_threshold_Nm_ == 0.0)
+      throw Error({.place = fmt::format("pair {}, {}", sources[pair_.first].name,
+                                        sources[pair_.second].name),
+                   .expected = fmt::format("recordings in which the error bars permit a threshold "
+                                           "of at most {:.3g} Nm at least once",
+                                           pair_.largest_armed_Nm),
+                   .found = "none: the monitor would never be ready",
+                   .advice = "require a larger disagreement, or record a motion after which the "
+                             "friction is known"});
+    pair_.ceiling_Nm = kCeilingMargin * largest_threshold_Nm_;
+  }
+
+  void see_drift(const std::vector<SourceRun>& runs) {
+    const std::size_t window = samples_of(kDriftWindow_s, 1.0 / period_s_);
     double sum = 0.0;
     std::size_t seen = 0;
-    for (std::size_t n = 0; n < runs[0].value_Nm.size(); ++n) {
-      if (!runs[pair_.first].is_valid(n) || !runs[pair_.second].is_valid(n)) continue;
-      sum += difference(runs, n) / threshold(runs, n);
-      if (++seen < window) continue;
+    each_share(runs, [&](double share, bool is_watched) {
+      if (!is_watched) return;
+      sum += share;
+      if (++seen < window) return;
       largest_mean_ = std::max(largest_mean_, std::abs(sum) / static_cast<double>(seen));
       sum = 0.0;
       seen = 0;
-    }
+    });
   }
   void set_allowance() { pair_.drift_allowance = std::clamp(1.2 * largest_mean_, 0.75, 0.95); }
 
-  void see_sums(const std::vector<SourceRun>& runs, double rate_Hz) {
-    double up_s = 0.0;
-    double down_s = 0.0;
-    for (std::size_t n = 0; n < runs[0].value_Nm.size(); ++n) {
-      if (!runs[pair_.first].is_valid(n) || !runs[pair_.second].is_valid(n)) continue;
-      const double share = difference(runs, n) / threshold(runs, n);
-      up_s = std::max(0.0, up_s + (share - pair_.drift_allowance) / rate_Hz);
-      down_s = std::max(0.0, down_s + (-share - pair_.drift_allowance) / rate_Hz);
-      largest_sum_s_ = std::max({largest_sum_s_, up_s, down_s});
-    }
+  void see_sums(const std::vector<SourceRun>& runs) {
+    detail::DriftSums sums;
+    each_share(runs, [&](double share, bool is_watched) {
+      detail::add_to_drift(sums, share, pair_, period_s_);
+      if (is_watched) largest_sum_s_ = std::max({largest_sum_s_, sums.up_s, sums.down_s});
+    });
   }
 
   [[nodiscard]] PairLimits limits() const {
@@ -156,40 +187,52 @@ class PairStatistics {
     return pair;
   }
   [[nodiscard]] CalibratedPair report(const std::vector<TorqueSource>& sources) const {
-    const double largest_threshold_Nm =
-        std::max(pair_.floor_Nm, pair_.factor * quantile(spreads_, 1.0));
     return {.first = sources[pair_.first].name,
             .second = sources[pair_.second].name,
             .largest_difference_Nm = largest_Nm_,
-            .typical_threshold_Nm = std::max(pair_.floor_Nm, pair_.factor * median_Nm_),
-            .surely_detected_Nm = largest_Nm_ + largest_threshold_Nm};
+            .typical_threshold_Nm = detail::threshold_without_ceiling(pair_, median_Nm_),
+            .detected_in_these_states_Nm = largest_Nm_ + largest_threshold_Nm_,
+            .is_factor_from_floor = is_factor_from_floor_};
   }
-  [[nodiscard]] std::size_t blocks() const { return std::max(small_.size(), large_.size()); }
+  /// Blocks with small error bars, which are at least half of the samples.
+  [[nodiscard]] std::size_t blocks() const { return small_.size(); }
 
  private:
+  [[nodiscard]] bool is_valid(const std::vector<SourceRun>& runs, std::size_t n) const {
+    return runs[pair_.first].is_valid(n) && runs[pair_.second].is_valid(n);
+  }
   [[nodiscard]] double difference(const std::vector<SourceRun>& runs, std::size_t n) const {
     return runs[pair_.first].value_Nm[n] - runs[pair_.second].value_Nm[n];
   }
   [[nodiscard]] double spread(const std::vector<SourceRun>& runs, std::size_t n) const {
-    const double first_Nm = runs[pair_.first].std_dev_Nm[n];
-    const double second_Nm = runs[pair_.second].std_dev_Nm[n];
-    return std::sqrt(std::max(0.0, first_Nm * first_Nm + second_Nm * second_Nm -
-                                       2.0 * correlation_ * first_Nm * second_Nm));
+    return detail::difference_std_dev(runs[pair_.first].std_dev_Nm[n],
+                                      runs[pair_.second].std_dev_Nm[n], correlation_);
   }
-  [[nodiscard]] double threshold(const std::vector<SourceRun>& runs, std::size_t n) const {
-    return std::max(pair_.floor_Nm, pair_.factor * spread(runs, n));
+  /// Difference over threshold of each valid sample, and whether the pair is watched.
+  template <class See>
+  void each_share(const std::vector<SourceRun>& runs, const See& see) const {
+    bool is_watched = false;
+    for (std::size_t n = 0; n < runs[0].value_Nm.size(); ++n) {
+      if (!is_valid(runs, n)) continue;
+      const double threshold_Nm = detail::threshold_without_ceiling(pair_, spread(runs, n));
+      is_watched = is_watched || threshold_Nm <= pair_.largest_armed_Nm;
+      see(difference(runs, n) / std::min(threshold_Nm, pair_.ceiling_Nm), is_watched);
+    }
   }
 
   PairLimits pair_;
   double correlation_;
+  double period_s_;
   std::size_t window_;
   BlockMaxima small_;  ///< |d| where the error bars are small
   BlockMaxima large_;  ///< |d| / s where they are large
   std::vector<double> spreads_;
   double median_Nm_ = kNotMeasured;
   double largest_Nm_ = 0.0;
+  double largest_threshold_Nm_ = 0.0;
   double largest_mean_ = 0.0;
   double largest_sum_s_ = 0.0;
+  bool is_factor_from_floor_ = false;
 };
 
 /// The limits of the signals.
@@ -426,9 +469,11 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
                                            kBlock_s * static_cast<double>(kLeastBlocks)),
                    .found = fmt::format("{:.0f} s", static_cast<double>(samples) / rate_Hz)});
     pair.set_thresholds(share, options.least_threshold_Nm, options.required_Nm);
-    for (const std::vector<SourceRun>& runs : recorded) pair.see_drift(runs, rate_Hz);
+    for (const std::vector<SourceRun>& runs : recorded) pair.see_thresholds(runs);
+    pair.set_ceiling(plan.sources);
+    for (const std::vector<SourceRun>& runs : recorded) pair.see_drift(runs);
     pair.set_allowance();
-    for (const std::vector<SourceRun>& runs : recorded) pair.see_sums(runs, rate_Hz);
+    for (const std::vector<SourceRun>& runs : recorded) pair.see_sums(runs);
     result.monitor.pairs.push_back(pair.limits());
     result.pairs.push_back(pair.report(plan.sources));
   }

@@ -5,6 +5,7 @@
 #include <deque>
 
 #include "numerics/quantile.hpp"
+#include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
@@ -16,13 +17,19 @@ constexpr double kLargestShape = 0.0;
 }  // namespace
 
 std::vector<double> persisting(std::span<const double> values, std::size_t window) {
-  std::vector<double> result(values.size());
-  std::deque<std::size_t> rising;  // samples of the window, each smaller than the later ones
+  struct Value {
+    double value;
+    std::size_t place;  ///< among the values that are not NaN
+  };
+  std::vector<double> result(values.size(), kNotMeasured);
+  std::deque<Value> rising;  // values of the window, each smaller than the later ones
+  std::size_t seen = 0;
   for (std::size_t n = 0; n < values.size(); ++n) {
-    while (!rising.empty() && !(values[rising.back()] < values[n])) rising.pop_back();
-    rising.push_back(n);
-    if (rising.front() + window < n) rising.pop_front();
-    result[n] = values[rising.front()];
+    if (std::isnan(values[n])) continue;
+    while (!rising.empty() && rising.back().value >= values[n]) rising.pop_back();
+    rising.push_back({values[n], seen});
+    if (rising.front().place + window < seen) rising.pop_front();
+    if (++seen > window) result[n] = rising.front().value;
   }
   return result;
 }

@@ -7,7 +7,9 @@
 
 namespace torsio {
 
-/// The largest value that each sample and the `window` before it all reach: what persists.
+/// The largest value that each sample and the `window` before it all reach: what persists. NaN is
+/// no sample and does not end a window, as `Monitor` continues its counts over invalid sources; NaN
+/// for it, and until there have been `window` + 1 samples.
 [[nodiscard]] std::vector<double> persisting(std::span<const double> values, std::size_t window);
 
 /// The maxima of a statistic over blocks of equal length, and the threshold that it exceeds at a
@@ -24,11 +26,12 @@ class BlockMaxima {
   [[nodiscard]] std::size_t size() const noexcept { return maxima_.size(); }
   [[nodiscard]] double largest() const noexcept { return largest_; }
 
-  /// The threshold that is exceeded in a share `share` of the blocks: u + s/xi ((p / share)^xi - 1), the
-  /// generalised Pareto tail of the maxima above their 90 % quantile u (p the share of those; shape xi and
-  /// scale s by moments, xi limited to -0.4 to 0, and 0 for fewer than 30 of them); at least 1.05 times the
-  /// largest one. 0 if there is no block. Differences of torques are bounded: an exponential
-  /// tail (xi = 0) is the heaviest one, and a larger xi is an error of its estimate.
+  /// The threshold that is exceeded in a share `share` of the blocks: u + s/xi ((p / share)^xi -
+  /// 1), the generalised Pareto tail of the maxima above their 90 % quantile u (p the share of
+  /// those; shape xi and scale s by moments, xi limited to -0.4 to 0, and 0 for fewer than 30 of
+  /// them); at least 1.05 times the largest one. 0 if there is no block. Differences of torques are
+  /// bounded: an exponential tail (xi = 0) is the heaviest one, and a larger xi is an error of its
+  /// estimate.
   [[nodiscard]] double threshold(double share) const;
 
  private:

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
+#include <span>
 #include <utility>
 
 #include "core/report_progress.hpp"
@@ -40,18 +43,40 @@ class RawChannels {
   double period_s_;
 };
 
-/// The findings that begin in a tick, of a monitor that has just been stepped.
+bool is_same(const MonitorEvent& a, const MonitorEvent& b) {
+  return a.check == b.check && a.first == b.first && a.second == b.second;
+}
+
+/// The findings that begin, or become a stop, in a tick, of a monitor that has just been stepped.
 class Findings {
  public:
   void add(const Monitor& monitor, std::vector<MonitorEvent>& events) {
-    const std::uint32_t begun = monitor.active() & ~active_;
-    active_ = monitor.active();
-    if (begun != 0) events.push_back(monitor.latest());
+    const std::span<const MonitorEvent> found = monitor.findings();
+    for (const MonitorEvent& event : found) {
+      const auto is_known = [&](const MonitorEvent& of) {
+        return is_same(of, event) && of.action == event.action;
+      };
+      if (std::ranges::none_of(last_, is_known)) events.push_back(event);
+    }
+    last_.assign(found.begin(), found.end());
   }
 
  private:
-  std::uint32_t active_ = 0;
+  std::vector<MonitorEvent> last_;
 };
+
+/// What prevents a monitor that has just been stepped from being ready.
+void add_not_ready(const Monitor& monitor, MonitorReplay& replay) {
+  const double period_s = monitor.settings().sample_period_s;
+  if (monitor.is_threshold_too_large()) replay.threshold_too_large_s += period_s;
+  for (const MonitorEvent& event : monitor.findings()) {
+    auto known = std::ranges::find_if(replay.not_ready,
+                                      [&](const auto& of) { return is_same(of.event, event); });
+    if (known == replay.not_ready.end()) known = replay.not_ready.insert(known, {.event = event});
+    known->event = event;
+    known->present_s += period_s;
+  }
+}
 
 }  // namespace
 
@@ -76,7 +101,8 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
       .estimated = {.channels = Recording(recording.name(), rate_Hz, recording.time_s(0)),
                     .faults = {}},
       .events = {},
-      .suspects = {}};
+      .suspects = {},
+      .not_ready = {}};
   replay.estimated.faults.reserve(samples);
   const DenormalsOff denormals_off;
   take_zeros(monitored.sources(), recording);
@@ -90,6 +116,7 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
     const FusedTorque torque = monitored.step(t_s, raw.at(n));
     Monitor& monitor = monitored.monitor();
     if (monitor.state() == Monitor::State::ready && monitor.arm(t_s)) replay.watching_from_s = t_s;
+    if (std::isnan(replay.watching_from_s)) add_not_ready(monitor, replay);
     std::size_t column = 0;
     columns[column++].values.push_back(torque.value_Nm);
     columns[column++].values.push_back(torque.std_dev_Nm);
@@ -101,14 +128,14 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
     findings.add(monitor, replay.events);
     if (monitor.state() != Monitor::State::stopped) continue;
     replay.stopped_at_s = t_s;
-    if (replay.events.empty() || replay.events.back().check != monitor.reason().check)
-      replay.events.push_back(monitor.reason());
     const Redundancy& redundancy = monitored.redundancy();
     // A part of all sources, such as the supply, is one of every pair and explains nothing.
     PartSet of_all = ~PartSet{0};
     for (std::size_t i = 0; i < monitored.sources().size(); ++i) of_all &= redundancy.parts_of(i);
     replay.suspects = redundancy.names(redundancy.suspects(monitor.disagreeing()) & ~of_all);
   }
+  std::ranges::stable_sort(replay.not_ready, std::ranges::greater{},
+                           &MonitorReplay::NotReady::present_s);
   for (const std::string& name : monitored.raw_inputs())
     replay.estimated.channels.add({.name = name, .values = recording.channel(name).values});
   for (Channel& column : columns) replay.estimated.channels.add(std::move(column));

@@ -20,8 +20,8 @@ struct SourceRun {
   }
 };
 
-/// A zero that was subtracted from the recording is not subtracted again. Without effect on channels that the
-/// sources do not read.
+/// A zero that was subtracted from the recording is not subtracted again. Without effect on
+/// channels that the sources do not read.
 void take_zeros(TorqueSources& sources, const Recording& recording);
 
 /// All sources over a recording, from `reset()`. @throws Error if a channel is missing.

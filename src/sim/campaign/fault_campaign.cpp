@@ -27,7 +27,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kVersion = 3;  // version of the results of units
+constexpr int kResultVersion = 4;  // version of the results of units
 constexpr std::size_t kInjectionsAUnit = 32;
 constexpr std::size_t kJointsAUnit = 16;
 constexpr double kUnitHours = 1.0;  // hours of each joint
@@ -81,6 +81,13 @@ void check(const CampaignSettings& settings, const std::vector<CampaignGroup>& g
             static_cast<double>(value));
   };
   require(!groups.empty(), "groups", "at least one", 0.0);
+  if (!settings.resume.empty())
+    for (const CampaignGroup& group : groups)
+      if (group.monitor_hash.empty())
+        throw UsageError({.place = fmt::format("campaign: resume: {}", group.name),
+                          .expected = "what identifies its monitor: results of monitors that are "
+                                      "calibrated differently do not mix",
+                          .found = "no monitor_hash"});
   hours("fault-free hours", settings.fault_free_hours);
   hours("hours under little load", settings.low_load_hours);
   count("injections", settings.injections);
@@ -173,7 +180,7 @@ std::vector<WorkUnit> units_of(const std::vector<Group>& groups, const CampaignS
 }
 
 std::string campaign_identity(const std::vector<Group>& groups, const CampaignSettings& settings) {
-  Json identity{{"version", kVersion},
+  Json identity{{"version", kResultVersion},
                 {"seed", settings.seed},
                 {"injections", settings.injections},
                 {"injections_of_a_size", settings.injections_of_a_size},

@@ -96,7 +96,7 @@ class Classes {
     for (const Sensor& sensor : sensors_)
       if (sensor.value != &Measurement::motor_current_A) encoders_.push_back(sensor);
     add_encoder_classes();
-    add_current_classes(sheet);
+    add_current_classes();
     add_part_classes(sheet);
     add_signal_classes();
     add_loop_classes(monitored);
@@ -139,17 +139,20 @@ class Classes {
       });
   }
 
-  void add_current_classes(const DataSheet& /*sheet*/) {
+  void add_current_classes() {
     for (const Sensor& sensor : sensors_) {
       if (sensor.value != &Measurement::motor_current_A) continue;
-      add({.name = "torque constant", .row = 3, .limit_s = kDrift_s, .has_size = true},
-          [](Random& random, double size) {
-            const double over_s = random.uniform() < 0.5 ? 0.0 : between_powers(random, 0.1, 10.0);
-            return fault({.what = "torque-constant",
-                          .kind = FaultKind::drift,
-                          .amount = factor_for(random, size),
-                          .over_s = over_s});
-          });
+      const auto torque_constant = [](bool drifts) {
+        return [drifts](Random& random, double size) {
+          const double amount = factor_for(random, size);
+          return fault({.what = "torque-constant",
+                        .kind = FaultKind::drift,
+                        .amount = amount,
+                        .over_s = drifts ? between_powers(random, 0.1, 10.0) : 0.0});
+        };
+      };
+      add({.name = "torque constant", .row = 3, .has_size = true}, torque_constant(false));
+      add({.name = "drift torque constant", .row = 3, .limit_s = kDrift_s}, torque_constant(true));
       add({.name = "gain " + sensor.channel, .row = 4, .has_size = true}, [sensor](Random& random,
                                                                                    double size) {
         return fault(
@@ -226,7 +229,7 @@ class Classes {
         [encoders = encoders_](Random& random, double) {
           return fault({.what = one_of(encoders, random).channel,
                         .kind = FaultKind::zero,
-                        .duration_s = between(random, 0.2, 2.0)});
+                        .duration_s = between(random, 0.5, 5.0)});
         });
   }
 

@@ -36,8 +36,8 @@ struct FaultClass {
   double limit_s = 0.02;  ///< largest latency
   bool must_stop = true;  ///< false: the monitor must not stop
   bool has_size = false;  ///< there are smaller ones
-  /// The fault does not reach the position loop of the bench: at power-up the drive has an angle of its own, and
-  /// a single spike is passed over by a loop that reads the guarded signals.
+  /// The fault does not reach the position loop of the bench: at power-up the drive has an angle of
+  /// its own, and a single spike is passed over by a loop that reads the guarded signals.
   bool is_loop_sound = false;
   /// @param size of the disagreement, nominally, over the largest torque
   std::function<DrawnFault(Random& random, double size)> draw = {};

@@ -34,7 +34,7 @@ Run run_once(const Recording& recording, const MonitoredTorque& monitored) {
   std::vector<const std::vector<double>*> channels;
   for (const std::string& name : sources.raw_inputs())
     channels.push_back(&recording.channel(name).values);
-  const std::vector<double>& measured_Nm = recording.channel("torque_Nm").values;
+  const std::vector<double>& true_Nm = recording.channel("truth_torque_Nm").values;
   std::vector<double> raw(channels.size());
   const std::size_t count = sources.size();
   Run run{.squares = std::vector<double>(count, 0.0),
@@ -49,13 +49,13 @@ Run run_once(const Recording& recording, const MonitoredTorque& monitored) {
     if (!std::ranges::all_of(estimates, is_sound)) continue;
     ++run.samples;
     for (std::size_t i = 0; i < count; ++i) {
-      run.squares[i] += std::pow(estimates[i].value - measured_Nm[n], 2);
+      run.squares[i] += std::pow(estimates[i].value - true_Nm[n], 2);
       left.assign(estimates.begin(), estimates.end());
       left[i].fault = Fault::input_not_finite;
-      run.without_squares[i] += std::pow(redundancy.step(left).value_Nm - measured_Nm[n], 2);
+      run.without_squares[i] += std::pow(redundancy.step(left).value_Nm - true_Nm[n], 2);
     }
     const FusedTorque fused = redundancy.step(estimates);
-    const double error_Nm = std::abs(fused.value_Nm - measured_Nm[n]);
+    const double error_Nm = std::abs(fused.value_Nm - true_Nm[n]);
     run.fused_squares += error_Nm * error_Nm;
     run.within += error_Nm <= fused.std_dev_Nm ? 1 : 0;
     run.within_2 += error_Nm <= 2.0 * fused.std_dev_Nm ? 1 : 0;
@@ -93,7 +93,7 @@ FusedAccuracy fused_accuracy(const DataSheet& sheet, const MonitoredTorque& moni
   for (std::size_t r = 0; r < first_runs + runs; ++r) {
     report_progress(progress, static_cast<double>(r) / static_cast<double>(first_runs + runs),
                     "accuracy of the combined torque");
-    DutyRun work{.seed = seed + r, .duration_s = duration_s};
+    DutyRun work{.seed = seed + r, .duration_s = duration_s, .with_truth = true};
     work.settings.impacts_per_min = 0.0;
     const Run run = run_once(with_source_delay(duty_recording(sheet, work, progress)), monitored);
     if (run.samples == 0)

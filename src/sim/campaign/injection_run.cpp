@@ -96,7 +96,7 @@ struct Attempt {
   bool is_lasting = false;     ///< it has lasted as long as a stop may take, and counts
   std::size_t late_steps = 0;  ///< steps of the loop since an overrun began
   int watched_ticks = 0;       ///< after the onset of a fault at power-up
-  bool was_watching = false;   ///< at the injection
+  bool would_watch = false;    ///< with the sound signals, while that fault lasts
   bool is_done = false;
 };
 
@@ -172,12 +172,11 @@ class Injections {
 
   // A monitor that does not watch cannot be tested: another joint is taken.
   void begin(Attempt& of, Outcome& outcome) const {
-    of.was_watching = of.monitor.monitor().is_watching();
     outcome.disagreement = 0.0;
     outcome.energy_gain = kNotMeasured;
     outcome.near_impact = false;
     outcome.brief = 0;
-    if (!of.was_watching && run_.fault.onset != FaultOnset::start) {
+    if (!of.monitor.monitor().is_watching() && run_.fault.onset != FaultOnset::start) {
       outcome.kind = Outcome::Kind::unreached;
       of.is_done = true;
     }
@@ -245,18 +244,22 @@ class Injections {
     }
   }
 
-  // Not to be armed is right as long as the sensor is not; to watch is wrong from the onset on.
+  // Not to be armed is right as long as the sensor is not; to watch is wrong from the onset on. A
+  // joint whose monitor would not watch with the sound signals either shows nothing.
   static void decide_start(std::size_t tick, Attempt& of, Outcome& outcome) {
     const ScheduledFault& fault = of.drawn.faults.front();
     const bool is_faulty = static_cast<double>(tick) < *fault.duration_s * kBenchRate_Hz;
     const Monitor& monitor = of.monitor.monitor();
-    if (is_faulty && of.onset_tick && monitor.is_watching()) ++of.watched_ticks;
-    of.was_watching = of.was_watching || monitor.is_watching();
+    if (is_faulty && of.onset_tick) {
+      of.watched_ticks += monitor.is_watching() ? 1 : 0;
+      of.would_watch = of.would_watch || of.sound->monitor().is_watching();
+    }
     if (is_faulty) return;
     of.is_done = true;
     outcome.latency_ticks = of.watched_ticks;
-    outcome.check = static_cast<int>(monitor.latest().check);
-    if (!of.onset_tick) {
+    if (monitor.latest().action != MonitorAction::off)
+      outcome.check = static_cast<int>(monitor.latest().check);
+    if (!of.would_watch) {
       outcome.kind = Outcome::Kind::unreached;
     } else {
       outcome.kind = of.watched_ticks < static_cast<int>(ticks_of(kMissed_s))

@@ -41,8 +41,8 @@ struct InjectionRun {
   std::size_t count = 1;
   double limit_share =
       0.2;  ///< share of the rated torque: the disagreement from which latency counts
-  /// Nominal size of all; 0: random, 0.25 to 1, and again with a larger one where the disagreement did
-  /// not reach the limit.
+  /// Nominal size of all; 0: random, 0.25 to 1, and again with a larger one where the disagreement
+  /// did not reach the limit.
   double size = 0.0;
   bool is_electrical = false;
 };

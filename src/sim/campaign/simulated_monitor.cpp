@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <utility>
 
+#include "actuator/text_hash.hpp"
 #include "core/report_progress.hpp"
+#include "torsio/core/version.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/monitor_file.hpp"
 #include "torsio/sim/campaign.hpp"
@@ -31,6 +33,14 @@ DataSheet other_specimen(const DataSheet& joint, unsigned serial) {
 }
 
 }  // namespace
+
+std::string calibration_hash(const SimulatedCalibration& of) {
+  return fmt::format(
+      "{:016x}",
+      text_hash(fmt::format("{} {} {} {} {} {} {} {}", kVersion, of.seed, of.training_s,
+                            of.fault_free_hours, of.false_alarms_per_hour, of.least_threshold_share,
+                            of.required_share, of.spring_serial)));
+}
 
 std::vector<SourceModel> SimulatedMonitor::models() const {
   std::vector<SourceModel> models;

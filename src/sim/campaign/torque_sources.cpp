@@ -362,14 +362,14 @@ SourceModel FittedSource::model() const {
 }
 
 Recording with_source_delay(const Recording& recording) {
-  constexpr std::string_view kTorque = "torque_Nm";
-  FeaturePipeline delay({.inputs = {delayed(std::string(kTorque))}, .definitions = {}},
-                        recording.sample_rate_Hz());
   Recording result(recording.name(), recording.sample_rate_Hz(), recording.time_s(0));
   result.source = recording.source;
   for (Channel channel : recording.channels()) {
-    if (channel.name == kTorque)
+    if (channel.name == "torque_Nm" || channel.name == "truth_torque_Nm") {
+      FeaturePipeline delay({.inputs = {delayed("torque_Nm")}, .definitions = {}},
+                            recording.sample_rate_Hz());
       for (double& value : channel.values) value = delay.step({&value, 1})[0];
+    }
     result.add(std::move(channel));
   }
   return result;

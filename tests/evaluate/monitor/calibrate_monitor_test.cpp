@@ -34,7 +34,7 @@ TEST(CalibrateMonitor, ChoosesThresholdsAboveTheFaultFreeDifferences) {
   EXPECT_GT(monitor.pairs[0].largest_difference_Nm, 1.2);
   EXPECT_LT(monitor.pairs[0].typical_threshold_Nm, monitor.pairs[0].largest_difference_Nm);
   EXPECT_GT(monitor.pairs[0].typical_threshold_Nm, 0.05);
-  EXPECT_GT(monitor.pairs[0].surely_detected_Nm, monitor.pairs[0].largest_difference_Nm);
+  EXPECT_GT(monitor.pairs[0].detected_in_these_states_Nm, monitor.pairs[0].largest_difference_Nm);
   EXPECT_NEAR(monitor.hours, 5.0 / 60.0, 1e-9);
   EXPECT_FALSE(monitor.is_extrapolated);
   // Other fault-free data give no alarm.
@@ -110,6 +110,70 @@ TEST(CalibrateMonitor, NoThresholdIsBelowTheSmallestOne) {
   EXPECT_GE(limited.pairs[0].typical_threshold_Nm, least_Nm);
 }
 
+/// Two torques whose current has an error bar of 0.4 Nm below 3 Nm and of `above_Nm` from there on.
+CalibratedMonitor with_two_error_bars(double above_Nm, const CalibrationOptions& options) {
+  TwoTorques joint;
+  joint.current.settings.residuals = {.edges = {-1000.0, 3.0, 1000.0}, .std_dev = {0.4, above_Nm}};
+  return calibrate_monitor(joint.models(), TwoTorques::plan(), TwoTorques::fault_free(300.0),
+                           options);
+}
+
+TEST(CalibrateMonitor, ACeilingEndsTheGrowthOfAThreshold) {
+  const CalibratedMonitor monitor = with_two_error_bars(4.0, {.false_alarms_per_hour = 40.0});
+  const PairLimits& pair = monitor.monitor.pairs[0];
+  EXPECT_FALSE(monitor.pairs[0].is_factor_from_floor);
+  // The largest threshold of the recordings is detected in all their states, and the ceiling leaves
+  // a margin.
+  const double largest_Nm =
+      monitor.pairs[0].detected_in_these_states_Nm - monitor.pairs[0].largest_difference_Nm;
+  EXPECT_GT(largest_Nm, 2.0 * monitor.pairs[0].typical_threshold_Nm);
+  EXPECT_NEAR(pair.ceiling_Nm, 1.25 * largest_Nm, 1e-9);
+  EXPECT_THAT(calibration_text(monitor), HasSubstr("detected in these states Nm"));
+}
+
+// Samples at which the error bars change size were once each taken for a difference that persists.
+TEST(CalibrateMonitor, ADifferencePersistsAcrossAChangeOfTheErrorBars) {
+  const CalibratedMonitor one = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  const CalibratedMonitor two = with_two_error_bars(0.401, {.false_alarms_per_hour = 40.0});
+  EXPECT_NEAR(two.monitor.pairs[0].floor_Nm, one.monitor.pairs[0].floor_Nm,
+              0.2 * one.monitor.pairs[0].floor_Nm);
+}
+
+TEST(CalibrateMonitor, WithConstantErrorBarsTheFactorIsTheFloorOverTheirSize) {
+  // What persists for two samples is larger than the error bars of the models, which are too small.
+  TwoTorques joint;
+  const CalibratedMonitor monitor =
+      calibrate_monitor(joint.models(), TwoTorques::plan(), TwoTorques::fault_free(300.0),
+                        {.false_alarms_per_hour = 40.0, .persistence_s = 1e-3});
+  EXPECT_TRUE(monitor.pairs[0].is_factor_from_floor);
+  const PairLimits& pair = monitor.monitor.pairs[0];
+  EXPECT_GT(pair.factor, 1.0);
+  EXPECT_NEAR(pair.factor * 0.447, pair.floor_Nm, 0.02);
+  EXPECT_THAT(calibration_text(monitor), HasSubstr("the error bars hardly change"));
+}
+
+TEST(CalibrateMonitor, ADisagreementThatHasToBeFoundLimitsWhatIsArmed) {
+  const CalibratedMonitor monitor =
+      with_two_error_bars(4.0, {.false_alarms_per_hour = 40.0, .required_Nm = 5.0});
+  EXPECT_EQ(monitor.monitor.pairs[0].largest_armed_Nm, 4.0);
+  const CalibratedMonitor narrow =
+      with_two_error_bars(4.0, {.false_alarms_per_hour = 40.0, .required_Nm = 1e-3});
+  EXPECT_EQ(narrow.monitor.pairs[0].largest_armed_Nm, 1.1 * narrow.monitor.pairs[0].floor_Nm);
+  EXPECT_THAT(
+      test::error_message([] {
+        static_cast<void>(with_two_error_bars(
+            0.41, {.false_alarms_per_hour = 40.0, .persistence_s = 1.0, .required_Nm = 0.01}));
+      }),
+      testing::AllOf(HasSubstr("pair spring, current"), HasSubstr("never be ready")));
+}
+
+TEST(CalibrateMonitor, TheLimitOfADriftFollowsTheRecordings) {
+  const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  EXPECT_EQ(monitor.monitor.pairs[0].drift_allowance, 0.75);
+  EXPECT_GE(monitor.monitor.pairs[0].drift_limit_s, 1.0);
+  EXPECT_LT(monitor.monitor.pairs[0].drift_limit_s, 2.0);
+}
+
 TEST(CalibrateMonitor, RefusesWhatItCannotUse) {
   const TwoTorques joint;
   const Dataset sound = TwoTorques::fault_free(300.0);
@@ -153,12 +217,63 @@ TEST(ReplayMonitor, ReportsARecordingThatItCannotArm) {
   const MonitorReplay replay = replay_monitor(monitored(monitor), without_spring);
   EXPECT_TRUE(std::isnan(replay.watching_from_s));
   EXPECT_TRUE(replay.events.empty());
-  EXPECT_THAT(replays_text({replay}, monitor.monitor), HasSubstr("was never armed"));
+  EXPECT_THAT(replays_text({replay}, monitor.monitor),
+              testing::AllOf(HasSubstr("was never ready"),
+                             HasSubstr("for 5.000 s  not_finite: spring_deflection_rad is not a"),
+                             HasSubstr("for 5.000 s  redundancy_lost: 1 valid torques are left")));
+  EXPECT_THAT(replays_json({replay}, monitor.monitor), HasSubstr("\"present_s\": 5.0"));
   Recording slow("slow", 500.0);
   slow.add({.name = "spring_deflection_rad", .values = {0.0}});
   EXPECT_THAT(
       test::error_message([&] { static_cast<void>(replay_monitor(monitored(monitor), slow)); }),
       testing::AllOf(HasSubstr("1000 Hz"), HasSubstr("--rate")));
+}
+
+TEST(ReplayMonitor, ReportsErrorBarsThatAreTooWideToBegin) {
+  CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  for (PairLimits& pair : monitor.monitor.pairs) {
+    pair.floor_Nm = 0.01;
+    pair.largest_armed_Nm = 0.02;
+  }
+  const MonitorReplay replay = replay_monitor(monitored(monitor), TwoTorques::recording(5.0, 5));
+  EXPECT_TRUE(std::isnan(replay.watching_from_s));
+  EXPECT_TRUE(replay.not_ready.empty());
+  EXPECT_NEAR(replay.threshold_too_large_s, 5.0, 1e-6);
+  EXPECT_THAT(replays_text({replay}, monitor.monitor),
+              HasSubstr("for 5.000 s the error bars made a threshold larger"));
+  // One that is too short for the proof.
+  monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  EXPECT_THAT(replays_text({replay_monitor(monitored(monitor), TwoTorques::recording(0.03, 5))},
+                           monitor.monitor),
+              HasSubstr("no check found anything, but for less than 0.05 s"));
+}
+
+// Two findings in one tick were once one event, and it was the last one whichever had begun.
+TEST(ReplayMonitor, ListsEachFindingThatBegins) {
+  CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  monitor.monitor.actions.fill(MonitorAction::warn);
+  monitor.monitor.longest_loss_s = 100.0;
+  Recording log("log", 1000.0);
+  const Recording sound = TwoTorques::recording(2.0, 5);
+  for (Channel channel : sound.channels()) {
+    const bool is_spring = channel.name == "spring_deflection_rad";
+    for (std::size_t n = 500; n < 1500 && is_spring; ++n) channel.values[n] = kNotMeasured;
+    for (std::size_t n = 1000; n < 1500 && channel.name == "motor_current_A"; ++n)
+      channel.values[n] = 20.0;
+    log.add(std::move(channel));
+  }
+  const MonitorReplay replay = replay_monitor(monitored(monitor), log);
+  ASSERT_TRUE(std::isnan(replay.stopped_at_s));
+  const auto begins = [&](MonitorCheck check) {
+    std::vector<double> times_s;
+    for (const MonitorEvent& event : replay.events)
+      if (event.check == check) times_s.push_back(event.t_s);
+    return times_s;
+  };
+  EXPECT_THAT(begins(MonitorCheck::not_finite), testing::ElementsAre(0.5));
+  EXPECT_THAT(begins(MonitorCheck::source_lost), testing::ElementsAre(0.5));
+  EXPECT_THAT(begins(MonitorCheck::redundancy_lost), testing::ElementsAre(0.5));
+  EXPECT_THAT(begins(MonitorCheck::range), testing::ElementsAre(1.001));
 }
 
 TEST(ReplayMonitor, TakesTheZerosThatTheMappingSubtracted) {

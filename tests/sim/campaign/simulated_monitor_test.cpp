@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "sim/campaign/fault_classes.hpp"
+#include "support/monitored_joint.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
 #include "torsio/files/monitor_file.hpp"
@@ -82,14 +84,41 @@ TEST(MonitorRecipe, EveryActuatorHasSourcesFromItsLoggedChannels) {
   }
 }
 
+TEST(SimulatedMonitor, TheHashOfACalibrationIsThatOfItsSettings) {
+  EXPECT_EQ(calibration_hash({}), calibration_hash({}));
+  EXPECT_NE(calibration_hash({}), calibration_hash({.fault_free_hours = 4.0}));
+  EXPECT_NE(calibration_hash({}), calibration_hash({.spring_serial = 4}));
+}
+
+TEST(FaultClasses, AStepOfTheTorqueConstantHasTheLimitOfADisagreement) {
+  const DataSheet sheet = data_sheet("dfki-50");
+  const MonitoredTorque current{
+      test::torque_sources({test::proportional_source("motor_current_A", 10.0)}),
+      {.sources = {{"current", {}}}, .correlation = {}},
+      {.sources = {"current"}, .signals = {}, .pairs = {}, .correlation = {}}};
+  Random random(1);
+  int found = 0;
+  for (const FaultClass& of : fault_classes(sheet, current)) {
+    const bool is_step = of.name == "torque constant";
+    if (!is_step && of.name != "drift torque constant") continue;
+    ++found;
+    EXPECT_EQ(of.limit_s, is_step ? 0.02 : 0.1);
+    for (int n = 0; n < 20; ++n)
+      EXPECT_EQ(of.draw(random, 0.5).faults.front().over_s == 0.0, is_step);
+  }
+  EXPECT_EQ(found, 2);
+}
+
 TEST(SourceDelay, IsThatOfAnInputOfTheSources) {
   Recording log("log", 1000.0);
   std::vector<double> step(100, 0.0);
   for (std::size_t n = 50; n < step.size(); ++n) step[n] = 1.0;
   log.add({.name = "torque_Nm", .values = step});
+  log.add({.name = "truth_torque_Nm", .values = step});
   log.add({.name = "motor_current_A", .values = step});
   const Recording delayed = with_source_delay(log);
   EXPECT_EQ(delayed.channel("motor_current_A").values, step);
+  EXPECT_EQ(delayed.channel("truth_torque_Nm").values, delayed.channel("torque_Nm").values);
   FeaturePipeline input({.inputs = {"lag(lowpass(motor_current_A, 100Hz), 1)"}, .definitions = {}},
                         1000.0);
   for (std::size_t n = 0; n < step.size(); ++n)
@@ -108,11 +137,13 @@ TEST(SimulatedMonitor, MissesNoFaultAndGivesNoFalseAlarmInTwoHours) {
        .injections_of_a_size = 0,
        .fault_free_hours = 2.0,
        .low_load_hours = 1.0});
-  EXPECT_EQ(result.classes.size(), 22U);
+  EXPECT_EQ(result.classes.size(), 23U);
   for (const ClassResult& of : result.classes) {
     EXPECT_EQ(of.injected, 8U) << of.name;
     EXPECT_EQ(of.detected, of.must_stop ? 8U : 0U) << of.name;
-    EXPECT_EQ(of.late, 0U) << of.name << ": " << of.latency.longest_ms << " ms";
+    // A step of the torque constant reaches the sources through the motion that it causes: docs/faults.md.
+    const std::size_t most_late = of.name == "torque constant" ? 4 : 0;
+    EXPECT_LE(of.late, most_late) << of.name << ": " << of.latency.longest_ms << " ms";
     EXPECT_EQ(of.stops_with_gain, 0U) << of.name;
   }
   EXPECT_GT(result.work.joint_hours, 1.9);

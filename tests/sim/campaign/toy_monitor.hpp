@@ -32,7 +32,10 @@ inline MonitoredTorque toy_monitor() {
 }
 
 inline CampaignGroup toy_group() {
-  return {.name = "dfki-50", .sheet = data_sheet("dfki-50"), .monitor = toy_monitor};
+  return {.name = "dfki-50",
+          .sheet = data_sheet("dfki-50"),
+          .monitor = toy_monitor,
+          .monitor_hash = "toy"};
 }
 
 }  // namespace torsio::test

@@ -20,7 +20,8 @@ struct CampaignGroup {
   DataSheet sheet;   ///< the joint that works
   /// Called once; the joints get copies.
   std::function<MonitoredTorque()> monitor;
-  /// What identifies the monitor, for `CampaignSettings::resume`: the hash of its file.
+  /// What identifies the monitor, which `CampaignSettings::resume` requires: the hash of its file
+  /// (`model_hash`), or `calibration_hash`.
   std::string monitor_hash = {};
 };
 
@@ -29,12 +30,13 @@ struct CampaignSettings {
   std::size_t injections = 300;           ///< count per class and group
   std::size_t injections_of_a_size = 60;  ///< count per smaller size, class and group
   double fault_free_hours = 1000.0;       ///< joints at work, all groups together
-  /// Joints whose spring has another hysteresis than its model, by up to 25 %, under little load, all groups together
-  /// (docs/faults.md 5).
+  /// Joints whose spring has another hysteresis than its model, by up to 25 %, under little load,
+  /// all groups together (docs/faults.md 5).
   double low_load_hours = 70.0;
   std::vector<std::string> classes = {};  ///< only those whose name begins so; empty: all
   std::size_t threads = 0;                ///< 0: as many as the machine has
-  /// Results are appended to this file, and those that are in it are not simulated again; empty: none.
+  /// Results are appended to this file, and those that are in it are not simulated again; empty:
+  /// none.
   std::string resume = {};
   bool is_electrical = false;
 };
@@ -45,16 +47,19 @@ struct Latencies {
   double longest_ms = kNotMeasured;
 };
 
-/// Injections of one class into one group. The disagreement of an injection is the largest difference
-/// between two sources that the fault causes: what changes against a monitor with the sound signals.
-/// It counts where it stays at `limit_share` of the rated torque or more, but for pauses of up to 10 ms, for as long as a stop may take; one that ends by
-/// itself sooner is `brief`. Latencies count from where it reaches that, and are 0 if the monitor stopped before; for a signal that is missing, not finite or wraps, and for the loop, from the injection.
+/// Injections of one class into one group. The disagreement of an injection is the largest
+/// difference between two sources that the fault causes: what changes against a monitor with the
+/// sound signals. It counts if it stays at `limit_share` of the rated torque or more for the
+/// limit of its class (pauses of up to 10 ms included). A shorter one is counted as brief. Latencies
+/// count from where it reaches that share, and are 0 if the monitor stopped before; for a signal
+/// that is missing, not finite or wraps, and for the loop, from the injection. At power-up, only
+/// joints count whose monitor would watch with the sound signals.
 struct ClassResult {
   std::string name;
   std::string group = {};
   int row = 0;  ///< number in the table of docs/faults.md
-  /// The disagreement that counts, over the rated torque: 0.2, or, in a joint with two sources, twice their
-  /// threshold if that is more.
+  /// The disagreement that counts, over the rated torque: 0.2, or, in a joint with two sources,
+  /// twice their threshold if that is more.
   double limit_share = 0.2;
   bool must_stop =
       true;  ///< false: a single spike; `detected` are stops, of which there must be none
@@ -62,7 +67,7 @@ struct ClassResult {
   std::size_t detected = 0;
   std::size_t late = 0;       ///< detected after `limit_ms`
   std::size_t redrawn = 0;    ///< attempts whose disagreement did not reach 20 % for so long
-  std::size_t brief = 0;      ///< injections before whose stop, or miss, were brief disagreements
+  std::size_t brief = 0;      ///< injections with brief disagreements before the stop or the miss
   std::size_t unreached = 0;  ///< not in `injected`: in no attempt
   double limit_ms = 0.0;
   double missed_upper_95 = 1.0;  ///< bound of the share that is missed
@@ -108,10 +113,12 @@ struct CampaignResult {
   FaultFreeResult low_load = {};
 };
 
-/// Injects random faults into simulated joints at work (`DutySettings`) and lets them work without one.
-/// The result depends on settings and groups alone, not on the number of threads or interruptions.
-/// @throws UsageError for settings out of range, Error if `resume` belongs to another campaign, cannot be
-/// written, or if a monitor does not fit its joint; Cancelled: what is done is in `resume`.
+/// Injects random faults into simulated joints at work (`DutySettings`) and lets them work without
+/// one. The result depends on settings and groups alone, not on the number of threads or
+/// interruptions.
+/// @throws UsageError for settings out of range or `resume` without a `monitor_hash`, Error if
+/// `resume` belongs to another campaign, cannot be written, or if a monitor does not fit its joint;
+/// Cancelled: what is done is in `resume`.
 [[nodiscard]] CampaignResult run_fault_campaign(const std::vector<CampaignGroup>& groups,
                                                 const CampaignSettings& settings,
                                                 const Progress& progress = {});

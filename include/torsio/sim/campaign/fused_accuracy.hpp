@@ -19,8 +19,9 @@ struct AccuracyWithout {
   double largest_ratio = kNotMeasured;
 };
 
-/// Errors of the combined torque and of each source against the torque on the load side, at the delay of the
-/// sources (`with_source_delay`). Root mean squares over the runs' samples in which all are valid.
+/// Errors of the combined torque and of each source against the torque on the load side without the
+/// noise of a load cell, at the delay of the sources (`with_source_delay`). Root mean squares over
+/// the runs' samples in which all are valid.
 struct FusedAccuracy {
   std::string actuator;
   std::size_t runs = 0;
@@ -36,8 +37,8 @@ struct FusedAccuracy {
   std::vector<AccuracyWithout> without;
 };
 
-/// Runs of `duration_s` of work without impacts at random temperatures and loads, and a quarter as many
-/// before them in which the best source is chosen. @throws Error, Cancelled.
+/// Runs of `duration_s` of work without impacts at random temperatures and loads, and a quarter as
+/// many before them in which the best source is chosen. @throws Error, Cancelled.
 [[nodiscard]] FusedAccuracy fused_accuracy(const DataSheet& sheet, const MonitoredTorque& monitored,
                                            std::size_t runs, std::uint64_t seed,
                                            double duration_s = 60.0, const Progress& progress = {});

@@ -13,7 +13,7 @@
 
 namespace torsio {
 
-/// How the monitor of a simulated joint is calibrated, as on a real one: recordings at work instead of
+/// How the monitor of a simulated joint is calibrated, as on a real one: recordings at work, not
 /// the truth.
 struct SimulatedCalibration {
   std::uint64_t seed = 1000;
@@ -26,6 +26,10 @@ struct SimulatedCalibration {
   unsigned spring_serial = 3;
 };
 
+/// Identifies a calibration that is repeated instead of read from a file, for
+/// `CampaignGroup::monitor_hash`: equal settings of one release give equal monitors.
+[[nodiscard]] std::string calibration_hash(const SimulatedCalibration& settings);
+
 /// Sources, their models and the limits of their monitor.
 struct SimulatedMonitor {
   std::vector<FittedSource> sources;
@@ -36,8 +40,8 @@ struct SimulatedMonitor {
   [[nodiscard]] MonitoredTorque monitored() const;
 };
 
-/// Writes the monitor file and, beside it, its models as NAME.SOURCE.safetensors, NAME the part of the file's
-/// name before ".monitor.json". @throws Error if one cannot be written.
+/// Writes the monitor file and, beside it, its models as NAME.SOURCE.safetensors, NAME the part of
+/// the file's name before ".monitor.json". @throws Error if one cannot be written.
 void save_simulated_monitor(const std::filesystem::path& path, const SimulatedMonitor& monitor,
                             const std::string& device_serial);
 

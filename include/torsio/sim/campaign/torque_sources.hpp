@@ -41,22 +41,22 @@ struct FittedSource {
 
 /// The estimates of an actuator's torque that its sensors permit, and the signals to watch.
 ///
-/// - current: N k_t i on the motor side, minus inertia and friction (presliding, load-dependent, viscous)
-///   of what is between motor and load;
+/// - current: N k_t i on the motor side, minus inertia and friction (presliding, load-dependent,
+///   viscous) of what is between motor and load;
 /// - gear: the twist of the gear's stiffness with its hysteresis, damping and kinematic error;
 /// - spring: a learned model of the deflection (`grey_box`).
 ///
-/// All have the same delay: every input passes a 100 Hz low-pass and the sample that two differences
-/// cost. Each then estimates the torque on the load side of the elastic element.
+/// All have the same delay: every input passes a 100 Hz low-pass and the sample that two
+/// differences cost. Each then estimates the torque on the load side of the elastic element.
 struct MonitorRecipe {
   std::vector<SourceRecipe> sources;
   MonitorPlan plan;
 };
 [[nodiscard]] MonitorRecipe monitor_recipe(const DataSheet& sheet);
 
-/// The same recording with the delay of the sources in its `torque_Nm`. Models that are trained on a torque
-/// without it compensate the delay with rates of their inputs, each in its own way, and disagree while
-/// the torque changes fast.
+/// The same recording with the delay of the sources in `torque_Nm` and, where it has it,
+/// `truth_torque_Nm`. Models that are trained on a torque without it compensate the delay with
+/// rates of their inputs, each in its own way, and disagree while the torque changes fast.
 [[nodiscard]] Recording with_source_delay(const Recording& recording);
 
 /// @param dataset the torque of a load cell, in records with the role train; records with the role
