@@ -40,12 +40,21 @@ Monitor::Monitor(MonitorSettings settings) : settings_(std::move(settings)) {
   companion_ = detail::companions(settings_.signals);
   correlation_ =
       detail::error_correlation(settings_.correlation, settings_.sources.size(), "monitor");
+  const std::size_t samples =
+      2 * detail::persistent_samples(settings_.persistence_s, settings_.sample_period_s);
+  for (std::size_t i = 0; i < settings_.pairs.size(); ++i)
+    pair_states_[i].beyond = pair_states_[i].opposite = detail::RecentCount(samples);
 }
 
 void Monitor::clear() noexcept {
   signal_states_ = {};
   source_states_ = {};
-  pair_states_ = {};
+  for (PairState& state : pair_states_) {
+    state.beyond.reset();
+    state.opposite.reset();
+    state.drift = {};
+    state.disagrees = false;
+  }
   disagreeing_count_ = 0;
   findings_count_ = 0;
   is_threshold_too_large_ = false;
@@ -263,11 +272,12 @@ void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexc
   if (!(wanted_Nm <= pair.largest_armed_Nm)) is_threshold_too_large_ = true;
   const double difference_Nm = first.value - second.value;
   const double release_Nm = state.disagrees ? settings_.release_share * limit_Nm : limit_Nm;
-  state.beyond = std::abs(difference_Nm) <= release_Nm ? 0 : state.beyond + 1;
-  state.disagrees = lasts_longer(state.beyond, period_s, settings_.persistence_s);
+  const std::size_t enough = detail::persistent_samples(settings_.persistence_s, period_s);
+  const bool is_beyond = !(std::abs(difference_Nm) <= release_Nm);
+  state.disagrees = state.beyond.add(is_beyond) >= enough && is_beyond;
   const bool is_opposite = std::signbit(first.value) != std::signbit(second.value) &&
                            std::min(std::abs(first.value), std::abs(second.value)) > 0.5 * limit_Nm;
-  state.opposite = is_opposite ? state.opposite + 1 : 0;
+  const bool has_wrong_sign = state.opposite.add(is_opposite) >= enough && is_opposite;
   const auto found = [&](MonitorCheck check, double value, double limit) {
     find({.check = check,
           .first = pair.first,
@@ -276,8 +286,7 @@ void Monitor::check_pair(std::size_t i, std::span<const Estimate> sources) noexc
           .limit = limit});
   };
   // Before the disagreement that it is as well: the reason of a stop is the first finding.
-  if (lasts_longer(state.opposite, period_s, settings_.persistence_s))
-    found(MonitorCheck::sign, difference_Nm, limit_Nm);
+  if (has_wrong_sign) found(MonitorCheck::sign, difference_Nm, limit_Nm);
   if (state.disagrees) {
     disagreeing_[disagreeing_count_++] = {pair.first, pair.second};
     found(MonitorCheck::disagreement, difference_Nm, limit_Nm);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "torsio/core/realtime.hpp"
 #include "torsio/safety/monitor.hpp"
@@ -20,6 +21,12 @@ inline double difference_std_dev(double first_Nm, double second_Nm,
 inline double threshold_without_ceiling(const PairLimits& pair,
                                         double std_dev_Nm) noexcept TORSIO_REALTIME {
   return std::max(pair.floor_Nm, pair.factor * std_dev_Nm);
+}
+
+/// In so many of the last samples, twice as many, a difference must exceed its threshold: the first
+/// number of samples that takes longer than the persistence; rounding does not make it longer.
+inline std::size_t persistent_samples(double persistence_s, double period_s) noexcept {
+  return static_cast<std::size_t>(persistence_s / period_s * (1.0 + 1e-9) + 1e-9) + 1;
 }
 
 /// One sample of the cumulative sum on either side, S <- max(0, S + (share - drift_allowance) T).

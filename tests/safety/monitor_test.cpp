@@ -1011,9 +1011,23 @@ TEST(Monitor, ADifferenceThatEndsInTimeIsNone) {
     loop.sources[2].value = 1.5;
     loop.step_for(5);
     loop.sources[2].value = 0.5;
-    (void)loop.step();
+    loop.step_for(7);
   }
   EXPECT_TRUE(loop.monitor.is_watching());
+}
+
+// An unstable loop: the difference passes through zero in every second period.
+TEST(Monitor, StopsOnADifferenceThatOscillates) {
+  Loop loop;
+  loop.start();
+  int ticks = 0;
+  for (; loop.monitor.is_watching() && ticks < 100; ++ticks) {
+    constexpr std::array kDifference{1.5, 0.0, -1.5};
+    loop.sources[2].value = kDifference[static_cast<std::size_t>(ticks % 3)];
+    (void)loop.step();
+  }
+  EXPECT_EQ(ticks, 9) << "six of nine samples";
+  EXPECT_EQ(loop.reason(), MonitorCheck::disagreement);
 }
 
 TEST(Monitor, WithoutPersistenceItStopsAtOnce) {
@@ -1160,10 +1174,10 @@ TEST(Monitor, ASmallTorqueHasNoWrongSign) {
   loop.step_for(5);
   EXPECT_TRUE(loop.monitor.is_watching());
   loop.sources[0].value = -0.1;
-  (void)loop.step();
+  loop.step_for(7);
   loop.sources[0].value = 0.6;
   loop.step_for(5);
-  EXPECT_TRUE(loop.monitor.is_watching()) << "counted from the beginning";
+  EXPECT_TRUE(loop.monitor.is_watching()) << "counted among the last twelve";
   EXPECT_EQ(loop.step(), State::stopped);
   EXPECT_EQ(loop.reason(), MonitorCheck::sign);
 }
@@ -1460,8 +1474,9 @@ TEST(Monitor, RefusesTimesThatAreNotValid) {
   using S = MonitorSettings;
   check(&S::sample_period_s, "sample_period_s: expected above 0, at most 1, found ", {1e-4, 1.0},
         {0.0, -1.0, 1.1});
-  check(&S::persistence_s, "persistence_s: expected 0 or more, found ", {0.0, 1.0},
-        {-1e-9, kInfinity});
+  check(&S::persistence_s,
+        "persistence_s: expected 0 or more, and at most a million sample periods, found ",
+        {0.0, 1.0}, {-1e-9, kInfinity});
   check(&S::release_share, "release_share: expected above 0, at most 1, found ", {0.1, 1.0},
         {0.0, 1.1});
   check(&S::longest_loss_s, "longest_loss_s: expected 0 or more, found ", {0.0, kInfinity},

@@ -11,6 +11,7 @@
 
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/safety/recent_count.hpp"
 
 namespace torsio {
 
@@ -77,8 +78,10 @@ struct MonitorSettings {
   /// Correlation of the sources' errors, row by row; empty: none.
   std::vector<double> correlation;
   std::array<MonitorAction, kMonitorChecks> actions = default_actions();
-  double persistence_s = 5e-3;  ///< how long a difference must exceed its threshold
-  double release_share = 0.8;   ///< below this share of the threshold, it has ended
+  /// How long a difference must exceed its threshold: in more samples than this time has, among the
+  /// last twice as many, so that a difference that oscillates through zero is found as well.
+  double persistence_s = 5e-3;
+  double release_share = 0.8;  ///< below this share of the threshold, it has ended
   /// How long a lost source is only a warning, how long a source may report a fault of its model or
   /// range, and how long one may warm up (then it is a `source_fault`). Of each, four samples
   /// without it compensate for one with it, so that one that comes and goes is found as well.
@@ -135,9 +138,10 @@ struct DriftSums {
 /// and of the brake.
 ///
 /// - disagreement: |t_i - t_j| > clamp(factor sqrt(s_i^2 + s_j^2 - 2 R_ij s_i s_j), floor, ceiling)
-///   =: h for `persistence_s`, with hysteresis: it ends below `release_share` h.
+///   =: h for `persistence_s` within twice that time, with hysteresis: it ends below
+///   `release_share` h.
 /// - drift: S <- max(0, S + ((t_i - t_j) / h - drift_allowance) T) > drift_limit_s, on either side.
-/// - sign: t_i and t_j have opposite signs and min(|t_i|, |t_j|) > h / 2 for `persistence_s`.
+/// - sign: t_i and t_j have opposite signs and min(|t_i|, |t_j|) > h / 2, likewise.
 /// - frozen: the signal keeps exactly one value while its companion travels further than
 ///   `largest_hidden_travel`; at rest there is no travel.
 ///
@@ -214,8 +218,8 @@ class Monitor {
     std::uint32_t novel = 0;  ///< samples in a row
   };
   struct PairState {
-    std::uint32_t beyond = 0;
-    std::uint32_t opposite = 0;
+    detail::RecentCount beyond;
+    detail::RecentCount opposite;
     detail::DriftSums drift;
     bool disagrees = false;
   };

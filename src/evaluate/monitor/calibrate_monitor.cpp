@@ -89,8 +89,7 @@ class PairStatistics {
       : pair_(pair),
         correlation_(correlation),
         period_s_(1.0 / rate_Hz),
-        // A difference is found in the sample after those of the persistence.
-        window_(static_cast<std::size_t>(std::floor(persistence_s * rate_Hz + 1e-9))),
+        window_(detail::persistent_samples(persistence_s, period_s_)),
         small_(samples_of(kBlock_s, rate_Hz)),
         large_(samples_of(kBlock_s, rate_Hz)) {}
 
@@ -100,7 +99,7 @@ class PairStatistics {
       if (is_valid(runs, n)) spreads_.push_back(spread(runs, n));
   }
 
-  // A difference is found if |d| > floor and |d| > factor s in a whole window. What persists is
+  // A difference is found if |d| > floor and |d| > factor s in enough samples of a window. What persists is
   // therefore taken of each, and one of the two has to be prevented: which one is decided by s at
   // the end of the window.
   void see_differences(const std::vector<SourceRun>& runs) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <functional>
 
 #include "numerics/quantile.hpp"
 #include "torsio/core/not_measured.hpp"
@@ -16,20 +17,19 @@ constexpr double kLargestShape = 0.0;
 
 }  // namespace
 
-std::vector<double> persisting(std::span<const double> values, std::size_t window) {
-  struct Value {
-    double value;
-    std::size_t place;  ///< among the values that are not NaN
-  };
+std::vector<double> persisting(std::span<const double> values, std::size_t count) {
   std::vector<double> result(values.size(), kNotMeasured);
-  std::deque<Value> rising;  // values of the window, each smaller than the later ones
-  std::size_t seen = 0;
+  std::deque<double> last;      // in the order of time
+  std::vector<double> ordered;  // the same, descending
   for (std::size_t n = 0; n < values.size(); ++n) {
     if (std::isnan(values[n])) continue;
-    while (!rising.empty() && rising.back().value >= values[n]) rising.pop_back();
-    rising.push_back({values[n], seen});
-    if (rising.front().place + window < seen) rising.pop_front();
-    if (++seen > window) result[n] = rising.front().value;
+    if (last.size() == 2 * count) {
+      ordered.erase(std::ranges::lower_bound(ordered, last.front(), std::ranges::greater()));
+      last.pop_front();
+    }
+    last.push_back(values[n]);
+    ordered.insert(std::ranges::lower_bound(ordered, values[n], std::ranges::greater()), values[n]);
+    if (ordered.size() >= count) result[n] = ordered[count - 1];
   }
   return result;
 }

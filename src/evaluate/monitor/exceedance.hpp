@@ -7,10 +7,10 @@
 
 namespace torsio {
 
-/// The largest value that each sample and the `window` before it all reach: what persists. NaN is
-/// no sample and does not end a window, as `Monitor` continues its counts over invalid sources; NaN
-/// for it, and until there have been `window` + 1 samples.
-[[nodiscard]] std::vector<double> persisting(std::span<const double> values, std::size_t window);
+/// The largest value that `count` of the last 2 `count` samples reach: what persists. NaN is
+/// no sample and takes no place among them, as `Monitor` continues its counts over invalid sources;
+/// NaN for it, and until there have been `count` samples.
+[[nodiscard]] std::vector<double> persisting(std::span<const double> values, std::size_t count);
 
 /// The maxima of a statistic over blocks of equal length, and the threshold that it exceeds at a
 /// given rate.
