@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "fit/grey_box/grey_box_search.hpp"
 #include "fit/mixture/fit_dgmm.hpp"
 #include "fit/network/fit_network.hpp"
+#include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -25,30 +27,67 @@ namespace {
 constexpr std::array kRateShares{0.2, 0.02};
 constexpr double kClearly = 0.99;  // less of the held-out error
 
-/// What the box leaves over, with its slips as further inputs.
-TrainingData residual_data(const TrainingData& data, const GreyBox::Parameters& parameters) {
-  TrainingData left{.inputs = data.inputs,
-                    .target = data.target,
-                    .sample_rate_Hz = data.sample_rate_Hz,
-                    .sequences = {}};
+/// What a box leaves over, with its slips as further inputs.
+struct ResidualData {
+  TrainingData samples;
+  /// By sequence, 1 for each sample of the fold that a trial is scored on.
+  std::vector<std::vector<std::uint8_t>> is_scored = {};
+};
+
+/// Whether a trial of a network holds out whole records. If it holds out the end of the only one, it
+/// needs the place of each sample in the record.
+bool holds_out_records(const TrainingData& data) {
+  const auto is_learned = [](const Sequence& sequence) {
+    const std::size_t samples = sequence.use.size();
+    for (std::size_t n = 0; n < samples; ++n)
+      if (sequence.use[n] != 0 && interleaved_fold(n, samples) != 0) return true;
+    return false;
+  };
+  return std::ranges::count_if(data.sequences, is_learned) > 1;
+}
+
+/// The residual of one record: at every sample, or only at those to learn from, of which a slow load
+/// cell has few.
+void add_residual(ResidualData& left, std::size_t s, const Sequence& sequence,
+                  const GreyBox::Parameters& parameters, bool whole) {
+  const std::size_t samples = sequence.target.size();
+  const std::size_t inputs = sequence.features.columns;
   const std::size_t slips = parameters.terms.thresholds.size();
-  for (std::size_t i = 0; i < slips; ++i)
-    left.inputs.push_back({.expression = fmt::format("slip {}", i + 1)});
-  for (const Sequence& sequence : data.sequences) {
-    GreyBox box(parameters);
-    Sequence& own = left.sequences.emplace_back(
-        Sequence{.recording = sequence.recording,
-                 .features = Matrix(sequence.features.rows, data.input_count() + slips),
-                 .target = sequence.target,
-                 .use = sequence.use});
-    for (std::size_t n = 0; n < sequence.target.size(); ++n) {
-      std::ranges::copy(sequence.features.row(n), own.features.row(n).begin());
-      if (!sequence.has_features(n)) continue;
-      own.target[n] -= box.step(sequence.features.row(n)).value;
-      std::ranges::copy(box.state().first(slips),
-                        own.features.row(n).subspan(data.input_count()).begin());
-    }
+  const auto is_kept = [&](std::uint8_t use) { return whole || use != 0; };
+  const auto kept = static_cast<std::size_t>(std::ranges::count_if(sequence.use, is_kept));
+  Sequence own{.recording = sequence.recording, .features = Matrix(kept, inputs + slips)};
+  std::vector<std::uint8_t>& is_scored = left.is_scored[s];
+  GreyBox box(parameters);
+  for (std::size_t n = 0; n < samples; ++n) {
+    const auto features = sequence.features.row(n);
+    const bool has_features = sequence.has_features(n);
+    const double estimate = has_features ? box.step(features).value : 0.0;
+    if (!is_kept(sequence.use[n])) continue;
+    const auto row = own.features.row(own.target.size());
+    std::ranges::copy(features, row.begin());
+    if (has_features) std::ranges::copy(box.state().first(slips), row.subspan(inputs).begin());
+    own.target.push_back(sequence.target[n] - estimate);
+    own.use.push_back(sequence.use[n]);
+    is_scored.push_back(interleaved_fold(n, samples) == 0 ? 1 : 0);
   }
+  left.samples.sequences[s] = std::move(own);
+}
+
+ResidualData residual_data(const TrainingData& data, const GreyBox::Parameters& parameters,
+                           ResidualKind kind) {
+  ResidualData left{.samples = {.inputs = data.inputs,
+                                .target = data.target,
+                                .sample_rate_Hz = data.sample_rate_Hz,
+                                .sequences = {}}};
+  for (std::size_t i = 0; i < parameters.terms.thresholds.size(); ++i)
+    left.samples.inputs.push_back({.expression = fmt::format("slip {}", i + 1)});
+  // The fit of a mixture names a sample that it refuses.
+  const bool whole = kind == ResidualKind::dgmm || !holds_out_records(data);
+  left.samples.sequences.resize(data.sequences.size());
+  left.is_scored.resize(data.sequences.size());
+  for_each_chunk(data.sequences.size(), 0, [&](std::size_t s) {
+    add_residual(left, s, data.sequences[s], parameters, whole);
+  });
   return left;
 }
 
@@ -73,18 +112,28 @@ AnyModel residual_model(const TrainingData& data, ResidualKind kind, const FitCo
   return Mlp(fit_mlp(data, {.layers = {16, 16}, .activation = Activation::tanh}, own).parameters);
 }
 
-/// The samples of one fold for evaluation, and the others for training.
-std::pair<TrainingData, TrainingData> parted(const TrainingData& data) {
-  std::pair<TrainingData, TrainingData> parts{data, data};
-  for (std::size_t s = 0; s < data.sequences.size(); ++s) {
-    const std::size_t samples = data.sequences[s].use.size();
-    for (std::size_t n = 0; n < samples; ++n) {
-      const bool is_scored = interleaved_fold(n, samples) == 0;
-      (is_scored ? parts.first : parts.second).sequences[s].use[n] = 0;
+/// Restricts the used samples to the scored fold, or to the others, as long as it lives.
+class PartInUse {
+ public:
+  PartInUse(ResidualData& left, bool scored) : left_(left) {
+    for (std::size_t s = 0; s < left.is_scored.size(); ++s) {
+      std::vector<std::uint8_t>& use = left.samples.sequences[s].use;
+      all_.push_back(use);
+      for (std::size_t n = 0; n < use.size(); ++n)
+        if ((left.is_scored[s][n] != 0) != scored) use[n] = 0;
     }
   }
-  return parts;
-}
+  ~PartInUse() {
+    for (std::size_t s = 0; s < all_.size(); ++s)
+      left_.samples.sequences[s].use = std::move(all_[s]);
+  }
+  PartInUse(const PartInUse&) = delete;
+  PartInUse& operator=(const PartInUse&) = delete;
+
+ private:
+  ResidualData& left_;
+  std::vector<std::vector<std::uint8_t>> all_;
+};
 
 GreyBoxResidual residual_of(const AnyModel& model, const TrainingData& data, double bound) {
   GreyBoxResidual residual{.bound = bound};
@@ -106,14 +155,17 @@ GreyBoxResidual residual_of(const AnyModel& model, const TrainingData& data, dou
 
 void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyBoxOptions& options,
                     const FitContext& context) {
-  const TrainingData left = residual_data(data, fitted.parameters);
-  const double rms = rms_of(left, nullptr);
+  ResidualData left = residual_data(data, fitted.parameters, options.residual);
+  const double rms = rms_of(left.samples, nullptr);
   if (options.residual == ResidualKind::automatic) {
     constexpr double kWorthwhile = 0.98;
-    const auto [learned, scored] = parted(left);
-    AnyModel trial = residual_model(learned, options.residual, context);
-    const double without = rms_of(scored, nullptr);
-    const double with = rms_of(scored, &trial);
+    AnyModel trial = [&] {
+      const PartInUse others(left, false);
+      return residual_model(left.samples, options.residual, context);
+    }();
+    const PartInUse scored(left, true);
+    const double without = rms_of(left.samples, nullptr);
+    const double with = rms_of(left.samples, &trial);
     const bool is_kept = with < kWorthwhile * without;
     fitted.notes.push_back(
         fmt::format("a network for the residual was {}: RMSE on a held-out fifth of the data "
@@ -123,8 +175,8 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
     if (!is_kept) return;
     fitted.held_out_rmse *= with / without;
   }
-  fitted.parameters.residual =
-      residual_of(residual_model(left, options.residual, context), left, options.bound * rms);
+  fitted.parameters.residual = residual_of(residual_model(left.samples, options.residual, context),
+                                           left.samples, options.bound * rms);
 }
 
 /// The box of the terms that predict best what is held out.
