@@ -111,6 +111,14 @@ TrainingSplit split_one(const Sequence& sequence, const SequencePart& part,
 
 void WindowSet::fill(std::span<const std::size_t> windows, SequenceBatch& batch) const {
   const std::size_t rows = windows.size();
+  // The windows lie anywhere in the data: the cache fetches several of them at once.
+  for (const std::size_t window : windows) {
+    const std::size_t sample = starts[window];
+    __builtin_prefetch(features.data() + sample * inputs);
+    __builtin_prefetch(features.data() + (sample + 1) * inputs - 1);
+    __builtin_prefetch(targets.data() + sample);
+    __builtin_prefetch(use.data() + sample);
+  }
   batch.steps = steps;
   batch.rows = rows;
   batch.inputs.resize(steps * rows * inputs);

@@ -11,7 +11,9 @@
 
 #include "fit/common/fitted.hpp"
 #include "fit/common/model_run.hpp"
+#include "fit/grey_box/grey_box_sums.hpp"
 #include "fit/linear/fit_linear.hpp"
+#include "numerics/nnls.hpp"
 #include "support/error_message.hpp"
 #include "support/example_data.hpp"
 #include "torsio/core/random.hpp"
@@ -69,6 +71,44 @@ TEST(FitGreyBox, FindsAStiffeningSpringWithFrictionToItsNoise) {
   EXPECT_FALSE(fitted.parameters.terms.thresholds.empty());
   ASSERT_FALSE(fitted.notes.empty());
   EXPECT_THAT(fitted.notes[0], HasSubstr("slip elements"));
+}
+
+TEST(GreyBoxSums, AreThoseOfTheCompleteTableOfTerms) {
+  TrainingData data = spring_data(1);
+  for (std::size_t k = 1; k < 4; ++k)
+    data.sequences.push_back(spring_data(1 + k, 30.0 * static_cast<double>(k)).sequences[0]);
+  for (Sequence& sequence : data.sequences)
+    for (std::size_t n = 0; n < sequence.use.size(); n += 3) sequence.use[n] = 0;
+  const GreyBoxSums sums = gather(data, "", 0.2);
+  Matrix table(data.usable_samples(), sums.all.columns());
+  std::vector<double> target;
+  for (const Sequence& sequence : data.sequences) {
+    GreyBoxTerms terms(sums.all);
+    for (std::size_t n = 0; n < sequence.use.size(); ++n) {
+      terms.move(sequence.features(n, 0));
+      if (sequence.use[n] == 0) continue;
+      terms.visit(sequence.features.row(n),
+                  [&](std::size_t column, double value) { table(target.size(), column) = value; });
+      target.push_back(sequence.target[n]);
+    }
+  }
+  const NormalEquations complete = normal_equations(table, target);
+  ASSERT_EQ(sums.cells.size(), 4U) << "a fold for each record";
+  NormalEquations streamed(sums.all.columns());
+  for (const NormalEquations& cell : sums.cells) add(streamed, cell);
+  EXPECT_EQ(streamed.rows, complete.rows);
+  EXPECT_NEAR(streamed.square, complete.square, 1e-12 * complete.square);
+  const auto nearly = [](const std::vector<double>& found, const std::vector<double>& expected) {
+    double largest = 0.0;
+    double difference = 0.0;
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      largest = std::max(largest, std::abs(expected[i]));
+      difference = std::max(difference, std::abs(found[i] - expected[i]));
+    }
+    return difference <= 1e-12 * largest;
+  };
+  EXPECT_TRUE(nearly(streamed.product.values, complete.product.values));
+  EXPECT_TRUE(nearly(streamed.projection, complete.projection));
 }
 
 TEST(FitGreyBox, LeavesAStraightLineAStraightLine) {
