@@ -4,9 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <limits>
+#include <optional>
+#include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -17,6 +22,7 @@
 #include "fit/mixture/fit_dgmm.hpp"
 #include "fit/network/fit_network.hpp"
 #include "numerics/parallel.hpp"
+#include "numerics/shared_progress.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -91,12 +97,15 @@ ResidualData residual_data(const TrainingData& data, const GreyBox::Parameters& 
   return left;
 }
 
-double rms_of(const TrainingData& data, AnyModel* model) {
+/// @param fold 1 for each sample that counts, by sequence; null: all in use
+double rms_of(const TrainingData& data, AnyModel* model,
+              const std::vector<std::vector<std::uint8_t>>* fold = nullptr) {
   double sum = 0.0;
   std::size_t count = 0;
-  for (const Sequence& sequence : data.sequences) {
+  for (std::size_t s = 0; s < data.sequences.size(); ++s) {
+    const Sequence& sequence = data.sequences[s];
     for (std::size_t n = 0; n < sequence.target.size(); ++n) {
-      if (sequence.use[n] == 0) continue;
+      if (sequence.use[n] == 0 || (fold != nullptr && (*fold)[s][n] == 0)) continue;
       const double estimate = model == nullptr ? 0.0 : model->step(sequence.features.row(n)).value;
       sum += (sequence.target[n] - estimate) * (sequence.target[n] - estimate);
       ++count;
@@ -112,28 +121,14 @@ AnyModel residual_model(const TrainingData& data, ResidualKind kind, const FitCo
   return Mlp(fit_mlp(data, {.layers = {16, 16}, .activation = Activation::tanh}, own).parameters);
 }
 
-/// Restricts the used samples to the scored fold, or to the others, as long as it lives.
-class PartInUse {
- public:
-  PartInUse(ResidualData& left, bool scored) : left_(left) {
-    for (std::size_t s = 0; s < left.is_scored.size(); ++s) {
-      std::vector<std::uint8_t>& use = left.samples.sequences[s].use;
-      all_.push_back(use);
-      for (std::size_t n = 0; n < use.size(); ++n)
-        if ((left.is_scored[s][n] != 0) != scored) use[n] = 0;
-    }
-  }
-  ~PartInUse() {
-    for (std::size_t s = 0; s < all_.size(); ++s)
-      left_.samples.sequences[s].use = std::move(all_[s]);
-  }
-  PartInUse(const PartInUse&) = delete;
-  PartInUse& operator=(const PartInUse&) = delete;
-
- private:
-  ResidualData& left_;
-  std::vector<std::vector<std::uint8_t>> all_;
-};
+/// The samples outside the scored fold.
+TrainingData others_of(const ResidualData& left) {
+  TrainingData others = left.samples;
+  for (std::size_t s = 0; s < others.sequences.size(); ++s)
+    for (std::size_t n = 0; n < left.is_scored[s].size(); ++n)
+      if (left.is_scored[s][n] != 0) others.sequences[s].use[n] = 0;
+  return others;
+}
 
 GreyBoxResidual residual_of(const AnyModel& model, const TrainingData& data, double bound) {
   GreyBoxResidual residual{.bound = bound};
@@ -153,30 +148,78 @@ GreyBoxResidual residual_of(const AnyModel& model, const TrainingData& data, dou
   return residual;
 }
 
+/// What a network for the residual achieves on the fold that it did not learn from.
+struct Trial {
+  double with = 0.0;  ///< RMSE; without it likewise
+  double without = 0.0;
+  [[nodiscard]] bool is_worthwhile() const {
+    constexpr double kWorthwhile = 0.98;
+    return with < kWorthwhile * without;
+  }
+};
+
+Trial trial_of(const ResidualData& left, ResidualKind kind, const FitContext& context) {
+  AnyModel model = residual_model(others_of(left), kind, context);
+  return {.with = rms_of(left.samples, &model, &left.is_scored),
+          .without = rms_of(left.samples, nullptr, &left.is_scored)};
+}
+
+/// A network for the residual if a trial shows that it is worthwhile. It is fitted at the same time
+/// as the trial, on another thread if there is one, and given up if the trial fails.
+std::pair<Trial, std::optional<AnyModel>> tried_model(const ResidualData& left, ResidualKind kind,
+                                                      const FitContext& context) {
+  ProgressOfParts progress(context.progress, 2);
+  std::atomic<bool> is_given_up = false;
+  Trial trial;
+  std::optional<AnyModel> model;
+  std::exception_ptr failure;
+  const auto try_it = [&] {
+    try {
+      trial = trial_of(left, kind, {.seed = context.seed, .progress = progress.part(0)});
+      is_given_up = !trial.is_worthwhile();
+    } catch (...) {
+      is_given_up = true;
+      throw;
+    }
+  };
+  const auto fit_it = [&] {
+    const Progress part = progress.part(1);
+    const Progress unless_given_up = [&](double fraction, std::string_view doing) {
+      return !is_given_up && (!part || part(fraction, doing));
+    };
+    if (is_given_up) return;
+    try {
+      model =
+          residual_model(left.samples, kind, {.seed = context.seed, .progress = unless_given_up});
+    } catch (...) {
+      failure = std::current_exception();  // does not matter if the trial fails
+    }
+  };
+  for_each_chunk(2, 0, [&](std::size_t chunk) { chunk == 0 ? try_it() : fit_it(); });
+  if (!trial.is_worthwhile()) return {trial, std::nullopt};
+  if (failure) std::rethrow_exception(failure);
+  return {trial, std::move(model)};
+}
+
 void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyBoxOptions& options,
                     const FitContext& context) {
-  ResidualData left = residual_data(data, fitted.parameters, options.residual);
-  const double rms = rms_of(left.samples, nullptr);
+  const ResidualData left = residual_data(data, fitted.parameters, options.residual);
+  std::optional<AnyModel> model;
   if (options.residual == ResidualKind::automatic) {
-    constexpr double kWorthwhile = 0.98;
-    AnyModel trial = [&] {
-      const PartInUse others(left, false);
-      return residual_model(left.samples, options.residual, context);
-    }();
-    const PartInUse scored(left, true);
-    const double without = rms_of(left.samples, nullptr);
-    const double with = rms_of(left.samples, &trial);
-    const bool is_kept = with < kWorthwhile * without;
+    Trial trial;
+    std::tie(trial, model) = tried_model(left, options.residual, context);
     fitted.notes.push_back(
         fmt::format("a network for the residual was {}: RMSE on a held-out fifth of the data "
                     "{:.4g} with it, {:.4g} "
                     "without",
-                    is_kept ? "added" : "not added", with, without));
-    if (!is_kept) return;
-    fitted.held_out_rmse *= with / without;
+                    model ? "added" : "not added", trial.with, trial.without));
+    if (!model) return;
+    fitted.held_out_rmse *= trial.with / trial.without;
+  } else {
+    model = residual_model(left.samples, options.residual, context);
   }
-  fitted.parameters.residual = residual_of(residual_model(left.samples, options.residual, context),
-                                           left.samples, options.bound * rms);
+  fitted.parameters.residual =
+      residual_of(*model, left.samples, options.bound * rms_of(left.samples, nullptr));
 }
 
 /// The box of the terms that predict best what is held out.
