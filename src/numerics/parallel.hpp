@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -39,7 +40,10 @@ void for_each_chunk(std::size_t chunks, std::size_t threads, const Work& work) {
   };
   {
     std::vector<std::jthread> helpers;
-    for (std::size_t k = 1; k < threads; ++k) helpers.emplace_back(run);
+    try {
+      for (std::size_t k = 1; k < threads; ++k) helpers.emplace_back(run);
+    } catch (const std::system_error&) {  // a limit of the system: with fewer threads, then
+    }
     run();
   }
   if (failure) std::rethrow_exception(failure);
