@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
+#include <thread>
 
 #include "check/checker.hpp"
 #include "fit/common/guards.hpp"
+#include "numerics/parallel.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
@@ -17,7 +21,34 @@ bool has_segment(const DatasetRecord& record, Role role) {
                              [&](const Segment& segment) { return segment.role == role; });
 }
 
+/// What this thread finds in the recording that it is at work on; null: in all of them.
+thread_local std::vector<Finding>* found_here = nullptr;
+
+class Collecting {
+ public:
+  explicit Collecting(std::vector<Finding>& findings) { found_here = &findings; }
+  ~Collecting() { found_here = nullptr; }
+  Collecting(const Collecting&) = delete;
+  Collecting& operator=(const Collecting&) = delete;
+};
+
+/// Each thread needs copies of the channels of one recording.
+std::size_t threads() {
+  constexpr std::size_t kMost = 4;
+  return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMost);
+}
+
 }  // namespace
+
+void Checker::for_each_record(const std::function<void(std::size_t)>& body) {
+  std::vector<std::vector<Finding>> found(pairs_.size());
+  for_each_chunk(found.size(), threads(), [&](std::size_t r) {
+    const Collecting here(found[r]);
+    body(r);
+  });
+  for (std::vector<Finding>& of_record : found)
+    std::ranges::move(of_record, std::back_inserter(findings_));
+}
 
 std::vector<Finding> Checker::run() {
   check_length();
@@ -48,7 +79,8 @@ std::vector<Finding> Checker::run() {
 
 void Checker::add(Verdict verdict, std::string check, std::string recording, std::string message,
                   std::string advice) {
-  findings_.push_back(
+  std::vector<Finding>& findings = found_here != nullptr ? *found_here : findings_;
+  findings.push_back(
       {verdict, std::move(check), std::move(recording), std::move(message), std::move(advice)});
 }
 
@@ -75,16 +107,20 @@ void Checker::check_length() {
 
 // Hysteresis is visible only at reversals; the effect of a constant speed looks like an offset.
 void Checker::check_excitation() {
-  std::size_t reversals = 0;
-  Extent speeds;
   const auto window = static_cast<std::size_t>(
       std::max(1.0, std::round(kSpeedHalfWindow_s * dataset_.sample_rate_Hz())));
-  for (std::size_t r = 0; r < pairs_.size(); ++r) {
-    if (!has_segment(dataset_.records[r], Role::train)) continue;
-    reversals += count_reversals(pairs_[r].input);
-    for (const double speed : typical_speeds(movement(pairs_[r].input, window)))
-      speeds.include(speed);
-  }
+  std::vector<std::size_t> reversals_of(pairs_.size(), 0);
+  std::vector<std::vector<double>> speeds_of(pairs_.size());
+  for_each_record([&](std::size_t r) {
+    if (!has_segment(dataset_.records[r], Role::train)) return;
+    reversals_of[r] = count_reversals(pairs_[r].input);
+    speeds_of[r] = typical_speeds(movement(pairs_[r].input, window));
+  });
+  const std::size_t reversals =
+      std::accumulate(reversals_of.begin(), reversals_of.end(), std::size_t{0});
+  Extent speeds;
+  for (const std::vector<double>& of_record : speeds_of)
+    for (const double speed : of_record) speeds.include(speed);
   if (speeds.width() < 0.0) return;  // nothing to train on: another check reports it
   if (reversals < kFewReversals)
     add(Verdict::warn, "excitation", "",

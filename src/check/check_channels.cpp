@@ -213,44 +213,43 @@ std::vector<Channel> Checker::others_of(std::size_t r, const std::string& name) 
 void Checker::leave_out(std::size_t r, const Rest& rest) {
   for (std::size_t i = rest.begin; i < std::min(rest.end + 1, pairs_[r].input.size()); ++i)
     pairs_[r].input[i] = kNotMeasured;
-  stalls_.emplace_back(r, rest);
+  stalls_[r].push_back(rest);
 }
 
 bool Checker::is_end_of_stall(std::size_t r, std::size_t sample) const {
-  return std::ranges::any_of(stalls_, [&](const auto& stall) {
-    return stall.first == r && sample >= stall.second.end && sample <= stall.second.end + 1;
+  return std::ranges::any_of(stalls_[r], [&](const Rest& stall) {
+    return sample >= stall.end && sample <= stall.end + 1;
   });
 }
 
 // The channels of the first input may have a much larger range than the input: the resolution of a
 // gear's angle is compared with the range of the deflection.
 void Checker::check_resolution() {
+  pass_unless_found("resolution", "every sensor resolves its range",
+                    [&] { for_each_record([&](std::size_t r) { check_resolution_of(r); }); });
+}
+
+void Checker::check_resolution_of(std::size_t r) {
   const auto unit_of = [](const std::string& name) {
     const auto parts = split_channel_name(name);
     return parts ? parts->unit->si_suffix : std::string_view();
   };
-  pass_unless_found("resolution", "every sensor resolves its range", [&] {
-    for (std::size_t r = 0; r < pairs_.size(); ++r) {
-      const Recording& recording = dataset_.records[r].recording;
-      const double first_input = extent_of(pairs_[r].input).width();
-      for (const std::string& name : channels_) {
-        if (is_condition(recording, name) || stands_still(r, name)) continue;
-        const std::vector<double>& values = recording.channel(name).values;
-        double range = extent_of(values).width();
-        if (first_input > 0.0 && unit_of(name) == unit_of(channels_.front()) &&
-            name != dataset_.target)
-          range = std::min(range, first_input);
-        const double code = finest_step(recording.channel(name));
-        if (!(range > 0.0) || code < kCoarseShare * range) continue;
-        add(Verdict::warn, "resolution", recording.name(),
-            fmt::format("{} has a resolution of {:.3g}: {} moves through only {:.0f} such steps",
-                        name, code, range == first_input ? spec_.inputs.front() : name,
-                        range / code),
-            "Check whether the sensor has lost bits or the log has too few digits. No model "
-            "resolves finer steps.");
-      }
-    }
-  });
+  const Recording& recording = dataset_.records[r].recording;
+  const double first_input = extent_of(pairs_[r].input).width();
+  for (const std::string& name : channels_) {
+    if (is_condition(recording, name) || stands_still(r, name)) continue;
+    const std::vector<double>& values = recording.channel(name).values;
+    double range = extent_of(values).width();
+    if (first_input > 0.0 && unit_of(name) == unit_of(channels_.front()) && name != dataset_.target)
+      range = std::min(range, first_input);
+    const double code = finest_step(recording.channel(name));
+    if (!(range > 0.0) || code < kCoarseShare * range) continue;
+    add(Verdict::warn, "resolution", recording.name(),
+        fmt::format("{} has a resolution of {:.3g}: {} moves through only {:.0f} such steps", name,
+                    code, range == first_input ? spec_.inputs.front() : name, range / code),
+        "Check whether the sensor has lost bits or the log has too few digits. No model "
+        "resolves finer steps.");
+  }
 }
 
 bool Checker::stands_out(const Jump& jump, const std::vector<double>& values) {
@@ -259,31 +258,32 @@ bool Checker::stands_out(const Jump& jump, const std::vector<double>& values) {
 }
 
 void Checker::check_gaps() {
-  pass_unless_found("gaps", "no jump", [&] {
-    for (std::size_t r = 0; r < pairs_.size(); ++r) {
-      check_jump_of_input(r);
-      if (!check_cut(r)) check_cadence(r);
-      const Recording& recording = dataset_.records[r].recording;
-      for (const std::string& name : channels_) {
-        const Channel& channel = recording.channel(name);
-        if (is_condition(recording, name) || stands_still(r, name)) continue;
-        // Between the new samples of a slow sensor there is no jump.
-        const std::vector<double> whole = bridged(channel);
-        std::vector<std::size_t> samples;
-        std::vector<double> values;
-        for (std::size_t i = 0; i < whole.size(); ++i)
-          if (channel.is_fresh(i)) samples.push_back(i), values.push_back(whole[i]);
-        Jump jump = largest_jump(values);
-        if (!samples.empty()) jump.sample = samples[jump.sample];
-        if (!stands_out(jump, values) || is_end_of_stall(r, jump.sample) ||
-            is_sign_flip(r, name, jump) || is_spike(r, jump.sample) ||
-            (spoiled_[r] != 0 && is_source(name)))
-          continue;
-        add(Verdict::warn, "gaps", recording.name(), jump_text(recording, name, jump),
-            "Check for lost samples and a slipping sensor. Cut the recording in two there.");
-      }
-    }
-  });
+  pass_unless_found("gaps", "no jump",
+                    [&] { for_each_record([&](std::size_t r) { check_gaps_of(r); }); });
+}
+
+void Checker::check_gaps_of(std::size_t r) {
+  check_jump_of_input(r);
+  if (!check_cut(r)) check_cadence(r);
+  const Recording& recording = dataset_.records[r].recording;
+  for (const std::string& name : channels_) {
+    const Channel& channel = recording.channel(name);
+    if (is_condition(recording, name) || stands_still(r, name)) continue;
+    // Between the new samples of a slow sensor there is no jump.
+    const std::vector<double> whole = bridged(channel);
+    std::vector<std::size_t> samples;
+    std::vector<double> values;
+    for (std::size_t i = 0; i < whole.size(); ++i)
+      if (channel.is_fresh(i)) samples.push_back(i), values.push_back(whole[i]);
+    Jump jump = largest_jump(values);
+    if (!samples.empty()) jump.sample = samples[jump.sample];
+    if (!stands_out(jump, values) || is_end_of_stall(r, jump.sample) ||
+        is_sign_flip(r, name, jump) || is_spike(r, jump.sample) ||
+        (spoiled_[r] != 0 && is_source(name)))
+      continue;
+    add(Verdict::warn, "gaps", recording.name(), jump_text(recording, name, jump),
+        "Check for lost samples and a slipping sensor. Cut the recording in two there.");
+  }
 }
 
 // A step that is small for an angle can be the whole range of the deflection between two angles.

@@ -13,22 +13,24 @@ namespace torsio {
 // turns by a unit's factor as much; and recordings of one joint have one stiffness.
 void Checker::check_units() {
   pass_unless_found("units", "the recordings agree", [&] {
-    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+    for_each_record([&](std::size_t r) {
       check_units_within(r);
       if (spoiled_[r] == 0 && !changes_[r]) check_scale(r);
       if (spoiled_[r] == 0) check_twist(r);
-    }
+    });
     compare_slopes();
-    for (std::size_t r = 0; r < pairs_.size(); ++r)
+    for_each_record([&](std::size_t r) {
       if (spoiled_[r] == 0) check_load(r);
+    });
   });
 }
 
 void Checker::compare_slopes() {
   if (pairs_.size() < 2) return;
-  std::vector<double> slopes;
-  for (std::size_t r = 0; r < pairs_.size(); ++r)
-    slopes.push_back(is_clear(r) ? std::abs(line_through(pairs_[r]).slope) : 0.0);
+  std::vector<double> slopes(pairs_.size(), 0.0);
+  for_each_record([&](std::size_t r) {
+    if (is_clear(r)) slopes[r] = std::abs(line_through(pairs_[r]).slope);
+  });
   const std::size_t usual = usual_slope(slopes);
   const auto near_usual = std::ranges::count_if(slopes, [&](double slope) {
     return slope > 0.0 && ratio_of(slope, slopes[usual]) < kSlopeRatio;
@@ -102,32 +104,33 @@ void Checker::check_units_within(std::size_t r) {
 }
 
 void Checker::check_sign_flips() {
-  flips_.resize(pairs_.size());
-  for (std::size_t r = 0; r < pairs_.size(); ++r)
-    if (const Jump jump = largest_jump(pairs_[r].input); !stands_out(jump, pairs_[r].input)) {
-      const Recording& recording = dataset_.records[r].recording;
-      double code = 0.0;
-      for (const std::string& source : sources_)
-        code = std::max(code, finest_step(recording.channel(source)));
-      flips_[r] = find_sign_flip(pairs_[r], code, finest_step(recording.channel(dataset_.target)));
-    }
+  for_each_record([&](std::size_t r) {
+    if (const Jump jump = largest_jump(pairs_[r].input); stands_out(jump, pairs_[r].input)) return;
+    const Recording& recording = dataset_.records[r].recording;
+    double code = 0.0;
+    for (const std::string& source : sources_)
+      code = std::max(code, finest_step(recording.channel(source)));
+    flips_[r] = find_sign_flip(pairs_[r], code, finest_step(recording.channel(dataset_.target)));
+  });
 }
 
 // Hysteresis makes the torque lead the deflection as well. A delay is what a static curve with
 // hysteresis does not explain: it shifts fast parts of the motion more than slow ones.
 void Checker::check_delay() {
   const double rate = dataset_.sample_rate_Hz();
-  double shortest_s = 0.0;
   const std::size_t before = findings_.size();
-  for (std::size_t r = 0; r < pairs_.size(); ++r) {
-    if (spoiled_[r] != 0 || changes_[r] || check_sides(r)) continue;
+  std::vector<double> shortest_of_s(pairs_.size(), 0.0);
+  for_each_record([&](std::size_t r) {
+    if (spoiled_[r] != 0 || changes_[r] || check_sides(r)) return;
     const auto delay = estimate_delay(pairs_[r], rate);
     if (delay && (is_late(*delay, rate) || is_early(*delay, rate)))
       report_delay(r, *delay);
     else
-      shortest_s = std::max(shortest_s, delay ? delay->shortest_s : HUGE_VAL);
-  }
+      shortest_of_s[r] = delay ? delay->shortest_s : HUGE_VAL;
+  });
   if (findings_.size() > before) return;
+  double shortest_s = 0.0;
+  for (const double each_s : shortest_of_s) shortest_s = std::max(shortest_s, each_s);
   add(Verdict::pass, "delay", "",
       fmt::format("{} and {} move together{}", spec_.inputs.front(), dataset_.target,
                   shortest_s > kClearDelay_s
@@ -170,8 +173,9 @@ void Checker::report_delay(std::size_t r, const Delay& delay) {
 void Checker::check_sign() {
   pass_unless_found(
       "sign", fmt::format("{} rises with {}", dataset_.target, spec_.inputs.front()), [&] {
-        std::vector<double> values;
-        for (const Pair& pair : pairs_) values.push_back(correlation(pair.input, pair.target));
+        std::vector<double> values(pairs_.size());
+        for_each_record(
+            [&](std::size_t r) { values[r] = correlation(pairs_[r].input, pairs_[r].target); });
         const std::string flipped = flipped_source(values);
         if (!flipped.empty()) std::ranges::fill(spoiled_, std::uint8_t{1});
         const bool some_rise =
@@ -275,15 +279,14 @@ int Checker::order_of_difference(std::size_t r) const {
 
 // Before the other checks of the relation: they would take a change for a delay or a wrong scale.
 void Checker::relate() {
-  for (std::size_t r = 0; r < pairs_.size(); ++r) {
+  for_each_record([&](std::size_t r) {
     const Recording& recording = dataset_.records[r].recording;
-    changes_.push_back(find_relation_change(pairs_[r]));
-    sides_.push_back(order_of_difference(r) == 0
-                         ? std::nullopt
-                         : relate_sides(recording.channel(sources_[0]).values,
-                                        recording.channel(sources_[1]).values, pairs_[r].target,
-                                        recording.sample_rate_Hz()));
-  }
+    changes_[r] = find_relation_change(pairs_[r]);
+    if (order_of_difference(r) != 0)
+      sides_[r] =
+          relate_sides(recording.channel(sources_[0]).values, recording.channel(sources_[1]).values,
+                       pairs_[r].target, recording.sample_rate_Hz());
+  });
 }
 
 // Changes without a jump: a zero that drifts, a spring that breaks.

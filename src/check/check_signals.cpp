@@ -27,34 +27,34 @@ bool Checker::is_spike(std::size_t r, std::size_t sample) const {
 // Two columns that were interchanged: a torque sensor after the spring follows the deflection
 // closely, apart from hysteresis; a current contains the friction of the gear as well.
 void Checker::check_columns() {
-  pass_unless_found("columns", "no other channel follows the first input better", [&] {
-    for (std::size_t r = 0; r < pairs_.size(); ++r) {
-      if (spoiled_[r] != 0 || changes_[r]) continue;
-      const Recording& recording = dataset_.records[r].recording;
-      const Pair& pair = pairs_[r];
-      std::vector<double> known = pair.input;
-      for (std::size_t i = 0; i < known.size(); ++i)
-        if (!is_finite(pair.target[i])) known[i] = pair.target[i];
-      const std::vector<std::size_t> samples = samples_for_fit(known, 0, known.size());
-      if (samples.size() < kFewSamples) continue;
-      const FixedColumns columns(hysteresis_columns(pair.input, samples));
-      const double own = columns.unexplained(at_samples(pair.target, samples));
-      for (const Channel& channel : recording.channels()) {
-        if (!may_be_target(recording, channel)) continue;
-        const std::vector<double> values = bridged(channel);
-        if (std::abs(correlation(pair.input, values)) < kClearCorrelation) continue;
-        const Eigen::VectorXd other = at_samples(values, samples);
-        if (!other.allFinite()) continue;
-        const double left = columns.unexplained(other);
-        if (left > kWellExplained || left > kOtherExplained * own) continue;
-        add(Verdict::warn, "columns", recording.name(),
-            fmt::format("{} follows {} more closely than {} does ({:.2g} and {:.2g} % unexplained)",
-                        channel.name, spec_.inputs.front(), dataset_.target, 100.0 * left,
-                        100.0 * own),
-            "Check whether two columns were interchanged.");
-      }
-    }
-  });
+  pass_unless_found("columns", "no other channel follows the first input better",
+                    [&] { for_each_record([&](std::size_t r) { check_columns_of(r); }); });
+}
+
+void Checker::check_columns_of(std::size_t r) {
+  if (spoiled_[r] != 0 || changes_[r]) return;
+  const Recording& recording = dataset_.records[r].recording;
+  const Pair& pair = pairs_[r];
+  std::vector<double> known = pair.input;
+  for (std::size_t i = 0; i < known.size(); ++i)
+    if (!is_finite(pair.target[i])) known[i] = pair.target[i];
+  const std::vector<std::size_t> samples = samples_for_fit(known, 0, known.size());
+  if (samples.size() < kFewSamples) return;
+  const FixedColumns columns(hysteresis_columns(pair.input, samples));
+  const double own = columns.unexplained(at_samples(pair.target, samples));
+  for (const Channel& channel : recording.channels()) {
+    if (!may_be_target(recording, channel)) continue;
+    const std::vector<double> values = bridged(channel);
+    if (std::abs(correlation(pair.input, values)) < kClearCorrelation) continue;
+    const Eigen::VectorXd other = at_samples(values, samples);
+    if (!other.allFinite()) continue;
+    const double left = columns.unexplained(other);
+    if (left > kWellExplained || left > kOtherExplained * own) continue;
+    add(Verdict::warn, "columns", recording.name(),
+        fmt::format("{} follows {} more closely than {} does ({:.2g} and {:.2g} % unexplained)",
+                    channel.name, spec_.inputs.front(), dataset_.target, 100.0 * left, 100.0 * own),
+        "Check whether two columns were interchanged.");
+  }
 }
 
 /// Torques, forces and currents that are neither the target nor an input.
@@ -143,8 +143,8 @@ void Checker::check_spikes() {
 
 void Checker::check_repeats() {
   pass_unless_found("repeats", "no rows occur twice", [&] {
-    for (const DatasetRecord& record : dataset_.records) {
-      const Recording& recording = record.recording;
+    for_each_record([&](std::size_t r) {
+      const Recording& recording = dataset_.records[r].recording;
       std::vector<const Channel*> channels;
       for (const std::string& name : channels_)
         if (!is_condition(recording, name)) channels.push_back(&recording.channel(name));
@@ -152,7 +152,7 @@ void Checker::check_repeats() {
           std::max(kRepeatRows,
                    static_cast<std::size_t>(std::round(kRepeat_s * recording.sample_rate_Hz())));
       const auto repeat = find_repeat(channels, rows);
-      if (!repeat) continue;
+      if (!repeat) return;
       add(Verdict::warn, "repeats", recording.name(),
           fmt::format(
               "the rows from t = {:.4g} s on occur again from t = {:.4g} s on, for {:.3g} s",
@@ -160,7 +160,7 @@ void Checker::check_repeats() {
               static_cast<double>(repeat->length) / recording.sample_rate_Hz()),
           "No sensor repeats its noise: check the logger for a buffer that was written twice, and "
           "cut the second one out.");
-    }
+    });
   });
 }
 
@@ -189,12 +189,17 @@ bool Checker::check_cut(std::size_t r) {
 
 /// The range without the outermost hundredth of the samples on either side.
 double Checker::inner_range(const std::vector<double>& values) {
-  std::vector<double> sorted;
-  std::ranges::copy_if(values, std::back_inserter(sorted), is_finite);
-  if (sorted.empty()) return 0.0;
-  std::ranges::sort(sorted);
-  const auto outer = static_cast<std::size_t>(kOuter * static_cast<double>(sorted.size()));
-  return sorted[sorted.size() - 1 - outer] - sorted[outer];
+  std::vector<double> finite;
+  finite.reserve(values.size());
+  std::ranges::copy_if(values, std::back_inserter(finite), is_finite);
+  if (finite.empty()) return 0.0;
+  const auto outer = static_cast<std::ptrdiff_t>(kOuter * static_cast<double>(finite.size()));
+  const auto low = finite.begin() + outer;
+  const auto high = finite.end() - 1 - outer;
+  std::ranges::nth_element(finite, low);
+  const double lowest = *low;
+  std::ranges::nth_element(low, high, finite.end());
+  return *high - lowest;
 }
 
 // A torque in mNm in every recording: nothing in the recordings contradicts it.

@@ -28,10 +28,16 @@ class Checker {
     first.inputs.resize(1);
     sources_ = FeaturePipeline(first, dataset.sample_rate_Hz()).raw_inputs();
     channels_.push_back(dataset.target);
-    for (const DatasetRecord& record : dataset.records)
-      pairs_.push_back({first_feature(record.recording, spec),
-                        bridged(record.recording.channel(dataset.target))});
+    pairs_.resize(dataset.records.size());
+    for_each_record([&](std::size_t r) {
+      const Recording& recording = dataset.records[r].recording;
+      pairs_[r] = {first_feature(recording, spec), bridged(recording.channel(dataset.target))};
+    });
     spoiled_.resize(pairs_.size());
+    stalls_.resize(pairs_.size());
+    flips_.resize(pairs_.size());
+    changes_.resize(pairs_.size());
+    sides_.resize(pairs_.size());
     spikes_.resize(pairs_.size());
   }
 
@@ -42,21 +48,25 @@ class Checker {
            std::string advice = {});
   void pass_unless_found(const std::string& check, std::string message,
                          const std::function<void()>& body);
+  /// Calls body(r) for each recording, some at the same time; what they find comes in the order of
+  /// the recordings.
+  void for_each_record(const std::function<void(std::size_t)>& body);
   template <class Body>
-  void for_each_channel(Body&& body) {
-    for (const DatasetRecord& record : dataset_.records)
-      for (const std::string& channel : channels_)
-        body(record.recording, record.recording.channel(channel));
+  void for_each_channel(const Body& body) {
+    for_each_record([&](std::size_t r) {
+      const Recording& recording = dataset_.records[r].recording;
+      for (const std::string& channel : channels_) body(recording, recording.channel(channel));
+    });
   }
 
   /// As above, without channels that are constant by design.
   template <class Body>
-  void for_each_moving_channel(Body&& body) {
-    for (std::size_t r = 0; r < pairs_.size(); ++r) {
+  void for_each_moving_channel(const Body& body) {
+    for_each_record([&](std::size_t r) {
       const Recording& recording = dataset_.records[r].recording;
       for (const std::string& channel : channels_)
         if (!stands_still(r, channel)) body(r, recording, recording.channel(channel));
-    }
+    });
   }
 
   [[nodiscard]] bool stands_still(std::size_t r, const std::string& name) const;
@@ -71,6 +81,9 @@ class Checker {
   void check_frozen();
   [[nodiscard]] static bool is_stop_of_motion(const Channel& channel, const Rest& rest);
   [[nodiscard]] std::vector<Channel> others_of(std::size_t r, const std::string& name) const;
+  void check_gaps_of(std::size_t r);
+  void check_columns_of(std::size_t r);
+  void check_resolution_of(std::size_t r);
   void leave_out(std::size_t r, const Rest& rest);
   [[nodiscard]] bool is_end_of_stall(std::size_t r, std::size_t sample) const;
   void check_resolution();
@@ -167,9 +180,9 @@ class Checker {
   std::vector<std::string> channels_;  ///< raw inputs and the target
   std::vector<std::string> sources_;   ///< channels of the first input's expression
   std::vector<Pair> pairs_;
-  std::vector<std::uint8_t> spoiled_;  ///< by record: its relation is known to be wrong
-  std::vector<std::pair<std::size_t, Rest>> stalls_;    ///< record, samples
-  std::vector<std::optional<SignFlip>> flips_;          ///< by record
+  std::vector<std::uint8_t> spoiled_;           ///< by record: its relation is known to be wrong
+  std::vector<std::vector<Rest>> stalls_;       ///< by record
+  std::vector<std::optional<SignFlip>> flips_;  ///< by record
   std::vector<std::optional<RelationChange>> changes_;  ///< by record
   std::vector<std::optional<TwoSides>> sides_;          ///< by record
   std::vector<std::vector<std::size_t>> spikes_;        ///< by record: samples

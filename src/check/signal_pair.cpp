@@ -1,6 +1,7 @@
 #include "check/signal_pair.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -32,8 +33,17 @@ double white_noise(const std::vector<double>& values) {
 }  // namespace
 
 Extent extent_of(const std::vector<double>& values) {
+  // The lanes do not wait for each other.
+  std::array<Extent, 4> lanes;
+  std::size_t i = 0;
+  for (; i + lanes.size() <= values.size(); i += lanes.size())
+    for (std::size_t lane = 0; lane < lanes.size(); ++lane) lanes[lane].include(values[i + lane]);
+  for (; i < values.size(); ++i) lanes[0].include(values[i]);
   Extent extent;
-  for (const double value : values) extent.include(value);
+  for (const Extent& lane : lanes) {
+    extent.lowest = std::min(extent.lowest, lane.lowest);
+    extent.highest = std::max(extent.highest, lane.highest);
+  }
   return extent;
 }
 
@@ -180,14 +190,19 @@ std::size_t count_reversals(const std::vector<double>& values) {
 
 std::vector<double> typical_speeds(const std::vector<double>& differences) {
   std::vector<double> speeds;
+  speeds.reserve(differences.size());
   for (const double difference : differences)
     if (is_finite(difference)) speeds.push_back(std::abs(difference));
   if (speeds.empty()) return {};
   const double fastest = *std::ranges::max_element(speeds);
   std::erase_if(speeds, [&](double speed) { return speed <= kRestShare * fastest; });
-  std::ranges::sort(speeds);
   if (speeds.empty()) return {};
-  return {speeds[speeds.size() / 10], speeds[speeds.size() * 9 / 10]};
+  const auto low = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() / 10);
+  const auto high = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() * 9 / 10);
+  std::ranges::nth_element(speeds, low);
+  const double slow = *low;
+  std::ranges::nth_element(low, high, speeds.end());
+  return {slow, *high};
 }
 
 }  // namespace torsio

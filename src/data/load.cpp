@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include "data/canonical_channels.hpp"
@@ -17,6 +19,8 @@
 #include "data/needed_definitions.hpp"
 #include "data/resample.hpp"
 #include "data/whole_samples.hpp"
+#include "numerics/parallel.hpp"
+#include "numerics/shared_progress.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/csv.hpp"
@@ -201,13 +205,14 @@ class Collector {
       if (const auto leak = mapping.computed_from.find(dataset_.target);
           leak != mapping.computed_from.end())
         leaks_.insert(leak->second.begin(), leak->second.end());
-      for (Recording& recording : load(planned.log, dataset_.target, needed, options_.progress)) {
-        auto segments =
-            segments_of(recording, planned.log.entry, planned.split_of_all, options_.role);
-        dataset_.records.push_back(
-            {.recording = std::move(recording), .segments = std::move(segments)});
-      }
     }
+    std::vector<std::vector<DatasetRecord>> of_logs(logs_.size());
+    ProgressOfParts progress(options_.progress, logs_.size());
+    for_each_chunk(logs_.size(), reading_threads(), [&](std::size_t i) {
+      of_logs[i] = records_of(logs_[i], needed, progress.part(i));
+    });
+    for (std::vector<DatasetRecord>& records : of_logs)
+      std::ranges::move(records, std::back_inserter(dataset_.records));
     dataset_.target_computed_from.assign(leaks_.begin(), leaks_.end());
     return std::move(dataset_);
   }
@@ -217,6 +222,30 @@ class Collector {
     Log log;
     std::optional<SplitRule> split_of_all = {};
   };
+
+  /// Files are read at the same time, a few of them, since the text of each becomes a table before
+  /// it becomes channels. A pipe can make its reader wait, and a stop must end that wait.
+  [[nodiscard]] std::size_t reading_threads() const {
+    constexpr std::size_t kMost = 4;
+    const auto is_file = [](const Planned& planned) {
+      std::error_code absent;
+      return std::filesystem::is_regular_file(planned.log.path, absent);
+    };
+    if (!std::ranges::all_of(logs_, is_file)) return 1;
+    return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMost);
+  }
+
+  [[nodiscard]] std::vector<DatasetRecord> records_of(const Planned& planned,
+                                                      const std::vector<std::string>& needed,
+                                                      const Progress& progress) const {
+    std::vector<DatasetRecord> records;
+    for (Recording& recording : load(planned.log, dataset_.target, needed, progress)) {
+      auto segments =
+          segments_of(recording, planned.log.entry, planned.split_of_all, options_.role);
+      records.push_back({.recording = std::move(recording), .segments = std::move(segments)});
+    }
+    return records;
+  }
 
   void add_log(const std::string& path, std::optional<Role> role) {
     Planned planned{.log = {.path = path, .mapping = mapping_.value_or(default_mapping_)}};

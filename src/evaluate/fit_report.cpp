@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "numerics/parallel.hpp"
 #include "torsio/evaluate/evaluate.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
@@ -32,20 +33,21 @@ std::optional<Role> scored_role(const Dataset& dataset) {
 std::vector<Run> runs_of(const TrainedModel& model, const Dataset& dataset, Role role) {
   const Estimator estimator = make_estimator(model.file);
   TrainingData data = training_data(dataset, model.file.settings.features, role);
-  auto sequence = data.sequences.begin();
-  std::vector<Run> runs;
-  for (const DatasetRecord& record : dataset.records) {
-    if (!record.has_role(role)) continue;
-    const Channel& target = record.recording.channel(dataset.target);
+  std::vector<const Recording*> recordings;
+  for (const DatasetRecord& record : dataset.records)
+    if (record.has_role(role)) recordings.push_back(&record.recording);
+  std::vector<Run> runs(recordings.size());
+  for_each_chunk(runs.size(), 0, [&](std::size_t r) {
+    const Channel& target = recordings[r]->channel(dataset.target);
     const Prediction prediction =
-        predict(estimator, record.recording, {&target, dataset.initialise_samples});
+        predict(estimator, *recordings[r], {&target, dataset.initialise_samples});
+    Sequence& sequence = data.sequences[r];
     std::vector<double> residual(target.values.size(), kNotMeasured);
     for (std::size_t n = prediction.initialised; n < residual.size(); ++n)
-      if (sequence->use[n] != 0 && prediction.estimates[n].fault != Fault::warming_up)
+      if (sequence.use[n] != 0 && prediction.estimates[n].fault != Fault::warming_up)
         residual[n] = prediction.estimates[n].value - target.values[n];
-    runs.push_back({std::move(residual), std::move(sequence->features)});
-    ++sequence;
-  }
+    runs[r] = {std::move(residual), std::move(sequence.features)};
+  });
   return runs;
 }
 
@@ -144,8 +146,16 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
   const double bound = kQuantile / std::sqrt(samples);
   const double step_s = static_cast<double>(stride) / model.file.settings.sample_rate_Hz;
 
-  const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
-  const std::vector<double> own = correlations(runs, residual, lags, stride);
+  // First the autocorrelation, then the correlation with each input.
+  const std::vector<std::string>& inputs = model.file.settings.features.inputs;
+  std::vector<std::vector<double>> all(1 + inputs.size());
+  for_each_chunk(all.size(), 0, [&](std::size_t k) {
+    const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
+    const auto input = [k](const Run& run, std::size_t n) { return run.features(n, k - 1); };
+    all[k] = k == 0 ? correlations(runs, residual, lags, stride)
+                    : correlations(runs, input, lags, stride);
+  });
+  const std::vector<double>& own = all.front();
   report.correlations.push_back(summary("residual", own, 1, step_s, bound));
   const auto forgotten = std::ranges::find_if(own, [](double r) { return r < std::exp(-1.0); });
   if (forgotten != own.end())
@@ -153,12 +163,8 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
   const auto end = std::ranges::find_if(own, [](double r) { return r <= 0.0; });
   report.effective_samples =
       samples / (1.0 + 2.0 * std::accumulate(own.begin() + 1, std::max(end, own.begin() + 1), 0.0));
-  const std::vector<std::string>& inputs = model.file.settings.features.inputs;
-  for (std::size_t j = 0; j < inputs.size(); ++j) {
-    const auto input = [j](const Run& run, std::size_t n) { return run.features(n, j); };
-    report.correlations.push_back(
-        summary(inputs[j], correlations(runs, input, lags, stride), 0, step_s, bound));
-  }
+  for (std::size_t j = 0; j < inputs.size(); ++j)
+    report.correlations.push_back(summary(inputs[j], all[1 + j], 0, step_s, bound));
   const double widening = std::sqrt(samples / report.effective_samples);
   for (FittedParameter& parameter : report.table) parameter.std_error *= widening;
   return report;

@@ -1,6 +1,7 @@
 #include "numerics/least_squares.hpp"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <string>
 
 #include "torsio/core/error.hpp"
@@ -76,6 +77,37 @@ LeastSquares least_squares(const Matrix& design, std::span<const double> target)
     result.coefficients[factorised.kept[i]] =
         solution(static_cast<Eigen::Index>(i)) / factorised.lengths[i];
   return result;
+}
+
+StreamedLeastSquares::StreamedLeastSquares(std::size_t columns, std::size_t block_rows)
+    : rows_(columns + 1 + std::max<std::size_t>(block_rows, 1), columns + 1) {}
+
+void StreamedLeastSquares::add(std::span<const double> row, double target) {
+  if (filled_ == rows_.rows) reduce();
+  const std::span<double> to = rows_.row(filled_++);
+  std::ranges::copy(row, to.begin());
+  to.back() = target;
+}
+
+void StreamedLeastSquares::reduce() {
+  const auto columns = static_cast<Eigen::Index>(rows_.columns);
+  const auto filled = static_cast<Eigen::Index>(filled_);
+  if (filled <= columns) return;
+  Eigen::Map<RowMajor> rows(rows_.values.data(), filled, columns);
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr{Eigen::MatrixXd(rows)};
+  rows.topRows(columns) = qr.matrixQR().topRows(columns).triangularView<Eigen::Upper>();
+  filled_ = rows_.columns;
+}
+
+LeastSquares StreamedLeastSquares::solve() {
+  reduce();
+  Matrix design(filled_, rows_.columns - 1);
+  std::vector<double> target(filled_);
+  for (std::size_t n = 0; n < filled_; ++n) {
+    std::ranges::copy(rows_.row(n).first(design.columns), design.row(n).begin());
+    target[n] = rows_.row(n).back();
+  }
+  return least_squares(design, target);
 }
 
 Matrix orthonormal_basis(const Matrix& design) {

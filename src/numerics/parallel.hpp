@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -12,7 +13,8 @@ namespace torsio {
 
 /// Calls `work(chunk)` for every chunk in 0 .. chunks - 1, on several threads. Chunks must not
 /// depend on each other; give each its own result and reduce these in order afterwards, then the
-/// number of threads changes no bit. The first exception is thrown again here.
+/// number of threads changes no bit. Of several exceptions that of the lowest chunk is thrown again
+/// here: every lower chunk has begun by then and ends.
 /// @param threads 0: as many as the machine has.
 template <class Work>
 void for_each_chunk(std::size_t chunks, std::size_t threads, const Work& work) {
@@ -20,6 +22,7 @@ void for_each_chunk(std::size_t chunks, std::size_t threads, const Work& work) {
   threads = std::min(threads, chunks);
   std::atomic<std::size_t> next = 0;
   std::exception_ptr failure;
+  std::size_t failed = chunks;
   std::mutex failure_guard;
   const auto run = [&] {
     for (std::size_t chunk = next++; chunk < chunks; chunk = next++) {
@@ -27,14 +30,20 @@ void for_each_chunk(std::size_t chunks, std::size_t threads, const Work& work) {
         work(chunk);
       } catch (...) {
         const std::scoped_lock lock(failure_guard);
-        if (!failure) failure = std::current_exception();
+        if (chunk < failed) {
+          failure = std::current_exception();
+          failed = chunk;
+        }
         next = chunks;
       }
     }
   };
   {
     std::vector<std::jthread> helpers;
-    for (std::size_t k = 1; k < threads; ++k) helpers.emplace_back(run);
+    try {
+      for (std::size_t k = 1; k < threads; ++k) helpers.emplace_back(run);
+    } catch (const std::system_error&) {  // a limit of the system: with fewer threads, then
+    }
     run();
   }
   if (failure) std::rethrow_exception(failure);

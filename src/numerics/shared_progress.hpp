@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <mutex>
+#include <numeric>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/report_progress.hpp"
 #include "torsio/core/progress.hpp"
@@ -44,6 +46,31 @@ class SharedProgress {
   double per_unit_;
   std::string doing_;
   std::size_t done_ = 0;
+  std::mutex guard_;
+};
+
+/// Progress of parts of equal length that report on several threads, as that of the whole.
+class ProgressOfParts {
+ public:
+  /// @param progress must outlive this
+  ProgressOfParts(const Progress& progress, std::size_t parts)
+      : progress_(progress), done_(parts, 0.0) {}
+
+  /// What one part reports to; this must outlive it.
+  [[nodiscard]] Progress part(std::size_t index) {
+    if (!progress_) return {};
+    return [this, index](double fraction, std::string_view doing) {
+      const std::scoped_lock lock(guard_);
+      done_[index] = fraction;
+      return progress_(
+          std::accumulate(done_.begin(), done_.end(), 0.0) / static_cast<double>(done_.size()),
+          doing);
+    };
+  }
+
+ private:
+  const Progress& progress_;
+  std::vector<double> done_;
   std::mutex guard_;
 };
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <span>
 
 #include "torsio/core/matrix.hpp"
@@ -15,6 +17,13 @@ namespace torsio {
 /// dgmm)
 /// @throws UsageError if there is no sample, a value is not finite, or the floors do not fit.
 [[nodiscard]] Normaliser fit_normaliser(const Matrix& data,
+                                        std::span<const double> scale_floors = {});
+
+/// Calls its argument with each sample, every time in the same order.
+using EachSample = std::function<void(const std::function<void(std::span<const double>)>&)>;
+
+/// The same from samples that are visited twice, so that no table of them is needed.
+[[nodiscard]] Normaliser fit_normaliser(std::size_t channels, const EachSample& each_sample,
                                         std::span<const double> scale_floors = {});
 
 }  // namespace torsio

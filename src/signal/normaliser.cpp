@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "signal/fit_normaliser.hpp"
 #include "torsio/core/error.hpp"
@@ -13,6 +14,15 @@ namespace torsio {
 namespace {
 
 constexpr double kRounding = 1e-12;  // share of the mean below which a spread counts as 0
+
+void check_fit(std::size_t samples, std::size_t channels, std::span<const double> scale_floors) {
+  if (samples == 0)
+    throw UsageError({.place = "normaliser", .expected = "samples to fit to", .found = "none"});
+  if (!scale_floors.empty() && scale_floors.size() != channels)
+    throw UsageError({.place = "normaliser",
+                      .expected = fmt::format("{} scale floors", channels),
+                      .found = fmt::format("{}", scale_floors.size())});
+}
 
 }  // namespace
 
@@ -30,32 +40,40 @@ Normaliser::Normaliser(Parameters parameters) : parameters_(std::move(parameters
   }
 }
 
-Normaliser fit_normaliser(const Matrix& data, std::span<const double> scale_floors) {
-  if (data.rows == 0)
-    throw UsageError({.place = "normaliser", .expected = "samples to fit to", .found = "none"});
-  if (!scale_floors.empty() && scale_floors.size() != data.columns)
-    throw UsageError({.place = "normaliser",
-                      .expected = fmt::format("{} scale floors", data.columns),
-                      .found = fmt::format("{}", scale_floors.size())});
-  Normaliser::Parameters fitted;
-  const auto count = static_cast<double>(data.rows);
-  for (std::size_t j = 0; j < data.columns; ++j) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < data.rows; ++i) sum += data(i, j);
-    const double mean = sum / count;
-    double variance = 0.0;
-    for (std::size_t i = 0; i < data.rows; ++i) {
-      const double deviation = data(i, j) - mean;
-      variance += deviation * deviation / count;
+Normaliser fit_normaliser(std::size_t channels, const EachSample& each_sample,
+                          std::span<const double> scale_floors) {
+  std::size_t samples = 0;
+  std::vector<double> means(channels, 0.0);
+  each_sample([&](std::span<const double> sample) {
+    ++samples;
+    for (std::size_t j = 0; j < channels; ++j) means[j] += sample[j];
+  });
+  check_fit(samples, channels, scale_floors);
+  const auto count = static_cast<double>(samples);
+  for (double& mean : means) mean /= count;
+  std::vector<double> variances(channels, 0.0);
+  each_sample([&](std::span<const double> sample) {
+    for (std::size_t j = 0; j < channels; ++j) {
+      const double deviation = sample[j] - means[j];
+      variances[j] += deviation * deviation / count;
     }
+  });
+  Normaliser::Parameters fitted{.centre = std::move(means), .scale = {}};
+  for (std::size_t j = 0; j < channels; ++j) {
     const double floor = scale_floors.empty() ? 0.0 : scale_floors[j];
-    const double scale = std::max(std::sqrt(variance), floor);
+    const double scale = std::max(std::sqrt(variances[j]), floor);
     // The mean of equal values is not always exactly that value.
-    const bool is_constant = scale <= kRounding * std::abs(mean);
-    fitted.centre.push_back(mean);
+    const bool is_constant = scale <= kRounding * std::abs(fitted.centre[j]);
     fitted.scale.push_back(is_constant ? 1.0 : scale);
   }
   return Normaliser(std::move(fitted));
+}
+
+Normaliser fit_normaliser(const Matrix& data, std::span<const double> scale_floors) {
+  const auto each_row = [&data](const auto& take) {
+    for (std::size_t i = 0; i < data.rows; ++i) take(data.row(i));
+  };
+  return fit_normaliser(data.columns, each_row, scale_floors);
 }
 
 }  // namespace torsio

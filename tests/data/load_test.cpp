@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
@@ -35,6 +38,44 @@ TEST(LoadDataset, CsvFilesTakeTheRoleOfTheirList) {
   EXPECT_EQ(dataset.target, "torque_Nm");
   EXPECT_EQ(dataset.records[0].recording.name(), "a");
   EXPECT_EQ(dataset.records[0].recording.source.file, a);
+}
+
+TEST(LoadDataset, KeepsTheOrderOfFilesThatAreReadAtTheSameTime) {
+  const TemporaryFolder folder;
+  std::vector<std::string> files;
+  for (int k = 0; k < 9; ++k) {
+    const std::size_t samples = k % 2 == 0 ? 20000 : 10;
+    files.push_back(folder.file(std::to_string(k) + ".csv", ramp(static_cast<int>(samples) + k)));
+  }
+  double last = 0.0;
+  std::size_t falls = 0;
+  LoadOptions options;
+  options.progress = [&](double fraction, std::string_view) {
+    if (fraction < last) ++falls;
+    last = fraction;
+    return true;
+  };
+  const Dataset dataset = load_dataset(files, {}, options);
+  EXPECT_EQ(dataset.files, files);
+  ASSERT_EQ(dataset.records.size(), 9U);
+  for (std::size_t k = 0; k < 9; ++k) {
+    EXPECT_EQ(dataset.records[k].recording.name(), std::to_string(k));
+    EXPECT_EQ(dataset.records[k].recording.size(), (k % 2 == 0 ? 20000 : 10) + k);
+  }
+  EXPECT_EQ(falls, 0U) << "the progress is that of all files together";
+  EXPECT_NEAR(last, 1.0, 1e-9);
+}
+
+TEST(LoadDataset, ReportsTheFirstOfSeveralWrongFiles) {
+  const TemporaryFolder folder;
+  std::vector<std::string> files;
+  for (int k = 0; k < 6; ++k) files.push_back(folder.file(std::to_string(k) + ".csv", ramp(20000)));
+  const std::string wrong = folder.file("2.csv", ramp(40000) + "1,x,2\n");
+  (void)folder.file("3.csv", "no numbers\n");
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    const std::string message = test::error_message([&] { (void)load_dataset(files, {}); });
+    EXPECT_TRUE(message.starts_with(wrong + ": line 40002")) << message;
+  }
 }
 
 TEST(LoadDataset, OneRateServesAll) {

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
+#include "fit/common/usable_table.hpp"
 #include "numerics/least_squares.hpp"
 #include "numerics/nnls.hpp"
 #include "torsio/core/did_you_mean.hpp"
@@ -28,6 +30,25 @@ std::size_t input_named(const std::string& expression, const TrainingData& data)
        .found = '"' + expression + '"',
        .advice =
            nearest.empty() ? "Add it to --inputs: the model requires it at run time." : nearest});
+}
+
+/// A knot at each distinct value of the scheduling input.
+template <class EachSample>
+CoefficientSchedule frame_of(const std::string& schedule, const TrainingData& data,
+                             const EachSample& each_sample) {
+  CoefficientSchedule frame{.scheduled = true, .feature = input_named(schedule, data)};
+  std::set<double> values;
+  each_sample([&](std::span<const double> features) {
+    if (values.size() <= kMaxKnots) values.insert(features[frame.feature]);
+  });
+  if (values.size() < 2 || values.size() > kMaxKnots)
+    throw Error({.place = "option schedule: " + schedule,
+                 .expected = "2 to " + std::to_string(kMaxKnots) +
+                             " distinct values in the training data, each of them a knot",
+                 .found = values.size() > kMaxKnots ? "more" : "one value",
+                 .advice = "Schedule over a condition of the records, which is constant in each."});
+  frame.knots.assign(values.begin(), values.end());
+  return frame;
 }
 
 struct Dropped {
@@ -94,28 +115,32 @@ std::vector<double> rows_of(const std::vector<double>& values,
 
 Groups groups_by(const std::string& schedule, const TrainingData& data, const Matrix& features) {
   Groups groups;
+  groups.samples.resize(1);
   if (schedule.empty()) {
-    groups.samples.resize(1);
     for (std::size_t n = 0; n < features.rows; ++n) groups.samples[0].push_back(n);
     return groups;
   }
   groups.feature = schedule;
-  groups.frame.scheduled = true;
-  groups.frame.feature = input_named(schedule, data);
-  std::map<double, std::vector<std::size_t>> by_value;
-  for (std::size_t n = 0; n < features.rows && by_value.size() <= kMaxKnots; ++n)
-    by_value[features(n, groups.frame.feature)].push_back(n);
-  if (by_value.size() < 2 || by_value.size() > kMaxKnots)
-    throw Error({.place = "option schedule: " + schedule,
-                 .expected = "2 to " + std::to_string(kMaxKnots) +
-                             " distinct values in the training data, each of them a knot",
-                 .found = by_value.size() > kMaxKnots ? "more" : "one value",
-                 .advice = "Schedule over a condition of the records, which is constant in each."});
-  for (auto& [knot, samples] : by_value) {
-    groups.frame.knots.push_back(knot);
-    groups.samples.push_back(std::move(samples));
-  }
+  groups.frame = frame_of(schedule, data, [&features](const auto& take) {
+    for (std::size_t n = 0; n < features.rows; ++n) take(features.row(n));
+  });
+  groups.samples.resize(groups.frame.knots.size());
+  for (std::size_t n = 0; n < features.rows; ++n)
+    groups.samples[knot_at(groups.frame, features.row(n))].push_back(n);
   return groups;
+}
+
+CoefficientSchedule schedule_frame(const std::string& schedule, const TrainingData& data) {
+  if (schedule.empty()) return {};
+  return frame_of(schedule, data, [&data](const auto& take) {
+    for_each_usable(data, [&](std::span<const double> features, double) { take(features); });
+  });
+}
+
+std::size_t knot_at(const CoefficientSchedule& frame, std::span<const double> features) {
+  if (!frame.scheduled) return 0;
+  return static_cast<std::size_t>(std::ranges::find(frame.knots, features[frame.feature]) -
+                                  frame.knots.begin());
 }
 
 DesignFit fit_design(const Design& design, const Groups& groups,

@@ -36,6 +36,14 @@ struct Groups {
 [[nodiscard]] Groups groups_by(const std::string& schedule, const TrainingData& data,
                                const Matrix& features);
 
+/// The `frame` of the groups of all usable samples alone. @throws as `groups_by`
+[[nodiscard]] CoefficientSchedule schedule_frame(const std::string& schedule,
+                                                 const TrainingData& data);
+
+/// The knot whose value the scheduling input has; 0 if nothing is scheduled.
+[[nodiscard]] std::size_t knot_at(const CoefficientSchedule& frame,
+                                  std::span<const double> features);
+
 struct DesignFit {
   CoefficientSchedule coefficients;
   std::vector<std::string> notes;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "fit/common/usable_table.hpp"
 #include "fit/common/warm_up.hpp"
 #include "numerics/least_squares.hpp"
+#include "numerics/parallel.hpp"
 
 namespace torsio {
 namespace {
@@ -22,15 +24,20 @@ struct Residual {
   double error = 0.0;
 };
 
-std::vector<Residual> residuals(AnyModel& model, const TrainingData& data) {
-  std::vector<Residual> all;
-  for (const Sequence& sequence : data.sequences) {
-    const std::vector<Estimate> estimates = run(model, sequence);
+std::vector<Residual> residuals(const AnyModel& model, const TrainingData& data) {
+  std::vector<std::vector<Residual>> of_sequences(data.sequences.size());
+  for_each_chunk(of_sequences.size(), 0, [&](std::size_t s) {
+    const Sequence& sequence = data.sequences[s];
+    AnyModel own = model;
+    const std::vector<Estimate> estimates = run(own, sequence);
     for (std::size_t n = 0; n < estimates.size(); ++n)
       if (sequence.use[n] != 0 && std::isfinite(estimates[n].value) &&
           estimates[n].fault == Fault::none)
-        all.push_back({estimates[n].value, estimates[n].value - sequence.target[n]});
-  }
+        of_sequences[s].push_back({estimates[n].value, estimates[n].value - sequence.target[n]});
+  });
+  std::vector<Residual> all;
+  for (const std::vector<Residual>& own : of_sequences)
+    all.insert(all.end(), own.begin(), own.end());
   return all;
 }
 
@@ -66,38 +73,44 @@ FeatureRanges feature_ranges(const TrainingData& data) {
   FeatureRanges ranges;
   ranges.lowest.assign(data.input_count(), kInfinity);
   ranges.highest.assign(data.input_count(), -kInfinity);
-  const Matrix features = usable_table(data).features;
-  for (std::size_t n = 0; n < features.rows; ++n) {
-    for (std::size_t j = 0; j < features.columns; ++j) {
-      ranges.lowest[j] = std::min(ranges.lowest[j], features(n, j));
-      ranges.highest[j] = std::max(ranges.highest[j], features(n, j));
+  for_each_usable(data, [&](std::span<const double> features, double) {
+    for (std::size_t j = 0; j < features.size(); ++j) {
+      ranges.lowest[j] = std::min(ranges.lowest[j], features[j]);
+      ranges.highest[j] = std::max(ranges.highest[j], features[j]);
     }
-  }
+  });
   return ranges;
 }
 
 LinearFallback linear_fallback(const TrainingData& data) {
-  const Table table = usable_table(data);
   // The columns of rates stay 0, so that least squares drops them.
-  Matrix design(table.features.rows, 1 + data.input_count());
-  for (std::size_t n = 0; n < design.rows; ++n) {
-    design(n, 0) = 1.0;
+  std::vector<double> row(1 + data.input_count(), 0.0);
+  row.front() = 1.0;
+  const auto take = [&](std::span<const double> features) {
     for (std::size_t j = 0; j < data.input_count(); ++j)
-      if (!data.inputs[j].is_rate) design(n, 1 + j) = table.features(n, j);
-  }
-  const LeastSquares solved = least_squares(design, table.target);
+      if (!data.inputs[j].is_rate) row[1 + j] = features[j];
+  };
+  StreamedLeastSquares equations(row.size());
+  std::size_t samples = 0;
+  for_each_usable(data, [&](std::span<const double> features, double target) {
+    take(features);
+    equations.add(row, target);
+    ++samples;
+  });
+  const LeastSquares solved = equations.solve();
   LinearFallback fallback;
   fallback.intercept = solved.coefficients.front();
   fallback.slope.assign(solved.coefficients.begin() + 1, solved.coefficients.end());
   double square_sum = 0.0;
-  for (std::size_t n = 0; n < design.rows; ++n) {
-    double error = -table.target[n];
-    for (std::size_t j = 0; j < design.columns; ++j) error += design(n, j) * solved.coefficients[j];
+  for_each_usable(data, [&](std::span<const double> features, double target) {
+    take(features);
+    double error = -target;
+    for (std::size_t j = 0; j < row.size(); ++j) error += row[j] * solved.coefficients[j];
     square_sum += error * error;
-  }
-  const std::size_t terms = design.columns - solved.dropped.size();
-  if (design.rows > terms)
-    fallback.residual_std = std::sqrt(square_sum / static_cast<double>(design.rows - terms));
+  });
+  const std::size_t terms = row.size() - solved.dropped.size();
+  if (samples > terms)
+    fallback.residual_std = std::sqrt(square_sum / static_cast<double>(samples - terms));
   return fallback;
 }
 

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 
 #include "fit/common/finite_input.hpp"
 #include "fit/common/outliers.hpp"
+#include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
@@ -25,9 +27,19 @@ std::vector<std::uint8_t> role_mask(const DatasetRecord& record, Role role) {
   return mask;
 }
 
+std::size_t new_samples(const Channel& channel) {
+  if (channel.fresh.empty()) return channel.values.size();
+  return static_cast<std::size_t>(
+      std::ranges::count_if(channel.fresh, [](std::uint8_t mark) { return mark != 0; }));
+}
+
 /// Limits of the channel over all samples of the role.
 OutlierLimits limits_of(const Dataset& dataset, const std::string& channel, Role role) {
   std::vector<double> values;
+  std::size_t samples = 0;
+  for (const DatasetRecord& record : dataset.records)
+    if (record.has_role(role)) samples += new_samples(record.recording.channel(channel));
+  values.reserve(samples);
   for (const DatasetRecord& record : dataset.records) {
     if (!record.has_role(role)) continue;
     const Channel& measured = record.recording.channel(channel);
@@ -174,18 +186,27 @@ bool Sequence::has_features(std::size_t sample) const {
 }
 
 TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role role) {
-  FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
+  const FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
   TrainingData data;
   data.target = dataset.target;
   data.sample_rate_Hz = dataset.sample_rate_Hz();
   for (std::size_t j = 0; j < pipeline.feature_count(); ++j)
     data.inputs.push_back({spec.inputs[j], pipeline.is_rate(j)});
   const ChannelLimits limits = channel_limits(dataset, pipeline, role);
-  for (const DatasetRecord& record : dataset.records) {
-    if (!record.has_role(role)) continue;
-    data.sequences.push_back(run(record, pipeline, dataset.target, role, limits, data.left_out));
-    data.largest_travel =
-        std::fmax(data.largest_travel, largest_travel(record, data.sequences.back(), role));
+  std::vector<const DatasetRecord*> records;
+  for (const DatasetRecord& record : dataset.records)
+    if (record.has_role(role)) records.push_back(&record);
+  data.sequences.resize(records.size());
+  std::vector<std::vector<LeftOut>> left_out(records.size());
+  std::vector<double> travels(records.size());
+  for_each_chunk(records.size(), 0, [&](std::size_t r) {
+    FeaturePipeline own = pipeline;
+    data.sequences[r] = run(*records[r], own, dataset.target, role, limits, left_out[r]);
+    travels[r] = largest_travel(*records[r], data.sequences[r], role);
+  });
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    std::ranges::move(left_out[r], std::back_inserter(data.left_out));
+    data.largest_travel = std::fmax(data.largest_travel, travels[r]);
   }
   for (const std::string& channel : pipeline.raw_inputs())
     data.largest_step.push_back(largest_step(dataset, channel, role, limits.at(channel)));

@@ -1,6 +1,7 @@
 #include "fit/common/usable_table.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include "torsio/fit/common/training_data.hpp"
 
@@ -18,13 +19,10 @@ Table usable_table(const TrainingData& data) {
   const std::size_t count = data.usable_samples();
   Table table{Matrix(count, data.input_count()), {}};
   table.target.reserve(count);
-  for (const Sequence& sequence : data.sequences) {
-    for (std::size_t n = 0; n < sequence.target.size(); ++n) {
-      if (sequence.use[n] == 0) continue;
-      std::ranges::copy(sequence.features.row(n), table.features.row(table.target.size()).begin());
-      table.target.push_back(sequence.target[n]);
-    }
-  }
+  for_each_usable(data, [&](std::span<const double> features, double target) {
+    std::ranges::copy(features, table.features.row(table.target.size()).begin());
+    table.target.push_back(target);
+  });
   return table;
 }
 

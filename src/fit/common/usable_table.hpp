@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "torsio/core/matrix.hpp"
@@ -14,5 +15,13 @@ struct Table {
 };
 
 [[nodiscard]] Table usable_table(const TrainingData& data);
+
+/// Calls `visit(features, target)` for the same samples in the same order, without a table.
+template <class Visit>
+void for_each_usable(const TrainingData& data, const Visit& visit) {
+  for (const Sequence& sequence : data.sequences)
+    for (std::size_t n = 0; n < sequence.target.size(); ++n)
+      if (sequence.use[n] != 0) visit(sequence.features.row(n), sequence.target[n]);
+}
 
 }  // namespace torsio

@@ -18,21 +18,23 @@ constexpr std::size_t kMaxSummed = 100000;  // rows; of more every n-th is taken
 constexpr std::size_t kRecordsToLeaveOut = 3;
 
 /// [lowest, highest] first input. @throws Error if that range is empty, or has few samples.
-std::pair<double, double> range_of(const Table& table, const TrainingData& data) {
+std::pair<double, double> range_of(const TrainingData& data) {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
-  for (std::size_t n = 0; n < table.features.rows; ++n) {
-    low = std::min(low, table.features(n, 0));
-    high = std::max(high, table.features(n, 0));
-  }
+  std::size_t samples = 0;
+  for_each_usable(data, [&](Features features, double) {
+    low = std::min(low, features[0]);
+    high = std::max(high, features[0]);
+    ++samples;
+  });
   if (!(high > low))
     throw Error({.problem = "a grey box needs a first input that varies",
                  .found = data.inputs[0].expression + " is constant in the training data"});
   constexpr std::size_t kLeast = 200;
-  if (table.features.rows < kLeast)
+  if (samples < kLeast)
     throw Error({.problem = "too few training samples for a grey box",
                  .expected = fmt::format("at least {}", kLeast),
-                 .found = fmt::format("{}", table.features.rows)});
+                 .found = fmt::format("{}", samples)});
   return {low, high};
 }
 
@@ -54,28 +56,30 @@ std::vector<double> time_constants(const TrainingData& data) {
 }
 
 /// Rates at which dry friction is taken to have turned: a share of their root mean square.
-std::vector<double> rate_scales(const TrainingData& data, const Table& table, double share) {
+std::vector<double> rate_scales(const TrainingData& data, double share) {
+  std::vector<double> squares(data.input_count(), 0.0);
+  std::size_t samples = 0;
+  for_each_usable(data, [&](Features features, double) {
+    for (std::size_t j = 0; j < squares.size(); ++j) squares[j] += features[j] * features[j];
+    ++samples;
+  });
   std::vector<double> scales(data.input_count(), 0.0);
-  for (std::size_t j = 0; j < scales.size(); ++j) {
-    if (!data.inputs[j].is_rate) continue;
-    double squares = 0.0;
-    for (std::size_t n = 0; n < table.features.rows; ++n)
-      squares += table.features(n, j) * table.features(n, j);
-    scales[j] = share * std::sqrt(squares / static_cast<double>(table.features.rows));
-  }
+  for (std::size_t j = 0; j < scales.size(); ++j)
+    if (data.inputs[j].is_rate)
+      scales[j] = share * std::sqrt(squares[j] / static_cast<double>(samples));
   return scales;
 }
 
-GreyBoxTerms::Structure finest(const TrainingData& data, const Table& table, double rate_share) {
+GreyBoxTerms::Structure finest(const TrainingData& data, double rate_share) {
   GreyBoxTerms::Structure all;
-  const auto [low, high] = range_of(table, data);
+  const auto [low, high] = range_of(data);
   all.sample_period_s = 1.0 / data.sample_rate_Hz;
   all.curve_knots = all.friction_knots = evenly(low, high, GreyBoxSums::kKnots);
   const double half = 0.5 * (high - low);
   for (std::size_t i = GreyBoxSums::kThresholds; i-- > 0;)
     all.thresholds.push_back(half * std::exp2(-static_cast<double>(i + 1)));
   all.time_constants_s = time_constants(data);
-  all.rate_scales = rate_scales(data, table, rate_share);
+  all.rate_scales = rate_scales(data, rate_share);
   return all;
 }
 
@@ -162,11 +166,7 @@ void add_data(GreyBoxSums& sums, const TrainingData& data) {
                                                  : interleaved_fold(own, usable);
       ++own;
       if (used++ % stride != 0) continue;
-      std::size_t level = 0;
-      if (sums.frame.scheduled)
-        level = static_cast<std::size_t>(
-            std::ranges::find(sums.frame.knots, features[sums.frame.feature]) -
-            sums.frame.knots.begin());
+      const std::size_t level = knot_at(sums.frame, features);
       row.add(sums.cells[level * sums.folds + fold], terms, features, sequence.target[n]);
       if (sums.is_by_record && !others[fold].holds(features[0]))
         row.add(sums.beyond[fold], terms, features, sequence.target[n]);
@@ -195,15 +195,15 @@ void add(NormalEquations& sum, const NormalEquations& part, double sign) {
 }
 
 GreyBoxSums gather(const TrainingData& data, const std::string& schedule, double rate_share) {
-  const Table table = usable_table(data);
-  const Groups groups = groups_by(schedule, data, table.features);
-  GreyBoxSums sums{.all = finest(data, table, rate_share),
+  CoefficientSchedule frame = schedule_frame(schedule, data);
+  const std::size_t levels = std::max<std::size_t>(frame.knots.size(), 1);
+  GreyBoxSums sums{.all = finest(data, rate_share),
                    .is_rate = {},
-                   .frame = groups.frame,
-                   .levels = groups.samples.size(),
+                   .frame = std::move(frame),
+                   .levels = levels,
                    .cells = {},
                    .beyond = {},
-                   .samples = table.features.rows};
+                   .samples = data.usable_samples()};
   for (const auto& input : data.inputs) sums.is_rate.push_back(input.is_rate ? 1 : 0);
   choose_folds(sums, data);
   sums.cells.assign(sums.levels * sums.folds, NormalEquations(sums.all.columns()));

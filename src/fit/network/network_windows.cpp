@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "signal/fit_normaliser.hpp"
 #include "torsio/core/error.hpp"
@@ -44,14 +45,51 @@ std::size_t counted_in(std::span<const std::uint8_t> use, std::size_t start,
       std::ranges::count_if(window, [](std::uint8_t used) { return used != 0; }));
 }
 
+/// Calls `visit(sequence, n)` for each sample to learn from.
+template <class Visit>
+void for_each_used(const TrainingData& data, std::span<const SequencePart> parts,
+                   const Visit& visit) {
+  for (const SequencePart& part : parts) {
+    const Sequence& sequence = data.sequences[part.sequence];
+    for (std::size_t n = part.begin; n < part.end; ++n)
+      if (sequence.use[n] != 0) visit(sequence, n);
+  }
+}
+
+void reserve(WindowSet& set, std::size_t samples) {
+  set.features.reserve(samples * set.inputs);
+  set.targets.reserve(samples);
+  set.use.reserve(samples);
+}
+
+/// Appends a sample, standardised.
+void append(WindowSet& set, const Sequence& sequence, std::size_t n,
+            const NetworkScaling& scaling) {
+  for (std::size_t j = 0; j < set.inputs; ++j)
+    set.features.push_back(static_cast<float>((sequence.features(n, j) - scaling.inputs.centre[j]) /
+                                              scaling.inputs.scale[j]));
+  const bool is_used = sequence.use[n] != 0;
+  set.use.push_back(is_used ? 1 : 0);
+  set.targets.push_back(is_used ? static_cast<float>((sequence.target[n] - scaling.target_centre) /
+                                                     scaling.target_scale)
+                                : 0.0F);
+}
+
+/// Calls `visit(start)` for each window of a part that has a sample in the loss.
+template <class Visit>
+void for_each_window(const Sequence& sequence, const SequencePart& part,
+                     const TrainingWindows& windows, const Visit& visit) {
+  for_each_run(sequence, part, [&](std::size_t begin, std::size_t end) {
+    for_each_start(begin, end, windows, [&](std::size_t start) {
+      if (counted_in(sequence.use, start, windows) > 0) visit(start);
+    });
+  });
+}
+
 bool has_window(const Sequence& sequence, const SequencePart& part,
                 const TrainingWindows& windows) {
   bool found = false;
-  for_each_run(sequence, part, [&](std::size_t begin, std::size_t end) {
-    for_each_start(begin, end, windows, [&](std::size_t start) {
-      found = found || counted_in(sequence.use, start, windows) > 0;
-    });
-  });
+  for_each_window(sequence, part, windows, [&](std::size_t) { found = true; });
   return found;
 }
 
@@ -73,6 +111,14 @@ TrainingSplit split_one(const Sequence& sequence, const SequencePart& part,
 
 void WindowSet::fill(std::span<const std::size_t> windows, SequenceBatch& batch) const {
   const std::size_t rows = windows.size();
+  // The windows lie anywhere in the data: the cache fetches several of them at once.
+  for (const std::size_t window : windows) {
+    const std::size_t sample = starts[window];
+    __builtin_prefetch(features.data() + sample * inputs);
+    __builtin_prefetch(features.data() + (sample + 1) * inputs - 1);
+    __builtin_prefetch(targets.data() + sample);
+    __builtin_prefetch(use.data() + sample);
+  }
   batch.steps = steps;
   batch.rows = rows;
   batch.inputs.resize(steps * rows * inputs);
@@ -91,6 +137,7 @@ void WindowSet::fill(std::span<const std::size_t> windows, SequenceBatch& batch)
 }
 
 std::size_t WindowSet::counted(std::size_t start) const {
+  if (steps == 1) return use[start] != 0 ? 1 : 0;
   return counted_in(use, start, {.length = steps, .burn_in = burn_in, .last_only = last_only});
 }
 
@@ -124,31 +171,28 @@ TrainingSplit split_for_validation(const TrainingData& data, const TrainingWindo
 }
 
 NetworkScaling scaling_of(const TrainingData& data, std::span<const SequencePart> parts) {
-  std::vector<double> features;
-  std::vector<double> target;
-  for (const SequencePart& part : parts) {
-    const Sequence& sequence = data.sequences[part.sequence];
-    for (std::size_t n = part.begin; n < part.end; ++n) {
-      if (sequence.use[n] == 0) continue;
-      const auto row = sequence.features.row(n);
-      if (!std::isfinite(sequence.target[n]) || !sequence.has_features(n))
-        throw Error({.place = fmt::format("{}: sample {}", sequence.recording, n),
-                     .expected = "finite inputs and a finite target where there is something to "
-                                 "learn",
-                     .found = std::isfinite(sequence.target[n])
-                                  ? "an input that is not"
-                                  : fmt::format("{} = {}", data.target, sequence.target[n])});
-      features.insert(features.end(), row.begin(), row.end());
-      target.push_back(sequence.target[n]);
-    }
-  }
-  Matrix samples(target.size(), data.input_count());
-  samples.values = std::move(features);
-  Matrix targets(target.size(), 1);
-  targets.values = target;
-  const Normaliser inputs = fit_normaliser(samples);
-  const Normaliser output = fit_normaliser(targets);
-  const auto [lowest, highest] = std::ranges::minmax(target);
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -lowest;
+  for_each_used(data, parts, [&](const Sequence& sequence, std::size_t n) {
+    if (!std::isfinite(sequence.target[n]) || !sequence.has_features(n))
+      throw Error({.place = fmt::format("{}: sample {}", sequence.recording, n),
+                   .expected = "finite inputs and a finite target where there is something to "
+                               "learn",
+                   .found = std::isfinite(sequence.target[n])
+                                ? "an input that is not"
+                                : fmt::format("{} = {}", data.target, sequence.target[n])});
+    lowest = std::min(lowest, sequence.target[n]);
+    highest = std::max(highest, sequence.target[n]);
+  });
+  const Normaliser inputs = fit_normaliser(data.input_count(), [&](const auto& take) {
+    for_each_used(data, parts,
+                  [&](const Sequence& sequence, std::size_t n) { take(sequence.features.row(n)); });
+  });
+  const Normaliser output = fit_normaliser(1, [&](const auto& take) {
+    for_each_used(data, parts, [&](const Sequence& sequence, std::size_t n) {
+      take(std::span(&sequence.target[n], 1));
+    });
+  });
   if (!(lowest < highest))
     throw Error({.place = data.target,
                  .expected = "a target that changes",
@@ -165,25 +209,22 @@ WindowSet make_windows(const TrainingData& data, std::span<const SequencePart> p
                 .burn_in = windows.burn_in,
                 .last_only = windows.last_only,
                 .inputs = data.input_count()};
+  const bool is_single = windows.length == 1;
+  std::size_t samples = 0;
+  for (const SequencePart& part : parts) {
+    if (!is_single) samples += part.end - part.begin;
+    for_each_window(data.sequences[part.sequence], part, windows,
+                    [&](std::size_t) { samples += is_single ? 1 : 0; });
+  }
+  reserve(set, samples);
   for (const SequencePart& part : parts) {
     const Sequence& sequence = data.sequences[part.sequence];
     const std::size_t base = set.use.size();
-    for (std::size_t n = part.begin; n < part.end; ++n) {
-      for (std::size_t j = 0; j < set.inputs; ++j)
-        set.features.push_back(static_cast<float>(
-            (sequence.features(n, j) - scaling.inputs.centre[j]) / scaling.inputs.scale[j]));
-      const bool is_used = sequence.use[n] != 0;
-      set.use.push_back(is_used ? 1 : 0);
-      set.targets.push_back(is_used
-                                ? static_cast<float>((sequence.target[n] - scaling.target_centre) /
-                                                     scaling.target_scale)
-                                : 0.0F);
-    }
-    for_each_run(sequence, part, [&](std::size_t begin, std::size_t end) {
-      for_each_start(begin, end, windows, [&](std::size_t start) {
-        const std::size_t in_set = base + start - part.begin;
-        if (set.counted(in_set) > 0) set.starts.push_back(in_set);
-      });
+    for (std::size_t n = part.begin; !is_single && n < part.end; ++n)
+      append(set, sequence, n, scaling);
+    for_each_window(sequence, part, windows, [&](std::size_t start) {
+      set.starts.push_back(is_single ? set.use.size() : base + start - part.begin);
+      if (is_single) append(set, sequence, start, scaling);
     });
   }
   return set;

@@ -24,7 +24,8 @@ struct WindowSet {
   std::size_t burn_in = 0;
   bool last_only = false;
   std::size_t inputs = 0;
-  std::vector<float> features = {};    ///< [samples x inputs], all sequences in series
+  /// [samples x inputs], all sequences in series; of windows of one sample only those in the loss.
+  std::vector<float> features = {};
   std::vector<float> targets = {};     ///< [samples]; 0 where not learned from
   std::vector<std::uint8_t> use = {};  ///< [samples]
   std::vector<std::size_t> starts = {};

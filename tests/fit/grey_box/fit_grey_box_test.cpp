@@ -7,13 +7,19 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "fit/common/fitted.hpp"
 #include "fit/common/model_run.hpp"
+#include "fit/grey_box/grey_box_sums.hpp"
 #include "fit/linear/fit_linear.hpp"
+#include "numerics/nnls.hpp"
 #include "support/error_message.hpp"
 #include "support/example_data.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
@@ -69,6 +75,100 @@ TEST(FitGreyBox, FindsAStiffeningSpringWithFrictionToItsNoise) {
   EXPECT_FALSE(fitted.parameters.terms.thresholds.empty());
   ASSERT_FALSE(fitted.notes.empty());
   EXPECT_THAT(fitted.notes[0], HasSubstr("slip elements"));
+}
+
+TEST(GreyBoxSums, AreThoseOfTheCompleteTableOfTerms) {
+  TrainingData data = spring_data(1);
+  for (std::size_t k = 1; k < 4; ++k)
+    data.sequences.push_back(spring_data(1 + k, 30.0 * static_cast<double>(k)).sequences[0]);
+  for (Sequence& sequence : data.sequences)
+    for (std::size_t n = 0; n < sequence.use.size(); n += 3) sequence.use[n] = 0;
+  const GreyBoxSums sums = gather(data, "", 0.2);
+  Matrix table(data.usable_samples(), sums.all.columns());
+  std::vector<double> target;
+  for (const Sequence& sequence : data.sequences) {
+    GreyBoxTerms terms(sums.all);
+    for (std::size_t n = 0; n < sequence.use.size(); ++n) {
+      terms.move(sequence.features(n, 0));
+      if (sequence.use[n] == 0) continue;
+      terms.visit(sequence.features.row(n),
+                  [&](std::size_t column, double value) { table(target.size(), column) = value; });
+      target.push_back(sequence.target[n]);
+    }
+  }
+  const NormalEquations complete = normal_equations(table, target);
+  ASSERT_EQ(sums.cells.size(), 4U) << "a fold for each record";
+  NormalEquations streamed(sums.all.columns());
+  for (const NormalEquations& cell : sums.cells) add(streamed, cell);
+  EXPECT_EQ(streamed.rows, complete.rows);
+  EXPECT_NEAR(streamed.square, complete.square, 1e-12 * complete.square);
+  const auto nearly = [](const std::vector<double>& found, const std::vector<double>& expected) {
+    double largest = 0.0;
+    double difference = 0.0;
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      largest = std::max(largest, std::abs(expected[i]));
+      difference = std::max(difference, std::abs(found[i] - expected[i]));
+    }
+    return difference <= 1e-12 * largest;
+  };
+  EXPECT_TRUE(nearly(streamed.product.values, complete.product.values));
+  EXPECT_TRUE(nearly(streamed.projection, complete.projection));
+}
+
+/// Records of a straight spring whose torque also follows a wave over a second input; a slow load cell
+/// measures every fourth sample.
+TrainingData records_of_a_wave(std::size_t records, std::size_t samples, double height_Nm) {
+  TrainingData data;
+  Random random(8);
+  for (std::size_t r = 0; r < records; ++r) {
+    const Matrix motion = wander(samples, 40.0 * static_cast<double>(r));
+    Matrix features(motion.rows, 2);
+    for (std::size_t n = 0; n < motion.rows; ++n) {
+      features(n, 0) = motion(n, 0);
+      features(n, 1) = std::sin(0.0031 * static_cast<double>(n + 500 * r));
+    }
+    TrainingData record = test::training_data_of(
+        {{.expression = "spring_deflection_rad"}, {.expression = "support_m"}}, std::move(features),
+        [&](Row x) {
+          return 400.0 * x[0] + height_Nm * std::cos(3.0 * x[1]) + 0.1 * random.normal();
+        });
+    for (std::size_t n = 0; n < samples; ++n) record.sequences[0].use[n] = n % 4 == 0 ? 1 : 0;
+    if (r == 0) {
+      data = std::move(record);
+    } else {
+      data.sequences.push_back(std::move(record.sequences[0]));
+    }
+  }
+  return data;
+}
+
+TEST(FitGreyBox, AddsTheNetworkThatItsTrialFindsWorthwhile) {
+  for (const std::size_t records : {1, 4}) {
+    SCOPED_TRACE(records);
+    const TrainingData data = records_of_a_wave(records, 24000 / records, 4.0);
+    const Fitted<GreyBox> tried = fit_grey_box(data, {});
+    ASSERT_TRUE(tried.parameters.residual) << tried.notes.back();
+    const Fitted<GreyBox> named = fit_grey_box(data, {.residual = ResidualKind::mlp});
+    const auto& one = std::get<Mlp::Parameters>(tried.parameters.residual->model);
+    const auto& other = std::get<Mlp::Parameters>(named.parameters.residual->model);
+    EXPECT_EQ(one.layers.front().weights, other.layers.front().weights)
+        << "the trial does not change the network that is kept";
+    EXPECT_EQ(tried.parameters.residual->bound, named.parameters.residual->bound);
+    EXPECT_LT(evaluate(GreyBox(tried.parameters), data).rmse,
+              0.8 * evaluate(GreyBox(fit_grey_box(data, kBoxAlone).parameters), data).rmse);
+  }
+}
+
+TEST(FitGreyBox, AddsNoNetworkWhereNothingIsLeft) {
+  const Fitted<GreyBox> fitted = fit_grey_box(records_of_a_wave(4, 4000, 0.0), {});
+  EXPECT_FALSE(fitted.parameters.residual);
+  EXPECT_THAT(fitted.notes.back(), HasSubstr("not added"));
+}
+
+TEST(FitGreyBox, StopsOnRequestWhileANetworkIsTried) {
+  const auto stop = [](double, std::string_view doing) { return !doing.starts_with("epoch 3"); };
+  EXPECT_THROW((void)fit_grey_box(records_of_a_wave(4, 4000, 4.0), {}, {.progress = stop}),
+               Cancelled);
 }
 
 TEST(FitGreyBox, LeavesAStraightLineAStraightLine) {

@@ -276,6 +276,24 @@ TEST(FitNetwork, LeavesOutWindowsWithoutTargets) {
   EXPECT_EQ(set.starts, (std::vector<std::size_t>{60, 70}));
 }
 
+TEST(FitNetwork, KeepsOfSingleSamplesOnlyThoseToLearnFrom) {
+  TrainingData data = delayed_sines(2, 100, 3);
+  for (Sequence& sequence : data.sequences)
+    for (std::size_t n = 0; n < 100; ++n) sequence.use[n] = n % 8 == 3 ? 1 : 0;
+  const auto parts = whole_sequences(data);
+  const NetworkScaling scaling = scaling_of(data, parts);
+  const WindowSet set =
+      make_windows(data, parts, scaling, {.length = 1, .stride = 1, .burn_in = 0});
+  ASSERT_EQ(set.starts.size(), 26U);
+  EXPECT_EQ(set.use, std::vector<std::uint8_t>(26, 1));
+  EXPECT_EQ(set.targets.size(), 26U);
+  ASSERT_EQ(set.features.size(), 26U * data.input_count());
+  const double input = data.sequences[1].features(11, 0);
+  EXPECT_EQ(set.features[set.starts[14] * data.input_count()],
+            static_cast<float>((input - scaling.inputs.centre[0]) / scaling.inputs.scale[0]))
+      << "the second sample in use of the second record";
+}
+
 TEST(FitNetwork, HoldsOutWholeRecordsOrTheEndOfTheOnlyOne) {
   const TrainingData many = delayed_sines(10, 100, 3);
   const TrainingWindows windows{.length = 20, .stride = 20, .burn_in = 5};
