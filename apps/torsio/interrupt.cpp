@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <string_view>
 
@@ -11,8 +12,10 @@ namespace {
 
 constexpr unsigned kDeadline_s = 1;
 
-volatile std::sig_atomic_t interrupted = 0;
-volatile std::sig_atomic_t is_terminal = 0;
+// Set by the handler of a signal, read by every thread that reports progress.
+std::atomic<int> interrupted = 0;
+static_assert(std::atomic<int>::is_always_lock_free);
+std::atomic<int> is_terminal = 0;
 
 void print(std::string_view text) {
   [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <mutex>
 #include <numeric>
+#include <set>
+#include <string>
 #include <thread>
 
 #include "check/checker.hpp"
@@ -21,33 +23,28 @@ bool has_segment(const DatasetRecord& record, Role role) {
                              [&](const Segment& segment) { return segment.role == role; });
 }
 
-/// What this thread finds in the recording that it is at work on; null: in all of them.
-thread_local std::vector<Finding>* found_here = nullptr;
-
-class Collecting {
- public:
-  explicit Collecting(std::vector<Finding>& findings) { found_here = &findings; }
-  ~Collecting() { found_here = nullptr; }
-  Collecting(const Collecting&) = delete;
-  Collecting& operator=(const Collecting&) = delete;
-};
-
-/// Each thread needs copies of the channels of one recording.
-std::size_t threads() {
+/// Each thread needs copies of the channels of one recording. One, where two recordings have one name: the
+/// order of their findings would not be determined.
+std::size_t threads_for(const Dataset& dataset) {
   constexpr std::size_t kMost = 4;
+  std::set<std::string> names;
+  for (const DatasetRecord& record : dataset.records) names.insert(record.recording.name());
+  if (names.size() < dataset.records.size()) return 1;
   return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMost);
 }
 
 }  // namespace
 
 void Checker::for_each_record(const std::function<void(std::size_t)>& body) {
-  std::vector<std::vector<Finding>> found(pairs_.size());
-  for_each_chunk(found.size(), threads(), [&](std::size_t r) {
-    const Collecting here(found[r]);
-    body(r);
-  });
-  for (std::vector<Finding>& of_record : found)
-    std::ranges::move(of_record, std::back_inserter(findings_));
+  const auto before = static_cast<std::ptrdiff_t>(findings_.size());
+  for_each_chunk(pairs_.size(), threads_for(dataset_), body);
+  const auto place_of = [&](const Finding& finding) {
+    return std::ranges::find(dataset_.records, finding.recording,
+                             [](const DatasetRecord& record) { return record.recording.name(); });
+  };
+  // Those of one recording are in their order, since one thread has added them.
+  std::stable_sort(findings_.begin() + before, findings_.end(),
+                   [&](const Finding& a, const Finding& b) { return place_of(a) < place_of(b); });
 }
 
 std::vector<Finding> Checker::run() {
@@ -79,8 +76,8 @@ std::vector<Finding> Checker::run() {
 
 void Checker::add(Verdict verdict, std::string check, std::string recording, std::string message,
                   std::string advice) {
-  std::vector<Finding>& findings = found_here != nullptr ? *found_here : findings_;
-  findings.push_back(
+  const std::lock_guard lock(adding_);
+  findings_.push_back(
       {verdict, std::move(check), std::move(recording), std::move(message), std::move(advice)});
 }
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -186,6 +187,7 @@ class Checker {
   std::vector<std::optional<RelationChange>> changes_;  ///< by record
   std::vector<std::optional<TwoSides>> sides_;          ///< by record
   std::vector<std::vector<std::size_t>> spikes_;        ///< by record: samples
+  std::mutex adding_;
   std::vector<Finding> findings_;
 };
 

@@ -141,9 +141,7 @@ TEST(SimulatedMonitor, MissesNoFaultAndGivesNoFalseAlarmInTwoHours) {
   for (const ClassResult& of : result.classes) {
     EXPECT_EQ(of.injected, 8U) << of.name;
     EXPECT_EQ(of.detected, of.must_stop ? 8U : 0U) << of.name;
-    // A step of the torque constant reaches the sources through the motion that it causes: docs/faults.md.
-    const std::size_t max_late = of.name == "torque constant" ? 4 : 0;
-    EXPECT_LE(of.late, max_late) << of.name << ": " << of.latency.longest_ms << " ms";
+    EXPECT_EQ(of.late, 0U) << of.name << ": " << of.latency.longest_ms << " ms";
     EXPECT_EQ(of.stops_with_gain, 0U) << of.name;
   }
   EXPECT_GT(result.work.joint_hours, 1.9);
