@@ -1,6 +1,4 @@
-// Two estimates of a joint's torque, combined and compared; their monitor, a watchdog of commands
-//   and a brake: 09_monitored_joint With a monitor file, `torsio::load_monitor` gives estimators,
-//   redundancy and monitor in one object.
+// Two estimators (a monitor file: `load_monitor`), their combination, monitor, watchdog and brake.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -12,11 +10,8 @@
 #include "torsio/safety/monitor.hpp"
 #include "torsio/safety/redundancy.hpp"
 
-namespace {
-
 constexpr double kStiffness_Nm_rad = 573.0;
 constexpr double kTorquePerCurrent_Nm_A = 12.5;
-
 struct Line {  // torque = slope x
   using Parameters = Line;
   double slope;
@@ -28,7 +23,7 @@ struct Line {  // torque = slope x
     return {.value = slope * x[0]};
   }
 };
-torsio::BasicEstimator<Line> line(const char* input, double slope, double std_dev_Nm) {
+static torsio::BasicEstimator<Line> line(const char* input, double slope, double std_dev_Nm) {
   torsio::EstimatorSettings settings;
   settings.features.inputs = {input};
   settings.sample_rate_Hz = 1000.0;
@@ -38,9 +33,6 @@ torsio::BasicEstimator<Line> line(const char* input, double slope, double std_de
   settings.residuals = {.edges = {-50.0, 50.0}, .std_dev = {std_dev_Nm}};
   return {settings, Line{slope}};
 }
-
-}  // namespace
-
 int main() try {
   auto spring = line("spring_deflection_rad", kStiffness_Nm_rad, 0.3);
   auto current = line("motor_current_A", kTorquePerCurrent_Nm_A, 0.6);
@@ -54,14 +46,13 @@ int main() try {
   torsio::CommandWatchdog watchdog({.timeout_s = 0.018});
   torsio::JointStop::Settings brake{.speed_rad_s = 1.0, .deceleration_rad_s2 = 5.0};
   brake.drive = torsio::series_elastic_joint(torsio::data_sheet("dfki-50")).drive;
-  brake.brake_static_Nm = 100.0, brake.brake_sliding_Nm = 80.0, brake.load_Nm = 20.0;
+  brake.brake_static_Nm = 100.0, brake.brake_sliding_Nm = 80.0, brake.load_Nm = 20.0,
   brake.brake_engage_s = 0.02, brake.brake_release_s = 0.04;
   torsio::JointStop stop(brake, 1000.0);
   for (int tick = 0; tick < 2500; ++tick) {
     const double t_s = 1e-3 * tick;
     const std::int64_t now_ns = std::int64_t{1'000'000} * tick;
-    // Replace these by the command and the registers of your drive. From 2 s on the current sensor
-    // is wrong.
+    // In place of the command and your drive's registers; from 2 s on the current sensor is wrong.
     const double wanted_Nm = 20.0 * std::sin(3.0 * t_s);
     const double deflection_rad = wanted_Nm / kStiffness_Nm_rad;
     const double measured_A = (tick < 2000 ? 1.0 : 0.6) * wanted_Nm / kTorquePerCurrent_Nm_A;
@@ -76,16 +67,13 @@ int main() try {
     if (tick == 101 && monitor.arm(t_s)) (void)stop.release();
     if (!monitor.is_watching() || state != torsio::CommandWatchdog::State::running)
       stop.trigger(torsio::StopCategory::power_off);  // latched, until `release`
-    // The current of the wanted torque alone; example 04 has a torque controller.
     const auto command = stop.step(reference.torque_Nm / kTorquePerCurrent_Nm_A, measured);
     if (tick % 250 == 0)
-      std::printf("t = %.2f s: %6.2f Nm +- %.2f, %5.2f A, monitor %s, brake %s\n", t_s,
-                  torque.value_Nm, torque.std_dev_Nm, command.current_A,
-                  name(monitor.state()).data(), command.is_brake_open ? "open" : "closed");
+      std::printf("%.2f s: %.2f Nm +- %.2f, monitor %s, brake %s\n", t_s, torque.value_Nm,
+                  torque.std_dev_Nm, name(monitor.state()).data(),
+                  command.is_brake_open ? "open" : "closed");
   }
-  std::printf("at %.3f s: %s\n", monitor.reason().t_s,
-              describe(monitor.reason(), settings).c_str());
+  std::puts(describe(monitor.reason(), settings).c_str());
 } catch (const torsio::Error& error) {
-  std::fprintf(stderr, "%s\n", error.what());
-  return 1;
+  return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

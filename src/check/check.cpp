@@ -42,7 +42,7 @@ void Checker::for_each_record(const std::function<void(std::size_t)>& body) {
     return std::ranges::find(dataset_.records, finding.recording,
                              [](const DatasetRecord& record) { return record.recording.name(); });
   };
-  // Those of one recording are in their order, since one thread has added them.
+  // The findings of one recording are in their order, since one thread has added them.
   std::stable_sort(findings_.begin() + before, findings_.end(),
                    [&](const Finding& a, const Finding& b) { return place_of(a) < place_of(b); });
 }
