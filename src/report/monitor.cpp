@@ -112,6 +112,23 @@ std::string calibration_text(const CalibratedMonitor& calibrated) {
   std::string notes;
   if (const auto checks = checks_without_limit(calibrated.monitor); !checks.empty())
     notes += fmt::format("without a limit: {}\n", fmt::join(checks, ", "));
+  if (!calibrated.not_redundant.empty())
+    notes += fmt::format("no comparison covers, since every source depends on it: {}\n",
+                         fmt::join(calibrated.not_redundant, ", "));
+  for (const TorqueSource& source : calibrated.redundancy.sources)
+    if (source.depends_on.empty())
+      notes += fmt::format(
+          "warning: {} states no parts (NAME=MODEL:PART+PART): a part that it shares with another "
+          "source is not found\n",
+          source.name);
+  for (const CalibratedPair& pair : calibrated.pairs)
+    if (pair.typical_threshold_Nm > pair.largest_torque_Nm)
+      notes += fmt::format(
+          "warning: {}, {}: the threshold of {:.3g} Nm is above the largest torque of the "
+          "recordings that both reach ({:.3g} Nm): their models may not fit this joint, its "
+          "mapping "
+          "or each other\n",
+          pair.first, pair.second, pair.typical_threshold_Nm, pair.largest_torque_Nm);
   for (const CalibratedPair& pair : calibrated.pairs)
     if (pair.is_factor_from_floor)
       notes += fmt::format(
@@ -135,12 +152,14 @@ std::string calibration_json(const CalibratedMonitor& calibrated) {
   Json document{{"fault_free_hours", calibrated.hours},
                 {"false_alarms_per_hour", calibrated.false_alarms_per_hour},
                 {"is_extrapolated", calibrated.is_extrapolated},
+                {"not_redundant", calibrated.not_redundant},
                 {"pairs", Json::array()}};
   for (const CalibratedPair& pair : calibrated.pairs)
     document["pairs"].push_back({{"first", pair.first},
                                  {"second", pair.second},
                                  {"largest_difference_Nm", pair.largest_difference_Nm},
                                  {"threshold_Nm", pair.typical_threshold_Nm},
+                                 {"largest_torque_Nm", pair.largest_torque_Nm},
                                  {"detected_in_these_states_Nm", pair.detected_in_these_states_Nm},
                                  {"is_factor_from_floor", pair.is_factor_from_floor}});
   return json_text(document);

@@ -129,10 +129,9 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
     if (monitor.state() != Monitor::State::stopped) continue;
     replay.stopped_at_s = t_s;
     const Redundancy& redundancy = monitored.redundancy();
-    // A part of all sources, such as the supply, is one of every pair and explains nothing.
-    PartSet of_all = ~PartSet{0};
-    for (std::size_t i = 0; i < monitored.sources().size(); ++i) of_all &= redundancy.parts_of(i);
-    replay.suspects = redundancy.names(redundancy.suspects(monitor.disagreeing()) & ~of_all);
+    // A part of all sources is one of every pair and explains nothing.
+    replay.suspects =
+        redundancy.names(redundancy.suspects(monitor.disagreeing()) & ~parts_of_all(redundancy));
   }
   std::ranges::stable_sort(replay.not_ready, std::ranges::greater{},
                            &MonitorReplay::NotReady::present_s);

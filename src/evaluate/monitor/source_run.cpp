@@ -14,6 +14,13 @@ void take_zeros(TorqueSources& sources, const Recording& recording) {
       sources.set_zero(zero.channel, 0.0);
 }
 
+PartSet parts_of_all(const Redundancy& redundancy) {
+  PartSet of_all = ~PartSet{0};
+  for (std::size_t i = 0; i < redundancy.settings().sources.size(); ++i)
+    of_all &= redundancy.parts_of(i);
+  return of_all;
+}
+
 std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recording) {
   take_zeros(sources, recording);
   std::vector<const std::vector<double>*> channels;

@@ -6,6 +6,7 @@
 
 #include "torsio/data/recording.hpp"
 #include "torsio/estimate/torque_sources.hpp"
+#include "torsio/safety/redundancy.hpp"
 
 namespace torsio {
 
@@ -23,6 +24,9 @@ struct SourceRun {
 /// A zero that was subtracted from the recording is not subtracted again. Without effect on
 /// channels that the sources do not read.
 void take_zeros(TorqueSources& sources, const Recording& recording);
+
+/// The parts on which every source depends, such as the supply.
+[[nodiscard]] PartSet parts_of_all(const Redundancy& redundancy);
 
 /// All sources over a recording, from `reset()`. @throws Error if a channel is missing.
 [[nodiscard]] std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recording);

@@ -206,6 +206,66 @@ TEST(CalibrateMonitor, RefusesWhatItCannotUse) {
       HasSubstr("% of the samples with a fault"));
 }
 
+TEST(CalibrateMonitor, RefusesASingleSource) {
+  MonitorPlan plan = TwoTorques::plan();
+  plan.sources.pop_back();
+  EXPECT_THAT(test::error_message([&] {
+                static_cast<void>(calibrate_monitor(
+                    {{.torque = make_estimator(TwoTorques().spring)}}, plan,
+                    TwoTorques::fault_free(300.0), {.false_alarms_per_hour = 40.0}));
+              }),
+              HasSubstr("at least two sources"));
+}
+
+TEST(CalibrateMonitor, ReportsThePartsThatNoComparisonCovers) {
+  const TwoTorques joint;
+  MonitorPlan plan = TwoTorques::plan();
+  const auto text = [&] {
+    const CalibratedMonitor monitor = calibrate_monitor(
+        joint.models(), plan, TwoTorques::fault_free(300.0), {.false_alarms_per_hour = 40.0});
+    return calibration_text(monitor) + calibration_json(monitor);
+  };
+  EXPECT_THAT(text(), testing::AllOf(HasSubstr("every source depends on it: clock\n"),
+                                     HasSubstr("\"not_redundant\": [\n    \"clock\""),
+                                     testing::Not(HasSubstr("states no parts"))));
+  plan.sources[1].depends_on.clear();
+  EXPECT_THAT(text(), testing::AllOf(HasSubstr("warning: current states no parts"),
+                                     testing::Not(HasSubstr("every source depends on it"))));
+}
+
+TEST(CalibrateMonitor, WarnsOfAThresholdAboveTheLargestTorque) {
+  const auto text = [](double least_Nm) {
+    return calibration_text(
+        calibrated(5.0, {.false_alarms_per_hour = 40.0, .least_threshold_Nm = least_Nm}));
+  };
+  EXPECT_THAT(text(0.0), testing::Not(HasSubstr("above the largest torque")));
+  EXPECT_THAT(text(8.0),
+              HasSubstr("spring, current: the threshold of 8 Nm is above the largest torque"));
+}
+
+TEST(CalibrateMonitor, RefusesACompanionThatIsNotWatchedOrDoesNotMove) {
+  MonitorPlan plan = TwoTorques::plan();
+  Dataset sound = TwoTorques::fault_free(300.0);
+  const auto message = [&] {
+    return test::error_message([&] {
+      static_cast<void>(
+          calibrate_monitor(TwoTorques().models(), plan, sound, {.false_alarms_per_hour = 40.0}));
+    });
+  };
+  plan.signals[0].moves_with = "motor_angle_rad";
+  EXPECT_THAT(message(), testing::AllOf(HasSubstr("signal spring_deflection_rad"),
+                                        HasSubstr("add --signal 'motor_angle_rad'")));
+  plan.signals.push_back({.name = "motor_angle_rad", .lowest = -1.0, .highest = 1.0});
+  Recording& recording = sound.records[0].recording;
+  recording.add({.name = "motor_angle_rad", .values = std::vector<double>(recording.size(), 0.0)});
+  EXPECT_THAT(message(), HasSubstr("motor_angle_rad, with which it is to move, is constant"));
+}
+
+TEST(CalibrateMonitor, ReportsAShortRecordingBeforeItsRate) {
+  EXPECT_THAT(test::error_message([] { calibrated(0.5); }),
+              testing::AllOf(HasSubstr("at least 100 s without a fault"), HasSubstr("found 30 s")));
+}
+
 TEST(ReplayMonitor, ReportsARecordingThatItCannotArm) {
   const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
   Recording without_spring("log", 1000.0);
