@@ -154,7 +154,7 @@ void replay(MonitorFlags& flags) {
     std::vector<torsio::EstimatedRecording> estimated;
     estimated.reserve(replays.size());
     for (const torsio::MonitorReplay& each : replays) estimated.push_back(each.estimated);
-    torsio::write_estimates(estimated, flags.output);
+    torsio::write_estimates(estimated, flags.output, torsio::FaultColumn::number);
   }
   if (!flags.plot.empty()) write_text(flags.plot, torsio::replay_svg(replays.front(), settings));
   if (flags.json.wants_tables() && !is_standard_output(flags.output))
@@ -198,6 +198,8 @@ void add_monitor(CLI::App& app) {
       "\\\n"
       "             --source spring=spring.safetensors:joint_encoder sound1.csv sound2.csv \\\n"
       "             -o joint.monitor.json\n"
+      "A stop and a joint that was never ready are results: the exit code is 0, as for a joint "
+      "without\na finding; scripts read stopped_at_s and watching_from_s of --json.\n"
       "docs/safety.md has the checks, what each detects, and what none detects.");
   verb->add_option("FILES", flags->files,
                    "a monitor file and recordings; with --calibrate: recordings without a fault");

@@ -109,8 +109,12 @@ torsio::MonitorReplay replay_simulated(const SimulatedMonitorFlags& flags,
           : torsio::load_monitor(monitor_file, {.serial = torsio::full_name(sheet)});
   settings = monitor.monitor().settings();
   ProgressBar progress;
-  return torsio::replay_monitor(monitor, torsio::duty_recording(sheet, work, progress.listener()),
-                                progress.listener());
+  torsio::MonitorReplay replay = torsio::replay_monitor(
+      monitor, torsio::duty_recording(sheet, work, progress.listener()), progress.listener());
+  for (const torsio::ScheduledFault& fault : work.faults.faults)
+    replay.injections.push_back(
+        {.fault = fmt::format("{} ({})", fault.what, fault.place), .start_s = fault.start_s});
+  return replay;
 }
 
 void run_campaign(const SimulatedMonitorFlags& flags, const JsonOutput& json) {

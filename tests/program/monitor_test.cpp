@@ -62,10 +62,15 @@ TEST_F(MonitorVerb, FindsAFaultInARecordingAndPassesASoundOne) {
                   .at("stopped_at_s")
                   .is_null());
   const std::string csv = contents("torque.csv");
-  EXPECT_NE(
-      csv.substr(0, csv.find('\n')).find("spring_torque_Nm,current_torque_Nm,monitor_state_1"),
-      std::string::npos)
-      << csv.substr(0, csv.find('\n'));
+  const std::size_t second = csv.find('\n') + 1;
+  EXPECT_NE(csv.substr(0, second).find(
+                "spring_torque_Nm,spring_fault_1,current_torque_Nm,current_fault_1,"
+                "monitor_state_1,fault_1\n"),
+            std::string::npos)
+      << csv.substr(0, second);
+  const std::string first_row = csv.substr(second, csv.find('\n', second) - second);
+  EXPECT_TRUE(first_row.ends_with(",nan,3,nan,3,0,3")) << "warming up: " << first_row;
+  EXPECT_EQ(torsio("check torque.csv").err.find("expected a number"), std::string::npos);
 
   ASSERT_EQ(shell("printf 'faults:\n  - {sensor: joint_angle_rad, fault: jump, at: 20s, by: "
                   "2deg}\n' > f.yaml")

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <string>
 
 #include "core/report_progress.hpp"
 #include "evaluate/monitor/exceedance.hpp"
@@ -462,17 +464,23 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
     scaled[i].error_bar_factor = result.error_bar_factors[i];
   }
   recorded = run_all(scaled, fault_free, progress, 0.5);
-  std::vector<double> guarded(sources.size(), 0.0);
-  for (const std::vector<SourceRun>& runs : recorded)
-    for (std::size_t i = 0; i < runs.size(); ++i)
-      guarded[i] += static_cast<double>(runs[i].guarded);
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    result.guarded_share.push_back(guarded[i] / static_cast<double>(samples));
+    std::map<Fault, std::size_t> guarded;
+    for (const std::vector<SourceRun>& runs : recorded)
+      for (const auto& [fault, count] : runs[i].guarded) guarded[fault] += count;
+    std::size_t sum = 0;
+    std::string faults;
+    for (const auto& [fault, count] : guarded) {
+      sum += count;
+      faults += fmt::format("{}{} {:.1f} %", faults.empty() ? "" : ", ", name(fault),
+                            100.0 * static_cast<double>(count) / static_cast<double>(samples));
+    }
+    result.guarded_share.push_back(static_cast<double>(sum) / static_cast<double>(samples));
     if (result.guarded_share[i] > kLargestGuardedShare)
       throw Error({.place = "source " + plan.sources[i].name,
                    .expected = "fault-free recordings within the range of its model",
-                   .found = fmt::format("{:.1f} % of the samples with a fault",
-                                        100.0 * result.guarded_share[i]),
+                   .found = fmt::format("{:.1f} % of the samples with a fault ({})",
+                                        100.0 * result.guarded_share[i], faults),
                    .advice = "train its model on recordings that cover this motion and load"});
   }
   const Redundancy redundancy({.sources = plan.sources, .correlation = {}});

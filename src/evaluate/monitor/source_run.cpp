@@ -41,7 +41,7 @@ std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recor
       const Fault fault = estimates[i].fault;
       runs[i].value_Nm.push_back(estimates[i].value);
       runs[i].std_dev_Nm.push_back(fault == Fault::none ? estimates[i].std_dev : kNotMeasured);
-      if (fault != Fault::none && fault != Fault::warming_up) ++runs[i].guarded;
+      if (fault != Fault::none && fault != Fault::warming_up) ++runs[i].guarded[fault];
     }
   }
   return runs;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include "torsio/data/recording.hpp"
@@ -13,8 +14,8 @@ namespace torsio {
 /// One source over a recording.
 struct SourceRun {
   std::vector<double> value_Nm;
-  std::vector<double> std_dev_Nm;  ///< NaN where the source has a fault
-  std::size_t guarded = 0;         ///< samples with a fault after the filters have settled
+  std::vector<double> std_dev_Nm;        ///< NaN where the source has a fault
+  std::map<Fault, std::size_t> guarded;  ///< samples with a fault after the filters have settled
 
   [[nodiscard]] bool is_valid(std::size_t sample) const noexcept {
     return std_dev_Nm[sample] > 0.0;

@@ -57,7 +57,8 @@ TEST(CalibrateMonitor, FindsAFaultAndNamesWhatExplainsIt) {
   EXPECT_THAT(text, HasSubstr("stopped at 4.2"));
   EXPECT_THAT(text, HasSubstr("the torques of spring and current differ by"));
   EXPECT_THAT(replays_json({replay}, monitor.monitor), HasSubstr("\"check\": \"disagreement\""));
-  EXPECT_THAT(replay_svg(replay, monitor.monitor), HasSubstr("<svg"));
+  EXPECT_THAT(replay_svg(replay, monitor.monitor),
+              testing::AllOf(HasSubstr("<svg"), HasSubstr("record: stopped at 4.2")));
 }
 
 TEST(CalibrateMonitor, RefusesARateThatTheDataCannotSupport) {
@@ -128,7 +129,9 @@ TEST(CalibrateMonitor, ACeilingEndsTheGrowthOfAThreshold) {
       monitor.pairs[0].detected_in_these_states_Nm - monitor.pairs[0].largest_difference_Nm;
   EXPECT_GT(largest_Nm, 2.0 * monitor.pairs[0].typical_threshold_Nm);
   EXPECT_NEAR(pair.ceiling_Nm, 1.25 * largest_Nm, 1e-9);
-  EXPECT_THAT(calibration_text(monitor), HasSubstr("detected in these states Nm"));
+  EXPECT_THAT(calibration_text(monitor),
+              testing::AllOf(HasSubstr("detected in these states Nm"),
+                             HasSubstr("which a difference must exceed for 5 ms")));
 }
 
 // Samples at which the error bars change size were once each taken for a difference that persists.
@@ -203,7 +206,7 @@ TEST(CalibrateMonitor, RefusesWhatItCannotUse) {
   EXPECT_THAT(
       message({{.torque = make_estimator(narrow)}, {.torque = make_estimator(joint.current)}},
               TwoTorques::plan(), sound, options),
-      HasSubstr("% of the samples with a fault"));
+      HasSubstr("% of the samples with a fault (outside_training_range "));
 }
 
 TEST(CalibrateMonitor, RefusesASingleSource) {
@@ -280,7 +283,7 @@ TEST(ReplayMonitor, ReportsARecordingThatItCannotArm) {
   EXPECT_THAT(replays_text({replay}, monitor.monitor),
               testing::AllOf(HasSubstr("was never ready"),
                              HasSubstr("for 5.000 s  not_finite: spring_deflection_rad is not a"),
-                             HasSubstr("for 5.000 s  redundancy_lost: 1 valid torques are left")));
+                             HasSubstr("for 5.000 s  redundancy_lost: 1 valid torque is left")));
   EXPECT_THAT(replays_json({replay}, monitor.monitor), HasSubstr("\"present_s\": 5.0"));
   Recording slow("slow", 500.0);
   slow.add({.name = "spring_deflection_rad", .values = {0.0}});
@@ -306,6 +309,68 @@ TEST(ReplayMonitor, ReportsErrorBarsThatAreTooWideToBegin) {
   EXPECT_THAT(replays_text({replay_monitor(monitored(monitor), TwoTorques::recording(0.03, 5))},
                            monitor.monitor),
               HasSubstr("no check found anything, but for less than 0.05 s"));
+}
+
+// A source that is lost once kept its last value in the table, without a fault.
+TEST(ReplayMonitor, HasTheFaultOfEachSource) {
+  const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  Recording log("log", 1000.0);
+  const Recording sound = TwoTorques::recording(1.0, 5);
+  for (Channel channel : sound.channels()) {
+    if (channel.name == "spring_deflection_rad") channel.values[500] = kNotMeasured;
+    log.add(std::move(channel));
+  }
+  const MonitorReplay replay = replay_monitor(monitored(monitor), log);
+  const auto at = [&](const std::string& channel, std::size_t n) {
+    return replay.estimated.channels.channel(channel).values[n];
+  };
+  EXPECT_EQ(at("spring_fault_1", 499), 0.0);
+  EXPECT_TRUE(std::isfinite(at("spring_torque_Nm", 499)));
+  EXPECT_EQ(at("spring_fault_1", 500), static_cast<double>(Fault::input_not_finite));
+  EXPECT_TRUE(std::isnan(at("spring_torque_Nm", 500)));
+  EXPECT_EQ(at("current_fault_1", 500), 0.0);
+  EXPECT_TRUE(std::isfinite(at("current_torque_Nm", 500)));
+}
+
+TEST(ReplayMonitor, NamesTheFaultOfASource) {
+  const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  TwoTorques joint;
+  joint.spring.settings.ranges = {.lowest = {-0.2}, .highest = {0.2}};
+  const MonitorReplay replay =
+      replay_monitor({TorqueSources(joint.models()), monitor.redundancy, monitor.monitor},
+                     TwoTorques::recording(2.0, 5));
+  EXPECT_THAT(replays_text({replay}, monitor.monitor),
+              testing::ContainsRegex("source_fault: the torque of spring .*limit 0.015 s "
+                                     "\\(outside_training_range\\)"));
+  EXPECT_THAT(replays_json({replay}, monitor.monitor),
+              HasSubstr("\"fault\": \"outside_training_range\""));
+}
+
+// Reports once did not mention an injection, so that one that was missed read as a sound joint.
+TEST(ReplayMonitor, ListsTheOutcomeOfEachInjection) {
+  const CalibratedMonitor monitor = calibrated(5.0, {.false_alarms_per_hour = 40.0});
+  MonitorReplay replay =
+      replay_monitor(monitored(monitor), TwoTorques::recording(10.0, 99, 1.5, 4.25));
+  replay.injections = {{"gain", 4.25}, {"second", 9.0}, {"third", 20.0}};
+  EXPECT_THAT(
+      replays_text({replay}, monitor.monitor),
+      testing::AllOf(testing::ContainsRegex("injected at 4.250 s, gain: stopped after [0-9]+ ms"),
+                     HasSubstr("9.000 s, second: the joint had stopped before"),
+                     HasSubstr("20.000 s, third: after the end of the recording")));
+  EXPECT_THAT(replays_json({replay}, monitor.monitor),
+              testing::AllOf(HasSubstr("\"stopped_after_s\": 0.0"),
+                             HasSubstr("\"outcome\": \"the joint had stopped before\"")));
+  MonitorReplay sound = replay_monitor(monitored(monitor), TwoTorques::recording(5.0, 99));
+  sound.injections = {{"nothing", 2.0}};
+  EXPECT_THAT(replays_text({sound}, monitor.monitor),
+              HasSubstr("injected at 2.000 s, nothing: not detected"));
+  sound.events = {
+      {{.t_s = 2.5, .check = MonitorCheck::source_lost, .action = MonitorAction::warn}}};
+  EXPECT_THAT(replays_text({sound}, monitor.monitor),
+              HasSubstr("nothing: no stop, a warning after 500 ms"));
+  sound.watching_from_s = kNotMeasured;
+  EXPECT_THAT(replays_text({sound}, monitor.monitor),
+              HasSubstr("nothing: not detected, since the monitor was never ready"));
 }
 
 // Two findings in one tick were once one event, and it was the last one whichever had begun.
