@@ -93,6 +93,12 @@ std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
          .advice = "torsio monitor joint.monitor.json log.csv; a monitor file is written with "
                    "torsio monitor --calibrate"});
   const std::string monitor_file = flags.files.front();
+  for (const char* const ending : {".csv", ".gz", ".yaml"})
+    if (monitor_file.ends_with(ending))
+      throw torsio::UsageError({.place = "torsio monitor",
+                                .expected = "the monitor file first, then recordings",
+                                .found = monitor_file,
+                                .advice = "torsio monitor joint.monitor.json log.csv"});
   flags.data.recordings.assign(flags.files.begin() + 1, flags.files.end());
   flags.data.check_outputs({flags.output, flags.plot, flags.json.destination}, {monitor_file});
   const torsio::MonitoredTorque monitored =
@@ -103,9 +109,18 @@ std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
         fmt::format("the monitor is that of device {}; --device-serial checks that the recordings "
                     "are of it\n",
                     file.device_serial));
-  const std::filesystem::path model =
-      std::filesystem::path(monitor_file).parent_path() / file.models.front().torque.file;
-  flags.data.use_model_mapping(torsio::load_model(model).card.mapping, model.string());
+  std::vector<ModelMapping> mappings;
+  const auto add = [&](const torsio::MonitoredModel& of) {
+    if (of.file.empty()) return;
+    const std::string model =
+        (std::filesystem::path(monitor_file).parent_path() / of.file).string();
+    mappings.push_back({model, torsio::load_model(model).card.mapping});
+  };
+  for (const torsio::MonitoredSource& source : file.models) {
+    add(source.torque);
+    add(source.friction);
+  }
+  use_common_mapping(flags.data, mappings);
   ProgressBar progress;
   const torsio::Dataset dataset =
       flags.data.load_inputs(monitored.raw_inputs(), progress.listener());
@@ -130,6 +145,7 @@ std::vector<torsio::MonitorReplay> replay_joint(MonitorFlags& flags,
 
 void replay(MonitorFlags& flags) {
   require_ending("--output", flags.output, {".csv", ".gz"});
+  require_ending("--plot", flags.plot, {".svg"});
   torsio::MonitorSettings settings;
   const std::vector<torsio::MonitorReplay> replays = flags.simulated.actuators.empty()
                                                          ? replay_recordings(flags, settings)
@@ -138,7 +154,7 @@ void replay(MonitorFlags& flags) {
     std::vector<torsio::EstimatedRecording> estimated;
     estimated.reserve(replays.size());
     for (const torsio::MonitorReplay& each : replays) estimated.push_back(each.estimated);
-    torsio::write_estimates(estimated, flags.output);
+    torsio::write_estimates(estimated, flags.output, torsio::FaultColumn::number);
   }
   if (!flags.plot.empty()) write_text(flags.plot, torsio::replay_svg(replays.front(), settings));
   if (flags.json.wants_tables() && !is_standard_output(flags.output))
@@ -182,6 +198,8 @@ void add_monitor(CLI::App& app) {
       "\\\n"
       "             --source spring=spring.safetensors:joint_encoder sound1.csv sound2.csv \\\n"
       "             -o joint.monitor.json\n"
+      "A stop and a joint that was never ready are results: the exit code is 0, as for a joint "
+      "without\na finding; scripts read stopped_at_s and watching_from_s of --json.\n"
       "docs/safety.md has the checks, what each detects, and what none detects.");
   verb->add_option("FILES", flags->files,
                    "a monitor file and recordings; with --calibrate: recordings without a fault");

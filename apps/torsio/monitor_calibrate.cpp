@@ -115,13 +115,49 @@ double quantity_or(const std::string& text, const char* unit, const char* option
   return text.empty() ? value : torsio::si_quantity(text, unit, option);
 }
 
+void check_last_day(const std::string& date) {
+  if (date.empty() || (torsio::is_date(date) && date >= torsio::today())) return;
+  throw torsio::UsageError(
+      {.place = "--valid-until",
+       .expected = fmt::format("a day as 2027-11-22, {} or later", torsio::today()),
+       .found = fmt::format("'{}'", date)});
+}
+
+/// One model twice agrees with itself in spite of every fault.
+/// @param models the last one is new
+void check_own_model(const std::vector<torsio::TorqueSource>& sources,
+                     const std::vector<torsio::MonitoredSource>& models) {
+  for (std::size_t i = 0; i + 1 < models.size(); ++i)
+    if (models[i].torque.hash == models.back().torque.hash)
+      throw torsio::UsageError({.place = "--source",
+                                .expected = "a model of its own for each source",
+                                .found = fmt::format("the same model for {} and {}",
+                                                     sources[i].name, sources.back().name),
+                                .advice = "a model always agrees with itself"});
+}
+
 }  // namespace
 
+void use_common_mapping(DataFlags& data, const std::vector<ModelMapping>& models) {
+  for (const ModelMapping& model : models)
+    if (data.mapping.empty() && model.mapping != models.front().mapping)
+      throw torsio::Error(
+          {.place = model.file + ": mapping",
+           .expected = fmt::format("the mapping with which {} was trained", models.front().file),
+           .found = model.mapping.empty() ? "none" : "another one",
+           .advice = "train both with one mapping, or give the one to use with --mapping"});
+  data.use_model_mapping(models.front().mapping, models.front().file);
+}
+
 void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
-  if (flags.sources.empty())
+  if (flags.sources.size() < 2)
     throw torsio::UsageError(
-        {.place = "--calibrate", .expected = "at least one --source NAME=MODEL", .found = "none"});
+        {.place = "--calibrate",
+         .expected = "at least two --source NAME=MODEL, which the monitor compares",
+         .found = flags.sources.empty() ? "none" : "one"});
+  check_last_day(flags.valid_until);
   std::vector<std::string> models;
+  std::vector<ModelMapping> mappings;
   std::vector<torsio::SourceModel> sources;
   torsio::MonitorPlan plan;
   torsio::MonitorFile file;
@@ -133,17 +169,21 @@ void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json) {
     SourceFlag flag = source_of(text);
     const torsio::ModelFile model = model_of(flag.model, flags.device_serial);
     torsio::SourceModel source{.torque = torsio::make_estimator(model)};
-    if (models.empty()) data.use_model_mapping(model.card.mapping, flag.model);
+    mappings.push_back({flag.model, model.card.mapping});
     models.push_back(flag.model);
     if (!flag.friction.empty()) {
-      source.friction = torsio::make_estimator(model_of(flag.friction, flags.device_serial));
+      const torsio::ModelFile friction = model_of(flag.friction, flags.device_serial);
+      source.friction = torsio::make_estimator(friction);
+      mappings.push_back({flag.friction, friction.card.mapping});
       models.push_back(flag.friction);
     }
     sources.push_back(std::move(source));
     plan.sources.push_back(std::move(flag.source));
     file.models.push_back(
         {.torque = named(flag.model, folder), .friction = named(flag.friction, folder)});
+    check_own_model(plan.sources, file.models);
   }
+  use_common_mapping(data, mappings);
   data.check_outputs({flags.output, json.destination}, models);
   require_writable(flags.output);
   for (const std::string& text : flags.signals) plan.signals.push_back(signal_of(text));

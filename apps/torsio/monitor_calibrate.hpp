@@ -20,5 +20,14 @@ struct CalibrateFlags {
   std::string persistence;      ///< with unit; empty: that of the library
 };
 
+struct ModelMapping {
+  std::string file;
+  std::string mapping;  ///< `ModelCard::mapping`
+};
+
+/// Recordings are read with the mapping of the models, unless an option gives another.
+/// @throws torsio::Error if they were trained with different ones.
+void use_common_mapping(DataFlags& data, const std::vector<ModelMapping>& models);
+
 /// Writes a monitor file from fault-free recordings.
 void calibrate(CalibrateFlags& flags, DataFlags& data, const JsonOutput& json);

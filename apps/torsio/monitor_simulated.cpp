@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "progress_bar.hpp"
@@ -51,6 +52,14 @@ torsio::MonitoredTorque monitored(const SimulatedMonitorFlags& flags,
   }
   const std::filesystem::path path = std::filesystem::path(flags.monitors) / file_name(sheet);
   if (!std::filesystem::exists(path)) {
+    // Before the calibration, which lasts minutes.
+    std::error_code failed;
+    std::filesystem::create_directories(flags.monitors, failed);
+    if (failed)
+      throw torsio::UsageError({.place = "--monitors",
+                                .expected = "a folder, or one that can be created",
+                                .found = flags.monitors + ": " + failed.message()});
+    require_writable(path.string());
     remark(fmt::format("calibrating the monitor of {}: {}\n", torsio::full_name(sheet),
                        path.string()));
     torsio::save_simulated_monitor(path, calibrated(flags, sheet), torsio::full_name(sheet));
@@ -100,8 +109,12 @@ torsio::MonitorReplay replay_simulated(const SimulatedMonitorFlags& flags,
           : torsio::load_monitor(monitor_file, {.serial = torsio::full_name(sheet)});
   settings = monitor.monitor().settings();
   ProgressBar progress;
-  return torsio::replay_monitor(monitor, torsio::duty_recording(sheet, work, progress.listener()),
-                                progress.listener());
+  torsio::MonitorReplay replay = torsio::replay_monitor(
+      monitor, torsio::duty_recording(sheet, work, progress.listener()), progress.listener());
+  for (const torsio::ScheduledFault& fault : work.faults.faults)
+    replay.injections.push_back(
+        {.fault = fmt::format("{} ({})", fault.what, fault.place), .start_s = fault.start_s});
+  return replay;
 }
 
 void run_campaign(const SimulatedMonitorFlags& flags, const JsonOutput& json) {

@@ -119,7 +119,8 @@ EstimateSummary summary_of(const EstimatedRecording& estimated, const std::strin
   return summary;
 }
 
-void write_estimates(const std::vector<EstimatedRecording>& recordings, const std::string& path) {
+void write_estimates(const std::vector<EstimatedRecording>& recordings, const std::string& path,
+                     FaultColumn fault) {
   if (recordings.empty()) return;
   check_equal_channels(recordings);
   OutputFile file = path == "-" ? OutputFile::standard_output() : OutputFile(path);
@@ -131,7 +132,10 @@ void write_estimates(const std::vector<EstimatedRecording>& recordings, const st
     text.add(",");
     text.add(column);
   }
-  text.add(",fault,recording\n");
+  const bool is_named = fault == FaultColumn::name;
+  const bool has_recording = is_named || recordings.size() > 1;
+  text.add(is_named ? ",fault" : ",fault_1");
+  text.add(has_recording ? ",recording\n" : "\n");
   for (const auto& [recording, faults] : recordings) {
     const std::string name_cell = cell(recording.name());
     std::vector<const std::vector<double>*> values;
@@ -144,9 +148,12 @@ void write_estimates(const std::vector<EstimatedRecording>& recordings, const st
         text.add((*channel)[n]);
       }
       text.add(",");
-      text.add(name(faults[n]));
-      text.add(",");
-      text.add(name_cell);
+      if (is_named)
+        text.add(name(faults[n]));
+      else
+        text.add(static_cast<double>(faults[n]));
+      if (has_recording) text.add(",");
+      if (has_recording) text.add(name_cell);
       text.add("\n");
     }
   }

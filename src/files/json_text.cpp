@@ -20,7 +20,8 @@ constexpr std::size_t kDeepest = 8;
 /// come twice, and with a callback it searches the parent's entries after each object.
 class DocumentBuilder final : public nlohmann::json_sax<json> {
  public:
-  explicit DocumentBuilder(std::string_view place) : place_(place) {}
+  DocumentBuilder(std::string_view place, std::string_view advice)
+      : place_(place), advice_(advice) {}
 
   [[nodiscard]] json take() { return std::move(document_); }
 
@@ -55,7 +56,7 @@ class DocumentBuilder final : public nlohmann::json_sax<json> {
     throw Error({.place = std::string(place_),
                  .expected = "JSON",
                  .found = fmt::format("something else at byte {}", byte),
-                 .advice = "The file is damaged: copy it again or fit the model again."});
+                 .advice = std::string(advice_)});
   }
 
  private:
@@ -85,6 +86,7 @@ class DocumentBuilder final : public nlohmann::json_sax<json> {
   }
 
   std::string_view place_;
+  std::string_view advice_;
   json document_;
   std::vector<json*> open_;
   json* next_ = nullptr;
@@ -92,8 +94,8 @@ class DocumentBuilder final : public nlohmann::json_sax<json> {
 
 }  // namespace
 
-json parse_json(std::string_view text, std::string_view place) {
-  DocumentBuilder builder(place);
+json parse_json(std::string_view text, std::string_view place, std::string_view advice) {
+  DocumentBuilder builder(place, advice);
   (void)json::sax_parse(text, &builder);
   return builder.take();
 }

@@ -59,17 +59,25 @@ ordered_json signal_json(const MonitoredSignal& signal) {
           {"largest_hidden_travel", limit(signal.largest_hidden_travel)}};
 }
 
-MonitoredSignal signal_of(const JsonObject& object) {
+MonitoredSignal signal_of(const JsonObject& object, const std::string& place) {
   object.allow_only({"signal", "lowest", "highest", "largest_rate", "longest_age_s", "turn",
                      "moves_with", "largest_hidden_travel"});
+  const std::string moves_with = object.text("moves_with");
+  const double largest_hidden_travel = limit_of(object, "largest_hidden_travel", kInfinity);
+  if (!moves_with.empty() && std::isinf(largest_hidden_travel))
+    throw Error(
+        {.place = fmt::format("{}/{}: largest_hidden_travel", place, object.text("signal")),
+         .expected = fmt::format("how far {} may move while it does not change", moves_with),
+         .found = "null",
+         .advice = "calibrate the monitor with --signal 'A moves with B'"});
   return {.name = object.text("signal"),
           .lowest = limit_of(object, "lowest", -kInfinity),
           .highest = limit_of(object, "highest", kInfinity),
           .largest_rate = limit_of(object, "largest_rate", kInfinity),
           .longest_age_s = limit_of(object, "longest_age_s", kInfinity),
           .turn = object.number("turn"),
-          .moves_with = object.text("moves_with"),
-          .largest_hidden_travel = limit_of(object, "largest_hidden_travel", kInfinity)};
+          .moves_with = moves_with,
+          .largest_hidden_travel = largest_hidden_travel};
 }
 
 ordered_json pair_json(const PairLimits& pair, const std::vector<std::string>& sources) {
@@ -105,6 +113,22 @@ PairLimits pair_of(const JsonObject& object, const std::vector<std::string>& sou
           .largest_armed_Nm = limit_of(object, "largest_armed_Nm", kInfinity),
           .drift_allowance = object.number("drift_allowance"),
           .drift_limit_s = limit_of(object, "drift_limit_s", kInfinity)};
+}
+
+/// A pair that is not in the file would never be compared.
+void check_every_pair(const MonitorSettings& monitor, const std::string& place) {
+  for (std::size_t i = 0; i < monitor.sources.size(); ++i)
+    for (std::size_t j = i + 1; j < monitor.sources.size(); ++j) {
+      const auto count = std::ranges::count_if(monitor.pairs, [&](const PairLimits& pair) {
+        return std::min(pair.first, pair.second) == i && std::max(pair.first, pair.second) == j;
+      });
+      if (count != 1)
+        throw Error({.place = place,
+                     .expected = fmt::format("the pair {}, {} once", monitor.sources[i],
+                                             monitor.sources[j]),
+                     .found = count == 0 ? std::string("none") : fmt::format("it {} times", count),
+                     .advice = "a pair is compared less strictly with a larger floor_Nm"});
+    }
 }
 
 ordered_json actions_json(const MonitorSettings& settings) {
@@ -234,10 +258,12 @@ MonitorFile file_of(const JsonObject& document, const std::string& place) {
   MonitorSettings& monitor = file.monitor;
   for (const TorqueSource& source : file.redundancy.sources) monitor.sources.push_back(source.name);
   file.redundancy.correlation = monitor.correlation = document.numbers("correlation");
-  monitor.signals = document.objects("signals", signal_of);
+  monitor.signals = document.objects(
+      "signals", [&](const JsonObject& signal) { return signal_of(signal, place + "/signals"); });
   monitor.pairs = document.objects("pairs", [&](const JsonObject& pair) {
     return pair_of(pair, monitor.sources, place + "/pairs");
   });
+  check_every_pair(monitor, place + "/pairs");
   read_actions(document.text_map("actions"), monitor, place + "/actions");
   monitor.sample_period_s = document.number("sample_period_s");
   monitor.persistence_s = document.number("persistence_s");
@@ -259,25 +285,41 @@ MonitorFile file_of(const JsonObject& document, const std::string& place) {
 }
 
 std::string today_of(const MonitorFileOptions& options) {
-  if (!options.today.empty()) return options.today;
-  const std::chrono::year_month_day day =
-      std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now());
-  return fmt::format("{:04}-{:02}-{:02}", static_cast<int>(day.year()),
-                     static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()));
+  return options.today.empty() ? today() : options.today;
 }
 
 /// Dates of one form compare as text.
 void check_date(const std::string& date, const std::string& place) {
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  bool is_date = date.size() == 10;
-  for (std::size_t i = 0; i < date.size() && is_date; ++i)
-    is_date = i == 4 || i == 7 ? date[i] == '-' : is_digit(date[i]);
-  if (!is_date)
+  if (!is_date(date))
     throw Error(
         {.place = place, .expected = "a date as 2027-11-22", .found = fmt::format("'{}'", date)});
 }
 
 }  // namespace
+
+bool is_date(std::string_view text) noexcept {
+  constexpr std::string_view kForm = "0000-00-00";
+  if (text.size() != kForm.size()) return false;
+  for (std::size_t i = 0; i < text.size(); ++i)
+    if (kForm[i] == '-' ? text[i] != '-' : text[i] < '0' || text[i] > '9') return false;
+  const auto number = [&](std::size_t begin, std::size_t end) {
+    unsigned value = 0;
+    for (std::size_t i = begin; i < end; ++i)
+      value = 10 * value + static_cast<unsigned>(text[i] - '0');
+    return value;
+  };
+  return std::chrono::year_month_day(std::chrono::year(static_cast<int>(number(0, 4))),
+                                     std::chrono::month(number(5, 7)),
+                                     std::chrono::day(number(8, 10)))
+      .ok();
+}
+
+std::string today() {
+  const std::chrono::year_month_day day =
+      std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now());
+  return fmt::format("{:04}-{:02}-{:02}", static_cast<int>(day.year()),
+                     static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()));
+}
 
 std::string model_hash(const std::filesystem::path& model) {
   return fmt::format("{:016x}", text_hash(text_of(read_whole_file(model, kMaxModelFileBytes))));
@@ -295,7 +337,7 @@ void save_monitor(const std::filesystem::path& path, const MonitorFile& file) {
 MonitorFile read_monitor(const std::filesystem::path& path) {
   const std::string place = path.string();
   const std::vector<std::byte> bytes = read_whole_file(path, kMaxFileBytes);
-  const json parsed = parse_json(text_of(bytes), place);
+  const json parsed = parse_json(text_of(bytes), place, kAdvice);
   const JsonObject document(parsed, place, kAdvice);
   check_version(document, place);
   MonitorFile file = file_of(document, place);

@@ -21,12 +21,13 @@ using Json = nlohmann::ordered_json;
 constexpr double kPlotBefore_s = 1.0;
 constexpr double kPlotAfter_s = 0.25;
 
-Json event_json(const MonitorEvent& event, const MonitorSettings& settings) {
+Json event_json(const MonitorReplay::Finding& event, const MonitorSettings& settings) {
   return {{"t_s", event.t_s},
           {"check", name(event.check)},
           {"action", name(event.action)},
           {"value", json_number(event.value)},
           {"limit", json_number(event.limit)},
+          {"fault", name(event.fault)},
           {"text", describe(event, settings)}};
 }
 
@@ -67,6 +68,29 @@ std::string verdict(const MonitorReplay& replay) {
   return fmt::format("stopped at {:.3f} s", replay.stopped_at_s);
 }
 
+std::string text_of(const MonitorReplay::Finding& finding, const MonitorSettings& settings) {
+  const std::string text = fmt::format("{}: {}", name(finding.check), describe(finding, settings));
+  return finding.fault == Fault::none ? text : fmt::format("{} ({})", text, name(finding.fault));
+}
+
+/// How long after an injection the joint stopped; NaN: it did not.
+double stopped_after_s(const MonitorReplay& replay, const MonitorReplay::Injection& of) {
+  return replay.stopped_at_s >= of.start_s ? replay.stopped_at_s - of.start_s : kNotMeasured;
+}
+
+std::string outcome(const MonitorReplay& replay, const MonitorReplay::Injection& of) {
+  const Recording& recording = replay.estimated.channels;
+  if (of.start_s > recording.time_s(recording.size() - 1)) return "after the end of the recording";
+  if (std::isnan(replay.watching_from_s)) return "not detected, since the monitor was never ready";
+  if (replay.stopped_at_s < of.start_s) return "the joint had stopped before";
+  if (const double after_s = stopped_after_s(replay, of); !std::isnan(after_s))
+    return fmt::format("stopped after {:.0f} ms", 1e3 * after_s);
+  for (const MonitorEvent& event : replay.events)
+    if (event.t_s >= of.start_s)
+      return fmt::format("no stop, a warning after {:.0f} ms", 1e3 * (event.t_s - of.start_s));
+  return "not detected";
+}
+
 /// Why it was never ready.
 std::string not_ready_text(const MonitorReplay& replay, const MonitorSettings& settings) {
   std::string text;
@@ -75,8 +99,7 @@ std::string not_ready_text(const MonitorReplay& replay, const MonitorSettings& s
         "  for {:.3f} s the error bars made a threshold larger than its largest_armed_Nm\n",
         replay.threshold_too_large_s);
   for (const MonitorReplay::NotReady& of : replay.not_ready)
-    text += fmt::format("  for {:.3f} s  {}: {}\n", of.present_s, name(of.event.check),
-                        describe(of.event, settings));
+    text += fmt::format("  for {:.3f} s  {}\n", of.present_s, text_of(of.event, settings));
   if (text.empty())
     text = fmt::format("  no check found anything, but for less than {:.3g} s\n", settings.proof_s);
   return text;
@@ -112,6 +135,23 @@ std::string calibration_text(const CalibratedMonitor& calibrated) {
   std::string notes;
   if (const auto checks = checks_without_limit(calibrated.monitor); !checks.empty())
     notes += fmt::format("without a limit: {}\n", fmt::join(checks, ", "));
+  if (!calibrated.not_redundant.empty())
+    notes += fmt::format("no comparison covers, since every source depends on it: {}\n",
+                         fmt::join(calibrated.not_redundant, ", "));
+  for (const TorqueSource& source : calibrated.redundancy.sources)
+    if (source.depends_on.empty())
+      notes += fmt::format(
+          "warning: {} states no parts (NAME=MODEL:PART+PART): a part that it shares with another "
+          "source is not found\n",
+          source.name);
+  for (const CalibratedPair& pair : calibrated.pairs)
+    if (pair.typical_threshold_Nm > pair.largest_torque_Nm)
+      notes += fmt::format(
+          "warning: {}, {}: the threshold of {:.3g} Nm is above the largest torque of the "
+          "recordings that both reach ({:.3g} Nm): their models may not fit this joint, its "
+          "mapping "
+          "or each other\n",
+          pair.first, pair.second, pair.typical_threshold_Nm, pair.largest_torque_Nm);
   for (const CalibratedPair& pair : calibrated.pairs)
     if (pair.is_factor_from_floor)
       notes += fmt::format(
@@ -121,26 +161,28 @@ std::string calibration_text(const CalibratedMonitor& calibrated) {
           pair.first, pair.second);
   return fmt::format(
       "{:.3g} h without a fault, thresholds for {:.3g} false alarms per hour{}\n{}"
-      "largest difference: in these recordings; threshold: its median; detected: a fault that "
-      "changes "
-      "the difference by so much, in any of the states of these recordings\n{}",
+      "largest difference: of single samples of these recordings; threshold: its median, which a "
+      "difference must exceed for {:.3g} ms; detected: a fault that changes the difference by so "
+      "much, in any of the states of these recordings\n{}",
       calibrated.hours, calibrated.false_alarms_per_hour,
       calibrated.is_extrapolated
           ? fmt::format(" (extrapolated: the recordings support {:.3g})", 3.0 / calibrated.hours)
           : "",
-      table.text(), notes);
+      table.text(), 1e3 * calibrated.monitor.persistence_s, notes);
 }
 
 std::string calibration_json(const CalibratedMonitor& calibrated) {
   Json document{{"fault_free_hours", calibrated.hours},
                 {"false_alarms_per_hour", calibrated.false_alarms_per_hour},
                 {"is_extrapolated", calibrated.is_extrapolated},
+                {"not_redundant", calibrated.not_redundant},
                 {"pairs", Json::array()}};
   for (const CalibratedPair& pair : calibrated.pairs)
     document["pairs"].push_back({{"first", pair.first},
                                  {"second", pair.second},
                                  {"largest_difference_Nm", pair.largest_difference_Nm},
                                  {"threshold_Nm", pair.typical_threshold_Nm},
+                                 {"largest_torque_Nm", pair.largest_torque_Nm},
                                  {"detected_in_these_states_Nm", pair.detected_in_these_states_Nm},
                                  {"is_factor_from_floor", pair.is_factor_from_floor}});
   return json_text(document);
@@ -152,9 +194,12 @@ std::string replays_text(const std::vector<MonitorReplay>& replays,
   for (const MonitorReplay& replay : replays) {
     text += fmt::format("{}: {}\n", replay.estimated.channels.name(), verdict(replay));
     if (std::isnan(replay.watching_from_s)) text += not_ready_text(replay, settings);
-    for (const MonitorEvent& event : replay.events)
-      text += fmt::format("  {:.3f} s  {}  {}: {}\n", event.t_s, name(event.action),
-                          name(event.check), describe(event, settings));
+    for (const MonitorReplay::Finding& event : replay.events)
+      text += fmt::format("  {:.3f} s  {}  {}\n", event.t_s, name(event.action),
+                          text_of(event, settings));
+    for (const MonitorReplay::Injection& of : replay.injections)
+      text += fmt::format("  injected at {:.3f} s, {}: {}\n", of.start_s, of.fault,
+                          outcome(replay, of));
     if (!replay.suspects.empty())
       text += fmt::format("  one fault of any of these explains it: {}\n",
                           fmt::join(replay.suspects, ", "));
@@ -168,7 +213,14 @@ std::string replays_json(const std::vector<MonitorReplay>& replays,
   Json document{{"recordings", Json::array()}};
   for (const MonitorReplay& replay : replays) {
     Json events = Json::array();
-    for (const MonitorEvent& event : replay.events) events.push_back(event_json(event, settings));
+    for (const MonitorReplay::Finding& event : replay.events)
+      events.push_back(event_json(event, settings));
+    Json injections = Json::array();
+    for (const MonitorReplay::Injection& of : replay.injections)
+      injections.push_back({{"fault", of.fault},
+                            {"start_s", of.start_s},
+                            {"stopped_after_s", json_number(stopped_after_s(replay, of))},
+                            {"outcome", outcome(replay, of)}});
     Json not_ready = Json::array();
     for (const MonitorReplay::NotReady& of : replay.not_ready) {
       not_ready.push_back(event_json(of.event, settings));
@@ -179,6 +231,7 @@ std::string replays_json(const std::vector<MonitorReplay>& replays,
                                       {"stopped_at_s", json_number(replay.stopped_at_s)},
                                       {"events", std::move(events)},
                                       {"suspects", replay.suspects},
+                                      {"injections", std::move(injections)},
                                       {"not_ready", std::move(not_ready)},
                                       {"threshold_too_large_s", replay.threshold_too_large_s}});
   }
@@ -237,7 +290,7 @@ std::string accuracy_json(const std::vector<FusedAccuracy>& actuators) {
 std::string replay_svg(const MonitorReplay& replay, const MonitorSettings& settings) {
   const std::vector<double> time_s = times(replay.estimated.channels);
   return svg_plot(curves_of(replay, settings, time_s, 0, time_s.size()), {"t [s]", "torque [Nm]"},
-                  replay.estimated.channels.name());
+                  fmt::format("{}: {}", replay.estimated.channels.name(), verdict(replay)));
 }
 
 }  // namespace torsio

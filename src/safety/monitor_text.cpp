@@ -1,10 +1,33 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string_view>
+#include <utility>
 
+#include "torsio/core/units.hpp"
 #include "torsio/safety/monitor.hpp"
 
 namespace torsio {
+namespace {
+
+/// Value and limit with as many digits as it takes for them to differ.
+std::pair<std::string, std::string> apart(double value, double limit, int digits = 3) {
+  constexpr int kMaxDigits = 9;
+  std::pair<std::string, std::string> text;
+  do {
+    text = {fmt::format("{:.{}g}", value, digits), fmt::format("{:.{}g}", limit, digits)};
+  } while (text.first == text.second && ++digits <= kMaxDigits);
+  return text;
+}
+
+/// " rad" of a channel; empty for an expression, whose unit is not known.
+std::string unit_after(std::string_view signal) {
+  if (signal.find_first_of(" +-*/(),") != std::string_view::npos) return "";
+  const std::string unit = unit_label(signal);
+  return unit.empty() ? "" : " " + unit;
+}
+
+}  // namespace
 
 std::string describe(const MonitorEvent& event, const MonitorSettings& settings) {
   const auto source = [&](std::uint8_t i) -> std::string {
@@ -15,15 +38,18 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
   };
   const double value = event.value;
   const double limit = event.limit;
+  const auto larger = apart(std::abs(value), limit);
+  const auto range = apart(value, limit, 4);
+  const std::string unit = unit_after(signal(event.first));
   switch (event.check) {
     case MonitorCheck::disagreement:
-      return fmt::format("the torques of {} and {} differ by {:.3g} Nm, more than {:.3g} Nm",
-                         source(event.first), source(event.second), std::abs(value), limit);
+      return fmt::format("the torques of {} and {} differ by {} Nm, more than {} Nm",
+                         source(event.first), source(event.second), larger.first, larger.second);
     case MonitorCheck::drift:
       return fmt::format(
-          "the torques of {} and {} have differed for too long: cumulative sum {:.3g} s, limit "
-          "{:.3g} s",
-          source(event.first), source(event.second), value, limit);
+          "a small difference between the torques of {} and {} lasts: difference over threshold "
+          "less the allowance, summed over time, is {} s, limit {} s",
+          source(event.first), source(event.second), larger.first, larger.second);
     case MonitorCheck::sign:
       return fmt::format("the torques of {} and {} have opposite signs and differ by {:.3g} Nm",
                          source(event.first), source(event.second), std::abs(value));
@@ -36,7 +62,8 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
           "s",
           source(event.first), value, limit);
     case MonitorCheck::redundancy_lost:
-      return fmt::format("{:.0f} valid torques are left, at least {:.0f} are needed", value, limit);
+      return fmt::format("{:.0f} valid {} left, at least {:.0f} are needed", value,
+                         value == 1.0 ? "torque is" : "torques are", limit);
     case MonitorCheck::novelty:
       return fmt::format("the inputs of the torque of {} have a novelty of {:.3g}, limit {:.3g}",
                          source(event.first), value, limit);
@@ -48,12 +75,14 @@ std::string describe(const MonitorEvent& event, const MonitorSettings& settings)
     case MonitorCheck::stale:
       return fmt::format("{} is {:.3g} s old, limit {:.3g} s", signal(event.first), value, limit);
     case MonitorCheck::range:
-      return fmt::format("{} is {:.4g}, beyond {:.4g}", signal(event.first), value, limit);
+      return fmt::format("{} is {}{unit}, beyond {}{unit}", signal(event.first), range.first,
+                         range.second, fmt::arg("unit", unit));
     case MonitorCheck::rate:
-      return fmt::format("{} changes by {:.3g} per second, limit {:.3g}", signal(event.first),
-                         value, limit);
+      return fmt::format("{} changes by {}{unit} per second, limit {}{unit} per second",
+                         signal(event.first), larger.first, larger.second, fmt::arg("unit", unit));
     case MonitorCheck::wrap:
-      return fmt::format("{} changed by {:.4g}, a turn of its encoder", signal(event.first), value);
+      return fmt::format("{} changed by {:.4g}{}, a turn of its encoder", signal(event.first),
+                         value, unit);
     case MonitorCheck::frozen:
       return fmt::format("{} did not change while {} moved by {:.3g}, limit {:.3g}",
                          signal(event.first), signal(event.second), value, limit);

@@ -139,6 +139,49 @@ TEST(MonitorFile, KeepsEverySetting) {
   EXPECT_EQ(read.correlation, settings.correlation);
 }
 
+TEST(MonitorFile, KnowsTheDaysOfTheCalendar) {
+  for (const char* const date : {"2027-11-22", "2028-02-29", "2027-12-31"})
+    EXPECT_TRUE(is_date(date)) << date;
+  for (const char* const date : {"2027-13-22", "2027-02-30", "2027-00-00", "2027-02-29",
+                                 "22.11.2027", "2027-1-22", "2027-11-2x", ""})
+    EXPECT_FALSE(is_date(date)) << date;
+  EXPECT_TRUE(is_date(today()));
+  Written written;
+  written.file.valid_until = "2027-02-30";
+  EXPECT_THAT(test::error_message([&] { save_monitor(written.path, written.file); }),
+              HasSubstr("a date as 2027-11-22"));
+  written.replace("2027-03-01", "2027-13-01");
+  EXPECT_THAT(written.refusal(), HasSubstr("'2027-13-01'"));
+}
+
+TEST(MonitorFile, HasEveryPairOfItsSourcesOnce) {
+  const Written written;
+  const std::string text = written.text();
+  const std::size_t begin = text.find("\"pairs\": [") + 10;
+  const std::string pair = text.substr(begin, text.find(" ],\n \"actions\"") - begin);
+  const std::string entry = pair.substr(pair.find('{'));
+  written.replace(entry, entry.substr(0, entry.rfind('}') + 1) + "," + entry);
+  EXPECT_THAT(written.refusal(), HasSubstr("the pair spring, current once, found it 2 times"));
+  std::ofstream(written.path) << text;
+  written.replace(entry, "");
+  EXPECT_THAT(written.refusal(), HasSubstr("the pair spring, current once, found none"));
+}
+
+TEST(MonitorFile, RefusesACompanionWithoutALimit) {
+  const Written written;
+  written.replace("\"largest_hidden_travel\": 0.1", "\"largest_hidden_travel\": null");
+  EXPECT_THAT(written.refusal(), testing::AllOf(HasSubstr("motor_current_A: largest_hidden_travel"),
+                                                HasSubstr("spring_deflection_rad may move")));
+}
+
+TEST(MonitorFile, ADamagedOneIsToBeCalibratedAgain) {
+  const Written written;
+  const std::string text = written.text();
+  std::ofstream(written.path) << text.substr(0, text.size() / 2);
+  EXPECT_THAT(written.refusal(), testing::AllOf(HasSubstr("calibrate the monitor again"),
+                                                testing::Not(HasSubstr("fit the model"))));
+}
+
 TEST(MonitorFile, OfAnEarlierReleaseHasTheDefaultsOfWhatItLacks) {
   const Written written;
   for (const char* const entry :

@@ -62,10 +62,15 @@ TEST_F(MonitorVerb, FindsAFaultInARecordingAndPassesASoundOne) {
                   .at("stopped_at_s")
                   .is_null());
   const std::string csv = contents("torque.csv");
-  EXPECT_NE(
-      csv.substr(0, csv.find('\n')).find("spring_torque_Nm,current_torque_Nm,monitor_state_1"),
-      std::string::npos)
-      << csv.substr(0, csv.find('\n'));
+  const std::size_t second = csv.find('\n') + 1;
+  EXPECT_NE(csv.substr(0, second).find(
+                "spring_torque_Nm,spring_fault_1,current_torque_Nm,current_fault_1,"
+                "monitor_state_1,fault_1\n"),
+            std::string::npos)
+      << csv.substr(0, second);
+  const std::string first_row = csv.substr(second, csv.find('\n', second) - second);
+  EXPECT_TRUE(first_row.ends_with(",nan,3,nan,3,0,3")) << "warming up: " << first_row;
+  EXPECT_EQ(torsio("check torque.csv").err.find("expected a number"), std::string::npos);
 
   ASSERT_EQ(shell("printf 'faults:\n  - {sensor: joint_angle_rad, fault: jump, at: 20s, by: "
                   "2deg}\n' > f.yaml")
@@ -106,6 +111,52 @@ TEST_F(MonitorVerb, RefusesWhatDoesNotBelongTogether) {
   ASSERT_EQ(
       shell("cp keep.json j.monitor.json; cp current.safetensors spring.safetensors").exit_code, 0);
   expect_refused("monitor j.monitor.json c.csv", 1, "hash");
+}
+
+TEST_F(MonitorVerb, RefusesWhatCannotMonitorBeforeAnyWork) {
+  calibrate();
+  const std::string start =
+      "monitor --calibrate b.csv c.csv -o x.json --source spring=spring.safetensors:a ";
+  expect_refused(start, kCallWasWrong, "at least two --source");
+  expect_refused(start + "--source again=spring.safetensors:b", kCallWasWrong,
+                 "the same model for spring and again");
+  const std::string both = start + "--source current=current.safetensors:a ";
+  for (const char* const date :
+       {"2027-13-22", "2099-02-30", "2099-00-00", "2020-01-01", "tomorrow"})
+    expect_refused(both + "--valid-until " + date, kCallWasWrong, "--valid-until");
+  expect_refused(both + "--signal 'motor_current_A moves with gear_angle_rad'", kCallWasWrong,
+                 "add --signal 'gear_angle_rad'");
+  EXPECT_EQ(contents("x.json"), "");
+  expect_refused("monitor c.csv j.monitor.json", kCallWasWrong, "the monitor file first");
+  expect_refused("monitor j.monitor.json c.csv --plot stop.png", kCallWasWrong, ".svg");
+  ASSERT_EQ(shell("touch simm").exit_code, 0);
+  expect_refused("monitor --actuator dfki-50 --monitors simm/x", kCallWasWrong, "--monitors");
+}
+
+// Only the mapping of the first source was once used.
+TEST_F(MonitorVerb, RefusesSourcesWithDifferentMappings) {
+  calibrate();
+  for (const char* const offset : {"30", "33"})
+    ASSERT_EQ(shell(std::string("printf 'channels:\n  joint_angle_rad: {from: joint_angle_rad, "
+                                "offset: ") +
+                    offset + "deg}\n' > m" + offset + ".yaml")
+                  .exit_code,
+              0);
+  ASSERT_EQ(torsio("fit a.csv b.csv --model linear --mapping m30.yaml -o m30.safetensors "
+                   "--inputs motor_current_A")
+                .exit_code,
+            0);
+  ASSERT_EQ(torsio("fit a.csv b.csv --model linear --mapping m33.yaml -o m33.safetensors "
+                   "--inputs motor_angle_rad")
+                .exit_code,
+            0);
+  const std::string call =
+      "monitor --calibrate b.csv c.csv -o x.json --source one=m30.safetensors:a --source "
+      "two=m33.safetensors:b --false-alarms-per-hour 200 ";
+  expect_refused(call, kWorkFailed, "m33.safetensors: mapping");
+  expect_refused(call, kWorkFailed, "with which m30.safetensors was trained");
+  EXPECT_EQ(torsio(call + "--mapping m30.yaml").err.find("m33.safetensors: mapping"),
+            std::string::npos);
 }
 
 // Options that a call does not use were once ignored: a fault that was not injected read as one

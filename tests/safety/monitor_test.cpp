@@ -426,7 +426,7 @@ TEST(Monitor, StopsOnTheSecondSampleBeyondARange) {
   loop.signals[2].value = 394.0;
   EXPECT_EQ(loop.ticks_to_stop(), 2);
   EXPECT_EQ(loop.reason(), MonitorCheck::range);
-  EXPECT_EQ(loop.text(), "motor_temperature_K is 394, beyond 393");
+  EXPECT_EQ(loop.text(), "motor_temperature_K is 394 K, beyond 393 K");
   EXPECT_EQ(loop.monitor.reason().first, 2);
   EXPECT_EQ(loop.monitor.reason().second, 2);
   Loop cold;
@@ -436,7 +436,7 @@ TEST(Monitor, StopsOnTheSecondSampleBeyondARange) {
   ASSERT_TRUE(cold.monitor.is_watching());
   cold.signals[2].value = 232.0;
   EXPECT_EQ(cold.ticks_to_stop(), 2);
-  EXPECT_EQ(cold.text(), "motor_temperature_K is 232, beyond 233");
+  EXPECT_EQ(cold.text(), "motor_temperature_K is 232 K, beyond 233 K");
 }
 
 // docs/faults.md 10
@@ -508,7 +508,21 @@ TEST(Monitor, StopsOnARateThatASignalCannotHave) {
   }
   EXPECT_EQ(
       describe({.check = MonitorCheck::rate, .first = 1, .value = 40.8, .limit = 10.0}, joint()),
-      "gear_angle_rad changes by 40.8 per second, limit 10");
+      "gear_angle_rad changes by 40.8 rad per second, limit 10 rad per second");
+  EXPECT_EQ(describe({.check = MonitorCheck::rate, .first = 1, .value = -2.0904, .limit = 2.0901},
+                     joint()),
+            "gear_angle_rad changes by 2.0904 rad per second, limit 2.0901 rad per second")
+      << "with as many digits as it takes";
+  EXPECT_EQ(
+      describe({.check = MonitorCheck::rate, .first = 1, .value = 2.0, .limit = 2.0}, joint()),
+      "gear_angle_rad changes by 2 rad per second, limit 2 rad per second");
+  MonitorSettings settings;
+  settings.signals = {{.name = "gear_angle_rad - joint_angle_rad"}, {.name = "share_1"}};
+  EXPECT_EQ(describe({.check = MonitorCheck::rate, .value = 3.0, .limit = 2.0}, settings),
+            "gear_angle_rad - joint_angle_rad changes by 3 per second, limit 2 per second");
+  EXPECT_EQ(
+      describe({.check = MonitorCheck::range, .first = 1, .value = 3.0, .limit = 2.0}, settings),
+      "share_1 is 3, beyond 2");
 }
 
 TEST(Monitor, AChangeOverAGapCountsForTheWholeGap) {
@@ -560,7 +574,7 @@ TEST(Monitor, RecognisesAWrapOfAnEncoder) {
   }
   EXPECT_EQ(
       describe({.check = MonitorCheck::wrap, .first = 1, .value = 2.0, .limit = 2.0}, joint()),
-      "gear_angle_rad changed by 2, a turn of its encoder");
+      "gear_angle_rad changed by 2 rad, a turn of its encoder");
 }
 
 // It was once compared with the angle before the wrap until the joint had moved by a tenth of a
@@ -803,7 +817,7 @@ TEST(Monitor, StopsWithOneValidSourceLeft) {
     loop.sources[1] = invalid;
     EXPECT_EQ(loop.ticks_to_stop(), 1);
     EXPECT_EQ(loop.reason(), MonitorCheck::redundancy_lost);
-    EXPECT_EQ(loop.text(), "1 valid torques are left, at least 2 are needed");
+    EXPECT_EQ(loop.text(), "1 valid torque is left, at least 2 are needed");
   }
 }
 
@@ -1201,10 +1215,9 @@ TEST(Monitor, StopsOnASmallDifferenceThatLasts) {
     EXPECT_EQ(loop.monitor.reason().second, 1);
     EXPECT_NEAR(loop.monitor.reason().value, 0.0505, 1e-9);
     EXPECT_EQ(loop.monitor.reason().limit, 0.0501);
-    EXPECT_EQ(
-        loop.text(),
-        "the torques of current and gear have differed for too long: cumulative sum 0.0505 s, "
-        "limit 0.0501 s");
+    EXPECT_EQ(loop.text(),
+              "a small difference between the torques of current and gear lasts: difference over "
+              "threshold less the allowance, summed over time, is 0.0505 s, limit 0.0501 s");
   }
 }
 

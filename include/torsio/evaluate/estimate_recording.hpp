@@ -53,10 +53,17 @@ struct EstimateSummary {
 [[nodiscard]] EstimateSummary summary_of(const EstimatedRecording& estimated,
                                          const std::string& target);
 
-/// Writes `t_s`, every channel (not the novelty of a model without one) and, by their names, the
-/// faults; the name of the recording is the last column. "-" is standard output; a file appears under
+/// How a table contains the faults of its samples.
+enum class FaultColumn {
+  name,    ///< "fault": by name, and the recording as last column
+  number,  ///< "fault_1": as `Fault`; the recording only where there are several, so that the
+           ///< table of one can be read as a recording
+};
+
+/// Writes `t_s`, every channel (not the novelty of a model without one) and the faults. "-" is standard output; a file appears under
 /// its name only when it is complete.
 /// @throws Error if it cannot be written, or the recordings differ in their channels.
-void write_estimates(const std::vector<EstimatedRecording>& recordings, const std::string& path);
+void write_estimates(const std::vector<EstimatedRecording>& recordings, const std::string& path,
+                     FaultColumn fault = FaultColumn::name);
 
 }  // namespace torsio

@@ -43,6 +43,8 @@ struct CalibratedPair {
   std::string second;
   double largest_difference_Nm = 0.0;  ///< in the fault-free recordings
   double typical_threshold_Nm = 0.0;   ///< median over the recordings
+  /// That both sources reach. A threshold above it finds no fault in such work.
+  double largest_torque_Nm = 0.0;
   /// A fault that changes the difference by this is found in any of the states of these recordings,
   /// even where the fault-free difference has the opposite sign: largest difference and largest
   /// threshold. In a state with wider error bars the threshold is larger, up to 1.25 times the
@@ -61,6 +63,8 @@ struct CalibratedMonitor {
   RedundancySettings redundancy;
   MonitorSettings monitor;
   std::vector<CalibratedPair> pairs;
+  /// Parts on which every source depends: no comparison covers them.
+  std::vector<std::string> not_redundant;
   std::vector<double> guarded_share;  ///< per source: share of the samples with a fault
   double hours = 0.0;                 ///< length of the fault-free recordings
   double false_alarms_per_hour = 0.0;
@@ -86,9 +90,9 @@ struct CalibratedMonitor {
 ///
 /// The sum over checks of signals is not part of the wanted rate: their limits have margins
 /// instead. Form: ours; tails: Pickands 1975, their moments Hosking and Wallis 1987.
-/// @throws Error if the recordings lack a channel, are shorter than ten blocks, cannot support the
+/// @throws Error if there are fewer than two sources, if the recordings lack a channel, are shorter than ten blocks, cannot support the
 /// wanted rate, or if a source has a fault in more than 1 % of the samples; UsageError for a rate
-/// that is not positive; Cancelled.
+/// that is not positive or a signal whose companion is not a signal; Cancelled.
 [[nodiscard]] CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
                                                   const MonitorPlan& plan,
                                                   const Dataset& fault_free,

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "torsio/core/not_measured.hpp"
@@ -43,6 +44,11 @@ struct MonitorFile {
   std::vector<Source> recordings;               ///< the fault-free ones
 };
 
+/// Whether a text is a day of the calendar, as 2027-11-22. Such texts compare as the days do.
+[[nodiscard]] bool is_date(std::string_view text) noexcept;
+/// Today in that form, by the clock of the machine (UTC).
+[[nodiscard]] std::string today();
+
 /// 16 hexadecimal digits that identify the bytes of a model file. Not cryptographic: it finds a
 /// file that was replaced or changed by mistake.
 [[nodiscard]] std::string model_hash(const std::filesystem::path& model);
@@ -51,7 +57,7 @@ struct MonitorFile {
 void save_monitor(const std::filesystem::path& path, const MonitorFile& file);
 
 /// @throws Error naming the entry: not JSON, another version, an entry that is missing, unknown or
-/// another kind of value, or numbers that `Redundancy` or `Monitor` refuse.
+/// another kind of value, a pair of sources that is missing or listed twice, or numbers that `Redundancy` or `Monitor` refuse.
 [[nodiscard]] MonitorFile read_monitor(const std::filesystem::path& path);
 
 /// The conditions under which a robot uses a monitor file.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <string>
 
 #include "core/report_progress.hpp"
 #include "evaluate/monitor/exceedance.hpp"
@@ -112,6 +114,8 @@ class PairStatistics {
       sizes[n] = std::abs(difference(runs, n));
       shares[n] = sizes[n] > 0.0 ? sizes[n] / spread(runs, n) : 0.0;
       largest_Nm_ = std::max(largest_Nm_, sizes[n]);
+      first_torque_Nm_ = std::max(first_torque_Nm_, std::abs(runs[pair_.first].value_Nm[n]));
+      second_torque_Nm_ = std::max(second_torque_Nm_, std::abs(runs[pair_.second].value_Nm[n]));
     }
     sizes = persisting(sizes, window_);
     shares = persisting(shares, window_);
@@ -190,6 +194,7 @@ class PairStatistics {
             .second = sources[pair_.second].name,
             .largest_difference_Nm = largest_Nm_,
             .typical_threshold_Nm = detail::threshold_without_ceiling(pair_, median_Nm_),
+            .largest_torque_Nm = std::min(first_torque_Nm_, second_torque_Nm_),
             .detected_in_these_states_Nm = largest_Nm_ + largest_threshold_Nm_,
             .is_factor_from_floor = is_factor_from_floor_};
   }
@@ -228,6 +233,8 @@ class PairStatistics {
   std::vector<double> spreads_;
   double median_Nm_ = kNotMeasured;
   double largest_Nm_ = 0.0;
+  double first_torque_Nm_ = 0.0;  ///< largest of each source
+  double second_torque_Nm_ = 0.0;
   double largest_threshold_Nm_ = 0.0;
   double largest_mean_ = 0.0;
   double largest_sum_s_ = 0.0;
@@ -283,6 +290,12 @@ class SignalStatistics {
         signal.longest_age_s = 1.5 * static_cast<double>(longest_gap_ + 1) / rate_Hz_;
       if (!signal.moves_with.empty() && std::isinf(signal.largest_hidden_travel))
         signal.largest_hidden_travel = 2.0 * std::max(state.hidden_travel, state.companion_step);
+      if (!(signal.largest_hidden_travel > 0.0))
+        throw Error({.place = "monitor: " + signal.name,
+                     .problem = fmt::format("{}, with which it is to move, is constant in the "
+                                            "fault-free recordings",
+                                            signal.moves_with),
+                     .advice = "record it while the joint moves"});
     }
     return limits;
   }
@@ -349,6 +362,20 @@ void check_arguments(const std::vector<SourceModel>& sources, const MonitorPlan&
     throw Error({.place = "calibration of a monitor",
                  .expected = "one model for each source of the plan",
                  .found = fmt::format("{} and {}", sources.size(), plan.sources.size())});
+  if (sources.size() < 2)
+    throw Error({.place = "calibration of a monitor",
+                 .expected = "at least two sources: a monitor compares them",
+                 .found = "one"});
+  for (const MonitoredSignal& signal : plan.signals) {
+    if (signal.moves_with.empty()) continue;
+    const auto companion =
+        std::ranges::find(plan.signals, signal.moves_with, &MonitoredSignal::name);
+    if (companion != plan.signals.end() && companion->name != signal.name) continue;
+    throw UsageError({.place = "signal " + signal.name,
+                      .expected = "to move with another signal that is watched as well",
+                      .found = fmt::format("'{}'", signal.moves_with),
+                      .advice = fmt::format("add --signal '{}'", signal.moves_with)});
+  }
   if (fault_free.records.empty())
     throw Error({.place = "calibration of a monitor", .problem = "there is no recording"});
 }
@@ -383,6 +410,13 @@ ErrorMoments moments_of(const Recorded& recorded, const Dataset& fault_free, std
   return moments;
 }
 
+[[noreturn]] void refuse_length(double duration_s) {
+  throw Error({.place = "calibration of a monitor",
+               .expected = fmt::format("at least {} s without a fault",
+                                       kBlock_s * static_cast<double>(kLeastBlocks)),
+               .found = fmt::format("{:.3g} s", duration_s)});
+}
+
 /// @returns whether the wanted rate is extrapolated
 bool check_rate(const CalibrationOptions& options, double hours) {
   const double supported = 3.0 / hours;
@@ -411,7 +445,9 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
   result.monitor.persistence_s = std::max(options.persistence_s, 2.0 / rate_Hz);
   std::size_t samples = 0;
   for (const DatasetRecord& record : fault_free.records) samples += record.recording.size();
-  result.hours = static_cast<double>(samples) / rate_Hz / kSecondsPerHour;
+  const double duration_s = static_cast<double>(samples) / rate_Hz;
+  if (duration_s < kBlock_s * static_cast<double>(kLeastBlocks)) refuse_length(duration_s);
+  result.hours = duration_s / kSecondsPerHour;
   result.false_alarms_per_hour = options.false_alarms_per_hour;
   result.is_extrapolated = check_rate(options, result.hours);
 
@@ -427,19 +463,27 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
     scaled[i].error_bar_factor = result.error_bar_factors[i];
   }
   recorded = run_all(scaled, fault_free, progress, 0.5);
-  std::vector<double> guarded(sources.size(), 0.0);
-  for (const std::vector<SourceRun>& runs : recorded)
-    for (std::size_t i = 0; i < runs.size(); ++i)
-      guarded[i] += static_cast<double>(runs[i].guarded);
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    result.guarded_share.push_back(guarded[i] / static_cast<double>(samples));
+    std::map<Fault, std::size_t> guarded;
+    for (const std::vector<SourceRun>& runs : recorded)
+      for (const auto& [fault, count] : runs[i].guarded) guarded[fault] += count;
+    std::size_t sum = 0;
+    std::string faults;
+    for (const auto& [fault, count] : guarded) {
+      sum += count;
+      faults += fmt::format("{}{} {:.1f} %", faults.empty() ? "" : ", ", name(fault),
+                            100.0 * static_cast<double>(count) / static_cast<double>(samples));
+    }
+    result.guarded_share.push_back(static_cast<double>(sum) / static_cast<double>(samples));
     if (result.guarded_share[i] > kLargestGuardedShare)
       throw Error({.place = "source " + plan.sources[i].name,
                    .expected = "fault-free recordings within the range of its model",
-                   .found = fmt::format("{:.1f} % of the samples with a fault",
-                                        100.0 * result.guarded_share[i]),
+                   .found = fmt::format("{:.1f} % of the samples with a fault ({})",
+                                        100.0 * result.guarded_share[i], faults),
                    .advice = "train its model on recordings that cover this motion and load"});
   }
+  const Redundancy redundancy({.sources = plan.sources, .correlation = {}});
+  result.not_redundant = redundancy.names(parts_of_all(redundancy));
   result.redundancy.correlation = result.monitor.correlation =
       moments_of(recorded, fault_free, sources.size()).correlation();
   result.monitor.signals = signals.limits();
@@ -462,11 +506,7 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
   const double share = options.false_alarms_per_hour * kBlock_s / kSecondsPerHour /
                        (2.0 * static_cast<double>(std::max<std::size_t>(pairs.size(), 1)));
   for (PairStatistics& pair : pairs) {
-    if (pair.blocks() < kLeastBlocks)
-      throw Error({.place = "calibration of a monitor",
-                   .expected = fmt::format("at least {} s without a fault",
-                                           kBlock_s * static_cast<double>(kLeastBlocks)),
-                   .found = fmt::format("{:.0f} s", static_cast<double>(samples) / rate_Hz)});
+    if (pair.blocks() < kLeastBlocks) refuse_length(static_cast<double>(pair.blocks()) * kBlock_s);
     pair.set_thresholds(share, options.least_threshold_Nm, options.required_Nm);
     for (const std::vector<SourceRun>& runs : recorded) pair.see_thresholds(runs);
     pair.set_ceiling(plan.sources);

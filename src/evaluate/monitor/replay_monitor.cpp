@@ -47,16 +47,32 @@ bool is_same(const MonitorEvent& a, const MonitorEvent& b) {
   return a.check == b.check && a.first == b.first && a.second == b.second;
 }
 
+MonitorReplay::Finding with_fault(const MonitorEvent& event, std::span<const Estimate> sources) {
+  const bool is_of_source =
+      event.check == MonitorCheck::source_fault || event.check == MonitorCheck::source_lost;
+  return {event, is_of_source ? sources[event.first].fault : Fault::none};
+}
+
+/// Without a valid source: their fault if they have one in common, as while they warm up.
+Fault fault_of(const FusedTorque& torque, std::span<const Estimate> sources) {
+  const Fault first = sources.front().fault;
+  const auto has_it = [&](const Estimate& source) { return source.fault == first; };
+  return torque.used == 0 && first != Fault::none && std::ranges::all_of(sources, has_it)
+             ? first
+             : torque.fault;
+}
+
 /// The findings that begin, or become a stop, in a tick, of a monitor that has just been stepped.
 class Findings {
  public:
-  void add(const Monitor& monitor, std::vector<MonitorEvent>& events) {
+  void add(const Monitor& monitor, std::span<const Estimate> sources,
+           std::vector<MonitorReplay::Finding>& events) {
     const std::span<const MonitorEvent> found = monitor.findings();
     for (const MonitorEvent& event : found) {
       const auto is_known = [&](const MonitorEvent& of) {
         return is_same(of, event) && of.action == event.action;
       };
-      if (std::ranges::none_of(last_, is_known)) events.push_back(event);
+      if (std::ranges::none_of(last_, is_known)) events.push_back(with_fault(event, sources));
     }
     last_.assign(found.begin(), found.end());
   }
@@ -66,14 +82,16 @@ class Findings {
 };
 
 /// What prevents a monitor that has just been stepped from being ready.
-void add_not_ready(const Monitor& monitor, MonitorReplay& replay) {
+void add_not_ready(const Monitor& monitor, std::span<const Estimate> sources,
+                   MonitorReplay& replay) {
   const double period_s = monitor.settings().sample_period_s;
   if (monitor.is_threshold_too_large()) replay.threshold_too_large_s += period_s;
   for (const MonitorEvent& event : monitor.findings()) {
     auto known = std::ranges::find_if(replay.not_ready,
                                       [&](const auto& of) { return is_same(of.event, event); });
-    if (known == replay.not_ready.end()) known = replay.not_ready.insert(known, {.event = event});
-    known->event = event;
+    if (known == replay.not_ready.end())
+      known = replay.not_ready.insert(known, MonitorReplay::NotReady{});
+    known->event = with_fault(event, sources);
     known->present_s += period_s;
   }
 }
@@ -92,8 +110,10 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
   RawChannels raw(recording, monitored.raw_inputs());
   std::vector<Channel> columns{{.name = estimate_channel(kTorque), .values = {}},
                                {.name = error_bar_channel(kTorque), .values = {}}};
-  for (const std::string& source : monitored.monitor().settings().sources)
+  for (const std::string& source : monitored.monitor().settings().sources) {
     columns.push_back({.name = source + "_torque_Nm", .values = {}});
+    columns.push_back({.name = source + "_fault_1", .values = {}});
+  }
   columns.push_back({.name = "monitor_state_1", .values = {}});
   for (Channel& column : columns) column.values.reserve(samples);
 
@@ -116,23 +136,24 @@ MonitorReplay replay_monitor(MonitoredTorque monitored, const Recording& recordi
     const FusedTorque torque = monitored.step(t_s, raw.at(n));
     Monitor& monitor = monitored.monitor();
     if (monitor.state() == Monitor::State::ready && monitor.arm(t_s)) replay.watching_from_s = t_s;
-    if (std::isnan(replay.watching_from_s)) add_not_ready(monitor, replay);
+    if (std::isnan(replay.watching_from_s)) add_not_ready(monitor, monitored.estimates(), replay);
     std::size_t column = 0;
     columns[column++].values.push_back(torque.value_Nm);
     columns[column++].values.push_back(torque.std_dev_Nm);
-    for (const Estimate& source : monitored.estimates())
-      columns[column++].values.push_back(source.value);
+    for (const Estimate& source : monitored.estimates()) {
+      columns[column++].values.push_back(source.fault == Fault::none ? source.value : kNotMeasured);
+      columns[column++].values.push_back(static_cast<double>(source.fault));
+    }
     columns[column].values.push_back(static_cast<double>(monitor.state()));
-    replay.estimated.faults.push_back(torque.fault);
+    replay.estimated.faults.push_back(fault_of(torque, monitored.estimates()));
     if (!std::isnan(replay.stopped_at_s) || std::isnan(replay.watching_from_s)) continue;
-    findings.add(monitor, replay.events);
+    findings.add(monitor, monitored.estimates(), replay.events);
     if (monitor.state() != Monitor::State::stopped) continue;
     replay.stopped_at_s = t_s;
     const Redundancy& redundancy = monitored.redundancy();
-    // A part of all sources, such as the supply, is one of every pair and explains nothing.
-    PartSet of_all = ~PartSet{0};
-    for (std::size_t i = 0; i < monitored.sources().size(); ++i) of_all &= redundancy.parts_of(i);
-    replay.suspects = redundancy.names(redundancy.suspects(monitor.disagreeing()) & ~of_all);
+    // A part of all sources is one of every pair and explains nothing.
+    replay.suspects =
+        redundancy.names(redundancy.suspects(monitor.disagreeing()) & ~parts_of_all(redundancy));
   }
   std::ranges::stable_sort(replay.not_ready, std::ranges::greater{},
                            &MonitorReplay::NotReady::present_s);

@@ -14,6 +14,13 @@ void take_zeros(TorqueSources& sources, const Recording& recording) {
       sources.set_zero(zero.channel, 0.0);
 }
 
+PartSet parts_of_all(const Redundancy& redundancy) {
+  PartSet of_all = ~PartSet{0};
+  for (std::size_t i = 0; i < redundancy.settings().sources.size(); ++i)
+    of_all &= redundancy.parts_of(i);
+  return of_all;
+}
+
 std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recording) {
   take_zeros(sources, recording);
   std::vector<const std::vector<double>*> channels;
@@ -34,7 +41,7 @@ std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recor
       const Fault fault = estimates[i].fault;
       runs[i].value_Nm.push_back(estimates[i].value);
       runs[i].std_dev_Nm.push_back(fault == Fault::none ? estimates[i].std_dev : kNotMeasured);
-      if (fault != Fault::none && fault != Fault::warming_up) ++runs[i].guarded;
+      if (fault != Fault::none && fault != Fault::warming_up) ++runs[i].guarded[fault];
     }
   }
   return runs;
