@@ -157,9 +157,8 @@ ResidualTable larger_of(const ResidualTable& first, const ResidualTable& second)
   std::ranges::set_union(first.edges, second.edges, std::back_inserter(table.edges));
   // Edges that differ by rounding only are one.
   const double least = 1e-9 * (table.edges.back() - table.edges.front());
-  const auto last = std::ranges::unique(table.edges, [least](double edge, double next) {
-                      return next - edge <= least;
-                    }).begin();
+  const auto last = std::unique(table.edges.begin(), table.edges.end(),
+                                [least](double edge, double next) { return next - edge <= least; });
   table.edges.erase(last, table.edges.end());
   for (std::size_t i = 1; i < table.edges.size(); ++i) {
     const double middle = 0.5 * (table.edges[i - 1] + table.edges[i]);
