@@ -114,7 +114,7 @@ LinearFallback linear_fallback(const TrainingData& data) {
   return fallback;
 }
 
-ResidualTable residual_table(AnyModel model, const TrainingData& data) {
+ResidualTable residual_table(const AnyModel& model, const TrainingData& data) {
   std::vector<Residual> all = residuals(model, data);
   const std::size_t regions = std::min(all.size() / kResidualsPerRegion, kMaxResidualRegions);
   if (regions == 0) return {};

@@ -25,7 +25,7 @@ inline constexpr std::size_t kMaxResidualRegions = 16;
 /// sample count, at least 50 samples each. It is the spread about 0, not about the region's mean,
 /// so that a bias of the model is included. Each sequence runs through the model from a reset, as
 /// in the loop. Empty where there are fewer than 50 samples.
-[[nodiscard]] ResidualTable residual_table(AnyModel model, const TrainingData& data);
+[[nodiscard]] ResidualTable residual_table(const AnyModel& model, const TrainingData& data);
 
 /// Error bars that are at least those of both tables, over the regions of both; outside of its own, a
 /// table has the value of its nearest region.

@@ -34,12 +34,12 @@ DataSheet other_specimen(const DataSheet& joint, unsigned serial) {
 
 }  // namespace
 
-std::string calibration_hash(const SimulatedCalibration& of) {
-  return fmt::format(
-      "{:016x}",
-      text_hash(fmt::format("{} {} {} {} {} {} {} {}", kVersion, of.seed, of.training_s,
-                            of.fault_free_hours, of.false_alarms_per_hour, of.least_threshold_share,
-                            of.required_share, of.spring_serial)));
+std::string calibration_hash(const SimulatedCalibration& settings) {
+  return fmt::format("{:016x}", text_hash(fmt::format(
+                                    "{} {} {} {} {} {} {} {}", kVersion, settings.seed,
+                                    settings.training_s, settings.fault_free_hours,
+                                    settings.false_alarms_per_hour, settings.least_threshold_share,
+                                    settings.required_share, settings.spring_serial)));
 }
 
 std::vector<SourceModel> SimulatedMonitor::models() const {
