@@ -40,7 +40,7 @@ constexpr std::array kJobs{
     Job{"check_of_a_silent_pipe", "check held"},
     Job{"check_of_a_manifest_pipe", "check pipe.yaml"},
     Job{"check_with_advice", "check long.csv --advise", milliseconds(1000),
-        "simulate dfki-50 sweep --duration 600s -o long.csv"},
+        "simulate dfki-50 sweep --duration 2400s -o long.csv"},
     Job{"fit_with_a_mapping_pipe", "fit a.csv --model linear --mapping pipe -o out"},
     Job{"fit_with_a_silent_mapping", "fit a.csv --model linear --mapping held -o out"},
     Job{"simulate_with_a_fault_pipe", "simulate dfki-50 sweep --faults held -o out"},
