@@ -1196,6 +1196,28 @@ TEST(Monitor, ASmallTorqueHasNoWrongSign) {
   EXPECT_EQ(loop.reason(), MonitorCheck::sign);
 }
 
+TEST(Monitor, AWrongSignThatHasEndedIsNotReported) {
+  MonitorSettings settings = joint();
+  settings.actions.fill(MonitorAction::warn);
+  Loop loop(settings);
+  loop.start();
+  loop.sources[0].value = 0.6;
+  loop.sources[1].value = -0.6;
+  loop.step_for(6);
+  EXPECT_NE(loop.monitor.active() & bit(MonitorCheck::sign), 0U);
+  loop.sources[0].value = loop.sources[1].value = 0.0;
+  (void)loop.step();
+  EXPECT_EQ(loop.monitor.active() & bit(MonitorCheck::sign), 0U);
+}
+
+TEST(Monitor, CountsTheTorquesThatAreLeft) {
+  const auto text = [](double left) {
+    return describe({.check = MonitorCheck::redundancy_lost, .value = left, .limit = 2.0}, joint());
+  };
+  EXPECT_EQ(text(1.0), "1 valid torque is left, at least 2 are needed");
+  EXPECT_EQ(text(0.0), "0 valid torques are left, at least 2 are needed");
+}
+
 MonitorSettings with_drift() {
   MonitorSettings settings = joint();
   settings.pairs = {
