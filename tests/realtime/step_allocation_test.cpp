@@ -129,6 +129,22 @@ ReferenceSample troublesome(int n, double output, double frozen) {
   return {.value = value, .age_s = n % 19 == 0 ? 1.0 : 0.0};
 }
 
+/// Steps with every trouble of a reference, a pause, a missing input and a reset.
+std::size_t heap_calls_while_adapting(AdaptiveEstimator& estimator, Estimator& frozen, int steps) {
+  return heap_calls_during([&] {
+    for (int n = 0; n < steps; ++n) {
+      const std::array raw{0.1 * std::sin(0.01 * n), 0.0};
+      const double output = estimator.step(raw).value;
+      (void)estimator.learn(troublesome(n, output, frozen.step(raw).value));
+      if (n == 2000) estimator.pause();
+      if (n == 2100) estimator.resume();
+    }
+    (void)estimator.step(std::array{kNaN, 0.0});
+    (void)estimator.learn({.value = 1.0});
+    estimator.reset();
+  });
+}
+
 TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
   EstimatorSettings settings = test::example_settings();
   settings.zeroed_channels.clear();
@@ -143,19 +159,7 @@ TEST(AdaptiveEstimator, NeverTouchesTheHeapOnAnyPath) {
                                  .saturation = 100.0,
                                  .largest_change = 0.1,
                                  .comparison_s = 0.5});
-    EXPECT_EQ(heap_calls_during([&] {
-                for (int n = 0; n < 4000; ++n) {
-                  const std::array raw{0.1 * std::sin(0.01 * n), 0.0};
-                  const double output = estimator.step(raw).value;
-                  (void)estimator.learn(troublesome(n, output, frozen.step(raw).value));
-                  if (n == 2000) estimator.pause();
-                  if (n == 2100) estimator.resume();
-                }
-                (void)estimator.step(std::array{kNaN, 0.0});
-                (void)estimator.learn({.value = 1.0});
-                estimator.reset();
-              }),
-              0U);
+    EXPECT_EQ(heap_calls_while_adapting(estimator, frozen, 4000), 0U);
     const AdaptationCounts counts = estimator.adapter().counts();
     for (std::size_t outcome = 0; outcome < kUpdateOutcomes; ++outcome)
       // A layer is restored at once.
@@ -187,19 +191,7 @@ TYPED_TEST(AdaptedInPlace, NeverTouchesTheHeapOnAnyPath) {
                                .saturation = 100.0,
                                .largest_change = 0.02,
                                .comparison_s = 0.5});
-  EXPECT_EQ(heap_calls_during([&] {
-              for (int n = 0; n < 8000; ++n) {
-                const std::array raw{0.1 * std::sin(0.01 * n), 0.0};
-                const double output = estimator.step(raw).value;
-                (void)estimator.learn(troublesome(n, output, frozen.step(raw).value));
-                if (n == 2000) estimator.pause();
-                if (n == 2100) estimator.resume();
-              }
-              (void)estimator.step(std::array{kNaN, 0.0});
-              (void)estimator.learn({.value = 1.0});
-              estimator.reset();
-            }),
-            0U);
+  EXPECT_EQ(heap_calls_while_adapting(estimator, frozen, 8000), 0U);
   const AdaptationCounts counts = estimator.adapter().counts();
   EXPECT_GT(counts.of(UpdateOutcome::updated), 0U);
   EXPECT_GT(counts.of(UpdateOutcome::limited), 0U);

@@ -140,8 +140,6 @@ TorqueParts torque_parts(std::span<const PartsRun> runs, double lowest, double h
       parts.stiffness.push_back(rows.curve().slope(knots, x));
       parts.friction.push_back(friction);
     });
-  parts.error_rms = std::sqrt(std::max(0.0, sums.error(fitted)) /
-                              static_cast<double>(std::max<std::size_t>(1, sums.rows)));
   return parts;
 }
 

@@ -19,7 +19,6 @@ struct TorqueParts {
   std::vector<double> stiffness;  ///< dE/dx
   std::vector<double> friction;   ///< H
   double middle = 0.0;            ///< x0: where E is 0; NaN: nowhere
-  double error_rms = 0.0;         ///< root mean square error of the fit
 };
 
 /// The samples of one recording, in the order of time.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "numerics/centred_sums.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -22,25 +23,10 @@ struct Moments {
 };
 
 Moments moments_of(const ReferencePairs& pairs) {
-  const auto count = static_cast<double>(pairs.measured.size());
-  double x = 0.0;
-  double y = 0.0;
-  for (std::size_t n = 0; n < pairs.measured.size(); ++n) {
-    x += pairs.estimated[n] / count;
-    y += pairs.measured[n] / count;
-  }
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
-  for (std::size_t n = 0; n < pairs.measured.size(); ++n) {
-    const double dx = pairs.estimated[n] - x;
-    const double dy = pairs.measured[n] - y;
-    xx += dx * dx;
-    xy += dx * dy;
-    yy += dy * dy;
-  }
-  if (!(xx > 0.0 && yy > 0.0)) return {};
-  return {.correlation = xy / std::sqrt(xx * yy), .gain = std::sqrt(yy / xx)};
+  const CentredSums sums(pairs.estimated, pairs.measured);
+  if (!(sums.xx > 0.0 && sums.yy > 0.0)) return {};
+  return {.correlation = sums.xy / std::sqrt(sums.xx * sums.yy),
+          .gain = std::sqrt(sums.yy / sums.xx)};
 }
 
 /// Largest range of the estimates over samples between which the measured value does not change.

@@ -17,6 +17,7 @@
 #include "fit/common/training_rules.hpp"
 #include "fit/transfer/output_map.hpp"
 #include "fit/transfer/refit.hpp"
+#include "numerics/centred_sums.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/train_model.hpp"
 
@@ -117,25 +118,11 @@ struct Line {
 
 /// Least squares with a gain above 0, else without.
 Line line_of(const Pairs& pairs) {
-  const auto count = static_cast<double>(pairs.measured.size());
-  double x = 0.0;
-  double y = 0.0;
-  for (std::size_t n = 0; n < pairs.measured.size(); ++n) {
-    x += pairs.estimated[n] / count;
-    y += pairs.measured[n] / count;
-  }
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
-  for (std::size_t n = 0; n < pairs.measured.size(); ++n) {
-    const double dx = pairs.estimated[n] - x;
-    const double dy = pairs.measured[n] - y;
-    xx += dx * dx;
-    xy += dx * dy;
-    yy += dy * dy;
-  }
-  const double gain = xx > 0.0 && xy > 0.0 ? xy / xx : 1.0;
-  return {.gain = gain, .offset = y - gain * x, .error = yy - 2.0 * gain * xy + gain * gain * xx};
+  const CentredSums sums(pairs.estimated, pairs.measured);
+  const double gain = sums.xx > 0.0 && sums.xy > 0.0 ? sums.xy / sums.xx : 1.0;
+  return {.gain = gain,
+          .offset = sums.y - gain * sums.x,
+          .error = sums.yy - 2.0 * gain * sums.xy + gain * gain * sums.xx};
 }
 
 void note_transfer(ModelCard& card, const TransferTrial& of, const Dataset& dataset) {
