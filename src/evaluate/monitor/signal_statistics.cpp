@@ -1,0 +1,91 @@
+#include "evaluate/monitor/signal_statistics.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr double kRangeMargin = 0.25;  // margin on either side, over the range in the recordings
+
+}  // namespace
+
+SignalStatistics::SignalStatistics(const std::vector<MonitoredSignal>& signals, double rate_Hz)
+    : signals_(signals), states_(signals.size()), rate_Hz_(rate_Hz) {
+  for (const MonitoredSignal& signal : signals) {
+    spec_.inputs.push_back(signal.name);
+    const auto companion = std::ranges::find(signals, signal.moves_with, &MonitoredSignal::name);
+    companions_.push_back(static_cast<std::size_t>(companion - signals.begin()));
+  }
+}
+
+void SignalStatistics::add(const Recording& recording) {
+  FeaturePipeline pipeline(spec_, rate_Hz_);
+  std::vector<const Channel*> channels;
+  for (const std::string& name : pipeline.raw_inputs())
+    channels.push_back(&recording.channel(name));
+  std::vector<double> raw(channels.size());
+  std::vector<std::size_t> ages(channels.size(), 0);
+  for (State& state : states_) state.is_started = false;
+  for (std::size_t n = 0; n < recording.size(); ++n) {
+    for (std::size_t k = 0; k < channels.size(); ++k) {
+      raw[k] = channels[k]->values[n];
+      ages[k] = channels[k]->is_fresh(n) ? 0 : ages[k] + 1;
+      longest_gap_ = std::max(longest_gap_, ages[k]);
+    }
+    const std::span<const double> values = pipeline.step(raw);
+    for (std::size_t i = 0; i < values.size(); ++i) add(states_[i], values, i);
+  }
+}
+
+std::vector<MonitoredSignal> SignalStatistics::limits() const {
+  std::vector<MonitoredSignal> limits = signals_;
+  for (std::size_t i = 0; i < limits.size(); ++i) {
+    const State& state = states_[i];
+    MonitoredSignal& signal = limits[i];
+    const double margin = kRangeMargin * (state.highest - state.lowest);
+    if (std::isinf(signal.lowest)) signal.lowest = state.lowest - margin;
+    if (std::isinf(signal.highest)) signal.highest = state.highest + margin;
+    if (!(signal.lowest < signal.highest))
+      throw Error({.place = "monitor: " + signal.name,
+                   .problem = "the signal is constant in the fault-free recordings",
+                   .advice = "record it while the joint moves, or give its range"});
+    if (std::isinf(signal.largest_rate)) signal.largest_rate = 1.5 * state.largest_step * rate_Hz_;
+    if (std::isinf(signal.longest_age_s))
+      signal.longest_age_s = 1.5 * static_cast<double>(longest_gap_ + 1) / rate_Hz_;
+    if (!signal.moves_with.empty() && std::isinf(signal.largest_hidden_travel))
+      signal.largest_hidden_travel = 2.0 * std::max(state.hidden_travel, state.companion_step);
+    if (!(signal.largest_hidden_travel > 0.0))
+      throw Error({.place = "monitor: " + signal.name,
+                   .problem = fmt::format("{}, with which it is to move, is constant in the "
+                                          "fault-free recordings",
+                                          signal.moves_with),
+                   .advice = "record it while the joint moves"});
+  }
+  return limits;
+}
+
+void SignalStatistics::add(State& state, std::span<const double> values, std::size_t i) const {
+  const double value = values[i];
+  if (!std::isfinite(value)) return;
+  const bool has_companion = companions_[i] < values.size();
+  const double companion = has_companion ? values[companions_[i]] : 0.0;
+  state.lowest = std::min(state.lowest, value);
+  state.highest = std::max(state.highest, value);
+  if (state.is_started) {
+    state.largest_step = std::max(state.largest_step, std::abs(value - state.last));
+    state.companion_step =
+        std::max(state.companion_step, std::abs(companion - state.last_companion));
+  }
+  if (!state.is_started || value != state.last) state.companion = companion;
+  state.hidden_travel = std::max(state.hidden_travel, std::abs(companion - state.companion));
+  state.last = value;
+  state.last_companion = companion;
+  state.is_started = true;
+}
+
+}  // namespace torsio
