@@ -92,9 +92,11 @@ void add_drift(CLI::App& app) {
                              "recordings of today with the inputs and the torque, or a manifest");
   flags->data.add_model_mapping(*verb);
   flags->data.add_initialise(*verb);
-  verb->add_option("--reference", flags->reference,
-                   "model of the same torque from the motor current or the twist of the gear: it "
-                   "separates the gain of the torque sensor from the stiffness");
+  verb->add_option(
+      "--reference", flags->reference,
+      "model of the same torque from the motor current or the twist of the gear: it "
+      "separates the gain of the torque sensor from the stiffness, and the current shows the "
+      "friction of the drive");
   verb->add_option("--device-serial", flags->serial,
                    "serial number of the joint; a model of another one is refused");
   verb->add_option("--campaign", flags->campaign,

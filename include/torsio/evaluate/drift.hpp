@@ -62,7 +62,8 @@ struct DriftOptions {
   std::size_t resamples = 400;  ///< number of records of the bootstrap, at least 100
   std::uint64_t seed = 1;       ///< seed of the bootstrap
   /// A model of the same torque from the motor current or the twist of the gear: it separates the
-  /// gain of the torque sensor from the stiffness. Null: they are one quantity.
+  /// gain of the torque sensor from the stiffness, and with the current it shows the friction of the drive.
+  /// Null: gain and stiffness are one quantity.
   const ModelFile* reference = nullptr;
 };
 

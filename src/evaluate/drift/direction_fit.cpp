@@ -76,6 +76,12 @@ Matrix to_coefficients(const Matrix& basis, const Matrix& columns) {
 
 }  // namespace
 
+double DirectionFit::residual_rms() const noexcept {
+  double sum = 0.0;
+  for (const double value : residual) sum += value * value;
+  return std::sqrt(sum / static_cast<double>(residual.size()));
+}
+
 DirectionFit fit_directions(const Matrix& columns, std::span<const double> residual,
                             std::size_t resamples, std::uint64_t seed) {
   const Eigen::MatrixXd gram = gram_of(columns);

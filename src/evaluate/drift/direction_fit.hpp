@@ -18,6 +18,8 @@ struct DirectionFit {
   std::vector<double> own_rms;
   std::vector<double> residual;
   double effective_samples = kNotMeasured;
+
+  [[nodiscard]] double residual_rms() const noexcept;
 };
 
 /// A column of which the others explain all but `kLeastOwnShare` of its length is left out, the last first.

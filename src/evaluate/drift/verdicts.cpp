@@ -1,5 +1,7 @@
 #include "evaluate/drift/verdicts.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -7,8 +9,10 @@
 namespace torsio {
 namespace {
 
-constexpr double kExplained = 0.8;    // error with the changes corrected over that without
-constexpr double kWorthFactor = 1.5;  // error now over that of the calibration
+constexpr double kQuantile = 1.96;        // 95 %
+constexpr double kModelErrorShare = 0.3;  // share of the remaining residual
+constexpr double kExplained = 0.8;        // error with the changes corrected over that without
+constexpr double kWorthFactor = 1.5;      // error now over that of the calibration
 
 DriftQuantity& named(Drift& drift, const char* name) {
   return *std::ranges::find(drift.quantities, name, &DriftQuantity::name);
@@ -38,6 +42,33 @@ void decide(DriftQuantity& of, double change, double half_width) {
   } else {
     of.reason = "near the limit: record longer";
   }
+}
+
+DriftQuantity direction_quantity(std::string of, std::string unit, double before,
+                                 const DirectionFit& fit, std::size_t column, double model_error,
+                                 double tolerance, double smallest) {
+  DriftQuantity result{.name = std::move(of), .unit = std::move(unit), .before = before};
+  const double scale = std::isfinite(before) ? before : 1.0;
+  result.tolerance = tolerance * scale;
+  result.smallest = smallest * scale;
+  if (!(fit.own_rms[column] > 0.0)) {
+    result.reason = "this motion does not separate it from the other changes";
+    return result;
+  }
+  const double error =
+      std::hypot(fit.standard_errors[column], kModelErrorShare * model_error / fit.own_rms[column]);
+  const double change = fit.coefficients[column];
+  result.change = change * scale;
+  result.relative = std::isfinite(before) ? change : kNotMeasured;
+  if (!std::isfinite(error)) {
+    result.reason = fmt::format(
+        "the remaining error changes slowly, {:.0f} independent samples: record more, or fit a "
+        "model with a smaller error",
+        fit.effective_samples);
+    return result;
+  }
+  decide(result, change * scale, kQuantile * error * scale);
+  return result;
 }
 
 void conclude(Drift& drift) {
@@ -71,6 +102,13 @@ void conclude(Drift& drift) {
   } else if (!is_certain && !has_changed) {
     drift.advice = DriftAdvice::record_more;
   }
+}
+
+void distrust_scale(Drift& reference, const std::string& reason) {
+  DriftQuantity& scale = named(reference, drift_names::kScale);
+  scale.relative = kNotMeasured;
+  scale.verdict = DriftVerdict::undetermined;
+  scale.reason = reason;
 }
 
 void separate_gain(Drift& drift, const Drift& reference) {

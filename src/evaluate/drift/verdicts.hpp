@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <string>
+
+#include "evaluate/drift/direction_fit.hpp"
 #include "torsio/evaluate/drift.hpp"
 
 namespace torsio {
@@ -10,13 +14,26 @@ inline constexpr const char* kScale = "stiffness or gain";
 inline constexpr const char* kStiffness = "stiffness";
 inline constexpr const char* kGain = "gain of the torque sensor";
 inline constexpr const char* kFriction = "friction";
+inline constexpr const char* kDriveFriction = "friction of the drive";
 }  // namespace drift_names
 
 /// Sets change, interval and verdict of a quantity whose 95 % interval is `change` +- `half_width`.
 void decide(DriftQuantity& of, double change, double half_width);
 
+/// The quantity whose change is the coefficient of a column, with its verdict. The 95 % interval contains the
+/// standard error and the error `model_error` (RMS) that the model itself may have in this direction.
+/// @param before value of the model: coefficient, `tolerance` and `smallest` are relative to it; NaN: they are
+/// in `unit`
+[[nodiscard]] DriftQuantity direction_quantity(std::string of, std::string unit, double before,
+                                               const DirectionFit& fit, std::size_t column,
+                                               double model_error, double tolerance,
+                                               double smallest);
+
 /// Verdict and advice from all quantities.
 void conclude(Drift& drift);
+
+/// Makes the scale of a reference undetermined. A friction that the reference does not contain acts like a gain.
+void distrust_scale(Drift& reference, const std::string& reason);
 
 /// Separates the gain g of the torque sensor from the relative change of the stiffness s: the spring shows
 /// s + g, the reference g, as long as the twist of the gear or the torque constant has not changed.

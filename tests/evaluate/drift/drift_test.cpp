@@ -227,6 +227,52 @@ TEST(Drift, AModelOfTheGearIsAReference) {
                UsageError);
 }
 
+/// A model of the torque from the motor current, with or without the friction of the drive.
+ModelFile drive_model(bool with_friction) {
+  std::vector<std::string> inputs{"motor_current_A"};
+  if (with_friction)
+    inputs.insert(inputs.end(), {"tanh(lowpass(rate(motor_angle_rad), 50Hz) / 0.6)",
+                                 "rate(lowpass(rate(gear_angle_rad), 20Hz))"});
+  return train_model(calibration(),
+                     {.family = "linear",
+                      .options = {{"rates", "true"}},
+                      .features = {.inputs = inputs, .definitions = {}}},
+                     1)
+      .file;
+}
+
+const ModelFile& drive() {
+  static const ModelFile file = drive_model(true);
+  return file;
+}
+
+TEST(Drift, FindsAChangeOfTheFrictionOfTheDrive) {
+  DataSheet changed = data_sheet(kActuator);
+  changed.friction.coulomb_Nm.value *= 2.0;
+  changed.friction.viscous_Nms_rad.value *= 2.0;
+  changed.friction.load_factor.value *= 2.0;
+  const Drift drift = detect_drift(model(), today(changed), {.reference = &drive()});
+  const DriftQuantity& friction = of(drift, "friction of the drive");
+  EXPECT_EQ(friction.verdict, DriftVerdict::changed);
+  EXPECT_NEAR(friction.relative, 1.0, 0.3);
+  EXPECT_FALSE(friction.is_of_joint);
+  EXPECT_EQ(of(drift, "friction").verdict, DriftVerdict::not_changed);
+}
+
+TEST(Drift, FiveDegreesAreNoChangeOfTheFrictionOfTheDrive) {
+  const Drift drift = detect_drift(model(), today(data_sheet(kActuator)), {.reference = &drive()});
+  EXPECT_EQ(of(drift, "friction of the drive").verdict, DriftVerdict::not_changed);
+}
+
+TEST(Drift, AReferenceThatLacksFrictionDeterminesNeitherItNorTheGain) {
+  const ModelFile without = drive_model(false);
+  const Drift drift = detect_drift(model(), today(data_sheet(kActuator)), {.reference = &without});
+  for (const char* name : {"friction of the drive", "gain of the torque sensor"}) {
+    EXPECT_EQ(of(drift, name).verdict, DriftVerdict::undetermined) << name;
+    EXPECT_THAT(of(drift, name).reason, HasSubstr("direction of motion")) << name;
+  }
+}
+
 TEST(Drift, FindsMorePlay) {
   const Drift drift = detect_drift(model(), today(worn(data_sheet(kActuator), {.play = 8.0})));
   EXPECT_EQ(of(drift, "backlash").verdict, DriftVerdict::changed);
