@@ -9,6 +9,7 @@
 
 #include "core/running_mean.hpp"
 #include "data/resample.hpp"
+#include "sim/torque_references.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/actuator/data_sheet.hpp"
@@ -33,19 +34,16 @@ constexpr double kTestLoad = 0.45;
 constexpr std::size_t kShown = 4000;  // samples in the picture
 constexpr std::size_t kShownEvery = 4;
 constexpr const char* kBase = "dfki-300#03";
-constexpr double kMass_kg = 9.0;
-constexpr double kGravity_m_s2 = 9.81;
 
 /// The bars of Figure 12.
 constexpr std::array kJoints{"dfki-300#03", "dfki-300#06", "dfki-120#01", "dfki-50#01"};
 
 Recording sweep(const std::string& actuator, double load, double duration_s, std::uint64_t seed) {
-  const double rated_Nm = data_sheet(actuator).rating.torque_Nm.value;
   return resample(simulate({.actuator = actuator,
                             .experiment = "sweep",
                             .seed = seed,
                             .duration_s = duration_s,
-                            .lever_m = load * rated_Nm / (kMass_kg * kGravity_m_s2)}),
+                            .lever_m = lever_m(data_sheet(actuator), load)}),
                   kRate_Hz);
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/report_progress.hpp"
 #include "fit/common/model_run.hpp"
+#include "sim/torque_references.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/evaluate/evaluate.hpp"
@@ -26,8 +27,6 @@ constexpr unsigned kFirstSpecimen = 11;
 constexpr std::size_t kSpecimens = 5;
 constexpr double kWalkShare = 0.2;   // share of the rated torque: its peaks reach 0.45
 constexpr double kSweepShare = 0.4;  // share of the rated torque, of the lever in a test
-constexpr double kMass_kg = 9.0;
-constexpr double kGravity_m_s2 = 9.81;
 
 struct Pair {
   const char* base;
@@ -46,10 +45,6 @@ void add(Dataset& dataset, const ExperimentSpec& spec, Role role) {
 
 double rated_Nm(const std::string& actuator) { return data_sheet(actuator).rating.torque_Nm.value; }
 
-double lever_m(const std::string& actuator, double share) {
-  return share * rated_Nm(actuator) / (kMass_kg * kGravity_m_s2);
-}
-
 /// The calibration of the base: sweeps, a chirp and a walk, up to half the rated torque.
 ModelFile base_model(const std::string& actuator, std::uint64_t seed, const Progress& progress) {
   Dataset dataset;
@@ -59,7 +54,7 @@ ModelFile base_model(const std::string& actuator, std::uint64_t seed, const Prog
         {.actuator = name,
          .experiment = "sweep",
          .seed = seed++,
-         .lever_m = lever_m(actuator, share)},
+         .lever_m = lever_m(data_sheet(actuator), share)},
         Role::train);
   add(dataset,
       {.actuator = name,
@@ -89,7 +84,7 @@ Dataset new_joint(const std::string& actuator, unsigned serial, double chirp_s,
       {.actuator = name,
        .experiment = "sweep",
        .seed = seed + 1,
-       .lever_m = lever_m(actuator, kSweepShare)},
+       .lever_m = lever_m(data_sheet(actuator), kSweepShare)},
       Role::test);
   add(dataset,
       {.actuator = name,

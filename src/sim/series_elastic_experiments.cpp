@@ -185,7 +185,7 @@ SweepProtocol sweep_protocol(const DataSheet& sheet) {
   if (sheet.name == "dfki-120" || sheet.name == "dfki-300")
     return {rad_from_deg(170.0), {0.35, 0.60, 0.80}, 0.72, incline_rad};
   // A sheet of the user's own: levers that take the same shares of its rating.
-  const double rated_m = sheet.rating.torque_Nm.value / lever(kLeverMass_kg, 1.0).gravity_Nm;
+  const double rated_m = lever_m(sheet, 1.0);
   return {rad_from_deg(170.0),
           {0.2 * rated_m, 0.35 * rated_m, 0.5 * rated_m},
           0.45 * rated_m,

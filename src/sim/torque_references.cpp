@@ -46,6 +46,10 @@ BandLimitedNoise torque_walk(double amplitude_Nm, std::uint64_t seed) {
   return {{.rms = scale, .cutoff_Hz = 1.0, .seed = ~seed}, kBenchRate_Hz};
 }
 
+double lever_m(const DataSheet& sheet, double share_of_rated) {
+  return share_of_rated * sheet.rating.torque_Nm.value / lever(kLeverMass_kg, 1.0).gravity_Nm;
+}
+
 void check_swing(const Swing& swing, const DataSheet& sheet) {
   const double inertia_kg_m2 = swing.load.inertia_kg_m2 + sheet.joint.inertia_kg_m2.value;
   const double period_s = 1.0 / kBenchRate_Hz;

@@ -29,6 +29,8 @@ constexpr double kWalkAmplitude = 0.35;
 
 /// The mass on the levers of the benches.
 constexpr double kLeverMass_kg = 9.0;
+/// Distance from the axis at which its weight, held level, is a share of the actuator's rated torque.
+[[nodiscard]] double lever_m(const DataSheet& sheet, double share_of_rated);
 
 /// A lever that a torque is to move.
 struct Swing {

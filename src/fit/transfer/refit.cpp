@@ -22,14 +22,26 @@
 namespace torsio {
 namespace {
 
-/// Least squares of coefficients with a prior around those of the base.
+constexpr double kWidestFactor = 2.0;  // range of a factor between specimens, not between sizes
+
+/// Consecutive coefficients [begin, end) that make up one part of the torque.
+struct Part {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+/// Least squares of coefficients with a prior around those of the base. Specimens differ most in the size of a
+/// part (stiffness, friction): the prior is around the base with each part scaled.
 class PriorFit {
  public:
   /// @param sizes of the columns, at least
   /// @param is_free one for each; 0: remains >= 0
-  PriorFit(std::vector<double> base, std::vector<double> sizes, std::vector<std::uint8_t> is_free)
+  /// @param parts that are scaled, in order; none: the prior is around the base
+  PriorFit(std::vector<double> base, std::vector<double> sizes, std::vector<std::uint8_t> is_free,
+           std::vector<Part> parts = {})
       : base_(std::move(base)),
         is_free_(std::move(is_free)),
+        parts_(std::move(parts)),
         largest_(std::move(sizes)),
         equations_(base_.size()) {}
 
@@ -44,18 +56,59 @@ class PriorFit {
   }
 
   [[nodiscard]] std::vector<double> solution(double prior) const {
+    const std::vector<double> centre = scaled_base(prior);
     NormalEquations equations = equations_;
     for (std::size_t j = 0; j < base_.size(); ++j) {
       const double weight = prior * static_cast<double>(equations.rows) * largest_[j] * largest_[j];
       equations.product(j, j) += weight;
-      equations.projection[j] += weight * base_[j];
+      equations.projection[j] += weight * centre[j];
     }
     return non_negative_least_squares(equations, is_free_).coefficients;
   }
 
  private:
+  /// The output of a part with the base's coefficients, times column k, summed over the samples.
+  [[nodiscard]] double product(const Part& part, std::size_t k) const {
+    double sum = 0.0;
+    for (std::size_t j = part.begin; j < part.end; ++j) sum += base_[j] * equations_.product(j, k);
+    return sum;
+  }
+
+  [[nodiscard]] double projection(const Part& part) const {
+    double sum = 0.0;
+    for (std::size_t j = part.begin; j < part.end; ++j) sum += base_[j] * equations_.projection[j];
+    return sum;
+  }
+
+  /// The base, each part times the factor that the data ask for: least squares with a ridge around 1 that is
+  /// relative to the part's own output. The other coefficients remain.
+  [[nodiscard]] std::vector<double> scaled_base(double prior) const {
+    if (parts_.empty()) return base_;
+    NormalEquations equations(parts_.size());
+    equations.rows = equations_.rows;
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      // The factors less 1, so that the coefficients in no part need no column.
+      double remaining = projection(parts_[p]);
+      for (std::size_t k = 0; k < base_.size(); ++k) remaining -= base_[k] * product(parts_[p], k);
+      equations.projection[p] = remaining;
+      for (std::size_t q = 0; q < parts_.size(); ++q)
+        for (std::size_t k = parts_[q].begin; k < parts_[q].end; ++k)
+          equations.product(p, q) += base_[k] * product(parts_[p], k);
+    }
+    for (std::size_t p = 0; p < parts_.size(); ++p) equations.product(p, p) *= 1.0 + prior;
+    const std::vector<double> changes =
+        non_negative_least_squares(equations, std::vector<std::uint8_t>(parts_.size(), 1))
+            .coefficients;
+    std::vector<double> scaled = base_;
+    for (std::size_t p = 0; p < parts_.size(); ++p)
+      for (std::size_t j = parts_[p].begin; j < parts_[p].end; ++j)
+        scaled[j] *= std::clamp(1.0 + changes[p], 1.0 / kWidestFactor, kWidestFactor);
+    return scaled;
+  }
+
   std::vector<double> base_;
   std::vector<std::uint8_t> is_free_;
+  std::vector<Part> parts_;
   std::vector<double> largest_;
   NormalEquations equations_;
 };
@@ -120,6 +173,7 @@ GreyBox::Parameters refit(GreyBox::Parameters box, const FeatureRanges& ranges,
   std::vector<std::uint8_t> is_free(base.size(), 1);
   for (std::size_t j = box.terms.first_slip(); j < box.terms.first_slope(); ++j)
     is_free[j] = base[j] < 0.0 ? 1 : 0;
+  // Banks have no sign of their own: u need not be the motion that the torque works on.
   // Friction of a rate that dissipates continues to dissipate.
   for (std::size_t l = 0; l < box.terms.inputs(); ++l)
     if (data.inputs[l].is_rate)
@@ -131,12 +185,21 @@ GreyBox::Parameters refit(GreyBox::Parameters box, const FeatureRanges& ranges,
   for (std::size_t j = box.terms.first_relaxation(); j < box.terms.first_slope(); ++j)
     sizes[j] = inputs[0];
   std::ranges::copy(inputs, sizes.begin() + static_cast<std::ptrdiff_t>(box.terms.first_slope()));
-  PriorFit fit(base, sizes, is_free);
+  std::size_t first = box.terms.first_bank();
+  for (const InputBank& bank : box.terms.banks) {
+    for (std::size_t j = bank.first_product(); j < bank.columns(); ++j)
+      sizes[first + j] = inputs[bank.input];
+    first += bank.columns();
+  }
+  // The elastic curve and the slip elements.
+  PriorFit fit(
+      base, sizes, is_free,
+      {{0, box.terms.first_slip()}, {box.terms.first_slip(), box.terms.first_relaxation()}});
   GreyBoxTerms terms(box.terms);
   std::vector<double> row(base.size());
   const auto move = [&](Features features, bool is_first) {
     if (is_first) terms.reset();
-    terms.move(features[0]);
+    terms.move(features);
   };
   each_error(data, AnyModel(box), move, [&](Features features, double error, auto /*layer*/) {
     std::ranges::fill(row, 0.0);

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "fit/common/model_run.hpp"
+#include "fit/transfer/refit.hpp"
 #include "model/grey_box/grey_box.hpp"
 #include "model/linear/linear.hpp"
 #include "support/bench_dataset.hpp"
@@ -148,6 +150,27 @@ TEST(Transfer, ARefitKeepsSlipForcesPositive) {
   const auto& box = result.best().file.parameters.get<GreyBox::Parameters>();
   for (std::size_t j = box.terms.first_slip(); j < box.terms.first_slope(); ++j)
     EXPECT_GE(box.coefficients.values(0, j), 0.0);
+}
+
+TEST(Refitted, ScalesStiffnessAndFrictionBeyondTheNewMotion) {
+  const ModelFile base =
+      train_model(test::one_recording({.friction_Nm = 1.0}),
+                  {.family = "grey_box",
+                   .options = {{"residual", "none"}},
+                   .features = {.inputs = {"gear_angle_rad - joint_angle_rad"}, .definitions = {}}},
+                  1)
+          .file;
+  // Stiffness and friction differ by different factors; the motion is two thirds of that of the base.
+  test::BenchOptions joint{
+      .stiffness_Nm_rad = 540.0, .friction_Nm = 1.6, .amplitude_rad = 0.02, .seed = 8};
+  const auto data = [&] {
+    return training_data(test::one_recording(joint), base.settings.features);
+  };
+  constexpr double kStrong = 0.1;
+  const AnyModel refit(refitted(base.parameters, base.settings.ranges, data(), kStrong));
+  joint.amplitude_rad = 0.03;
+  // With a prior around the base itself it is 0.63.
+  EXPECT_LT(evaluate(refit, data()).rmse, 0.55 * evaluate(AnyModel(base.parameters), data()).rmse);
 }
 
 TEST(Transfer, ARefitKeepsTheFrictionOfARatePositive) {
