@@ -19,13 +19,15 @@ MemoryError::MemoryError(ModelMemory memory, double width, double sample_period_
     : memory_(std::move(memory)),
       width_(width),
       warm_up_ticks_(std::ceil(warm_up_s / sample_period_s)),
-      share_(memory_.relaxations.size()) {
+      share_(memory_.relaxations.size()),
+      others_(memory_.slips.size()) {
   double largest = 0.0;
   for (const Relaxation& each : memory_.relaxations) {
     decay_.push_back(std::exp(-sample_period_s / each.time_constant_s));
     largest += each.gain;
   }
-  for (const SlipMemory& each : memory_.slips) largest += each.gain * std::min(each.travel, width_);
+  for (const SlipMemory& each : memory_.slips)
+    largest += each.gain * (each.input == 0 ? std::min(each.travel, width_) : each.travel);
   negligible_ = kNegligible * largest;
   reset();
 }
@@ -36,15 +38,17 @@ void MemoryError::reset() noexcept {
   unknown_travel_ = 0.0;
   lowest_ = kInfinity;
   highest_ = -kInfinity;
+  std::ranges::fill(others_, Travel{});
   ticks_left_ = 0.0;
   bound_ = 0.0;
   is_zero_ = true;
 }
 
-void MemoryError::interrupt(double ticks, double share) noexcept {
+void MemoryError::interrupt(double ticks, double share, bool others) noexcept {
   for (std::size_t k = 0; k < share_.size(); ++k) {
     const double kept = ticks == 1.0 ? decay_[k] : std::pow(decay_[k], ticks);
-    if (share_[k] < share) share_[k] = share - (share - share_[k]) * kept;
+    const double own = memory_.relaxations[k].input == 0 ? share : (others ? 1.0 : 0.0);
+    if (share_[k] < own) share_[k] = own - (own - share_[k]) * kept;
   }
   if (highest_ >= lowest_) {  // usable ticks since the last interruption
     travel_before_ = std::max(0.0, unknown_travel_ - (highest_ - lowest_));
@@ -53,9 +57,36 @@ void MemoryError::interrupt(double ticks, double share) noexcept {
   unknown_travel_ = std::min(width_, std::max(unknown_travel_, travel_before_ + share * width_));
   lowest_ = kInfinity;
   highest_ = -kInfinity;
+  for (std::size_t i = 0; others && i < others_.size(); ++i)
+    others_[i] = {.lowest = kInfinity, .highest = -kInfinity, .unknown = memory_.slips[i].travel};
   ticks_left_ = warm_up_ticks_;
   is_zero_ = memory_.is_empty();
   update_bound();
+}
+
+void MemoryError::miss_others(std::span<const double> missed,
+                              std::span<const double> widths) noexcept {
+  for (std::size_t k = 0; k < share_.size(); ++k)
+    if (const std::size_t input = memory_.relaxations[k].input; input > 0 && missed[input] > 0.0)
+      share_[k] = std::max(share_[k], std::min(1.0, missed[input] / widths[input]));
+  for (std::size_t i = 0; i < others_.size(); ++i) {
+    const SlipMemory& slip = memory_.slips[i];
+    const double cut_off = missed[slip.input];
+    if (slip.input == 0 || !(cut_off > 0.0)) continue;
+    // What a rate misses adds up; an input that is limited comes back.
+    const double left = others_[i].left();
+    const double unknown =
+        slip.period_s > 0.0 ? left + slip.period_s * cut_off : std::max(left, cut_off);
+    others_[i] = {
+        .lowest = kInfinity, .highest = -kInfinity, .unknown = std::min(slip.travel, unknown)};
+  }
+  is_zero_ = memory_.is_empty();
+  update_bound();
+}
+
+double MemoryError::Travel::left() const noexcept {
+  const double seen = highest >= lowest ? highest - lowest : 0.0;
+  return std::max(0.0, unknown - seen);
 }
 
 void MemoryError::lose() noexcept {
@@ -63,10 +94,19 @@ void MemoryError::lose() noexcept {
   interrupt(1.0);
 }
 
-void MemoryError::advance(double first_input) noexcept {
+void MemoryError::advance(std::span<const double> inputs) noexcept {
   for (std::size_t k = 0; k < share_.size(); ++k) share_[k] *= decay_[k];
-  lowest_ = std::min(lowest_, first_input);
-  highest_ = std::max(highest_, first_input);
+  lowest_ = std::min(lowest_, inputs[0]);
+  highest_ = std::max(highest_, inputs[0]);
+  for (std::size_t i = 0; i < others_.size(); ++i) {
+    const SlipMemory& slip = memory_.slips[i];
+    if (slip.input == 0) continue;
+    Travel& travel = others_[i];
+    const double u = inputs[slip.input];
+    travel.position = slip.period_s > 0.0 ? travel.position + slip.period_s * u : u;
+    travel.lowest = std::min(travel.lowest, travel.position);
+    travel.highest = std::max(travel.highest, travel.position);
+  }
   if (ticks_left_ > 0.0) ticks_left_ -= 1.0;
   update_bound();
   if (bound_ > negligible_) return;
@@ -82,8 +122,15 @@ void MemoryError::update_bound() noexcept {
   }
   for (std::size_t k = 0; k < share_.size(); ++k) bound_ += memory_.relaxations[k].gain * share_[k];
   const double covered = highest_ >= lowest_ ? highest_ - lowest_ : 0.0;
-  for (const SlipMemory& slip : memory_.slips)
-    bound_ += slip.gain * std::max(0.0, std::min({slip.travel, width_, unknown_travel_}) - covered);
+  for (std::size_t i = 0; i < others_.size(); ++i) {
+    const SlipMemory& slip = memory_.slips[i];
+    if (slip.input == 0) {
+      bound_ +=
+          slip.gain * std::max(0.0, std::min({slip.travel, width_, unknown_travel_}) - covered);
+    } else {
+      bound_ += slip.gain * others_[i].left();
+    }
+  }
 }
 
 }  // namespace torsio::detail

@@ -17,6 +17,11 @@ struct GreyBoxWithDgmm : GreyBox {
   using GreyBox::GreyBox;
 };
 
+/// A grey box with a bank over its second input.
+struct GreyBoxWithBanks : GreyBox {
+  using GreyBox::GreyBox;
+};
+
 /// The example of a grey box, with a residual of its two inputs and two slips.
 inline GreyBox::Parameters grey_box_with(decltype(GreyBoxResidual::model) residual) {
   GreyBox::Parameters parameters = example<GreyBox>().parameters();
@@ -25,6 +30,24 @@ inline GreyBox::Parameters grey_box_with(decltype(GreyBoxResidual::model) residu
                          .lowest = {-0.1, -0.4, -1.0, -1.0},
                          .highest = {0.1, 0.4, 1.0, 1.0}};
   return parameters;
+}
+
+template <>
+inline GreyBoxWithBanks example<GreyBoxWithBanks>() {
+  GreyBox::Parameters parameters = example<GreyBox>().parameters();
+  parameters.terms.banks = {{.input = 1,
+                             .is_integrated = true,
+                             .thresholds = {0.001, 0.01},
+                             .force_knots = {-0.1, 0.1},
+                             .curve_knots = {-0.4, 0.0, 0.4},
+                             .product_knots = {-0.1, 0.1},
+                             .product_input = 0,
+                             .time_constants_s = {0.001}}};
+  Matrix& values = parameters.coefficients.values;
+  for (const double value : {-0.5, -0.9, -1.5, -0.7, 0.4, 1.0, -1.0, 2.0})
+    values.values.push_back(value);
+  values.columns = parameters.terms.columns();
+  return GreyBoxWithBanks(parameters);
 }
 
 template <>

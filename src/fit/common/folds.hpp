@@ -14,4 +14,13 @@ inline constexpr std::size_t kFolds = 5;
   return i * kFolds * kBlocksPerFold / count % kFolds;
 }
 
+/// Whether sample i is in the first or last twentieth of its block of `interleaved_fold`: what a trial
+/// leaves out there, it has not seen almost the same of.
+[[nodiscard]] constexpr bool is_next_to_border(std::size_t i, std::size_t count) {
+  constexpr std::size_t kBlocks = kFolds * 10;
+  constexpr std::size_t kShare = 20;
+  const std::size_t within = i * kBlocks % count;
+  return within * kShare < count || (count - within) * kShare <= count;
+}
+
 }  // namespace torsio

@@ -222,6 +222,50 @@ void learn_residual(FittedGreyBox& fitted, const TrainingData& data, const GreyB
       residual_of(*model, left.samples, options.bound * rms_of(left.samples, nullptr));
 }
 
+/// Takes the terms of a search, with a note.
+/// @param without error without banks
+void keep(FittedGreyBox& fitted, const GreyBoxSearch& search,
+          const GreyBoxSearch::Candidate& chosen, const TrainingData& data, double without) {
+  fitted.parameters = search.fitted(chosen.choice);
+  fitted.held_out_rmse = chosen.held_out_error;
+  fitted.notes.push_back(
+      fmt::format("with banks over other inputs: {}; held out ({}): RMSE {:.4g}, {:.4g} without",
+                  search.description_of(chosen.choice, data), search.what_was_held_out(),
+                  chosen.held_out_error, without));
+}
+
+/// Adds the banks that predict better what is held out; none: the box stays as it is.
+void add_banks(FittedGreyBox& fitted, const GreyBoxChoice& main, const TrainingData& data,
+               const GreyBoxOptions& options, double rate_share, const Progress& progress) {
+  const GreyBoxSearch search(data, options.schedule, fitted.parameters.terms);
+  const GreyBoxSearch::Candidate chosen = search.choose_banks(main, progress);
+  GreyBox::Parameters parameters = search.fitted(chosen.choice);
+  if (parameters.terms.banks.empty()) {
+    fitted.notes.push_back(
+        fmt::format("no bank over another input was added: held out ({}), none gains enough",
+                    search.what_was_held_out()));
+    return;
+  }
+  // The terms of the first input were chosen to describe what the banks describe better.
+  GreyBoxChoice line{.is_passive = options.passive, .banks = {}};
+  for (const BankChoice& bank : chosen.choice.banks)
+    if (!bank.is_empty()) line.banks.push_back(bank);
+  const GreyBoxSearch beside(data, options.schedule, rate_share, parameters.terms.banks);
+  GreyBoxSearch::Candidate again = beside.choose(line, progress);
+  if (again.score < kClearly * chosen.score) {
+    GreyBoxTerms::Structure terms = beside.fitted(again.choice).terms;
+    terms.banks.clear();
+    again.choice.banks.clear();
+    const GreyBoxSearch second(data, options.schedule, terms);
+    const GreyBoxSearch::Candidate better = second.choose_banks(again.choice, progress);
+    if (better.score < kClearly * chosen.score) {
+      keep(fitted, second, better, data, search.held_out_error(main));
+      return;
+    }
+  }
+  keep(fitted, search, chosen, data, search.held_out_error(main));
+}
+
 /// The box of the terms that predict best what is held out.
 FittedGreyBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, double rate_share,
                          const Progress& progress) {
@@ -230,9 +274,12 @@ FittedGreyBox chosen_box(const TrainingData& data, const GreyBoxOptions& options
   FittedGreyBox fitted;
   fitted.parameters = search.fitted(chosen.choice);
   fitted.held_out_rmse = chosen.held_out_error;
-  fitted.notes.push_back(fmt::format(
-      "{}; held out ({}): RMSE {:.4g}, linear model {:.4g}", search.description_of(chosen.choice),
-      search.what_was_held_out(), chosen.held_out_error, search.held_out_error({})));
+  fitted.notes.push_back(fmt::format("{}; held out ({}): RMSE {:.4g}, linear model {:.4g}",
+                                     search.description_of(chosen.choice, data),
+                                     search.what_was_held_out(), chosen.held_out_error,
+                                     search.held_out_error({})));
+  if (!options.passive && options.banks && data.input_count() > 1)
+    add_banks(fitted, chosen.choice, data, options, rate_share, progress);
   return fitted;
 }
 

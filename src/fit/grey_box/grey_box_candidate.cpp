@@ -27,8 +27,8 @@ std::vector<std::size_t> kept(std::size_t n, std::size_t count) {
   return indices;
 }
 
-GreyBoxTerms::Structure structure_of(const GreyBoxTerms::Structure& all,
-                                     const GreyBoxChoice& choice) {
+GreyBoxTerms::Structure main_structure_of(const GreyBoxTerms::Structure& all,
+                                          const GreyBoxChoice& choice) {
   GreyBoxTerms::Structure own;
   const double low = all.curve_knots.front();
   const double high = all.curve_knots.back();
@@ -46,55 +46,6 @@ GreyBoxTerms::Structure structure_of(const GreyBoxTerms::Structure& all,
   return own;
 }
 
-/// Coarse hat functions expressed by fine ones: hats at every 2^coarser-th knot.
-void add_hats(std::vector<Eigen::Triplet<double>>& triplets, std::size_t fine_first,
-              std::size_t coarse_first, std::size_t level, std::size_t places) {
-  const std::size_t step = (GreyBoxSums::kKnots - 1) >> level;
-  const auto index = [](std::size_t i) { return static_cast<int>(i); };
-  for (std::size_t fine = 0; fine < GreyBoxSums::kKnots; ++fine) {
-    const std::size_t left = std::min(fine / step, places - 2);
-    const double share = static_cast<double>(fine - left * step) / static_cast<double>(step);
-    if (share < 1.0)
-      triplets.emplace_back(index(fine_first + fine), index(coarse_first + left), 1.0 - share);
-    if (share > 0.0)
-      triplets.emplace_back(index(fine_first + fine), index(coarse_first + left + 1), share);
-  }
-}
-
-/// The terms of `own` as sums of all terms: all columns x own columns.
-Eigen::SparseMatrix<double> map_of(const GreyBoxSums& sums, const GreyBoxChoice& choice,
-                                   const GreyBoxTerms::Structure& own) {
-  std::vector<Eigen::Triplet<double>> triplets;
-  const auto one = [&](std::size_t from, std::size_t to) {
-    triplets.emplace_back(static_cast<int>(from), static_cast<int>(to), 1.0);
-  };
-  add_hats(triplets, 0, 0, choice.curve, own.curve_knots.size());
-  const std::size_t forces = own.friction_knots.size();
-  const auto slips = kept(kSlips[choice.slips], GreyBoxSums::kThresholds);
-  for (std::size_t i = 0; i < slips.size(); ++i) {
-    const std::size_t fine = sums.all.first_slip() + slips[i] * GreyBoxSums::kKnots;
-    const std::size_t coarse = own.first_slip() + i * forces;
-    if (forces > 1)
-      add_hats(triplets, fine, coarse, choice.forces, forces);
-    else
-      for (std::size_t k = 0; k < GreyBoxSums::kKnots; ++k) one(fine + k, coarse);
-  }
-  const auto branches = kept(kBranches[choice.branches], GreyBoxSums::kTimeConstants);
-  for (std::size_t i = 0; i < branches.size(); ++i)
-    one(sums.all.first_relaxation() + branches[i], own.first_relaxation() + i);
-  for (std::size_t j = 1; j < sums.all.inputs(); ++j) {
-    const bool schedules = sums.frame.scheduled && sums.frame.feature == j;
-    if (!schedules && (sums.is_rate[j] == 0 || choice.has_viscous))
-      one(sums.all.first_slope() + j, own.first_slope() + j);
-    if (choice.has_coulomb && sums.is_rate[j] != 0)
-      one(sums.all.first_coulomb() + j, own.first_coulomb() + j);
-  }
-  Eigen::SparseMatrix<double> map(static_cast<Index>(sums.all.columns()),
-                                  static_cast<Index>(own.columns()));
-  map.setFromTriplets(triplets.begin(), triplets.end());
-  return map;
-}
-
 /// λ |second differences|² over `count` neighbouring columns.
 void add_smoothing(Eigen::MatrixXd& product, std::size_t first, std::size_t count, double weight) {
   constexpr std::array<double, 3> kDifference{1.0, -2.0, 1.0};
@@ -103,6 +54,22 @@ void add_smoothing(Eigen::MatrixXd& product, std::size_t first, std::size_t coun
       for (std::size_t b = 0; b < 3; ++b)
         product(static_cast<Index>(first + i + a), static_cast<Index>(first + i + b)) +=
             weight * kDifference[a] * kDifference[b];
+}
+
+/// The same for the hats of a bank, those of a product in units of its input's mean square.
+/// @param rows samples
+void add_smoothing(Eigen::MatrixXd& product, const InputBank& bank, std::size_t first,
+                   double smoothing, double rows) {
+  const std::size_t forces = bank.force_knots.size();
+  for (std::size_t i = 0; i < bank.thresholds.size(); ++i)
+    add_smoothing(product, first + i * forces, forces, smoothing * rows);
+  add_smoothing(product, first + bank.first_curve(), bank.first_product() - bank.first_curve(),
+                smoothing * rows);
+  const auto from = static_cast<Index>(first + bank.first_product());
+  const auto count = static_cast<Index>(bank.product_knots.size());
+  const double squares = product.diagonal().segment(from, count).sum();
+  add_smoothing(product, first + bank.first_product(), bank.product_knots.size(),
+                smoothing * squares);
 }
 
 /// argmin over all columns, those that are not free >= 0: the free ones are eliminated first, so
@@ -147,7 +114,70 @@ Eigen::VectorXd solve_mixed(const Eigen::MatrixXd& product, const Eigen::VectorX
 }  // namespace
 
 GreyBoxCandidate::GreyBoxCandidate(const GreyBoxSums& sums, const GreyBoxChoice& choice)
-    : sums_(sums), choice_(choice), structure_(structure_of(sums.all, choice)) {}
+    : sums_(sums), choice_(choice) {
+  if (sums.is_main_chosen) {
+    structure_ = sums.all;
+    structure_.banks.clear();
+  } else {
+    structure_ = main_structure_of(sums.all, choice);
+  }
+  for (std::size_t k = 0; k < choice.banks.size(); ++k) {
+    if (choice.banks[k].is_empty()) continue;
+    banks_.push_back({.place = k, .first = structure_.columns()});
+    structure_.banks.push_back(sums.are_banks_chosen ? sums.all.banks[k]
+                                                     : bank_of(sums.all.banks[k], choice.banks[k]));
+  }
+}
+
+void GreyBoxCandidate::add_main_columns(std::vector<ColumnShare>& shares) const {
+  const auto one = [&](std::size_t from, std::size_t to) { shares.push_back({from, to, 1.0}); };
+  if (sums_.is_main_chosen) {
+    for (std::size_t j = 0; j < structure_.first_slope(); ++j) one(j, j);
+    return;
+  }
+  constexpr std::size_t kKnots = GreyBoxSums::kKnots;
+  add_hats(shares, 0, kKnots, 0, structure_.curve_knots.size());
+  const std::size_t forces = structure_.friction_knots.size();
+  const auto slips = kept(kSlips[choice_.slips], GreyBoxSums::kThresholds);
+  for (std::size_t i = 0; i < slips.size(); ++i) {
+    const std::size_t fine = sums_.all.first_slip() + slips[i] * kKnots;
+    const std::size_t coarse = structure_.first_slip() + i * forces;
+    if (forces > 1)
+      add_hats(shares, fine, kKnots, coarse, forces);
+    else
+      for (std::size_t k = 0; k < kKnots; ++k) one(fine + k, coarse);
+  }
+  const auto branches = kept(kBranches[choice_.branches], GreyBoxSums::kTimeConstants);
+  for (std::size_t i = 0; i < branches.size(); ++i)
+    one(sums_.all.first_relaxation() + branches[i], structure_.first_relaxation() + i);
+}
+
+std::vector<ColumnShare> GreyBoxCandidate::map() const {
+  std::vector<ColumnShare> shares;
+  add_main_columns(shares);
+  const auto one = [&](std::size_t from, std::size_t to) { shares.push_back({from, to, 1.0}); };
+  for (std::size_t j = 1; j < sums_.all.inputs(); ++j) {
+    const bool schedules = sums_.frame.scheduled && sums_.frame.feature == j;
+    if (!schedules && (sums_.is_rate[j] == 0 || choice_.has_viscous))
+      one(sums_.all.first_slope() + j, structure_.first_slope() + j);
+    if (choice_.has_coulomb && sums_.is_rate[j] != 0)
+      one(sums_.all.first_coulomb() + j, structure_.first_coulomb() + j);
+  }
+  std::size_t finest = sums_.all.first_bank();
+  for (std::size_t k = 0, own = 0; k < sums_.all.banks.size(); ++k) {
+    if (own < banks_.size() && banks_[own].place == k) {
+      const std::size_t first = banks_[own].first;
+      const InputBank& bank = structure_.banks[own++];
+      const double sign = choice_.banks[k].is_negative ? -1.0 : 1.0;
+      if (!sums_.are_banks_chosen)
+        add_bank_columns(shares, sums_.all.banks[k], finest, bank, first, choice_.banks[k]);
+      for (std::size_t j = 0; sums_.are_banks_chosen && j < bank.columns(); ++j)
+        shares.push_back({finest + j, first + j, j < bank.first_curve() ? sign : 1.0});
+    }
+    finest += sums_.all.banks[k].columns();
+  }
+  return shares;
+}
 
 bool GreyBoxCandidate::is_possible() const noexcept {
   const std::size_t columns = structure_.columns();
@@ -156,7 +186,10 @@ bool GreyBoxCandidate::is_possible() const noexcept {
 
 std::vector<NormalEquations> GreyBoxCandidate::projected(
     const std::vector<NormalEquations>& all) const {
-  const Eigen::SparseMatrix<double> map = map_of(sums_, choice_, structure_);
+  const std::vector<ColumnShare> shares = this->map();
+  Eigen::SparseMatrix<double> map(static_cast<Index>(sums_.all.columns()),
+                                  static_cast<Index>(structure_.columns()));
+  map.setFromTriplets(shares.begin(), shares.end());
   std::vector<NormalEquations> cells;
   cells.reserve(all.size());
   for (const NormalEquations& cell : all) {
@@ -186,6 +219,9 @@ std::vector<double> GreyBoxCandidate::solved(const NormalEquations& equations) c
   for (std::size_t i = 0; i < structure_.thresholds.size(); ++i)
     add_smoothing(product, structure_.first_slip() + i * structure_.friction_knots.size(),
                   structure_.friction_knots.size(), weight);
+  for (std::size_t k = 0; k < banks_.size(); ++k)
+    add_smoothing(product, structure_.banks[k], banks_[k].first, kSmoothing[choice_.smoothing],
+                  static_cast<double>(equations.rows));
   // Coefficients that no sample determines remain 0.
   constexpr double kRidge = 1e-9;
   const double mean = product.trace() / static_cast<double>(count);
@@ -193,6 +229,9 @@ std::vector<double> GreyBoxCandidate::solved(const NormalEquations& equations) c
   for (Index j = 0; j < count; ++j) product(j, j) += kRidge * std::max(product(j, j), 1e-3 * mean);
   for (std::size_t j = structure_.first_slip(); j < structure_.first_slope(); ++j)
     if (!choice_.is_signed || j >= structure_.first_relaxation()) is_free[j] = 0;
+  for (std::size_t k = 0; k < banks_.size(); ++k)
+    std::fill_n(is_free.begin() + static_cast<std::ptrdiff_t>(banks_[k].first),
+                structure_.banks[k].first_curve(), 0);
   for (std::size_t l = 0; choice_.is_passive && l < structure_.inputs(); ++l)
     if (sums_.is_rate[l] != 0)
       is_free[structure_.first_slope() + l] = is_free[structure_.first_coulomb() + l] = 0;
@@ -232,10 +271,14 @@ double GreyBoxCandidate::left_out_levels(const std::vector<NormalEquations>& cel
   return std::sqrt(error / static_cast<double>(rows));
 }
 
-double GreyBoxCandidate::left_out_folds(const std::vector<NormalEquations>& cells) const {
+GreyBoxCandidate::HeldOut GreyBoxCandidate::left_out_folds(
+    const std::vector<NormalEquations>& cells) const {
   const std::vector<NormalEquations> beyond = projected(sums_.beyond);
-  double error = 0.0;
-  std::size_t rows = 0;
+  struct Sum {
+    double error = 0.0;
+    std::size_t rows = 0;
+  };
+  std::vector<Sum> folds(sums_.folds);
   for (std::size_t level = 0; level < sums_.levels; ++level) {
     const NormalEquations sum = of_level(cells, level);
     for (std::size_t fold = 0; fold < sums_.folds; ++fold) {
@@ -244,28 +287,49 @@ double GreyBoxCandidate::left_out_folds(const std::vector<NormalEquations>& cell
       NormalEquations rest = sum;
       add(rest, out, -1.0);
       const std::vector<double> coefficients = solved(rest);
-      error += out.error(coefficients);
-      rows += out.rows;
+      folds[fold].error += out.error(coefficients);
+      folds[fold].rows += out.rows;
       if (beyond.empty()) continue;
-      error -= beyond[fold].error(coefficients);
-      rows -= beyond[fold].rows;
+      folds[fold].error -= beyond[fold].error(coefficients);
+      folds[fold].rows -= beyond[fold].rows;
     }
   }
-  return std::sqrt(error / static_cast<double>(rows));
+  Sum all;
+  double logarithms = 0.0;
+  double scored = 0.0;
+  for (const Sum& fold : folds) {
+    all = {all.error + fold.error, all.rows + fold.rows};
+    if (fold.rows == 0) continue;
+    logarithms += 0.5 * std::log(fold.error / static_cast<double>(fold.rows));
+    scored += 1.0;
+  }
+  return {.rmse = std::sqrt(all.error / static_cast<double>(all.rows)),
+          .geometric = std::exp(logarithms / scored)};
 }
 
-double GreyBoxCandidate::held_out_error() const {
+GreyBoxCandidate::HeldOut GreyBoxCandidate::held_out() const {
   const std::vector<NormalEquations> cells = projected(sums_.cells);
-  return sums_.folds == 1 ? left_out_levels(cells) : left_out_folds(cells);
+  if (sums_.folds > 1) return left_out_folds(cells);
+  const double rmse = left_out_levels(cells);
+  return {.rmse = rmse, .geometric = rmse};
 }
 
 GreyBox::Parameters GreyBoxCandidate::fitted() const {
   const std::vector<NormalEquations> cells = projected(sums_.cells);
+  const std::vector<NormalEquations> gap = projected(sums_.gap);
   GreyBox::Parameters parameters{.terms = structure_, .coefficients = sums_.frame, .residual = {}};
   Matrix& values = parameters.coefficients.values;
   values = Matrix(sums_.levels, structure_.columns());
-  for (std::size_t level = 0; level < sums_.levels; ++level)
-    std::ranges::copy(solved(of_level(cells, level)), values.row(level).begin());
+  for (std::size_t level = 0; level < sums_.levels; ++level) {
+    NormalEquations sum = of_level(cells, level);
+    if (!gap.empty()) add(sum, gap[level]);
+    std::vector<double> solution = solved(sum);
+    for (std::size_t k = 0; k < banks_.size(); ++k)
+      if (choice_.banks[banks_[k].place].is_negative)
+        for (std::size_t j = 0; j < structure_.banks[k].first_curve(); ++j)
+          solution[banks_[k].first + j] = -solution[banks_[k].first + j];
+    std::ranges::copy(solution, values.row(level).begin());
+  }
   return parameters;
 }
 

@@ -10,15 +10,16 @@ namespace torsio {
 
 /// The terms of a grey box: a position in each of these sequences of structures.
 struct GreyBoxChoice {
-  std::size_t curve = 0;      ///< 2^curve + 1 knots
-  std::size_t slips = 0;      ///< 0, 1, 2, 4, 8 thresholds
-  std::size_t forces = 0;     ///< 0: the same everywhere; else 2^forces + 1 knots
-  std::size_t branches = 0;   ///< 0, 3, 6 time constants
-  std::size_t smoothing = 2;  ///< λ = 1e-6, 1e-4, 1e-2
-  bool is_signed = false;     ///< slip forces of any sign
-  bool is_passive = false;    ///< slopes and friction of rates >= 0, too
-  bool has_viscous = false;   ///< slopes of rates
-  bool has_coulomb = false;   ///< tanh of rates
+  std::size_t curve = 0;               ///< 2^curve + 1 knots
+  std::size_t slips = 0;               ///< 0, 1, 2, 4, 8 thresholds
+  std::size_t forces = 0;              ///< 0: the same everywhere; else 2^forces + 1 knots
+  std::size_t branches = 0;            ///< 0, 3, 6 time constants
+  std::size_t smoothing = 2;           ///< λ = 1e-6, 1e-4, 1e-2
+  bool is_signed = false;              ///< slip forces of any sign
+  bool is_passive = false;             ///< slopes and friction of rates >= 0, too
+  bool has_viscous = false;            ///< slopes of rates
+  bool has_coulomb = false;            ///< tanh of rates
+  std::vector<BankChoice> banks = {};  ///< one for each finest bank of the sums, or none
 
   static constexpr std::size_t kMaxSlips = 4;     ///< the highest place
   static constexpr std::size_t kMaxBranches = 2;  ///< the highest place
@@ -36,23 +37,37 @@ class GreyBoxCandidate {
   /// Whether the samples suffice for its columns.
   [[nodiscard]] bool is_possible() const noexcept;
 
-  /// Root mean square error on what was held out.
-  [[nodiscard]] double held_out_error() const;
+  /// Errors on what was held out.
+  struct HeldOut {
+    double rmse = 0.0;       ///< root mean square of all samples
+    double geometric = 0.0;  ///< geometric mean of the folds' root mean squares; of levels: `rmse`
+  };
+  [[nodiscard]] HeldOut held_out() const;
   /// Fitted to all data.
   [[nodiscard]] GreyBox::Parameters fitted() const;
 
  private:
+  /// A bank that has terms.
+  struct Bank {
+    std::size_t place = 0;  ///< among the finest banks
+    std::size_t first = 0;  ///< column
+  };
+
   [[nodiscard]] std::vector<double> solved(const NormalEquations& equations) const;
   [[nodiscard]] std::vector<NormalEquations> projected(
       const std::vector<NormalEquations>& all) const;
   [[nodiscard]] double left_out_levels(const std::vector<NormalEquations>& cells) const;
-  [[nodiscard]] double left_out_folds(const std::vector<NormalEquations>& cells) const;
+  [[nodiscard]] HeldOut left_out_folds(const std::vector<NormalEquations>& cells) const;
+  /// The terms of the candidate as sums of all terms.
+  [[nodiscard]] std::vector<ColumnShare> map() const;
+  void add_main_columns(std::vector<ColumnShare>& shares) const;
   [[nodiscard]] NormalEquations of_level(const std::vector<NormalEquations>& cells,
                                          std::size_t level) const;
 
   const GreyBoxSums& sums_;
   GreyBoxChoice choice_;
   GreyBoxTerms::Structure structure_;
+  std::vector<Bank> banks_;
 };
 
 }  // namespace torsio

@@ -11,6 +11,11 @@ namespace torsio {
 namespace {
 
 constexpr double kWorthwhile = 0.99;
+/// Blocks of a recording resemble their neighbours: what gains less on them seldom gains on another motion.
+constexpr double kWorthwhileOnBlocks = 0.95;
+/// All banks together.
+constexpr double kTogether = 0.9;
+constexpr double kTogetherOnBlocks = 0.8;
 
 /// One step up any sequence from `at`.
 std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
@@ -48,27 +53,94 @@ std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
   return next;
 }
 
+/// One step up any sequence of one bank.
+std::vector<BankChoice> steps_up(const BankChoice& at, bool may_slip) {
+  std::vector<BankChoice> next;
+  const auto with = [&](auto change) {
+    BankChoice candidate = at;
+    change(candidate);
+    next.push_back(candidate);
+  };
+  for (std::size_t by = 1; by <= 2; ++by) {
+    if (at.slips == 0 && may_slip) {
+      // Which way the torque acts on this input is not known.
+      for (const bool is_negative : {false, true})
+        with([&](auto& c) {
+          c.slips = by;
+          c.is_negative = is_negative;
+        });
+    } else if (may_slip) {
+      if (at.slips + by <= BankChoice::kMaxSlips) with([by](auto& c) { c.slips += by; });
+      if (at.forces + by <= BankChoice::kMaxForces) with([by](auto& c) { c.forces += by; });
+    }
+    if (at.curve + by <= BankChoice::kMaxCurve) with([by](auto& c) { c.curve += by; });
+    if (at.product + by <= BankChoice::kMaxProduct) with([by](auto& c) { c.product += by; });
+    if (at.relaxations + by <= BankChoice::kMaxRelaxations)
+      with([by](auto& c) { c.relaxations += by; });
+  }
+  return next;
+}
+
 }  // namespace
 
-GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& progress) const {
-  const bool has_rates = std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
-  const GreyBoxChoice line{.is_passive = passive};
-  Candidate best{.choice = line, .held_out_error = held_out_error(line)};
+GreyBoxSearch::Candidate GreyBoxSearch::rated(const GreyBoxChoice& choice) const {
+  const GreyBoxCandidate::HeldOut error = GreyBoxCandidate(sums_, choice).held_out();
+  const bool has_banks = sums_.is_main_chosen || sums_.are_banks_chosen;
+  return {.choice = choice,
+          .held_out_error = error.rmse,
+          .score = has_banks ? error.geometric : error.rmse};
+}
+
+template <class Next>
+GreyBoxSearch::Candidate GreyBoxSearch::climbed(Candidate best, double worthwhile, const Next& next,
+                                                const Progress& progress) const {
   constexpr double kUsualSteps = 12.0;
   for (double step = 0.0;; ++step) {
     report_progress(progress, std::min(step / kUsualSteps, 0.99),
                     fmt::format("choosing terms, error {:.4g}", best.held_out_error));
     std::optional<Candidate> better;
-    for (const GreyBoxChoice& choice : steps_up(best.choice, has_rates)) {
-      const GreyBoxCandidate candidate(sums_, choice);
-      if (!candidate.is_possible()) continue;
-      const double error = candidate.held_out_error();
-      if (error < kWorthwhile * best.held_out_error && (!better || error < better->held_out_error))
-        better = Candidate{choice, error};
+    for (const GreyBoxChoice& choice : next(best.choice)) {
+      if (!GreyBoxCandidate(sums_, choice).is_possible()) continue;
+      const Candidate candidate = rated(choice);
+      if (candidate.score < worthwhile * best.score && (!better || candidate.score < better->score))
+        better = candidate;
     }
     if (!better) return best;
     best = *better;
   }
+}
+
+GreyBoxSearch::Candidate GreyBoxSearch::choose_banks(const GreyBoxChoice& main,
+                                                     const Progress& progress) const {
+  GreyBoxChoice without = main;
+  without.banks.assign(sums_.all.banks.size(), {});
+  const auto next = [this](const GreyBoxChoice& at) {
+    std::vector<GreyBoxChoice> choices;
+    for (std::size_t k = 0; k < at.banks.size(); ++k) {
+      for (const BankChoice& bank : steps_up(at.banks[k], !sums_.all.banks[k].thresholds.empty())) {
+        choices.push_back(at);
+        choices.back().banks[k] = bank;
+      }
+    }
+    return choices;
+  };
+  const bool is_by_block = !sums_.is_by_record && sums_.folds > 1;
+  const Candidate start = rated(without);
+  const Candidate chosen =
+      climbed(start, is_by_block ? kWorthwhileOnBlocks : kWorthwhile, next, progress);
+  return chosen.score < (is_by_block ? kTogetherOnBlocks : kTogether) * start.score ? chosen
+                                                                                    : start;
+}
+
+GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& progress) const {
+  return choose(GreyBoxChoice{.is_passive = passive}, progress);
+}
+
+GreyBoxSearch::Candidate GreyBoxSearch::choose(const GreyBoxChoice& line,
+                                               const Progress& progress) const {
+  const bool has_rates = std::ranges::find(sums_.is_rate, 1) != sums_.is_rate.end();
+  const auto next = [has_rates](const GreyBoxChoice& at) { return steps_up(at, has_rates); };
+  return climbed(rated(line), kWorthwhile, next, progress);
 }
 
 const char* GreyBoxSearch::what_was_held_out() const {
@@ -76,7 +148,8 @@ const char* GreyBoxSearch::what_was_held_out() const {
   return sums_.is_by_record ? "records in turn" : "fifths of interleaved blocks";
 }
 
-std::string GreyBoxSearch::description_of(const GreyBoxChoice& choice) const {
+std::string GreyBoxSearch::description_of(const GreyBoxChoice& choice,
+                                          const TrainingData& data) const {
   const GreyBoxTerms::Structure own = GreyBoxCandidate(sums_, choice).structure();
   std::string text = fmt::format("a curve of {} knots", own.curve_knots.size());
   if (!own.thresholds.empty())
@@ -89,6 +162,9 @@ std::string GreyBoxSearch::description_of(const GreyBoxChoice& choice) const {
   if (choice.is_signed) text += ", slip forces of any sign (not passive)";
   if (choice.has_viscous) text += ", viscous friction";
   if (choice.has_coulomb) text += ", dry friction of the rates";
+  auto bank = own.banks.begin();
+  for (const BankChoice& each : choice.banks)
+    if (!each.is_empty()) text += ", " + torsio::description_of(*bank++, each, data);
   return text;
 }
 

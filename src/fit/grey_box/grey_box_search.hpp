@@ -13,17 +13,33 @@ class GreyBoxSearch {
   /// Runs once through the data. @param schedule, rate_share as `gather` takes them
   GreyBoxSearch(const TrainingData& data, const std::string& schedule, double rate_share)
       : sums_(gather(data, schedule, rate_share)) {}
+  /// The same for banks beside terms that have been chosen, as `gather_banks` takes them.
+  GreyBoxSearch(const TrainingData& data, const std::string& schedule,
+                const GreyBoxTerms::Structure& chosen)
+      : sums_(gather_banks(data, schedule, chosen)) {}
+  /// The same for terms of the first input beside banks that have been chosen.
+  GreyBoxSearch(const TrainingData& data, const std::string& schedule, double rate_share,
+                const std::vector<InputBank>& banks)
+      : sums_(gather_beside(data, schedule, rate_share, banks)) {}
 
   struct Candidate {
     GreyBoxChoice choice;
     double held_out_error = 0.0;  ///< root mean square
+    double score = 0.0;           ///< what is lowered: see `rated`
   };
   /// @param passive never signed
   [[nodiscard]] Candidate choose(bool passive, const Progress& progress) const;
 
+  /// The same, from these terms on. @param line with banks, if they are chosen
+  [[nodiscard]] Candidate choose(const GreyBoxChoice& line, const Progress& progress) const;
+
+  /// Adds to the chosen terms those banks over other inputs that lower the held-out error.
+  /// @param main the terms, without banks
+  [[nodiscard]] Candidate choose_banks(const GreyBoxChoice& main, const Progress& progress) const;
+
   /// Root mean square error on what was held out.
   [[nodiscard]] double held_out_error(const GreyBoxChoice& choice) const {
-    return GreyBoxCandidate(sums_, choice).held_out_error();
+    return GreyBoxCandidate(sums_, choice).held_out().rmse;
   }
   /// Fitted to all data.
   [[nodiscard]] GreyBox::Parameters fitted(const GreyBoxChoice& choice) const {
@@ -31,10 +47,21 @@ class GreyBoxSearch {
   }
 
   /// "17 knots, 4 slip elements with 5 knots, ..."
-  [[nodiscard]] std::string description_of(const GreyBoxChoice& choice) const;
+  [[nodiscard]] std::string description_of(const GreyBoxChoice& choice,
+                                           const TrainingData& data) const;
   [[nodiscard]] const char* what_was_held_out() const;
 
+  /// Rates terms of the first input alone by the root mean square error on what was held out, and
+  /// those beside banks by the geometric mean of the folds' errors: recordings of another kind each have
+  /// errors of another size, and the largest shall not choose the banks alone.
+  [[nodiscard]] Candidate rated(const GreyBoxChoice& choice) const;
+
  private:
+  /// From `best` on, the best of `next(best.choice)` as long as it is worthwhile.
+  template <class Next>
+  [[nodiscard]] Candidate climbed(Candidate best, double worthwhile, const Next& next,
+                                  const Progress& progress) const;
+
   GreyBoxSums sums_;
 };
 

@@ -9,6 +9,7 @@
 
 #include "fit/common/folds.hpp"
 #include "fit/common/usable_table.hpp"
+#include "fit/grey_box/sample_range.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -118,20 +119,9 @@ class RowSum {
   std::vector<std::pair<std::size_t, double>> row_;  ///< what is not 0
 };
 
-struct Range {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-
-  void take(double value) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  [[nodiscard]] bool holds(double value) const { return value >= low && value <= high; }
-};
-
 /// Range of the first input in all records but those of each fold.
-std::vector<Range> ranges_of_others(const GreyBoxSums& sums, const TrainingData& data) {
-  std::vector<Range> ranges(sums.folds);
+std::vector<SampleRange> ranges_of_others(const GreyBoxSums& sums, const TrainingData& data) {
+  std::vector<SampleRange> ranges(sums.folds);
   std::size_t record = 0;
   for (const Sequence& sequence : data.sequences) {
     if (usable_samples(sequence) == 0) continue;
@@ -146,8 +136,8 @@ std::vector<Range> ranges_of_others(const GreyBoxSums& sums, const TrainingData&
 }
 
 void add_data(GreyBoxSums& sums, const TrainingData& data) {
-  const std::vector<Range> others =
-      sums.is_by_record ? ranges_of_others(sums, data) : std::vector<Range>{};
+  const std::vector<SampleRange> others =
+      sums.is_by_record ? ranges_of_others(sums, data) : std::vector<SampleRange>{};
   const std::size_t stride = (sums.samples + kMaxSummed - 1) / kMaxSummed;
   RowSum row;
   std::size_t record = 0;
@@ -159,15 +149,17 @@ void add_data(GreyBoxSums& sums, const TrainingData& data) {
     for (std::size_t n = 0; n < sequence.target.size(); ++n) {
       if (!sequence.has_features(n)) continue;
       const Features features = sequence.features.row(n);
-      terms.move(features[0]);
+      terms.move(features);
       if (sequence.use[n] == 0) continue;
+      const bool is_in_gap = !sums.gap.empty() && is_next_to_border(own, usable);
       const std::size_t fold = sums.is_by_record ? record % sums.folds
                                : sums.folds == 1 ? 0
                                                  : interleaved_fold(own, usable);
       ++own;
       if (used++ % stride != 0) continue;
       const std::size_t level = knot_at(sums.frame, features);
-      row.add(sums.cells[level * sums.folds + fold], terms, features, sequence.target[n]);
+      row.add(is_in_gap ? sums.gap[level] : sums.cells[level * sums.folds + fold], terms, features,
+              sequence.target[n]);
       if (sums.is_by_record && !others[fold].holds(features[0]))
         row.add(sums.beyond[fold], terms, features, sequence.target[n]);
     }
@@ -176,14 +168,6 @@ void add_data(GreyBoxSums& sums, const TrainingData& data) {
 }
 
 }  // namespace
-
-std::vector<double> evenly(double low, double high, std::size_t count) {
-  std::vector<double> all(count);
-  for (std::size_t i = 0; i < count; ++i)
-    all[i] = low + (high - low) * static_cast<double>(i) / static_cast<double>(count - 1);
-  all.back() = high;
-  return all;
-}
 
 void add(NormalEquations& sum, const NormalEquations& part, double sign) {
   for (std::size_t i = 0; i < sum.product.values.size(); ++i)
@@ -194,21 +178,51 @@ void add(NormalEquations& sum, const NormalEquations& part, double sign) {
   sum.rows = sign > 0.0 ? sum.rows + part.rows : sum.rows - part.rows;
 }
 
-GreyBoxSums gather(const TrainingData& data, const std::string& schedule, double rate_share) {
-  CoefficientSchedule frame = schedule_frame(schedule, data);
+namespace {
+
+GreyBoxSums sums_of(const TrainingData& data, CoefficientSchedule frame,
+                    GreyBoxTerms::Structure all, bool with_gap) {
   const std::size_t levels = std::max<std::size_t>(frame.knots.size(), 1);
-  GreyBoxSums sums{.all = finest(data, rate_share),
+  GreyBoxSums sums{.all = std::move(all),
                    .is_rate = {},
                    .frame = std::move(frame),
                    .levels = levels,
                    .cells = {},
                    .beyond = {},
+                   .gap = {},
                    .samples = data.usable_samples()};
   for (const auto& input : data.inputs) sums.is_rate.push_back(input.is_rate ? 1 : 0);
   choose_folds(sums, data);
-  sums.cells.assign(sums.levels * sums.folds, NormalEquations(sums.all.columns()));
+  const NormalEquations none(sums.all.columns());
+  sums.cells.assign(sums.levels * sums.folds, none);
   if (sums.is_by_record) sums.beyond = sums.cells;
+  if (with_gap && !sums.is_by_record && sums.folds > 1) sums.gap.assign(sums.levels, none);
   add_data(sums, data);
+  return sums;
+}
+
+}  // namespace
+
+GreyBoxSums gather(const TrainingData& data, const std::string& schedule, double rate_share) {
+  return sums_of(data, schedule_frame(schedule, data), finest(data, rate_share), false);
+}
+
+GreyBoxSums gather_banks(const TrainingData& data, const std::string& schedule,
+                         const GreyBoxTerms::Structure& chosen) {
+  CoefficientSchedule frame = schedule_frame(schedule, data);
+  GreyBoxTerms::Structure all = chosen;
+  all.banks = finest_banks(data, frame.scheduled ? frame.feature : 0);
+  GreyBoxSums sums = sums_of(data, std::move(frame), std::move(all), true);
+  sums.is_main_chosen = true;
+  return sums;
+}
+
+GreyBoxSums gather_beside(const TrainingData& data, const std::string& schedule, double rate_share,
+                          const std::vector<InputBank>& banks) {
+  GreyBoxTerms::Structure all = finest(data, rate_share);
+  all.banks = banks;
+  GreyBoxSums sums = sums_of(data, schedule_frame(schedule, data), std::move(all), true);
+  sums.are_banks_chosen = true;
   return sums;
 }
 

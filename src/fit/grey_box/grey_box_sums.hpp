@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fit/common/design.hpp"
+#include "fit/grey_box/bank_choice.hpp"
 #include "model/grey_box/grey_box.hpp"
 #include "numerics/nnls.hpp"
 
@@ -30,6 +31,12 @@ struct GreyBoxSums {
   /// folds are records. A guard replaces the model's value there, so these samples are not used to
   /// choose terms.
   std::vector<NormalEquations> beyond;
+  /// For each level, the samples next to the borders of blocks, which are fitted to in the end but
+  /// are on neither side of a trial; empty: none.
+  std::vector<NormalEquations> gap;
+  bool is_main_chosen = false;  ///< `all` has the chosen terms of the first input, and finest banks
+  bool are_banks_chosen =
+      false;  ///< `all` has the finest terms of the first input, and chosen banks
   std::size_t samples = 0;
 };
 
@@ -39,8 +46,15 @@ struct GreyBoxSums {
 [[nodiscard]] GreyBoxSums gather(const TrainingData& data, const std::string& schedule,
                                  double rate_share);
 
-/// `count` knots over [low, high].
-[[nodiscard]] std::vector<double> evenly(double low, double high, std::size_t count);
+/// The same for terms that have been chosen, and every bank that the other inputs may have. Where blocks
+/// are held out, a tenth of each block is a gap to the next one.
+/// @param chosen without banks
+[[nodiscard]] GreyBoxSums gather_banks(const TrainingData& data, const std::string& schedule,
+                                       const GreyBoxTerms::Structure& chosen);
+
+/// As `gather`, beside banks that have been chosen, with the gaps of `gather_banks`.
+[[nodiscard]] GreyBoxSums gather_beside(const TrainingData& data, const std::string& schedule,
+                                        double rate_share, const std::vector<InputBank>& banks);
 
 /// sum += sign * part
 void add(NormalEquations& sum, const NormalEquations& part, double sign = 1.0);

@@ -47,13 +47,11 @@ GreyBoxTerms::Structure checked(GreyBoxTerms::Structure structure) {
           "rate_scales", "one number >= 0 for each input", count(structure.rate_scales));
   require(std::isfinite(structure.sample_period_s) && structure.sample_period_s > 0.0,
           "sample_period_s", "a positive number", std::to_string(structure.sample_period_s));
+  require(structure.banks.size() <= Terms::kMaxBanks, "banks", "at most 64",
+          count(structure.banks));
+  for (std::size_t k = 0; k < structure.banks.size(); ++k)
+    structure.banks[k].check(structure.inputs(), "grey_box: banks/" + std::to_string(k));
   return structure;
-}
-
-SlipBank bank_of(std::span<const double> thresholds) {
-  std::vector<double> per_threshold(thresholds.size());
-  std::ranges::transform(thresholds, per_threshold.begin(), [](double r) { return 1.0 / r; });
-  return {per_threshold, std::vector<double>(thresholds.size(), 1.0), GreyBox::kFamily};
 }
 
 /// What `use` returns of the residual's model; where there is none, 0.
@@ -69,23 +67,26 @@ auto of_residual(Residual& residual, const Use& use) noexcept
 
 GreyBoxTerms::GreyBoxTerms(Structure structure)
     : structure_(checked(std::move(structure))),
-      slips_(bank_of(structure_.thresholds)),
-      state_(structure_.thresholds.size() + structure_.time_constants_s.size(), 0.0) {
-  for (const double time_constant : structure_.time_constants_s) {
-    const double periods = structure_.sample_period_s / time_constant;
-    decay_.push_back(std::exp(-periods));
-    gain_.push_back(-std::expm1(-periods) / periods);
+      slips_(detail::relative_stops(structure_.thresholds, GreyBox::kFamily)) {
+  detail::add_relaxations(structure_.time_constants_s, structure_.sample_period_s, decay_, gain_);
+  std::size_t states = slips_.size() + decay_.size();
+  for (const InputBank& bank : structure_.banks) {
+    banks_.emplace_back(bank, structure_.sample_period_s, GreyBox::kFamily);
+    states += bank.states();
   }
+  state_.assign(states, 0.0);
 }
 
 void GreyBoxTerms::reset() noexcept {
   slips_.reset();
+  for (InputBankTerms& bank : banks_) bank.reset();
   std::ranges::fill(state_, 0.0);
   last_ = 0.0;
   is_started_ = false;
 }
 
-void GreyBoxTerms::move(double x) noexcept {
+void GreyBoxTerms::move(Features features) noexcept {
+  const double x = features[0];
   const double dx = is_started_ ? x - last_ : 0.0;
   last_ = x;
   is_started_ = true;
@@ -94,20 +95,34 @@ void GreyBoxTerms::move(double x) noexcept {
   const std::size_t slips = slips_.size();
   for (std::size_t j = 0; j < decay_.size(); ++j)
     state_[slips + j] = decay_[j] * state_[slips + j] + gain_[j] * dx;
+  auto to = state_.begin() + static_cast<std::ptrdiff_t>(slips + decay_.size());
+  for (std::size_t k = 0; k < banks_.size(); ++k) {
+    banks_[k].move(features[structure_.banks[k].input]);
+    to = std::ranges::copy(banks_[k].state(), to).out;
+  }
 }
 
 void GreyBoxTerms::set_state(std::span<const double> state) noexcept {
   const std::size_t slips = slips_.size();
+  const std::size_t states = slips + decay_.size();
   slips_.set_forces(state.first(slips));
   std::ranges::copy(slips_.forces(), state_.begin());
-  for (std::size_t j = slips; j < state_.size(); ++j)
+  for (std::size_t j = slips; j < states; ++j)
     if (std::isfinite(state[j])) state_[j] = state[j];
+  std::size_t first = states;
+  for (InputBankTerms& bank : banks_) {
+    const std::size_t count = bank.state().size();
+    bank.set_state(state.subspan(first, count));
+    std::ranges::copy(bank.state(), state_.begin() + static_cast<std::ptrdiff_t>(first));
+    first += count;
+  }
 }
 
-GreyBoxTerms::Cell GreyBoxTerms::cell_of(std::span<const double> knots, double x) noexcept {
-  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, x);
-  const auto left = static_cast<std::size_t>(above - knots.begin()) - 1;
-  return {.left = left, .share = (x - knots[left]) / (knots[left + 1] - knots[left])};
+void GreyBoxTerms::jump_banks(Features features, std::span<double> state) const noexcept {
+  for (std::size_t k = 0; k < banks_.size(); ++k) {
+    banks_[k].jump(features[structure_.banks[k].input], state);
+    state = state.subspan(structure_.banks[k].states());
+  }
 }
 
 GreyBox::GreyBox(Parameters parameters)
@@ -116,6 +131,7 @@ GreyBox::GreyBox(Parameters parameters)
       coefficients_(parameters_.coefficients, parameters_.terms.inputs(), kFamily) {
   require(coefficients_.size() == parameters_.terms.columns(), "coefficients",
           "one column for each term", std::to_string(coefficients_.size()) + " columns");
+  jumped_.resize(terms_.bank_states());
   if (!parameters_.residual) return;
   const GreyBoxResidual& learned = *parameters_.residual;
   std::visit([this]<class P>(const P& own) { residual_.emplace<typename P::Family>(own); },
@@ -159,11 +175,27 @@ ModelMemory GreyBox::memory(const InputRanges& ranges) const {
   for (std::size_t j = 0; j < structure.time_constants_s.size(); ++j)
     memory.relaxations.push_back({width * coefficients_.largest(structure.first_relaxation() + j),
                                   structure.time_constants_s[j]});
+  std::size_t column = structure.first_bank();
+  for (const InputBank& bank : structure.banks) {
+    const std::size_t forces = bank.force_knots.size();
+    for (std::size_t i = 0; i < bank.thresholds.size(); ++i) {
+      double weight = 0.0;
+      for (std::size_t k = 0; k < forces; ++k)
+        weight = std::max(weight, coefficients_.largest(column + i * forces + k));
+      memory.slips.push_back({weight / bank.thresholds[i], 2.0 * bank.thresholds[i], bank.input,
+                              bank.is_integrated ? structure.sample_period_s : 0.0});
+    }
+    for (std::size_t j = 0; j < bank.time_constants_s.size(); ++j)
+      memory.relaxations.push_back(
+          {ranges.width(bank.input) * coefficients_.largest(column + bank.first_relaxation() + j),
+           bank.time_constants_s[j], bank.input});
+    column += bank.columns();
+  }
   return memory;
 }
 
 Estimate GreyBox::step(Features features) noexcept {
-  terms_.move(features[0]);
+  terms_.move(features);
   const auto at = coefficients_.locate(features);
   double value = 0.0;
   terms_.visit(features, [&](std::size_t column, double term) {
@@ -195,11 +227,14 @@ double GreyBox::residual(Features features) noexcept {
   return share * std::min(std::max(correction, -learned.bound), learned.bound);
 }
 
-double GreyBox::at_jump(const ScheduledCoefficients::Position& at, double x) const noexcept {
+double GreyBox::at_jump(const ScheduledCoefficients::Position& at, double x,
+                        Features features) const noexcept {
   double value = 0.0;
-  terms_.visit_jump(x, [&](std::size_t column, double term) {
+  const auto add = [&](std::size_t column, double term) {
     value += coefficients_.coefficient(at, column) * term;
-  });
+  };
+  terms_.visit_jump(x, add);
+  terms_.visit_banks(x, features, jumped_, add);
   return value;
 }
 
@@ -248,7 +283,8 @@ Estimate GreyBox::invert(double target, Features features) noexcept {
   if (schedule.scheduled && schedule.feature == 0) return detail::no_inverse(features);
   const auto at = coefficients_.locate(features);
   const double wanted = target - others(at, features) - residual(features);
-  const auto error_at = [&](double x) { return at_jump(at, x) - wanted; };
+  terms_.jump_banks(features, jumped_);
+  const auto error_at = [&](double x) { return at_jump(at, x, features) - wanted; };
   double low = parameters_.terms.curve_knots.front();
   double high = parameters_.terms.curve_knots.back();
   if (const double near = near_root(error_at, at, wanted); near >= low && near <= high)

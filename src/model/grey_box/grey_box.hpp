@@ -11,9 +11,12 @@
 #include <vector>
 
 #include "model/common/schedule.hpp"
+#include "model/grey_box/hats.hpp"
+#include "model/grey_box/input_bank.hpp"
 #include "model/hysteresis/slip_bank.hpp"
 #include "model/mixture/dgmm.hpp"
 #include "model/network/mlp.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -31,6 +34,7 @@ namespace torsio {
 /// | relaxation: v_j, a spring in series with a dashpot of time constant T_j | time constants |
 /// | slope: every other input | inputs |
 /// | Coulomb: tanh of every input over its scale | inputs |
+/// | each bank over another input: see `InputBank` | its columns |
 ///
 ///     s_i <- clip(s_i + dx, +-r_i),   v_j <- e^(-h/T_j) v_j + (T_j / h) (1 - e^(-h/T_j)) dx
 ///
@@ -40,6 +44,7 @@ class GreyBoxTerms {
   static constexpr std::size_t kMaxThresholds = 32;
   static constexpr std::size_t kMaxKnots = 1000;
   static constexpr std::size_t kMaxTimeConstants = 32;
+  static constexpr std::size_t kMaxBanks = 64;
 
   struct Structure {
     std::vector<double> curve_knots;       ///< x's unit, ascending, at least 2
@@ -48,6 +53,7 @@ class GreyBoxTerms {
     std::vector<double> time_constants_s;  ///< T_j > 0
     std::vector<double> rate_scales;       ///< per input, in its unit; 0: no Coulomb term
     double sample_period_s = 0.0;
+    std::vector<InputBank> banks = {};  ///< over other inputs than the first
 
     template <class Self, class Visit>
     static void visit_fields(Self& self, Visit&& visit) {
@@ -57,6 +63,7 @@ class GreyBoxTerms {
       visit("time_constants_s", self.time_constants_s);
       visit("rate_scales", self.rate_scales);
       visit("sample_period_s", self.sample_period_s);
+      visit("banks", self.banks);
     }
     bool operator==(const Structure&) const = default;
 
@@ -69,7 +76,13 @@ class GreyBoxTerms {
       return first_relaxation() + time_constants_s.size();
     }
     [[nodiscard]] std::size_t first_coulomb() const noexcept { return first_slope() + inputs(); }
-    [[nodiscard]] std::size_t columns() const noexcept { return first_coulomb() + inputs(); }
+    /// Column of the first bank: the number of the columns of x and of the slopes and Coulomb terms.
+    [[nodiscard]] std::size_t first_bank() const noexcept { return first_coulomb() + inputs(); }
+    [[nodiscard]] std::size_t columns() const noexcept {
+      std::size_t sum = first_bank();
+      for (const InputBank& bank : banks) sum += bank.columns();
+      return sum;
+    }
   };
 
   GreyBoxTerms() = default;
@@ -80,20 +93,26 @@ class GreyBoxTerms {
 
   /// As if x had long been where it is at the next `move`.
   void reset() noexcept;
-  /// One sample period later x is here.
-  void move(double x) noexcept TORSIO_REALTIME;
+  /// One sample period later the inputs are here.
+  void move(Features features) noexcept TORSIO_REALTIME;
   /// Last x; 0 before the first.
   [[nodiscard]] double position() const noexcept { return last_; }
 
-  /// s_i / r_i, then v_j.
+  /// s_i / r_i, then v_j, then the same of each bank.
   [[nodiscard]] std::span<const double> state() const noexcept { return state_; }
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(slips_, state_, banks_, last_, is_started_);
+  }
 
   /// Calls term(column, value) for each term that is not 0, as of now.
   /// @param features the first is not looked at
   template <class Term>
   void visit(Features features, Term&& term) const noexcept {
-    visit_motion(last_, state_, term);
+    visit_motion(last_, main_state(), term);
+    visit_banks(last_, features, bank_state(), term);
     for (std::size_t j = 1; j < features.size(); ++j) {
       term(structure_.first_slope() + j, features[j]);
       if (const double scale = structure_.rate_scales[j]; scale > 0.0)
@@ -109,29 +128,42 @@ class GreyBoxTerms {
     const std::size_t slips = slips_.size();
     for (std::size_t i = 0; i < slips; ++i)
       moved[i] = std::min(std::max(state_[i] + dx * slips_.stiffness()[i], -1.0), 1.0);
-    for (std::size_t j = slips; j < state_.size(); ++j) moved[j] = state_[j] + dx;
-    visit_motion(x, std::span(moved).first(state_.size()), term);
+    const std::size_t states = main_state().size();
+    for (std::size_t j = slips; j < states; ++j) moved[j] = state_[j] + dx;
+    visit_motion(x, std::span(moved).first(states), term);
+  }
+
+  /// States of all banks.
+  [[nodiscard]] std::size_t bank_states() const noexcept { return bank_state().size(); }
+  /// The states of the banks if their inputs had jumped here at once. @param state `bank_states()`
+  void jump_banks(Features features, std::span<double> state) const noexcept TORSIO_REALTIME;
+  /// The terms of the banks alone with these states and this x; `features[0]` is not looked at.
+  template <class Term>
+  void visit_banks(double x, Features features, std::span<const double> state,
+                   Term&& term) const noexcept {
+    std::size_t column = structure_.first_bank();
+    for (const InputBank& bank : structure_.banks) {
+      InputBankTerms::visit(bank, column, x, features, state.first(bank.states()), term);
+      state = state.subspan(bank.states());
+      column += bank.columns();
+    }
   }
 
  private:
-  /// Between which knots x lies, and how far it is on its way to the right one.
-  struct Cell {
-    std::size_t left = 0;
-    double share = 0.0;
-  };
-  [[nodiscard]] static Cell cell_of(std::span<const double> knots, double x) noexcept;
+  [[nodiscard]] std::span<const double> main_state() const noexcept {
+    return std::span(state_).first(slips_.size() + decay_.size());
+  }
+  [[nodiscard]] std::span<const double> bank_state() const noexcept {
+    return std::span(state_).subspan(slips_.size() + decay_.size());
+  }
 
   template <class Term>
   void visit_motion(double x, std::span<const double> state, Term&& term) const noexcept {
-    const Cell curve = cell_of(structure_.curve_knots, x);
+    const detail::HatCell curve = detail::hat_cell(structure_.curve_knots, x);
     term(curve.left, 1.0 - curve.share);
     term(curve.left + 1, curve.share);
     const std::size_t knots = structure_.friction_knots.size();
-    Cell slip;
-    if (knots > 1) {
-      slip = cell_of(structure_.friction_knots, x);
-      slip.share = std::min(std::max(slip.share, 0.0), 1.0);
-    }
+    const detail::HatCell slip = detail::held_hat_cell(structure_.friction_knots, x);
     std::size_t column = structure_.first_slip() + slip.left;
     for (std::size_t i = 0; i < slips_.size(); ++i, column += knots) {
       term(column, (1.0 - slip.share) * state[i]);
@@ -145,6 +177,7 @@ class GreyBoxTerms {
   SlipBank slips_;             ///< s_i / r_i
   std::vector<double> decay_;  ///< e^(-h/T_j)
   std::vector<double> gain_;   ///< (T_j / h) (1 - e^(-h/T_j))
+  std::vector<InputBankTerms> banks_;
   std::vector<double> state_;
   double last_ = 0.0;
   bool is_started_ = false;
@@ -171,16 +204,18 @@ struct GreyBoxResidual {
 /// torsio's own spring model: what physics allows, and of that what the data ask for.
 ///
 ///     y = curve(x) + sum_i w_i(x) s_i / r_i + sum_j k_j v_j + sum_l (k_l x_l + f_l tanh(x_l / u_l))
-///         + residual
+///         + banks + residual
 ///
 /// A stiffening and, if need be, asymmetric elastic curve; a bank of slip operators whose forces may
 /// depend on the deflection (friction under load); viscoelastic branches; viscous and dry friction of
-/// other inputs (rates); see `GreyBoxTerms`. All coefficients may be scheduled over one input. With
-/// w_i constant and >= 0, k_j >= 0 and an ascending curve it is passive. The residual, if there is
+/// other inputs (rates); for another input with a bank of its own, slip operators, a curve, a product
+/// and an inertia (`InputBank`); see `GreyBoxTerms`. All coefficients may be scheduled over one input. With
+/// w_i constant and >= 0, k_j >= 0, an ascending curve and no bank it is passive. The residual, if there is
 /// one, is a small network or mixture, bounded, and faded out away from its training data. A fit
 /// chooses which terms there are by cross-validation (fit/grey_box/fit_grey_box.hpp). A family of its own:
 /// no paper has it; the parts are those of specification 3.6 and 3.7. Cost: some 4 (2 + 2
-/// thresholds + branches + inputs) multiply-adds, and that of the residual.
+/// thresholds + branches + inputs) multiply-adds, those of the banks, and that of the
+/// residual.
 class GreyBox {
  public:
   static constexpr std::string_view kFamily = "grey_box";
@@ -224,11 +259,14 @@ class GreyBox {
   /// As of the last `step`.
   [[nodiscard]] const GreyBoxTerms& terms() const noexcept { return terms_; }
 
-  /// s_i / r_i, then v_j in the first input's unit.
+  /// s_i / r_i, then v_j in the first input's unit, then the same of each bank.
   [[nodiscard]] std::span<const double> state() const noexcept { return terms_.state(); }
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME {
     terms_.set_state(state);
   }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(terms_); }
 
   /// The first input at which the output would be `target` after an immediate change from the
   /// present input, the others as given and the residual as at the present input (secants kept
@@ -239,7 +277,8 @@ class GreyBox {
   static constexpr int kInversionSteps = 100;
 
  private:
-  [[nodiscard]] double at_jump(const ScheduledCoefficients::Position& at, double x) const noexcept;
+  [[nodiscard]] double at_jump(const ScheduledCoefficients::Position& at, double x,
+                               Features features) const noexcept;
   template <class Error>
   [[nodiscard]] double near_root(const Error& error_at, const ScheduledCoefficients::Position& at,
                                  double wanted) const noexcept;
@@ -252,6 +291,7 @@ class GreyBox {
   ScheduledCoefficients coefficients_;
   std::variant<std::monostate, Mlp, Dgmm> residual_;  ///< the first: none
   std::vector<double> residual_inputs_;
+  std::vector<double> jumped_;  ///< states of the banks, while inverting
 };
 
 }  // namespace torsio

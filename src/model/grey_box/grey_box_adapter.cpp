@@ -95,8 +95,18 @@ std::size_t GreyBoxAdapter::add_terms(const GreyBox::Parameters& base, double la
   add_group(0, terms.first_slip(), false);
   add_group(terms.first_slip(), terms.first_relaxation(), true);
   add_group(terms.first_relaxation(), terms.first_slope(), true);
-  for (std::size_t column = terms.first_slope(); column < terms.columns(); ++column)
+  for (std::size_t column = terms.first_slope(); column < terms.first_bank(); ++column)
     add_group(column, column + 1, true);
+  std::size_t first = terms.first_bank();
+  for (const InputBank& bank : terms.banks) {
+    const std::size_t end = first + bank.columns();
+    add_group(first, first + bank.first_curve(), false);
+    add_group(first + bank.first_curve(), first + bank.first_product(), false);
+    add_group(first + bank.first_product(), first + bank.first_relaxation(), false);
+    for (std::size_t column = first + bank.first_relaxation(); column < end; ++column)
+      add_group(column, column + 1, false);
+    first = end;
+  }
   return active_.size();
 }
 

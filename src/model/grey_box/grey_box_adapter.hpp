@@ -19,7 +19,8 @@ namespace torsio {
 ///
 /// phi_c are the terms (`GreyBoxTerms`), S the spread of the target: that of a torque which is
 /// uniform over the elastic curve. g_c is the largest |coefficient| of the group of the term: the
-/// curve, all slips, all branches, or the term itself (slopes and friction of other inputs). Terms
+/// curve, all slips, all branches, or the term itself (slopes and friction of other inputs); of a bank the
+/// slips, the curve, the product, or the term itself. Terms
 /// whose group is 0 are left out. d follows the error by `LinearUpdate`, and is then
 /// brought back into its bounds:
 ///

@@ -28,7 +28,8 @@ namespace {
 using testing::HasSubstr;
 using Row = std::span<const double>;
 
-constexpr GreyBoxOptions kBoxAlone{.residual = ResidualKind::none};
+constexpr GreyBoxOptions kBoxAlone{.banks = false, .residual = ResidualKind::none};
+constexpr GreyBoxOptions kWithoutBanks{.banks = false};
 
 /// A slow, uneven to and fro of about +-0.1.
 Matrix wander(std::size_t samples, double start = 0.0) {
@@ -89,7 +90,7 @@ TEST(GreyBoxSums, AreThoseOfTheCompleteTableOfTerms) {
   for (const Sequence& sequence : data.sequences) {
     GreyBoxTerms terms(sums.all);
     for (std::size_t n = 0; n < sequence.use.size(); ++n) {
-      terms.move(sequence.features(n, 0));
+      terms.move(sequence.features.row(n));
       if (sequence.use[n] == 0) continue;
       terms.visit(sequence.features.row(n),
                   [&](std::size_t column, double value) { table(target.size(), column) = value; });
@@ -146,9 +147,10 @@ TEST(FitGreyBox, AddsTheNetworkThatItsTrialFindsWorthwhile) {
   for (const std::size_t records : {1, 4}) {
     SCOPED_TRACE(records);
     const TrainingData data = records_of_a_wave(records, 24000 / records, 4.0);
-    const Fitted<GreyBox> tried = fit_grey_box(data, {});
+    const Fitted<GreyBox> tried = fit_grey_box(data, kWithoutBanks);
     ASSERT_TRUE(tried.parameters.residual) << tried.notes.back();
-    const Fitted<GreyBox> named = fit_grey_box(data, {.residual = ResidualKind::mlp});
+    const Fitted<GreyBox> named =
+        fit_grey_box(data, {.banks = false, .residual = ResidualKind::mlp});
     const auto& one = std::get<Mlp::Parameters>(tried.parameters.residual->model);
     const auto& other = std::get<Mlp::Parameters>(named.parameters.residual->model);
     EXPECT_EQ(one.layers.front().weights, other.layers.front().weights)
@@ -160,15 +162,16 @@ TEST(FitGreyBox, AddsTheNetworkThatItsTrialFindsWorthwhile) {
 }
 
 TEST(FitGreyBox, AddsNoNetworkWhereNothingIsLeft) {
-  const Fitted<GreyBox> fitted = fit_grey_box(records_of_a_wave(4, 4000, 0.0), {});
+  const Fitted<GreyBox> fitted = fit_grey_box(records_of_a_wave(4, 4000, 0.0), kWithoutBanks);
   EXPECT_FALSE(fitted.parameters.residual);
   EXPECT_THAT(fitted.notes.back(), HasSubstr("not added"));
 }
 
 TEST(FitGreyBox, StopsOnRequestWhileANetworkIsTried) {
   const auto stop = [](double, std::string_view doing) { return !doing.starts_with("epoch 3"); };
-  EXPECT_THROW((void)fit_grey_box(records_of_a_wave(4, 4000, 4.0), {}, {.progress = stop}),
-               Cancelled);
+  EXPECT_THROW(
+      (void)fit_grey_box(records_of_a_wave(4, 4000, 4.0), kWithoutBanks, {.progress = stop}),
+      Cancelled);
 }
 
 TEST(FitGreyBox, LeavesAStraightLineAStraightLine) {
@@ -371,10 +374,10 @@ TEST(FitGreyBox, ANetworkIsKeptOnlyWhereItHelps) {
         std::move(features),
         [&](Row x) { return 400.0 * x[0] + bend * x[1] * x[1] + 0.2 * random.normal(); });
   };
-  const Fitted<GreyBox> straight = fit_grey_box(data_of(0.0), {});
+  const Fitted<GreyBox> straight = fit_grey_box(data_of(0.0), kWithoutBanks);
   EXPECT_FALSE(straight.parameters.residual.has_value());
   const TrainingData bent = data_of(5.0);
-  const Fitted<GreyBox> learned = fit_grey_box(bent, {});
+  const Fitted<GreyBox> learned = fit_grey_box(bent, kWithoutBanks);
   ASSERT_TRUE(learned.parameters.residual.has_value());
   EXPECT_LT(evaluate(GreyBox(learned.parameters), bent).rmse,
             0.5 * evaluate(GreyBox(fit_grey_box(bent, kBoxAlone).parameters), bent).rmse);

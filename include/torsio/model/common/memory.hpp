@@ -4,8 +4,13 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
+
+#include "torsio/core/state_bytes.hpp"
+#include "torsio/model/common/model.hpp"
 
 namespace torsio {
 
@@ -27,14 +32,19 @@ struct Relaxation {
   /// Largest contribution to the output for inputs within their ranges [target's unit].
   double gain = 0.0;
   double time_constant_s = 0.0;
+  std::size_t input = 0;  ///< whose past it is; only how far the first one moved unseen is limited
 };
 
-/// A part of a model's memory that depends on the travel of the first input: a stop or play operator.
+/// A part of a model's memory that depends on the travel of an input: a stop or play operator.
 struct SlipMemory {
   /// Error of the output per travel that is unknown [target's unit over the input's].
   double gain = 0.0;
   /// The history is erased when the input has covered a range of this width.
   double travel = 0.0;
+  std::size_t input = 0;  ///< which input of the model
+  /// 0: the travel is that of the input. Else the input is a rate, and the travel that of its integral
+  /// over time: this many seconds per sample.
+  double period_s = 0.0;
 };
 
 /// What the output of a model depends on besides the present inputs. The estimator computes from it
@@ -65,6 +75,31 @@ template <class M>
     return model.memory(ranges);
   } else {
     return {};
+  }
+}
+
+/// The state of a model for `StateBytes`; that of a model with memory that does not list it is refused.
+template <class M>
+void visit_state_of(M& model, StateBytes& bytes) noexcept {
+  if constexpr (HasStateBytes<M>) {
+    model.visit_state(bytes);
+  } else if constexpr (HasMemory<M> || HasState<M> || FeedsBack<M>) {
+    bytes.fail();
+  }
+}
+
+/// Differs for the states of different models: family and parameters.
+template <class M>
+[[nodiscard]] std::uint64_t state_identity_of(const M& model) noexcept {
+  if constexpr (requires { model.state_identity(); }) {
+    return model.state_identity();
+  } else {
+    StateHash hash;
+    hash.add(model.input_count());
+    hash.add(model.parameter_count());
+    if constexpr (requires { M::kFamily; }) hash.add(std::string_view(M::kFamily));
+    hash.add_value(model.parameters());
+    return hash.value();
   }
 }
 
