@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <numbers>
@@ -13,6 +14,7 @@
 
 #include "core/all_finite.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio::detail {
@@ -125,6 +127,23 @@ void check_zeroed(const std::vector<std::string>& channels,
              fmt::format("'{}'", channel));
 }
 
+std::uint64_t identity_of(const EstimatorSettings& settings) noexcept {
+  StateHash hash;
+  hash.add_value(settings.features.inputs);
+  for (const ChannelDefinition& each : settings.features.definitions) {
+    hash.add(each.name);
+    hash.add(each.expression);
+  }
+  hash.add_value(settings.sample_rate_Hz);
+  hash.add_value(settings.target);
+  hash.add_value(settings.zeroed_channels);
+  hash.add_value(settings.ranges);
+  hash.add_value(settings.disturbances);
+  hash.add_value(settings.fallback);
+  hash.add_value(settings.residuals);
+  return hash.value();
+}
+
 }  // namespace
 
 EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input_count,
@@ -160,6 +179,10 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
   std::ranges::transform(settings_.disturbances.largest_step, jump_limits_.begin(),
                          [](double step) { return kJumpFactor * step; });
   limited_.resize(model_input_count);
+  missed_parts_.resize(model_input_count);
+  for (std::size_t i = 0; i < model_input_count; ++i)
+    widths_.push_back(ranges.highest[i] - ranges.lowest[i]);
+  state_identity_ = identity_of(settings_);
 }
 
 void EstimatorCore::set_zero(std::string_view channel, double value) {
@@ -242,7 +265,7 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   }
   if (input.for_model.empty()) return input;
   excluded_ticks_ = 0.0;
-  if (input.excursion <= 1.0) memory_error_.follow(features[0]);
+  if (input.excursion <= 1.0) memory_error_.follow(features);
   input.restarted = needs_reset_;
   needs_reset_ = false;
   has_run_ = true;
@@ -265,11 +288,16 @@ void EstimatorCore::limit(Conditioned& input) noexcept {
                              ranges_[i].highest + ranges_[i].border);
   input.for_model = limited_;
   const double missed = std::abs(input.features[0] - limited_[0]);
-  if (has_run_) memory_error_.interrupt(1.0, std::min(1.0, missed / first_width_));
+  if (!has_run_) return;
+  memory_error_.interrupt(1.0, std::min(1.0, missed / first_width_), false);
+  for (std::size_t i = 0; i < limited_.size(); ++i)
+    missed_parts_[i] = std::abs(input.features[i] - limited_[i]);
+  memory_error_.miss_others(missed_parts_, widths_);
 }
 
 Estimate EstimatorCore::held(Fault fault) const noexcept {
-  return {.value = last_value_, .fault = fault};
+  // A forged state may contain any number.
+  return {.value = std::isfinite(last_value_) ? last_value_ : 0.0, .fault = fault};
 }
 
 Estimate EstimatorCore::apply_guards(const Conditioned& input,

@@ -45,6 +45,8 @@ bool AnyModel::feeds_back() const noexcept { return held_->feeds_back(); }
 void AnyModel::correct(double measured) noexcept { held_->correct(measured); }
 std::span<const double> AnyModel::state() const noexcept { return held_->state(); }
 void AnyModel::set_state(std::span<const double> state) noexcept { held_->set_state(state); }
+void AnyModel::visit_state(detail::StateBytes& bytes) noexcept { held_->visit_state(bytes); }
+std::uint64_t AnyModel::state_identity() const noexcept { return held_->state_identity(); }
 std::span<const float> AnyModel::last_layer_input() const noexcept {
   return held_->last_layer_input();
 }

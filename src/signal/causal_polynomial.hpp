@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 
 namespace torsio {
 
@@ -29,6 +30,12 @@ class CausalPolynomial {
   /// Takes the next sample. @returns the values at the places before it: all equal to the first.
   std::span<const double> step(double sample) noexcept TORSIO_REALTIME;
   [[nodiscard]] bool is_started() const noexcept { return known_ > 0; }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(samples_);
+    bytes.visit_at_most(known_, order_ + 1);
+  }
 
  private:
   /// Weights of a polynomial through `samples` samples: places x samples, the newest first.

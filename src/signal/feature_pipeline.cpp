@@ -42,6 +42,11 @@ class DelayLine {
     return output;
   }
 
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(past_, is_full_);
+    bytes.visit_at_most(next_, past_.size() - 1);
+  }
+
  private:
   std::vector<double> past_;  // a ring
   std::size_t next_ = 0;
@@ -81,6 +86,10 @@ class StopOperator {
   [[nodiscard]] double error(double input_error) const noexcept {
     const double own = std::max(highest_ - state_, state_ - lowest_);
     return std::min(2.0 * threshold_, own + 2.0 * input_error);
+  }
+
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(state_, lowest_, highest_, last_, has_last_);
   }
 
  private:
@@ -131,6 +140,10 @@ class DahlOperator {
     const double sure = std::max(0.0, travel_ - 2.0 * largest_input_error_);
     const double start = 1.0 + 4.0 * largest_input_error_ / distance_;
     return std::min(2.0, start * std::exp(-sure / distance_) + 4.0 * input_error / distance_);
+  }
+
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(travel_, largest_input_error_, state_, last_, has_last_);
   }
 
  private:
@@ -424,6 +437,13 @@ bool FeaturePipeline::is_settled() const noexcept {
 
 std::span<const double> FeaturePipeline::state_errors() const noexcept {
   return program_->feature_errors;
+}
+
+void FeaturePipeline::visit_state(detail::StateBytes& bytes) noexcept {
+  Program& program = *program_;
+  bytes.visit(program.differentiators, program.lowpasses, program.delay_lines, program.stops,
+              program.dahls, program.has_travelled, program.feature_errors);
+  bytes.visit_at_most(program.seen, program.settling_samples);
 }
 
 std::vector<std::string> channels_of(std::string_view expression) {

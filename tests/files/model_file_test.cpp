@@ -44,7 +44,8 @@ std::vector<std::uint64_t> run(Estimator estimator) {
 template <class Family>
 class EveryFamily : public testing::Test {};
 template <class... Family>
-using WithResiduals = testing::Types<Family..., test::GreyBoxWithMlp, test::GreyBoxWithDgmm>;
+using WithResiduals =
+    testing::Types<Family..., test::GreyBoxWithMlp, test::GreyBoxWithDgmm, test::GreyBoxWithBanks>;
 TYPED_TEST_SUITE(EveryFamily, KnownFamilies::In<WithResiduals>);
 
 TYPED_TEST(EveryFamily, ComesBackBitForBit) {
@@ -125,6 +126,24 @@ TEST(ModelFile, NamesTheResidualOfAGreyBoxByItsFamily) {
                                      "model.residual.model.mlp.layers.0.weights"}));
   EXPECT_THAT(names_of(example<test::GreyBoxWithDgmm>()),
               testing::Contains("model.residual.model.dgmm.mixture.means"));
+}
+
+TEST(ModelFile, AGreyBoxWithoutBanksIsWrittenAsBeforeThereWereAny) {
+  const auto names_of = [](const GreyBox& model) {
+    std::vector<std::string> names;
+    for (const auto& [name, tensor] :
+         parse_safetensors(model_bytes(example_model_file(model)), "m").tensors)
+      if (name.starts_with("model.terms.")) names.push_back(name);
+    return names;
+  };
+  EXPECT_THAT(
+      names_of(example<GreyBox>()),
+      testing::UnorderedElementsAre("model.terms.curve_knots", "model.terms.thresholds",
+                                    "model.terms.friction_knots", "model.terms.time_constants_s",
+                                    "model.terms.rate_scales", "model.terms.sample_period_s"))
+      << "files that were written before have these, and load";
+  EXPECT_THAT(names_of(example<test::GreyBoxWithBanks>()),
+              testing::Contains("model.terms.banks.0.thresholds"));
 }
 
 TEST(ModelFile, IsBoundToItsDevice) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <cstdlib>
 #include <limits>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "support/every_family.hpp"
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
+#include "support/grey_box_examples.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/motor_referenced_torques.hpp"
@@ -97,6 +99,36 @@ TYPED_TEST(EveryFamily, StepNeverTouchesTheHeap) {
               (void)model.step(overflowing);
               model.reset();
               (void)model.step(features.row(0));
+            }),
+            0U);
+}
+
+TYPED_TEST(EveryFamily, SavingAndLoadingTheStateNeverTouchesTheHeap) {
+  TorqueEstimator estimator(Estimator(test::example_settings(), example<TypeParam>()));
+  std::vector<std::byte> state(estimator.state_size());
+  ASSERT_GT(state.size(), 0U);
+  bool saved = false;
+  bool loaded = false;
+  bool junk_loaded = true;
+  EXPECT_EQ(heap_calls_during([&] {
+              (void)estimator.step({.gear_angle_rad = 0.1, .joint_angle_rad = 0.0});
+              saved = estimator.state_size() == state.size() && estimator.save(state);
+              loaded = estimator.load(state);
+              state[state.size() / 2] ^= std::byte{1};
+              junk_loaded = estimator.load(state);
+            }),
+            0U);
+  EXPECT_TRUE(saved && loaded);
+  EXPECT_FALSE(junk_loaded);
+}
+
+TEST(GreyBoxBanks, StepNeverTouchesTheHeap) {
+  TorqueEstimator estimator(
+      Estimator(test::example_settings(), GreyBox(example<test::GreyBoxWithBanks>().parameters())));
+  EXPECT_EQ(heap_calls_during([&] {
+              for (const double angle_rad : {0.1, 0.2, std::nan(""), -0.1, 5.0, 0.0})
+                (void)estimator.step({.gear_angle_rad = angle_rad, .joint_angle_rad = 0.0});
+              estimator.reset();
             }),
             0U);
 }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -8,6 +10,7 @@
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/estimate/estimator_core.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/model/common/model.hpp"
@@ -54,6 +57,10 @@ class BasicEstimator {
   /// finite.
   BasicEstimator(EstimatorSettings settings, M model)
       : core_(std::move(settings), model), model_(std::move(model)) {
+    detail::StateHash hash;
+    hash.add(core_.state_identity());
+    hash.add(detail::state_identity_of(model_));
+    state_identity_ = hash.value();
     reset();
   }
 
@@ -110,9 +117,37 @@ class BasicEstimator {
     model_.correct(measured);
   }
 
+  /// The state as bytes, for a copy in time: everything that `reset` restarts (filters, lags, memory
+  /// and guards), so that after `load` the steps give the same numbers to
+  /// the bit. Zeros are configuration and not contained: set them first. The bytes are for the same
+  /// build on the same kind of machine, not for an archive. No heap, no lock.
+  /// @returns bytes that `save` writes, always as many; 0 for a model with memory whose family does not
+  /// list it (`HasStateBytes`), as a model that is adapted
+  [[nodiscard]] std::size_t state_size() const noexcept TORSIO_REALTIME {
+    return detail::state_size(*this);
+  }
+  /// @param bytes `state_size()` of them. @returns false, without effect, if they are not as many or 0.
+  [[nodiscard]] bool save(std::span<std::byte> bytes) const noexcept TORSIO_REALTIME {
+    return detail::save_state(*this, state_identity_, bytes);
+  }
+  /// @returns false, without effect, for anything but a state that `save` wrote of an estimator with the
+  /// same model and settings.
+  [[nodiscard]] bool load(std::span<const std::byte> bytes) noexcept TORSIO_REALTIME {
+    return detail::load_state(*this, state_identity_, bytes);
+  }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(core_);
+    detail::visit_state_of(model_, bytes);
+  }
+  /// Differs for the states of different models.
+  [[nodiscard]] std::uint64_t state_identity() const noexcept { return state_identity_; }
+
  private:
   detail::EstimatorCore core_;
   M model_;
+  std::uint64_t state_identity_ = 0;
 };
 
 }  // namespace torsio

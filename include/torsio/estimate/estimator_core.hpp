@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string_view>
@@ -10,6 +11,7 @@
 
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/estimate/memory_error.hpp"
 #include "torsio/model/common/model.hpp"
@@ -89,6 +91,14 @@ class EstimatorCore {
     is_wrong_rate_ = is_wrong && depends_on_rate_;
   }
 
+  /// The members that change in a step; not the zeros.
+  void visit_state(StateBytes& bytes) noexcept {
+    bytes.visit(pipeline_, missed_, poisoned_, last_value_, is_wrong_rate_, needs_reset_, has_run_,
+                in_jump_, excluded_ticks_, previous_raw_, start_std_dev_, memory_error_);
+  }
+  /// Differs for the states of estimators with different settings.
+  [[nodiscard]] std::uint64_t state_identity() const noexcept { return state_identity_; }
+
  private:
   struct Range {
     double lowest = 0.0;
@@ -137,7 +147,10 @@ class EstimatorCore {
   std::vector<double> previous_raw_;  ///< raw inputs of the last tick; NaN: none
   std::vector<double> jump_limits_;   ///< the largest change of a raw input in a tick
   std::vector<double> limited_;       ///< features
+  std::vector<double> missed_parts_;  ///< by which the features were limited
+  std::vector<double> widths_;        ///< widths of the ranges of the features
   double start_std_dev_ = 0.0;
+  std::uint64_t state_identity_ = 0;
   MemoryError memory_error_{{}, 0.0, 1.0, 0.0};
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 
 namespace torsio::detail {
 
@@ -38,6 +39,11 @@ class PeriodCheck {
     too_short_ = too_short_ << 1U | static_cast<std::uint32_t>(period_s < shortest_s_);
     too_long_ = too_long_ << 1U | static_cast<std::uint32_t>(period_s > longest_s_);
     return std::popcount(too_short_) > kPeriods / 2 || std::popcount(too_long_) > kPeriods / 2;
+  }
+
+  /// The members that change in a step.
+  void visit_state(StateBytes& bytes) noexcept {
+    bytes.visit(last_s_, too_short_, too_long_, has_last_);
   }
 
  private:

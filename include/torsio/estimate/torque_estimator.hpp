@@ -1,9 +1,12 @@
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <string_view>
 #include <utility>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/estimate/estimator.hpp"
 #include "torsio/estimate/joint_sample.hpp"
 #include "torsio/estimate/period_check.hpp"
@@ -41,6 +44,21 @@ class BasicTorqueEstimator {
     estimator_.set_wrong_rate(period_check_.step(sample.t_s));
     return estimator_.step(inputs_.from(sample));
   }
+
+  /// The state as bytes, as `BasicEstimator::state_size`, `save` and `load`, with the check of the rate.
+  /// A state of the estimator in it is another one.
+  [[nodiscard]] std::size_t state_size() const noexcept TORSIO_REALTIME {
+    return detail::state_size(*this);
+  }
+  [[nodiscard]] bool save(std::span<std::byte> bytes) const noexcept TORSIO_REALTIME {
+    return detail::save_state(*this, estimator_.state_identity(), bytes);
+  }
+  [[nodiscard]] bool load(std::span<const std::byte> bytes) noexcept TORSIO_REALTIME {
+    return detail::load_state(*this, estimator_.state_identity(), bytes);
+  }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(estimator_, period_check_); }
 
  private:
   BasicEstimator<M> estimator_;

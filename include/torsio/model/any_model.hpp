@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include "torsio/core/error.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
@@ -106,6 +108,10 @@ class AnyModel {
   [[nodiscard]] std::span<const double> state() const noexcept;
   /// As the family's own; nothing to a family without. @param state `state().size()` numbers.
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
+  /// As the family lists it (`HasStateBytes`).
+  void visit_state(detail::StateBytes& bytes) noexcept;
+  /// Differs for the states of different models: family and parameters.
+  [[nodiscard]] std::uint64_t state_identity() const noexcept;
   /// The input of a network's last layer in the last step; empty for other families.
   [[nodiscard]] std::span<const float> last_layer_input() const noexcept;
 
@@ -146,6 +152,8 @@ class HeldModel {
   virtual void correct(double measured) noexcept = 0;
   [[nodiscard]] virtual std::span<const double> state() const noexcept = 0;
   virtual void set_state(std::span<const double> state) noexcept = 0;
+  virtual void visit_state(StateBytes& bytes) noexcept = 0;
+  [[nodiscard]] virtual std::uint64_t state_identity() const noexcept = 0;
   [[nodiscard]] virtual std::span<const float> last_layer_input() const noexcept = 0;
   [[nodiscard]] virtual bool can_invert() const noexcept = 0;
   virtual Estimate invert(double target, Features features) noexcept = 0;
@@ -220,6 +228,10 @@ class HeldModelOf final : public HeldModel {
   }
   void set_state([[maybe_unused]] std::span<const double> state) noexcept override {
     if constexpr (HasState<M>) model_.set_state(state);
+  }
+  void visit_state(StateBytes& bytes) noexcept override { visit_state_of(model_, bytes); }
+  [[nodiscard]] std::uint64_t state_identity() const noexcept override {
+    return state_identity_of(model_);
   }
   [[nodiscard]] std::span<const float> last_layer_input() const noexcept override {
     if constexpr (HasLastLayer<M>) {

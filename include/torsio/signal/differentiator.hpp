@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/signal/lowpass.hpp"
 
 namespace torsio {
@@ -45,6 +46,13 @@ class Differentiator {
 
   /// Whether `settling_samples()` steps were made since `reset()`.
   [[nodiscard]] bool is_settled() const noexcept { return seen_ == settling_samples_; }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit_at_most(seen_, settling_samples_);
+    bytes.visit(previous_, rate_, is_skipped_);
+    if (lowpass_) bytes.visit(*lowpass_);
+  }
 
  private:
   double sample_rate_Hz_;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 
 namespace torsio {
 
@@ -87,6 +88,9 @@ class FeaturePipeline {
   /// low-pass and a lag are taken as immediate. 0 once it is settled; infinite where there is no bound (the
   /// rate of such a state).
   [[nodiscard]] std::span<const double> state_errors() const noexcept;
+
+  /// The members that change in a step; not the zeros.
+  void visit_state(detail::StateBytes& bytes) noexcept;
 
  private:
   struct Program;

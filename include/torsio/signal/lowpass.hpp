@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 
 namespace torsio {
 
@@ -53,6 +54,9 @@ class Lowpass {
 
   /// Standard deviation of the output over that of a white input, in the long run.
   [[nodiscard]] double noise_gain() const noexcept;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(band_, low_, is_started_); }
 
  private:
   double prewarped_;  // g = tan(pi cutoff / rate)

@@ -8,6 +8,7 @@
 
 #include "model/hammerstein_wiener/static_curve.hpp"
 #include "model/hammerstein_wiener/transfer_function.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -84,6 +85,9 @@ class HammersteinWiener {
   /// Two numbers a section.
   [[nodiscard]] std::span<const double> state() const noexcept { return state_; }
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(state_, value_); }
 
  private:
   Parameters parameters_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "model/hysteresis/increment.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -71,6 +72,9 @@ class BoucWenModel {
 
   /// As `Backlash::invert`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(increment_, share_); }
 
  private:
   [[nodiscard]] double share_after(double increment) const noexcept;

@@ -7,6 +7,7 @@
 
 #include "model/hysteresis/envelope.hpp"
 #include "model/hysteresis/increment.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -63,6 +64,11 @@ class ExponentialLoading {
 
   /// As `Backlash::invert`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(increment_, half_width_, offset_);
+  }
 
  private:
   [[nodiscard]] double offset(double x, double half_width) const noexcept;

@@ -7,6 +7,7 @@
 
 #include "model/hysteresis/increment.hpp"
 #include "model/hysteresis/slip_bank.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -74,6 +75,9 @@ class ImprovedPrandtlIshlinskii {
   /// S(v), and S^-1(y).
   [[nodiscard]] double bent(double v) const noexcept;
   [[nodiscard]] double straightened(double y) const noexcept;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(stops_, increment_); }
 
  private:
   [[nodiscard]] double limit_scale(Features features) const noexcept;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "torsio/core/state_bytes.hpp"
+
 namespace torsio {
 
 /// How far an input moved since the last tick, for operators that feel only that: 0 in the first
@@ -28,6 +30,9 @@ class Increment {
 
   [[nodiscard]] bool has_last() const noexcept { return has_last_; }
   [[nodiscard]] double last() const noexcept { return last_; }  ///< 0 before the first tick
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(last_, has_last_); }
 
  private:
   double last_ = 0.0;

@@ -7,6 +7,7 @@
 
 #include "model/hysteresis/envelope.hpp"
 #include "model/hysteresis/increment.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -80,6 +81,11 @@ class Backlash {
   /// An x_0 within the training range at which the next step would output `target`; where its two
   /// ends do not enclose the target, the nearer one with `Fault::outside_training_range`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(increment_, middle_, offset_);
+  }
 
  private:
   struct Torque {

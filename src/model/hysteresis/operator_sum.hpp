@@ -8,6 +8,7 @@
 #include "model/common/schedule.hpp"
 #include "model/hysteresis/increment.hpp"
 #include "model/hysteresis/slip_bank.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -82,6 +83,9 @@ class OperatorSum {
   /// the nearest end of the rising part is returned with `Fault::outside_training_range`; where y
   /// does not depend on x_0 or the schedule uses it, the given x_0 with `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(stops_, increment_); }
 
  private:
   [[nodiscard]] double curve(double x, double slope) const noexcept;

@@ -9,6 +9,7 @@
 
 #include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 
 namespace torsio {
 
@@ -88,6 +89,9 @@ class SlipBank {
     move(increment);
     return sum(weights);
   }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(force_); }
 
  private:
   static constexpr std::size_t kLanes = 4;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "torsio/core/state_bytes.hpp"
+
 namespace torsio {
 
 enum class Direction : std::uint8_t { unknown, rising, falling };
@@ -35,6 +37,14 @@ class DirectionTracker {
       lowest_ = x;
     }
     return direction_;
+  }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(lowest_, highest_, started_);
+    auto direction = static_cast<std::uint8_t>(direction_);
+    bytes.visit_at_most(direction, static_cast<std::uint8_t>(Direction::falling));
+    direction_ = static_cast<Direction>(direction);
   }
 
  private:

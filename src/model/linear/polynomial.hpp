@@ -5,6 +5,7 @@
 
 #include "model/common/schedule.hpp"
 #include "model/linear/direction.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -86,6 +87,9 @@ class Polynomial {
   /// `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
   static constexpr int kInversionSteps = 100;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(direction_); }
 
  private:
   struct Curve {

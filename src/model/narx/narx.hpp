@@ -111,6 +111,12 @@ class Narx {
     if (std::isfinite(measured)) output_ = measured;
   }
 
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    detail::visit_state_of(model_, bytes);
+    bytes.visit(regressors_, output_, is_started_);
+  }
+
  private:
   [[nodiscard]] std::ptrdiff_t outputs() const noexcept {
     return static_cast<std::ptrdiff_t>(parameters_.output_lags);

@@ -111,6 +111,11 @@ class Ensemble {
     return estimate;
   }
 
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    for (M& member : members_) detail::visit_state_of(member, bytes);
+  }
+
  private:
   Parameters parameters_;
   std::vector<M> members_;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "model/network/recurrent_network.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/model/network/network_layers.hpp"
@@ -72,6 +73,9 @@ class RecurrentModel {
   [[nodiscard]] std::span<const float> last_layer_input() const noexcept {
     return network_.last_layer_input(0);
   }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(network_); }
 
  private:
   Parameters parameters_;

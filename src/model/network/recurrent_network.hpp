@@ -9,6 +9,7 @@
 #include "model/network/recurrent_stack.hpp"
 #include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/model/network/network_layers.hpp"
 
@@ -65,6 +66,12 @@ class RecurrentNetwork {
 
   [[nodiscard]] std::span<const float> last_layer_input(std::size_t joint) const noexcept {
     return head_.last_layer_input(stack_.output(joint));
+  }
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(stack_);
+    for (std::size_t& steps : steps_) bytes.visit_at_most(steps, warm_up_samples_);
   }
 
  private:

@@ -7,6 +7,7 @@
 
 #include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/network/network_layers.hpp"
 
 namespace torsio {
@@ -45,6 +46,11 @@ class RecurrentStack {
   /// h of the last layer, padded to whole vectors.
   [[nodiscard]] const float* output(std::size_t joint) const noexcept {
     return layers_.back().hidden.data() + joint * layers_.back().stride;
+  }
+
+  /// The members that change in a step, padding included: whatever vectors the machine has.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    for (Packed& layer : layers_) bytes.visit(layer.hidden, layer.cell);
   }
 
  private:

@@ -8,6 +8,7 @@
 
 #include "model/second_order/sampled_time.hpp"
 #include "signal/causal_polynomial.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
@@ -86,6 +87,9 @@ class DynamicBoucWen {
   [[nodiscard]] std::span<const double> state() const noexcept { return state_; }
   /// The state of the first sample to come: call it after `reset`.
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(input_, state_); }
 
  private:
   using State = std::array<double, 3>;

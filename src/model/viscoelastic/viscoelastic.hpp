@@ -7,6 +7,7 @@
 
 #include "model/viscoelastic/spring_dashpot_network.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -78,6 +79,11 @@ class Viscoelastic {
   /// The first input of the last step for which its output would have been `target`. Where there is
   /// none (a fluid, before it has moved) the given one is returned with `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
+
+  /// The members that change in a step.
+  void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.visit(torque_, last_, is_started_, value_without_, value_per_input_);
+  }
 
  private:
   Parameters parameters_;

@@ -7,6 +7,7 @@
 
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/core/state_bytes.hpp"
 
 namespace torsio {
 
@@ -36,6 +37,13 @@ template <class M>
 concept HasState = Model<M> && requires(M model, const M fixed, std::span<const double> state) {
   { fixed.state() } noexcept -> std::same_as<std::span<const double>>;
   { model.set_state(state) } noexcept;
+};
+
+/// A model with memory whose state can be saved as bytes (`BasicEstimator::save`): it lists every member
+/// that a step changes and a later step reads. A model without memory needs no such list.
+template <class M>
+concept HasStateBytes = Model<M> && requires(M model, detail::StateBytes& bytes) {
+  { model.visit_state(bytes) } noexcept;
 };
 
 /// A model that feeds its own past output back: its output depends on its earlier outputs.
