@@ -18,6 +18,13 @@ if(TORSIO_HAS_ONNX)
   install(EXPORT torsioOnnxTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
 endif()
 
+if(TORSIO_BUILD_C)
+  install(TARGETS torsio_c EXPORT torsioCTargets FILE_SET HEADERS LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT torsioCTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
+  configure_file(c/torsio.pc.in ${PROJECT_BINARY_DIR}/torsio.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/torsio.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endif()
+
 configure_package_config_file(cmake/torsioConfig.cmake.in ${PROJECT_BINARY_DIR}/torsioConfig.cmake
   INSTALL_DESTINATION ${torsio_package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/torsioConfigVersion.cmake COMPATIBILITY SameMinorVersion)

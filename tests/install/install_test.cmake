@@ -1,6 +1,6 @@
 # cmake -DBUILD=<build tree> -DSOURCE=<tests/install/stranger> -DWORK=<scratch> -P install_test.cmake
-# Installs torsio into a scratch prefix, builds three strangers' projects against it (one without the lab, one with
-# it, one with a real-time loop) and runs them.
+# Installs torsio into a scratch prefix, builds four strangers' projects against it (one without the lab, one with
+# it, one with a real-time loop, one in C where libtorsio.so is built) and runs them.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -28,4 +28,17 @@ run(${torsio} fit ${WORK}/sweep.csv --model linear -o ${WORK}/joint.safetensors)
 run(${WORK}/build/stranger ${WORK}/joint.safetensors)
 if(NOT output MATCHES "torsio [0-9.]+: -?[0-9.]+ Nm")
   message(FATAL_ERROR "the stranger's program printed: ${output}")
+endif()
+if(EXISTS ${WORK}/prefix/include/torsio.h)
+  run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_in_c -B ${WORK}/build_c -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+  run(${CMAKE_COMMAND} --build ${WORK}/build_c)
+  run(${WORK}/build_c/stranger_in_c ${WORK}/joint.safetensors)
+  if(NOT output MATCHES "torsio [0-9.]+: -?[0-9.]+, [a-z_]+")
+    message(FATAL_ERROR "the stranger's program in C printed: ${output}")
+  endif()
+  file(GLOB_RECURSE pkg_config ${WORK}/prefix/torsio.pc)
+  file(STRINGS "${pkg_config}" libs REGEX "^Libs: .*-ltorsio")
+  if(NOT libs)
+    message(FATAL_ERROR "torsio.pc does not name the library")
+  endif()
 endif()
