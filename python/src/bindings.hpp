@@ -1,0 +1,68 @@
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/error.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/data/dataset.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/fit/common/fitted.hpp"
+
+namespace torsio::python {
+
+namespace py = pybind11;
+
+/// A model as Python holds it: never changed, so that estimators and threads share it.
+struct Model {
+  std::shared_ptr<const ModelFile> file;
+  std::vector<std::string> notes = {};
+  std::vector<FittedParameter> table = {};
+  double fit_seconds = kNotMeasured;
+};
+
+/// Pickles begin with this number; a later one is refused.
+inline constexpr int kPickleVersion = 1;
+void check_pickle(const py::tuple& state, std::size_t size, std::string_view what);
+
+/// Runs `work(progress)` without the interpreter's lock. Ctrl-C, and whatever else a handler of a signal
+/// raises, stops the work and is raised afterwards.
+template <class Work>
+auto interruptible(const Work& work) {
+  std::optional<py::error_already_set> raised;
+  const Progress progress = [&raised](double /*fraction*/, std::string_view /*doing*/) {
+    const py::gil_scoped_acquire lock;
+    if (!raised && PyErr_CheckSignals() != 0) raised.emplace();
+    return !raised.has_value();
+  };
+  try {
+    const py::gil_scoped_release unlocked;
+    return work(progress);
+  } catch (const Cancelled&) {
+    if (raised) throw py::error_already_set(*raised);
+    throw;
+  }
+}
+
+/// The text of a path-like object.
+[[nodiscard]] std::string path_text(const py::handle& path);
+[[nodiscard]] bool is_path(const py::handle& object);
+/// "an array of shape (3, 2)", "a str": for messages.
+[[nodiscard]] std::string kind_of(const py::handle& object);
+
+void bind_errors(py::module_& module);
+void bind_recordings(py::module_& module);
+void bind_models(py::module_& module);
+void bind_estimators(py::module_& module);
+void bind_batches(py::module_& module);
+void bind_learning(py::module_& module);
+void bind_control(py::module_& module);
+
+}  // namespace torsio::python

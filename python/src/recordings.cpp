@@ -1,0 +1,359 @@
+#include <algorithm>
+#include <utility>
+
+#include "bindings.hpp"
+#include "data/csv/csv_table.hpp"
+#include "data/measured_recordings.hpp"
+#include "torsio/data/csv.hpp"
+#include "torsio/data/load.hpp"
+#include "torsio/data/mapping.hpp"
+#include "torsio/sim/bench_dataset.hpp"
+#include "torsio/sim/experiment.hpp"
+
+namespace torsio::python {
+namespace {
+
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Flags = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+std::vector<double> values_of(const Doubles& array, const std::string& place) {
+  if (array.ndim() != 1)
+    throw UsageError(
+        {.place = place, .expected = "an array of one dimension", .found = kind_of(array)});
+  return {array.data(), array.data() + array.size()};
+}
+
+/// The memory of the channel itself, which lives as long as the recording does and never moves.
+py::array view_of(const py::object& recording, const std::string& name) {
+  const std::vector<double>& values = recording.cast<const Recording&>().channel(name).values;
+  py::array_t<double> view(static_cast<py::ssize_t>(values.size()), values.data(), recording);
+  view.attr("setflags")(py::arg("write") = false);
+  return view;
+}
+
+py::array_t<bool> freshness(const Recording& recording, const std::string& name) {
+  const Channel& channel = recording.channel(name);
+  py::array_t<bool> fresh(static_cast<py::ssize_t>(recording.size()));
+  bool* to = fresh.mutable_data();
+  for (std::size_t n = 0; n < recording.size(); ++n) to[n] = channel.is_fresh(n);
+  return fresh;
+}
+
+py::array_t<double> times(const Recording& recording) {
+  py::array_t<double> t_s(static_cast<py::ssize_t>(recording.size()));
+  double* to = t_s.mutable_data();
+  for (std::size_t n = 0; n < recording.size(); ++n) to[n] = recording.time_s(n);
+  return t_s;
+}
+
+void add_channel(Recording& recording, const std::string& name, const Doubles& values,
+                 const std::optional<Flags>& fresh) {
+  Channel channel{name, values_of(values, name)};
+  if (fresh) {
+    if (fresh->ndim() != 1 || fresh->size() != values.size())
+      throw UsageError({.place = name + ": fresh",
+                        .expected = "as many as there are values",
+                        .found = kind_of(*fresh)});
+    channel.fresh.assign(fresh->data(), fresh->data() + fresh->size());
+  }
+  recording.add(std::move(channel));
+}
+
+/// Columns of a table in memory, read as those of a CSV file are.
+std::vector<Recording> recordings_from_columns(
+    const std::vector<std::pair<std::string, Doubles>>& columns, std::optional<double> rate_Hz,
+    const std::string& mapping, const std::string& name) {
+  CsvTable table;
+  table.source.file = name;
+  table.line_marks = {{0, 0}};  // rows are counted as pandas does
+  for (const auto& [column, values] : columns)
+    table.columns.push_back({column, table.columns.size() + 1, values_of(values, column)});
+  return interruptible([&](const Progress& progress) {
+    const Mapping rules = mapping.empty() ? Mapping{} : read_mapping(mapping, progress);
+    std::vector<Recording> recordings =
+        measured_recordings(table, rules, rate_Hz.value_or(0.0), name);
+    for (Recording& recording : recordings) {
+      add_derived(recording, rules.derive);
+      recording.mapping = mapping_text(rules);
+    }
+    return recordings;
+  });
+}
+
+std::vector<Recording> read(const py::object& path, const py::object& mapping,
+                            std::optional<double> rate_Hz, const std::string& target) {
+  LoadOptions options;
+  options.rate_Hz = rate_Hz;
+  options.target = target;
+  if (!mapping.is_none()) options.mapping = path_text(mapping);
+  const std::string file = path_text(path);
+  return interruptible([&](const Progress& progress) {
+    options.progress = progress;
+    return load_recordings(file, options);
+  });
+}
+
+struct Roles {
+  py::object train;
+  py::object validation;
+  py::object test;
+};
+
+/// Recordings, paths of logs or manifests, or lists of those.
+void add_to(Dataset& dataset, const py::handle& item, Role role, const LoadOptions& options) {
+  if (item.is_none()) return;
+  if (py::isinstance<Recording>(item)) {
+    DatasetRecord record{item.cast<const Recording&>(), {}};
+    record.segments = whole_record(record.recording.size(), role);
+    dataset.records.push_back(std::move(record));
+  } else if (is_path(item)) {
+    const std::vector<std::string> files{path_text(item)};
+    Dataset read = interruptible([&](const Progress& progress) {
+      LoadOptions of_file = options;
+      of_file.role = role;
+      of_file.progress = progress;
+      return role == Role::test ? load_dataset({}, files, of_file)
+                                : load_dataset(files, {}, of_file);
+    });
+    for (DatasetRecord& record : read.records) dataset.records.push_back(std::move(record));
+    if (dataset.input_sets.empty()) dataset.input_sets = read.input_sets;
+    if (dataset.label.empty()) dataset.label = read.label;
+    if (options.target.empty()) dataset.target = read.target;
+    dataset.target_computed_from.insert(dataset.target_computed_from.end(),
+                                        read.target_computed_from.begin(),
+                                        read.target_computed_from.end());
+    dataset.files.insert(dataset.files.end(), read.files.begin(), read.files.end());
+  } else if (py::isinstance<py::sequence>(item)) {
+    for (const py::handle& each : item) add_to(dataset, each, role, options);
+  } else {
+    throw UsageError({.place = std::string(name(role)) + " of a Dataset",
+                      .expected = "Recordings, paths, or lists of them",
+                      .found = kind_of(item),
+                      .advice = "Recording.from_pandas makes one of a DataFrame."});
+  }
+}
+
+Dataset dataset_of(const Roles& roles, const std::string& target, const py::object& mapping,
+                   std::optional<double> rate_Hz, std::optional<std::size_t> initialise_samples) {
+  LoadOptions options;
+  options.rate_Hz = rate_Hz;
+  options.target = target;
+  if (!mapping.is_none()) options.mapping = path_text(mapping);
+  Dataset dataset;
+  if (!target.empty()) dataset.target = target;
+  if (initialise_samples) dataset.initialise_samples = *initialise_samples;
+  add_to(dataset, roles.train, Role::train, options);
+  add_to(dataset, roles.validation, Role::validation, options);
+  add_to(dataset, roles.test, Role::test, options);
+  if (dataset.records.empty())
+    throw UsageError({.place = "Dataset",
+                      .expected = "at least one recording",
+                      .found = "none",
+                      .advice = "Dataset(train=[...], test=[...])"});
+  dataset.check();
+  return dataset;
+}
+
+std::vector<std::pair<std::string, std::string>> roles_of(const Dataset& dataset) {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (const DatasetRecord& record : dataset.records) {
+    std::string text;
+    for (const Role role : {Role::train, Role::validation, Role::test})
+      if (record.has_role(role)) text += (text.empty() ? "" : ", ") + std::string(name(role));
+    all.emplace_back(record.recording.name(), text);
+  }
+  return all;
+}
+
+py::tuple pickled(const py::object& self) {
+  const auto& recording = self.cast<const Recording&>();
+  py::list channels;
+  for (const Channel& channel : recording.channels())
+    channels.append(py::make_tuple(
+        channel.name, view_of(self, channel.name).attr("tobytes")(),
+        py::bytes(reinterpret_cast<const char*>(channel.fresh.data()), channel.fresh.size()),
+        channel.step_before_resampling));
+  py::list definitions;
+  for (const ChannelDefinition& each : recording.definitions)
+    definitions.append(py::make_tuple(each.name, each.expression));
+  py::list zeros;
+  for (const ZeroRule& each : recording.zeros)
+    zeros.append(py::make_tuple(each.channel, each.first_s, each.mid_range));
+  return py::make_tuple(kPickleVersion, recording.name(), recording.sample_rate_Hz(),
+                        recording.time_s(0), channels, recording.conditions(), definitions, zeros,
+                        recording.mapping, recording.source.file, recording.source.sha256);
+}
+
+Recording unpickled(const py::tuple& state) {
+  check_pickle(state, 11, "Recording");
+  Recording recording(state[1].cast<std::string>(), state[2].cast<double>(),
+                      state[3].cast<double>());
+  const auto conditions = state[5].cast<std::vector<std::string>>();
+  for (const py::handle& each : state[4]) {
+    const auto part = each.cast<py::tuple>();
+    Channel channel{part[0].cast<std::string>(), {}};
+    const auto values = part[1].cast<std::string>();
+    channel.values.resize(values.size() / sizeof(double));
+    values.copy(reinterpret_cast<char*>(channel.values.data()),
+                channel.values.size() * sizeof(double));
+    const auto fresh = part[2].cast<std::string>();
+    channel.fresh.assign(fresh.begin(), fresh.end());
+    if (!fresh.empty() && fresh.size() != channel.values.size())
+      throw Error({.place = "pickle of a Recording", .problem = "its channels are damaged"});
+    channel.step_before_resampling = part[3].cast<double>();
+    const bool is_condition =
+        std::find(conditions.begin(), conditions.end(), channel.name) != conditions.end();
+    if (is_condition && !channel.values.empty() && recording.size() > 0) {
+      recording.add_condition(channel.name, channel.values.front());
+    } else {
+      recording.add(std::move(channel));
+    }
+  }
+  for (const py::handle& each : state[6]) {
+    const auto part = each.cast<std::pair<std::string, std::string>>();
+    recording.definitions.push_back({part.first, part.second});
+  }
+  for (const py::handle& each : state[7]) {
+    const auto part = each.cast<std::tuple<std::string, double, bool>>();
+    recording.zeros.push_back({std::get<0>(part), std::get<1>(part), std::get<2>(part)});
+  }
+  recording.mapping = state[8].cast<std::string>();
+  recording.source = {state[9].cast<std::string>(), state[10].cast<std::string>()};
+  return recording;
+}
+
+std::string short_text(const Recording& recording) {
+  std::string channels;
+  for (const Channel& channel : recording.channels())
+    channels += (channels.empty() ? "" : ", ") + channel.name;
+  return "<Recording '" + recording.name() + "': " + std::to_string(recording.size()) +
+         " samples at " + std::string(py::str(py::float_(recording.sample_rate_Hz()))) + " Hz; " +
+         channels + ">";
+}
+
+void bind_recording(py::module_& module) {
+  py::class_<Recording>(module, "Recording",
+                        "Channels by name on one uniform clock, in SI units.\n\n"
+                        "Names end in their unit (torque_Nm, gear_angle_rad). recording[name] is a "
+                        "read-only view of shape (samples,), without a copy.")
+      .def(py::init<std::string, double, double>(), py::arg("name"), py::arg("sample_rate_Hz"),
+           py::arg("start_s") = 0.0, "An empty recording, for `add`.")
+      .def_property_readonly("name", &Recording::name)
+      .def_property_readonly("sample_rate_Hz", &Recording::sample_rate_Hz)
+      .def_property_readonly("time_s", times, "Times of the samples in s, shape (samples,).")
+      .def_property_readonly("channels",
+                             [](const Recording& self) {
+                               std::vector<std::string> names;
+                               for (const Channel& each : self.channels())
+                                 names.push_back(each.name);
+                               return names;
+                             })
+      .def_property_readonly("conditions", &Recording::conditions,
+                             "Channels that are constant over the record.")
+      .def_property_readonly("file", [](const Recording& self) { return self.source.file; })
+      .def("__len__", &Recording::size)
+      .def("__contains__",
+           [](const Recording& self, const std::string& channel) { return self.has(channel); })
+      .def("__getitem__", view_of, py::arg("channel"))
+      .def("fresh", freshness, py::arg("channel"),
+           "True where the sensor measured anew, False where its last value is held; shape "
+           "(samples,).")
+      .def("add", add_channel, py::arg("name"), py::arg("values"), py::arg("fresh") = py::none(),
+           "Adds a channel in SI; values of shape (samples,).")
+      .def("add_condition", &Recording::add_condition, py::arg("name"), py::arg("value"),
+           "Adds a condition of the whole record, in SI.")
+      .def(
+          "write_csv",
+          [](const Recording& self, const py::object& path) {
+            const std::string file = path_text(path);
+            interruptible([&](const Progress& progress) {
+              write_csv(self, file, progress);
+              return 0;
+            });
+          },
+          py::arg("path"), "Writes t_s and every channel.")
+      .def("__repr__", short_text)
+      .def(py::pickle([](const py::object& self) { return pickled(self); },
+                      [](const py::tuple& state) { return unpickled(state); }));
+}
+
+}  // namespace
+
+void bind_recordings(py::module_& module) {
+  bind_recording(module);
+  module.def("recordings_from_columns", recordings_from_columns, py::arg("columns"),
+             py::arg("rate_Hz"), py::arg("mapping"), py::arg("name"));
+  module.def("read", read, py::arg("path"), py::kw_only(), py::arg("mapping") = py::none(),
+             py::arg("rate_Hz") = py::none(), py::arg("target") = "",
+             "Reads a CSV file, plain or gzipped, or every file of a manifest (.yaml).\n\n"
+             "mapping: a YAML file that names the columns of a foreign log (docs/recordings.md).\n"
+             "rate_Hz: all recordings are brought to it.");
+  module.def(
+      "simulate",
+      [](const std::string& actuator, const std::string& experiment, std::uint64_t seed,
+         std::optional<double> duration_s, std::optional<double> lever_m, double inclination_rad,
+         std::optional<double> torque_amplitude_Nm, std::optional<double> angle_amplitude_rad,
+         std::optional<double> frequency_Hz, bool is_electrical, bool with_truth) {
+        const ExperimentSpec spec{.actuator = actuator,
+                                  .experiment = experiment,
+                                  .seed = seed,
+                                  .duration_s = duration_s,
+                                  .lever_m = lever_m,
+                                  .inclination_rad = inclination_rad,
+                                  .torque_amplitude_Nm = torque_amplitude_Nm,
+                                  .angle_amplitude_rad = angle_amplitude_rad,
+                                  .frequency_Hz = frequency_Hz,
+                                  .is_electrical = is_electrical,
+                                  .with_truth = with_truth};
+        return interruptible([&](const Progress& progress) { return simulate(spec, progress); });
+      },
+      py::arg("actuator"), py::arg("experiment") = "sweep", py::kw_only(), py::arg("seed") = 1,
+      py::arg("duration_s") = py::none(), py::arg("lever_m") = py::none(),
+      py::arg("inclination_rad") = 0.0, py::arg("torque_amplitude_Nm") = py::none(),
+      py::arg("angle_amplitude_rad") = py::none(), py::arg("frequency_Hz") = py::none(),
+      py::arg("is_electrical") = false, py::arg("with_truth") = false,
+      "One experiment on a simulated bench (docs/actuators.md). Equal arguments give equal "
+      "recordings.");
+  module.def(
+      "sweep_dataset",
+      [](const std::string& actuator, std::uint64_t seed) {
+        return interruptible(
+            [&](const Progress& progress) { return sweep_dataset(actuator, seed, progress); });
+      },
+      py::arg("actuator") = "dfki-50", py::kw_only(), py::arg("seed") = 1,
+      "Three simulated sweeps for training and one with another lever for the test: the data of "
+      "`torsio demo`.");
+  py::class_<Dataset>(
+      module, "Dataset",
+      "Recordings with their roles: train, validation, test.\n\n"
+      "Each argument is a Recording, the path of a log or of a manifest, or a list of these.")
+      .def(py::init([](py::object train, py::object test, py::object validation,
+                       const std::string& target, const py::object& mapping,
+                       std::optional<double> rate_Hz,
+                       std::optional<std::size_t> initialise_samples) {
+             return dataset_of({std::move(train), std::move(validation), std::move(test)}, target,
+                               mapping, rate_Hz, initialise_samples);
+           }),
+           py::arg("train") = py::none(), py::arg("test") = py::none(),
+           py::arg("validation") = py::none(), py::kw_only(), py::arg("target") = "",
+           py::arg("mapping") = py::none(), py::arg("rate_Hz") = py::none(),
+           py::arg("initialise_samples") = py::none())
+      .def_property_readonly("target", [](const Dataset& self) { return self.target; })
+      .def_property_readonly("sample_rate_Hz", &Dataset::sample_rate_Hz)
+      .def_property_readonly("roles", roles_of, "(name, role) of each recording.")
+      .def_property_readonly("recordings",
+                             [](const Dataset& self) {
+                               std::vector<Recording> all;
+                               for (const DatasetRecord& each : self.records)
+                                 all.push_back(each.recording);
+                               return all;
+                             })
+      .def("__len__", [](const Dataset& self) { return self.records.size(); })
+      .def("__repr__", [](const Dataset& self) {
+        std::string text = "<Dataset of " + self.target + ":";
+        for (const auto& [name, role] : roles_of(self)) text += " " + name + " (" + role + ")";
+        return text + ">";
+      });
+}
+
+}  // namespace torsio::python

@@ -1,0 +1,125 @@
+"""Joint torque of series-elastic actuators: learned from recordings, estimated in real time.
+
+    sweep = torsio.simulate("dfki-50", "sweep", seed=1)            # a Recording
+    log = torsio.Recording.from_pandas(frame, rate_Hz=1000)        # or from_dict, or torsio.read("run.csv")
+    model = torsio.fit([sweep, log], "grey_box")
+    print(torsio.evaluate(model, torsio.read("other_lever.csv")))
+    model.save("joint.safetensors")
+
+    estimator = torsio.load("joint.safetensors").estimator(rate_Hz=1000.0)
+    torque = estimator.step(gear_angle_rad, joint_angle_rad)       # torque.value, torque.std_dev, torque.fault
+
+All quantities are in SI units, which the names end in. Errors are ValueErrors. Documentation: docs/python.md.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from . import _core
+from ._core import (
+    Batch,
+    Dataset,
+    Error,
+    Estimate,
+    Estimator,
+    Model,
+    Recording,
+    UsageError,
+    estimate,
+    families,
+    load,
+    read,
+    simulate,
+    sweep_dataset,
+)
+from ._faults import Fault
+from ._tables import recording_from_dict, recording_from_pandas, recording_to_pandas
+
+if TYPE_CHECKING:
+    from . import plot
+    from ._learning import attribute, check, compare, crossvalidate, drift, evaluate, fit, margins, track, transfer
+    from ._results import (
+        CheckReport,
+        Comparison,
+        CrossValidation,
+        Document,
+        Estimates,
+        Finding,
+        FoldSummary,
+        Margins,
+        Results,
+        Score,
+    )
+
+# Their types are in _core.pyi.
+setattr(Recording, "from_dict", staticmethod(recording_from_dict))
+setattr(Recording, "from_pandas", staticmethod(recording_from_pandas))
+setattr(Recording, "to_pandas", recording_to_pandas)
+
+__version__ = _core.__version__
+
+for _type in (Batch, Dataset, Estimate, Estimator, Model, Recording):
+    _type.__module__ = "torsio"
+del _type
+
+__all__ = [
+    "Batch",
+    "CheckReport",
+    "Comparison",
+    "CrossValidation",
+    "Dataset",
+    "Document",
+    "Error",
+    "Estimate",
+    "Estimates",
+    "Estimator",
+    "Fault",
+    "Finding",
+    "FoldSummary",
+    "Margins",
+    "Model",
+    "Recording",
+    "Results",
+    "Score",
+    "UsageError",
+    "attribute",
+    "check",
+    "compare",
+    "crossvalidate",
+    "drift",
+    "estimate",
+    "evaluate",
+    "families",
+    "fit",
+    "load",
+    "margins",
+    "plot",
+    "read",
+    "simulate",
+    "sweep_dataset",
+    "track",
+    "transfer",
+]
+
+
+# Imported when they are first used: a loop that only loads a model starts sooner.
+_LATER = {
+    "_learning": "attribute check compare crossvalidate drift evaluate fit margins track transfer",
+    "_results": "CheckReport Comparison CrossValidation Document Estimates Finding FoldSummary Margins Results Score",
+}
+
+
+def __getattr__(name: str) -> Any:
+    import importlib
+
+    if name == "plot":
+        return importlib.import_module("torsio.plot")
+    for module, names in _LATER.items():
+        if name in names.split():
+            value = getattr(importlib.import_module(f"torsio.{module}"), name)
+            globals()[name] = value
+            return value
+    raise AttributeError(f"module 'torsio' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__", "plot"]

@@ -1,0 +1,169 @@
+"""The verbs of the program `torsio` as functions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any, Union
+
+from . import _core
+from ._core import Dataset, Model, Recording
+from ._results import CheckReport, Comparison, CrossValidation, Document, Margins, Results
+
+#: A dataset, or recordings (of the role that the function needs), or paths of logs or manifests.
+Data = Union[Dataset, Recording, str, "PathLike[str]", Sequence[Any]]
+
+
+def _dataset(data: Data, role: str, target: str = "") -> Dataset:
+    if isinstance(data, Dataset):
+        return data
+    if role == "train":
+        return Dataset(train=data, target=target)
+    return Dataset(test=data, target=target)
+
+
+def _inputs(inputs: str | Sequence[str] | None) -> list[str]:
+    if inputs is None:
+        return []
+    return [inputs] if isinstance(inputs, str) else list(inputs)
+
+
+def _option(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def check(data: Data, *, inputs: str | Sequence[str] | None = None, advise: bool = False) -> CheckReport:
+    """Looks for errors in recordings before a fit: clock, units, signs, delay, range, ... (docs/check.md).
+
+    advise: also propose which recording to make next, in `report.document["advice"]`.
+    """
+    return CheckReport.from_json(_core.check(_dataset(data, "train"), _inputs(inputs), advise))
+
+
+def fit(
+    data: Data,
+    family: str,
+    *,
+    inputs: str | Sequence[str] | None = None,
+    seed: int = 1,
+    allow_leak: bool = False,
+    serial: str = "",
+    **options: Any,
+) -> Model:
+    """Trains one model on the recordings with the role train; equal arguments give equal models.
+
+    inputs: expressions of channels (docs/expressions.md); without them, the deflection of the spring, its
+    rate and the speed of the joint, as far as they are there.
+    options: those of the family (`torsio.families()`), as layers="64", branch=True.
+    Ctrl-C stops it.
+    """
+    given = {name: _option(value) for name, value in options.items()}
+    return _core.fit(_dataset(data, "train"), family, given, _inputs(inputs), seed, allow_leak, serial)
+
+
+def evaluate(model: Model, data: Data) -> Results:
+    """Scores a model in free run on every role of the data; recordings without a role are tests."""
+    return Results.from_json(_core.evaluate(model, _dataset(data, "test", model.target)))
+
+
+def compare(
+    data: Data,
+    models: str | Sequence[str] = "all",
+    *,
+    inputs: str | Sequence[str] | None = None,
+    seed: int = 1,
+    allow_leak: bool = False,
+) -> Comparison:
+    """Trains several families and ranks them on the held-out recordings (docs/evaluation.md).
+
+    models: "all", or families with options after colons: "linear,polynomial:degree=7".
+    """
+    names = models if isinstance(models, str) else ",".join(models)
+    text, best = _core.compare(_dataset(data, "train"), names, _inputs(inputs), seed, allow_leak)
+    return Comparison(Results.from_json(text), best)
+
+
+def crossvalidate(
+    data: Data,
+    models: str | Sequence[str] = "all",
+    *,
+    inputs: str | Sequence[str] | None = None,
+    folds: int = 5,
+    by: str = "",
+    embargo_s: float = 1.0,
+    seed: int = 1,
+    allow_leak: bool = False,
+) -> CrossValidation:
+    """Trains every model on each fold's rest and scores it on the fold.
+
+    by: "record" for one fold a recording, or a condition, each value of which is a fold.
+    """
+    names = models if isinstance(models, str) else ",".join(models)
+    text = _core.crossvalidate(
+        _dataset(data, "train"), names, _inputs(inputs), folds, by, embargo_s, seed, allow_leak
+    )
+    return CrossValidation.from_json(text)
+
+
+def attribute(
+    model: Model,
+    data: Data,
+    *,
+    windows: int = 200,
+    background: int = 50,
+    window_samples: int = 0,
+    repeats: int = 5,
+    seed: int = 1,
+) -> Document:
+    """How much a model uses each input: Shapley values and permutation importance (docs/evaluation.md).
+
+    window_samples: 0 for the memory of the model.
+    """
+    dataset = _dataset(data, "test", model.target)
+    text = _core.attribute(model, dataset, windows, background, window_samples, repeats, seed)
+    return Document.from_json(text, "results")
+
+
+def drift(model: Model, data: Data, *, reference: Model | None = None, seed: int = 1) -> Document:
+    """What has changed in a joint since the calibration of its model (docs/drift.md)."""
+    text = _core.drift(model, _dataset(data, "test", model.target), reference, seed)
+    return Document.from_json(text, "quantities")
+
+
+def transfer(
+    base: Model, data: Data, *, use_s: float = 10.0, method: str = "auto", seed: int = 1
+) -> tuple[Model, Document]:
+    """A model of one joint for another one, from the first use_s seconds of its recordings (docs/transfer.md).
+
+    Returns the model and the scores of all methods, on test recordings or on what follows the used part.
+    """
+    text, model = _core.transfer(base, _dataset(data, "train", base.target), use_s, method, seed)
+    return model, Document.from_json(text, "methods")
+
+
+def track(
+    actuator: str,
+    models: Mapping[str, Model],
+    reference: str = "chirp",
+    *,
+    amplitude_Nm: float | None = None,
+    duration_s: float | None = None,
+    bandwidth_rad_s: float = 50.0,
+    is_free: bool = False,
+    seeds: Sequence[int] = (1,),
+) -> Document:
+    """A torque loop on a simulated joint, with each model and with a line from sweeps (docs/tracking.md).
+
+    reference: chirp, random_walk, steps or sweep. is_free: the lever moves; else the output is locked.
+    """
+    text = _core.track(
+        actuator, list(models.items()), reference, amplitude_Nm, duration_s, bandwidth_rad_s, is_free, list(seeds)
+    )
+    return Document.from_json(text, "results")
+
+
+def margins(
+    actuator: str, *, bandwidth_rad_s: float = 50.0, damping: float = 0.9, load_inertia_kg_m2: float = 0.0
+) -> list[Margins]:
+    """Stability margins of the deflection control at 1 kHz on the data sheet of an actuator, locked and free."""
+    return [Margins(*row) for row in _core.margins(actuator, bandwidth_rad_s, damping, load_inertia_kg_m2)]
