@@ -189,6 +189,8 @@ ordered_json monitor_json(const MonitorFile& file) {
   for (std::size_t i = 0; i < file.redundancy.sources.size(); ++i)
     document["sources"].push_back(source_json(file.redundancy.sources[i], file.models.at(i)));
   document["correlation"] = file.redundancy.correlation;
+  if (!file.redundancy.error_bar_factors.empty())
+    document["combination_factors"] = file.redundancy.error_bar_factors;
   document["signals"] = ordered_json::array();
   for (const MonitoredSignal& signal : monitor.signals)
     document["signals"].push_back(signal_json(signal));
@@ -224,19 +226,33 @@ void check_version(const JsonObject& document, const std::string& place) {
 }
 
 MonitorFile file_of(const JsonObject& document, const std::string& place) {
-  document.allow_only({"format",           "format_version",
-                       "torsio_version",   "device_serial",
-                       "valid_until",      "sample_period_s",
-                       "fault_free_hours", "false_alarms_per_hour",
-                       "is_extrapolated",  "recordings",
-                       "sources",          "correlation",
-                       "signals",          "pairs",
-                       "actions",          "persistence_s",
-                       "release_share",    "longest_loss_s",
-                       "longest_fault_s",  "longest_warm_up_s",
-                       "largest_novelty",  "longest_overrun",
-                       "spikes_in_a_row",  "spike_memory_s",
-                       "proof_s",          "longest_command_age_s"});
+  document.allow_only({"format",
+                       "format_version",
+                       "torsio_version",
+                       "device_serial",
+                       "valid_until",
+                       "sample_period_s",
+                       "fault_free_hours",
+                       "false_alarms_per_hour",
+                       "is_extrapolated",
+                       "recordings",
+                       "sources",
+                       "correlation",
+                       "signals",
+                       "pairs",
+                       "actions",
+                       "persistence_s",
+                       "release_share",
+                       "longest_loss_s",
+                       "longest_fault_s",
+                       "longest_warm_up_s",
+                       "largest_novelty",
+                       "longest_overrun",
+                       "spikes_in_a_row",
+                       "spike_memory_s",
+                       "proof_s",
+                       "longest_command_age_s",
+                       "combination_factors"});
   MonitorFile file;
   file.device_serial = document.text("device_serial");
   file.valid_until = document.text("valid_until");
@@ -258,6 +274,8 @@ MonitorFile file_of(const JsonObject& document, const std::string& place) {
   MonitorSettings& monitor = file.monitor;
   for (const TorqueSource& source : file.redundancy.sources) monitor.sources.push_back(source.name);
   file.redundancy.correlation = monitor.correlation = document.numbers("correlation");
+  if (document.has("combination_factors"))
+    file.redundancy.error_bar_factors = document.numbers("combination_factors");
   monitor.signals = document.objects(
       "signals", [&](const JsonObject& signal) { return signal_of(signal, place + "/signals"); });
   monitor.pairs = document.objects("pairs", [&](const JsonObject& pair) {

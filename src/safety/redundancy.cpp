@@ -1,6 +1,7 @@
 #include "torsio/safety/redundancy.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -26,10 +27,25 @@ void check_sources(const std::vector<TorqueSource>& sources) {
                  .found = fmt::format("'{}'", *name)});
 }
 
+void check_factors(const RedundancySettings& settings) {
+  const std::vector<double>& factors = settings.error_bar_factors;
+  if (factors.empty()) return;
+  constexpr double kLargest = 1e6;
+  const auto is_usable = [](double factor) { return factor >= 1.0 && factor <= kLargest; };
+  if (factors.size() == settings.sources.size() && std::ranges::all_of(factors, is_usable)) return;
+  throw Error(
+      {.place = "redundancy: error_bar_factors",
+       .expected = fmt::format("{} numbers from 1 to {:g}", settings.sources.size(), kLargest),
+       .found = fmt::format("{}", fmt::join(factors, ", "))});
+}
+
 }  // namespace
 
 Redundancy::Redundancy(const RedundancySettings& settings) : settings_(settings) {
   check_sources(settings.sources);
+  check_factors(settings);
+  factors_.fill(1.0);
+  std::ranges::copy(settings.error_bar_factors, factors_.begin());
   correlation_ =
       detail::error_correlation(settings.correlation, settings.sources.size(), "redundancy");
   inverses_ = detail::inverses(correlation_, settings.sources.size());
@@ -140,11 +156,14 @@ FusedTorque Redundancy::step(std::span<const Estimate> sources) noexcept {
   }
   PartSet shared = ~PartSet{0};
   double smallest_Nm = std::numeric_limits<double>::infinity();
+  Row std_dev_Nm{};
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (!detail::is_valid(sources[i])) continue;
     fused.used |= SourceSet{1} << i;
     shared &= parts_of_[i];
-    smallest_Nm = std::min(smallest_Nm, sources[i].std_dev);
+    // The largest number in place of infinity: the product of two finite numbers.
+    std_dev_Nm[i] = std::min(factors_[i] * sources[i].std_dev, std::numeric_limits<double>::max());
+    smallest_Nm = std::min(smallest_Nm, std_dev_Nm[i]);
   }
   if (fused.used == 0) return fused;
   Row precision{};
@@ -153,7 +172,7 @@ FusedTorque Redundancy::step(std::span<const Estimate> sources) noexcept {
   double highest_Nm = -lowest_Nm;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if ((fused.used >> i & 1U) == 0) continue;
-    precision[i] = smallest_Nm / sources[i].std_dev;
+    precision[i] = smallest_Nm / std_dev_Nm[i];
     lowest_Nm = std::min(lowest_Nm, sources[i].value);
     highest_Nm = std::max(highest_Nm, sources[i].value);
   }

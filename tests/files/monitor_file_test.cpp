@@ -95,6 +95,7 @@ TEST(MonitorFile, ComesBackAsItWasWritten) {
 TEST(MonitorFile, KeepsEverySetting) {
   Written written;
   MonitorSettings& settings = written.file.monitor;
+  written.file.redundancy.error_bar_factors = {1.0, 1.5};
   settings.pairs[0].ceiling_Nm = 9.0;
   settings.pairs[0].drift_allowance = 0.8;
   settings.persistence_s = 0.006;
@@ -109,6 +110,8 @@ TEST(MonitorFile, KeepsEverySetting) {
   settings.proof_s = 0.07;
   settings.longest_command_age_s = 0.25;
   save_monitor(written.path, written.file);
+  EXPECT_EQ(read_monitor(written.path).redundancy.error_bar_factors,
+            written.file.redundancy.error_bar_factors);
   const MonitorSettings read = read_monitor(written.path).monitor;
   const auto numbers = [](const MonitorSettings& of) {
     return std::vector<double>{of.pairs[0].factor,

@@ -348,6 +348,43 @@ TEST(Redundancy, RefusesSettingsThatAreNotValid) {
             "one");
 }
 
+TEST(Redundancy, AFactorCountsAsALongerErrorBar) {
+  RedundancySettings settings = anonymous_sources(3);
+  settings.correlation = {1.0, 0.3, 0.1, 0.3, 1.0, -0.2, 0.1, -0.2, 1.0};
+  Redundancy plain(settings);
+  settings.error_bar_factors = {2.0, 1.0, 3.0};
+  Redundancy weighed(settings);
+  const std::vector<Estimate> sources{torque(1.0, 0.5), torque(2.0, 1.0), torque(4.0, 0.25)};
+  const std::vector<Estimate> longer{torque(1.0, 1.0), torque(2.0, 1.0), torque(4.0, 0.75)};
+  const FusedTorque expected = plain.step(longer);
+  const FusedTorque fused = weighed.step(sources);
+  EXPECT_EQ(fused.value_Nm, expected.value_Nm);
+  EXPECT_EQ(fused.std_dev_Nm, expected.std_dev_Nm);
+  EXPECT_NE(fused.value_Nm, plain.step(sources).value_Nm);
+  // A product that is not a number of this machine.
+  settings.error_bar_factors = {1e6, 1e6, 1e6};
+  const double huge = std::numeric_limits<double>::max();
+  const FusedTorque far = Redundancy(settings).step(
+      std::vector{torque(1.0, huge), torque(2.0, huge), torque(4.0, huge)});
+  EXPECT_GE(far.value_Nm, 1.0);
+  EXPECT_LE(far.value_Nm, 4.0);
+}
+
+TEST(Redundancy, RefusesFactorsThatAreNotOneForEachSource) {
+  const auto refusal = [](std::vector<double> factors) {
+    RedundancySettings settings = anonymous_sources(2);
+    settings.error_bar_factors = std::move(factors);
+    return test::error_message([&] { Redundancy{settings}; });
+  };
+  EXPECT_EQ(refusal({1.0, 1e6}), "");
+  const std::string expected =
+      "redundancy: error_bar_factors: expected 2 numbers from 1 to 1e+06, found ";
+  EXPECT_EQ(refusal({2.0}), expected + "2");
+  EXPECT_EQ(refusal({1.0, 0.5}), expected + "1, 0.5");
+  EXPECT_EQ(refusal({1.0, 2e6}), expected + "1, 2000000");
+  EXPECT_EQ(refusal({kNaN, 1.0}), expected + "nan, 1");
+}
+
 TEST(Redundancy, RefusesWhatIsNoCorrelation) {
   const auto refusal = [](const std::vector<double>& correlation, std::size_t count = 2) {
     RedundancySettings settings = anonymous_sources(count);

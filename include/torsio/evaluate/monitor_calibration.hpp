@@ -80,18 +80,19 @@ struct CalibratedMonitor {
 ///   above their 90 % quantile, which gives the threshold for the wanted rate, at least 1.05 times
 ///   the largest one observed. The ceiling is 1.25 times the largest threshold since the pair was
 ///   first narrow enough to be armed: error bars that grow further do not make the pair blind.
-/// - Error bars and correlation of the sources' errors: where the recordings have the measured
-///   torque.
-/// - Signals: range with a quarter of its width on either side; 1.5 times the largest rate; 1.5
-///   times the longest gap between fresh samples (at least a sample); twice the longest travel of a
-///   companion without a change.
+/// - Error bars, correlation of the sources' errors and factors of the combination: where the
+///   recordings have the measured torque.
+/// - Signals: range with a quarter of its width on either side; 1.5 times the largest rate; twice the
+///   longest travel of a companion without a change; each of them at least what the tail of its
+///   maxima over blocks, as for pairs, exceeds at the wanted rate. 1.5 times the longest gap between
+///   fresh samples (at least a sample).
 /// - Drift: what is allowed is 1.2 times the largest size of a mean of d / h over a minute, limited
 ///   to 0.75 to 0.95; the limit is 3 times the largest cumulative sum, at least 1 s.
 ///
-/// The sum over checks of signals is not part of the wanted rate: their limits have margins
-/// instead. Form: ours; tails: Pickands 1975, their moments Hosking and Wallis 1987.
-/// @throws Error if there are fewer than two sources, if the recordings lack a channel, are shorter than ten blocks, cannot support the
-/// wanted rate, or if a source has a fault in more than 1 % of the samples; UsageError for a rate
+/// One half of the wanted rate belongs to the pairs, the other to the signals, in equal shares.
+/// Form: ours; tails: Pickands 1975, their moments Hosking and Wallis 1987.
+/// @throws Error if there are fewer than two sources, if the recordings lack a channel, are shorter
+/// than ten blocks, cannot support the wanted rate, or if a source has a fault in more than 1 % of the samples; UsageError for a rate
 /// that is not positive or a signal whose companion is not a signal; Cancelled.
 [[nodiscard]] CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
                                                   const MonitorPlan& plan,

@@ -24,6 +24,10 @@ struct RedundancySettings {
   std::vector<TorqueSource> sources;
   /// Correlation of the sources' errors in units of their error bars, row by row; empty: none.
   std::vector<double> correlation;
+  /// Per source, at least 1; empty: 1 each. The error bar counts so many times: a source whose error
+  /// persists for a whole recording gets less weight than one with the same error bar whose errors
+  /// average out.
+  std::vector<double> error_bar_factors = {};
 };
 
 /// A set of sources or of parts: bit i is the i-th one.
@@ -45,9 +49,9 @@ struct FusedTorque {
 
 /// Combines estimates of one torque by their error bars:
 ///
-///     tau = w' t,  var = w' S w,  S_ij = s_i R_ij s_j
+///     tau = w' t,  var = w' S w,  S_ij = c_i s_i R_ij c_j s_j
 ///
-/// t the valid estimates, s their error bars at this tick, R the correlation of their errors. w are
+/// t the valid estimates, s their error bars at this tick, c the factors of the settings, R the correlation of their errors. w are
 /// the weights >= 0 with sum 1 of the smallest variance. Since the weights are not negative, the
 /// result lies between the estimates; since a smaller set of sources has a larger minimum, the
 /// error bar never becomes narrower when a source is lost.
@@ -63,8 +67,9 @@ class Redundancy {
   static constexpr std::size_t kMaxParts = 32;
 
   /// @throws Error for no sources or more than `kMaxSources`, names that are empty or used twice,
-  /// parts without a name or more than `kMaxParts` of them, or a correlation that is not a
-  /// correlation matrix (size, ones on the diagonal, symmetric, positive definite).
+  /// parts without a name or more than `kMaxParts` of them, a correlation that is not a
+  /// correlation matrix (size, ones on the diagonal, symmetric, positive definite), or factors that
+  /// are not one of 1 to 1e6 for each source.
   explicit Redundancy(const RedundancySettings& settings);
 
   /// @param sources one estimate for each source; of another size, none is used
@@ -101,6 +106,7 @@ class Redundancy {
   std::vector<std::string> parts_;
   std::array<PartSet, kMaxSources> parts_of_{};
   std::array<Row, kMaxSources> correlation_{};
+  Row factors_{};
   std::vector<double> inverses_;  ///< one for each set of sources
   double last_Nm_ = 0.0;
 };

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "core/report_progress.hpp"
+#include "evaluate/monitor/combination_factors.hpp"
 #include "evaluate/monitor/pair_calibration.hpp"
 #include "evaluate/monitor/signal_statistics.hpp"
 #include "evaluate/monitor/source_run.hpp"
@@ -18,8 +20,11 @@ namespace {
 
 constexpr double kSecondsPerHour = 3600.0;
 constexpr double kLargestGuardedShare = 0.01;
+constexpr double kCombinationSegment_s = 60.0;
 /// The correlation is known only from a finite record: it is taken a little towards none.
 constexpr double kCorrelationShare = 0.95;
+/// The share of the wanted rate of false alarms that pairs have; the limits of signals have the rest.
+constexpr double kPairsShare = 0.5;
 
 /// The errors in units of their error bars, where the torque was measured.
 class ErrorMoments {
@@ -127,17 +132,24 @@ Recorded run_all(const std::vector<SourceModel>& sources, const Dataset& fault_f
   return recorded;
 }
 
-ErrorMoments moments_of(const Recorded& recorded, const Dataset& fault_free, std::size_t sources) {
-  ErrorMoments moments(sources);
+/// The recordings in which the torque was measured.
+std::vector<MeasuredRun> measured_runs(const Recorded& recorded, const Dataset& fault_free) {
+  std::vector<MeasuredRun> runs;
   for (std::size_t r = 0; r < recorded.size(); ++r) {
     const Recording& recording = fault_free.records[r].recording;
     if (!recording.has(fault_free.target)) continue;
     const Channel& measured = recording.channel(fault_free.target);
-    std::vector<double> fresh(measured.values);
-    for (std::size_t n = 0; n < fresh.size(); ++n)
-      if (!measured.is_fresh(n)) fresh[n] = kNotMeasured;
-    moments.add(recorded[r], fresh);
+    MeasuredRun run{.sources = &recorded[r], .torque_Nm = measured.values};
+    for (std::size_t n = 0; n < run.torque_Nm.size(); ++n)
+      if (!measured.is_fresh(n)) run.torque_Nm[n] = kNotMeasured;
+    runs.push_back(std::move(run));
   }
+  return runs;
+}
+
+ErrorMoments moments_of(const std::vector<MeasuredRun>& runs, std::size_t sources) {
+  ErrorMoments moments(sources);
+  for (const MeasuredRun& run : runs) moments.add(*run.sources, run.torque_Nm);
   return moments;
 }
 
@@ -176,12 +188,17 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
   result.false_alarms_per_hour = options.false_alarms_per_hour;
   result.is_extrapolated = check_rate(options, result.hours);
 
+  // The share of the blocks in which each of so many limits may be exceeded.
+  const auto blocks_share = [&](double share_of_rate, std::size_t limits) {
+    return share_of_rate * options.false_alarms_per_hour * kCalibrationBlock_s / kSecondsPerHour /
+           static_cast<double>(limits);
+  };
   SignalStatistics signals(plan.signals, rate_Hz);
   for (const DatasetRecord& record : fault_free.records) signals.add(record.recording);
   std::vector<SourceModel> scaled = sources;
   Recorded recorded = run_all(scaled, fault_free, progress, 0.0);
   // The error bars first, since a filter of the friction uses them.
-  const ErrorMoments moments = moments_of(recorded, fault_free, sources.size());
+  const ErrorMoments moments = moments_of(measured_runs(recorded, fault_free), sources.size());
   result.error_bar_factors = moments.sizes();
   for (std::size_t i = 0; i < sources.size(); ++i) {
     result.error_bar_factors[i] *= scaled[i].error_bar_factor;
@@ -208,10 +225,14 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
                    .advice = "train its model on recordings that cover this motion and load"});
   }
   const Redundancy redundancy({.sources = plan.sources, .correlation = {}});
+  const std::vector<MeasuredRun> measured = measured_runs(recorded, fault_free);
   result.not_redundant = redundancy.names(parts_of_all(redundancy));
   result.redundancy.correlation = result.monitor.correlation =
-      moments_of(recorded, fault_free, sources.size()).correlation();
-  result.monitor.signals = signals.limits();
+      moments_of(measured, sources.size()).correlation();
+  result.redundancy.error_bar_factors = combination_factors(
+      result.redundancy, measured, static_cast<std::size_t>(kCombinationSegment_s * rate_Hz));
+  result.monitor.signals = signals.limits(
+      blocks_share(1.0 - kPairsShare, SignalStatistics::kLimits * plan.signals.size()));
   for (const TorqueSource& source : plan.sources) result.monitor.sources.push_back(source.name);
 
   std::vector<PairLimits> pairs;
@@ -221,9 +242,7 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
           {.first = static_cast<std::uint8_t>(i), .second = static_cast<std::uint8_t>(j)});
   PairChoice choice{.rate_Hz = rate_Hz,
                     .persistence_s = result.monitor.persistence_s,
-                    // Floor and factor of every pair have the same share of the wanted rate.
-                    .share = options.false_alarms_per_hour * kCalibrationBlock_s / kSecondsPerHour /
-                             (2.0 * static_cast<double>(pairs.size())),
+                    .share = blocks_share(kPairsShare, 2 * pairs.size()),  // floor and factor
                     .least_Nm = options.least_threshold_Nm,
                     .required_Nm = options.required_Nm};
   for (const PairLimits& pair : pairs) {

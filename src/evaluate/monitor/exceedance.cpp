@@ -35,19 +35,25 @@ std::vector<double> persisting(std::span<const double> values, std::size_t count
 }
 
 void BlockMaxima::add(std::span<const double> values) {
-  for (const double value : values) {
-    if (value > maximum_) maximum_ = value;
-    if (++in_block_ < block_) continue;
-    if (std::isfinite(maximum_)) {
-      maxima_.push_back(maximum_);
-      largest_ = std::max(largest_, maximum_);
-    }
-    maximum_ = -std::numeric_limits<double>::infinity();
-    in_block_ = 0;
+  for (const double value : values) add(value);
+}
+
+void BlockMaxima::add(double value) {
+  if (value > maximum_) maximum_ = value;
+  if (++in_block_ < block_) return;
+  if (std::isfinite(maximum_)) {
+    maxima_.push_back(maximum_);
+    largest_ = std::max(largest_, maximum_);
   }
+  maximum_ = -std::numeric_limits<double>::infinity();
+  in_block_ = 0;
 }
 
 double BlockMaxima::threshold(double share) const {
+  return maxima_.empty() ? 0.0 : std::max(1.05 * largest_, exceeded_in(share));
+}
+
+double BlockMaxima::exceeded_in(double share) const {
   if (maxima_.empty()) return 0.0;
   const double high = quantile(maxima_, 0.9);
   double sum = 0.0;
@@ -59,13 +65,12 @@ double BlockMaxima::threshold(double share) const {
     squares += (maximum - high) * (maximum - high);
     ++above;
   }
-  const double floor = 1.05 * largest_;
-  if (above == 0) return floor;
+  if (above == 0) return largest_;
   const auto count = static_cast<double>(above);
   const double mean = sum / count;
   const double variance = squares / count - mean * mean;
   const double ratio = count / (share * static_cast<double>(maxima_.size()));
-  if (!(ratio > 1.0)) return floor;
+  if (!(ratio > 1.0)) return largest_;
   // Moments of the generalised Pareto distribution (Hosking and Wallis 1987).
   const bool has_shape = above >= kLeastForShape && variance > 0.0;
   const double shape =
@@ -74,7 +79,7 @@ double BlockMaxima::threshold(double share) const {
   const double scale = mean * (1.0 - shape);
   const double excess = std::abs(shape) < 1e-6 ? scale * std::log(ratio)
                                                : scale / shape * (std::pow(ratio, shape) - 1.0);
-  return std::max(floor, high + excess);
+  return std::max(largest_, high + excess);
 }
 
 }  // namespace torsio

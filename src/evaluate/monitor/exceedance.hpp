@@ -21,24 +21,26 @@ class BlockMaxima {
 
   /// Adds samples; NaN is none. Blocks run across calls.
   void add(std::span<const double> values);
+  void add(double value);
 
   /// Complete blocks that had a value.
   [[nodiscard]] std::size_t size() const noexcept { return maxima_.size(); }
   [[nodiscard]] double largest() const noexcept { return largest_; }
 
-  /// The threshold that is exceeded in a share `share` of the blocks: u + s/xi ((p / share)^xi -
-  /// 1), the generalised Pareto tail of the maxima above their 90 % quantile u (p the share of
-  /// those; shape xi and scale s by moments, xi limited to -0.4 to 0, and 0 for fewer than 30 of
-  /// them); at least 1.05 times the largest one. 0 if there is no block. Differences of torques are
-  /// bounded: an exponential tail (xi = 0) is the heaviest one, and a larger xi is an error of its
-  /// estimate.
+  /// The value that is exceeded in a share `share` of the blocks: u + s/xi ((p / share)^xi - 1), the
+  /// generalised Pareto tail of the maxima above their 90 % quantile u (p the share of those; shape
+  /// xi and scale s by moments, xi limited to -0.4 to 0, and 0 for fewer than 30 of them); at least
+  /// the largest one. 0 if there is no block. What a joint measures is bounded: an exponential tail
+  /// (xi = 0) is the heaviest one, and a larger xi is an error of its estimate.
+  [[nodiscard]] double exceeded_in(double share) const;
+  /// The same of values that are not negative, at least 1.05 times the largest one.
   [[nodiscard]] double threshold(double share) const;
 
  private:
   std::size_t block_;
   std::size_t in_block_ = 0;
   double maximum_ = -std::numeric_limits<double>::infinity();
-  double largest_ = 0.0;
+  double largest_ = -std::numeric_limits<double>::infinity();
   std::vector<double> maxima_;
 };
 

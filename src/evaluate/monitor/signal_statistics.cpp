@@ -5,17 +5,22 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evaluate/monitor/pair_calibration.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
 constexpr double kRangeMargin = 0.25;  // margin on either side, over the range in the recordings
+constexpr double kRateMargin = 1.5;    // over the largest value in the recordings
+constexpr double kHiddenTravelMargin = 2.0;
 
 }  // namespace
 
 SignalStatistics::SignalStatistics(const std::vector<MonitoredSignal>& signals, double rate_Hz)
-    : signals_(signals), states_(signals.size()), rate_Hz_(rate_Hz) {
+    : signals_(signals),
+      states_(signals.size(), State(static_cast<std::size_t>(kCalibrationBlock_s * rate_Hz))),
+      rate_Hz_(rate_Hz) {
   for (const MonitoredSignal& signal : signals) {
     spec_.inputs.push_back(signal.name);
     const auto companion = std::ranges::find(signals, signal.moves_with, &MonitoredSignal::name);
@@ -42,23 +47,29 @@ void SignalStatistics::add(const Recording& recording) {
   }
 }
 
-std::vector<MonitoredSignal> SignalStatistics::limits() const {
+std::vector<MonitoredSignal> SignalStatistics::limits(double share) const {
   std::vector<MonitoredSignal> limits = signals_;
   for (std::size_t i = 0; i < limits.size(); ++i) {
     const State& state = states_[i];
     MonitoredSignal& signal = limits[i];
-    const double margin = kRangeMargin * (state.highest - state.lowest);
-    if (std::isinf(signal.lowest)) signal.lowest = state.lowest - margin;
-    if (std::isinf(signal.highest)) signal.highest = state.highest + margin;
+    const double margin = kRangeMargin * (state.highest_value - state.lowest_value);
+    if (std::isinf(signal.lowest))
+      signal.lowest = std::min(state.lowest_value - margin, -state.lowest.exceeded_in(share));
+    if (std::isinf(signal.highest))
+      signal.highest = std::max(state.highest_value + margin, state.highest.exceeded_in(share));
     if (!(signal.lowest < signal.highest))
       throw Error({.place = "monitor: " + signal.name,
                    .problem = "the signal is constant in the fault-free recordings",
                    .advice = "record it while the joint moves, or give its range"});
-    if (std::isinf(signal.largest_rate)) signal.largest_rate = 1.5 * state.largest_step * rate_Hz_;
+    if (std::isinf(signal.largest_rate))
+      signal.largest_rate =
+          rate_Hz_ * std::max(kRateMargin * state.largest_step, state.steps.exceeded_in(share));
     if (std::isinf(signal.longest_age_s))
       signal.longest_age_s = 1.5 * static_cast<double>(longest_gap_ + 1) / rate_Hz_;
     if (!signal.moves_with.empty() && std::isinf(signal.largest_hidden_travel))
-      signal.largest_hidden_travel = 2.0 * std::max(state.hidden_travel, state.companion_step);
+      signal.largest_hidden_travel =
+          std::max(kHiddenTravelMargin * std::max(state.hidden_travel, state.companion_step),
+                   state.hidden.exceeded_in(share));
     if (!(signal.largest_hidden_travel > 0.0))
       throw Error({.place = "monitor: " + signal.name,
                    .problem = fmt::format("{}, with which it is to move, is constant in the "
@@ -74,15 +85,21 @@ void SignalStatistics::add(State& state, std::span<const double> values, std::si
   if (!std::isfinite(value)) return;
   const bool has_companion = companions_[i] < values.size();
   const double companion = has_companion ? values[companions_[i]] : 0.0;
-  state.lowest = std::min(state.lowest, value);
-  state.highest = std::max(state.highest, value);
+  state.lowest_value = std::min(state.lowest_value, value);
+  state.highest_value = std::max(state.highest_value, value);
+  state.lowest.add(-value);
+  state.highest.add(value);
   if (state.is_started) {
-    state.largest_step = std::max(state.largest_step, std::abs(value - state.last));
+    const double step = std::abs(value - state.last);
+    state.largest_step = std::max(state.largest_step, step);
+    state.steps.add(step);
     state.companion_step =
         std::max(state.companion_step, std::abs(companion - state.last_companion));
   }
   if (!state.is_started || value != state.last) state.companion = companion;
-  state.hidden_travel = std::max(state.hidden_travel, std::abs(companion - state.companion));
+  const double hidden_travel = std::abs(companion - state.companion);
+  state.hidden_travel = std::max(state.hidden_travel, hidden_travel);
+  state.hidden.add(hidden_travel);
   state.last = value;
   state.last_companion = companion;
   state.is_started = true;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "evaluate/monitor/exceedance.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/safety/monitor.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
@@ -18,14 +19,26 @@ class SignalStatistics {
 
   void add(const Recording& recording);
 
-  /// The signals with the limits that were not given.
+  /// The signals with the limits that were not given. In blocks of the recordings, the largest values
+  /// have a tail that exceeds such a limit in a share `share` of the blocks; a limit has a margin at
+  /// least.
   /// @throws Error for a signal that is constant, or that is to move with one that is.
-  [[nodiscard]] std::vector<MonitoredSignal> limits() const;
+  [[nodiscard]] std::vector<MonitoredSignal> limits(double share) const;
+
+  /// Limits of a signal that follow the recordings: two of its range, its rate, and the hidden travel.
+  static constexpr std::size_t kLimits = 4;
 
  private:
   struct State {
-    double lowest = std::numeric_limits<double>::infinity();
-    double highest = -std::numeric_limits<double>::infinity();
+    explicit State(std::size_t block)
+        : highest(block), lowest(block), steps(block), hidden(block) {}
+
+    BlockMaxima highest;
+    BlockMaxima lowest;  ///< maxima of the negative values
+    BlockMaxima steps;   ///< between successive samples
+    BlockMaxima hidden;  ///< travel of the companion while the signal keeps its value
+    double lowest_value = std::numeric_limits<double>::infinity();
+    double highest_value = -std::numeric_limits<double>::infinity();
     double largest_step = 0.0;
     double hidden_travel = 0.0;
     double companion_step = 0.0;

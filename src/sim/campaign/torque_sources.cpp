@@ -251,7 +251,7 @@ std::string with_kinematic_error(const SourceRecipe& recipe, const ChannelDefini
 /// Work is rougher than a training recording of minutes. These models are linear or continue linearly: the
 /// monitor has limits of its own for signals, and compares the sources.
 void widen(EstimatorSettings& settings) {
-  constexpr double kShare = 0.5;
+  constexpr double kShare = 1.0;
   constexpr double kSteps = 3.0;
   for (std::size_t i = 0; i < settings.ranges.lowest.size(); ++i) {
     const double wider = kShare * (settings.ranges.highest[i] - settings.ranges.lowest[i]);

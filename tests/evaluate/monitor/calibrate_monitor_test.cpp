@@ -102,6 +102,15 @@ TEST(CalibrateMonitor, TakesTheLimitsOfSignalsFromTheDataUnlessTheyAreGiven) {
   EXPECT_EQ(monitor.monitor.signals[1].highest, 50.0);
 }
 
+// The largest of a short recording is exceeded in a longer one.
+TEST(CalibrateMonitor, TheLimitsOfSignalsFollowTheWantedRate) {
+  const auto spring = [](double per_hour) {
+    return calibrated(5.0, {.false_alarms_per_hour = per_hour, .extrapolate = true})
+        .monitor.signals[0];
+  };
+  EXPECT_GT(spring(1e-12).largest_rate, 1.1 * spring(40.0).largest_rate);
+}
+
 TEST(CalibrateMonitor, NoThresholdIsBelowTheSmallestOne) {
   const CalibratedMonitor free = calibrated(5.0, {.false_alarms_per_hour = 40.0});
   const double least_Nm = 2.0 * free.monitor.pairs[0].floor_Nm;

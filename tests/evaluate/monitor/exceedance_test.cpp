@@ -58,7 +58,22 @@ TEST(BlockMaxima, TheThresholdIsExceededAtTheWantedRate) {
   EXPECT_GT(maxima.threshold(1e-10), maxima.threshold(1e-8));
 }
 
+TEST(BlockMaxima, ValuesBelowZeroHaveATailAsWell) {
+  Random random(4);
+  BlockMaxima maxima(1);
+  BlockMaxima shifted(1);
+  for (int i = 0; i < 2000; ++i) {
+    const double value = std::exp(0.5 * random.normal());
+    maxima.add(value);
+    shifted.add(value - 100.0);
+  }
+  EXPECT_GT(maxima.exceeded_in(1e-5), 1.2 * maxima.largest());
+  EXPECT_NEAR(shifted.exceeded_in(1e-5), maxima.exceeded_in(1e-5) - 100.0, 1e-9);
+  EXPECT_EQ(maxima.exceeded_in(0.5), maxima.largest());
+}
+
 TEST(BlockMaxima, WithoutABlockThereIsNoThreshold) {
+  EXPECT_EQ(BlockMaxima(10).exceeded_in(0.1), 0.0);
   EXPECT_EQ(BlockMaxima(10).threshold(0.1), 0.0);
 }
 
