@@ -41,7 +41,8 @@ Monitor::Monitor(MonitorSettings settings) : settings_(std::move(settings)) {
   correlation_ =
       detail::error_correlation(settings_.correlation, settings_.sources.size(), "monitor");
   const std::size_t samples =
-      2 * detail::persistent_samples(settings_.persistence_s, settings_.sample_period_s);
+      detail::kPersistenceWindow *
+      detail::persistent_samples(settings_.persistence_s, settings_.sample_period_s);
   for (std::size_t i = 0; i < settings_.pairs.size(); ++i)
     pair_states_[i].beyond = pair_states_[i].opposite = detail::RecentCount(samples);
 }

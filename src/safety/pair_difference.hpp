@@ -23,11 +23,15 @@ inline double threshold_without_ceiling(const PairLimits& pair,
   return std::max(pair.floor_Nm, pair.factor * std_dev_Nm);
 }
 
-/// In so many of the last samples, twice as many, a difference must exceed its threshold: the first
+/// In so many of the last samples, of a window, a difference must exceed its threshold: the first
 /// number of samples that takes longer than the persistence; rounding does not make it longer.
 inline std::size_t persistent_samples(double persistence_s, double period_s) noexcept {
   return static_cast<std::size_t>(persistence_s / period_s * (1.0 + 1e-9) + 1e-9) + 1;
 }
+
+/// The window over the number of these samples. A difference that oscillates, as where a fault makes
+/// a control loop unstable, exceeds its threshold in less than half of the samples.
+inline constexpr std::size_t kPersistenceWindow = 3;
 
 /// One sample of the cumulative sum on either side, S <- max(0, S + (share - drift_allowance) T).
 /// @param share difference over threshold; NaN counts as none

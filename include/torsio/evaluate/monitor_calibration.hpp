@@ -78,8 +78,9 @@ struct CalibratedMonitor {
 ///   `persistence_s`; the floor comes from the first where s is at most its median, the factor from
 ///   the second where it is above. The maxima of blocks of 10 s have a generalised Pareto tail
 ///   above their 90 % quantile, which gives the threshold for the wanted rate, at least 1.05 times
-///   the largest one observed. The ceiling is 1.25 times the largest threshold since the pair was
-///   first narrow enough to be armed: error bars that grow further do not make the pair blind.
+///   the largest one observed. The ceiling is the same threshold of |d| in every state since the pair
+///   was first narrow enough to be armed, at most 1.25 times the largest h since then: error bars that
+///   grow further do not hide a difference that never occurred.
 /// - Error bars, correlation of the sources' errors and factors of the combination: where the
 ///   recordings have the measured torque.
 /// - Signals: range with a quarter of its width on either side; 1.5 times the largest rate; twice the

@@ -24,7 +24,7 @@ constexpr double kCombinationSegment_s = 60.0;
 /// The correlation is known only from a finite record: it is taken a little towards none.
 constexpr double kCorrelationShare = 0.95;
 /// The share of the wanted rate of false alarms that pairs have; the limits of signals have the rest.
-constexpr double kPairsShare = 0.5;
+constexpr double kPairsShare = 0.8;
 
 /// The errors in units of their error bars, where the torque was measured.
 class ErrorMoments {
@@ -242,7 +242,7 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
           {.first = static_cast<std::uint8_t>(i), .second = static_cast<std::uint8_t>(j)});
   PairChoice choice{.rate_Hz = rate_Hz,
                     .persistence_s = result.monitor.persistence_s,
-                    .share = blocks_share(kPairsShare, 2 * pairs.size()),  // floor and factor
+                    .share = blocks_share(kPairsShare, 3 * pairs.size()),  // floor, factor, ceiling
                     .least_Nm = options.least_threshold_Nm,
                     .required_Nm = options.required_Nm};
   for (const PairLimits& pair : pairs) {

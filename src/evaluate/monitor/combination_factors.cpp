@@ -13,7 +13,7 @@ namespace torsio {
 namespace {
 
 constexpr std::array kSteps{1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0};
-constexpr double kLargestRatio = 1.1;
+constexpr double kLargestRatio = 1.02;
 constexpr std::size_t kEvery = 11;  // sums of squares over a minute need no more
 
 /// Squared errors over a segment of a recording.

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "numerics/quantile.hpp"
+#include "safety/pair_difference.hpp"
 #include "torsio/core/not_measured.hpp"
 
 namespace torsio {
@@ -23,7 +24,7 @@ std::vector<double> persisting(std::span<const double> values, std::size_t count
   std::vector<double> ordered;  // the same, descending
   for (std::size_t n = 0; n < values.size(); ++n) {
     if (std::isnan(values[n])) continue;
-    if (last.size() == 2 * count) {
+    if (last.size() == detail::kPersistenceWindow * count) {
       ordered.erase(std::ranges::lower_bound(ordered, last.front(), std::ranges::greater()));
       last.pop_front();
     }

@@ -7,7 +7,8 @@
 
 namespace torsio {
 
-/// The largest value that `count` of the last 2 `count` samples reach: what persists. NaN is
+/// The largest value that `count` of the last samples reach: what persists. The window is that of
+/// `Monitor`, `kPersistenceWindow` times as long. NaN is
 /// no sample and takes no place among them, as `Monitor` continues its counts over invalid sources;
 /// NaN for it, and until there have been `count` samples.
 [[nodiscard]] std::vector<double> persisting(std::span<const double> values, std::size_t count);

@@ -30,7 +30,8 @@ class PairStatistics {
         period_s_(1.0 / rate_Hz),
         window_(detail::persistent_samples(persistence_s, period_s_)),
         small_(samples_of(kCalibrationBlock_s, rate_Hz)),
-        large_(samples_of(kCalibrationBlock_s, rate_Hz)) {}
+        large_(samples_of(kCalibrationBlock_s, rate_Hz)),
+        watched_(samples_of(kCalibrationBlock_s, rate_Hz)) {}
 
   void add_spreads(const std::vector<SourceRun>& runs) {
     constexpr std::size_t kEvery = 97;  // the median needs no more
@@ -85,7 +86,20 @@ class PairStatistics {
       if (is_watched) largest_threshold_Nm_ = std::max(largest_threshold_Nm_, threshold_Nm);
     }
   }
-  void set_ceiling(const std::vector<TorqueSource>& sources) {
+  /// The differences in every state while the pair is watched.
+  void add_watched(const std::vector<SourceRun>& runs) {
+    bool is_watched = false;
+    std::vector<double> sizes(runs[0].value_Nm.size(), kNotMeasured);
+    for (std::size_t n = 0; n < sizes.size(); ++n) {
+      if (!is_valid(runs, n)) continue;
+      is_watched = is_watched || detail::threshold_without_ceiling(pair_, spread(runs, n)) <=
+                                     pair_.largest_armed_Nm;
+      if (is_watched) sizes[n] = std::abs(difference(runs, n));
+    }
+    watched_.add(persisting(sizes, window_));
+  }
+  /// @param share of the blocks in which the pair may exceed the ceiling
+  void set_ceiling(double share, const std::vector<TorqueSource>& sources) {
     if (largest_threshold_Nm_ == 0.0)
       throw Error({.place = fmt::format("pair {}, {}", sources[pair_.first].name,
                                         sources[pair_.second].name),
@@ -95,7 +109,8 @@ class PairStatistics {
                    .found = "none: the monitor would never be ready",
                    .advice = "require a larger disagreement, or record a motion after which the "
                              "friction is known"});
-    pair_.ceiling_Nm = kCeilingMargin * largest_threshold_Nm_;
+    pair_.ceiling_Nm = std::min(kCeilingMargin * largest_threshold_Nm_,
+                                std::max(pair_.floor_Nm, watched_.threshold(share)));
   }
 
   void add_means(const std::vector<SourceRun>& runs) {
@@ -165,8 +180,9 @@ class PairStatistics {
   double correlation_;
   double period_s_;
   std::size_t window_;
-  BlockMaxima small_;  ///< |d| where the error bars are small
-  BlockMaxima large_;  ///< |d| / s where they are large
+  BlockMaxima small_;    ///< |d| where the error bars are small
+  BlockMaxima large_;    ///< |d| / s where they are large
+  BlockMaxima watched_;  ///< |d| in every state
   std::vector<double> spreads_;
   double median_Nm_ = kNotMeasured;
   double largest_Nm_ = 0.0;
@@ -198,7 +214,8 @@ PairCalibration calibrate_pair(const PairLimits& pair, const std::vector<TorqueS
     refuse_calibration(static_cast<double>(statistics.blocks()) * kCalibrationBlock_s);
   statistics.set_thresholds(choice.share, choice.least_Nm, choice.required_Nm);
   for (const auto& runs : recorded) statistics.add_thresholds(runs);
-  statistics.set_ceiling(sources);
+  for (const auto& runs : recorded) statistics.add_watched(runs);
+  statistics.set_ceiling(choice.share, sources);
   for (const auto& runs : recorded) statistics.add_means(runs);
   statistics.set_allowance();
   for (const auto& runs : recorded) statistics.add_sums(runs);

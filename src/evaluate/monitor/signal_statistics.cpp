@@ -11,9 +11,9 @@
 namespace torsio {
 namespace {
 
-constexpr double kRangeMargin = 0.25;  // margin on either side, over the range in the recordings
-constexpr double kRateMargin = 1.5;    // over the largest value in the recordings
-constexpr double kHiddenTravelMargin = 2.0;
+constexpr double kRangeMargin = 0.4;  // margin on either side, over the range in the recordings
+constexpr double kRateMargin = 1.5;   // over the largest value in the recordings
+constexpr double kHiddenTravelMargin = 3.0;
 
 }  // namespace
 
