@@ -1025,22 +1025,22 @@ TEST(Monitor, ADifferenceThatEndsInTimeIsNone) {
     loop.sources[2].value = 1.5;
     loop.step_for(5);
     loop.sources[2].value = 0.5;
-    loop.step_for(7);
+    loop.step_for(13);
   }
   EXPECT_TRUE(loop.monitor.is_watching());
 }
 
-// An unstable loop: the difference passes through zero in every second period.
+// An unstable loop: the difference passes through zero.
 TEST(Monitor, StopsOnADifferenceThatOscillates) {
   Loop loop;
   loop.start();
   int ticks = 0;
   for (; loop.monitor.is_watching() && ticks < 100; ++ticks) {
-    constexpr std::array kDifference{1.5, 0.0, -1.5};
-    loop.sources[2].value = kDifference[static_cast<std::size_t>(ticks % 3)];
+    constexpr std::array kDifference{1.5, 0.0, -1.5, 0.0, 0.0};
+    loop.sources[2].value = kDifference[static_cast<std::size_t>(ticks % 5)];
     (void)loop.step();
   }
-  EXPECT_EQ(ticks, 9) << "six of nine samples";
+  EXPECT_EQ(ticks, 13) << "six of 13 samples, less than half of them";
   EXPECT_EQ(loop.reason(), MonitorCheck::disagreement);
 }
 
@@ -1188,10 +1188,10 @@ TEST(Monitor, ASmallTorqueHasNoWrongSign) {
   loop.step_for(5);
   EXPECT_TRUE(loop.monitor.is_watching());
   loop.sources[0].value = -0.1;
-  loop.step_for(7);
+  loop.step_for(13);
   loop.sources[0].value = 0.6;
   loop.step_for(5);
-  EXPECT_TRUE(loop.monitor.is_watching()) << "counted among the last twelve";
+  EXPECT_TRUE(loop.monitor.is_watching()) << "counted among the last 18";
   EXPECT_EQ(loop.step(), State::stopped);
   EXPECT_EQ(loop.reason(), MonitorCheck::sign);
 }

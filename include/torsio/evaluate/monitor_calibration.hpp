@@ -83,14 +83,14 @@ struct CalibratedMonitor {
 ///   grow further do not hide a difference that never occurred.
 /// - Error bars, correlation of the sources' errors and factors of the combination: where the
 ///   recordings have the measured torque.
-/// - Signals: range with a quarter of its width on either side; 1.5 times the largest rate; twice the
+/// - Signals: range with 0.4 of its width on either side; 1.5 times the largest rate; three times the
 ///   longest travel of a companion without a change; each of them at least what the tail of its
 ///   maxima over blocks, as for pairs, exceeds at the wanted rate. 1.5 times the longest gap between
 ///   fresh samples (at least a sample).
 /// - Drift: what is allowed is 1.2 times the largest size of a mean of d / h over a minute, limited
 ///   to 0.75 to 0.95; the limit is 3 times the largest cumulative sum, at least 1 s.
 ///
-/// One half of the wanted rate belongs to the pairs, the other to the signals, in equal shares.
+/// Four fifths of the wanted rate belong to the pairs, the rest to the signals, in equal shares.
 /// Form: ours; tails: Pickands 1975, their moments Hosking and Wallis 1987.
 /// @throws Error if there are fewer than two sources, if the recordings lack a channel, are shorter
 /// than ten blocks, cannot support the wanted rate, or if a source has a fault in more than 1 % of the samples; UsageError for a rate

@@ -79,7 +79,7 @@ struct MonitorSettings {
   std::vector<double> correlation;
   std::array<MonitorAction, kMonitorChecks> actions = default_actions();
   /// How long a difference must exceed its threshold: in more samples than this time has, among the
-  /// last twice as many, so that a difference that oscillates through zero is found as well.
+  /// last three times as many, so that a difference that oscillates through zero is found as well.
   double persistence_s = 5e-3;
   double release_share = 0.8;  ///< below this share of the threshold, it has ended
   /// How long a lost source is only a warning, how long a source may report a fault of its model or
@@ -138,7 +138,7 @@ struct DriftSums {
 /// and of the brake.
 ///
 /// - disagreement: |t_i - t_j| > clamp(factor sqrt(s_i^2 + s_j^2 - 2 R_ij s_i s_j), floor, ceiling)
-///   =: h for `persistence_s` within twice that time, with hysteresis: it ends below
+///   =: h for `persistence_s` within three times that time, with hysteresis: it ends below
 ///   `release_share` h.
 /// - drift: S <- max(0, S + ((t_i - t_j) / h - drift_allowance) T) > drift_limit_s, on either side.
 /// - sign: t_i and t_j have opposite signs and min(|t_i|, |t_j|) > h / 2, likewise.

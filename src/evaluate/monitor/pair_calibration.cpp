@@ -147,7 +147,8 @@ class PairStatistics {
             .largest_difference_Nm = largest_Nm_,
             .typical_threshold_Nm = detail::threshold_without_ceiling(pair_, median_Nm_),
             .largest_torque_Nm = std::min(first_torque_Nm_, second_torque_Nm_),
-            .detected_in_these_states_Nm = largest_Nm_ + largest_threshold_Nm_,
+            .detected_in_these_states_Nm =
+                largest_Nm_ + std::min(largest_threshold_Nm_, pair_.ceiling_Nm),
             .is_factor_from_floor = is_factor_from_floor_};
   }
   /// Blocks with small error bars, which are at least half of the samples.

@@ -15,10 +15,10 @@ namespace {
 using testing::ElementsAre;
 using testing::IsNan;
 
-TEST(Persisting, IsReachedByHalfOfTheWindow) {
+TEST(Persisting, IsReachedByAThirdOfTheWindow) {
   const std::vector<double> values{1.0, 5.0, 4.0, 3.0, 6.0, 7.0, 8.0};
   EXPECT_THAT(persisting(values, 2), ElementsAre(IsNan(), 1.0, 4.0, 4.0, 5.0, 6.0, 7.0));
-  EXPECT_THAT(persisting(values, 1), ElementsAre(1.0, 5.0, 5.0, 4.0, 6.0, 7.0, 8.0));
+  EXPECT_THAT(persisting(values, 1), ElementsAre(1.0, 5.0, 5.0, 5.0, 6.0, 7.0, 8.0));
   EXPECT_TRUE(persisting({}, 3).empty());
 }
 
@@ -27,7 +27,7 @@ TEST(Persisting, PassesOverWhatIsNotANumber) {
   const std::vector<double> values{9.0,          kNotMeasured, 8.0, 1.0,
                                    kNotMeasured, kNotMeasured, 7.0, 6.0};
   EXPECT_THAT(persisting(values, 2),
-              ElementsAre(IsNan(), IsNan(), 8.0, 8.0, IsNan(), IsNan(), 8.0, 7.0));
+              ElementsAre(IsNan(), IsNan(), 8.0, 8.0, IsNan(), IsNan(), 8.0, 8.0));
   EXPECT_THAT(persisting(values, 5),
               ElementsAre(IsNan(), IsNan(), IsNan(), IsNan(), IsNan(), IsNan(), IsNan(), 1.0));
 }
