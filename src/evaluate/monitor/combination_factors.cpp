@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/realtime.hpp"
@@ -12,8 +11,8 @@
 namespace torsio {
 namespace {
 
-constexpr std::array kSteps{1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0};
-constexpr double kLargestRatio = 1.02;
+constexpr std::array kFactors{1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0};
+constexpr double kLargestRatio = 1.01;
 constexpr std::size_t kEvery = 11;  // sums of squares over a minute need no more
 
 /// Squared errors over a segment of a recording.
@@ -70,17 +69,14 @@ std::vector<double> combination_factors(const RedundancySettings& settings,
     for (std::size_t i = 0; i < count; ++i) totals[i] += sums.sources[i];
   }
   if (*std::ranges::max_element(totals) == 0.0) return {};
-  std::vector<std::size_t> order(count);
-  std::iota(order.begin(), order.end(), 0U);
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return totals[i]; });
+  const auto best = static_cast<std::size_t>(std::ranges::min_element(totals) - totals.begin());
   RedundancySettings tried = settings;
-  tried.error_bar_factors.assign(count, 1.0);
-  for (const double step : kSteps) {
-    for (std::size_t k = 0; k < count; ++k)
-      tried.error_bar_factors[order[k]] = std::pow(step, static_cast<double>(k));
+  for (const double factor : kFactors) {
+    tried.error_bar_factors.assign(count, factor);
+    tried.error_bar_factors[best] = 1.0;
     const bool is_enough = std::ranges::all_of(segments, [&](const Segment& each) {
       const ErrorSums sums = error_sums(tried, each);
-      return std::sqrt(sums.combined) <= kLargestRatio * std::sqrt(sums.sources[order.front()]);
+      return std::sqrt(sums.combined) <= kLargestRatio * std::sqrt(sums.sources[best]);
     });
     if (is_enough) break;
   }
