@@ -78,12 +78,13 @@ struct CalibratedMonitor {
 ///   `persistence_s`; the floor comes from the first where s is at most its median, the factor from
 ///   the second where it is above. The maxima of blocks of 10 s have a generalised Pareto tail
 ///   above their 90 % quantile, which gives the threshold for the wanted rate, at least 1.05 times
-///   the largest one observed. The ceiling is the same threshold of |d| in every state since the pair
-///   was first narrow enough to be armed, at most 1.25 times the largest h since then: error bars that
-///   grow further do not hide a difference that never occurred.
+///   the largest one observed. The ceiling is 1.25 times the largest h since
+///   the pair was first narrow enough to be armed. If a required disagreement is given, it is at most
+///   the largest of the floor, 0.7 times what is required, and the threshold of |d| in every state, so
+///   that error bars that grow further do not hide what has to be found.
 /// - Error bars, correlation of the sources' errors and factors of the combination: where the
 ///   recordings have the measured torque.
-/// - Signals: range with 0.4 of its width on either side; 1.5 times the largest rate; three times the
+/// - Signals: range with 0.4 of its width on either side; 1.5 times the largest rate; five times the
 ///   longest travel of a companion without a change; each of them at least what the tail of its
 ///   maxima over blocks, as for pairs, exceeds at the wanted rate. 1.5 times the longest gap between
 ///   fresh samples (at least a sample).

@@ -15,6 +15,8 @@ namespace {
 
 constexpr double kArmedShare = 0.8;  // threshold that is armed, over the required disagreement
 constexpr double kCeilingMargin = 1.25;
+/// The least ceiling, over the required disagreement: the rest is for a difference without a fault.
+constexpr double kCeilingShare = 0.7;
 constexpr double kDriftWindow_s = 60.0;
 
 std::size_t samples_of(double seconds, double rate_Hz) {
@@ -99,7 +101,7 @@ class PairStatistics {
     watched_.add(persisting(sizes, window_));
   }
   /// @param share of the blocks in which the pair may exceed the ceiling
-  void set_ceiling(double share, const std::vector<TorqueSource>& sources) {
+  void set_ceiling(double share, double required_Nm, const std::vector<TorqueSource>& sources) {
     if (largest_threshold_Nm_ == 0.0)
       throw Error({.place = fmt::format("pair {}, {}", sources[pair_.first].name,
                                         sources[pair_.second].name),
@@ -109,8 +111,9 @@ class PairStatistics {
                    .found = "none: the monitor would never be ready",
                    .advice = "require a larger disagreement, or record a motion after which the "
                              "friction is known"});
-    pair_.ceiling_Nm = std::min(kCeilingMargin * largest_threshold_Nm_,
-                                std::max(pair_.floor_Nm, watched_.threshold(share)));
+    pair_.ceiling_Nm = std::min(
+        kCeilingMargin * largest_threshold_Nm_,
+        std::max({pair_.floor_Nm, watched_.threshold(share), kCeilingShare * required_Nm}));
   }
 
   void add_means(const std::vector<SourceRun>& runs) {
@@ -216,7 +219,7 @@ PairCalibration calibrate_pair(const PairLimits& pair, const std::vector<TorqueS
   statistics.set_thresholds(choice.share, choice.least_Nm, choice.required_Nm);
   for (const auto& runs : recorded) statistics.add_thresholds(runs);
   for (const auto& runs : recorded) statistics.add_watched(runs);
-  statistics.set_ceiling(choice.share, sources);
+  statistics.set_ceiling(choice.share, choice.required_Nm, sources);
   for (const auto& runs : recorded) statistics.add_means(runs);
   statistics.set_allowance();
   for (const auto& runs : recorded) statistics.add_sums(runs);

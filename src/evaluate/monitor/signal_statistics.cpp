@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kRangeMargin = 0.4;  // margin on either side, over the range in the recordings
 constexpr double kRateMargin = 1.5;   // over the largest value in the recordings
-constexpr double kHiddenTravelMargin = 3.0;
+constexpr double kHiddenTravelMargin = 5.0;
 
 }  // namespace
 
