@@ -36,14 +36,14 @@ class Batch {
   }
   void set_zero(const std::string& channel, double value) { worker_.set_zero(channel, value); }
 
-  py::object step(const py::object& inputs) {
+  py::object step(const py::object& inputs, const py::object& out) {
     const InUse in_use(worker_.is_in_use);
     const Rows rows(inputs, raw_inputs(), "Batch.step");
     if (rows.size() != rows_)
       throw UsageError({.place = "Batch.step",
                         .expected = std::to_string(rows_) + " rows",
                         .found = std::to_string(rows.size())});
-    EstimateArrays estimates(rows_);
+    EstimateArrays estimates(rows_, out, "Batch.step");
     {
       const py::gil_scoped_release unlocked;
       for (std::size_t n = 0; n < rows_; ++n) {
@@ -149,8 +149,11 @@ void bind_batches(py::module_& module) {
       .def_property_readonly("unset_zeros", &Batch::unset_zeros)
       .def("set_zero", &Batch::set_zero, py::arg("channel"), py::arg("value"),
            "Subtracts a value in SI from a channel of all rows from now on.")
-      .def("step", &Batch::step, py::arg("inputs"),
-           "One tick of every joint: inputs of shape (rows, channels); Estimates of shape (rows,).")
+      .def("step", &Batch::step, py::arg("inputs"), py::kw_only(), py::arg("out") = py::none(),
+           "One tick of every joint: inputs of shape (rows, channels); Estimates of shape "
+           "(rows,).\n\n"
+           "Writes into the arrays of out, the result of an earlier step, and returns it, if it is "
+           "given.")
       .def("reset", &Batch::reset, py::arg("mask") = py::none(),
            "Resets all rows, or those where the mask of shape (rows,) is True.")
       .def("save", &Batch::saved, "The states of all rows: uint8 of shape (rows, bytes).")

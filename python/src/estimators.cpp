@@ -30,6 +30,13 @@ py::handle fault_object(Fault fault) {
   return (*members)[static_cast<std::size_t>(fault)];
 }
 
+/// `torsio.Estimates`; it lives as long as the process.
+py::handle estimates_type() {
+  static const py::handle type =
+      py::object(py::module_::import("torsio._results").attr("Estimates")).release();
+  return type;
+}
+
 /// One tick from the arguments of `step`: numbers, one sequence or array, or channels by name.
 void fill_row(PythonEstimator& self, const py::args& arguments, const py::kwargs& by_name) {
   const std::vector<std::string>& channels = self.estimator.raw_inputs();
@@ -199,10 +206,37 @@ EstimateArrays::EstimateArrays(std::size_t rows)
       novelty_(novelties_.mutable_data()),
       fault_(faults_.mutable_data()) {}
 
+EstimateArrays::EstimateArrays(std::size_t rows, const py::object& out, const std::string& place)
+    : EstimateArrays(out.is_none() ? rows : 0) {
+  if (out.is_none()) return;
+  if (!py::isinstance(out, estimates_type()))
+    throw UsageError(
+        {.place = place + ": out", .expected = "Estimates or None", .found = kind_of(out)});
+  const auto take = [&]<class Number>(const char* name, py::array_t<Number>& into) {
+    const py::object array = out.attr(name);
+    if (!py::isinstance<py::array_t<Number, py::array::c_style>>(array) ||
+        py::array(array).ndim() != 1 ||
+        py::array(array).shape(0) != static_cast<py::ssize_t>(rows) ||
+        !py::array(array).writeable())
+      throw UsageError({.place = place + ": out." + name,
+                        .expected = "a writeable contiguous array of shape (" +
+                                    std::to_string(rows) + ",) and type " +
+                                    std::string(py::str(py::dtype::of<Number>())),
+                        .found = kind_of(array),
+                        .advice = "Reuse the result of an earlier step of this batch."});
+    into = py::reinterpret_borrow<py::array_t<Number>>(array);
+    return into.mutable_data();
+  };
+  value_ = take("value", values_);
+  std_dev_ = take("std_dev", std_devs_);
+  novelty_ = take("novelty", novelties_);
+  fault_ = take("fault", faults_);
+  out_ = out;
+}
+
 py::object EstimateArrays::result() const {
-  static const py::handle type =
-      py::object(py::module_::import("torsio._results").attr("Estimates")).release();
-  return type(values_, std_devs_, novelties_, faults_);
+  if (!out_.is_none()) return out_;
+  return estimates_type()(values_, std_devs_, novelties_, faults_);
 }
 
 InUse::InUse(std::atomic<bool>& flag) : flag_(flag) {

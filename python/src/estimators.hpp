@@ -42,16 +42,21 @@ class Rows {
 class EstimateArrays {
  public:
   explicit EstimateArrays(std::size_t rows);
+  /// Writes into the arrays of `out`, `torsio.Estimates`, or into new ones if it is None.
+  /// @param place of the call, for messages. @throws UsageError for other types or shapes, or for
+  /// arrays that are read-only or not contiguous.
+  EstimateArrays(std::size_t rows, const py::object& out, const std::string& place);
   void set(std::size_t row, const Estimate& estimate) noexcept {
     value_[row] = estimate.value;
     std_dev_[row] = estimate.std_dev;
     novelty_[row] = estimate.novelty;
     fault_[row] = static_cast<std::uint8_t>(estimate.fault);
   }
-  /// `torsio.Estimates`.
+  /// `torsio.Estimates`: `out`, where it was given.
   [[nodiscard]] py::object result() const;
 
  private:
+  py::object out_ = py::none();
   py::array_t<double> values_;
   py::array_t<double> std_devs_;
   py::array_t<double> novelties_;

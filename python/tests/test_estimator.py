@@ -1,4 +1,5 @@
 import copy
+import dataclasses
 import multiprocessing
 import pickle
 import threading
@@ -229,6 +230,41 @@ def test_a_batch_gives_the_bits_of_single_estimators(any_model, inputs):
             assert out.value[k] == expected.value and out.fault[k] == expected.fault
     batch.load(saved)
     assert (batch.save() == saved).all()
+
+
+def test_a_batch_writes_into_the_arrays_of_out(model, inputs):
+    batch, other = model.batch(3), model.batch(3)
+    kept = batch.step(inputs[:3])
+    first = other.step(inputs[:3])
+    value = kept.value
+    for n in range(1, 200):
+        assert batch.step(inputs[n : n + 3], out=kept) is kept and kept.value is value
+        expected = other.step(inputs[n : n + 3])
+        for name in ("value", "std_dev", "novelty", "fault"):
+            assert getattr(kept, name).tobytes() == getattr(expected, name).tobytes()
+    assert kept.value.tobytes() != first.value.tobytes()
+
+
+def test_a_batch_refuses_another_out_and_keeps_its_state(model, inputs):
+    batch = model.batch(3)
+    good = batch.step(inputs[:3])
+    state = batch.save()
+    read_only = np.zeros(3)
+    read_only.flags.writeable = False
+    for field, array in (
+        ("value", np.zeros(2)),
+        ("value", np.zeros(3, dtype=np.float32)),
+        ("value", np.zeros((3, 1))),
+        ("std_dev", np.zeros(6)[::2]),
+        ("novelty", read_only),
+        ("fault", np.zeros(3)),
+        ("fault", None),
+    ):
+        with pytest.raises(torsio.UsageError, match=f"out.{field}"):
+            batch.step(inputs[:3], out=dataclasses.replace(good, **{field: array}))
+    with pytest.raises(torsio.UsageError, match="Estimates"):
+        batch.step(inputs[:3], out=np.zeros(3))
+    assert (batch.save() == state).all()
 
 
 def test_a_batch_refuses_wrong_calls(model, inputs):
