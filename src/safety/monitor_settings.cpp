@@ -74,7 +74,7 @@ void check_pair(const PairLimits& pair, std::size_t sources) {
 void check_times(const MonitorSettings& settings) {
   require(is_positive(settings.sample_period_s) && settings.sample_period_s <= 1.0,
           "sample_period_s", "above 0, at most 1", settings.sample_period_s);
-  constexpr double kMaxSamples = 1e6;  // `RecentCount` keeps twice as many
+  constexpr double kMaxSamples = 1e6;  // `RecentCount` keeps three times as many
   require(settings.persistence_s >= 0.0 &&
               settings.persistence_s <= kMaxSamples * settings.sample_period_s,
           "persistence_s", "0 or more, and at most a million sample periods",

@@ -1243,6 +1243,18 @@ TEST(Monitor, StopsOnASmallDifferenceThatLasts) {
   }
 }
 
+TEST(Monitor, AResetBeginsTheSumOfADriftAgain) {
+  Loop loop(with_drift());
+  loop.start();
+  loop.sources[0].value = 0.75;
+  loop.step_for(100);
+  loop.monitor.reset(loop.t_s);
+  loop.sources[0].value = 0.0;
+  loop.start();
+  loop.sources[0].value = 0.75;
+  EXPECT_EQ(loop.ticks_to_stop(), 101);
+}
+
 TEST(Monitor, ADifferenceWithinTheAllowanceNeverDrifts) {
   Loop loop(with_drift());
   loop.start();
