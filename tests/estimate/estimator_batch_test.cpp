@@ -157,7 +157,7 @@ TEST_P(EstimatorBatchLaw, GivesEachRowWhatAnEstimatorOfItsOwnDoes) {
         ASSERT_TRUE(batch.save(row, mine));
         ASSERT_TRUE(alone[row].save(expected));
         ASSERT_EQ(mine, expected) << model.family();
-        // Row 0 goes on from there, too.
+        // Row 0 continues from there, too.
         ASSERT_TRUE(batch.load(0, expected));
         ASSERT_TRUE(alone[0].load(expected));
       }
