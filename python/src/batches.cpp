@@ -1,138 +1,112 @@
 #include <cstddef>
-#include <cstring>
 #include <utility>
 
 #include "estimators.hpp"
-#include "torsio/core/state_bytes.hpp"
+#include "torsio/estimate/estimator_batch.hpp"
 
 namespace torsio::python {
 namespace {
 
-/// Many joints of one model: one estimator, whose state is exchanged for that of each row, so that the
-/// parameters remain in the nearest cache.
+/// A batch as Python holds it.
 class Batch {
  public:
-  Batch(std::shared_ptr<const ModelFile> file, double rate_Hz, std::size_t rows)
-      : worker_(std::move(file), rate_Hz), rows_(rows) {
-    if (rows == 0)
-      throw UsageError({.place = "batch", .expected = "at least one row", .found = "0"});
-    detail::StateBytes count;
-    worker_.estimator.visit_state(count);
-    if (!count.is_valid())
-      throw Error({.place = "batch", .problem = "the state of this model cannot be saved"});
-    state_bytes_ = count.position();
-    start_.resize(state_bytes_);
-    write(start_.data());
-    states_.resize(rows * state_bytes_);
-    reset_rows([](std::size_t) { return true; });
-  }
+  Batch(const std::shared_ptr<const ModelFile>& file, double rate_Hz, std::size_t rows)
+      : Batch(PythonEstimator(file, rate_Hz), rows) {}
 
-  [[nodiscard]] std::size_t size() const noexcept { return rows_; }
+  [[nodiscard]] std::size_t size() const noexcept { return rows_.size(); }
   [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept {
-    return worker_.estimator.raw_inputs();
+    return rows_.raw_inputs();
   }
   [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept {
-    return worker_.estimator.unset_zeros();
+    return rows_.unset_zeros();
   }
-  void set_zero(const std::string& channel, double value) { worker_.set_zero(channel, value); }
+  void set_zero(const std::string& channel, double value) {
+    const InUse in_use(is_in_use_);
+    rows_.set_zero(channel, value);
+  }
 
   py::object step(const py::object& inputs, const py::object& out) {
-    const InUse in_use(worker_.is_in_use);
+    const InUse in_use(is_in_use_);
     const Rows rows(inputs, raw_inputs(), "Batch.step");
-    if (rows.size() != rows_)
+    if (rows.size() != size())
       throw UsageError({.place = "Batch.step",
-                        .expected = std::to_string(rows_) + " rows",
+                        .expected = std::to_string(size()) + " rows",
                         .found = std::to_string(rows.size())});
-    EstimateArrays estimates(rows_, out, "Batch.step");
+    EstimateArrays estimates(size(), out, "Batch.step");
     {
       const py::gil_scoped_release unlocked;
-      for (std::size_t n = 0; n < rows_; ++n) {
-        rows.copy(n, worker_.row);
-        std::byte* const state = states_.data() + n * state_bytes_;
-        read(state);
-        estimates.set(n, worker_.estimator.step(worker_.row));
-        write(state);
-      }
+      const std::size_t channels = raw_inputs().size();
+      for (std::size_t n = 0; n < size(); ++n)
+        rows.copy(n, std::span(raw_).subspan(n * channels, channels));
+      rows_.step(raw_, estimates_);
+      for (std::size_t n = 0; n < size(); ++n) estimates.set(n, estimates_[n]);
     }
     return estimates.result();
   }
 
   void reset(const py::object& mask) {
-    const InUse in_use(worker_.is_in_use);
-    if (mask.is_none()) return reset_rows([](std::size_t) { return true; });
+    const InUse in_use(is_in_use_);
+    if (mask.is_none()) return rows_.reset();
     const auto flags = py::array::ensure(mask);
     if (!flags || flags.ndim() != 1 || flags.dtype().kind() != 'b' ||
-        flags.shape(0) != static_cast<py::ssize_t>(rows_)) {
+        flags.shape(0) != static_cast<py::ssize_t>(size())) {
       PyErr_Clear();
       throw UsageError(
           {.place = "Batch.reset",
-           .expected = "a mask of shape (" + std::to_string(rows_) + ",) and type bool",
+           .expected = "a mask of shape (" + std::to_string(size()) + ",) and type bool",
            .found = kind_of(mask)});
     }
     const py::array_t<bool> chosen(flags);
-    reset_rows([&](std::size_t n) { return chosen.at(n); });
+    for (std::size_t n = 0; n < size(); ++n)
+      if (chosen.at(n)) rows_.reset(n);
   }
 
-  [[nodiscard]] py::array_t<std::uint8_t> saved() const {
-    py::array_t<std::uint8_t> all({rows_, detail::kStateHeaderBytes + state_bytes_});
-    auto* to = reinterpret_cast<std::byte*>(all.mutable_data());
-    for (std::size_t n = 0; n < rows_; ++n) {
-      const std::span row(to + n * (detail::kStateHeaderBytes + state_bytes_),
-                          detail::kStateHeaderBytes + state_bytes_);
-      std::memcpy(row.data() + detail::kStateHeaderBytes, states_.data() + n * state_bytes_,
-                  state_bytes_);
-      detail::write_state_header(row, worker_.estimator.state_identity());
-    }
+  [[nodiscard]] py::array_t<std::uint8_t> saved() {
+    const InUse in_use(is_in_use_);
+    const std::size_t width = rows_.state_size();
+    py::array_t<std::uint8_t> all({size(), width});
+    auto* const to = reinterpret_cast<std::byte*>(all.mutable_data());
+    for (std::size_t n = 0; n < size(); ++n)
+      static_cast<void>(rows_.save(n, {to + n * width, width}));
     return all;
   }
 
   /// All rows are checked before the first one changes.
   void load(const py::object& object) {
-    const InUse in_use(worker_.is_in_use);
-    const std::size_t width = detail::kStateHeaderBytes + state_bytes_;
+    const InUse in_use(is_in_use_);
+    const std::size_t width = rows_.state_size();
     const auto refuse = [&](const std::string& found) {
       throw UsageError({.place = "Batch.load",
-                        .expected = "states of save, of shape (" + std::to_string(rows_) + ", " +
+                        .expected = "states of save, of shape (" + std::to_string(size()) + ", " +
                                     std::to_string(width) + ") and type uint8",
                         .found = found});
     };
     const auto array = py::array::ensure(object);
     if (!array || !py::isinstance<py::array_t<std::uint8_t>>(array) || array.ndim() != 2 ||
-        array.shape(0) != static_cast<py::ssize_t>(rows_) ||
+        array.shape(0) != static_cast<py::ssize_t>(size()) ||
         array.shape(1) != static_cast<py::ssize_t>(width)) {
       PyErr_Clear();
       refuse(kind_of(object));
     }
     const py::array_t<std::uint8_t, py::array::c_style> whole(array);
     const auto* const from = reinterpret_cast<const std::byte*>(whole.data());
-    for (std::size_t n = 0; n < rows_; ++n)
-      if (!worker_.estimator.load({from + n * width, width}))
+    for (std::size_t n = 0; n < size(); ++n)
+      if (!rows_.is_state({from + n * width, width}))
         refuse("row " + std::to_string(n) + ", which is not a state of this model");
-    for (std::size_t n = 0; n < rows_; ++n)
-      std::memcpy(states_.data() + n * state_bytes_, from + n * width + detail::kStateHeaderBytes,
-                  state_bytes_);
+    for (std::size_t n = 0; n < size(); ++n)
+      static_cast<void>(rows_.load(n, {from + n * width, width}));
   }
 
  private:
-  void read(const std::byte* state) noexcept {
-    detail::StateBytes bytes(detail::StateBytes::Task::read, {state, state_bytes_});
-    worker_.estimator.visit_state(bytes);
-  }
-  void write(std::byte* state) noexcept {
-    detail::StateBytes bytes(std::span(state, state_bytes_));
-    worker_.estimator.visit_state(bytes);
-  }
-  template <class Chosen>
-  void reset_rows(const Chosen& chosen) {
-    for (std::size_t n = 0; n < rows_; ++n)
-      if (chosen(n)) std::memcpy(states_.data() + n * state_bytes_, start_.data(), state_bytes_);
-  }
+  Batch(const PythonEstimator& one, std::size_t rows)
+      : rows_(one.estimator.settings(), one.estimator.model(), rows),
+        raw_(rows * rows_.raw_inputs().size()),
+        estimates_(rows) {}
 
-  PythonEstimator worker_;
-  std::size_t rows_;
-  std::size_t state_bytes_ = 0;
-  std::vector<std::byte> start_;  ///< the state after a reset
-  std::vector<std::byte> states_;
+  EstimatorBatch rows_;
+  std::vector<double> raw_;
+  std::vector<Estimate> estimates_;
+  std::atomic<bool> is_in_use_ = false;
 };
 
 }  // namespace

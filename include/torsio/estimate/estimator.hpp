@@ -16,6 +16,23 @@
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
+namespace detail {
+
+/// One tick of an estimator.
+template <Model M>
+Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> raw) noexcept {
+  const detail::EstimatorCore::Conditioned input = core.condition(raw);
+  if (input.fault != Fault::none) return core.held(input.fault);
+  if (input.for_model.empty()) return core.apply_guards(input, {});
+  if (input.restarted) model.reset();
+  const Estimate raw_estimate = model.step(input.for_model);
+  const bool is_finite = std::isfinite(raw_estimate.value);
+  if (!is_finite) model.reset();
+  if (!is_finite || raw_estimate.fault == Fault::model_not_finite) core.lose_memory();
+  return core.apply_guards(input, raw_estimate);
+}
+
+}  // namespace detail
 
 /// The estimator for a control loop: raw channels -> features -> model -> guards -> value with
 /// error bar.
@@ -98,15 +115,7 @@ class BasicEstimator {
 
   /// @param raw one value for each of `raw_inputs()`; NaN for one that was not measured.
   Estimate step(std::span<const double> raw) noexcept TORSIO_REALTIME {
-    const detail::EstimatorCore::Conditioned input = core_.condition(raw);
-    if (input.fault != Fault::none) return core_.held(input.fault);
-    if (input.for_model.empty()) return core_.apply_guards(input, {});
-    if (input.restarted) model_.reset();
-    const Estimate raw_estimate = model_.step(input.for_model);
-    const bool is_finite = std::isfinite(raw_estimate.value);
-    if (!is_finite) model_.reset();
-    if (!is_finite || raw_estimate.fault == Fault::model_not_finite) core_.lose_memory();
-    return core_.apply_guards(input, raw_estimate);
+    return detail::estimator_step(core_, model_, raw);
   }
 
   /// A measurement of the last step's target, for a model that feeds its output back: free run

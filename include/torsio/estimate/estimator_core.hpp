@@ -91,6 +91,32 @@ class EstimatorCore {
     is_wrong_rate_ = is_wrong && depends_on_rate_;
   }
 
+  /// Whether an ordinary tick (finite inputs without a jump, all features inside their ranges) would change
+  /// the filters, the last raw inputs and the last value only.
+  [[nodiscard]] bool is_at_rest() const noexcept TORSIO_REALTIME {
+    return missed_ == 0 && !poisoned_ && !is_wrong_rate_ && !needs_reset_ && has_run_ &&
+           !in_jump_ && excluded_ticks_ == 0.0 && is_settled() && start_std_dev_ == 0.0 &&
+           memory_error_.is_zero();
+  }
+  /// What such a tick changes besides the filters.
+  [[nodiscard]] std::span<const double> previous_raw() const noexcept { return previous_raw_; }
+  [[nodiscard]] double last_value() const noexcept { return last_value_; }
+  void continue_after(const double* raw, double value) noexcept TORSIO_REALTIME {
+    for (double& previous : previous_raw_) previous = *raw++;
+    last_value_ = value;
+  }
+  /// The largest change of a raw input in a tick that is not a jump.
+  [[nodiscard]] double jump_limit(std::size_t channel) const noexcept {
+    return jump_limits_[channel];
+  }
+  /// The range of a feature, rounding included.
+  [[nodiscard]] double lowest(std::size_t feature) const noexcept {
+    return ranges_[feature].lowest;
+  }
+  [[nodiscard]] double highest(std::size_t feature) const noexcept {
+    return ranges_[feature].highest;
+  }
+
   /// The members that change in a step; not the zeros.
   void visit_state(StateBytes& bytes) noexcept {
     bytes.visit(pipeline_, missed_, poisoned_, last_value_, is_wrong_rate_, needs_reset_, has_run_,

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/realtime.hpp"
+#include "torsio/estimate/any_estimator.hpp"
+
+namespace torsio {
+
+/// Many joints of one model, one a row, each with a state of its own: every row gets what an `Estimator`
+/// of its own would give it, to the bit, for less time.
+///
+/// A row whose filters have settled, whose memory misses nothing and whose inputs are ordinary (finite, no
+/// jump, inside the ranges of the training) takes the short way: features and guards of a block of rows at
+/// once, LSTM and GRU networks with the weights read once for many rows. All other rows are stepped by one
+/// estimator that takes up their states one after the other. Zeros are those of all rows.
+class EstimatorBatch {
+ public:
+  /// @throws UsageError if there is no row; Error if the state of the model cannot be saved, or as `Estimator`
+  EstimatorBatch(const EstimatorSettings& settings, const AnyModel& model, std::size_t rows);
+  EstimatorBatch(EstimatorBatch&&) noexcept;
+  EstimatorBatch& operator=(EstimatorBatch&&) noexcept;
+  ~EstimatorBatch();
+
+  [[nodiscard]] std::size_t size() const noexcept;  ///< rows
+  [[nodiscard]] const std::vector<std::string>& raw_inputs() const noexcept;
+  /// As those of `Estimator`, for all rows.
+  [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept;
+  void set_zero(std::string_view channel, double value);
+
+  /// @param raw rows x channels, row by row @param estimates one a row
+  void step(std::span<const double> raw, std::span<Estimate> estimates) noexcept TORSIO_REALTIME;
+
+  void reset() noexcept;
+  void reset(std::size_t row) noexcept TORSIO_REALTIME;
+
+  /// The state of a row: the bytes of `Estimator`, which takes them and whose bytes are taken.
+  [[nodiscard]] std::size_t state_size() const noexcept;
+  [[nodiscard]] bool save(std::size_t row, std::span<std::byte> bytes) noexcept TORSIO_REALTIME;
+  [[nodiscard]] bool is_state(std::span<const std::byte> bytes) noexcept TORSIO_REALTIME;
+  [[nodiscard]] bool load(std::size_t row,
+                          std::span<const std::byte> bytes) noexcept TORSIO_REALTIME;
+
+ private:
+  struct Rows;
+  std::unique_ptr<Rows> rows_;
+};
+
+}  // namespace torsio
