@@ -70,7 +70,7 @@ class NetworkRows {
  private:
   static constexpr std::size_t kGroup = 128;
 
-  /// Of each layer h, then c; in the bytes they are padded to whole vectors.
+  /// The bytes contain h, then c, for each layer, padded to whole vectors.
   template <class Visit>
   void visit_parts(const Visit& visit) const noexcept {
     constexpr int kParts = std::same_as<Layer, LstmLayer> ? 2 : 1;
@@ -171,7 +171,7 @@ struct EstimatorBatch::Rows {
   std::vector<std::uint8_t> is_at_rest;
   std::vector<std::uint8_t> is_ordinary;
   std::vector<double> previous_raw;  ///< rows x channels, of rows at rest
-  std::vector<double> last_value;    ///< of rows at rest
+  std::vector<double> last_value;    ///< meaningful for rows at rest only
   std::vector<double> features;      ///< rows x inputs
 };
 

@@ -39,7 +39,7 @@ class FeatureColumns {
   /// The features of the rows `first` to `first + count` without a change of the filters; see `commit`.
   /// @param raw of these rows, one after the other @param count at most `kBlock`
   void step(std::size_t first, std::size_t count, const double* raw) noexcept TORSIO_REALTIME;
-  /// A feature of the last `step`, one value a row.
+  /// A feature of the last `step`, one value per row.
   [[nodiscard]] const double* feature(std::size_t index) const noexcept {
     return values_[sources_[index]].data();
   }
@@ -58,7 +58,7 @@ class FeatureColumns {
     std::uint32_t target;
     std::uint32_t left;
     std::uint32_t right;
-    std::size_t column;  ///< of a filter's first state
+    std::size_t column;  ///< the first state of a filter
     double band_gain = 0.0;
     double low_gain = 0.0;
     double high_gain = 0.0;

@@ -12,8 +12,8 @@
 
 namespace torsio {
 
-/// Many joints of one model, one a row, each with a state of its own: every row gets what an `Estimator`
-/// of its own would give it, to the bit, for less time.
+/// Many joints of one model, one per row, with separate states: every row gets the numbers of a single
+/// `Estimator`, to the bit, for less time.
 ///
 /// A row whose filters have settled, whose memory misses nothing and whose inputs are ordinary (finite, no
 /// jump, inside the ranges of the training) takes the short way: features and guards of a block of rows at
@@ -33,7 +33,7 @@ class EstimatorBatch {
   [[nodiscard]] const std::vector<std::string>& unset_zeros() const noexcept;
   void set_zero(std::string_view channel, double value);
 
-  /// @param raw rows x channels, row by row @param estimates one a row
+  /// @param raw rows x channels, row by row @param estimates one per row
   void step(std::span<const double> raw, std::span<Estimate> estimates) noexcept TORSIO_REALTIME;
 
   void reset() noexcept;
