@@ -47,8 +47,8 @@ struct CalibratedPair {
   double largest_torque_Nm = 0.0;
   /// A fault that changes the difference by this is found in any of the states of these recordings,
   /// even where the fault-free difference has the opposite sign: largest difference and largest
-  /// threshold. In a state with wider error bars the threshold is larger, up to 1.25 times the
-  /// largest one here.
+  /// threshold. In a state with wider error bars the threshold is larger, up to the ceiling of
+  /// the pair.
   double detected_in_these_states_Nm = 0.0;
   /// Error bars were above their median in fewer than ten blocks: the factor is the floor over the
   /// median.

@@ -229,8 +229,8 @@ CalibratedMonitor calibrate_monitor(const std::vector<SourceModel>& sources,
   result.not_redundant = redundancy.names(parts_of_all(redundancy));
   result.redundancy.correlation = result.monitor.correlation =
       moments_of(measured, sources.size()).correlation();
-  result.redundancy.error_bar_factors = combination_factors(
-      result.redundancy, measured, static_cast<std::size_t>(kCombinationSegment_s * rate_Hz));
+  result.redundancy.error_bar_factors =
+      combination_factors(result.redundancy, measured, samples_of(kCombinationSegment_s, rate_Hz));
   result.monitor.signals = signals.limits(
       blocks_share(1.0 - kPairsShare, SignalStatistics::kLimits * plan.signals.size()));
   for (const TorqueSource& source : plan.sources) result.monitor.sources.push_back(source.name);

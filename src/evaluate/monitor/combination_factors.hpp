@@ -22,7 +22,7 @@ struct MeasuredRun {
 /// stiffness or by the temperature, is common to the samples of a minute, so that in some minutes the
 /// other sources add more error than they remove. All but the best one get the same factor: the smallest
 /// one (among 1, 1.25, 1.5, 2, 3, 4, 6, 8) for which the root mean square error of the combination is at
-/// most 1.01 times that of the best source in each segment of the recordings.
+/// most 1.01 times that of the best source in each segment of the recordings; 8 if none achieves that.
 /// @param segment samples of a minute
 /// @returns one factor for each source; empty if no recording has a measured torque
 [[nodiscard]] std::vector<double> combination_factors(const RedundancySettings& settings,

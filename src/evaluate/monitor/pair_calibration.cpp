@@ -19,10 +19,6 @@ constexpr double kCeilingMargin = 1.25;
 constexpr double kCeilingShare = 0.7;
 constexpr double kDriftWindow_s = 60.0;
 
-std::size_t samples_of(double seconds, double rate_Hz) {
-  return static_cast<std::size_t>(std::ceil(seconds * rate_Hz - 1e-9));
-}
-
 /// The differences of two sources in the recordings.
 class PairStatistics {
  public:
@@ -199,6 +195,10 @@ class PairStatistics {
 };
 
 }  // namespace
+
+std::size_t samples_of(double seconds, double rate_Hz) {
+  return static_cast<std::size_t>(std::ceil(seconds * rate_Hz - 1e-9));
+}
 
 void refuse_calibration(double duration_s) {
   throw Error(

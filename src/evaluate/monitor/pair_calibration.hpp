@@ -19,12 +19,16 @@ struct PairCalibration {
   CalibratedPair report;
 };
 
+/// Samples of a time, as many at least.
+[[nodiscard]] std::size_t samples_of(double seconds, double rate_Hz);
+
 /// How the limits of a pair of sources are chosen.
 struct PairChoice {
   double correlation = 0.0;  ///< correlation of the errors of both sources
   double rate_Hz = 0.0;
   double persistence_s = 0.0;
-  double share = 0.0;        ///< share of the blocks in which floor and factor may each be exceeded
+  double share =
+      0.0;  ///< share of the blocks in which floor, factor and ceiling may each be exceeded
   double least_Nm = 0.0;     ///< the smallest threshold
   double required_Nm = 0.0;  ///< see `CalibrationOptions`
 };

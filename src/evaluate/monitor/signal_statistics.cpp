@@ -19,7 +19,7 @@ constexpr double kHiddenTravelMargin = 5.0;
 
 SignalStatistics::SignalStatistics(const std::vector<MonitoredSignal>& signals, double rate_Hz)
     : signals_(signals),
-      states_(signals.size(), State(static_cast<std::size_t>(kCalibrationBlock_s * rate_Hz))),
+      states_(signals.size(), State(samples_of(kCalibrationBlock_s, rate_Hz))),
       rate_Hz_(rate_Hz) {
   for (const MonitoredSignal& signal : signals) {
     spec_.inputs.push_back(signal.name);
@@ -82,7 +82,12 @@ std::vector<MonitoredSignal> SignalStatistics::limits(double share) const {
 
 void SignalStatistics::add(State& state, std::span<const double> values, std::size_t i) const {
   const double value = values[i];
-  if (!std::isfinite(value)) return;
+  if (!std::isfinite(value)) {
+    // The blocks go by the clock.
+    for (BlockMaxima* maxima : {&state.lowest, &state.highest, &state.steps, &state.hidden})
+      maxima->add(kNotMeasured);
+    return;
+  }
   const bool has_companion = companions_[i] < values.size();
   const double companion = has_companion ? values[companions_[i]] : 0.0;
   state.lowest_value = std::min(state.lowest_value, value);
