@@ -7,7 +7,9 @@
  *   if (torque.fault == TORSIO_FAULT_NONE) use(torque.value);
  *
  * An estimator is used by one thread at a time; several estimators may run in parallel. Functions that can
- * fail return NULL, -1 or 0; torsio_last_error then states why. Pointers to estimators may be NULL everywhere.
+ * fail return NULL, -1 or 0; torsio_last_error then states why, except of those that only name or count
+ * something. Pointers to estimators may be NULL everywhere. "No heap" holds for calls that succeed: the first
+ * refusal in a thread may allocate the text of torsio_last_error, unless that was called there before.
  * All quantities are in SI units. Documentation: docs/c.md, docs/estimator.md.
  */
 #ifndef TORSIO_H

@@ -109,15 +109,18 @@ class Batch {
   std::atomic<bool> is_in_use_ = false;
 };
 
+std::unique_ptr<Batch> batch_of(const Model& model, std::size_t rows,
+                                std::optional<double> rate_Hz) {
+  return std::make_unique<Batch>(model.file, rate_of(*model.file, rate_Hz), rows);
+}
+
 }  // namespace
 
 void bind_batches(py::module_& module) {
   py::class_<Batch>(module, "Batch",
                     "Many joints of one model, each with a state of its own: one joint a row.")
-      .def(py::init([](const Model& model, std::size_t rows, std::optional<double> rate_Hz) {
-             return std::make_unique<Batch>(model.file, rate_of(*model.file, rate_Hz), rows);
-           }),
-           py::arg("model"), py::arg("rows"), py::kw_only(), py::arg("rate_Hz") = py::none())
+      .def(py::init(batch_of), py::arg("model"), py::arg("rows"), py::kw_only(),
+           py::arg("rate_Hz") = py::none())
       .def("__len__", &Batch::size)
       .def_property_readonly("raw_inputs", &Batch::raw_inputs)
       .def_property_readonly("unset_zeros", &Batch::unset_zeros)
@@ -134,10 +137,7 @@ void bind_batches(py::module_& module) {
       .def("load", &Batch::load, py::arg("states"), "Returns to the states of save.");
   const py::object model = module.attr("Model");
   model.attr("batch") = py::cpp_function(
-      [](const Model& self, std::size_t rows, std::optional<double> rate_Hz) {
-        return std::make_unique<Batch>(self.file, rate_of(*self.file, rate_Hz), rows);
-      },
-      py::name("batch"), py::is_method(model), py::arg("rows"), py::kw_only(),
+      batch_of, py::name("batch"), py::is_method(model), py::arg("rows"), py::kw_only(),
       py::arg("rate_Hz") = py::none(), "So many joints of this model, one per row.");
 }
 

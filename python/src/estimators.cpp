@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 
 #include "torsio/core/did_you_mean.hpp"
@@ -21,19 +22,25 @@ std::string list_of(const std::vector<std::string>& names) {
 
 /// Members of `torsio.Fault` by number; they live as long as the process.
 py::handle fault_object(Fault fault) {
-  static const auto* const members = [] {
-    auto* all = new std::array<PyObject*, 10>{};
+  // Not initialised by a call: Python may let another thread run in it, which would wait here for ever with
+  // the interpreter's lock.
+  static std::array<PyObject*, 10>* members = nullptr;
+  if (members == nullptr) {
+    auto all = std::make_unique<std::array<PyObject*, 10>>();
     const py::object type = py::module_::import("torsio._faults").attr("Fault");
     for (std::size_t i = 0; i < all->size(); ++i) (*all)[i] = type(i).release().ptr();
-    return all;
-  }();
+    if (members == nullptr) members = all.release();
+  }
   return (*members)[static_cast<std::size_t>(fault)];
 }
 
 /// `torsio.Estimates`; it lives as long as the process.
 py::handle estimates_type() {
-  static const py::handle type =
-      py::object(py::module_::import("torsio._results").attr("Estimates")).release();
+  static PyObject* type = nullptr;  // as above
+  if (type == nullptr) {
+    py::object found = py::module_::import("torsio._results").attr("Estimates");
+    if (type == nullptr) type = found.release().ptr();
+  }
   return type;
 }
 
@@ -70,17 +77,17 @@ void fill_row(PythonEstimator& self, const py::args& arguments, const py::kwargs
     }
     return;
   }
+  if (arguments.size() == 1 && py::isinstance<py::array>(arguments[0])) {
+    const Rows one(arguments[0].attr("reshape")(1, -1), channels, "step");
+    one.copy(0, self.row);
+    return;
+  }
   if (arguments.size() == 1 && py::isinstance<py::sequence>(arguments[0]) &&
       !py::isinstance<py::str>(arguments[0])) {
     const auto sequence = py::reinterpret_borrow<py::sequence>(arguments[0]);
     if (sequence.size() != channels.size()) throw wrong_count(sequence.size());
     for (std::size_t i = 0; i < channels.size(); ++i)
       self.row[i] = number(py::object(sequence[i]), channels[i]);
-    return;
-  }
-  if (arguments.size() == 1 && py::isinstance<py::array>(arguments[0])) {
-    const Rows one(arguments[0].attr("reshape")(1, -1), channels, "step");
-    one.copy(0, self.row);
     return;
   }
   if (arguments.size() != channels.size()) throw wrong_count(arguments.size());
@@ -108,10 +115,16 @@ py::object run(PythonEstimator& self, const py::object& inputs) {
 }
 
 py::bytes saved(const PythonEstimator& self) {
+  const InUse in_use(self.is_in_use);
   std::string bytes(self.estimator.state_size(), '\0');
   if (bytes.empty() || !self.estimator.save(std::as_writable_bytes(std::span(bytes))))
     throw Error({.place = "save", .problem = "the state of this model cannot be saved"});
   return bytes;
+}
+
+PythonEstimator copied(const PythonEstimator& self) {
+  const InUse in_use(self.is_in_use);
+  return self;
 }
 
 void load(PythonEstimator& self, const py::object& state) {
@@ -301,8 +314,11 @@ void bind_estimators(py::module_& module) {
       .def_property_readonly(
           "target", [](const PythonEstimator& self) { return self.estimator.settings().target; })
       .def_readonly("sample_rate_Hz", &PythonEstimator::rate_Hz)
-      .def_property_readonly(
-          "is_settled", [](const PythonEstimator& self) { return self.estimator.is_settled(); })
+      .def_property_readonly("is_settled",
+                             [](const PythonEstimator& self) {
+                               const InUse in_use(self.is_in_use);
+                               return self.estimator.is_settled();
+                             })
       .def("set_zero", &PythonEstimator::set_zero, py::arg("channel"), py::arg("value"),
            "Subtracts a value in SI from a channel from now on.")
       .def(
@@ -322,9 +338,9 @@ void bind_estimators(py::module_& module) {
            "columns;\ncontinues from the present state. Other threads run meanwhile.")
       .def("save", saved, "The state (filters, memory, guards; not the zeros) as bytes.")
       .def("load", load, py::arg("state"), "Returns to a state of save.")
-      .def("__copy__", [](const PythonEstimator& self) { return PythonEstimator(self); })
-      .def("__deepcopy__", [](const PythonEstimator& self,
-                              const py::dict& /*memo*/) { return PythonEstimator(self); })
+      .def("__copy__", copied)
+      .def("__deepcopy__",
+           [](const PythonEstimator& self, const py::dict& /*memo*/) { return copied(self); })
       .def("__repr__",
            [](const PythonEstimator& self) {
              return "<Estimator of " + self.estimator.settings().target + " from " +

@@ -91,7 +91,8 @@ struct PythonEstimator {
   Estimator estimator;
   std::map<std::string, double> zeros = {};
   std::vector<double> row;  ///< the channels in one step
-  std::atomic<bool> is_in_use = false;
+  mutable std::atomic<bool> is_in_use =
+      false;  ///< reading a state while it changes is refused, too
 };
 
 /// The rate of a model file where none is asked for.

@@ -184,6 +184,29 @@ def test_two_threads_on_one_estimator_never_mix(model, inputs):
     for thread in threads:
         thread.join()
     assert all("another thread" in failure for failure in failures)
+
+
+def test_a_state_is_not_read_while_it_changes(model, inputs):
+    estimator = model.estimator()
+    estimator.step(inputs[0])
+    many = np.tile(inputs, (200, 1))
+    thread = threading.Thread(target=estimator.run, args=(many,))
+    thread.start()
+    refused = {}
+    while thread.is_alive():
+        for name, read in (
+            ("save", estimator.save),
+            ("copy", lambda: copy.copy(estimator)),
+            ("pickle", lambda: pickle.dumps(estimator)),
+        ):
+            try:
+                read()
+            except ValueError as error:
+                refused[name] = str(error)
+    thread.join()
+    assert set(refused) == {"save", "copy", "pickle"}
+    assert all("another thread" in text for text in refused.values())
+    estimator.save()
     estimator.reset()
     same(estimator.run(inputs), model.estimator().run(inputs))
 
