@@ -150,7 +150,7 @@ struct EstimatorBatch::Rows {
   }
 
   /// Features of a block; for rows at rest with ordinary inputs, their filters, too.
-  void find_ordinary(std::size_t first, std::size_t count, const double* raw) noexcept;
+  void find_ordinary(std::size_t first, std::size_t rows, const double* raw) noexcept;
   [[nodiscard]] Estimate ordinary_step(std::size_t row) noexcept;
   [[nodiscard]] Estimate unusable(std::size_t row, const Estimate& estimate) noexcept;
   [[nodiscard]] Estimate other_step(std::size_t row, std::span<const double> raw) noexcept;
@@ -338,8 +338,8 @@ void EstimatorBatch::Rows::step(std::span<const double> raw,
 EstimatorBatch::EstimatorBatch(const EstimatorSettings& settings, const AnyModel& model,
                                std::size_t rows)
     : rows_(std::make_unique<Rows>(settings, model, rows)) {}
-EstimatorBatch::EstimatorBatch(EstimatorBatch&&) noexcept = default;
-EstimatorBatch& EstimatorBatch::operator=(EstimatorBatch&&) noexcept = default;
+EstimatorBatch::EstimatorBatch(EstimatorBatch&& other) noexcept = default;
+EstimatorBatch& EstimatorBatch::operator=(EstimatorBatch&& other) noexcept = default;
 EstimatorBatch::~EstimatorBatch() = default;
 
 std::size_t EstimatorBatch::size() const noexcept { return rows_->count; }

@@ -23,8 +23,8 @@ class EstimatorBatch {
  public:
   /// @throws UsageError if there is no row; Error if the state of the model cannot be saved, or as `Estimator`
   EstimatorBatch(const EstimatorSettings& settings, const AnyModel& model, std::size_t rows);
-  EstimatorBatch(EstimatorBatch&&) noexcept;
-  EstimatorBatch& operator=(EstimatorBatch&&) noexcept;
+  EstimatorBatch(EstimatorBatch&& other) noexcept;
+  EstimatorBatch& operator=(EstimatorBatch&& other) noexcept;
   ~EstimatorBatch();
 
   [[nodiscard]] std::size_t size() const noexcept;  ///< rows
