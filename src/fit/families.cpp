@@ -98,9 +98,12 @@ const FamilyInfo& find_family(std::string_view name) {
   std::vector<std::string> names;
   names.reserve(all.size());
   for (const FamilyInfo& each : all) names.emplace_back(each.name);
-  throw UsageError({.problem = "no model family is called \"" + std::string(name) + '"',
-                    .expected = "one of " + joined(names),
-                    .advice = did_you_mean(name, names)});
+  throw UsageError(
+      {.problem = "no model family is called \"" + std::string(name) + '"',
+       .expected = "one of " + joined(names),
+       .advice = name.find(':') == std::string_view::npos
+                     ? did_you_mean(name, names)
+                     : "Give one model and its options as --model FAMILY --set NAME=VALUE."});
 }
 
 }  // namespace torsio

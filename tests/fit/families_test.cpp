@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "model/linear/linear_coulomb.hpp"
+#include "support/error_message.hpp"
 #include "support/example_data.hpp"
 #include "support/fitted_families.hpp"
 #include "torsio/core/error.hpp"
@@ -61,6 +62,13 @@ TEST(Families, NameTheNearestWhenOneIsUnknown) {
     EXPECT_NE(message.find("linear, linear_coulomb, polynomial"), std::string::npos) << message;
     EXPECT_NE(message.find("Did you mean 'polynomial'?"), std::string::npos) << message;
   }
+}
+
+TEST(Families, StateWhereOptionsGoIfTheyAreInTheName) {
+  EXPECT_NE(test::error_message([] {
+              (void)find_family("linear:rate_scale=1");
+            }).find("--set NAME=VALUE"),
+            std::string::npos);
 }
 
 TEST(Families, PassTheirOptionsOn) {

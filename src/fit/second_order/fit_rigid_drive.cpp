@@ -43,34 +43,51 @@ struct Scale {
 /// A number of `Parameters` that may be searched for.
 struct Field {
   SearchedParameter searched;
-  double Parameters::*place;
+  double& (*place)(Parameters&);
   double start = 0.0;
 };
+
+/// The place of a number of `Parameters`.
+template <double Parameters::*Member>
+double& of_drive(Parameters& parameters) {
+  return parameters.*Member;
+}
+
+/// The place of a number of its `VariableFriction`, which it has from then on.
+template <double VariableFriction::*Member>
+double& of_variable(Parameters& parameters) {
+  if (!parameters.variable_friction) parameters.variable_friction.emplace();
+  return (*parameters.variable_friction).*Member;
+}
 
 std::vector<Field> basic_fields(const Parameters& p, const Scale& scale) {
   return {{{.name = "inertia",
             .unit = scale.per_target(" s^2"),
             .typical = p.inertia,
             .lowest = 1e-3 * p.inertia},
-           &Parameters::inertia,
+           of_drive<&Parameters::inertia>,
            p.inertia},
           {{.name = "viscous",
             .unit = scale.per_target(" s"),
             .typical = std::max(p.viscous, p.coulomb / scale.speed),
             .lowest = 0.0},
-           &Parameters::viscous,
+           of_drive<&Parameters::viscous>,
            p.viscous},
           {{.name = "coulomb",
             .unit = scale.force_unit,
             .typical = std::max(p.coulomb, 0.1 * p.viscous * scale.speed),
             .lowest = 0.0},
-           &Parameters::coulomb,
+           of_drive<&Parameters::coulomb>,
            p.coulomb},
           {{.name = "offset",
             .unit = scale.force_unit,
             .typical = std::max(p.coulomb, 0.1 * p.viscous * scale.speed)},
-           &Parameters::offset,
+           of_drive<&Parameters::offset>,
            p.offset}};
+}
+
+std::string energy_unit(const Scale& scale) {
+  return scale.force_unit + (scale.target_unit.empty() ? "" : " " + scale.target_unit);
 }
 
 struct Term {
@@ -78,19 +95,19 @@ struct Term {
   std::vector<Field> (*fields)(const Parameters&, const Scale&);
 };
 
-const std::array<Term, 6> kTerms{{
+const std::array<Term, 9> kTerms{{
     {"stribeck",
      [](const Parameters&, const Scale& scale) {
        return std::vector<Field>{
            {{.name = "static_ratio", .unit = "", .typical = 1.0, .lowest = 1.0, .highest = 20.0},
-            &Parameters::static_ratio,
+            of_drive<&Parameters::static_ratio>,
             1.3},
            {{.name = "stribeck_speed",
              .unit = scale.target_unit.empty() ? "" : scale.target_unit + "/s",
              .typical = 0.05 * scale.speed,
              .lowest = 1e-3 * scale.speed,
              .highest = scale.speed},
-            &Parameters::stribeck_speed,
+            of_drive<&Parameters::stribeck_speed>,
             0.05 * scale.speed}};
      }},
     {"lugre",
@@ -100,7 +117,7 @@ const std::array<Term, 6> kTerms{{
                                    .typical = 1e-3 * scale.travel,
                                    .lowest = 1e-6 * scale.travel,
                                    .highest = 0.1 * scale.travel},
-                                  &Parameters::bristle,
+                                  of_drive<&Parameters::bristle>,
                                   1e-3 * scale.travel}};
      }},
     {"asymmetry",
@@ -108,7 +125,7 @@ const std::array<Term, 6> kTerms{{
        return std::vector<Field>{{{.name = "viscous_asymmetry",
                                    .unit = scale.per_target(" s"),
                                    .typical = 0.1 * std::max(p.viscous, p.coulomb / scale.speed)},
-                                  &Parameters::viscous_asymmetry,
+                                  of_drive<&Parameters::viscous_asymmetry>,
                                   0.0}};
      }},
     {"quadratic",
@@ -119,7 +136,7 @@ const std::array<Term, 6> kTerms{{
              .unit = scale.per_target(" s^2") + (scale.target_unit.empty() ? "" : "^2"),
              .typical = size,
              .lowest = 0.0},
-            &Parameters::viscous_quadratic,
+            of_drive<&Parameters::viscous_quadratic>,
             0.05 * size}};
      }},
     {"spring",
@@ -128,7 +145,7 @@ const std::array<Term, 6> kTerms{{
            {{.name = "spring",
              .unit = scale.per_target(""),
              .typical = std::max(p.coulomb, 0.1 * p.viscous * scale.speed) / scale.travel},
-            &Parameters::spring,
+            of_drive<&Parameters::spring>,
             0.0}};
      }},
     {"position",
@@ -137,8 +154,40 @@ const std::array<Term, 6> kTerms{{
            {{.name = "coulomb_slope",
              .unit = scale.target_unit.empty() ? "" : fmt::format("1/{}", scale.target_unit),
              .typical = 1.0 / scale.travel},
-            &Parameters::coulomb_slope,
+            of_drive<&Parameters::coulomb_slope>,
             0.0}};
+     }},
+    {"load",
+     [](const Parameters&, const Scale&) {
+       return std::vector<Field>{
+           {{.name = "load_share", .unit = "", .typical = 0.05, .lowest = 0.0, .highest = 0.9},
+            of_variable<&VariableFriction::load_share>,
+            0.02}};
+     }},
+    {"dwell",
+     [](const Parameters&, const Scale&) {
+       return std::vector<Field>{
+           {{.name = "dwell_gain", .unit = "", .typical = 0.2, .lowest = 0.0, .highest = 20.0},
+            of_variable<&VariableFriction::dwell_gain>,
+            0.1},
+           {{.name = "dwell_time", .unit = "s", .typical = 0.5, .lowest = 0.01, .highest = 100.0},
+            of_variable<&VariableFriction::dwell_time_s>,
+            0.5}};
+     }},
+    {"heating",
+     [](const Parameters& p, const Scale& scale) {
+       const double power = scale.speed * (p.coulomb + p.viscous * scale.speed);
+       const double size = 0.1 / (10.0 * std::max(power, 1e-300));  // 10 % after 10 s
+       return std::vector<Field>{
+           {{.name = "heating",
+             .unit = fmt::format("1/({})", energy_unit(scale)),
+             .typical = size,
+             .lowest = 0.0},
+            of_variable<&VariableFriction::heating>,
+            0.2 * size},
+           {{.name = "heating_time", .unit = "s", .typical = 20.0, .lowest = 0.5, .highest = 1e4},
+            of_variable<&VariableFriction::heating_time_s>,
+            20.0}};
      }},
 }};
 
@@ -175,7 +224,7 @@ std::string names_of(const TermSet& set) {
 /// Sets the searched parameters; the gains of the inputs after the first follow them.
 Parameters with_fields(Parameters p, const std::vector<Field>& fields,
                        std::span<const double> values) {
-  for (std::size_t i = 0; i < fields.size(); ++i) p.*fields[i].place = values[i];
+  for (std::size_t i = 0; i < fields.size(); ++i) fields[i].place(p) = values[i];
   std::ranges::copy(values.subspan(fields.size()), p.gains.begin() + 1);
   return p;
 }
@@ -211,11 +260,11 @@ Candidate candidate(const Parameters& with, const Scale& scale, const TermSet& s
 }
 
 /// The basic numbers of a guess, its further gains, and the terms where they start.
-std::vector<double> start_of(const Candidate& made, const Parameters& guess) {
+std::vector<double> start_of(const Candidate& made, Parameters guess) {
   constexpr std::size_t kBasic = 4;
   std::vector<double> start;
   for (std::size_t i = 0; i < made.fields.size(); ++i)
-    start.push_back(i < kBasic ? guess.*made.fields[i].place : made.fields[i].start);
+    start.push_back(i < kBasic ? made.fields[i].place(guess) : made.fields[i].start);
   start.insert(start.end(), guess.gains.begin() + 1, guess.gains.end());
   return start;
 }

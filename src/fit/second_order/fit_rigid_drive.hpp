@@ -16,7 +16,7 @@ namespace torsio {
 struct RigidDriveOptions {
   double gain = 1.0;  ///< g, known beforehand: it only scales the other parameters
   /// Besides J, Fv, Fc and offset: some of "stribeck", "lugre", "asymmetry", "quadratic", "spring",
-  /// "position", joined by +; "none"; "auto": added as long as they help on held-out blocks.
+  /// "position", "load", "dwell", "heating", joined by +; "none"; "auto": added as long as they help on held-out blocks.
   std::string terms = "none";
   std::size_t substeps = 1;
   std::size_t input_order = 3;
@@ -32,9 +32,10 @@ struct RigidDriveOptions {
            .help = "force of one unit of the first input; known beforehand, it scales the others"});
     visit(self.terms,
           {.name = "terms",
-           .help = "besides inertia, viscous and Coulomb friction and offset: some of stribeck, "
-                   "lugre, asymmetry, quadratic, spring, position, joined by +; auto: by held-out "
-                   "blocks"});
+           .help =
+               "besides inertia, viscous and Coulomb friction and offset: some of stribeck, "
+               "lugre, asymmetry, quadratic, spring, position, load, dwell, heating, joined by +; "
+               "auto: by held-out blocks"});
     visit_free_run_options(self, visit);
   }
 };

@@ -40,6 +40,14 @@ void check_signs(const RigidDrive::Parameters& p) {
           p.viscous_quadratic);
   require(true, "spring", "a number", p.spring);
   require(true, "coulomb_slope", "a number", p.coulomb_slope);
+  const VariableFriction variable = p.variable_friction.value_or(VariableFriction{});
+  require(variable.load_share >= 0.0 && variable.load_share < 1.0, "load_share",
+          "a number from 0 to less than 1", variable.load_share);
+  require(variable.dwell_gain >= 0.0, "dwell_gain", "a number not below 0", variable.dwell_gain);
+  require(variable.dwell_time_s > 0.0, "dwell_time_s", "a positive number", variable.dwell_time_s);
+  require(variable.heating >= 0.0, "heating", "a number not below 0", variable.heating);
+  require(variable.heating_time_s > 0.0, "heating_time_s", "a positive number",
+          variable.heating_time_s);
 }
 
 const RigidDrive::Parameters& checked(const RigidDrive::Parameters& p) {
@@ -62,7 +70,9 @@ RigidDrive::RigidDrive(const Parameters& parameters)
       substep_s_(parameters.time.sample_period_s / static_cast<double>(parameters.time.substeps)),
       input_(parameters.time.input_order, middles(parameters.time.substeps)),
       stribeck_(parameters.static_ratio, parameters.stribeck_speed),
-      bristle_stiffness_(bristle_stiffness(parameters)) {}
+      bristle_stiffness_(bristle_stiffness(parameters)),
+      variable_(parameters.variable_friction.value_or(VariableFriction{})),
+      kept_heat_(std::exp(-substep_s_ / variable_.heating_time_s)) {}
 
 std::size_t RigidDrive::parameter_count() const noexcept {
   const Parameters& p = parameters_;
@@ -71,12 +81,16 @@ std::size_t RigidDrive::parameter_count() const noexcept {
   for (const double term :
        {p.bristle, p.viscous_asymmetry, p.viscous_quadratic, p.spring, p.coulomb_slope})
     if (term != 0.0) ++count;
+  if (variable_.load_share > 0.0) ++count;
+  if (variable_.dwell_gain > 0.0) count += 2;
+  if (variable_.heating > 0.0) count += 2;
   return count;
 }
 
 void RigidDrive::reset() noexcept {
   input_.reset();
   state_ = {};
+  friction_factor_ = 1.0;
 }
 
 void RigidDrive::set_state(std::span<const double> state) noexcept {
@@ -86,35 +100,52 @@ void RigidDrive::set_state(std::span<const double> state) noexcept {
   const double most =
       bristle_stiffness_ > 0.0 ? parameters_.static_ratio * parameters_.coulomb : 0.0;
   state_[2] = std::clamp(state_[2], -most, most);
+  state_[3] = std::max(state_[3], 0.0);
+  state_[4] = std::max(state_[4], 0.0);
+  friction_factor_ = std::exp(-variable_.heating * state_[4]);
 }
 
-double RigidDrive::dry_level() const noexcept {
-  return parameters_.coulomb * std::max(0.0, 1.0 + parameters_.coulomb_slope * state_[0]) *
-         stribeck_(state_[1]);
+double RigidDrive::dry_level(double force) const noexcept {
+  double level = parameters_.coulomb * std::max(0.0, 1.0 + parameters_.coulomb_slope * state_[0]) *
+                 stribeck_(state_[1]);
+  level += variable_.load_share * std::abs(force);
+  if (variable_.dwell_gain > 0.0 && state_[3] > 0.0)
+    level *= 1.0 - variable_.dwell_gain * std::expm1(-state_[3] / variable_.dwell_time_s);
+  return friction_factor_ * level;
 }
 
-void RigidDrive::coast(double dt_s) noexcept {
+void RigidDrive::age(double friction) noexcept {
+  const double speed = state_[1];
+  if (variable_.dwell_gain > 0.0) state_[3] = speed == 0.0 ? state_[3] + substep_s_ : 0.0;
+  if (variable_.heating == 0.0) return;
+  state_[4] = kept_heat_ * state_[4] + substep_s_ * std::abs(speed) * friction;
+  friction_factor_ = std::exp(-variable_.heating * state_[4]);
+}
+
+void RigidDrive::coast(double dt_s, double force) noexcept {
   state_[0] += dt_s * state_[1];
   if (bristle_stiffness_ == 0.0) return;
-  const double level = dry_level();
+  const double level = dry_level(force);
   state_[2] =
       level > 0.0 ? relaxed_bristle(state_[2], state_[1], level, bristle_stiffness_, dt_s) : 0.0;
 }
 
 void RigidDrive::advance(double force) noexcept {
   const Parameters& p = parameters_;
-  coast(0.5 * substep_s_);
+  coast(0.5 * substep_s_, force);
   const double speed = state_[1];
-  const double drag = p.viscous + std::copysign(p.viscous_asymmetry, speed * p.viscous_asymmetry) +
-                      p.viscous_quadratic * std::abs(speed);
+  const double drag = friction_factor_ *
+                      (p.viscous + std::copysign(p.viscous_asymmetry, speed * p.viscous_asymmetry) +
+                       p.viscous_quadratic * std::abs(speed));
   const double driving = force - p.offset - p.spring * state_[0] - state_[2];
   const double half = 0.5 * substep_s_ / p.inertia;
   const double damped = 1.0 + half * drag;
   const double wanted = ((1.0 - half * drag) * speed + 2.0 * half * driving) / damped;
-  const double dry =
-      bristle_stiffness_ > 0.0 ? 0.0 : 2.0 * half * dry_level() / damped;  // what it can take away
+  const double level = bristle_stiffness_ > 0.0 ? 0.0 : dry_level(force);
+  const double dry = 2.0 * half * level / damped;  // what it can take away
   state_[1] = std::copysign(std::max(std::abs(wanted) - dry, 0.0), wanted);
-  coast(0.5 * substep_s_);
+  coast(0.5 * substep_s_, force);
+  age(drag * std::abs(state_[1]) + level + std::abs(state_[2]));
 }
 
 Estimate RigidDrive::step(Features features) noexcept {

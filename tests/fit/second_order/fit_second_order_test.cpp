@@ -112,6 +112,19 @@ TEST(FitRigidDrive, ChoosesATermThatIsThere) {
   EXPECT_THAT(with.notes, Contains(HasSubstr("chosen terms: quadratic")));
 }
 
+TEST(FitRigidDrive, FindsFrictionUnderLoadAndHeating) {
+  std::vector<double> force = multisine(8000, 1000.0, 0.3, 3.0, 90.0);
+  RigidDrive::Parameters truth = carriage().parameters();
+  truth.variable_friction =
+      VariableFriction{.load_share = 0.15, .heating = 0.02, .heating_time_s = 20.0};
+  const TrainingData data = recorded(RigidDrive(truth), force, 1e-7);
+  const RigidDrive::Parameters load = fit_rigid_drive(data, {.terms = "load+heating"}).parameters;
+  ASSERT_TRUE(load.variable_friction);
+  EXPECT_NEAR(load.variable_friction->load_share, 0.15, 0.02);
+  EXPECT_NEAR(load.variable_friction->heating, 0.02, 0.004);
+  EXPECT_FALSE(fit_rigid_drive(data, {}).parameters.variable_friction);
+}
+
 TEST(FitRigidDrive, StatesWhyItCannotFit) {
   EXPECT_THAT(test::error_message(
                   [] { (void)fit_rigid_drive(carriage_record(), {.terms = "lugre+stribek"}); }),

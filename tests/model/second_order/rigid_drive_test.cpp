@@ -106,6 +106,51 @@ TEST(RigidDrive, HasMoreFrictionAccordingToItsSlope) {
   }
 }
 
+TEST(RigidDrive, HasMoreFrictionUnderLoad) {
+  auto parameters = sliding();
+  parameters.variable_friction = VariableFriction{.load_share = 0.2};
+  // Starts where F = 20 + 0.2 F, slides where 200 v = 80 - 36.
+  RigidDrive model(parameters);
+  for (int n = 0; n < 100; ++n) EXPECT_EQ(step(model, 24.9), 0.0);
+  for (int n = 0; n < 10000; ++n) (void)step(model, 80.0);
+  EXPECT_NEAR(model.state()[1], 0.22, 1e-6);
+}
+
+TEST(RigidDrive, NeedsMoreForceToStartTheLongerItRested) {
+  auto parameters = sliding();
+  parameters.variable_friction = VariableFriction{.dwell_gain = 0.5, .dwell_time_s = 0.2};
+  double before = 0.0;
+  for (const int rest_ms : {10, 100, 1000}) {
+    RigidDrive model(parameters);
+    for (int n = 0; n < rest_ms; ++n) (void)step(model, 0.0);
+    double force = 0.0;
+    for (; model.state()[1] == 0.0 && force < 50.0; force += 0.5) (void)step(model, force);
+    EXPECT_GT(force, before);
+    before = force;
+    if (rest_ms != 1000) continue;
+    EXPECT_NEAR(force, 30.0, 1.5);
+    for (int n = 0; n < 2000; ++n) (void)step(model, 60.0);
+    EXPECT_NEAR(model.state()[1], 0.2, 1e-2);  // it slides against the same friction as before
+  }
+}
+
+TEST(RigidDrive, LosesFrictionAsItWarmsAndRegainsItAtRest) {
+  auto parameters = sliding();
+  parameters.variable_friction = VariableFriction{.heating = 0.002, .heating_time_s = 5.0};
+  parameters.highest = 1e4;
+  RigidDrive model(parameters);
+  for (int n = 0; n < 200000; ++n) (void)step(model, 80.0);
+  // At rest the power 80 v heats, E = 5 s 80 v, and exp(-0.002 E) (200 v + 20) = 80.
+  const double speed = model.state()[1];
+  EXPECT_NEAR(std::exp(-0.002 * 5.0 * 80.0 * speed) * (200.0 * speed + 20.0), 80.0, 0.1);
+  const double heat = model.state()[4];
+  for (int n = 0; n < 30000; ++n) (void)step(model, 0.0);
+  EXPECT_LT(model.state()[4], 0.01 * heat);
+  EXPECT_GT(heat, 100.0);
+  model.reset();
+  EXPECT_EQ(model.state()[4], 0.0);
+}
+
 TEST(RigidDrive, WithABristleIsASpringBeforeItSlides) {
   auto parameters = sliding();
   parameters.bristle = 1e-3;  // 20 kN/m
@@ -123,6 +168,8 @@ TEST(RigidDrive, TakesMoreEnergyThanItHolds) {
     parameters.static_ratio = 1.5;
     parameters.stribeck_speed = 0.02;
     parameters.spring = 300.0;
+    parameters.variable_friction = VariableFriction{
+        .load_share = 0.1, .dwell_gain = 0.3, .dwell_time_s = 0.1, .heating = 0.05};
     RigidDrive model(parameters);
     double work = 0.0;
     double before = 0.0;
@@ -160,10 +207,10 @@ TEST(RigidDrive, KeepsABristleBelowWhatItCanHold) {
   parameters.bristle = 1e-3;
   RigidDrive with(parameters);
   with.set_state(std::vector<double>{0.0, NAN, 1e9});
-  EXPECT_THAT(with.state(), testing::ElementsAre(0.0, 0.0, 20.0));
+  EXPECT_THAT(with.state(), testing::ElementsAre(0.0, 0.0, 20.0, 0.0, 0.0));
   RigidDrive without(sliding());
   without.set_state(std::vector<double>{20.0, 1.0, 5.0});
-  EXPECT_THAT(without.state(), testing::ElementsAre(10.0, 1.0, 0.0));
+  EXPECT_THAT(without.state(), testing::ElementsAre(10.0, 1.0, 0.0, 0.0, 0.0));
 }
 
 TEST(RigidDrive, RefusesWhatIsNoDrive) {
