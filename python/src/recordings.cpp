@@ -2,7 +2,7 @@
 #include <utility>
 
 #include "bindings.hpp"
-#include "data/csv/csv_table.hpp"
+#include "data/log_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"
@@ -63,8 +63,9 @@ void add_channel(Recording& recording, const std::string& name, const Doubles& v
 std::vector<Recording> recordings_from_columns(
     const std::vector<std::pair<std::string, Doubles>>& columns, std::optional<double> rate_Hz,
     const std::string& mapping, const std::string& name) {
-  CsvTable table;
+  LogTable table;
   table.source.file = name;
+  table.row_word = "row";
   table.line_marks = {{0, 0}};  // rows are counted as pandas does
   for (const auto& [column, values] : columns)
     table.columns.push_back({column, table.columns.size() + 1, values_of(values, column)});

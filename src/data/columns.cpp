@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "data/column_advice.hpp"
-#include "data/csv/csv_table.hpp"
+#include "data/log_table.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -27,7 +27,7 @@ std::string_view quantity_of(std::string_view column_name) {
 }
 
 /// scale * column + offset. @throws Error where that is too large for a number.
-std::vector<double> converted(const CsvColumn& column, const CsvTable& table, double scale,
+std::vector<double> converted(const LogColumn& column, const LogTable& table, double scale,
                               double offset) {
   std::vector<double> values = column.values;
   if (scale == 1.0 && offset == 0.0) return values;  // keeps even the sign of a zero
@@ -48,10 +48,10 @@ const Unit* unit_of_source(const ChannelRule& rule, const Unit* unit_of_channel)
   return from ? from->unit : unit_of_channel;
 }
 
-TableChannel channel_from_rule(const ChannelRule& rule, const CsvTable& table,
+TableChannel channel_from_rule(const ChannelRule& rule, const LogTable& table,
                                const std::string& mapping_file) {
   const std::string place = mapping_file + ": channels." + rule.name;
-  const CsvColumn& column = column_named(table, rule.from, place);
+  const LogColumn& column = column_named(table, rule.from, place);
   const auto name = split_channel_name(rule.name);
   if (!name) throw Error({.place = place, .problem = "the name has no unit"});
   const Unit* unit = unit_of_source(rule, name->unit);
@@ -70,7 +70,7 @@ TableChannel channel_from_rule(const ChannelRule& rule, const CsvTable& table,
           .column = &column};
 }
 
-TableChannel channel_from_column(const CsvColumn& column, const CsvTable& table) {
+TableChannel channel_from_column(const LogColumn& column, const LogTable& table) {
   const auto name = split_channel_name(column.name);
   if (!name) {
     const auto ending = column.name.rfind('_');
@@ -89,13 +89,13 @@ TableChannel channel_from_column(const CsvColumn& column, const CsvTable& table)
 }
 
 /// Freshness column -> the column whose samples it marks.
-std::map<const CsvColumn*, const CsvColumn*> freshness_of(const CsvTable& table) {
-  std::map<const CsvColumn*, const CsvColumn*> marked;
-  for (const CsvColumn& mask : table.columns) {
+std::map<const LogColumn*, const LogColumn*> freshness_of(const LogTable& table) {
+  std::map<const LogColumn*, const LogColumn*> marked;
+  for (const LogColumn& mask : table.columns) {
     std::string_view quantity = mask.name;
     if (!quantity.ends_with(kFreshEnding)) continue;
     quantity.remove_suffix(kFreshEnding.size());
-    for (const CsvColumn& column : table.columns) {
+    for (const LogColumn& column : table.columns) {
       if (quantity_of(column.name) != quantity) continue;
       if (!marked.emplace(&mask, &column).second)
         throw Error({.place = table.header_place(mask),
@@ -106,7 +106,7 @@ std::map<const CsvColumn*, const CsvColumn*> freshness_of(const CsvTable& table)
   return marked;
 }
 
-std::vector<std::uint8_t> freshness_mask(const CsvTable& table, const CsvColumn& column) {
+std::vector<std::uint8_t> freshness_mask(const LogTable& table, const LogColumn& column) {
   std::vector<std::uint8_t> mask(column.values.size());
   for (std::size_t row = 0; row < mask.size(); ++row) {
     const double value = column.values[row];
@@ -119,8 +119,8 @@ std::vector<std::uint8_t> freshness_mask(const CsvTable& table, const CsvColumn&
   return mask;
 }
 
-void refuse_duplicates(const std::vector<TableChannel>& channels, const CsvTable& table) {
-  std::map<std::string_view, const CsvColumn*> seen;
+void refuse_duplicates(const std::vector<TableChannel>& channels, const LogTable& table) {
+  std::map<std::string_view, const LogColumn*> seen;
   for (const TableChannel& made : channels) {
     const auto [first, is_new] = seen.emplace(made.channel.name, made.column);
     if (!is_new)
@@ -139,20 +139,20 @@ bool is_clock(const TableChannel& made) {
 
 }  // namespace
 
-const CsvColumn& column_named(const CsvTable& table, const std::string& name,
+const LogColumn& column_named(const LogTable& table, const std::string& name,
                               const std::string& place) {
-  if (const CsvColumn* column = table.find(name)) return *column;
+  if (const LogColumn* column = table.find(name)) return *column;
   std::vector<std::string> names;
-  for (const CsvColumn& column : table.columns) names.push_back(column.name);
+  for (const LogColumn& column : table.columns) names.push_back(column.name);
   throw Error({.place = place,
                .problem = fmt::format("{} has no column '{}'", table.source.file, name),
                .found = "the columns " + joined(names),
                .advice = did_you_mean(name, names)});
 }
 
-TableChannels channels_of_table(const CsvTable& table, const Mapping& mapping) {
+TableChannels channels_of_table(const LogTable& table, const Mapping& mapping) {
   const auto masks = freshness_of(table);
-  std::set<const CsvColumn*> consumed;
+  std::set<const LogColumn*> consumed;
   for (const auto& [mask, column] : masks) consumed.insert(mask);
   if (!mapping.split_by.empty())
     consumed.insert(&column_named(table, mapping.split_by, mapping.file + ": split_by"));
@@ -162,12 +162,15 @@ TableChannels channels_of_table(const CsvTable& table, const Mapping& mapping) {
     all.push_back(channel_from_rule(rule, table, mapping.file));
     consumed.insert(all.back().column);
   }
-  for (const CsvColumn& column : table.columns)
-    if (!consumed.contains(&column)) all.push_back(channel_from_column(column, table));
+  for (const LogColumn& column : table.columns)
+    if (!consumed.contains(&column) && (table.has_units || split_channel_name(column.name)))
+      all.push_back(channel_from_column(column, table));
   refuse_duplicates(all, table);
   for (const auto& [mask, column] : masks)
     for (TableChannel& made : all)
       if (made.column == column) made.channel.fresh = freshness_mask(table, *mask);
+  for (TableChannel& made : all)
+    if (made.channel.fresh.empty()) made.channel.fresh = made.column->fresh;
 
   TableChannels result;
   for (TableChannel& made : all) {
@@ -185,7 +188,12 @@ TableChannels channels_of_table(const CsvTable& table, const Mapping& mapping) {
   if (result.channels.empty())
     throw Error({.place = table.source.file,
                  .problem = "no channels",
-                 .expected = "at least one column beside the clock"});
+                 .expected = table.has_units ? "at least one column beside the clock"
+                                             : "a mapping that names the fields to be read",
+                 .found = table.has_units ? "" : "the fields " + table.column_list(),
+                 .advice = table.has_units ? ""
+                                           : "Write a mapping: channels: {joint_angle_rad: "
+                                             "/joint_states/elbow/position, ...}"});
   return result;
 }
 

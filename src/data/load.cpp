@@ -49,11 +49,11 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }
 
 /// Removes what a log does not need: definitions, and rules for channels that it does not have.
-void keep_needed(Mapping& mapping, const CsvTable& table, std::vector<std::string> needed) {
+void keep_needed(Mapping& mapping, const LogTable& table, std::vector<std::string> needed) {
   needed.insert(needed.end(), {"t_s", "time_s"});
   mapping.derive = needed_definitions(mapping.derive, needed);
   std::vector<std::string> left = needed;
-  for (const CsvColumn& column : table.columns)
+  for (const LogColumn& column : table.columns)
     if (const auto name = split_channel_name(column.name)) left.push_back(name->si());
   std::erase_if(mapping.channels, [&](const ChannelRule& rule) {
     const auto name = split_channel_name(rule.name);
@@ -112,7 +112,7 @@ void check_computed_from(const Mapping& mapping, const Recording& recording) {
 /// @param needed the channels that suffice; empty: all of the mapping, and the target
 std::vector<Recording> load(const Log& log, const std::string& target,
                             const std::vector<std::string>& needed, const Progress& progress) {
-  const CsvTable table = read_csv(log.path, {.skip = log.mapping.drop, .progress = progress});
+  const LogTable table = read_csv(log.path, {.skip = log.mapping.drop, .progress = progress});
   Mapping mapping = log.mapping;
   if (!needed.empty()) keep_needed(mapping, table, needed);
   std::vector<Recording> recordings =

@@ -27,9 +27,9 @@ struct NamedRows {
   Rows rows;
 };
 
-std::vector<NamedRows> runs_of_equal_value(const CsvTable& table, const Mapping& mapping,
+std::vector<NamedRows> runs_of_equal_value(const LogTable& table, const Mapping& mapping,
                                            const std::string& stem) {
-  const CsvColumn& column = column_named(table, mapping.split_by, mapping.file + ": split_by");
+  const LogColumn& column = column_named(table, mapping.split_by, mapping.file + ": split_by");
   std::vector<NamedRows> runs;
   std::map<double, std::size_t> met;
   const auto& values = column.values;
@@ -58,7 +58,7 @@ std::vector<NamedRows> runs_of_equal_value(const CsvTable& table, const Mapping&
   return runs;
 }
 
-std::vector<NamedRows> records_of(const CsvTable& table, const Mapping& mapping,
+std::vector<NamedRows> records_of(const LogTable& table, const Mapping& mapping,
                                   const std::string& name) {
   const std::string stem = name.empty() ? file_stem(table.source.file) : name;
   if (!mapping.split_by.empty()) return runs_of_equal_value(table, mapping, stem);
@@ -142,7 +142,7 @@ double zero_of(const std::string& recording, const Channel& channel, const ZeroR
   return rule.mid_range ? 0.5 * (lowest + highest) : sum / count;
 }
 
-Recording recording_of(const CsvTable& table, TableChannels& columns, const NamedRows& run,
+Recording recording_of(const LogTable& table, TableChannels& columns, const NamedRows& run,
                        const Mapping& mapping, double rate_Hz) {
   const RecordClock clock = record_clock(table, columns, run.rows, mapping, rate_Hz);
   std::vector<Channel> channels;
@@ -177,7 +177,7 @@ Recording recording_of(const CsvTable& table, TableChannels& columns, const Name
 
 }  // namespace
 
-std::vector<Recording> measured_recordings(const CsvTable& table, const Mapping& mapping,
+std::vector<Recording> measured_recordings(const LogTable& table, const Mapping& mapping,
                                            double rate_Hz, const std::string& name) {
   TableChannels columns = channels_of_table(table, mapping);
   std::vector<Recording> recordings;

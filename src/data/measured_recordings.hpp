@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "data/csv/csv_table.hpp"
+#include "data/log_table.hpp"
 #include "torsio/data/mapping.hpp"
 #include "torsio/data/recording.hpp"
 
@@ -14,7 +14,7 @@ namespace torsio {
 /// resampling and conditions. `rate_Hz` is the sample rate of a log without clock whose mapping
 /// gives none; `name` names the recordings, the file's name if empty.
 /// @throws Error naming place, expected, found and the mapping line that helps.
-[[nodiscard]] std::vector<Recording> measured_recordings(const CsvTable& table,
+[[nodiscard]] std::vector<Recording> measured_recordings(const LogTable& table,
                                                          const Mapping& mapping,
                                                          double rate_Hz = 0.0,
                                                          const std::string& name = {});

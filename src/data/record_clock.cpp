@@ -8,10 +8,10 @@
 #include <span>
 #include <utility>
 
-#include "data/csv/csv_table.hpp"
 #include "data/finest_step.hpp"
 #include "data/inspect_clock.hpp"
 #include "data/interpolate.hpp"
+#include "data/log_table.hpp"
 #include "data/resample.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
@@ -23,8 +23,8 @@ constexpr double kLongestGapIntervals = 5.0;
 
 /// The stamps of one record, with what is needed to complain about them.
 struct Stamps {
-  const CsvTable& table;
-  const CsvColumn& column;
+  const LogTable& table;
+  const LogColumn& column;
   Rows rows;
   std::span<const double> values_s;
   ClockReport report;
@@ -188,10 +188,10 @@ void refuse_gaps(const Stamps& stamps) {
   }
 }
 
-double given_rate(const CsvTable& table, const Mapping& mapping, double rate_Hz) {
+double given_rate(const LogTable& table, const Mapping& mapping, double rate_Hz) {
   const double rate = mapping.rate_Hz > 0.0 ? mapping.rate_Hz : rate_Hz;
   if (rate > 0.0) return rate;
-  throw Error({.place = fmt::format("{}: line {}", table.source.file, table.header_line),
+  throw Error({.place = table.header_place(),
                .problem = "the log has no clock",
                .expected = "a column t_s (or t_ms, time_us ...)",
                .found = "the columns " + table.column_list(),
@@ -200,10 +200,10 @@ double given_rate(const CsvTable& table, const Mapping& mapping, double rate_Hz)
 
 }  // namespace
 
-RecordClock record_clock(const CsvTable& table, const TableChannels& columns, Rows rows,
+RecordClock record_clock(const LogTable& table, const TableChannels& columns, Rows rows,
                          const Mapping& mapping, double rate_Hz) {
   if (!columns.clock) return {.sample_rate_Hz = given_rate(table, mapping, rate_Hz)};
-  const CsvColumn& column = *columns.clock->column;
+  const LogColumn& column = *columns.clock->column;
   if (mapping.rate_Hz > 0.0)
     throw Error({.place = mapping.file + ": rate",
                  .problem = "the log has a clock of its own, column " + column.name,

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "data/columns.hpp"
-#include "data/csv/csv_table.hpp"
+#include "data/log_table.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/mapping.hpp"
 
@@ -24,7 +24,7 @@ struct RecordClock {
 };
 
 /// The clock of some rows by the mapping's rules; `rate_Hz` if neither log nor mapping has a rate.
-[[nodiscard]] RecordClock record_clock(const CsvTable& table, const TableChannels& columns,
+[[nodiscard]] RecordClock record_clock(const LogTable& table, const TableChannels& columns,
                                        Rows rows, const Mapping& mapping, double rate_Hz);
 
 /// Samples that share a stamp, spread evenly up to the next stamp (the last ones as those before),

@@ -59,7 +59,7 @@ std::string gzipped(const std::string& text) {
   return packed;
 }
 
-void expect_two_rows(const CsvTable& table) {
+void expect_two_rows(const LogTable& table) {
   ASSERT_EQ(table.columns.size(), 2U);
   EXPECT_EQ(table.columns[0].name, "t_s");
   EXPECT_EQ(table.columns[1].name, "torque_Nm");
@@ -85,14 +85,14 @@ INSTANTIATE_TEST_SUITE_P(
         gzipped("t_s,torque_Nm\n0,1.5\n") + gzipped("0.5,-2\n")));
 
 TEST(Csv, AQuotedHeaderMayHoldSeparatorsAndQuotes) {
-  const CsvTable table = parse_csv("\"a,b_rad\",\"the \"\"x\"\"_1\"\n1,2\n", "a.csv");
+  const LogTable table = parse_csv("\"a,b_rad\",\"the \"\"x\"\"_1\"\n1,2\n", "a.csv");
   ASSERT_EQ(table.columns.size(), 2U);
   EXPECT_EQ(table.columns[0].name, "a,b_rad");
   EXPECT_EQ(table.columns[1].name, "the \"x\"_1");
 }
 
 TEST(Csv, EmptyCellsAndNanAreMissingValues) {
-  const CsvTable table = parse_csv("a_1,b_1,c_1\n,nan,\nNaN, ,3\n", "a.csv");
+  const LogTable table = parse_csv("a_1,b_1,c_1\n,nan,\nNaN, ,3\n", "a.csv");
   EXPECT_TRUE(std::isnan(table.columns[0].values[0]));
   EXPECT_TRUE(std::isnan(table.columns[0].values[1]));
   EXPECT_TRUE(std::isnan(table.columns[1].values[0]));
@@ -102,7 +102,7 @@ TEST(Csv, EmptyCellsAndNanAreMissingValues) {
 }
 
 TEST(Csv, ASkippedColumnMayHoldAnything) {
-  const CsvTable table =
+  const LogTable table =
       parse_csv("a_1,phase,b_1\n1,\"up, then down\",2\n3,down,4\n", "a.csv", {.skip = {"phase"}});
   ASSERT_EQ(table.columns.size(), 2U);
   EXPECT_EQ(table.columns[1].values, (std::vector<double>{2.0, 4.0}));
@@ -110,7 +110,7 @@ TEST(Csv, ASkippedColumnMayHoldAnything) {
 }
 
 TEST(Csv, LineNumbersCountCommentsAndBlankLines) {
-  const CsvTable table = parse_csv("# one\na_1\n1\n2\n\n# six\n3\n4\n", "a.csv");
+  const LogTable table = parse_csv("# one\na_1\n1\n2\n\n# six\n3\n4\n", "a.csv");
   EXPECT_EQ(table.line_of(0), 3U);
   EXPECT_EQ(table.line_of(1), 4U);
   EXPECT_EQ(table.line_of(2), 7U);
@@ -122,7 +122,7 @@ TEST(Csv, TellsTheSha256OfTheFileAsItStands) {
   const TemporaryFolder folder;
   // printf 'a_1\n1\n' | sha256sum
   const std::string path = folder.file("a.csv", "a_1\n1\n");
-  const CsvTable table = read_csv(path);
+  const LogTable table = read_csv(path);
   EXPECT_EQ(table.source.file, path);
   EXPECT_EQ(table.source.sha256,
             "2ea78cc556ed74a182f57b9ecce150d3ba98cc351c83464a486ded36bcf90042");
@@ -219,8 +219,8 @@ TEST(CsvWriter, PacksWhatEndsInGzAndAlwaysToTheSameBytes) {
   const std::string packed = written("a.csv.gz");
   EXPECT_LT(packed.size(), plain.size() / 2);
   EXPECT_EQ(packed, written("b.csv.gz"));
-  const CsvTable table = read_csv(folder.path("a.csv"));
-  const CsvTable unpacked = read_csv(folder.path("a.csv.gz"));
+  const LogTable table = read_csv(folder.path("a.csv"));
+  const LogTable unpacked = read_csv(folder.path("a.csv.gz"));
   ASSERT_EQ(table.columns.size(), unpacked.columns.size());
   EXPECT_EQ(table.columns.front().values, unpacked.columns.front().values);
   EXPECT_EQ(table.columns.back().values, unpacked.columns.back().values);

@@ -21,11 +21,11 @@ namespace {
 /// Turns lines into rows of a table.
 class TableParser {
  public:
-  TableParser(CsvTable& table, const CsvHeader& header, const CsvOptions& options)
+  TableParser(LogTable& table, const CsvHeader& header, const CsvOptions& options)
       : table_(table), separator_(header.separator), limits_(options.limits) {
     for (std::size_t i = 0; i < header.names.size(); ++i)
       columns_.push_back({.name = header.names[i], .number = i + 1, .values = {}});
-    for (const CsvColumn& column : columns_)
+    for (const LogColumn& column : columns_)
       read_.push_back(std::ranges::find(options.skip, column.name) == options.skip.end() ? 1 : 0);
   }
 
@@ -76,7 +76,7 @@ class TableParser {
   }
 
   /// Everything but a plain number: blanks, quotes, an empty cell, nan, a decimal comma.
-  double unusual_cell(std::string_view cell, std::size_t line, const CsvColumn& column) {
+  double unusual_cell(std::string_view cell, std::size_t line, const LogColumn& column) {
     const std::string_view whole = cell;
     const auto strip = [&cell](char c) {
       while (!cell.empty() && cell.front() == c) cell.remove_prefix(1);
@@ -110,7 +110,7 @@ class TableParser {
     const auto is_broken = [](double value) {
       return std::isfinite(value) && std::trunc(value) != value;
     };
-    return std::ranges::any_of(columns_, [&](const CsvColumn& column) {
+    return std::ranges::any_of(columns_, [&](const LogColumn& column) {
       return std::ranges::any_of(column.values, is_broken);
     });
   }
@@ -121,12 +121,12 @@ class TableParser {
     last_line_ = line;
   }
 
-  [[nodiscard]] std::string place(std::size_t line, const CsvColumn& column) const {
+  [[nodiscard]] std::string place(std::size_t line, const LogColumn& column) const {
     return fmt::format("{}: line {}, column {} ({})", table_.source.file, line, column.number,
                        column.name);
   }
 
-  [[noreturn]] void refuse_mixture(std::size_t line, const CsvColumn& column) const {
+  [[noreturn]] void refuse_mixture(std::size_t line, const LogColumn& column) const {
     throw Error({.place = place(line, column),
                  .problem = "decimal commas and decimal points in one file",
                  .advice = "Export the log again with one of them and without thousands marks."});
@@ -144,10 +144,10 @@ class TableParser {
                  .advice = "The line may have been cut off while logging: remove or correct it."});
   }
 
-  CsvTable& table_;
+  LogTable& table_;
   char separator_;
   CsvLimits limits_;
-  std::vector<CsvColumn> columns_;
+  std::vector<LogColumn> columns_;
   std::vector<std::uint8_t> read_;
   std::size_t rows_ = 0;
   std::size_t last_line_ = 0;
@@ -206,8 +206,8 @@ void refuse_model(std::string_view first, LineReader& lines, const std::string& 
                          "recordings only."});
 }
 
-CsvTable parse(ByteSource& source, const std::string& name, const CsvOptions& options) {
-  CsvTable table;
+LogTable parse(ByteSource& source, const std::string& name, const CsvOptions& options) {
+  LogTable table;
   table.source.file = name;
   LineReader lines(source, name);
   const std::string first(header_line(lines, name, options.limits.header_bytes));
@@ -245,41 +245,12 @@ CsvTable parse(ByteSource& source, const std::string& name, const CsvOptions& op
 
 }  // namespace
 
-const CsvColumn* CsvTable::find(std::string_view name) const noexcept {
-  const auto at = std::ranges::find(columns, name, &CsvColumn::name);
-  return at == columns.end() ? nullptr : &*at;
-}
-
-std::size_t CsvTable::line_of(std::size_t row) const noexcept {
-  const auto after =
-      std::ranges::upper_bound(line_marks, row, {}, &std::pair<std::size_t, std::size_t>::first);
-  if (after == line_marks.begin()) return 0;
-  const auto& [first_row, first_line] = *(after - 1);
-  return first_line + row - first_row;
-}
-
-std::string CsvTable::column_list() const {
-  std::vector<std::string> names;
-  for (const CsvColumn& column : columns) names.push_back(column.name);
-  return joined(names);
-}
-
-std::string CsvTable::place(std::size_t row, const CsvColumn& column) const {
-  return fmt::format("{}: line {}, column {} ({})", source.file, line_of(row), column.number,
-                     column.name);
-}
-
-std::string CsvTable::header_place(const CsvColumn& column) const {
-  return fmt::format("{}: line {}, column {} ({})", source.file, header_line, column.number,
-                     column.name);
-}
-
-CsvTable read_csv(const std::string& path, const CsvOptions& options) {
+LogTable read_csv(const std::string& path, const CsvOptions& options) {
   const auto source = open_bytes(path, options.progress);
   return parse(*source, path == "-" ? "standard input" : path, options);
 }
 
-CsvTable parse_csv(std::string_view bytes, const std::string& name, const CsvOptions& options) {
+LogTable parse_csv(std::string_view bytes, const std::string& name, const CsvOptions& options) {
   const auto source = bytes_in_memory(bytes, name);
   return parse(*source, name, options);
 }

@@ -3,39 +3,12 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
+#include "data/log_table.hpp"
 #include "torsio/core/progress.hpp"
-#include "torsio/core/provenance.hpp"
 
 namespace torsio {
-
-/// One column of a CSV file without conversion. An empty cell is NaN.
-struct CsvColumn {
-  std::string name;
-  std::size_t number = 0;  ///< counted from 1 in the header
-  std::vector<double> values;
-};
-
-/// A CSV file in memory.
-struct CsvTable {
-  Source source;
-  std::size_t header_line = 0;
-  std::vector<CsvColumn> columns;
-  /// (row, line) wherever the line numbers jump because of comments or blank lines.
-  std::vector<std::pair<std::size_t, std::size_t>> line_marks;
-
-  [[nodiscard]] std::size_t rows() const noexcept {
-    return columns.empty() ? 0 : columns.front().values.size();
-  }
-  [[nodiscard]] const CsvColumn* find(std::string_view name) const noexcept;
-  [[nodiscard]] std::size_t line_of(std::size_t row) const noexcept;
-  [[nodiscard]] std::string column_list() const;  ///< for error messages
-  /// "sweep.csv: line 12, column 3 (torque_Nm)"
-  [[nodiscard]] std::string place(std::size_t row, const CsvColumn& column) const;
-  [[nodiscard]] std::string header_place(const CsvColumn& column) const;
-};
 
 /// What a reader takes before it refuses: a pipe of endless zeros must not fill the memory.
 struct CsvLimits {
@@ -57,10 +30,10 @@ struct CsvOptions {
 /// comments. See docs/recordings.md.
 /// @throws Error with line and column if it is not a table of numbers, Cancelled if the
 /// progress asks to stop.
-[[nodiscard]] CsvTable read_csv(const std::string& path, const CsvOptions& options = {});
+[[nodiscard]] LogTable read_csv(const std::string& path, const CsvOptions& options = {});
 
 /// The same from bytes in memory; `name` is the file name in messages.
-[[nodiscard]] CsvTable parse_csv(std::string_view bytes, const std::string& name,
+[[nodiscard]] LogTable parse_csv(std::string_view bytes, const std::string& name,
                                  const CsvOptions& options = {});
 
 /// The name of the column that holds the freshness of a channel: "torque_Nm" -> "torque_fresh_1".

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "torsio/core/provenance.hpp"
+
+namespace torsio {
+
+/// One column of a log without conversion. A missing value is NaN.
+struct LogColumn {
+  std::string name;
+  std::size_t number = 0;  ///< counted from 1 in the header
+  std::vector<double> values;
+  /// `Channel::fresh`, where the format has it.
+  std::vector<std::uint8_t> fresh = {};
+};
+
+/// What every reader of a log makes of it: named columns of equal length, and where in the file a
+/// row is, for messages. Mapping and clock are applied to it, whatever the format was.
+struct LogTable {
+  Source source;
+  std::size_t header_line = 0;  ///< line of the names in a text; 0: the file is not a text
+  std::vector<LogColumn> columns;
+  /// (row, number of its line, message, ...) wherever the numbers jump, as at comments.
+  std::vector<std::pair<std::size_t, std::size_t>> line_marks;
+  std::string row_word = "line";  ///< what a row is in the file: "line", "message", "row"
+  /// Names end in units. Where they are those of fields, only the columns that the mapping names,
+  /// or that have a unit by chance, are channels.
+  bool has_units = true;
+
+  [[nodiscard]] std::size_t rows() const noexcept {
+    return columns.empty() ? 0 : columns.front().values.size();
+  }
+  [[nodiscard]] const LogColumn* find(std::string_view name) const noexcept;
+  [[nodiscard]] std::size_t line_of(std::size_t row) const noexcept;
+  [[nodiscard]] std::string column_list() const;  ///< for error messages
+  /// "sweep.csv: line 12, column 3 (torque_Nm)", "run.mcap: message 12, /imu/x"
+  [[nodiscard]] std::string place(std::size_t row, const LogColumn& column) const;
+  [[nodiscard]] std::string header_place(const LogColumn& column) const;
+  [[nodiscard]] std::string header_place() const;
+};
+
+}  // namespace torsio
