@@ -13,8 +13,10 @@
 #include "torsio/check/advice.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
+#include "torsio/data/log_summary.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/check.hpp"
+#include "torsio/report/log_summary.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -23,6 +25,7 @@ struct CheckFlags {
   DataFlags data;
   std::vector<std::string> test;
   bool advise = false;
+  bool list = false;
   std::vector<std::string> want;
   JsonOutput json;
 };
@@ -71,7 +74,21 @@ Checked checked(const CheckFlags& flags) {
   }
 }
 
+/// Topics and fields instead of findings: what a mapping can name.
+void list(CheckFlags& flags) {
+  if (flags.data.recordings.size() != 1)
+    throw torsio::UsageError({.place = "--list", .expected = "one recording"});
+  flags.data.check_outputs({flags.json.destination}, flags.test);
+  const torsio::LogSummary summary = [&] {
+    ProgressBar progress;
+    return torsio::list_log(flags.data.recordings.front(), progress.listener());
+  }();
+  if (flags.json.wants_tables()) print(torsio::log_summary_text(summary));
+  flags.json.write(torsio::log_summary_json(summary));
+}
+
 void run(CheckFlags& flags) {
+  if (flags.list) return list(flags);
   if (!flags.want.empty() && !flags.advise)
     throw torsio::UsageError({.place = "--want",
                               .problem = "it states the intended use for --advise",
@@ -113,6 +130,8 @@ void add_check(CLI::App& app) {
   flags->data.add_target_and_inputs(*verb);
   verb->add_option("--test", flags->test,
                    "held-out recordings: are they inside the training range?");
+  verb->add_flag("--list", flags->list,
+                 "topics, rates, gaps and fields of an MCAP file or rosbag2 folder, for a mapping");
   verb->add_flag("--advise", flags->advise,
                  "what to record next: the motion or condition whose absence costs most");
   verb->add_option(

@@ -13,10 +13,10 @@
 
 #include "data/canonical_channels.hpp"
 #include "data/channel_names.hpp"
-#include "data/csv/csv_table.hpp"
 #include "data/measured_recordings.hpp"
 #include "data/names.hpp"
 #include "data/needed_definitions.hpp"
+#include "data/read_log.hpp"
 #include "data/resample.hpp"
 #include "data/whole_samples.hpp"
 #include "numerics/parallel.hpp"
@@ -109,10 +109,20 @@ void check_computed_from(const Mapping& mapping, const Recording& recording) {
   }
 }
 
+/// The columns that the mapping names.
+std::vector<std::string> columns_of(const Mapping& mapping) {
+  std::vector<std::string> names;
+  for (const ChannelRule& rule : mapping.channels) names.push_back(rule.from);
+  if (!mapping.split_by.empty()) names.push_back(mapping.split_by);
+  return names;
+}
+
 /// @param needed the channels that suffice; empty: all of the mapping, and the target
 std::vector<Recording> load(const Log& log, const std::string& target,
                             const std::vector<std::string>& needed, const Progress& progress) {
-  const LogTable table = read_csv(log.path, {.skip = log.mapping.drop, .progress = progress});
+  const LogTable table =
+      read_log(log.path,
+               {.skip = log.mapping.drop, .wanted = columns_of(log.mapping), .progress = progress});
   Mapping mapping = log.mapping;
   if (!needed.empty()) keep_needed(mapping, table, needed);
   std::vector<Recording> recordings =

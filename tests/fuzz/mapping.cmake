@@ -1,1 +1,2 @@
 torsio_fuzzer(mapping torsio_readers)
+torsio_fuzzer(mcap torsio_readers)

@@ -206,7 +206,9 @@ void refuse_model(std::string_view first, LineReader& lines, const std::string& 
                          "recordings only."});
 }
 
-LogTable parse(ByteSource& source, const std::string& name, const CsvOptions& options) {
+}  // namespace
+
+LogTable read_csv(ByteSource& source, const std::string& name, const CsvOptions& options) {
   LogTable table;
   table.source.file = name;
   LineReader lines(source, name);
@@ -243,16 +245,14 @@ LogTable parse(ByteSource& source, const std::string& name, const CsvOptions& op
   return table;
 }
 
-}  // namespace
-
 LogTable read_csv(const std::string& path, const CsvOptions& options) {
   const auto source = open_bytes(path, options.progress);
-  return parse(*source, path == "-" ? "standard input" : path, options);
+  return read_csv(*source, path == "-" ? "standard input" : path, options);
 }
 
 LogTable parse_csv(std::string_view bytes, const std::string& name, const CsvOptions& options) {
   const auto source = bytes_in_memory(bytes, name);
-  return parse(*source, name, options);
+  return read_csv(*source, name, options);
 }
 
 }  // namespace torsio

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "data/byte_source.hpp"
 #include "data/log_table.hpp"
 #include "torsio/core/progress.hpp"
 
@@ -32,7 +33,9 @@ struct CsvOptions {
 /// progress asks to stop.
 [[nodiscard]] LogTable read_csv(const std::string& path, const CsvOptions& options = {});
 
-/// The same from bytes in memory; `name` is the file name in messages.
+/// The same from bytes of any origin; `name` is the file name in messages.
+[[nodiscard]] LogTable read_csv(ByteSource& source, const std::string& name,
+                                const CsvOptions& options = {});
 [[nodiscard]] LogTable parse_csv(std::string_view bytes, const std::string& name,
                                  const CsvOptions& options = {});
 

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "torsio/data/log_summary.hpp"
+
+namespace torsio {
+
+/// Topics with their rates, largest gaps and fields, and what a mapping of them looks like.
+[[nodiscard]] std::string log_summary_text(const LogSummary& summary);
+
+/// `{"topics": [{"topic", "schema", "encoding", "messages", "rate_Hz", "duration_s",
+/// "largest_gap_s", "fields", "problem"}], "unfinished"}`.
+[[nodiscard]] std::string log_summary_json(const LogSummary& summary);
+
+}  // namespace torsio

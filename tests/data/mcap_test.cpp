@@ -1,0 +1,249 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "data/mcap/mcap_table.hpp"
+#include "data/mcap/ros_schema.hpp"
+#include "data/read_log.hpp"
+#include "support/error_message.hpp"
+#include "support/temporary_folder.hpp"
+#include "torsio/data/load.hpp"
+#include "torsio/report/log_summary.hpp"
+
+namespace torsio {
+namespace {
+
+using test::error_message;
+using testing::HasSubstr;
+
+// Written by the reference implementation of MCAP: tools/mcap_fixtures/make.mjs has the equations.
+constexpr std::size_t kMessages = 200;
+
+std::string path_of(const std::string& name) { return std::string(TORSIO_MCAP_FILES "/") + name; }
+
+std::string bytes_of_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+LogTable parsed(std::string_view bytes, const McapOptions& options = {}) {
+  const auto source = bytes_in_memory(bytes, "test.mcap");
+  const std::vector<NamedBytes> files{{"test.mcap", source.get()}};
+  return read_mcap(files, "test.mcap", options);
+}
+
+double elbow(std::size_t n) { return std::sin(0.05 * static_cast<double>(n)); }
+
+class McapFile : public testing::TestWithParam<std::string> {};
+
+TEST_P(McapFile, HasTheNumbersOfItsMessagesWhateverItsPacking) {
+  const LogTable table = read_log(path_of(GetParam()));
+  ASSERT_EQ(table.rows(), kMessages - 3);  // before the first message of the load cell
+  EXPECT_EQ(table.source.sha256.size(), 64U);
+  const LogColumn& position = *table.find("/joint_states/elbow/position");
+  const LogColumn& shoulder = *table.find("/joint_states/shoulder/effort");
+  const LogColumn& cell = *table.find("/load_cell/wrench/torque/z");
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::size_t n = row + 3;
+    EXPECT_NEAR(position.values[row], elbow(n), 1e-12);  // the order of the joints changes half-way
+    EXPECT_NEAR(shoulder.values[row], 20.0 * elbow(n), 1e-12);
+    EXPECT_NEAR(table.find("t_s")->values[row], 0.005 * static_cast<double>(row), 1e-9);
+    const std::size_t held = (n - 3) / 4 * 4 + 2;
+    EXPECT_EQ(cell.values[row], 0.5 * static_cast<double>(held));
+    EXPECT_EQ(cell.fresh[row], (n - 3) % 4 == 0 ? 1 : 0) << n;
+  }
+  EXPECT_TRUE(position.fresh.empty());
+  EXPECT_EQ(table.find("/joint_states/elbow/velocity"), nullptr);
+  EXPECT_EQ(table.find("/motor/temperature/others/2")->values[0], 3.0);
+  EXPECT_EQ(table.find("/motor/temperature/raw/0"), nullptr);
+  EXPECT_NEAR(table.find("/status/current/A")->values.back(), 10.0, 1e-12);
+  EXPECT_EQ(table.find("/status/armed")->values.back(), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Packings, McapFile,
+                         testing::Values("no_chunks.mcap", "lz4.mcap", "zstd.mcap"),
+                         [](const auto& file) {
+                           return file.param.substr(0, file.param.find('.'));
+                         });
+
+TEST(Mcap, ReadsOnlyTheTopicsThatAreWanted) {
+  const LogTable table =
+      read_log(path_of("zstd.mcap"), {.skip = {}, .wanted = {"/load_cell/wrench/torque/z"}});
+  EXPECT_EQ(table.rows(), kMessages / 4);  // its rows are those of that topic
+  EXPECT_EQ(table.find("/joint_states/elbow/position"), nullptr);
+  const LogColumn& cell = *table.find("/load_cell/wrench/torque/z");
+  EXPECT_TRUE(cell.fresh.empty());
+  EXPECT_EQ(cell.values[2], 5.0);
+  EXPECT_EQ(table.place(1, cell).substr(0, path_of("zstd.mcap").size()), path_of("zstd.mcap"));
+  EXPECT_THAT(table.place(1, cell), HasSubstr(": message 1"));
+}
+
+TEST(Mcap, BecomesChannelsByAMapping) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path("joint.yaml")) << "channels:\n"
+                                              "  joint_angle_rad: /joint_states/elbow/position\n"
+                                              "  torque_Nm: /load_cell/wrench/torque/z\n"
+                                              "  motor_temperature_K: {from: "
+                                              "/motor/temperature/temperature, unit: degC}\n";
+  LoadOptions options;
+  options.mapping = folder.path("joint.yaml");
+  const std::vector<Recording> recordings = load_recordings(path_of("lz4.mcap"), options);
+  ASSERT_EQ(recordings.size(), 1U);
+  EXPECT_NEAR(recordings[0].sample_rate_Hz(), 200.0, 1e-6);
+  EXPECT_EQ(recordings[0].channels().size(), 3U);
+  EXPECT_FALSE(recordings[0].channel("torque_Nm").is_fresh(1));
+  EXPECT_NEAR(recordings[0].channel("motor_temperature_K").values[0], 298.15, 1e-12);
+  EXPECT_EQ(recordings[0].name(), "lz4");
+}
+
+TEST(Mcap, IsReadUpToItsLastWholeRecordIfTheRecorderWasStopped) {
+  const std::string whole = bytes_of_file(path_of("no_chunks.mcap"));
+  const LogTable all = parsed(whole);
+  for (const std::size_t size : {whole.size() / 2, whole.size() / 2 + 1, whole.size() / 3}) {
+    const LogTable cut = parsed(std::string_view(whole).substr(0, size));
+    ASSERT_LT(cut.rows(), all.rows());
+    const LogColumn& position = *cut.find("/joint_states/elbow/position");
+    for (std::size_t row = 0; row < cut.rows(); ++row)
+      EXPECT_EQ(position.values[row], all.find(position.name)->values[row]);
+  }
+}
+
+TEST(Mcap, AnyChangedByteIsAnErrorOrAnotherNumber) {
+  const std::string whole = bytes_of_file(path_of("zstd.mcap"));
+  std::size_t refused = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 37) {
+    std::string changed = whole;
+    changed[at] = static_cast<char>(changed[at] ^ 0x55);
+    try {
+      EXPECT_GT(parsed(changed, {.limits = {.record_bytes = std::size_t{1} << 20}}).rows(), 0U);
+    } catch (const Error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, whole.size() / 37 / 2);  // most of it is in chunks, which have checksums
+}
+
+/// A file with one channel and one message.
+std::string file_with(const std::string& schema_encoding, const std::string& definition,
+                      const std::string& encoding, const std::string& message) {
+  const auto number = [](auto value) {
+    return std::string(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  const auto text = [&](const std::string& value) {
+    return number(static_cast<std::uint32_t>(value.size())) + value;
+  };
+  const auto record = [&](char kind, const std::string& content) {
+    return kind + number(static_cast<std::uint64_t>(content.size())) + content;
+  };
+  const auto one = number(std::uint16_t{1});
+  const auto time = number(std::int64_t{1000});
+  return std::string(kMcapMark) + record('\x01', text("") + text("")) +
+         record('\x03', one + text("p/msg/T") + text(schema_encoding) + text(definition)) +
+         record('\x04', one + one + text("/t") + text(encoding) + text("")) +
+         record('\x05', one + number(std::uint32_t{0}) + time + time + message);
+}
+
+TEST(Mcap, StatesWhatItDoesNotRead) {
+  const std::string cdr("\0\1\0\0", 4);
+  const auto refused = [](const std::string& bytes) {
+    return error_message([&] { (void)parsed(bytes); });
+  };
+  EXPECT_EQ(parsed(file_with("ros2msg", "float32 x", "cdr", cdr + std::string("\0\0\x80\x3f", 4)))
+                .find("/t/x")
+                ->values[0],
+            1.0);
+  EXPECT_THAT(
+      refused(file_with("ros2msg", "float64 x", "cdr", cdr + "1234")),
+      testing::AllOf(HasSubstr("test.mcap: message 1"), HasSubstr("does not match its schema")));
+  EXPECT_THAT(
+      refused(file_with("ros2msg", "float64 x", "cdr", std::string("\0\7\0\0", 4) + "12345678")),
+      HasSubstr("XCDR2"));
+  EXPECT_THAT(refused(file_with("ros2msg", "other/Type x", "cdr", cdr)),
+              HasSubstr("a type that the schema does not define"));
+  EXPECT_THAT(refused(file_with("ros2msg", "wstring x", "cdr", cdr)), HasSubstr("wide texts"));
+  EXPECT_THAT(refused(file_with("protobuf", "", "protobuf", "")), HasSubstr("no numbers"));
+  EXPECT_THAT(refused(file_with("jsonschema", "", "json", "{\"a\": ")), HasSubstr("expected JSON"));
+  EXPECT_THAT(refused(std::string(kMcapMark)), HasSubstr("no messages"));
+  EXPECT_THAT(refused("a,b\n"), HasSubstr("an MCAP file"));
+  // An array that claims more elements than there are bytes.
+  EXPECT_THAT(
+      refused(file_with("ros2msg", "float64[] x", "cdr", cdr + std::string("\xff\xff\xff\xff", 4))),
+      HasSubstr("does not match"));
+  const McapOptions unknown{.wanted = {"/t/y"}};
+  const std::string bytes = file_with("ros2msg", "float32 x", "cdr", cdr + "1234");
+  EXPECT_THAT(error_message([&] { (void)parsed(bytes, unknown); }),
+              testing::AllOf(HasSubstr("/t/y"), HasSubstr("check --list")));
+}
+
+TEST(Mcap, TypesThatContainThemselvesAreRefused) {
+  const std::string line(80, '=');
+  EXPECT_THAT(error_message([&] {
+                (void)parse_ros_schema("p/msg/A", "B b\n" + line + "\nMSG: p/B\nA a\n", "x.mcap");
+              }),
+              HasSubstr("nested too deeply"));
+}
+
+TEST(RosSchema, HasFieldsArraysConstantsAndDefaults) {
+  const RosSchema schema = parse_ros_schema("p/msg/T",
+                                            "uint8 ON=1  # a constant\n"
+                                            "float64[4] w\n"
+                                            "int32[<=3] bounded\n"
+                                            "string<=10 unit \"rad\"\n"
+                                            "bool ok true\n",
+                                            "x.mcap");
+  ASSERT_EQ(schema.types.size(), 1U);
+  const auto& fields = schema.types[0].fields;
+  ASSERT_EQ(fields.size(), 4U);
+  EXPECT_EQ(fields[0].size, 4U);
+  EXPECT_EQ(fields[1].count, RosField::Count::sequence);
+  EXPECT_EQ(fields[2].kind, RosKind::text);
+  EXPECT_EQ(fields[3].name, "ok");
+}
+
+TEST(ReadLog, ReadsTheFolderOfRosbag2InItsOrder) {
+  const TemporaryFolder folder;
+  const std::string whole = bytes_of_file(path_of("no_chunks.mcap"));
+  for (const char* name : {"run_0.mcap", "run_1.mcap"})
+    std::ofstream(folder.path(name), std::ios::binary) << whole;
+  std::ofstream(folder.path("metadata.yaml"))
+      << "rosbag2_bagfile_information:\n  version: 5\n"
+         "  relative_file_paths:\n    - run_0.mcap\n    - run_1.mcap\n";
+  const ReadLogOptions options{.skip = {}, .wanted = {"/joint_states/elbow/position"}};
+  EXPECT_EQ(read_log(folder.path(""), options).rows(), 2 * kMessages);
+  std::filesystem::remove(folder.path("metadata.yaml"));
+  EXPECT_THAT(error_message([&] { (void)read_log(folder.path("")); }), HasSubstr("metadata.yaml"));
+}
+
+TEST(ReadLog, NamesFormatsThatItDoesNotRead) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path("run.bag")) << "#ROSBAG V2.0\n....";
+  EXPECT_THAT(error_message([&] { (void)read_log(folder.path("run.bag")); }),
+              testing::AllOf(HasSubstr("ROS 1"), HasSubstr("mcap convert")));
+  EXPECT_THAT(error_message([&] { (void)list_log(folder.path("run.bag")); }), HasSubstr("ROS 1"));
+  std::ofstream(folder.path("run.csv")) << "t_s,torque_Nm\n0,1\n";
+  EXPECT_EQ(read_log(folder.path("run.csv")).rows(), 1U);
+  EXPECT_THAT(error_message([&] { (void)list_log(folder.path("run.csv")); }),
+              HasSubstr("expected an MCAP file"));
+}
+
+TEST(ListLog, HasTopicsRatesGapsAndFields) {
+  const LogSummary summary = list_log(path_of("lz4.mcap"));
+  ASSERT_EQ(summary.topics.size(), 4U);
+  EXPECT_FALSE(summary.is_unfinished);
+  const TopicSummary& cell = summary.topics[1];
+  EXPECT_EQ(cell.topic, "/load_cell");
+  EXPECT_EQ(cell.messages, kMessages / 4);
+  EXPECT_EQ(cell.largest_gap_ns, 20'000'000);
+  EXPECT_THAT(cell.fields, testing::Contains("/load_cell/wrench/force/y"));
+  EXPECT_THAT(log_summary_text(summary), HasSubstr("geometry_msgs/msg/WrenchStamped"));
+  EXPECT_THAT(log_summary_json(summary), HasSubstr("\"duration_s\": 0.98"));
+}
+
+}  // namespace
+}  // namespace torsio
