@@ -27,7 +27,7 @@ bool is_read(std::string_view bytes) {
 
 }  // namespace
 
-/// Any bytes, and any records behind the mark of a file, are a recording or an Error.
+/// Any bytes, and any damaged file of a recorder, are a recording or an Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static_cast<void>(is_read({reinterpret_cast<const char*>(data), size}));
   return 0;

@@ -14,14 +14,13 @@
 namespace torsio {
 namespace {
 
-enum Record : std::uint8_t {
-  kFooter = 0x02,
-  kSchema = 0x03,
-  kChannel = 0x04,
-  kMessage = 0x05,
-  kChunk = 0x06,
-  kDataEnd = 0x0F
-};
+// Kinds of records.
+constexpr std::uint8_t kFooter = 0x02;
+constexpr std::uint8_t kSchema = 0x03;
+constexpr std::uint8_t kChannel = 0x04;
+constexpr std::uint8_t kMessage = 0x05;
+constexpr std::uint8_t kChunk = 0x06;
+constexpr std::uint8_t kDataEnd = 0x0F;
 
 constexpr std::size_t kRecordHead = 9;  ///< its kind and its length
 

@@ -15,14 +15,14 @@ inline constexpr std::string_view kMcapMark{"\x89MCAP0\r\n", 8};
 
 struct McapSchema {
   std::string name;      ///< "sensor_msgs/msg/JointState"
-  std::string encoding;  ///< of the definition: "ros2msg", "jsonschema", ..
+  std::string encoding;  ///< form of the definition: "ros2msg", "jsonschema", ..
   std::string definition;
 };
 
 struct McapChannel {
   std::uint16_t id = 0;
   std::string topic;
-  std::string encoding;  ///< of the messages: "cdr", "json", ..
+  std::string encoding;  ///< form of the messages: "cdr", "json", ..
   McapSchema schema;     ///< empty if it has none
 };
 
@@ -34,7 +34,8 @@ struct McapMessage {
 
 /// What a reader of a file of unknown origin takes at most.
 struct McapLimits {
-  std::size_t record_bytes = std::size_t{256} << 20;  ///< of a record, and of a chunk unpacked
+  std::size_t record_bytes = std::size_t{256}
+                             << 20;  ///< largest record, and largest unpacked chunk
   std::size_t channels = 4096;
 };
 

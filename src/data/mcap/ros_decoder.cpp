@@ -8,7 +8,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostElements = 100;
+constexpr std::size_t kMaxElements = 100;
 constexpr std::int64_t kNanoseconds = 1'000'000'000;
 
 template <class Number>
@@ -67,7 +67,7 @@ bool RosDecoder::decode_field(const RosField& field, Place& place) {
 }
 
 bool RosDecoder::decode_elements(const RosField& field, std::size_t count, Place& place) {
-  const std::size_t known = std::min(count, kMostElements);
+  const std::size_t known = std::min(count, kMaxElements);
   for (std::size_t i = 0; i < known; ++i)
     if (!decode_one(field, element(place, field, i))) return false;
   return skip(field, count - known);
@@ -95,7 +95,7 @@ bool RosDecoder::decode_names(std::size_t count) {
     if (!reader_.align(sizeof(std::uint32_t))) return false;
     const auto text = reader_.text<std::uint32_t>();
     if (!text) return false;
-    if (i < kMostElements) names.push_back(escaped(text->substr(0, text->find('\0'))));
+    if (i < kMaxElements) names.push_back(escaped(text->substr(0, text->find('\0'))));
   }
   if (names != names_) {
     names_ = std::move(names);

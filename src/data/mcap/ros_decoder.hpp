@@ -27,7 +27,7 @@ class RosDecoder {
   /// dropped
   bool decode(std::string_view message, TopicTable& table);
 
-  /// Of the last message: its `header.stamp`, unless that is zero or absent.
+  /// The `header.stamp` in the last message, unless that is zero or absent.
   [[nodiscard]] std::optional<std::int64_t> stamp_ns() const noexcept { return stamp_ns_; }
 
  private:
@@ -36,7 +36,7 @@ class RosDecoder {
     std::string name;
     std::optional<std::size_t> column = {};
     std::vector<Place> parts = {};  ///< fields of a message, elements of an array
-    std::size_t names_version = 0;  ///< of elements that have names
+    std::size_t names_version = 0;  ///< that the parts were named by
   };
 
   bool decode_type(std::size_t type, Place& place);

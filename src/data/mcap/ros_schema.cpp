@@ -15,8 +15,8 @@
 namespace torsio {
 namespace {
 
-constexpr std::size_t kMostTypes = 256;
-constexpr std::size_t kMostFields = 1024;
+constexpr std::size_t kMaxTypes = 256;
+constexpr std::size_t kMaxFields = 1024;
 constexpr std::size_t kDeepest = 16;
 
 constexpr std::array<std::pair<std::string_view, RosKind>, 14> kNames{
@@ -83,7 +83,7 @@ class Parser {
     line = trimmed(line.substr(0, line.find('#')));
     if (line.empty() || line.find_first_not_of('=') == std::string_view::npos) return;
     if (line.starts_with(kNext)) {
-      if (schema_.types.size() >= kMostTypes) refuse("too many types", line);
+      if (schema_.types.size() >= kMaxTypes) refuse("too many types", line);
       schema_.types.push_back({short_name(trimmed(line.substr(kNext.size()))), {}});
       nested_.emplace_back();
       return;
@@ -117,7 +117,7 @@ class Parser {
     }
     type = type.substr(0, type.find("<="));  // the limit of a text
     if (type == "wstring") refuse("wide texts are not supported", name);
-    if (schema_.types.back().fields.size() >= kMostFields) refuse("too many fields", name);
+    if (schema_.types.back().fields.size() >= kMaxFields) refuse("too many fields", name);
     const auto kind = kind_named(type);
     field.kind = kind.value_or(RosKind::nested);
     schema_.types.back().fields.push_back(std::move(field));
@@ -144,12 +144,12 @@ class Parser {
 
   void check_depth(std::size_t type, std::size_t depth) {
     if (depth > kDeepest) refuse("types nested too deeply", schema_.types[type].name);
-    if (++visits_ > kMostVisits) refuse("too many fields", schema_.types[0].name);
+    if (++visits_ > kMaxVisits) refuse("too many fields", schema_.types[0].name);
     for (const RosField& field : schema_.types[type].fields)
       if (field.kind == RosKind::nested) check_depth(field.type, depth + 1);
   }
 
-  static constexpr std::size_t kMostVisits = 10000;
+  static constexpr std::size_t kMaxVisits = 10000;
   std::string place_;
   RosSchema schema_;
   std::vector<std::vector<std::string>> nested_;  ///< names of the types of fields

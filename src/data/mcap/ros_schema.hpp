@@ -32,7 +32,7 @@ struct RosField {
 
   std::string name;
   RosKind kind = RosKind::float64;
-  std::size_t type = 0;  ///< of a nested message: index in `RosSchema::types`
+  std::size_t type = 0;  ///< nested message: index in `RosSchema::types`
   Count count = Count::one;
   std::size_t size = 1;  ///< elements, if fixed
 };
