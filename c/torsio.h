@@ -52,7 +52,7 @@ typedef struct torsio_estimate {
 
 /* TORSIO_ABI_VERSION of the library, which may be another one than that of this header. */
 int torsio_abi_version(void);
-/* "0.1.0" */
+/* "0.2.0" */
 const char* torsio_version(void);
 /* Why the last failed call of this thread failed; "" before the first. Valid until the thread ends; the next
  * failure overwrites it. */

@@ -1,7 +1,8 @@
 # One export set each for runtime with files, realtime, lab and onnx, so that a robot that links runtime and files does not need the
-# libraries of the lab.
+# libraries of the lab. The components are the Debian packages of packages.cmake.
 include(CMakePackageConfigHelpers)
 set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 
 install(TARGETS torsio_runtime torsio_files EXPORT torsioTargets FILE_SET HEADERS
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -9,7 +10,11 @@ install(EXPORT torsioTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir
 install(TARGETS torsio_realtime EXPORT torsioRealtimeTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT torsioRealtimeTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
 if(TORSIO_BUILD_LAB)
-  install(TARGETS torsio_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS torsio_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+  if(NOT CMAKE_CROSSCOMPILING)
+    install(DIRECTORY ${PROJECT_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program
+            FILES_MATCHING PATTERN "*.1")
+  endif()
   install(TARGETS torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT torsioLabTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
   install(FILES cmake/Findlz4.cmake DESTINATION ${torsio_package_dir})
@@ -20,7 +25,8 @@ if(TORSIO_HAS_ONNX)
 endif()
 
 if(TORSIO_BUILD_C)
-  install(TARGETS torsio_c EXPORT torsioCTargets FILE_SET HEADERS LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS torsio_c EXPORT torsioCTargets FILE_SET HEADERS
+          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime NAMELINK_COMPONENT development)
   install(EXPORT torsioCTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
   configure_file(c/torsio.pc.in ${PROJECT_BINARY_DIR}/torsio.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/torsio.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
@@ -31,5 +37,6 @@ configure_package_config_file(cmake/torsioConfig.cmake.in ${PROJECT_BINARY_DIR}/
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/torsioConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/torsioConfig.cmake ${PROJECT_BINARY_DIR}/torsioConfigVersion.cmake
         DESTINATION ${torsio_package_dir})
-install(FILES LICENSE README.md CHANGELOG.md CONTRIBUTING.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES LICENSE README.md CHANGELOG.md CONTRIBUTING.md THIRD_PARTY.md DESTINATION ${CMAKE_INSTALL_DOCDIR}
+        COMPONENT program)
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)

@@ -6,8 +6,8 @@
 #include <new>
 #include <string>
 
-#include "blas_threads.hpp"
 #include "interrupt.hpp"
+#include "man_pages.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
 #include "verbs.hpp"
@@ -57,6 +57,14 @@ int run(int argc, char** argv) {
   add_tune_loop(app);
   add_reproduce(app);
   add_unpack(app);
+  // For the build, which installs the pages: in no help text.
+  app.add_option_function<std::string>("--man-pages",
+                                       [&app](const std::string& folder) {
+                                         write_man_pages(app, folder);
+                                         throw CLI::Success();
+                                       })
+      ->group("")
+      ->trigger_on_parse();
   refuse_empty_values(app);
   catch_interrupts();
   try {
@@ -73,7 +81,6 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  limit_blas_threads(argv);
   try {
     return run(argc, argv);
   } catch (const torsio::UsageError& error) {

@@ -119,7 +119,7 @@ std::unique_ptr<Batch> batch_of(const Model& model, std::size_t rows,
 void bind_batches(py::module_& module) {
   py::class_<Batch>(module, "Batch",
                     "Many joints of one model, each with a state of its own: one joint a row.")
-      .def(py::init(batch_of), py::arg("model"), py::arg("rows"), py::kw_only(),
+      .def(py::init(&batch_of), py::arg("model"), py::arg("rows"), py::kw_only(),
            py::arg("rate_Hz") = py::none())
       .def("__len__", &Batch::size)
       .def_property_readonly("raw_inputs", &Batch::raw_inputs)

@@ -16,7 +16,7 @@ namespace torsio {
 /// s_0 is the state after `reset()`, each state scaled by the change that moves the output by the
 /// target's spread; e is the usual error of the model. Its errors are correlated over more than a
 /// few samples, so that these count as one: a slow state is not moved far to explain a small slope.
-/// Levenberg-Marquardt by Ceres. The model remains at rest if nothing better is found. Other
+/// Levenberg-Marquardt. The model remains at rest if nothing better is found. Other
 /// families are reset.
 /// @param features samples x inputs, the first of a recording; a row that is not finite is not
 /// stepped

@@ -1,23 +1,16 @@
 #include "numerics/residual_search.hpp"
 
-#include <ceres/cost_function.h>
-#include <ceres/iteration_callback.h>
-#include <ceres/manifold.h>
-#include <ceres/problem.h>
-#include <ceres/solver.h>
 #include <fmt/format.h>
-#include <glog/logging.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <exception>
-#include <mutex>
 #include <optional>
 #include <utility>
 
 #include "core/all_finite.hpp"
 #include "core/report_progress.hpp"
+#include "numerics/levenberg_marquardt.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 
@@ -67,163 +60,57 @@ bool evaluate(const ResidualProblem& problem, std::span<const double> theta,
   return all_finite(jacobian);
 }
 
-class Residuals : public ceres::CostFunction {
- public:
-  Residuals(const ResidualProblem& problem, std::size_t parameters, std::span<const double> typical)
-      : problem_(problem), typical_(typical), parameters_(parameters) {
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(parameters));
-    set_num_residuals(static_cast<int>(problem.residuals));
-  }
-
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override {
-    std::span<double> jacobian;
-    if (jacobians != nullptr && jacobians[0] != nullptr)
-      jacobian = {jacobians[0], problem_.residuals * parameters_};
-    return evaluate(problem_, {parameters[0], parameters_}, typical_,
-                    {residuals, problem_.residuals}, jacobian);
-  }
-
- private:
-  const ResidualProblem& problem_;
-  std::span<const double> typical_;
-  std::size_t parameters_;
-};
-
-/// Reports each iteration to `Progress`, and each evaluation, of which an iteration has many; its
-/// exceptions are thrown again after Ceres has returned.
-class Reporter : public ceres::IterationCallback {
- public:
-  explicit Reporter(const SearchOptions& options) : options_(options) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary& at) override {
-    share_ = static_cast<double>(at.iteration) /
-             static_cast<double>(std::max<std::size_t>(options_.max_iterations, 1));
-    doing_ = fmt::format("iteration {}, error {:.4g}", at.iteration, std::sqrt(2.0 * at.cost));
-    return continues() ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
-  }
-  /// The same problem, which can no longer be evaluated once the listener asks to stop.
-  [[nodiscard]] ResidualProblem reported(ResidualProblem problem) {
-    problem.evaluate = [this, evaluate = std::move(problem.evaluate)](std::span<const double> theta,
-                                                                      std::span<double> residuals,
-                                                                      std::span<double> jacobian) {
-      return continues() && evaluate(theta, residuals, jacobian);
-    };
-    return problem;
-  }
-  void rethrow() const {
-    if (thrown_) std::rethrow_exception(thrown_);
-  }
-
- private:
-  bool continues() {
-    if (thrown_) return false;
-    try {
-      report_progress(options_.progress, share_, doing_);
-    } catch (...) {
-      thrown_ = std::current_exception();
-    }
-    return !thrown_;
-  }
-
-  const SearchOptions& options_;
-  double share_ = 0.0;
-  std::string doing_ = "iteration 0";
-  std::exception_ptr thrown_;
-};
-
-void set_bounds(ceres::Problem& problem, std::vector<double>& theta, const SearchOptions& options) {
-  const auto clamp_to = [&](std::span<const double> bound, bool is_lower) {
-    if (bound.empty()) return;
-    for (std::size_t i = 0; i < theta.size(); ++i) {
-      const auto index = static_cast<int>(i);
-      if (!std::isfinite(bound[i])) continue;
-      if (is_lower) {
-        problem.SetParameterLowerBound(theta.data(), index, bound[i]);
-        theta[i] = std::max(theta[i], bound[i]);
-      } else {
-        problem.SetParameterUpperBound(theta.data(), index, bound[i]);
-        theta[i] = std::min(theta[i], bound[i]);
-      }
-    }
-  };
+/// The start within the bounds. @throws UsageError
+std::vector<double> within_bounds(std::vector<double> theta, const SearchOptions& options) {
   for (std::size_t i = 0; i < options.lower.size() && i < options.upper.size(); ++i)
     if (options.lower[i] > options.upper[i])
       throw UsageError({.place = fmt::format("bounds of parameter {}", i),
                         .expected = "lower <= upper",
                         .found = fmt::format("{} and {}", options.lower[i], options.upper[i])});
-  clamp_to(options.lower, true);
-  clamp_to(options.upper, false);
+  for (std::size_t i = 0; i < options.lower.size(); ++i)
+    theta[i] = std::max(theta[i], options.lower[i]);
+  for (std::size_t i = 0; i < options.upper.size(); ++i)
+    theta[i] = std::min(theta[i], options.upper[i]);
+  return theta;
 }
-
-std::vector<int> on_bounds(const std::vector<double>& theta, const SearchOptions& options) {
-  std::vector<int> held;
-  for (std::size_t i = 0; i < theta.size(); ++i)
-    if ((!options.lower.empty() && theta[i] <= options.lower[i]) ||
-        (!options.upper.empty() && theta[i] >= options.upper[i]))
-      held.push_back(static_cast<int>(i));
-  return held;
-}
-
-/// The messages of a search are in its summary; Ceres would also print them to the terminal. glog
-/// has one level for the program, which is restored after the last of the searches that run.
-class SilentCeres {
- public:
-  SilentCeres() {
-    const std::scoped_lock lock(mutex);
-    if (searches++ == 0) before = std::exchange(FLAGS_minloglevel, google::GLOG_FATAL);
-  }
-  ~SilentCeres() {
-    const std::scoped_lock lock(mutex);
-    if (--searches == 0) FLAGS_minloglevel = before;
-  }
-  SilentCeres(const SilentCeres&) = delete;
-  SilentCeres& operator=(const SilentCeres&) = delete;
-
- private:
-  static inline std::mutex mutex;
-  static inline std::size_t searches = 0;
-  static inline int before = 0;
-};
 
 /// Nothing if r cannot be computed at the start.
 std::optional<SearchResult> search(const ResidualProblem& unreported, std::vector<double> theta,
                                    const SearchOptions& options) {
-  Reporter reporter(options);
-  const ResidualProblem problem = reporter.reported(unreported);
-  ceres::Problem ceres_problem;
-  ceres_problem.AddResidualBlock(
-      new Residuals(problem, theta.size(), options.typical),  // the problem owns it
-      nullptr, theta.data());
-  set_bounds(ceres_problem, theta, options);
+  // Reported in each evaluation, of which an iteration has many.
+  double share = 0.0;
+  std::string doing = "iteration 0";
+  ResidualProblem problem = unreported;
+  problem.evaluate = [&](std::span<const double> at, std::span<double> residuals,
+                         std::span<double> jacobian) {
+    report_progress(options.progress, share, doing);
+    return unreported.evaluate(at, residuals, jacobian);
+  };
+  theta = within_bounds(std::move(theta), options);
   std::vector<double> residuals(problem.residuals);
-  const bool can_start = evaluate(problem, theta, options.typical, residuals, {});
-  reporter.rethrow();
-  if (!can_start) return std::nullopt;
-  ceres::Solver::Options settings;
-  settings.linear_solver_type = ceres::DENSE_QR;
-  settings.max_num_iterations = static_cast<int>(options.max_iterations);
-  settings.function_tolerance = options.tolerance;
-  settings.parameter_tolerance = 1e-10;
-  settings.num_threads = 1;
-  settings.logging_type = ceres::SILENT;
-  settings.callbacks.push_back(&reporter);
-  ceres::Solver::Summary summary;
-  const SilentCeres silent;
-  ceres::Solve(settings, &ceres_problem, &summary);
-  reporter.rethrow();
-  // Steps that a bound shortens end the search early: parameters on a bound are held, and the
-  // search continues with the others.
-  if (const std::vector<int> held = on_bounds(theta, options);
-      !held.empty() && held.size() < theta.size()) {
-    ceres_problem.SetManifold(theta.data(),
-                              new ceres::SubsetManifold(static_cast<int>(theta.size()), held));
-    ceres::Solve(settings, &ceres_problem, &summary);
-    reporter.rethrow();
-  }
-  return SearchResult{.theta = std::move(theta),
-                      .sum_of_squares = 2.0 * summary.final_cost,
-                      .has_converged = summary.termination_type == ceres::CONVERGENCE,
-                      .iterations = summary.iterations.size()};
+  if (!evaluate(problem, theta, options.typical, residuals, {})) return std::nullopt;
+  const BoxedSquares squares{
+      .residuals = problem.residuals,
+      .evaluate =
+          [&](std::span<const double> at, std::span<double> r, std::span<double> jacobian) {
+            return evaluate(problem, at, options.typical, r, jacobian);
+          },
+      .lower = options.lower,
+      .upper = options.upper,
+      .max_iterations = options.max_iterations,
+      .tolerance = options.tolerance,
+      .report =
+          [&](std::size_t iteration, double sum_of_squares) {
+            share = static_cast<double>(iteration) /
+                    static_cast<double>(std::max<std::size_t>(options.max_iterations, 1));
+            doing = fmt::format("iteration {}, error {:.4g}", iteration, std::sqrt(sum_of_squares));
+            report_progress(options.progress, share, doing);
+          }};
+  BoxedMinimum found = levenberg_marquardt(squares, std::move(theta));
+  return SearchResult{.theta = std::move(found.theta),
+                      .sum_of_squares = found.sum_of_squares,
+                      .has_converged = found.has_converged,
+                      .iterations = found.iterations};
 }
 
 [[noreturn]] void refuse_start() {

@@ -45,7 +45,7 @@ struct SearchResult {
   std::size_t iterations = 0;
 };
 
-/// argmin_θ Σ r², by Levenberg-Marquardt (Ceres), one thread, deterministic.
+/// argmin_θ Σ r², by `levenberg_marquardt`, one thread, deterministic.
 /// @throws Error if r cannot be computed at the start, UsageError for contradicting bounds,
 /// Cancelled.
 [[nodiscard]] SearchResult minimise_squares(const ResidualProblem& problem,

@@ -60,6 +60,37 @@ TEST(ResidualSearch, StaysInsideItsBounds) {
   EXPECT_THAT(found.theta, ElementsAre(DoubleNear(0.5, 1e-6), DoubleNear(0.25, 1e-4)));
 }
 
+TEST(ResidualSearch, LeavesABoundThatTheMinimumIsNotOn) {
+  const SearchResult found =
+      minimise_squares(rosenbrock(true), {-2.0, 2.0}, {.lower = {-2.0, -2.0}, .upper = {2.0, 2.0}});
+  EXPECT_TRUE(found.has_converged);
+  EXPECT_THAT(found.theta, ElementsAre(DoubleNear(1.0, 1e-5), DoubleNear(1.0, 1e-5)));
+}
+
+TEST(ResidualSearch, HoldsAParameterWhoseBoundsAreEqual) {
+  const SearchResult found =
+      minimise_squares(rosenbrock(true), {1.2, 1.0}, {.lower = {-2.0, 0.3}, .upper = {2.0, 0.3}});
+  EXPECT_EQ(found.theta[1], 0.3);
+  // The root above 0 of 400 x^3 - 118 x - 2, the slope of 100 (0.3 - x^2)^2 + (1 - x)^2.
+  EXPECT_NEAR(found.theta[0], 0.55144, 1e-4);
+}
+
+TEST(ResidualSearch, TakesShorterStepsWhereTheResidualsCannotBeComputed) {
+  for (const bool is_bounded : {false, true}) {
+    const ResidualProblem problem{
+        .residuals = 1,
+        .evaluate = [](std::span<const double> x, std::span<double> r, std::span<double>) {
+          r[0] = std::log(x[0]) - 1.0;  // the whole step from 20 leads below 0
+          return x[0] > 0.0;
+        }};
+    SearchOptions options;
+    if (is_bounded) options.lower = {-1e3};
+    const SearchResult found = minimise_squares(problem, {20.0}, options);
+    EXPECT_TRUE(found.has_converged);
+    EXPECT_NEAR(found.theta[0], std::exp(1.0), 1e-5);
+  }
+}
+
 TEST(ResidualSearch, BoundsThatContradictAreAUsageError) {
   EXPECT_THROW((void)minimise_squares(rosenbrock(true), {0.0, 0.0},
                                       {.lower = {1.0, 0.0}, .upper = {0.0, 1.0}}),

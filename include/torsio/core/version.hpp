@@ -3,6 +3,6 @@
 namespace torsio {
 
 /// The release, "major.minor.patch"; CMakeLists.txt reads it from here.
-inline constexpr const char* kVersion = "0.1.0";
+inline constexpr const char* kVersion = "0.2.0";
 
 }  // namespace torsio

@@ -84,7 +84,7 @@ struct HammersteinWienerOptions {
 /// 1. Structure: where it is not given, orders and then degrees by the simulation error on held-out
 ///    blocks (5 folds of 10 interleaved blocks); the smallest within 1 % of the best.
 /// 2. Parameters: G by Steiglitz-McBride and from a grid of time constants, curves by least squares, then
-///    all of them together by Ceres with sensitivities run as filters. Gauges are held, poles stay inside
+///    all of them together by Levenberg-Marquardt with sensitivities run as filters. Gauges are held, poles stay inside
 ///    the unit circle, each record starts from a state of its own (at rest where that would be more than
 ///    64 numbers).
 ///

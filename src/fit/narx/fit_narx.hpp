@@ -111,7 +111,7 @@ struct ArxOptions {
   }
 };
 
-/// A linear NARX model (ARX) by least squares one step ahead, refined by Ceres for the least error
+/// A linear NARX model (ARX) by least squares one step ahead, refined for the least error
 /// in free run (output error):
 ///
 ///     min_θ Σ (ŷ_k(θ) − y_k)²,   dŷ_k/dθ = φ_k + Σ_i a_i dŷ_{k−i}/dθ

@@ -22,7 +22,7 @@ struct NarxPolynomialOptions {
   /// Number of terms; 0: chosen by the error in free run, up to `kMaxAutomatic`.
   std::size_t terms = 0;
   bool exchange = true;
-  /// one_step, or noise: least squares. free_run: then refined by Ceres, as `fit_arx`.
+  /// one_step, or noise: least squares. free_run: then refined, as `fit_arx`.
   NarxTraining training = NarxTraining::free_run;
   double noise = 0.02;  ///< standard deviation, as a share of the target's
   double range = 1.2;   ///< limit of the output over the largest |target|

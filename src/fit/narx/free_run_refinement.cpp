@@ -115,7 +115,7 @@ class FreeRun {
 };
 
 void check_memory(const NarxTerms& f, const TrainingData& data) {
-  constexpr double kTables = 3.0;  // slopes, and copies in Ceres
+  constexpr double kTables = 3.0;  // slopes, and copies in the search
   double samples = 0.0;
   for (const Sequence& sequence : data.sequences)
     samples += static_cast<double>(sequence.target.size());

@@ -24,7 +24,7 @@ struct Refined {
   std::string report;  ///< how the search ended, as text
 };
 
-/// The coefficients of least error in free run, from the measured start of every sequence, by Ceres:
+/// The coefficients of least error in free run, from the measured start of every sequence:
 ///
 ///     min sum (yhat_k(theta) - y_k)^2,   dyhat_k/dtheta = phi_k + sum_i (df/dy_k-i) dyhat_k-i/dtheta
 ///

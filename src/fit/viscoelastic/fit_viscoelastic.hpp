@@ -47,7 +47,7 @@ struct ViscoelasticOptions {
 /// z_0 enters linearly and is eliminated exactly. A slow branch can then explain what the network
 /// cannot, so this is for records that start in motion. s: std(target) / std(u) for springs, that
 /// times the geometric mean of sample period and longest record for dashpots. Levenberg-Marquardt
-/// by Ceres over q and b from several starts (the given values first, then random ones with
+/// by Levenberg-Marquardt over q and b from several starts (the given values first, then random ones with
 /// relaxation times from two samples to a quarter of the longest record); all are searched with few
 /// iterations, the best three to the end. Of more than 30 000 usable samples every m-th is scored.
 /// Parallel networks of one shape are interchangeable: the fastest comes first.
