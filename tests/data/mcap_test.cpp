@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -129,24 +130,47 @@ TEST(Mcap, AnyChangedByteIsAnErrorOrAnotherNumber) {
   EXPECT_GT(refused, whole.size() / 37 / 2);  // most of it is in chunks, which have checksums
 }
 
+template <class Number>
+std::string number(Number value) {
+  return std::string(reinterpret_cast<const char*>(&value), sizeof(value));
+}
+
+std::string text(const std::string& value) {
+  return number(static_cast<std::uint32_t>(value.size())) + value;
+}
+
+std::string record(char kind, const std::string& content) {
+  return kind + number(static_cast<std::uint64_t>(content.size())) + content;
+}
+
+std::string channel(std::uint16_t id, std::uint16_t schema, const std::string& topic,
+                    const std::string& encoding) {
+  return record('\x04', number(id) + number(schema) + text(topic) + text(encoding) + text(""));
+}
+
+std::string message(std::uint16_t id, std::int64_t time_ns, const std::string& data) {
+  return record('\x05',
+                number(id) + number(std::uint32_t{0}) + number(time_ns) + number(time_ns) + data);
+}
+
 /// A file with one channel and one message.
 std::string file_with(const std::string& schema_encoding, const std::string& definition,
-                      const std::string& encoding, const std::string& message) {
-  const auto number = [](auto value) {
-    return std::string(reinterpret_cast<const char*>(&value), sizeof(value));
-  };
-  const auto text = [&](const std::string& value) {
-    return number(static_cast<std::uint32_t>(value.size())) + value;
-  };
-  const auto record = [&](char kind, const std::string& content) {
-    return kind + number(static_cast<std::uint64_t>(content.size())) + content;
-  };
-  const auto one = number(std::uint16_t{1});
-  const auto time = number(std::int64_t{1000});
+                      const std::string& encoding, const std::string& data) {
   return std::string(kMcapMark) + record('\x01', text("") + text("")) +
-         record('\x03', one + text("p/msg/T") + text(schema_encoding) + text(definition)) +
-         record('\x04', one + one + text("/t") + text(encoding) + text("")) +
-         record('\x05', one + number(std::uint32_t{0}) + time + time + message);
+         record('\x03', number(std::uint16_t{1}) + text("p/msg/T") + text(schema_encoding) +
+                            text(definition)) +
+         channel(1, 1, "/t", encoding) + message(1, 1000, data);
+}
+
+TEST(Mcap, RowsBeforeTheFirstMessageOfAnotherTopicHaveNoValueOfIt) {
+  const std::string file = std::string(kMcapMark) + channel(1, 0, "/a", "json") +
+                           channel(2, 0, "/b", "json") + message(1, 2, "{\"x\": 0}") +
+                           message(2, 4, "{\"y\": 7}") + message(1, 5, "{\"x\": 1}") +
+                           message(1, 10, "{\"x\": 2}") + message(1, 3, "{\"x\": 3}");
+  const LogTable table = parsed(file);  // the clock of /a goes back at its last message
+  EXPECT_THAT(table.find("/a/x")->values, testing::ElementsAre(1.0, 2.0, 3.0));
+  EXPECT_THAT(table.find("/b/y")->values, testing::ElementsAre(7.0, 7.0, testing::IsNan()));
+  EXPECT_THAT(table.find("/b/y")->fresh, testing::ElementsAre(1, 0, 1));
 }
 
 TEST(Mcap, StatesWhatItDoesNotRead) {

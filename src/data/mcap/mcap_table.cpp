@@ -13,6 +13,7 @@
 #include "data/mcap/ros_schema.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
@@ -201,7 +202,9 @@ void add_other(LogTable& table, const TopicTable& other, const std::vector<std::
   const bool is_always_fresh = std::ranges::find(fresh, 0) == fresh.end();
   for (const TopicTable::Column& column : other.columns()) {
     LogColumn held{.name = column.name, .number = table.columns.size() + 1, .values = {}};
-    for (std::size_t i = first; i < rows.size(); ++i) held.values.push_back(column.values[rows[i]]);
+    // A row whose stamp is earlier than that of the row before may be before the first message.
+    for (std::size_t i = first; i < rows.size(); ++i)
+      held.values.push_back(rows[i] < other.rows() ? column.values[rows[i]] : kNotMeasured);
     if (!is_always_fresh) held.fresh = fresh;
     table.columns.push_back(std::move(held));
   }
