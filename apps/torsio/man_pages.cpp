@@ -36,7 +36,7 @@ std::string entry(std::string_view term, std::string_view text) {
 
 std::string verbatim(std::string_view text) { return fmt::format(".nf\n{}\n.fi\n", roff(text)); }
 
-/// The help's own line, "torsio fit [OPTIONS] [REC...]".
+/// The usage line of the help, "torsio fit [OPTIONS] [REC...]".
 std::string usage(const CLI::App& app, const std::string& name) {
   std::string text = CLI::Formatter().make_usage(&app, name);
   text.erase(0, text.find(name));

@@ -1,4 +1,4 @@
-"""python3 licences_test.py TOOL: what tools/licences says of packages that every Debian has."""
+"""python3 licences_test.py TOOL: what tools/licences reports of packages that every Debian has."""
 import importlib.machinery
 import importlib.util
 import sys

@@ -18,7 +18,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// What stands in front of the descriptions below a heading of the help, such as "-o,--output".
+/// What precedes the descriptions below a heading of the help, such as "-o,--output".
 std::vector<std::string> names_below(const std::string& help, const std::string& heading) {
   std::vector<std::string> names;
   bool is_below = false;
