@@ -92,7 +92,10 @@ class Batch {
     const auto* const from = reinterpret_cast<const std::byte*>(whole.data());
     for (std::size_t n = 0; n < size(); ++n)
       if (!rows_.is_state({from + n * width, width}))
-        refuse("row " + std::to_string(n) + ", which is not a state of this model");
+        throw Error({.place = "Batch.load: row " + std::to_string(n),
+                     .expected = "bytes that save gave for the same model and rate",
+                     .found = "other bytes",
+                     .advice = "The states of all rows are as they were."});
     for (std::size_t n = 0; n < size(); ++n)
       static_cast<void>(rows_.load(n, {from + n * width, width}));
   }
@@ -130,7 +133,7 @@ void bind_batches(py::module_& module) {
            "One tick of every joint: inputs of shape (rows, channels); Estimates of shape "
            "(rows,).\n\n"
            "Writes into the arrays of out, the result of an earlier step, and returns it, if it is "
-           "given.")
+           "given. They may share memory with the inputs, which are read first.")
       .def("reset", &Batch::reset, py::arg("mask") = py::none(),
            "Resets all rows, or those where the mask of shape (rows,) is True.")
       .def("save", &Batch::saved, "The states of all rows: uint8 of shape (rows, bytes).")

@@ -24,9 +24,10 @@ std::string list_of(const std::vector<std::string>& names) {
 py::handle fault_object(Fault fault) {
   // Not initialised by a call: Python may let another thread run in it, which would wait here for ever with
   // the interpreter's lock.
-  static std::array<PyObject*, 10>* members = nullptr;
+  using Members = std::array<PyObject*, kFaultCount>;
+  static Members* members = nullptr;
   if (members == nullptr) {
-    auto all = std::make_unique<std::array<PyObject*, 10>>();
+    auto all = std::make_unique<Members>();
     const py::object type = py::module_::import("torsio._faults").attr("Fault");
     for (std::size_t i = 0; i < all->size(); ++i) (*all)[i] = type(i).release().ptr();
     if (members == nullptr) members = all.release();
@@ -244,6 +245,18 @@ EstimateArrays::EstimateArrays(std::size_t rows, const py::object& out, const st
   std_dev_ = take("std_dev", std_devs_);
   novelty_ = take("novelty", novelties_);
   fault_ = take("fault", faults_);
+  const std::array<std::uintptr_t, 4> starts{
+      reinterpret_cast<std::uintptr_t>(value_), reinterpret_cast<std::uintptr_t>(std_dev_),
+      reinterpret_cast<std::uintptr_t>(novelty_), reinterpret_cast<std::uintptr_t>(fault_)};
+  const std::array<std::size_t, 4> sizes{rows * sizeof(double), rows * sizeof(double),
+                                         rows * sizeof(double), rows};
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (starts[i] < starts[j] + sizes[j] && starts[j] < starts[i] + sizes[i])
+        throw UsageError({.place = place + ": out",
+                          .expected = "four arrays that share no memory",
+                          .found = "two that do",
+                          .advice = "Reuse the result of an earlier step of this batch."});
   out_ = out;
 }
 

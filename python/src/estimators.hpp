@@ -44,7 +44,7 @@ class EstimateArrays {
   explicit EstimateArrays(std::size_t rows);
   /// Writes into the arrays of `out`, `torsio.Estimates`, or into new ones if it is None.
   /// @param place of the call, for messages. @throws UsageError for other types or shapes, or for
-  /// arrays that are read-only or not contiguous.
+  /// arrays that are read-only, not contiguous, or share memory with each other.
   EstimateArrays(std::size_t rows, const py::object& out, const std::string& place);
   void set(std::size_t row, const Estimate& estimate) noexcept {
     value_[row] = estimate.value;

@@ -287,6 +287,34 @@ def test_a_batch_refuses_another_out_and_keeps_its_state(model, inputs):
             batch.step(inputs[:3], out=dataclasses.replace(good, **{field: array}))
     with pytest.raises(torsio.UsageError, match="Estimates"):
         batch.step(inputs[:3], out=np.zeros(3))
+    memory = np.zeros(5)
+    for std_dev, fault in ((memory[2:], good.fault), (good.std_dev, memory[1:2].view(np.uint8)[:3])):
+        with pytest.raises(torsio.UsageError, match="share no memory"):
+            batch.step(
+                inputs[:3], out=dataclasses.replace(good, value=memory[:3], std_dev=std_dev, fault=fault)
+            )
+    assert (batch.save() == state).all()
+
+
+def test_a_batch_reads_its_inputs_before_it_writes(model, inputs):
+    batch, other = model.batch(3), model.batch(3)
+    kept = batch.step(inputs[:3])
+    other.step(inputs[:3])
+    columns = np.asfortranarray(inputs[1:4])
+    kept = dataclasses.replace(kept, value=columns[:, 0])
+    expected = other.step(inputs[1:4])
+    assert batch.step(columns, out=kept).value.tobytes() == expected.value.tobytes()
+
+
+def test_a_batch_refuses_bytes_that_are_no_state(model, inputs):
+    batch = model.batch(3)
+    batch.step(inputs[:3])
+    state = batch.save()
+    spoilt = state.copy()
+    spoilt[2, -1] ^= 1
+    with pytest.raises(torsio.Error, match="row 2") as caught:
+        batch.load(spoilt)
+    assert not isinstance(caught.value, torsio.UsageError)
     assert (batch.save() == state).all()
 
 

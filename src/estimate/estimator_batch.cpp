@@ -1,6 +1,7 @@
 #include "torsio/estimate/estimator_batch.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
@@ -359,19 +360,24 @@ void EstimatorBatch::set_zero(std::string_view channel, double value) {
 }
 
 void EstimatorBatch::step(std::span<const double> raw, std::span<Estimate> estimates) noexcept {
+  assert(raw.size() == size() * raw_inputs().size() && estimates.size() == size());
   rows_->step(raw, estimates);
 }
 
 void EstimatorBatch::reset() noexcept {
   for (std::size_t row = 0; row < size(); ++row) reset(row);
 }
-void EstimatorBatch::reset(std::size_t row) noexcept { rows_->reset(row); }
+void EstimatorBatch::reset(std::size_t row) noexcept {
+  assert(row < size());
+  rows_->reset(row);
+}
 
 std::size_t EstimatorBatch::state_size() const noexcept {
   return detail::kStateHeaderBytes + rows_->state_bytes;
 }
 
 bool EstimatorBatch::save(std::size_t row, std::span<std::byte> bytes) noexcept {
+  assert(row < size());
   if (bytes.size() != state_size()) return false;
   const bool was_at_rest = rows_->is_at_rest[row] != 0;
   rows_->leave_rest(row);
@@ -386,6 +392,7 @@ bool EstimatorBatch::is_state(std::span<const std::byte> bytes) noexcept {
 }
 
 bool EstimatorBatch::load(std::size_t row, std::span<const std::byte> bytes) noexcept {
+  assert(row < size());
   if (!is_state(bytes)) return false;
   rows_->is_at_rest[row] = 0;
   std::ranges::copy(bytes.subspan(detail::kStateHeaderBytes), rows_->state(row).begin());

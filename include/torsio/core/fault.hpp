@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -18,6 +19,7 @@ enum class Fault : std::uint8_t {
   model_not_finite,  ///< the model produced NaN or infinity; linear fallback in use
   diverged,  ///< a model that feeds its output back left its range and stays at its end; linear fallback
 };
+inline constexpr std::size_t kFaultCount = static_cast<std::size_t>(Fault::diverged) + 1;
 
 /// The enumerator's own spelling, for logs and JSON.
 [[nodiscard]] std::string_view name(Fault fault) noexcept;

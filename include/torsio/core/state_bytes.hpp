@@ -105,7 +105,9 @@ class StateHash {
     } else if constexpr (requires { value.index(), value.valueless_by_exception(); }) {
       add(value.index());
       add_alternative(value, std::make_index_sequence<std::variant_size_v<Value>>());
-    } else if constexpr (std::ranges::sized_range<Value>) {
+    } else {
+      static_assert(std::ranges::sized_range<Value>,
+                    "the hash of this type is not defined: give it visit_fields");
       add(std::ranges::size(value));
       if constexpr (std::is_arithmetic_v<std::ranges::range_value_t<Value>> &&
                     std::ranges::contiguous_range<Value>) {

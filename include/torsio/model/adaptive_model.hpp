@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 
 #include "torsio/core/realtime.hpp"
@@ -41,6 +42,7 @@ class AdaptiveModel {
   [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const {
     return model_.memory(ranges);
   }
+  [[nodiscard]] std::uint64_t state_identity() const noexcept { return model_.state_identity(); }
 
   /// Resets the model's state; what was learned is kept (`adapter().reset()` resets it).
   void reset() noexcept { model_.reset(); }

@@ -88,7 +88,7 @@ void visit_state_of(M& model, StateBytes& bytes) noexcept {
   }
 }
 
-/// Differs for the states of different models: family and parameters.
+/// Differs for the states of different models: family and, where they list their fields, parameters.
 template <class M>
 [[nodiscard]] std::uint64_t state_identity_of(const M& model) noexcept {
   if constexpr (requires { model.state_identity(); }) {
@@ -98,7 +98,10 @@ template <class M>
     hash.add(model.input_count());
     hash.add(model.parameter_count());
     if constexpr (requires { M::kFamily; }) hash.add(std::string_view(M::kFamily));
-    hash.add_value(model.parameters());
+    if constexpr (requires(const typename M::Parameters& own) {
+                    M::Parameters::visit_fields(own, [](std::string_view, auto&) {});
+                  })
+      hash.add_value(model.parameters());
     return hash.value();
   }
 }
