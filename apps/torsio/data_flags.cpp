@@ -93,19 +93,22 @@ void DataFlags::add_recordings(CLI::App& verb, const char* help) {
 }
 
 void DataFlags::add_mapping(CLI::App& verb) {
-  verb.add_option("--mapping", mapping,
-                  "YAML file that renames and converts the columns of a foreign log");
-  add_rate(verb);
+  verb.add_option(
+      "--mapping", mapping,
+      "YAML file that renames and converts the columns of a foreign log, or the name of "
+      "a mapping that comes with torsio (docs/recordings.md)");
+  add_rate_and_joint(verb);
 }
 
 void DataFlags::add_model_mapping(CLI::App& verb) {
   verb.add_option("--mapping", mapping,
                   "YAML file that renames and converts the columns of a foreign log (default: the "
                   "mapping that the model was trained with; none: the columns as they are named)");
-  add_rate(verb);
+  add_rate_and_joint(verb);
 }
 
-void DataFlags::add_rate(CLI::App& verb) {
+void DataFlags::add_rate_and_joint(CLI::App& verb) {
+  verb.add_option("--joint", joint, "joint of a mapping for several, whose names it uses");
   verb.add_option("--rate", rate, "resample to this rate, or the rate of a log without a clock");
 }
 
@@ -143,10 +146,15 @@ torsio::LoadOptions DataFlags::load_options(const torsio::Progress& progress) co
   torsio::LoadOptions options;
   options.progress = progress;
   if (!mapping.empty()) options.mapping = mapping;
+  if (!joint.empty() && mapping.empty())
+    throw torsio::UsageError({.place = "--joint " + joint,
+                              .problem = "there is no mapping to choose a joint of",
+                              .advice = "Give one with --mapping FILE."});
   options.default_mapping = model_mapping_;
   options.default_mapping_place = model_mapping_place_;
   if (!rate.empty()) options.rate_Hz = torsio::si_quantity(rate, "Hz", "--rate");
   options.target = target;
+  options.joint = joint;
   return options;
 }
 

@@ -16,6 +16,7 @@
 struct DataFlags {
   std::vector<std::string> recordings;  ///< CSV, CSV.gz or a dataset manifest (.yaml)
   std::string mapping;
+  std::string joint;
   std::string rate;
   std::string target;
   std::string inputs;
@@ -43,6 +44,7 @@ struct DataFlags {
   /// The recordings for a model with these raw inputs; other channels may be missing.
   [[nodiscard]] torsio::Dataset load_inputs(const std::vector<std::string>& channels,
                                             const torsio::Progress& progress) const;
+  [[nodiscard]] torsio::LoadOptions load_options(const torsio::Progress& progress) const;
   [[nodiscard]] std::vector<std::string> wanted_inputs() const;
   /// Refuses outputs (an empty one is none) that would replace one of the files that are read, that
   /// are the same file, or whose folder does not exist. `load` and `load_as_test` compare them again
@@ -51,9 +53,8 @@ struct DataFlags {
                      const std::vector<std::string>& more_inputs = {});
 
  private:
-  void add_rate(CLI::App& verb);
+  void add_rate_and_joint(CLI::App& verb);
   void require_recordings() const;
-  [[nodiscard]] torsio::LoadOptions load_options(const torsio::Progress& progress) const;
   [[nodiscard]] torsio::Dataset read(const std::vector<std::string>& files,
                                      const std::vector<std::string>& test,
                                      const torsio::LoadOptions& options) const;

@@ -8,7 +8,7 @@
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/csv.hpp"
+#include "torsio/data/write.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/files/model_file.hpp"
@@ -88,9 +88,9 @@ void run(EvaluateFlags& flags) {
   warn_of_another_unit(file, dataset);
   if (!flags.predictions.empty()) {
     const torsio::Estimator estimator = torsio::make_estimator(file, dataset.sample_rate_Hz());
-    torsio::write_csv(prediction_recording(estimator, dataset.records.front().recording,
-                                           dataset.target, dataset.initialise_samples),
-                      flags.predictions);
+    torsio::write_recording(prediction_recording(estimator, dataset.records.front().recording,
+                                                 dataset.target, dataset.initialise_samples),
+                            flags.predictions);
   }
   if (flags.json.wants_tables()) print(evaluation_text(results));
   flags.json.write(torsio::results_json(results));

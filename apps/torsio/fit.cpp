@@ -13,6 +13,7 @@
 #include "progress_bar.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/data/mapping.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/fit_report.hpp"
 #include "torsio/files/model_file.hpp"
@@ -20,6 +21,7 @@
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
 #include "torsio/report/fit_report.hpp"
+#include "torsio/signal/feature_pipeline.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -88,8 +90,47 @@ void refuse_diverged(const torsio::ResultRow& on_training) {
                                  "settings (--set) or another --model."});
 }
 
+constexpr std::string_view kJointPlace = "{joint}";
+
+std::string with_joint(std::string path, const std::string& joint) {
+  if (const std::size_t at = path.find(kJointPlace); at != std::string::npos)
+    path.replace(at, kJointPlace.size(), joint);
+  return path;
+}
+
+void run_one(FitFlags& flags);
+
+/// One model for each joint of the mapping, or of those that `--joint` lists.
+void run_each_joint(const FitFlags& flags) {
+  const std::vector<std::string> joints = flags.data.joint.empty()
+                                              ? torsio::joints_of_mapping(flags.data.mapping)
+                                              : torsio::split_inputs(flags.data.joint);
+  if (joints.empty())
+    throw torsio::UsageError({.place = "--output " + flags.output,
+                              .expected = "--joint NAME,NAME or a mapping that lists joints:",
+                              .found = "no joints"});
+  for (const std::string& joint : joints) {
+    FitFlags one = flags;
+    one.data.joint = joint;
+    one.output = with_joint(flags.output, joint);
+    one.json.destination = with_joint(flags.json.destination, joint);
+    if (joints.size() > 1 && !one.json.destination.empty() &&
+        one.json.destination == flags.json.destination)
+      throw torsio::UsageError({.place = "--json " + flags.json.destination,
+                                .problem = "the scores of every joint would be written to it",
+                                .advice = "Put {joint} into its name."});
+    remark(fmt::format("joint {}", joint));
+    run_one(one);
+  }
+}
+
 void run(FitFlags& flags) {
   if (flags.list) return print(family_list());
+  if (flags.output.find(kJointPlace) != std::string::npos) return run_each_joint(flags);
+  run_one(flags);
+}
+
+void run_one(FitFlags& flags) {
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
   std::vector<std::string> missing;
   if (flags.data.recordings.empty()) missing.emplace_back("recordings");
@@ -140,7 +181,10 @@ void add_fit(CLI::App& app) {
   verb->add_option("--set", flags->settings, "set an option of the family, option=value")
       ->allow_extra_args(false);
   verb->add_option("--validation", flags->validation, "recordings that error bars are taken from");
-  verb->add_option("-o,--output", flags->output, "model file; untouched unless the fit succeeds");
+  verb->add_option(
+      "-o,--output", flags->output,
+      "model file; untouched unless the fit succeeds; {joint} in its name: a model for each "
+      "joint of the mapping");
   verb->add_option("--serial", flags->device_serial,
                    "serial number of the joint that the model belongs to");
   add_seed(*verb, flags->seed, "seed of the random number generators");

@@ -57,6 +57,7 @@ int run(int argc, char** argv) {
   add_tune_loop(app);
   add_reproduce(app);
   add_unpack(app);
+  add_convert(app);
   // For the build, which installs the pages: in no help text.
   app.add_option_function<std::string>("--man-pages",
                                        [&app](const std::string& folder) {

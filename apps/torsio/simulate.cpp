@@ -13,7 +13,7 @@
 #include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/data/csv.hpp"
+#include "torsio/data/write.hpp"
 #include "torsio/report/json_text.hpp"
 #include "torsio/report/plots.hpp"
 #include "torsio/report/text_table.hpp"
@@ -294,7 +294,7 @@ void run(const SimulateFlags& flags) {
   const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());
   const torsio::ExperimentSpec spec = experiment_spec(flags, sheet, progress.listener());
   const torsio::Recording recording = torsio::simulate(sheet, spec, progress.listener());
-  torsio::write_csv(recording, flags.output, progress.listener());
+  torsio::write_recording(recording, flags.output, progress.listener());
   if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, sheet, recording));
   flags.json.write(torsio::json_text(recording_json(flags, spec, recording)));
   remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),
@@ -317,8 +317,11 @@ void add_simulate(CLI::App& app) {
   verb->add_option("ACTUATOR", flags->actuator,
                    "--list shows the names; or a data sheet, FILE.yaml");
   verb->add_option("EXPERIMENT", flags->experiment, "--list shows the names");
-  verb->add_option("-o,--output", flags->output,
-                   "CSV file to write (packed if it ends in .gz), or - for standard output");
+  verb->add_option(
+      "-o,--output", flags->output,
+      fmt::format("file to write; its ending names the format: {}; or - for CSV on standard "
+                  "output",
+                  torsio::kRecordingEndings));
   verb->add_option("--duration", flags->duration,
                    "length of the recording (default: that of the protocol)");
   verb->add_option("--lever", flags->lever, "distance of the 9 kg mass from the joint axis: 0.17m");

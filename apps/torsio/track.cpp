@@ -15,8 +15,8 @@
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"
+#include "torsio/data/write.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
 #include "torsio/sim/sheet_file.hpp"
@@ -305,7 +305,7 @@ void run(TrackFlags& flags, const CLI::App& verb) {
         models.empty() ? torsio::AnyInverse(linear) : models.front().inverse;
     torsio::TrackingSpec recorded = spec;
     recorded.measures_bandwidth = false;
-    torsio::write_csv(
+    torsio::write_recording(
         torsio::track(sheet, recorded, inverse, flags.seed, progress.listener()).record,
         flags.record);
   }

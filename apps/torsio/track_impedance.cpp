@@ -5,7 +5,7 @@
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/data/csv.hpp"
+#include "torsio/data/write.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/closed_loop/impedance_tracking.hpp"
 #include "torsio/sim/sheet_file.hpp"
@@ -84,7 +84,7 @@ void run_impedance(const ImpedanceFlags& flags, const SharedTrackFlags& shared) 
   const torsio::DataSheet sheet = torsio::find_data_sheet(shared.actuator, progress.listener());
   const torsio::ImpedanceRun run =
       torsio::track_impedance(sheet, spec_of(flags, shared), shared.seed, progress.listener());
-  if (!shared.record.empty()) torsio::write_csv(run.record, shared.record);
+  if (!shared.record.empty()) torsio::write_recording(run.record, shared.record);
   if (shared.json.wants_tables()) print(torsio::impedance_text(run));
   shared.json.write(torsio::impedance_json(run));
 }

@@ -6,8 +6,8 @@
 #include "output.hpp"
 #include "progress_bar.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/csv.hpp"
 #include "torsio/data/recording_blocks.hpp"
+#include "torsio/data/write.hpp"
 #include "torsio/report/json_text.hpp"
 #include "verbs.hpp"
 
@@ -55,7 +55,7 @@ void run(const UnpackFlags& flags) {
   if (blocks.frames == 0)
     throw torsio::Error({.place = flags.recording, .problem = "no block with frames was sealed"});
   ProgressBar progress;
-  torsio::write_csv(blocks.recording, flags.output, progress.listener());
+  torsio::write_recording(blocks.recording, flags.output, progress.listener());
   remark(text_of(blocks, flags));
   flags.json.write(json_of(blocks));
 }
@@ -64,10 +64,13 @@ void run(const UnpackFlags& flags) {
 
 void add_unpack(CLI::App& app) {
   auto flags = std::make_shared<UnpackFlags>();
-  CLI::App* verb = app.add_subcommand("unpack", "convert a recorder's file (.tsr) to CSV");
+  CLI::App* verb =
+      app.add_subcommand("unpack", "convert a recorder's file (.tsr) to CSV, MCAP, .npz or .mat");
   verb->footer("Example: torsio unpack run.tsr -o run.csv.gz");
   verb->add_option("recording", flags->recording, "file of a torsio::Recorder")->required();
-  verb->add_option("-o,--output", flags->output, "CSV file to write; compressed if it ends in .gz")
+  verb->add_option(
+          "-o,--output", flags->output,
+          fmt::format("file to write; its ending names the format: {}", torsio::kRecordingEndings))
       ->required();
   verb->add_option("--json", flags->json.destination,
                    "write the contents of the file as JSON to a file, or - for standard output");

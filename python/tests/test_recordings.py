@@ -64,7 +64,7 @@ def test_a_channel_is_a_read_only_view_that_outlives_the_name():
 
 def test_gaps_in_the_clock_are_refused_with_the_line_that_helps():
     gap = frame().drop(index=range(500, 700))
-    with pytest.raises(torsio.Error, match="line 500, column 1 .t_s.: 200 samples are missing"):
+    with pytest.raises(torsio.Error, match="row 500, t_s: 200 samples are missing"):
         torsio.Recording.from_pandas(gap)
 
 

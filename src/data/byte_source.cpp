@@ -207,4 +207,17 @@ std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes, const std::s
   return std::make_unique<MaybeGzip>(std::make_unique<MemoryBytes>(bytes), name);
 }
 
+bool read_exactly(ByteSource& source, std::string& to, std::size_t size) {
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  to.clear();
+  while (to.size() < size) {
+    const std::size_t before = to.size();
+    to.resize(std::min(size, before + kBlock));
+    const std::size_t got = source.read(to.data() + before, to.size() - before);
+    to.resize(before + got);
+    if (got == 0) return false;
+  }
+  return true;
+}
+
 }  // namespace torsio

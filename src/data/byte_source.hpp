@@ -24,6 +24,10 @@ class ByteSource {
 [[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::string& path,
                                                      const Progress& progress = {});
 
+/// `size` bytes into `to`, or what is left; memory grows with what arrives, whatever the size.
+/// @returns whether there were so many
+[[nodiscard]] bool read_exactly(ByteSource& source, std::string& to, std::size_t size);
+
 /// Bytes in memory, unpacked if they start like gzip. `bytes` must outlive the source.
 [[nodiscard]] std::unique_ptr<ByteSource> bytes_in_memory(std::string_view bytes,
                                                           const std::string& name);

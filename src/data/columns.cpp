@@ -56,7 +56,8 @@ TableChannel channel_from_rule(const ChannelRule& rule, const LogTable& table,
   if (!name) throw Error({.place = place, .problem = "the name has no unit"});
   const Unit* unit = unit_of_source(rule, name->unit);
   if (unit == nullptr) throw Error({.place = place, .problem = "unknown unit '" + rule.unit + "'"});
-  const double scale = rule.sign * rule.scale;
+  const double scale =
+      rule.sign * rule.scale * gear_scale(name->unit->si_suffix, rule.gear_ratio).value_or(1.0);
   if (unit->si_suffix != name->unit->si_suffix && rule.scale == 1.0)
     throw Error({.place = place,
                  .expected = fmt::format("a column in a unit of {}", name->unit->si_suffix),
@@ -139,6 +140,12 @@ bool is_clock(const TableChannel& made) {
 
 }  // namespace
 
+std::optional<double> gear_scale(std::string_view si_unit, double gear_ratio) noexcept {
+  if (si_unit == "rad" || si_unit == "rad_s" || si_unit == "rad_s2") return 1.0 / gear_ratio;
+  if (si_unit == "Nm" || si_unit == "Nm_s") return gear_ratio;
+  return std::nullopt;
+}
+
 const LogColumn& column_named(const LogTable& table, const std::string& name,
                               const std::string& place) {
   if (const LogColumn* column = table.find(name)) return *column;
@@ -192,8 +199,8 @@ TableChannels channels_of_table(const LogTable& table, const Mapping& mapping) {
                                              : "a mapping that names the fields to be read",
                  .found = table.has_units ? "" : "the fields " + table.column_list(),
                  .advice = table.has_units ? ""
-                                           : "Write a mapping: channels: {joint_angle_rad: "
-                                             "/joint_states/elbow/position, ...}"});
+                                           : "Write a mapping: channels: {joint_angle_rad: FIELD, "
+                                             "torque_Nm: FIELD}"});
   return result;
 }
 

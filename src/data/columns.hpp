@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "data/log_table.hpp"
@@ -24,6 +25,11 @@ struct TableChannels {
 
 /// Renames and converts the columns, and puts freshness columns to their channels.
 [[nodiscard]] TableChannels channels_of_table(const LogTable& table, const Mapping& mapping);
+
+/// What a value in that SI unit on the motor's side of a gear is multiplied by on its output side;
+/// none if a gear does not change it.
+[[nodiscard]] std::optional<double> gear_scale(std::string_view si_unit,
+                                               double gear_ratio) noexcept;
 
 /// The column of that name. @throws Error that lists the columns, at `place`.
 [[nodiscard]] const LogColumn& column_named(const LogTable& table, const std::string& name,

@@ -306,7 +306,7 @@ class Collector {
 
   [[nodiscard]] Mapping mapping_from(const std::string& path) {
     dataset_.files.push_back(path);
-    return read_mapping(path, options_.progress);
+    return read_mapping(path, options_.progress, options_.joint);
   }
 
   [[nodiscard]] Mapping mapping_of(const ManifestFile& entry, const Manifest& manifest) {

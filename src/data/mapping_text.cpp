@@ -21,6 +21,7 @@ class MappingWriter {
     if (rule.sign != 1.0) entry("sign", digits(rule.sign));
     if (rule.scale != 1.0) entry("scale", digits(rule.scale));
     if (rule.offset != 0.0) entry("offset", digits(rule.offset));
+    if (rule.gear_ratio != 1.0) entry("gear_ratio", digits(rule.gear_ratio));
     yaml_ << YAML::EndMap;
   }
   void add(const ChannelDefinition& definition) { entry(definition.name, definition.expression); }

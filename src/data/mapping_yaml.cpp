@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <map>
 #include <utility>
 
+#include "data/columns.hpp"
 #include "data/names.hpp"
+#include "data/ready_mappings.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
@@ -18,7 +22,7 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
     rule.from = yaml.text();
     return rule;
   }
-  yaml.allow_only({"from", "unit", "sign", "scale", "offset"});
+  yaml.allow_only({"from", "unit", "sign", "scale", "offset", "gear_ratio"});
   rule.from = yaml.at("from").text();
   if (const auto unit = yaml.find("unit")) {
     const Unit* const known = find_written_unit(unit->text());
@@ -32,6 +36,13 @@ ChannelRule channel_rule(const std::string& name, const YamlValue& yaml) {
   if (const auto scale = yaml.find("scale")) {
     rule.scale = scale->factor();
     if (rule.scale == 0.0) scale->refuse("a number other than 0");
+  }
+  if (const auto ratio = yaml.find("gear_ratio")) {
+    rule.gear_ratio = ratio->factor();
+    if (!(rule.gear_ratio > 0.0)) ratio->refuse("a positive number, like 150");
+    if (!gear_scale(split_channel_name(si_name)->unit->si_suffix, rule.gear_ratio))
+      ratio->refuse("no gear ratio for this unit: angles, their rates and torques have one",
+                    "Use scale.");
   }
   if (const auto offset = yaml.find("offset"))
     rule.offset = offset->number(split_channel_name(si_name)->unit->suffix);
@@ -93,14 +104,104 @@ std::vector<ZeroRule> zeros_from(const YamlValue& yaml) {
   return rules;
 }
 
-Mapping mapping_from(const YamlValue& yaml) {
-  if (yaml.find("files"))
-    throw Error({.place = yaml.place(),
+namespace {
+
+/// A joint of a mapping for several, and what its placeholders become.
+struct MappedJoint {
+  std::string name;
+  std::map<std::string, std::string> texts;
+};
+
+/// `joints: [elbow, wrist]`, or with further placeholders `joints: {elbow: {motor: m3}, ..}`.
+std::vector<MappedJoint> joints_from(const YamlValue& joints) {
+  std::vector<MappedJoint> all;
+  if (!joints.is_map()) {
+    for (const YamlValue& name : joints.items())
+      all.push_back({name.text(), {{"joint", name.text()}}});
+  } else {
+    for (const auto& [name, parts] : joints.entries()) {
+      all.push_back({name, {{"joint", name}}});
+      for (const auto& [key, text] : parts.entries()) {
+        if (key == "joint") text.refuse("another name than 'joint', which is that of the joint");
+        all.back().texts[key] = text.text();
+      }
+      for (const auto& [key, text] : all.front().texts)
+        if (!all.back().texts.contains(key)) parts.refuse("the key '" + key + "', as other joints");
+    }
+  }
+  if (all.empty()) joints.refuse("at least one joint");
+  return all;
+}
+
+std::vector<std::string> names_of(const std::vector<MappedJoint>& joints) {
+  std::vector<std::string> names;
+  for (const MappedJoint& joint : joints) names.push_back(joint.name);
+  return names;
+}
+
+/// Whether a column is named by the joint. Without `joints:` any joint may be meant.
+bool has_placeholder(const YamlValue& yaml) {
+  const auto channels = yaml.find("channels");
+  if (!channels) return false;
+  return std::ranges::any_of(channels->entries(), [](const auto& entry) {
+    const auto from = entry.second.is_map() ? entry.second.find("from") : entry.second;
+    return from && from->is_scalar() && from->text().find("{joint}") != std::string::npos;
+  });
+}
+
+[[noreturn]] void refuse_joint(const std::string& file, const std::string& joint,
+                               const std::vector<std::string>& names) {
+  throw UsageError(
+      {.place = file,
+       .problem = joint.empty() ? "the mapping is one for several joints"
+                                : "there is no joint '" + printable(joint) + "'",
+       .expected = names.empty() ? "" : "one of the joints " + joined(names),
+       .advice = joint.empty() ? "Choose one: --joint NAME" : did_you_mean(joint, names)});
+}
+
+/// The file of that name, or else the mapping that comes with torsio.
+YamlValue yaml_of(const std::string& path, const Progress& progress) {
+  std::error_code absent;
+  if (path != "-" && !std::filesystem::exists(path, absent))
+    if (const std::string_view text = ready_mapping(path); !text.empty())
+      return YamlValue::parse(text, path);
+  return YamlValue::read(path, progress);
+}
+
+/// The mapping with the names of one joint in the place of the placeholders.
+YamlValue of_joint(const YamlValue& yaml, const std::string& joint) {
+  const auto listed = yaml.find("joints");
+  if (!listed) {
+    if (has_placeholder(yaml)) {
+      if (joint.empty()) refuse_joint(yaml.file(), joint, {});
+      return yaml.replaced({{"joint", joint}});
+    }
+    if (!joint.empty())
+      throw UsageError({.place = yaml.file(),
+                        .problem = "the mapping has no joints to choose from",
+                        .expected = "joints: and names of columns with {joint}",
+                        .advice = "Leave --joint out."});
+    return yaml;
+  }
+  const std::vector<MappedJoint> joints = joints_from(*listed);
+  const auto chosen = joint.empty() && joints.size() == 1
+                          ? joints.begin()
+                          : std::ranges::find(joints, joint, &MappedJoint::name);
+  if (chosen == joints.end()) refuse_joint(yaml.file(), joint, names_of(joints));
+  return yaml.replaced(chosen->texts);
+}
+
+}  // namespace
+
+Mapping mapping_from(const YamlValue& of_joints, const std::string& joint) {
+  if (of_joints.find("files"))
+    throw Error({.place = of_joints.place(),
                  .expected = "a mapping",
                  .found = "a manifest (it has files:)",
                  .advice = "Give a manifest in the place of a recording, without --mapping."});
-  yaml.allow_only({"channels", "derive", "drop", "split_by", "keep", "clock", "rate", "zero",
-                   "hold", "latency", "computed_from"});
+  of_joints.allow_only({"joints", "channels", "derive", "drop", "split_by", "keep", "clock", "rate",
+                        "zero", "hold", "latency", "computed_from"});
+  const YamlValue yaml = of_joint(of_joints, joint);
   Mapping mapping;
   mapping.file = yaml.file();
   if (const auto channels = yaml.find("channels"))
@@ -133,12 +234,18 @@ Mapping mapping_from(const YamlValue& yaml) {
   return mapping;
 }
 
-Mapping read_mapping(const std::string& path, const Progress& progress) {
-  return mapping_from(YamlValue::read(path, progress));
+Mapping read_mapping(const std::string& path, const Progress& progress, const std::string& joint) {
+  return mapping_from(yaml_of(path, progress), joint);
 }
 
-Mapping parse_mapping(std::string_view text, const std::string& name) {
-  return mapping_from(YamlValue::parse(text, name));
+Mapping parse_mapping(std::string_view text, const std::string& name, const std::string& joint) {
+  return mapping_from(YamlValue::parse(text, name), joint);
+}
+
+std::vector<std::string> joints_of_mapping(const std::string& path, const Progress& progress) {
+  const YamlValue yaml = yaml_of(path, progress);
+  const auto joints = yaml.find("joints");
+  return joints ? names_of(joints_from(*joints)) : std::vector<std::string>{};
 }
 
 }  // namespace torsio

@@ -7,7 +7,8 @@
 
 namespace torsio {
 
-[[nodiscard]] Mapping mapping_from(const YamlValue& yaml);
+/// @param joint as in `read_mapping`
+[[nodiscard]] Mapping mapping_from(const YamlValue& yaml, const std::string& joint = {});
 [[nodiscard]] std::vector<ZeroRule> zeros_from(const YamlValue& yaml);
 
 /// The SI name of a channel that a file names. @throws Error at the value's place if the name ends

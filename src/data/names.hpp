@@ -18,7 +18,7 @@ namespace torsio {
 /// `escaped`, cut to a readable length, for error messages.
 [[nodiscard]] std::string printable(std::string_view text);
 
-/// The file's name without folders and without `.csv`, `.gz`, `.tsr`, `.mcap`, `.yaml`.
+/// The file's name without folders and without the endings of recordings, mappings and manifests.
 [[nodiscard]] std::string file_stem(std::string_view path);
 
 }  // namespace torsio

@@ -4,14 +4,22 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string_view>
 #include <utility>
 
+#include "data/arrays/mat.hpp"
+#include "data/arrays/npz.hpp"
+#include "data/arrays/zip_archive.hpp"
+#include "data/bag/bag_records.hpp"
 #include "data/byte_source.hpp"
 #include "data/csv/csv_table.hpp"
-#include "data/mcap/mcap_table.hpp"
+#include "data/db3/db3_messages.hpp"
+#include "data/mcap/mcap_records.hpp"
+#include "data/ros/message_topics.hpp"
 #include "data/yaml_reader.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/log_summary.hpp"
@@ -52,29 +60,42 @@ class PeekedBytes final : public ByteSource {
   std::size_t given_ = 0;
 };
 
-struct ForeignFormat {
+enum class Format : std::uint8_t { text, mcap, bag, db3, npz, mat, hdf5 };
+
+struct Mark {
   std::string_view mark;
-  std::string_view name;
-  std::string_view advice;
+  Format format;
 };
 
-constexpr std::array<ForeignFormat, 6> kForeign{
-    {{"#ROSBAG V2.0", "a bag of ROS 1", "Convert it: mcap convert RUN.bag RUN.mcap"},
-     {"SQLite format 3", "a database, perhaps rosbag2's .db3",
-      "Convert it: ros2 bag convert with storage_id: mcap"},
-     {"MATLAB 5.0 MAT", "a MATLAB file", "Write a table: writetable(t, 'run.csv')"},
-     {"MATLAB 7.3 MAT", "a MATLAB file", "Write a table: writetable(t, 'run.csv')"},
-     {"\x89HDF\r\n", "an HDF5 file", "Write a CSV file with one column for each signal."},
-     {"PK\x03\x04", "a ZIP archive, perhaps numpy's .npz",
-      "Write a CSV file with one column for each signal."}}};
+constexpr std::array<Mark, 7> kMarks{{{kMcapMark, Format::mcap},
+                                      {kBagMark, Format::bag},
+                                      {kDb3Mark, Format::db3},
+                                      {kZipMark, Format::npz},
+                                      {"MATLAB 5.0 MAT", Format::mat},
+                                      {"MATLAB 7.3 MAT", Format::mat},
+                                      {"\x89HDF\r\n", Format::hdf5}}};
 
-void refuse_foreign(std::string_view start, const std::string& name) {
-  for (const ForeignFormat& format : kForeign)
-    if (start.starts_with(format.mark))
-      throw Error({.place = name,
-                   .expected = "a CSV or MCAP file",
-                   .found = std::string(format.name),
-                   .advice = std::string(format.advice)});
+/// By the first bytes; MATLAB's version 4 has none that are its own, and other programs leave them
+/// out of version 7.3.
+Format format_of(std::string_view start, const std::string& path) {
+  for (const Mark& mark : kMarks)
+    if (start.starts_with(mark.mark) && (mark.format != Format::hdf5 || !path.ends_with(".mat")))
+      return mark.format;
+  return path.ends_with(".mat") ? Format::mat : Format::text;
+}
+
+[[noreturn]] void refuse_hdf5(const std::string& name) {
+  throw Error({.place = name,
+               .expected = "CSV, MCAP, .npz, .mat, or a bag of ROS",
+               .found = "an HDF5 file",
+               .advice = "Save one array for each signal: numpy.savez('run.npz', **signals)"});
+}
+
+void refuse_standard_input(const std::string& path, const char* format) {
+  if (path != "-") return;
+  throw Error({.place = "standard input",
+               .problem = std::string(format) + " cannot be read from a pipe",
+               .advice = "Give the name of the file."});
 }
 
 std::string name_of(const std::string& path) { return path == "-" ? "standard input" : path; }
@@ -98,50 +119,104 @@ std::vector<std::string> files_of_bag(const std::filesystem::path& folder,
   return files;
 }
 
-/// The open files of a recording in MCAP.
+/// The bytes of the files of one recording, of which the first bytes were looked at.
 struct OpenFiles {
+  std::vector<std::string> paths;
   std::vector<std::unique_ptr<PeekedBytes>> sources;
-  std::vector<NamedBytes> named;
 
-  void add(const std::string& path, const Progress& progress) {
-    sources.push_back(std::make_unique<PeekedBytes>(open_bytes(path, progress)));
-    named.push_back({.name = name_of(path), .bytes = sources.back().get()});
+  OpenFiles(const std::string& path, const Progress& progress) : paths({path}) {
+    std::error_code absent;
+    if (path != "-" && std::filesystem::is_directory(path, absent))
+      paths = files_of_bag(path, progress);
+    for (const std::string& file : paths)
+      sources.push_back(std::make_unique<PeekedBytes>(open_bytes(file, progress)));
+  }
+  [[nodiscard]] Format format() const { return format_of(sources.front()->start(), paths.front()); }
+  /// The bytes of all files are read to the end, whoever read them before.
+  [[nodiscard]] std::string sha256() const {
+    if (sources.size() > 1) return {};
+    std::array<char, 1 << 16> block{};
+    while (sources.front()->read(block.data(), block.size()) > 0) {
+    }
+    return sources.front()->sha256();
   }
 };
 
-OpenFiles open_log(const std::string& path, const Progress& progress) {
-  OpenFiles files;
-  std::error_code absent;
-  if (path != "-" && std::filesystem::is_directory(path, absent)) {
-    for (const std::string& file : files_of_bag(path, progress)) files.add(file, progress);
-  } else {
-    files.add(path, progress);
+/// The messages of files of one format.
+class OpenMessages {
+ public:
+  OpenMessages(const OpenFiles& files, Format format, const Progress& progress) {
+    for (std::size_t i = 0; i < files.paths.size(); ++i) {
+      const std::string name = name_of(files.paths[i]);
+      add(*files.sources[i], files.paths[i], name, format, progress);
+      named_.push_back({.name = name, .messages = sources_.back().get()});
+    }
   }
-  return files;
+  [[nodiscard]] std::span<const NamedMessages> all() const noexcept { return named_; }
+
+ private:
+  void add(PeekedBytes& bytes, const std::string& path, const std::string& name, Format format,
+           const Progress& progress) {
+    if (format == Format::mcap) {
+      sources_.push_back(std::make_unique<McapRecords>(bytes, name));
+    } else if (format == Format::bag) {
+      sources_.push_back(std::make_unique<BagRecords>(bytes, name));
+    } else {
+      refuse_standard_input(path, "a database");
+      sources_.push_back(std::make_unique<Db3Messages>(path, progress));
+    }
+  }
+
+  std::vector<std::unique_ptr<MessageSource>> sources_;
+  std::vector<NamedMessages> named_;
+};
+
+bool has_messages(Format format) {
+  return format == Format::mcap || format == Format::bag || format == Format::db3;
+}
+
+/// Otherwise the message about what is missing lists all arrays, also those that are not wanted.
+bool has_all(const std::vector<NamedArray>& arrays, const std::vector<std::string>& wanted) {
+  return std::ranges::all_of(wanted, [&](const std::string& name) {
+    return std::ranges::find(arrays, name, &NamedArray::name) != arrays.end();
+  });
 }
 
 }  // namespace
 
 LogTable read_log(const std::string& path, const ReadLogOptions& options) {
-  const OpenFiles files = open_log(path, options.progress);
+  const OpenFiles files(path, options.progress);
   const std::string name = name_of(path);
-  PeekedBytes& first = *files.sources.front();
-  if (files.sources.size() > 1 || first.start().starts_with(kMcapMark))
-    return read_mcap(files.named, name, {.wanted = options.wanted});
-  refuse_foreign(first.start(), name);
-  return read_csv(first, name, {.skip = options.skip});
+  const Format format = files.format();
+  if (format == Format::text) return read_csv(*files.sources.front(), name, {.skip = options.skip});
+  if (format == Format::hdf5) refuse_hdf5(name);
+  LogTable table;
+  if (has_messages(format)) {
+    const OpenMessages messages(files, format, options.progress);
+    table = table_of_messages(messages.all(), name, {.wanted = options.wanted});
+  } else if (format == Format::npz) {
+    table = table_of_arrays(read_npz(*files.sources.front(), name, options.wanted), name,
+                            options.wanted);
+  } else {
+    refuse_standard_input(path, "a MATLAB file");
+    std::vector<NamedArray> arrays = read_mat(path, options.wanted, options.progress);
+    if (!has_all(arrays, options.wanted)) arrays = read_mat(path, {}, options.progress);
+    table = table_of_arrays(std::move(arrays), name, options.wanted);
+  }
+  table.source.sha256 = files.sha256();
+  return table;
 }
 
 LogSummary list_log(const std::string& path, const Progress& progress) {
-  const OpenFiles files = open_log(path, progress);
-  const std::string_view start = files.sources.front()->start();
-  refuse_foreign(start, name_of(path));
-  if (!start.starts_with(kMcapMark))
+  const OpenFiles files(path, progress);
+  const Format format = files.format();
+  if (!has_messages(format))
     throw Error({.place = name_of(path),
-                 .expected = "an MCAP file or the folder of rosbag2",
+                 .expected = "a file of messages: MCAP, a bag of ROS 1, or the folder or database "
+                             "of rosbag2",
                  .found = "another file",
                  .advice = "The columns of a CSV file are in its first line."});
-  return list_mcap(files.named);
+  return summary_of_messages(OpenMessages(files, format, progress).all());
 }
 
 }  // namespace torsio

@@ -15,9 +15,10 @@ struct ReadLogOptions {
   Progress progress = {};
 };
 
-/// A log of any format, which its first bytes show: CSV, plain or gzipped, MCAP (plain, or as the
-/// folder of rosbag2). "-" is standard input.
-/// @throws Error as `read_csv` and `read_mcap`, and for formats that are recognised but not read.
+/// A log of any format, which its first bytes show: CSV, plain or gzipped; messages in MCAP, in a
+/// database or folder of rosbag2, in a bag of ROS 1; arrays in `.npz` and `.mat`. "-" is standard
+/// input.
+/// @throws Error as the readers of the formats, and for an HDF5 file.
 [[nodiscard]] LogTable read_log(const std::string& path, const ReadLogOptions& options = {});
 
 }  // namespace torsio

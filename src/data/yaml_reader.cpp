@@ -54,6 +54,23 @@ std::string yaml_quoted(std::string_view text) {
   return all + '"';
 }
 
+YamlValue YamlValue::replaced(std::map<std::string, std::string> texts) const {
+  return {node_, file_, path_,
+          std::make_shared<const std::map<std::string, std::string>>(std::move(texts))};
+}
+
+std::string YamlValue::scalar() const {
+  std::string text = node_.Scalar();
+  if (!replacements_) return text;
+  for (const auto& [name, replacement] : *replacements_) {
+    const std::string placeholder = "{" + name + "}";
+    for (std::size_t at = text.find(placeholder); at != std::string::npos;
+         at = text.find(placeholder, at + replacement.size()))
+      text.replace(at, placeholder.size(), replacement);
+  }
+  return text;
+}
+
 std::string YamlValue::place() const {
   const YAML::Mark mark = node_.Mark();
   std::string place = file_;
@@ -81,7 +98,7 @@ std::vector<std::pair<std::string, YamlValue>> YamlValue::entries() const {
       throw Error({.place = YamlValue(entry.first, file_, path_).place(),
                    .problem = "the key '" + printable(key) + "' is given twice"});
     const std::string path = path_.empty() ? key : path_ + "." + key;
-    all.emplace_back(std::move(key), YamlValue(entry.second, file_, path));
+    all.emplace_back(std::move(key), YamlValue(entry.second, file_, path, replacements_));
   }
   return all;
 }
@@ -115,7 +132,7 @@ std::vector<YamlValue> YamlValue::items() const {
   if (!node_.IsSequence()) refuse("a list");
   std::vector<YamlValue> all;
   for (const auto& item : node_)
-    all.push_back(YamlValue(item, file_, fmt::format("{}[{}]", path_, all.size())));
+    all.push_back(YamlValue(item, file_, fmt::format("{}[{}]", path_, all.size()), replacements_));
   return all;
 }
 
@@ -127,12 +144,12 @@ std::vector<std::string> YamlValue::texts() const {
 
 std::string YamlValue::text() const {
   if (!node_.IsScalar() || node_.Scalar().empty()) refuse("text");
-  return node_.Scalar();
+  return scalar();
 }
 
 double YamlValue::number(std::string_view si_unit) const {
   if (!node_.IsScalar()) refuse("a number");
-  return si_quantity(node_.Scalar(), si_unit, place());
+  return si_quantity(scalar(), si_unit, place());
 }
 
 double YamlValue::plain_number(double largest) const {
@@ -147,7 +164,7 @@ double YamlValue::plain_number(double largest) const {
 
 double YamlValue::factor() const {
   if (!node_.IsScalar()) refuse("a number or a fraction such as 1/150");
-  const std::string text = node_.Scalar();
+  const std::string text = scalar();
   const std::size_t slash = text.find('/');
   if (slash == std::string::npos) return number();
   const double numerator = si_quantity(text.substr(0, slash), "1", place());

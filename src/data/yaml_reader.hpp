@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <initializer_list>
+#include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -24,6 +26,9 @@ class YamlValue {
   /// @throws Error if the text is not YAML or too large.
   static YamlValue parse(std::string_view text, const std::string& file);
   static YamlValue read(const std::string& path, const Progress& progress = {});
+
+  /// The same with other texts in the place of `{name}`, wherever that is in a scalar of it.
+  [[nodiscard]] YamlValue replaced(std::map<std::string, std::string> texts) const;
 
   [[nodiscard]] std::string place() const;
   [[nodiscard]] const std::string& file() const noexcept { return file_; }
@@ -58,12 +63,20 @@ class YamlValue {
   [[noreturn]] void refuse(const std::string& expected, const std::string& advice = {}) const;
 
  private:
-  YamlValue(const YAML::Node& node, std::string file, std::string path)
-      : node_(node), file_(std::move(file)), path_(std::move(path)) {}
+  using Replacements = std::shared_ptr<const std::map<std::string, std::string>>;
+
+  YamlValue(const YAML::Node& node, std::string file, std::string path,
+            Replacements replacements = {})
+      : node_(node),
+        file_(std::move(file)),
+        path_(std::move(path)),
+        replacements_(std::move(replacements)) {}
+  [[nodiscard]] std::string scalar() const;
 
   YAML::Node node_;
   std::string file_;
   std::string path_;  ///< keys down to here: "clock.rebuild"
+  Replacements replacements_;
 };
 
 }  // namespace torsio

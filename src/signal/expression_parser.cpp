@@ -293,11 +293,26 @@ class ExpressionParser::Reader {
 
   double lag_of(const Operand& argument) const {
     const double value = graph_.nodes()[argument.node].parameter;
-    if (!graph_.is_constant(argument.node) || !argument.si_unit.empty() || !(value >= 0.0) ||
-        value > static_cast<double>(kLongestLag) || value != std::floor(value))
-      fail(argument.start, fmt::format("a whole number of samples from 0 to {}", kLongestLag),
-           as_written(argument));
-    return value + 0.0;  // no negative zero
+    const bool is_time = argument.si_unit == "s";
+    const bool is_constant = graph_.is_constant(argument.node) && value >= 0.0;
+    if (is_constant && is_time && !parser_.sample_rate_Hz_) return value;
+    const double samples = is_time ? samples_of(value) : value;
+    if (!is_constant || (!is_time && !argument.si_unit.empty()) ||
+        samples > static_cast<double>(kLongestLag) || samples != std::floor(samples))
+      fail(argument.start,
+           fmt::format("a whole number of samples from 0 to {}, or their time, like 10ms",
+                       kLongestLag),
+           as_written(argument),
+           is_time ? fmt::format("One sample is {:g} ms.", 1e3 / *parser_.sample_rate_Hz_) : "");
+    return samples + 0.0;  // no negative zero
+  }
+
+  /// A time in samples, whole if it is so but for rounding.
+  double samples_of(double time_s) const {
+    constexpr double kRounding = 1e-6;
+    const double samples = time_s * parser_.sample_rate_Hz_.value_or(1.0);
+    const double whole = std::round(samples);
+    return std::abs(samples - whole) <= kRounding ? whole : samples;
   }
 
   double distance_of(const Operand& argument) const {

@@ -9,9 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "data/mcap/mcap_table.hpp"
-#include "data/mcap/ros_schema.hpp"
+#include "data/mcap/mcap_records.hpp"
 #include "data/read_log.hpp"
+#include "data/ros/message_topics.hpp"
+#include "data/ros/ros_schema.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/data/load.hpp"
@@ -23,7 +24,7 @@ namespace {
 using test::error_message;
 using testing::HasSubstr;
 
-// Written by the reference implementation of MCAP: tools/mcap_fixtures/make.mjs has the equations.
+// Written by the reference implementation of MCAP: tools/recording_peers/make_mcap.mjs has the equations.
 constexpr std::size_t kMessages = 200;
 
 std::string path_of(const std::string& name) { return std::string(TORSIO_MCAP_FILES "/") + name; }
@@ -33,10 +34,11 @@ std::string bytes_of_file(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-LogTable parsed(std::string_view bytes, const McapOptions& options = {}) {
+LogTable parsed(std::string_view bytes, const TopicOptions& options = {}) {
   const auto source = bytes_in_memory(bytes, "test.mcap");
-  const std::vector<NamedBytes> files{{"test.mcap", source.get()}};
-  return read_mcap(files, "test.mcap", options);
+  McapRecords records(*source, "test.mcap", {.record_bytes = std::size_t{1} << 20});
+  const std::vector<NamedMessages> files{{"test.mcap", &records}};
+  return table_of_messages(files, "test.mcap", options);
 }
 
 double elbow(std::size_t n) { return std::sin(0.05 * static_cast<double>(n)); }
@@ -122,7 +124,7 @@ TEST(Mcap, AnyChangedByteIsAnErrorOrAnotherNumber) {
     std::string changed = whole;
     changed[at] = static_cast<char>(changed[at] ^ 0x55);
     try {
-      EXPECT_GT(parsed(changed, {.limits = {.record_bytes = std::size_t{1} << 20}}).rows(), 0U);
+      EXPECT_GT(parsed(changed).rows(), 0U);
     } catch (const Error&) {
       ++refused;
     }
@@ -192,14 +194,14 @@ TEST(Mcap, StatesWhatItDoesNotRead) {
               HasSubstr("a type that the schema does not define"));
   EXPECT_THAT(refused(file_with("ros2msg", "wstring x", "cdr", cdr)), HasSubstr("wide texts"));
   EXPECT_THAT(refused(file_with("protobuf", "", "protobuf", "")), HasSubstr("no numbers"));
-  EXPECT_THAT(refused(file_with("jsonschema", "", "json", "{\"a\": ")), HasSubstr("expected JSON"));
+  EXPECT_THAT(refused(file_with("jsonschema", "", "json", "{\"a\": ")), HasSubstr("expected json"));
   EXPECT_THAT(refused(std::string(kMcapMark)), HasSubstr("no messages"));
   EXPECT_THAT(refused("a,b\n"), HasSubstr("an MCAP file"));
   // An array that claims more elements than there are bytes.
   EXPECT_THAT(
       refused(file_with("ros2msg", "float64[] x", "cdr", cdr + std::string("\xff\xff\xff\xff", 4))),
       HasSubstr("does not match"));
-  const McapOptions unknown{.wanted = {"/t/y"}};
+  const TopicOptions unknown{.wanted = {"/t/y"}};
   const std::string bytes = file_with("ros2msg", "float32 x", "cdr", cdr + "1234");
   EXPECT_THAT(error_message([&] { (void)parsed(bytes, unknown); }),
               testing::AllOf(HasSubstr("/t/y"), HasSubstr("check --list")));
@@ -246,14 +248,13 @@ TEST(ReadLog, ReadsTheFolderOfRosbag2InItsOrder) {
 
 TEST(ReadLog, NamesFormatsThatItDoesNotRead) {
   const TemporaryFolder folder;
-  std::ofstream(folder.path("run.bag")) << "#ROSBAG V2.0\n....";
-  EXPECT_THAT(error_message([&] { (void)read_log(folder.path("run.bag")); }),
-              testing::AllOf(HasSubstr("ROS 1"), HasSubstr("mcap convert")));
-  EXPECT_THAT(error_message([&] { (void)list_log(folder.path("run.bag")); }), HasSubstr("ROS 1"));
+  std::ofstream(folder.path("run.h5")) << "\x89HDF\r\n....";
+  EXPECT_THAT(error_message([&] { (void)read_log(folder.path("run.h5")); }),
+              testing::AllOf(HasSubstr("HDF5"), HasSubstr("numpy.savez")));
   std::ofstream(folder.path("run.csv")) << "t_s,torque_Nm\n0,1\n";
   EXPECT_EQ(read_log(folder.path("run.csv")).rows(), 1U);
   EXPECT_THAT(error_message([&] { (void)list_log(folder.path("run.csv")); }),
-              HasSubstr("expected an MCAP file"));
+              HasSubstr("expected a file of messages"));
 }
 
 TEST(ListLog, HasTopicsRatesGapsAndFields) {

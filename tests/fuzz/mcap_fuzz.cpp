@@ -3,22 +3,23 @@
 #include <string_view>
 #include <vector>
 
-#include "data/mcap/mcap_table.hpp"
+#include "data/mcap/mcap_records.hpp"
 #include "data/measured_recordings.hpp"
+#include "data/ros/message_topics.hpp"
 #include "torsio/core/error.hpp"
 
 namespace {
 
 /// Whether the bytes are a recording, and not an Error.
 bool is_read(std::string_view bytes) {
-  const torsio::McapOptions options{
-      .wanted = {}, .limits = {.record_bytes = 1 << 20, .channels = 64}, .values = 1 << 16};
   const auto source = torsio::bytes_in_memory(bytes, "fuzz.mcap");
-  const std::vector<torsio::NamedBytes> files{{"fuzz.mcap", source.get()}};
   constexpr double kRateHz = 100.0;
   try {
-    static_cast<void>(torsio::measured_recordings(torsio::read_mcap(files, "fuzz.mcap", options),
-                                                  torsio::Mapping{}, kRateHz));
+    torsio::McapRecords records(*source, "fuzz.mcap", {.record_bytes = 1 << 20, .channels = 64});
+    const std::vector<torsio::NamedMessages> files{{"fuzz.mcap", &records}};
+    static_cast<void>(torsio::measured_recordings(
+        torsio::table_of_messages(files, "fuzz.mcap", {.values = 1 << 16}), torsio::Mapping{},
+        kRateHz));
     return true;
   } catch (const torsio::Error&) {
     return false;

@@ -37,6 +37,7 @@ const JsonCase kCases[] = {
     {"Estimate", kModel, "estimate m.safetensors a.csv"},
     {"Evaluate", kModel, "evaluate m.safetensors a.csv"},
     {"EvaluateAModelAlone", kModel, "evaluate m.safetensors"},
+    {"Convert", kRecord, "convert a.csv -o a.mcap"},
     {"Fit", kRecord, "fit a.csv --model linear -o m.safetensors"},
     {"Import", "",
      "import '" TORSIO_SOURCE "/tests/golden/import/weights_mlp.json' --activation softsign "

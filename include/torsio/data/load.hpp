@@ -13,6 +13,7 @@ namespace torsio {
 /// Options of a user, in addition to the files.
 struct LoadOptions {
   std::optional<std::string> mapping;  ///< file; replaces the mapping of a manifest
+  std::string joint = {};              ///< which joint, if a mapping is for several
   /// `mapping_text`, for the logs that have no other mapping; empty: none.
   std::string default_mapping = {};
   std::string default_mapping_place = {};  ///< where it comes from, for messages

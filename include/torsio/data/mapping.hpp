@@ -11,7 +11,9 @@
 
 namespace torsio {
 
-/// A channel made from one column: `channel = sign * scale * SI(column) + offset`.
+/// A channel made from one column: `channel = sign * scale * SI(column) + offset`. With a gear ratio n
+/// the column is of the motor's side of a gear and the channel of its output: an angle or a rate of
+/// one is divided by n, a torque or its rate multiplied by n.
 struct ChannelRule {
   std::string name;  ///< with a unit; inside torsio it becomes the SI one
   std::string from;  ///< column
@@ -19,6 +21,7 @@ struct ChannelRule {
   double sign = 1.0;
   double scale = 1.0;  ///< from SI to SI; needed where the quantities differ
   double offset = 0.0;
+  double gear_ratio = 1.0;
 };
 
 /// How the time stamps are used. Default: they must be uniform.
@@ -52,9 +55,22 @@ struct Mapping {
   std::map<std::string, std::vector<std::string>> computed_from;
 };
 
-/// @throws Error naming file, line, key, the known keys and the nearest one; Cancelled.
-[[nodiscard]] Mapping read_mapping(const std::string& path, const Progress& progress = {});
-[[nodiscard]] Mapping parse_mapping(std::string_view text, const std::string& name);
+/// @param path a file, or where there is none of that name one of `ready_mapping_names`
+/// @param joint whose names replace the placeholders of a mapping for several joints; empty: the only
+/// one
+/// @throws Error naming file, line, key, the known keys and the nearest one; UsageError if the mapping
+/// is for several joints and none of them is chosen; Cancelled.
+[[nodiscard]] Mapping read_mapping(const std::string& path, const Progress& progress = {},
+                                   const std::string& joint = {});
+[[nodiscard]] Mapping parse_mapping(std::string_view text, const std::string& name,
+                                    const std::string& joint = {});
+
+/// The joints that a mapping lists; none if it is for one.
+[[nodiscard]] std::vector<std::string> joints_of_mapping(const std::string& path,
+                                                         const Progress& progress = {});
+
+/// The mappings for known logs that come with torsio: "cycloidal_drive".
+[[nodiscard]] std::vector<std::string> ready_mapping_names();
 
 /// The mapping as YAML that `parse_mapping` reads back, without its file and without `keep`, which
 /// selects records of one log. Empty if nothing else is set.

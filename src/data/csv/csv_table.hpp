@@ -39,7 +39,4 @@ struct CsvOptions {
 [[nodiscard]] LogTable parse_csv(std::string_view bytes, const std::string& name,
                                  const CsvOptions& options = {});
 
-/// The name of the column that holds the freshness of a channel: "torque_Nm" -> "torque_fresh_1".
-[[nodiscard]] std::string freshness_column(std::string_view channel_name);
-
 }  // namespace torsio

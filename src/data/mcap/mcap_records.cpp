@@ -6,30 +6,22 @@
 #include <algorithm>
 #include <utility>
 
-#include "data/mcap/little_endian.hpp"
-#include "data/mcap/unpack_chunk.hpp"
+#include "data/little_endian.hpp"
 #include "data/names.hpp"
+#include "data/unpack_chunk.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
-// Kinds of records.
-constexpr std::uint8_t kFooter = 0x02;
-constexpr std::uint8_t kSchema = 0x03;
-constexpr std::uint8_t kChannel = 0x04;
-constexpr std::uint8_t kMessage = 0x05;
-constexpr std::uint8_t kChunk = 0x06;
-constexpr std::uint8_t kDataEnd = 0x0F;
-
 constexpr std::size_t kRecordHead = 9;  ///< its kind and its length
 
-std::uint32_t checksum(std::string_view bytes) {
-  return static_cast<std::uint32_t>(
-      crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
-
 }  // namespace
+
+std::uint32_t mcap_checksum(std::string_view bytes, std::uint32_t before) noexcept {
+  return static_cast<std::uint32_t>(
+      crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
 
 McapRecords::McapRecords(ByteSource& source, std::string name, McapLimits limits)
     : source_(source), name_(std::move(name)), limits_(limits) {
@@ -46,21 +38,12 @@ void McapRecords::refuse(const std::string& problem) const {
 }
 
 bool McapRecords::read(std::string& to, std::size_t size) {
-  constexpr std::size_t kBlock = std::size_t{1} << 20;
-  to.clear();
-  while (to.size() < size) {
-    // The length is the file's word: memory grows with what arrives.
-    const std::size_t before = to.size();
-    to.resize(std::min(size, before + kBlock));
-    const std::size_t got = source_.read(to.data() + before, to.size() - before);
-    to.resize(before + got);
-    if (got == 0) return false;
-  }
-  place_ += size;
-  return true;
+  const bool is_whole = read_exactly(source_, to, size);
+  if (is_whole) place_ += size;
+  return is_whole;
 }
 
-bool McapRecords::next(McapMessage& message) {
+bool McapRecords::next(LogMessage& message) {
   while (true) {
     if (next_in_chunk(message)) return true;
     if (is_at_end_) return false;
@@ -70,7 +53,7 @@ bool McapRecords::next(McapMessage& message) {
       return false;
     }
     LittleEndianReader reader(head);
-    const std::uint8_t kind = *reader.number<std::uint8_t>();
+    const auto kind = static_cast<McapKind>(*reader.number<std::uint8_t>());
     const std::uint64_t size = *reader.number<std::uint64_t>();
     if (size > limits_.record_bytes)
       refuse(fmt::format("a record of {} bytes; at most {} are read", size, limits_.record_bytes));
@@ -78,13 +61,13 @@ bool McapRecords::next(McapMessage& message) {
       is_unfinished_ = is_at_end_ = true;
       return false;
     }
-    if (kind == kDataEnd || kind == kFooter) {
+    if (kind == McapKind::data_end || kind == McapKind::footer) {
       is_at_end_ = true;
       while (read(record_, std::size_t{1} << 16)) {
       }  // the hash is that of the whole file
       return false;
     }
-    if (kind == kChunk) {
+    if (kind == McapKind::chunk) {
       open_chunk(record_);
     } else if (take(kind, record_, message)) {
       return true;
@@ -92,7 +75,7 @@ bool McapRecords::next(McapMessage& message) {
   }
 }
 
-bool McapRecords::next_in_chunk(McapMessage& message) {
+bool McapRecords::next_in_chunk(LogMessage& message) {
   while (chunk_at_ < chunk_.size()) {
     LittleEndianReader reader(std::string_view(chunk_).substr(chunk_at_));
     const auto kind = reader.number<std::uint8_t>();
@@ -100,14 +83,14 @@ bool McapRecords::next_in_chunk(McapMessage& message) {
     if (!kind || !size || *size > reader.left()) refuse("a chunk ends inside a record");
     const auto content = *reader.bytes(static_cast<std::size_t>(*size));
     chunk_at_ += reader.at();
-    if (take(*kind, content, message)) return true;
+    if (take(static_cast<McapKind>(*kind), content, message)) return true;
   }
   return false;
 }
 
-bool McapRecords::take(std::uint8_t kind, std::string_view content, McapMessage& message) {
+bool McapRecords::take(McapKind kind, std::string_view content, LogMessage& message) {
   LittleEndianReader reader(content);
-  if (kind == kMessage) {
+  if (kind == McapKind::message) {
     const auto id = reader.number<std::uint16_t>();
     const auto sequence = reader.number<std::uint32_t>();
     const auto log_time = reader.number<std::int64_t>();
@@ -119,7 +102,7 @@ bool McapRecords::take(std::uint8_t kind, std::string_view content, McapMessage&
     message = {.channel = &channel->second, .log_time_ns = *log_time, .data = reader.rest()};
     return true;
   }
-  if (kind == kSchema) {
+  if (kind == McapKind::schema) {
     const auto id = reader.number<std::uint16_t>();
     const auto name = reader.text<std::uint32_t>();
     const auto encoding = reader.text<std::uint32_t>();
@@ -127,7 +110,7 @@ bool McapRecords::take(std::uint8_t kind, std::string_view content, McapMessage&
     if (!id || !name || !encoding || !definition) refuse("a schema is too short");
     schemas_[*id] = {escaped(*name), escaped(*encoding), std::string(*definition)};
   }
-  if (kind == kChannel) {
+  if (kind == McapKind::channel) {
     const auto id = reader.number<std::uint16_t>();
     const auto schema = reader.number<std::uint16_t>();
     const auto topic = reader.text<std::uint32_t>();
@@ -138,10 +121,10 @@ bool McapRecords::take(std::uint8_t kind, std::string_view content, McapMessage&
       refuse(fmt::format("channel '{}' has a schema that is not declared", printable(*topic)));
     if (channels_.size() >= limits_.channels)
       refuse(fmt::format("more than {} channels", limits_.channels));
-    channels_.try_emplace(*id, McapChannel{.id = *id,
-                                           .topic = escaped(*topic),
-                                           .encoding = escaped(*encoding),
-                                           .schema = *schema == 0 ? McapSchema{} : found->second});
+    channels_.try_emplace(*id,
+                          MessageChannel{.topic = escaped(*topic),
+                                         .encoding = escaped(*encoding),
+                                         .schema = *schema == 0 ? MessageSchema{} : found->second});
   }
   return false;
 }
@@ -161,7 +144,8 @@ void McapRecords::open_chunk(std::string_view content) {
   if (!unpack_chunk(*packing, *packed, static_cast<std::size_t>(*size), chunk_))
     refuse(fmt::format("a chunk packed by '{}' cannot be unpacked; known are {}",
                        printable(*packing), kKnownPackings));
-  if (*expected != 0 && checksum(chunk_) != *expected) refuse("the checksum of a chunk is wrong");
+  if (*expected != 0 && mcap_checksum(chunk_) != *expected)
+    refuse("the checksum of a chunk is wrong");
 }
 
 }  // namespace torsio

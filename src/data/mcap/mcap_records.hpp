@@ -7,30 +7,31 @@
 #include <string_view>
 
 #include "data/byte_source.hpp"
+#include "data/ros/message_source.hpp"
 
 namespace torsio {
 
 /// The first bytes of an MCAP file.
 inline constexpr std::string_view kMcapMark{"\x89MCAP0\r\n", 8};
 
-struct McapSchema {
-  std::string name;      ///< "sensor_msgs/msg/JointState"
-  std::string encoding;  ///< form of the definition: "ros2msg", "jsonschema", ..
-  std::string definition;
+/// Kinds of records.
+enum class McapKind : std::uint8_t {
+  header = 0x01,
+  footer = 0x02,
+  schema = 0x03,
+  channel = 0x04,
+  message = 0x05,
+  chunk = 0x06,
+  message_index = 0x07,
+  chunk_index = 0x08,
+  statistics = 0x0B,
+  summary_offset = 0x0E,
+  data_end = 0x0F
 };
 
-struct McapChannel {
-  std::uint16_t id = 0;
-  std::string topic;
-  std::string encoding;  ///< form of the messages: "cdr", "json", ..
-  McapSchema schema;     ///< empty if it has none
-};
-
-struct McapMessage {
-  const McapChannel* channel = nullptr;
-  std::int64_t log_time_ns = 0;
-  std::string_view data;  ///< valid until the next message
-};
+/// CRC-32 of bytes, as in the checksums of a file; `before`: that of the bytes before them.
+[[nodiscard]] std::uint32_t mcap_checksum(std::string_view bytes,
+                                          std::uint32_t before = 0) noexcept;
 
 /// What a reader of a file of unknown origin takes at most.
 struct McapLimits {
@@ -42,24 +43,20 @@ struct McapLimits {
 /// The messages of an MCAP file in the order of the file, read as a stream: the index at its end is
 /// not used, so that the file of a recorder that was killed can be read up to its last whole record.
 /// Chunks are plain, lz4 or zstd; their checksums are verified. Source: MCAP format specification.
-class McapRecords {
+class McapRecords final : public MessageSource {
  public:
   McapRecords(ByteSource& source, std::string name, McapLimits limits = {});
 
-  /// @returns false at the end. @throws Error with the byte where the file contradicts the format.
-  bool next(McapMessage& message);
+  bool next(LogMessage& message) override;
 
   /// The file ended inside a record, or without the record that ends its data.
-  [[nodiscard]] bool is_unfinished() const noexcept { return is_unfinished_; }
-  [[nodiscard]] const std::map<std::uint16_t, McapChannel>& channels() const noexcept {
-    return channels_;
-  }
+  [[nodiscard]] bool is_unfinished() const noexcept override { return is_unfinished_; }
 
  private:
   /// Reads `size` bytes into `to`. @returns false if the file ends before.
   bool read(std::string& to, std::size_t size);
-  bool next_in_chunk(McapMessage& message);
-  bool take(std::uint8_t kind, std::string_view content, McapMessage& message);
+  bool next_in_chunk(LogMessage& message);
+  bool take(McapKind kind, std::string_view content, LogMessage& message);
   void open_chunk(std::string_view content);
   [[noreturn]] void refuse(const std::string& problem) const;
 
@@ -70,8 +67,8 @@ class McapRecords {
   std::string record_;
   std::string chunk_;
   std::size_t chunk_at_ = 0;
-  std::map<std::uint16_t, McapSchema> schemas_;
-  std::map<std::uint16_t, McapChannel> channels_;
+  std::map<std::uint16_t, MessageSchema> schemas_;
+  std::map<std::uint16_t, MessageChannel> channels_;
   bool is_at_end_ = false;
   bool is_unfinished_ = false;
 };

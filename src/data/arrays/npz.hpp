@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "data/arrays/array_table.hpp"
+#include "data/byte_source.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/data/recording.hpp"
+#include "torsio/files/output_file.hpp"
+
+namespace torsio {
+
+/// The arrays of numbers of numpy's `.npz`, packed or not: real and integer numbers and booleans of
+/// one or two dimensions, little-endian; single numbers are arrays of length 1. Source: numpy,
+/// format 1.0 to 3.0.
+/// @throws Error for objects (pickles), structured, complex, half-precision and big-endian arrays
+/// and for three dimensions, if one of `wanted` is such an array; without `wanted` those are left out.
+[[nodiscard]] std::vector<NamedArray> read_npz(ByteSource& source, const std::string& name,
+                                               const std::vector<std::string>& wanted = {});
+
+/// An array of float64 for `t_s`, each channel, and the freshness of those that have it.
+void write_npz(const Recording& recording, OutputFile& file, const Progress& progress = {});
+
+}  // namespace torsio

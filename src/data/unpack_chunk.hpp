@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace torsio {
+
+/// The contents of a chunk that was packed by "lz4", "zstd", "bz2" or not at all ("", "none").
+/// @returns false unless they are exactly `size` bytes, or if `packing` is another one
+[[nodiscard]] bool unpack_chunk(std::string_view packing, std::string_view packed, std::size_t size,
+                                std::string& unpacked);
+
+/// The packings that `unpack_chunk` reads, for messages.
+inline constexpr std::string_view kKnownPackings = "none, lz4, zstd, bz2";
+
+}  // namespace torsio
