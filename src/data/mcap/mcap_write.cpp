@@ -262,7 +262,8 @@ class McapFile {
   std::string message_;
   std::string chunk_;  ///< unpacked
   std::string packed_;
-  std::vector<std::pair<std::int64_t, std::size_t>> index_;  ///< stamp and offset of each message of the chunk
+  std::vector<std::pair<std::int64_t, std::size_t>>
+      index_;  ///< stamp and offset of each message of the chunk
   std::vector<ChunkPlace> chunks_;
 };
 
