@@ -86,9 +86,10 @@ void write_man_pages(const CLI::App& app, const std::string& folder) {
     const std::string page = program + "-" + verb->get_name();
     overview += entry(verb->get_name(), verb->get_description());
     pages += fmt::format("{}\\fB{}\\fR(1)", pages.empty() ? "" : ",\n", roff(page));
-    write_text(folder + "/" + page + ".1",
-               head(*verb, page, program + " " + verb->get_name()) + examples(*verb) +
-                   exit_status() + section("SEE ALSO") + "\\fB" + roff(program) + "\\fR(1)\n");
+    const std::string text = head(*verb, page, fmt::format("{} {}", program, verb->get_name()));
+    write_text(fmt::format("{}/{}.1", folder, page),
+               fmt::format("{}{}{}{}\\fB{}\\fR(1)\n", text, examples(*verb), exit_status(),
+                           section("SEE ALSO"), roff(program)));
   }
   write_text(folder + "/" + program + ".1",
              overview + examples(app) + exit_status() + section("SEE ALSO") + pages + "\n");

@@ -135,6 +135,7 @@ std::vector<MappedJoint> joints_from(const YamlValue& joints) {
 
 std::vector<std::string> names_of(const std::vector<MappedJoint>& joints) {
   std::vector<std::string> names;
+  names.reserve(joints.size());
   for (const MappedJoint& joint : joints) names.push_back(joint.name);
   return names;
 }

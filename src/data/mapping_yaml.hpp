@@ -8,7 +8,7 @@
 namespace torsio {
 
 /// @param joint as in `read_mapping`
-[[nodiscard]] Mapping mapping_from(const YamlValue& yaml, const std::string& joint = {});
+[[nodiscard]] Mapping mapping_from(const YamlValue& of_joints, const std::string& joint = {});
 [[nodiscard]] std::vector<ZeroRule> zeros_from(const YamlValue& yaml);
 
 /// The SI name of a channel that a file names. @throws Error at the value's place if the name ends

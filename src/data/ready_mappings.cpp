@@ -26,6 +26,7 @@ std::string_view ready_mapping(std::string_view name) noexcept {
 
 std::vector<std::string> ready_mapping_names() {
   std::vector<std::string> names;
+  names.reserve(kReady.size());
   for (const auto& [name, text] : kReady) names.emplace_back(name);
   return names;
 }

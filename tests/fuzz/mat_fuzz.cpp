@@ -8,6 +8,9 @@
 #include "data/arrays/mat.hpp"
 #include "torsio/core/error.hpp"
 
+/// libmatio asks for as much memory as a damaged file claims, and expects null.
+extern "C" const char* __asan_default_options() { return "allocator_may_return_null=1"; }
+
 /// Any bytes, and any damaged MATLAB file, are columns or an Error: the library that reads them works in
 /// a child process, whose end by a signal is an Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

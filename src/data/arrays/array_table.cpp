@@ -52,6 +52,7 @@ LogTable table_of_arrays(std::vector<NamedArray> arrays, const std::string& file
   for (const std::string& name : wanted)
     if (std::ranges::find(arrays, name, &NamedArray::name) == arrays.end()) {
       std::vector<std::string> names;
+      names.reserve(arrays.size());
       for (const NamedArray& array : arrays) names.push_back(array.name);
       throw Error({.place = file,
                    .problem = fmt::format("there is no array '{}'", printable(name)),

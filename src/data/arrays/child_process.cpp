@@ -84,7 +84,8 @@ class Child {
 [[noreturn]] void run_child(const std::function<std::string(int)>& work, int results, int reasons,
                             const ChildLimits& limits) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_DFL);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL})
+    std::signal(signal, SIG_DFL);
   const rlimit cpu{limits.cpu_s, limits.cpu_s};
   setrlimit(RLIMIT_CPU, &cpu);
   const rlimit no_core{0, 0};
@@ -164,7 +165,7 @@ ChildOutput output_of_child(const std::function<std::string(int)>& work, const s
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return output_in(memory, place);
   if (reason.empty())
     reason = WIFSIGNALED(status) ? fmt::format("the library that reads it ended by signal {} ({})",
-                                               WTERMSIG(status), strsignal(WTERMSIG(status)))
+                                               WTERMSIG(status), sigdescr_np(WTERMSIG(status)))
                                  : "the library that reads it ended without result";
   throw Error({.place = place, .problem = reason});
 }

@@ -30,7 +30,8 @@ constexpr std::int64_t kNanoseconds = 1'000'000'000;
 /// A name of a field of ROS 2: small letters, digits, and single underscores between them.
 std::string field_name(std::string_view column) {
   std::string name;
-  for (const unsigned char c : column) {
+  for (const char written : column) {
+    const auto c = static_cast<unsigned char>(written);
     if (std::isalnum(c) != 0 && c < 0x80)
       name += static_cast<char>(std::tolower(c));
     else if (!name.empty() && name.back() != '_')
