@@ -30,12 +30,45 @@ void copy(void* to, const void* from, std::size_t size) noexcept {
 }  // namespace
 
 void StateBytes::visit_raw(void* data, std::size_t size) noexcept {
+  if (task_ == Task::list) return add_segment(data, size, StateSegment::Kind::bytes);
   const std::size_t from = position_;
   position_ += size;
   if (task_ == Task::count || size == 0) return;
   if (position_ > size_) return fail();
   if (task_ == Task::write) copy(target_ + from, data, size);
   if (task_ == Task::read) copy(data, source_ + from, size);
+}
+
+void StateBytes::add_segment(void* member, std::size_t size, StateSegment::Kind kind) noexcept {
+  if (size > 0)
+    segments_->push_back({.member = member, .size = size, .offset = position_, .kind = kind});
+  position_ += size;
+}
+
+void StateSegments::read(std::span<const std::byte> bytes) const noexcept {
+  for (const StateSegment& segment : segments_) {
+    const std::byte* const from = bytes.data() + segment.offset;
+    if (segment.kind == StateSegment::Kind::bytes) {
+      copy(segment.member, from, segment.size);
+    } else {
+      std::memcpy(segment.member, from,  // little-endian: the low bytes come first
+                  segment.kind == StateSegment::Kind::flag ? 1 : sizeof(std::uint64_t));
+    }
+  }
+}
+
+void StateSegments::write(std::span<std::byte> bytes) const noexcept {
+  for (const StateSegment& segment : segments_) {
+    std::byte* const to = bytes.data() + segment.offset;
+    if (segment.kind == StateSegment::Kind::bytes) {
+      copy(to, segment.member, segment.size);
+    } else {
+      std::uint64_t value = 0;
+      std::memcpy(&value, segment.member,
+                  segment.kind == StateSegment::Kind::flag ? 1 : sizeof value);
+      std::memcpy(to, &value, sizeof value);
+    }
+  }
 }
 
 void StateBytes::peek(void* data, std::size_t size) const noexcept {

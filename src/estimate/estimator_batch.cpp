@@ -165,8 +165,9 @@ struct EstimatorBatch::Rows {
   std::size_t inputs;
   std::size_t core_bytes = 0;
   std::size_t state_bytes = 0;
-  std::vector<std::byte> start;   ///< the state after a reset
-  std::vector<std::byte> states;  ///< rows x state_bytes
+  detail::StateSegments model_state;  ///< members of `worker.model`
+  std::vector<std::byte> start;       ///< the state after a reset
+  std::vector<std::byte> states;      ///< rows x state_bytes
   FeatureColumns columns;
   Networks networks;
   std::vector<std::uint8_t> is_at_rest;
@@ -201,6 +202,8 @@ EstimatorBatch::Rows::Rows(const EstimatorSettings& settings, const AnyModel& mo
   if (!of_all.is_valid())
     throw Error({.place = "batch", .problem = "the state of this model cannot be saved"});
   state_bytes = of_all.position();
+  model_state = detail::StateSegments(
+      [this](StateBytes& bytes) { detail::visit_state_of(worker.model, bytes); });
   start.resize(state_bytes);
   write(worker, start);
   states.resize(rows * state_bytes);
@@ -287,11 +290,9 @@ Estimate EstimatorBatch::Rows::ordinary_step(std::size_t row) noexcept {
   });
   if (!is_network) {
     const auto bytes = state(row).subspan(core_bytes);
-    StateBytes from(StateBytes::Task::read, bytes);
-    detail::visit_state_of(worker.model, from);
+    model_state.read(bytes);
     estimate = worker.model.step(now);
-    StateBytes to(bytes);
-    detail::visit_state_of(worker.model, to);
+    model_state.write(bytes);
   }
   if (estimate.fault != Fault::none || !std::isfinite(estimate.value))
     return unusable(row, estimate);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/hyperbolic_tangent.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -29,7 +30,7 @@ double computed(Operation operation, double left, double right) noexcept {
     case Operation::sign:
       if (left > 0.0) return 1.0;
       return left < 0.0 ? -1.0 : left;  // a zero or a NaN
-    case Operation::tanh: return std::tanh(left);
+    case Operation::tanh: return detail::hyperbolic_tangent(left);
     case Operation::sin: return std::sin(left);
     case Operation::cos: return std::cos(left);
     case Operation::atan: return std::atan(left);

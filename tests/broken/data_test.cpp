@@ -208,7 +208,7 @@ INSTANTIATE_TEST_SUITE_P(
                  {"t_s, pos_deg, tau, run", "take a manifest"}},
         BadInput{"TypoInAKey",
                  "\nchanels: {torque_Nm: tau}",
-                 {"map.yaml: line 2 (chanels): unknown key 'chanels'", "one of channels, derive",
+                 {"map.yaml: line 2 (chanels): unknown key 'chanels'", "one of joints, channels, derive",
                   "Did you mean 'channels'?"}},
         BadInput{"TypoInAnInnerKey",
                  "clock: {rebild: true}",

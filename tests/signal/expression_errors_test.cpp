@@ -26,6 +26,8 @@ constexpr const char* kFunctionList =
     "min, max";
 
 TEST(ExpressionError, StatesPlaceExpectedAndFound) {
+  const std::string samples =
+      "a whole number of samples from 0 to 100000, or their time, like 10ms";
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "input '': column 1: expected a channel, a number, a function or '(', found the end"},
       {"a +",
@@ -62,21 +64,14 @@ TEST(ExpressionError, StatesPlaceExpectedAndFound) {
       {"stop(a, b)",
        "input 'stop(a, b)': column 9: expected a positive constant in the unit of the first "
        "argument, found 'b'"},
-      {"lag(a, 1.5)",
-       "input 'lag(a, 1.5)': column 8: expected a whole number of samples from 0 to 100000, found "
-       "'1.5'"},
+      {"lag(a, 1.5)", "input 'lag(a, 1.5)': column 8: expected " + samples + ", found '1.5'"},
       {"lag(a, 100001)",
-       "input 'lag(a, 100001)': column 8: expected a whole number of samples from 0 to 100000, "
-       "found '100001'"},
-      {"lag(a, -1)",
-       "input 'lag(a, -1)': column 8: expected a whole number of samples from 0 to 100000, found "
-       "'-1'"},
-      {"lag(a, 5ms)",
-       "input 'lag(a, 5ms)': column 8: expected a whole number of samples from 0 to 100000, found "
-       "'5ms'"},
-      {"lag(a, b)",
-       "input 'lag(a, b)': column 8: expected a whole number of samples from 0 to 100000, found "
-       "'b'"},
+       "input 'lag(a, 100001)': column 8: expected " + samples + ", found '100001'"},
+      {"lag(a, -1)", "input 'lag(a, -1)': column 8: expected " + samples + ", found '-1'"},
+      {"lag(a, 5.5ms)", "input 'lag(a, 5.5ms)': column 8: expected " + samples +
+                            ", found '5.5ms'\n  One sample is 1 ms."},
+      {"lag(a, 5Hz)", "input 'lag(a, 5Hz)': column 8: expected " + samples + ", found '5Hz'"},
+      {"lag(a, b)", "input 'lag(a, b)': column 8: expected " + samples + ", found 'b'"},
   };
   for (const auto& [input, expected] : cases) EXPECT_EQ(message(input), expected);
 }

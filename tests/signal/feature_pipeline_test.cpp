@@ -189,6 +189,15 @@ TEST(FeaturePipeline, DelaysByWholeSamplesAndHoldsTheOldestUntilThen) {
   }
 }
 
+TEST(FeaturePipeline, DelaysByATimeThatIsAWholeNumberOfSamples) {
+  FeaturePipeline features = pipeline({"lag(x, 3)", "lag(x, 3ms)", "lag(x, 0.0030000000001s)"});
+  for (int n = 0; n < 20; ++n) {
+    const std::span<const double> values = features.step(std::vector{10.0 + n});
+    EXPECT_EQ(values[1], values[0]);
+    EXPECT_EQ(values[2], values[0]);
+  }
+}
+
 TEST(FeaturePipeline, SettlesWhenItsSlowestChainHas) {
   const std::size_t filter = Lowpass(10.0, kRate_Hz).settling_samples();
   EXPECT_EQ(pipeline({"x", "tanh(x * 3)"}).settling_samples(), 0U);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/hyperbolic_tangent.hpp"
 #include "fit/common/design.hpp"
 #include "fit/common/fitted.hpp"
 #include "fit/common/usable_table.hpp"
@@ -92,8 +93,9 @@ class FrictionSearch {
   /// (f . y)^2 / f . f for the part f of the friction column that the basis does not hold.
   [[nodiscard]] static double gain(const Group& group, double scale) {
     std::vector<double> friction(group.rate.size());
-    std::ranges::transform(group.rate, friction.begin(),
-                           [scale](double rate) { return std::tanh(rate / scale); });
+    std::ranges::transform(group.rate, friction.begin(), [scale](double rate) {
+      return detail::hyperbolic_tangent(rate / scale);
+    });
     std::vector<double> inside(group.basis.columns, 0.0);
     double length = 0.0;
     for (std::size_t n = 0; n < friction.size(); ++n) {
@@ -177,7 +179,7 @@ Fitted<LinearCoulomb> fit_linear_coulomb(const TrainingData& data,
   const std::size_t friction = design.columns.columns - 1;
   design.terms[friction] = "the friction";
   for (std::size_t n = 0; n < rate.size(); ++n)
-    design.columns(n, friction) = std::tanh(rate[n] / parameters.rate_scale);
+    design.columns(n, friction) = detail::hyperbolic_tangent(rate[n] / parameters.rate_scale);
   DesignFit fit = fit_design(design, groups);
   parameters.coefficients = std::move(fit.coefficients);
   std::ranges::move(fit.notes, std::back_inserter(fitted.notes));

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/hyperbolic_tangent.hpp"
 #include "model/common/affine_inverse.hpp"
 #include "torsio/core/error.hpp"
 
@@ -196,11 +197,18 @@ ModelMemory GreyBox::memory(const InputRanges& ranges) const {
 
 Estimate GreyBox::step(Features features) noexcept {
   terms_.move(features);
-  const auto at = coefficients_.locate(features);
   double value = 0.0;
-  terms_.visit(features, [&](std::size_t column, double term) {
-    value += coefficients_.coefficient(at, column) * term;
-  });
+  if (!coefficients_.schedule()
+           .scheduled) {  // most are not, and interpolation takes a third of the step
+    const auto coefficients = coefficients_.schedule().values.row(0);
+    terms_.visit(features,
+                 [&](std::size_t column, double term) { value += coefficients[column] * term; });
+  } else {
+    const auto at = coefficients_.locate(features);
+    terms_.visit(features, [&](std::size_t column, double term) {
+      value += coefficients_.coefficient(at, column) * term;
+    });
+  }
   return {.value = value + residual(features)};
 }
 
@@ -246,7 +254,7 @@ double GreyBox::others(const ScheduledCoefficients::Position& at,
     value += coefficients_.coefficient(at, structure.first_slope() + j) * features[j];
     if (const double scale = structure.rate_scales[j]; scale > 0.0)
       value += coefficients_.coefficient(at, structure.first_coulomb() + j) *
-               std::tanh(features[j] / scale);
+               detail::hyperbolic_tangent(features[j] / scale);
   }
   return value;
 }

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/hyperbolic_tangent.hpp"
 #include "model/common/schedule.hpp"
 #include "model/grey_box/hats.hpp"
 #include "model/grey_box/input_bank.hpp"
@@ -116,7 +117,7 @@ class GreyBoxTerms {
     for (std::size_t j = 1; j < features.size(); ++j) {
       term(structure_.first_slope() + j, features[j]);
       if (const double scale = structure_.rate_scales[j]; scale > 0.0)
-        term(structure_.first_coulomb() + j, std::tanh(features[j] / scale));
+        term(structure_.first_coulomb() + j, detail::hyperbolic_tangent(features[j] / scale));
     }
   }
 

@@ -42,9 +42,7 @@ class DirectionTracker {
   /// The members that change in a step.
   void visit_state(detail::StateBytes& bytes) noexcept {
     bytes.visit(lowest_, highest_, started_);
-    auto direction = static_cast<std::uint8_t>(direction_);
-    bytes.visit_at_most(direction, static_cast<std::uint8_t>(Direction::falling));
-    direction_ = static_cast<Direction>(direction);
+    bytes.visit_at_most(direction_, Direction::falling);
   }
 
  private:

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/hyperbolic_tangent.hpp"
 #include "model/common/affine_inverse.hpp"
 #include "torsio/core/error.hpp"
 
@@ -38,7 +39,7 @@ double LinearCoulomb::without_slopes(const ScheduledCoefficients::Position& at,
                                      Features features) const noexcept {
   return coefficients_.coefficient(at, 0) +
          coefficients_.coefficient(at, coefficients_.size() - 1) *
-             std::tanh(features[rate_feature_] / rate_scale_);
+             detail::hyperbolic_tangent(features[rate_feature_] / rate_scale_);
 }
 
 Estimate LinearCoulomb::step(Features features) const noexcept {
