@@ -11,6 +11,7 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
@@ -20,6 +21,7 @@
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
 #include "torsio/report/fit_report.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -36,6 +38,7 @@ struct FitFlags {
   bool list = false;
   bool resume = false;
   JsonOutput json;
+  ReportOutput report;
 
   /// The checkpoint of a fit that was stopped.
   [[nodiscard]] std::string checkpoint() const { return output + ".checkpoint"; }
@@ -100,7 +103,8 @@ void run(FitFlags& flags) {
         {.place = "torsio fit",
          .problem = fmt::format("{} missing", fmt::join(missing, " and ")),
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
-  flags.data.check_outputs({flags.output, flags.json.destination}, flags.validation);
+  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination},
+                           flags.validation);
   require_model_file(flags.output);
   ProgressBar progress;
   const torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
@@ -116,6 +120,9 @@ void run(FitFlags& flags) {
   const torsio::FitReport report = torsio::fit_report(trained, dataset);
   if (flags.json.wants_tables()) print(evaluation_text(results) + torsio::fit_report_text(report));
   flags.json.write(torsio::fit_json(results, report, trained.notes));
+  if (flags.report.is_wanted())
+    flags.report.write(
+        torsio::fit_page(results, report, trained, flags.output, dataset, progress.listener()));
   refuse_diverged(results.rows.front());
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   if (flags.resume) std::filesystem::remove(flags.checkpoint());
@@ -151,5 +158,6 @@ void add_fit(CLI::App& app) {
   verb->add_flag("--list", flags->list, "show the families and their settings");
   verb->add_option("--json", flags->json.destination,
                    "write the scores as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -8,6 +8,7 @@
 
 #include "interrupt.hpp"
 #include "man_pages.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
 #include "verbs.hpp"
@@ -67,6 +68,7 @@ int run(int argc, char** argv) {
       ->trigger_on_parse();
   refuse_empty_values(app);
   catch_interrupts();
+  keep_command_line(argc, argv);
   try {
     app.parse(argc, argv);
     return 0;
