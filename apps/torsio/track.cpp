@@ -286,7 +286,8 @@ void run(TrackFlags& flags, const CLI::App& verb) {
                                            .duration = flags.duration,
                                            .seed = flags.seed,
                                            .record = flags.record,
-                                           .json = flags.json});
+                                           .json = flags.json,
+                                           .report = flags.report});
   flags.has_damping = verb.get_option("--damping")->count() > 0;
   ProgressBar progress;
   const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());

@@ -20,7 +20,7 @@ namespace torsio {
 /// `ranked_table` before it becomes text.
 struct RankedRows {
   TextTable table;
-  std::vector<const ResultRow*> rows;  ///< of the table, in its order
+  std::vector<const ResultRow*> rows;  ///< those that the table has, in its order
   struct Other {
     const ResultRow* row;
     std::string reason;

@@ -10,7 +10,7 @@ export interface Axis {
 
 export interface XySeries {
   label: string;
-  style: "line" | "points" | "bars";
+  style: "line" | "points" | "columns";
   role: "measured" | "model" | "limit";
   shown: boolean;
   x: Numbers;

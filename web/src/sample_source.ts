@@ -13,7 +13,7 @@ export interface Samples {
 export interface SampleSource {
   readonly begin_s: number;
   readonly end_s: number;
-  range(begin_s: number, end_s: number, most_points: number): Samples;
+  range(begin_s: number, end_s: number, max_points: number): Samples;
 }
 
 /** Minima and maxima of ever longer buckets of one series. */
@@ -57,16 +57,16 @@ export class StoredSamples implements SampleSource {
     this.details = series.map((one) => slice(report, one.detail));
   }
 
-  range(begin_s: number, end_s: number, most_points: number): Samples {
-    return this.window_at(begin_s, end_s, most_points) ?? this.overview(begin_s, end_s, most_points);
+  range(begin_s: number, end_s: number, max_points: number): Samples {
+    return this.window_at(begin_s, end_s, max_points) ?? this.overview(begin_s, end_s, max_points);
   }
 
   /** All samples of the range, if one window contains it and they are few enough to be drawn. */
-  private window_at(begin_s: number, end_s: number, most_points: number): Samples | null {
+  private window_at(begin_s: number, end_s: number, max_points: number): Samples | null {
     const { figure } = this;
     const first = Math.max(Math.floor((begin_s - figure.start_s) * figure.rate_Hz), 0);
     const last = Math.min(Math.ceil((end_s - figure.start_s) * figure.rate_Hz), figure.samples - 1);
-    if (last - first > 2 * most_points) return null;
+    if (last - first > 2 * max_points) return null;
     let offset = 0;
     for (const { begin, end } of figure.windows) {
       if (first >= begin - 1 && last <= end) {
@@ -82,12 +82,12 @@ export class StoredSamples implements SampleSource {
     return null;
   }
 
-  private overview(begin_s: number, end_s: number, most_points: number): Samples {
+  private overview(begin_s: number, end_s: number, max_points: number): Samples {
     const { figure } = this;
     const half_samples = figure.bucket / 2;
     const points = ((end_s - begin_s) * figure.rate_Hz) / half_samples;
     const deepest = this.levels.length === 0 ? 0 : this.levels[0].length - 1;
-    const level = Math.min(Math.max(Math.ceil(Math.log2(points / most_points)), 0), deepest);
+    const level = Math.min(Math.max(Math.ceil(Math.log2(points / max_points)), 0), deepest);
     const step = half_samples * 2 ** level;
     const index_at = (time_s: number) => ((time_s - figure.start_s) * figure.rate_Hz) / step;
     const length = this.levels.length === 0 ? 0 : this.levels[0][level].length;

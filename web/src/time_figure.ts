@@ -8,7 +8,7 @@ import { css_colour, on_theme, series_colour, series_dash } from "./theme";
 
 const kFirstPanelHeight = 300;
 const kPanelHeight = 170;
-const kMostPoints = 3000;
+const kMaxPoints = 3000;
 
 interface Panel {
   plot: uPlot;
@@ -94,7 +94,7 @@ export class TimeView implements View {
     const [begin, end] = this.view;
     let shown: Samples | undefined;
     for (const { plot, source } of this.panels) {
-      shown = source.range(begin, end, kMostPoints);
+      shown = source.range(begin, end, kMaxPoints);
       plot.batch(() => {
         plot.setData([shown!.time_s, ...shown!.values.map(with_gaps)] as unknown as uPlot.AlignedData, false);
         plot.setScale("x", { min: begin, max: end });

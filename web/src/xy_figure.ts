@@ -30,7 +30,7 @@ function element(parent: Element, name: string, attributes: Record<string, strin
   return made;
 }
 
-/** Loops, scatter, bars and Bode diagrams: any x, in SVG, so that printing and zooming stay sharp. */
+/** Loops, scatter, columns and Bode diagrams: any x, in SVG, so that printing and zooming stay sharp. */
 export class XyView implements View {
   private readonly frame: Frame;
   private readonly drawn: Drawn[];
@@ -95,10 +95,10 @@ export class XyView implements View {
   private fit(): void {
     const shown = this.drawn.filter((one) => one.shown);
     const fitted = shown.length > 0 ? shown : this.drawn;
-    const is_bars = fitted.some((one) => one.series.style === "bars");
-    this.x = scale_of(fitted.map((one) => one.x), this.figure.x.log, is_bars ? 0.06 : 0.04);
+    const has_columns = fitted.some((one) => one.series.style === "columns");
+    this.x = scale_of(fitted.map((one) => one.x), this.figure.x.log, has_columns ? 0.06 : 0.04);
     const heights = fitted.map((one) => one.y);
-    if (is_bars) heights.push(new Float32Array([0]));
+    if (has_columns) heights.push(new Float32Array([0]));
     this.y = scale_of(heights, this.figure.y.log);
   }
 
@@ -193,15 +193,15 @@ export class XyView implements View {
       ? log_ticks(this.x.low, this.x.high)
       : linear_ticks(this.x.low, this.x.high, Math.max(this.width / 90, 3));
     const y_ticks = figure.y.log ? log_ticks(this.y.low, this.y.high) : linear_ticks(this.y.low, this.y.high, 6);
-    const names = this.drawn.find((one) => one.series.style === "bars" && one.series.names)?.series.names;
+    const names = this.drawn.find((one) => one.series.style === "columns" && one.series.names)?.series.names;
     for (const tick of x_ticks) {
       const x = this.pixel_x(tick);
       element(this.svg, "line", { x1: x, x2: x, y1: kTop, y2: bottom, class: "grid" });
       if (!names)
         element(this.svg, "text", { x, y: bottom + 16, class: "tick middle" }).textContent = tick_text(tick);
     }
-    names?.forEach((name, bar) => {
-      element(this.svg, "text", { x: this.pixel_x(bar), y: bottom + 16, class: "tick middle" }).textContent = name;
+    names?.forEach((name, column) => {
+      element(this.svg, "text", { x: this.pixel_x(column), y: bottom + 16, class: "tick middle" }).textContent = name;
     });
     for (const tick of y_ticks) {
       const y = this.pixel_y(tick);
@@ -224,7 +224,7 @@ export class XyView implements View {
 
   private draw_series(layer: Element, one: Drawn): void {
     const { style } = one.series;
-    if (style === "bars") return this.draw_bars(layer, one);
+    if (style === "columns") return this.draw_columns(layer, one);
     const colours = one.colour ? kColourBins : 1;
     const range = one.colour ? scale_of([one.colour], false, 0) : null;
     const bin_of = (i: number) => {
@@ -271,21 +271,21 @@ export class XyView implements View {
     });
   }
 
-  private draw_bars(layer: Element, one: Drawn): void {
+  private draw_columns(layer: Element, one: Drawn): void {
     const step = one.x.length > 1 ? Math.abs(one.x[1] - one.x[0]) : 1;
     const width = Math.max(0.85 * Math.abs(this.pixel_x(step) - this.pixel_x(0)), 1);
     const zero = this.pixel_y(0);
     for (let i = 0; i < one.x.length; ++i) {
       const y = this.pixel_y(one.y[i]);
       if (!Number.isFinite(y)) continue;
-      const bar = element(layer, "rect", {
+      const column = element(layer, "rect", {
         x: this.pixel_x(one.x[i]) - width / 2,
         y: Math.min(y, zero),
         width,
         height: Math.abs(zero - y),
-        class: "bar",
+        class: "column",
       });
-      bar.style.fill = `var(${one.css})`;
+      column.style.fill = `var(${one.css})`;
     }
   }
 }

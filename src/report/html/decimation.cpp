@@ -63,22 +63,21 @@ std::vector<float> detail_of(std::span<const double> values,
 }
 
 OverviewPlan plan_overview(std::size_t samples, std::size_t series,
-                           const std::vector<PlaceOfInterest>& places, std::size_t most_values) {
+                           const std::vector<PlaceOfInterest>& places, std::size_t max_values) {
   constexpr std::size_t kShortest = 200;
   constexpr std::size_t kLongest = 4000;
   OverviewPlan plan;
   const std::size_t each =
-      std::max<std::size_t>(most_values / 2 / std::max<std::size_t>(series, 1), 1);
+      std::max<std::size_t>(max_values / 2 / std::max<std::size_t>(series, 1), 1);
   // Each bucket has two values.
   plan.bucket = std::max<std::size_t>((2 * samples + each - 1) / each, 1);
   if (samples <= each) {
     plan.windows = {{0, samples, "the whole recording"}};
     return plan;
   }
-  const std::size_t length =
-      std::min(std::clamp(each / kMostWindows, kShortest, kLongest), samples);
+  const std::size_t length = std::min(std::clamp(each / kMaxWindows, kShortest, kLongest), samples);
   for (const PlaceOfInterest& place : places) {
-    if (plan.windows.size() == kMostWindows) break;
+    if (plan.windows.size() == kMaxWindows) break;
     const bool is_shown = std::ranges::any_of(plan.windows, [&](const DetailWindow& window) {
       return place.sample >= window.begin && place.sample < window.end;
     });
@@ -90,7 +89,7 @@ OverviewPlan plan_overview(std::size_t samples, std::size_t series,
   return plan;
 }
 
-ThinnedCurve thinned(std::span<const double> x, std::span<const double> y, std::size_t most) {
+ThinnedCurve thinned(std::span<const double> x, std::span<const double> y, std::size_t max_points) {
   const Range x_range = range_of(x);
   const Range y_range = range_of(y);
   ThinnedCurve curve;
@@ -112,9 +111,9 @@ ThinnedCurve thinned(std::span<const double> x, std::span<const double> y, std::
       has_last = is_point;
       last_x = x[n];
       last_y = y[n];
-      if (curve.x.size() > most && step < 0.5) break;
+      if (curve.x.size() > max_points && step < 0.5) break;
     }
-    if (curve.x.size() <= most || step >= 0.5) return curve;
+    if (curve.x.size() <= max_points || step >= 0.5) return curve;
   }
 }
 

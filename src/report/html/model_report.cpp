@@ -88,12 +88,12 @@ std::vector<PlaceOfInterest> largest_residuals(const RecordRuns& record) {
   return places;
 }
 
-TimeFigure time_series(const RecordRuns& record, std::size_t most_values) {
+TimeFigure time_series(const RecordRuns& record, std::size_t max_values) {
   std::vector<PlaceOfInterest> places = reversals_of(record.input);
   std::ranges::copy(largest_residuals(record), std::back_inserter(places));
   const std::size_t series = 2 + record.recording->channels().size() + 2 * record.runs.size();
   TimeFigureBuilder builder("Time series of " + record.recording->name(), *record.recording, series,
-                            places, most_values);
+                            places, max_values);
   builder.panel(with_unit(record.target->name));
   builder.add("measured", CurveRole::measured, true, record.target->values);
   const ModelRun& first = record.runs.front();

@@ -62,7 +62,7 @@ const char* text_of(CurveStyle style) {
   switch (style) {
     case CurveStyle::line: return "line";
     case CurveStyle::points: return "points";
-    case CurveStyle::bars: return "bars";
+    case CurveStyle::columns: return "columns";
   }
   return "line";
 }

@@ -33,6 +33,23 @@ std::size_t count(const std::vector<Finding>& findings, Verdict verdict) {
   return static_cast<std::size_t>(std::ranges::count(findings, verdict, &Finding::verdict));
 }
 
+/// What the loop is for comes first: reference, answer and the error between them.
+TimeFigure loop_signals(const Recording& record) {
+  TimeFigureBuilder builder("Signals of the loop", record, record.channels().size() + 1, {},
+                            values_of_figure(record.size()));
+  const std::vector<double>& wanted = record.channel("wanted_torque_Nm").values;
+  const std::vector<double>& answer = record.channel("truth_torque_Nm").values;
+  std::vector<double> error(wanted.size());
+  for (std::size_t n = 0; n < error.size(); ++n) error[n] = wanted[n] - answer[n];
+  builder.panel("torque [Nm]");
+  builder.add("wanted_torque_Nm", CurveRole::measured, true, wanted);
+  builder.add("truth_torque_Nm", CurveRole::model, true, answer);
+  builder.panel("wanted less true torque [Nm]");
+  builder.add("error", CurveRole::model, true, error);
+  builder.add_channels(record, {"wanted_torque_Nm", "truth_torque_Nm"});
+  return builder.finish();
+}
+
 }  // namespace
 
 ReportDocument check_report(const std::vector<Finding>& findings, const Dataset* dataset,
@@ -142,10 +159,10 @@ ReportDocument tracking_report(std::span<const TrackingRow> rows, const Recordin
     document.summary = {"No run ended: the table states why."};
   document.sections.push_back(std::move(scores));
   if (record != nullptr)
-    document.sections.push_back(
-        {.heading = "One run",
-         .text = "Reference, answer, each term of the command and what no sensor measures (truth).",
-         .figures = {channels_figure(*record, "Signals of the loop", {}, {})}});
+    document.sections.push_back({.heading = "One run",
+                                 .text = "Reference, answer, error, each term of the command, and "
+                                         "at a click what no sensor measures (truth).",
+                                 .figures = {loop_signals(*record)}});
   return document;
 }
 

@@ -90,9 +90,10 @@ class Page {
     for (const ReportTable& table : section.tables) html += table_html(table);
     for (const ReportFigure& figure : section.figures) html += figure_html(figure);
     if (!section.preformatted.empty())
-      html +=
-          fmt::format("<details><summary>as text</summary><pre tabindex=\"0\">{}</pre></details>\n",
-                      markup_text(section.preformatted));
+      html += fmt::format(
+          "<details{}><summary>as text</summary><pre tabindex=\"0\">{}</pre></details>\n",
+          section.tables.empty() && section.figures.empty() ? " open" : "",
+          markup_text(section.preformatted));
     return html + "</section>\n";
   }
 

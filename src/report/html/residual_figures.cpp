@@ -13,7 +13,7 @@ namespace torsio {
 namespace {
 
 constexpr std::size_t kModels = 3;     // whose residuals are drawn
-constexpr std::size_t kPoints = 1500;  // of a scatter plot
+constexpr std::size_t kPoints = 1500;  // in a scatter plot
 constexpr std::size_t kSpectrumSamples = 16384;
 constexpr std::size_t kFrequencies = 150;
 
@@ -88,33 +88,33 @@ XyFigure histogram(const Context& of) {
   for (const double error : errors) largest = std::max(largest, std::abs(error));
   if (largest == 0.0) return figure;
   const double width = 2.0 * largest / static_cast<double>(kBins);
-  XySeries bars{.label = "residuals", .style = CurveStyle::bars, .x = {}, .y = {}};
+  XySeries columns{.label = "residuals", .style = CurveStyle::columns, .x = {}, .y = {}};
   XySeries claimed{
       .label = "claimed by the error bar", .role = CurveRole::measured, .x = {}, .y = {}};
-  bars.y.assign(kBins, 0.0);
+  columns.y.assign(kBins, 0.0);
   for (const double error : errors) {
     const auto bin = static_cast<std::size_t>((error + largest) / width);
-    bars.y[std::min(bin, kBins - 1)] += 1.0 / (width * static_cast<double>(errors.size()));
+    columns.y[std::min(bin, kBins - 1)] += 1.0 / (width * static_cast<double>(errors.size()));
   }
   for (std::size_t k = 0; k < kBins; ++k) {
-    bars.x.push_back(-largest + (static_cast<double>(k) + 0.5) * width);
-    claimed.x.push_back(bars.x.back());
-    claimed.y.push_back(claimed_density(run, bars.x.back()));
+    columns.x.push_back(-largest + (static_cast<double>(k) + 0.5) * width);
+    claimed.x.push_back(columns.x.back());
+    claimed.y.push_back(claimed_density(run, columns.x.back()));
   }
-  figure.series = {std::move(bars), std::move(claimed)};
+  figure.series = {std::move(columns), std::move(claimed)};
   return figure;
 }
 
 XyFigure autocorrelation(const Context& of) {
   constexpr std::size_t kLags = 200;
-  constexpr std::size_t kMostSamples = 50'000;
+  constexpr std::size_t kMaxSamples = 50'000;
   XyFigure figure{.title = "Autocorrelation of the residuals",
                   .x = {"lag [s]"},
                   .y = {"correlation"},
                   .series = {}};
   for (std::size_t m = 0; m < of.models(); ++m) {
     const std::vector<double>& e = of.record.runs[m].residual;
-    const std::size_t samples = std::min(e.size(), kMostSamples);
+    const std::size_t samples = std::min(e.size(), kMaxSamples);
     const std::size_t stride = std::max<std::size_t>(samples / 10 / kLags, 1);
     XySeries series{.label = of.record.runs[m].label, .x = {}, .y = {}};
     double at_zero = 0.0;
@@ -181,7 +181,7 @@ constexpr std::array<double, 9> kMultiples = {0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2
 
 XyFigure calibration(const Context& of) {
   XyFigure figure{.title = "Error bars: claimed and found share of the samples",
-                  .x = {"claimed share within the bar"},
+                  .x = {"claimed share within the error bar"},
                   .y = {"found share"},
                   .series = {}};
   figure.series.push_back(

@@ -14,8 +14,8 @@ std::size_t values_of_figure(std::size_t samples) noexcept {
 
 TimeFigureBuilder::TimeFigureBuilder(std::string title, const Recording& recording,
                                      std::size_t series, const std::vector<PlaceOfInterest>& places,
-                                     std::size_t most_values) {
-  OverviewPlan plan = plan_overview(recording.size(), series, places, most_values);
+                                     std::size_t max_values) {
+  OverviewPlan plan = plan_overview(recording.size(), series, places, max_values);
   figure_.title = std::move(title);
   figure_.start_s = recording.time_s(0);
   figure_.rate_Hz = recording.sample_rate_Hz();
@@ -61,17 +61,18 @@ void TimeFigureBuilder::add_channels(const Recording& recording,
   for (const Channel& channel : recording.channels()) {
     if (std::ranges::find(left_out, channel.name) != left_out.end()) continue;
     const std::string unit = unit_label(channel.name);
+    const bool is_shown = !channel.name.starts_with(kTruthPrefix);
     const std::string label = unit.empty() ? channel.name : "[" + unit + "]";
     const auto known = std::find_if(
         figure_.panels.begin() + static_cast<std::ptrdiff_t>(first), figure_.panels.end(),
         [&](const TimeFigure::Panel& panel) { return panel.label == label; });
     if (known == figure_.panels.end()) {
       panel(label);
-      add(channel.name, CurveRole::model, true, channel.values);
+      add(channel.name, CurveRole::model, is_shown, channel.values);
     } else {
       known->series.push_back({.label = channel.name,
                                .role = CurveRole::model,
-                               .is_shown = true,
+                               .is_shown = is_shown,
                                .overview = overview_of(channel.values, figure_.bucket),
                                .detail = detail_of(channel.values, figure_.windows)});
     }

@@ -13,7 +13,7 @@ namespace torsio {
 
 /// Values of a time figure: about 5 bytes each in the page.
 inline constexpr std::size_t kValuesOfFigure = 300'000;
-/// Of a recording with more than a million samples.
+/// The same for a recording with more than a million samples.
 inline constexpr std::size_t kValuesOfLongFigure = 1'500'000;
 [[nodiscard]] std::size_t values_of_figure(std::size_t samples) noexcept;
 
@@ -23,7 +23,7 @@ class TimeFigureBuilder {
   /// @param recording whose clock all series have
   /// @param series their number
   TimeFigureBuilder(std::string title, const Recording& recording, std::size_t series,
-                    const std::vector<PlaceOfInterest>& places, std::size_t most_values);
+                    const std::vector<PlaceOfInterest>& places, std::size_t max_values);
 
   void panel(std::string label);
   /// To the last panel.

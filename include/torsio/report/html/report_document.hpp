@@ -26,7 +26,7 @@ struct ReportAxis {
   bool is_logarithmic = false;
 };
 
-enum class CurveStyle : std::uint8_t { line, points, bars };
+enum class CurveStyle : std::uint8_t { line, points, columns };
 enum class CurveRole : std::uint8_t { measured, model, limit, lower, upper };
 
 struct XySeries {
@@ -37,10 +37,10 @@ struct XySeries {
   std::vector<double> x;  ///< a point that is not finite is a gap
   std::vector<double> y;
   std::vector<double> colour = {};  ///< selects the colour of each point (time, speed); empty: one
-  std::vector<std::string> names = {};  ///< of each point, or below each bar
+  std::vector<std::string> names = {};  ///< one for each point, or below each column
 };
 
-/// Loops, scatter, bars, histograms, Bode diagrams.
+/// Loops, scatter, columns, histograms, Bode diagrams.
 struct XyFigure {
   std::string title;
   ReportAxis x;
@@ -86,9 +86,9 @@ struct TimeFigure {
   double rate_Hz = 1.0;
   std::size_t samples = 0;
   std::size_t bucket = 1;  ///< samples in a bucket of the overview
-  std::vector<DetailWindow> windows;
-  std::vector<TimeMark> marks;
-  std::vector<Panel> panels;
+  std::vector<DetailWindow> windows = {};
+  std::vector<TimeMark> marks = {};
+  std::vector<Panel> panels = {};
 };
 
 /// A picture that is already SVG, from this program.

@@ -13,9 +13,10 @@
 #include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/evaluate/fit_report.hpp"
 #include "torsio/report/html/report_document.hpp"
+#include "torsio/sim/closed_loop/impedance_tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
 
-// The pages of the verbs. Each states its result in `summary`; the origin has what the data tell (hashes), to which
+// The pages of the verbs. Each states its result in `summary`; the origin has what the data state (hashes), to which
 // the program adds its command and versions.
 namespace torsio {
 
@@ -59,6 +60,9 @@ namespace torsio {
 /// @param record of the first run of a model; empty: none
 [[nodiscard]] ReportDocument tracking_report(std::span<const TrackingRow> rows,
                                              const Recording* record);
+
+/// Wanted, linear and rendered impedance as Bode and Nyquist diagrams, and the motion of the hand.
+[[nodiscard]] ReportDocument impedance_report(const ImpedanceRun& run);
 
 /// A page with the text of a verb and its figures.
 [[nodiscard]] ReportDocument text_report(std::string title, std::vector<std::string> summary,
