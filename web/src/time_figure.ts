@@ -8,7 +8,9 @@ import { css_colour, on_theme, series_colour, series_dash } from "./theme";
 
 const kFirstPanelHeight = 300;
 const kPanelHeight = 170;
-const kMaxPoints = 3000;
+/** A measured curve can be seen below the model that follows it. */
+const kWidths: Record<string, number> = { measured: 3, lower: 0.5, upper: 0.5 };
+const kMaxPoints = 2000;
 
 interface Panel {
   plot: uPlot;
@@ -53,8 +55,10 @@ export class TimeView implements View {
     this.add_windows();
     add_legend(this.frame, entries, (index, shown) => {
       for (const [panel, series] of entries[index].at) this.panels[panel].plot.setSeries(series, { show: shown });
+      this.hide_empty_panels();
     });
     this.update();
+    this.hide_empty_panels();
     new ResizeObserver(() => this.resize()).observe(this.frame.canvas);
     on_theme(() => this.panels.forEach(({ plot }) => plot.redraw(false)));
   }
@@ -104,6 +108,10 @@ export class TimeView implements View {
     this.frame.note.textContent = shown?.complete
       ? "Every sample is shown."
       : `Lines show minima and maxima; ${where_detail_ends(this.figure)}.`;
+  }
+
+  private hide_empty_panels(): void {
+    for (const { plot } of this.panels) plot.root.hidden = !plot.series.slice(1).some((one) => one.show);
   }
 
   private width(): number {
@@ -159,7 +167,7 @@ export class TimeView implements View {
             show: one.shown,
             stroke: () => css_colour(series_colour(one.role, colours.get(colour_key(one)) ?? 0)),
             dash: one.role === "limit" ? [4, 4] : series_dash(colours.get(colour_key(one)) ?? 0),
-            width: one.role === "lower" || one.role === "upper" ? 0.5 : 1.25,
+            width: kWidths[one.role] ?? 1.25,
             points: { show: false },
           })),
         ],

@@ -253,6 +253,8 @@ export class XyView implements View {
       const stroke = one.colour ? scale_colour(bin / colours) : `var(${one.css})`;
       const path = element(layer, "path", { d, class: style === "points" ? "dots" : "curve" });
       path.style.stroke = stroke;
+      // It can be seen below the model that follows it.
+      if (style === "line" && one.series.role === "measured") path.style.strokeWidth = "3";
       if (one.dash.length > 0 && style === "line") path.style.strokeDasharray = one.dash.join(" ");
     });
     if (style === "points") this.name_points(layer, one);

@@ -8,6 +8,7 @@ import { chromium } from "playwright-core";
 const [reports, pictures] = process.argv.slice(2);
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const kMaxMilliseconds = 1500;
+const kPictureHeight = 1900;
 const problems = [];
 
 function expect(condition, what) {
@@ -31,7 +32,9 @@ async function check_time_figure(page, name) {
   await page.keyboard.press("0");
   await page.waitForTimeout(60);
   expect((await range())[0] === all[0], `${name}: the key 0 does not show the whole time series`);
-  const box = await canvas.locator(".u-over").first().boundingBox();
+  const plot = canvas.locator(".u-over").first();
+  await plot.scrollIntoViewIfNeeded();
+  const box = await plot.boundingBox();
   await page.mouse.move(box.x + 0.3 * box.width, box.y + 40);
   await page.mouse.down();
   await page.mouse.move(box.x + 0.5 * box.width, box.y + 60, { steps: 4 });
@@ -101,6 +104,21 @@ async function panning_rate(page) {
   });
 }
 
+/** The page from its beginning to the end of the first time series, or of the first figures. */
+async function take_picture(page, path) {
+  const size = page.viewportSize();
+  await page.setViewportSize({ width: size.width, height: kPictureHeight });
+  await page.waitForTimeout(300);  // figures are drawn when they come near the screen
+  const end = await page.evaluate(() => {
+    const figures = [...document.querySelectorAll("figure")];
+    const last = figures.find((figure) => figure.querySelector(".uplot")) ?? figures[0];
+    return last ? last.getBoundingClientRect().bottom : innerHeight;
+  });
+  const clip = { x: 0, y: 0, width: 1100, height: Math.min(Math.ceil(end) + 16, kPictureHeight) };
+  await page.screenshot({ path, clip, animations: "disabled" });
+  await page.setViewportSize(size);
+}
+
 async function check_report(browser, file, theme) {
   const name = `${file} (${theme})`;
   const context = await browser.newContext({ colorScheme: theme, viewport: { width: 1100, height: 900 } });
@@ -116,12 +134,12 @@ async function check_report(browser, file, theme) {
   await page.goto("file://" + resolve(join(reports, file)));
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   const opened_ms = performance.now() - start;
+  if (pictures) await take_picture(page, join(pictures, `${file.replace(".html", "")}-${theme}.png`));
   await check_table(page, name);
   await check_xy_figure(page, name);
   await check_time_figure(page, name);
   const rate = await panning_rate(page);
   await page.evaluate(() => scrollTo(0, 0));
-  if (pictures) await page.screenshot({ path: join(pictures, `${file.replace(".html", "")}-${theme}.png`) });
   await page.evaluate(axe);
   const { violations } = await page.evaluate(() => window.axe.run());
   for (const { id, impact, nodes } of violations)

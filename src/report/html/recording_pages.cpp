@@ -44,7 +44,7 @@ TimeFigure loop_signals(const Recording& record) {
   builder.panel("torque [Nm]");
   builder.add("wanted_torque_Nm", CurveRole::measured, true, wanted);
   builder.add("truth_torque_Nm", CurveRole::model, true, answer);
-  builder.panel("wanted less true torque [Nm]");
+  builder.panel("error [Nm]");
   builder.add("error", CurveRole::model, true, error);
   builder.add_channels(record, {"wanted_torque_Nm", "truth_torque_Nm"});
   return builder.finish();
