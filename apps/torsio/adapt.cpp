@@ -4,12 +4,14 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/adaptation.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/model/adaptive_model.hpp"
 #include "torsio/report/adaptation.hpp"
+#include "torsio/report/html/change_reports.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -25,6 +27,7 @@ struct AdaptFlags {
   std::string output;
   std::string device_serial;
   JsonOutput json;
+  ReportOutput report;
 };
 
 std::string settings_list() {
@@ -50,7 +53,7 @@ torsio::Dataset load(const AdaptFlags& flags, const torsio::ModelFile& file,
 void run(AdaptFlags& flags) {
   std::vector<std::string> read = flags.test;
   read.push_back(flags.model);
-  flags.data.check_outputs({flags.output, flags.json.destination}, read);
+  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination}, read);
   require_model_file(flags.output);
   const auto settings = torsio::adaptation_settings(flags.method, parse_settings(flags.settings));
   const torsio::ModelFile file = torsio::load_model(flags.model);
@@ -63,6 +66,9 @@ void run(AdaptFlags& flags) {
   if (!flags.device_serial.empty()) adapted.file.card.device_serial = flags.device_serial;
   if (flags.json.wants_tables()) print(torsio::adaptation_text(adapted, flags.model));
   flags.json.write(torsio::adaptation_json(adapted, flags.model));
+  if (flags.report.is_wanted())
+    flags.report.write(
+        torsio::adaptation_report(adapted, file, flags.model, dataset, progress.listener()));
   const torsio::AdaptationScore& held_out = adapted.held_out.back();
   if (held_out.adapted.rmse > held_out.frozen.rmse)
     remark(
@@ -118,5 +124,6 @@ void add_adapt(CLI::App& app) {
                    "serial number of the joint that the adapted model belongs to");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

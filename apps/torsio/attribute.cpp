@@ -4,12 +4,14 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/attribution.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/attribution.hpp"
+#include "torsio/report/html/change_reports.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -20,6 +22,7 @@ struct AttributeFlags {
   torsio::AttributionOptions options = {.seed = kDefaultSeed};
   std::string window = "auto";
   JsonOutput json;
+  ReportOutput report;
 };
 
 /// 0: found from the model.
@@ -48,7 +51,7 @@ torsio::Dataset load(const AttributeFlags& flags, const torsio::ModelFile& file,
 }
 
 void run(AttributeFlags& flags) {
-  flags.data.check_outputs({flags.json.destination}, {flags.model});
+  flags.data.check_outputs({flags.json.destination, flags.report.destination}, {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   ProgressBar progress;
   const torsio::Dataset dataset = load(flags, file, progress.listener());
@@ -68,6 +71,8 @@ void run(AttributeFlags& flags) {
                                            .sample_rate_Hz = dataset.sample_rate_Hz()};
   if (flags.json.wants_tables()) print(torsio::attribution_text(attribution, subject));
   flags.json.write(torsio::attribution_json(attribution, subject));
+  if (flags.report.is_wanted())
+    flags.report.write(torsio::attribution_report(attribution, subject));
 }
 
 }  // namespace
@@ -103,5 +108,6 @@ void add_attribute(CLI::App& app) {
   add_seed(*verb, flags->options.seed, "seed of the random number generators");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

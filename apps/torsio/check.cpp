@@ -10,12 +10,14 @@
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/check/advice.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/clock.hpp"
 #include "torsio/data/log_summary.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/check.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/log_summary.hpp"
 #include "verbs.hpp"
 
@@ -28,6 +30,7 @@ struct CheckFlags {
   bool list = false;
   std::vector<std::string> want;
   JsonOutput json;
+  ReportOutput report;
 };
 
 std::string text_of(const std::vector<torsio::Finding>& findings) {
@@ -43,6 +46,8 @@ std::string text_of(const std::vector<torsio::Finding>& findings) {
 struct Checked {
   std::vector<torsio::Finding> findings;
   std::optional<torsio::Advice> advice;
+  std::optional<torsio::Dataset> dataset = {};  ///< none: it could not be read
+  torsio::FeatureSpec spec = {};
 };
 
 std::vector<torsio::WantedRange> wanted_of(const CheckFlags& flags, const torsio::Dataset& dataset,
@@ -57,13 +62,15 @@ std::vector<torsio::WantedRange> wanted_of(const CheckFlags& flags, const torsio
 Checked checked(const CheckFlags& flags) {
   try {
     ProgressBar progress;
-    const torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
+    torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
     const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
     const auto wanted = wanted_of(flags, dataset, spec);  // a wrong call before any work
     Checked result{.findings = {{torsio::Verdict::pass, "clock", "", "uniform", ""}}, .advice = {}};
     std::ranges::move(torsio::check_dataset(dataset, spec), std::back_inserter(result.findings));
     if (flags.advise && torsio::worst(result.findings) != torsio::Verdict::fail)
       result.advice = torsio::advise(dataset, spec, wanted, progress.listener());
+    result.dataset = std::move(dataset);
+    result.spec = spec;
     return result;
   } catch (const torsio::ClockError& error) {
     const std::string_view message = error.what();
@@ -93,7 +100,7 @@ void run(CheckFlags& flags) {
     throw torsio::UsageError({.place = "--want",
                               .problem = "it states the intended use for --advise",
                               .advice = "Add --advise."});
-  flags.data.check_outputs({flags.json.destination}, flags.test);
+  flags.data.check_outputs({flags.json.destination, flags.report.destination}, flags.test);
   const Checked result = checked(flags);
   const torsio::Verdict verdict = torsio::worst(result.findings);
   if (flags.json.wants_tables()) {
@@ -105,7 +112,11 @@ void run(CheckFlags& flags) {
                                                          : "a model can be trained on this"));
     if (result.advice) print("\n" + torsio::advice_text(*result.advice));
   }
-  flags.json.write(torsio::check_json(result.findings, result.advice ? &*result.advice : nullptr));
+  const torsio::Advice* const advice = result.advice ? &*result.advice : nullptr;
+  flags.json.write(torsio::check_json(result.findings, advice));
+  if (flags.report.is_wanted())
+    flags.report.write(torsio::check_report(
+        result.findings, result.dataset ? &*result.dataset : nullptr, result.spec, advice));
   if (verdict == torsio::Verdict::fail)
     throw torsio::Error({.problem = "the recordings did not pass",
                          .advice = flags.advise ? "There is no advice on further recordings until "
@@ -142,5 +153,6 @@ void add_check(CLI::App& app) {
       ->allow_extra_args(false);
   verb->add_option("--json", flags->json.destination,
                    "write the findings as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -6,12 +6,14 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/structure_search.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/cross_validation.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/results.hpp"
 #include "verbs.hpp"
 
@@ -23,14 +25,15 @@ struct CompareFlags {
   std::vector<std::string> test;
   std::string models = "all";
   std::string output;
-  std::string report;
   std::uint64_t seed = kDefaultSeed;
   bool allow_leak = false;
   JsonOutput json;
+  ReportOutput report;
 };
 
 void run(CompareFlags& flags) {
-  flags.data.check_outputs({flags.output, flags.report, flags.json.destination}, flags.test);
+  flags.data.check_outputs({flags.output, flags.report.destination, flags.json.destination},
+                           flags.test);
   require_model_file(flags.output);
   ProgressBar progress;
   const torsio::Dataset dataset =
@@ -68,7 +71,8 @@ void run(CompareFlags& flags) {
         fmt::format("note: all leaves out {} families, which --help lists: add them by name, as in "
                     "all,lstm",
                     families_beyond_all().size()));
-  if (!flags.report.empty()) write_text(flags.report, torsio::results_html(comparison.results));
+  if (flags.report.is_wanted())
+    flags.report.write(torsio::comparison_report(comparison, dataset, progress.listener()));
   if (!comparison.best) throw torsio::Error({.problem = first_failure(comparison.results)});
   if (flags.output.empty()) return;
   torsio::save_model(flags.output, comparison.best->file);
@@ -94,7 +98,7 @@ void add_compare(CLI::App& app) {
              "search: orders and structures of each family by cross-validation within the training "
              "records, the best then compared: minutes to hours");
   verb->add_option("-o,--output", flags->output, "write the best model to this file");
-  verb->add_option("--report", flags->report, "write the tables as an HTML page");
+  flags->report.add(*verb);
   add_seed(*verb, flags->seed, "seed of the random number generators");
   verb->add_flag("--allow-leak", flags->allow_leak,
                  "accept an input that the target was computed from; the results are marked");

@@ -7,6 +7,7 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -14,6 +15,7 @@
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
 #include "torsio/report/cross_validation.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -28,6 +30,7 @@ struct CrossValidateFlags {
   std::uint64_t seed = kDefaultSeed;
   bool allow_leak = false;
   JsonOutput json;
+  ReportOutput report;
 };
 
 std::vector<torsio::ModelChoice> choices_of(const CrossValidateFlags& flags,
@@ -60,20 +63,22 @@ void warn_of_other_motions_in_folds(torsio::Dataset dataset, const torsio::Featu
 
 void run(CrossValidateFlags& flags) {
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
-  flags.data.check_outputs({flags.json.destination});
+  flags.data.check_outputs({flags.json.destination, flags.report.destination});
   const torsio::FoldScheme scheme{.folds = flags.folds,
                                   .embargo_s = torsio::si_quantity(flags.embargo, "s", "--embargo"),
                                   .by = flags.by};
   ProgressBar progress;
-  torsio::Dataset dataset = flags.data.load({}, {}, progress.listener());
+  const torsio::Dataset dataset = flags.data.load({}, {}, progress.listener());
   const auto choices = choices_of(flags, settings, dataset);
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
   warn_of_failed_checks(dataset, features);
   warn_of_other_motions_in_folds(dataset, features, scheme, flags.seed);
   const torsio::CrossValidation validation = torsio::cross_validate(
-      std::move(dataset), choices, scheme, flags.seed, flags.allow_leak, progress.listener());
+      dataset, choices, scheme, flags.seed, flags.allow_leak, progress.listener());
   flags.json.write(torsio::cross_validation_json(validation));
   if (flags.json.wants_tables()) print(cross_validation_text(validation));
+  if (flags.report.is_wanted())
+    flags.report.write(torsio::cross_validation_report(validation, dataset));
   if (std::ranges::none_of(validation.ranking,
                            [](const torsio::FoldSummary& summary) { return summary.folds > 0; }) ||
       !validation.ranked().is_possible())
@@ -115,5 +120,6 @@ void add_crossvalidate(CLI::App& app) {
                  "accept an input that the target was computed from; the results are marked");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

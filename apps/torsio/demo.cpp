@@ -5,11 +5,13 @@
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/fit/common/inputs.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/plots.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/report/text_table.hpp"
@@ -24,6 +26,7 @@ struct DemoFlags {
   std::string actuator = "dfki-50";
   std::string models = "all";
   std::string output = "torsio-demo.safetensors";
+  ReportOutput report = {"torsio-demo.html"};
   std::uint64_t seed = kDefaultSeed;
   JsonOutput json;
 };
@@ -59,7 +62,8 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
 }
 
 void run(DemoFlags& flags) {
-  flags.data.check_outputs({flags.output, flags.json.destination}, flags.test);
+  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination},
+                           flags.test);
   require_model_file(flags.output);
   ProgressBar progress;
   const bool is_simulated = flags.data.recordings.empty();
@@ -76,6 +80,7 @@ void run(DemoFlags& flags) {
     print(comparison_text(comparison.results) + loop_plot(dataset, comparison.best->file) +
           deployed);
   flags.json.write(torsio::results_json(comparison.results));
+  flags.report.write(torsio::comparison_report(comparison, dataset, progress.listener()));
 }
 
 }  // namespace
@@ -99,5 +104,6 @@ void add_demo(CLI::App& app) {
   verb->add_option(
       "--json", flags->json.destination,
       "write the results of the comparison as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

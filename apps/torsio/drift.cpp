@@ -11,9 +11,12 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/drift.hpp"
+#include "torsio/report/html/change_reports.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/sim/campaign/drift_campaign.hpp"
 #include "verbs.hpp"
 
@@ -27,6 +30,7 @@ struct DriftFlags {
   std::size_t campaign = 0;
   torsio::DriftCampaignSettings settings;
   JsonOutput json;
+  ReportOutput report;
 };
 
 void run_campaign(DriftFlags& flags) {
@@ -34,13 +38,17 @@ void run_campaign(DriftFlags& flags) {
     throw torsio::UsageError({.place = "torsio drift --campaign",
                               .expected = "no model file: each simulated joint gets its own",
                               .found = flags.model});
-  DataFlags().check_outputs({flags.json.destination, flags.settings.resume});
+  DataFlags().check_outputs(
+      {flags.json.destination, flags.settings.resume, flags.report.destination});
   flags.settings.specimens = flags.campaign;
   ProgressBar progress;
   const torsio::DriftCampaignResult result =
       torsio::run_drift_campaign(flags.settings, progress.listener());
   if (flags.json.wants_tables()) print(torsio::drift_campaign_text(result));
   flags.json.write(torsio::drift_campaign_json(result));
+  if (flags.report.is_wanted())
+    flags.report.write(
+        torsio::text_report("Campaign of changed joints", {}, torsio::drift_campaign_text(result)));
 }
 
 void run(DriftFlags& flags) {
@@ -52,7 +60,7 @@ void run(DriftFlags& flags) {
                               .advice = "torsio drift joint.safetensors today.csv"});
   std::vector<std::string> models{flags.model};
   if (!flags.reference.empty()) models.push_back(flags.reference);
-  flags.data.check_outputs({flags.json.destination}, models);
+  flags.data.check_outputs({flags.json.destination, flags.report.destination}, models);
   const torsio::ModelFile file = torsio::load_model(flags.model, flags.serial);
   flags.data.target = file.settings.target;
   flags.data.use_model_mapping(file.card.mapping, flags.model);
@@ -74,6 +82,8 @@ void run(DriftFlags& flags) {
   const torsio::Drift drift = torsio::detect_drift(file, dataset, options, progress.listener());
   if (flags.json.wants_tables()) print(torsio::drift_text(drift, file.settings.target));
   flags.json.write(torsio::drift_json(drift, file.settings.target));
+  if (flags.report.is_wanted())
+    flags.report.write(torsio::drift_report(drift, file, dataset, progress.listener()));
 }
 
 }  // namespace
@@ -113,5 +123,6 @@ void add_drift(CLI::App& app) {
   add_seed(*verb, flags->settings.seed, "seed of the campaign");
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

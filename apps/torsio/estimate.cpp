@@ -6,10 +6,13 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/estimates.hpp"
+#include "torsio/report/html/model_report.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 #include "verbs.hpp"
 
@@ -20,10 +23,12 @@ struct EstimateFlags {
   DataFlags data;
   std::string output;
   JsonOutput json;
+  ReportOutput report;
 };
 
 void run(EstimateFlags& flags) {
-  flags.data.check_outputs({flags.output, flags.json.destination}, {flags.model});
+  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination},
+                           {flags.model});
   require_ending("--output", flags.output, {".csv", ".gz"});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   flags.data.use_model_mapping(file.card.mapping, flags.model);
@@ -45,6 +50,12 @@ void run(EstimateFlags& flags) {
   if (flags.json.wants_tables() && !is_standard_output(flags.output))
     print(torsio::estimates_text(summaries, file.settings));
   flags.json.write(torsio::estimates_json(summaries, file.settings));
+  if (flags.report.is_wanted()) {
+    torsio::ReportDocument document =
+        torsio::estimate_report(estimated, summaries, file, flags.model);
+    document.origin = torsio::origin_of(dataset);
+    flags.report.write(std::move(document));
+  }
 }
 
 }  // namespace
@@ -66,5 +77,6 @@ void add_estimate(CLI::App& app) {
                    "CSV file to write, compressed if it ends in .gz; - for standard output");
   verb->add_option("--json", flags->json.destination,
                    "write the summary as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -6,12 +6,15 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/write.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/report/html/model_report.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/model_description.hpp"
 #include "torsio/report/results.hpp"
 #include "verbs.hpp"
@@ -23,6 +26,7 @@ struct EvaluateFlags {
   DataFlags data;
   std::string predictions;
   JsonOutput json;
+  ReportOutput report;
 };
 
 /// Target, estimate, error bar and fault of every sample of one recording: the run that is scored.
@@ -62,7 +66,8 @@ void require_no_flags_of_recordings(const EvaluateFlags& flags) {
 }
 
 void run(EvaluateFlags& flags) {
-  flags.data.check_outputs({flags.predictions, flags.json.destination}, {flags.model});
+  flags.data.check_outputs({flags.predictions, flags.json.destination, flags.report.destination},
+                           {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   if (flags.data.recordings.empty()) {
     require_no_flags_of_recordings(flags);
@@ -70,6 +75,14 @@ void run(EvaluateFlags& flags) {
     const torsio::SlowCycle cycle = torsio::slow_cycle(file, progress.listener());
     if (flags.json.wants_tables()) print(torsio::model_description(file, cycle));
     flags.json.write(torsio::model_description_json(file, cycle));
+    if (flags.report.is_wanted()) {
+      torsio::ReportDocument document = torsio::text_report(
+          "Description of " + flags.model,
+          {"Without recordings, only what the file states and what a slow cycle shows."},
+          torsio::model_description(file, cycle));
+      document.sections.push_back(torsio::card_section(file, "Card of the model"));
+      flags.report.write(std::move(document));
+    }
     return;
   }
   DataFlags data = flags.data;
@@ -94,6 +107,9 @@ void run(EvaluateFlags& flags) {
   }
   if (flags.json.wants_tables()) print(evaluation_text(results));
   flags.json.write(torsio::results_json(results));
+  if (flags.report.is_wanted())
+    flags.report.write(
+        torsio::evaluation_report(results, file, flags.model, dataset, progress.listener()));
   if (std::ranges::all_of(results.rows,
                           [](const torsio::ResultRow& row) { return row.status != "ok"; }))
     throw torsio::Error({.problem = first_failure(results)});
@@ -121,5 +137,6 @@ void add_evaluate(CLI::App& app) {
                    "write target, estimate, error bar and fault of one recording as CSV");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

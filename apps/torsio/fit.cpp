@@ -11,6 +11,7 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/mapping.hpp"
@@ -21,6 +22,7 @@
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
 #include "torsio/report/fit_report.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 #include "verbs.hpp"
 
@@ -38,6 +40,7 @@ struct FitFlags {
   bool list = false;
   bool resume = false;
   JsonOutput json;
+  ReportOutput report;
 
   /// The checkpoint of a fit that was stopped.
   [[nodiscard]] std::string checkpoint() const { return output + ".checkpoint"; }
@@ -112,13 +115,16 @@ void run_each_joint(const FitFlags& flags) {
   for (const std::string& joint : joints) {
     FitFlags one = flags;
     one.data.joint = joint;
-    one.output = with_joint(flags.output, joint);
-    one.json.destination = with_joint(flags.json.destination, joint);
-    if (joints.size() > 1 && !one.json.destination.empty() &&
-        one.json.destination == flags.json.destination)
-      throw torsio::UsageError({.place = "--json " + flags.json.destination,
-                                .problem = "the scores of every joint would be written to it",
-                                .advice = "Put {joint} into its name."});
+    const auto place = [&](std::string& destination) {
+      const std::string given = std::exchange(destination, with_joint(destination, joint));
+      if (joints.size() > 1 && !given.empty() && given == destination)
+        throw torsio::UsageError({.place = given,
+                                  .problem = "the results of every joint would be written to it",
+                                  .advice = "Put {joint} into its name."});
+    };
+    place(one.output);
+    place(one.json.destination);
+    place(one.report.destination);
     remark(fmt::format("joint {}", joint));
     run_one(one);
   }
@@ -141,7 +147,8 @@ void run_one(FitFlags& flags) {
         {.place = "torsio fit",
          .problem = fmt::format("{} missing", fmt::join(missing, " and ")),
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
-  flags.data.check_outputs({flags.output, flags.json.destination}, flags.validation);
+  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination},
+                           flags.validation);
   require_model_file(flags.output);
   ProgressBar progress;
   const torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
@@ -157,6 +164,9 @@ void run_one(FitFlags& flags) {
   const torsio::FitReport report = torsio::fit_report(trained, dataset);
   if (flags.json.wants_tables()) print(evaluation_text(results) + torsio::fit_report_text(report));
   flags.json.write(torsio::fit_json(results, report, trained.notes));
+  if (flags.report.is_wanted())
+    flags.report.write(
+        torsio::fit_page(results, report, trained, flags.output, dataset, progress.listener()));
   refuse_diverged(results.rows.front());
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   if (flags.resume) std::filesystem::remove(flags.checkpoint());
@@ -195,5 +205,6 @@ void add_fit(CLI::App& app) {
   verb->add_flag("--list", flags->list, "show the families and their settings");
   verb->add_option("--json", flags->json.destination,
                    "write the scores as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -3,11 +3,15 @@
 #include <CLI/Formatter.hpp>
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <new>
 #include <string>
 
+#include "completion.hpp"
 #include "interrupt.hpp"
 #include "man_pages.hpp"
+#include "output.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
 #include "verbs.hpp"
@@ -33,7 +37,34 @@ void refuse_empty_values(CLI::App& app) {
       if (option->get_items_expected_max() > 0) option->check(refuse);
 }
 
+/// What a person who types the name alone wants to know.
+constexpr const char* kFirstSteps =
+    "torsio fits models of a series-elastic actuator's spring and estimates the joint torque.\n\n"
+    "  torsio demo                              the whole workflow on a simulated bench, with a "
+    "report\n"
+    "  torsio check my_recording.csv            can a model be trained on it?\n"
+    "  torsio compare a.csv b.csv --test c.csv --report result.html\n"
+    "                                           which model is best, with pictures\n"
+    "  torsio fit a.csv b.csv --model grey_box -o joint.safetensors\n"
+    "  torsio doctor                            what this machine has for torsio\n\n"
+    "torsio --help lists all verbs, torsio VERB --help their options.\n";
+
+void add_completion(CLI::App& app) {
+  CLI::App* verb = app.add_subcommand("completion",
+                                      "print a script that completes verbs and options in a shell");
+  verb->footer(
+      "Example: source <(torsio completion bash)\n"
+      "         torsio completion fish > ~/.config/fish/completions/torsio.fish");
+  auto shell = std::make_shared<std::string>();
+  verb->add_option("SHELL", *shell, "bash, zsh or fish")->required();
+  verb->callback([&app, shell] { print(completion_script(app, *shell)); });
+}
+
 int run(int argc, char** argv) {
+  if (argc == 1) {
+    print(kFirstSteps);
+    return kCallWasWrong;  // of a script whose variables are empty
+  }
   CLI::App app(
       "Fits models of a series-elastic actuator's spring and estimates the joint torque with them.",
       "torsio");
@@ -58,6 +89,9 @@ int run(int argc, char** argv) {
   add_reproduce(app);
   add_unpack(app);
   add_convert(app);
+  add_bench(app);
+  add_doctor(app);
+  add_completion(app);
   // For the build, which installs the pages: in no help text.
   app.add_option_function<std::string>("--man-pages",
                                        [&app](const std::string& folder) {
@@ -68,6 +102,7 @@ int run(int argc, char** argv) {
       ->trigger_on_parse();
   refuse_empty_values(app);
   catch_interrupts();
+  keep_command_line(argc, argv);
   try {
     app.parse(argc, argv);
     return 0;

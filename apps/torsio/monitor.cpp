@@ -15,10 +15,12 @@
 #include "monitor_simulated.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/files/monitor_file.hpp"
+#include "torsio/report/html/change_reports.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -33,6 +35,7 @@ struct MonitorFlags {
   SimulatedMonitorFlags simulated;
   DataFlags data;
   JsonOutput json;
+  ReportOutput report;
 };
 
 /// What a call does, and the options that it uses.
@@ -65,9 +68,10 @@ Mode mode_of(const MonitorFlags& flags) {
   if (is_simulated)
     return {"--actuator",
             {"FILES", "--actuator", "--monitors", "--fault-free-calibration-hours", "--inject",
-             "--faults", "--duration", "--seed", "--output", "--plot", "--json"}};
+             "--faults", "--duration", "--seed", "--output", "--plot", "--json", "--report"}};
   return {"a monitor file with recordings",
-          {"FILES", "--mapping", "--rate", "--output", "--plot", "--device-serial", "--json"}};
+          {"FILES", "--mapping", "--rate", "--output", "--plot", "--device-serial", "--json",
+           "--report"}};
 }
 
 /// @throws torsio::UsageError for an option that this call would not use.
@@ -100,7 +104,8 @@ std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
                                 .found = monitor_file,
                                 .advice = "torsio monitor joint.monitor.json log.csv"});
   flags.data.recordings.assign(flags.files.begin() + 1, flags.files.end());
-  flags.data.check_outputs({flags.output, flags.plot, flags.json.destination}, {monitor_file});
+  flags.data.check_outputs(
+      {flags.output, flags.plot, flags.json.destination, flags.report.destination}, {monitor_file});
   const torsio::MonitoredTorque monitored =
       torsio::load_monitor(monitor_file, {.serial = flags.serial});
   const torsio::MonitorFile file = torsio::read_monitor(monitor_file);
@@ -139,7 +144,8 @@ std::vector<torsio::MonitorReplay> replay_joint(MonitorFlags& flags,
                               .expected = "at most a monitor file",
                               .found = fmt::format("{} files", flags.files.size())});
   const std::string monitor_file = flags.files.empty() ? "" : flags.files.front();
-  flags.data.check_outputs({flags.output, flags.plot, flags.json.destination}, {monitor_file});
+  flags.data.check_outputs(
+      {flags.output, flags.plot, flags.json.destination, flags.report.destination}, {monitor_file});
   return {replay_simulated(flags.simulated, monitor_file, settings)};
 }
 
@@ -160,6 +166,7 @@ void replay(MonitorFlags& flags) {
   if (flags.json.wants_tables() && !is_standard_output(flags.output))
     print(torsio::replays_text(replays, settings));
   flags.json.write(torsio::replays_json(replays, settings));
+  if (flags.report.is_wanted()) flags.report.write(torsio::monitor_report(replays, settings));
 }
 
 void run(const CLI::App& verb, MonitorFlags& flags) {
@@ -289,5 +296,6 @@ void add_monitor(CLI::App& app) {
   add_seed(*verb, simulated.seed, "of the work of simulated joints, and of a campaign");
   verb->add_option("--json", flags->json.destination,
                    "write the result as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags, verb] { run(*verb, *flags); });
 }

@@ -8,9 +8,11 @@
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "studies/study.hpp"
 #include "studies/study_report.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/report/html/report_document.hpp"
 #include "torsio/report/text_table.hpp"
 #include "verbs.hpp"
 
@@ -22,6 +24,7 @@ struct ReproduceFlags {
   bool list = false;
   std::string plot;
   JsonOutput json;
+  ReportOutput report;
 };
 
 void list() {
@@ -52,20 +55,38 @@ void run(const ReproduceFlags& flags) {
     for (const torsio::StudyInfo& info : torsio::studies())
       if (!info.needs_recordings) wanted.push_back(&info);
   check_plot(flags, wanted);
-  DataFlags().check_outputs({flags.json.destination, flags.plot});
+  DataFlags().check_outputs({flags.json.destination, flags.plot, flags.report.destination});
   require_ending("--plot", flags.plot, {".svg"});
   auto documents = nlohmann::ordered_json::array();
+  torsio::ReportDocument report{
+      .title = "Experiments of the papers",
+      .summary =
+          {fmt::format(
+               "{} experiment(s) on the simulated benches, our figures beside the published ones.",
+               wanted.size()),
+           "The benches are models: agreement shows that a method works there, not on a real "
+           "joint."},
+      .sections = {},
+      .origin = {{"seed", fmt::format("{}", flags.options.seed)},
+                 {"repeats", fmt::format("{}", flags.options.repeats)}}};
   for (const torsio::StudyInfo* info : wanted) {
     ProgressBar progress;
     const torsio::Study study = torsio::run_study(*info, flags.options, progress.listener());
     if (!flags.plot.empty()) write_text(flags.plot, study.picture_svg);
     documents.push_back(nlohmann::ordered_json::parse(torsio::study_json(*info, study)));
+    torsio::ReportSection section{.heading = std::string(info->name),
+                                  .text = std::string(info->title),
+                                  .preformatted = torsio::study_text(*info, study)};
+    if (info->has_picture)
+      section.figures.emplace_back(torsio::SvgFigure{"Figure", study.picture_svg});
+    report.sections.push_back(std::move(section));
     if (flags.json.wants_tables()) {
       print(torsio::study_text(*info, study) + "\n");
       flags.json.write(documents.dump(2) + "\n");  // after each: the next may take an hour
     }
   }
   if (!flags.json.wants_tables()) flags.json.write(documents.dump(2) + "\n");
+  if (flags.report.is_wanted()) flags.report.write(std::move(report));
 }
 
 }  // namespace
@@ -90,5 +111,6 @@ void add_reproduce(CLI::App& app) {
                    "write the figures as JSON to a file, or - for standard output");
   verb->add_option("--plot", flags->plot,
                    "draw the figure of an experiment that has one into an SVG file");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

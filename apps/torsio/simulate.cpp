@@ -9,11 +9,13 @@
 #include "data_flags.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/write.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/json_text.hpp"
 #include "torsio/report/plots.hpp"
 #include "torsio/report/text_table.hpp"
@@ -48,6 +50,7 @@ struct SimulateFlags {
   bool is_electrical = false;
   bool list = false;
   JsonOutput json;
+  ReportOutput report;
 };
 
 /// The first one is the default.
@@ -287,8 +290,9 @@ void run(const SimulateFlags& flags) {
                               .expected = "ACTUATOR EXPERIMENT -o FILE",
                               .advice = "torsio simulate --list shows all names; example: "
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
-  DataFlags().check_outputs({flags.output, flags.json.destination, flags.plot},
-                            {flags.faults, sheet_file(flags.actuator)});
+  DataFlags().check_outputs(
+      {flags.output, flags.json.destination, flags.plot, flags.report.destination},
+      {flags.faults, sheet_file(flags.actuator)});
   require_ending("--plot", flags.plot, {".svg"});
   ProgressBar progress;
   const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());
@@ -297,6 +301,10 @@ void run(const SimulateFlags& flags) {
   torsio::write_recording(recording, flags.output, progress.listener());
   if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, sheet, recording));
   flags.json.write(torsio::json_text(recording_json(flags, spec, recording)));
+  if (flags.report.is_wanted())
+    flags.report.write(
+        torsio::simulation_report(recording, torsio::measured_twist(sheet, recording),
+                                  fmt::format("{} {}", flags.actuator, flags.experiment)));
   remark(fmt::format("{}: {} samples at {:g} Hz", flags.output, recording.size(),
                      recording.sample_rate_Hz()));
   if (const std::string inputs = inputs_for(sheet.family, sheet.variant); !inputs.empty())
@@ -360,5 +368,6 @@ void add_simulate(CLI::App& app) {
   verb->add_option("--json", flags->json.destination,
                    "write the description of the recording, or the list, as JSON to a file, or - "
                    "for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

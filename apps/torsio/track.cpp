@@ -13,10 +13,12 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/data/write.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
 #include "torsio/sim/sheet_file.hpp"
@@ -52,6 +54,7 @@ struct TrackFlags {
   std::size_t seeds = 1;
   ImpedanceFlags impedance;
   JsonOutput json;
+  ReportOutput report;
 };
 
 /// A model file and its path.
@@ -243,7 +246,7 @@ void check(TrackFlags& flags) {
   read.push_back(flags.faults);
   read.push_back(flags.replayed);
   if (torsio::is_sheet_file(flags.actuator)) read.push_back(flags.actuator);
-  flags.data.check_outputs({flags.record, flags.json.destination}, read);
+  flags.data.check_outputs({flags.record, flags.json.destination, flags.report.destination}, read);
   if (flags.seeds < 1 || flags.seeds > kMaxSeeds)
     throw torsio::UsageError({.place = "--seeds",
                               .expected = fmt::format("1 to {}", kMaxSeeds),
@@ -283,7 +286,8 @@ void run(TrackFlags& flags, const CLI::App& verb) {
                                            .duration = flags.duration,
                                            .seed = flags.seed,
                                            .record = flags.record,
-                                           .json = flags.json});
+                                           .json = flags.json,
+                                           .report = flags.report});
   flags.has_damping = verb.get_option("--damping")->count() > 0;
   ProgressBar progress;
   const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());
@@ -300,17 +304,19 @@ void run(TrackFlags& flags, const CLI::App& verb) {
   for (std::size_t k = 0; k < flags.seeds; ++k) seeds.push_back(flags.seed + k);
   const std::vector<torsio::TrackingRow> rows =
       torsio::track_models(sheet, spec, linear, models, seeds, progress.listener());
-  if (!flags.record.empty()) {
+  std::optional<torsio::Recording> recorded_run;
+  if (!flags.record.empty() || flags.report.is_wanted()) {
     const torsio::AnyInverse inverse =
         models.empty() ? torsio::AnyInverse(linear) : models.front().inverse;
     torsio::TrackingSpec recorded = spec;
     recorded.measures_bandwidth = false;
-    torsio::write_recording(
-        torsio::track(sheet, recorded, inverse, flags.seed, progress.listener()).record,
-        flags.record);
+    recorded_run = torsio::track(sheet, recorded, inverse, flags.seed, progress.listener()).record;
+    if (!flags.record.empty()) torsio::write_recording(*recorded_run, flags.record);
   }
   if (flags.json.wants_tables()) print(torsio::tracking_text(rows));
   flags.json.write(torsio::tracking_json(rows));
+  if (flags.report.is_wanted())
+    flags.report.write(torsio::tracking_report(rows, recorded_run ? &*recorded_run : nullptr));
   for (const torsio::TrackingRow& row : rows)
     if (row.status == "failed") throw torsio::Error({.place = row.model, .problem = row.reason});
 }
@@ -384,6 +390,7 @@ void add_track(CLI::App& app) {
                    "the only --model as CSV");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   flags->impedance.add(*verb);
   verb->callback([flags, verb] { run(*flags, *verb); });
 }

@@ -6,6 +6,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/data/write.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/closed_loop/impedance_tracking.hpp"
 #include "torsio/sim/sheet_file.hpp"
@@ -76,7 +77,7 @@ void ImpedanceFlags::check(const CLI::App& verb) const {
            .problem = "it belongs to the torque loop, and --impedance replaces this loop",
            .expected = "one of the two loops",
            .advice = "With --impedance: --impedance-damping, --torque-gain, --amplitude, "
-                     "--duration, --seed, --record, --json."});
+                     "--duration, --seed, --record, --json, --report."});
 }
 
 void run_impedance(const ImpedanceFlags& flags, const SharedTrackFlags& shared) {
@@ -87,4 +88,5 @@ void run_impedance(const ImpedanceFlags& flags, const SharedTrackFlags& shared) 
   if (!shared.record.empty()) torsio::write_recording(run.record, shared.record);
   if (shared.json.wants_tables()) print(torsio::impedance_text(run));
   shared.json.write(torsio::impedance_json(run));
+  if (shared.report.is_wanted()) shared.report.write(torsio::impedance_report(run));
 }

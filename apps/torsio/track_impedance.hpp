@@ -5,6 +5,7 @@
 #include <string>
 
 #include "output.hpp"
+#include "report_output.hpp"
 
 /// The flags of `torsio track --impedance`, and those that it shares with the torque loop.
 struct ImpedanceFlags {
@@ -26,6 +27,7 @@ struct SharedTrackFlags {
   std::uint64_t seed = 1;
   std::string record;
   JsonOutput json;
+  ReportOutput report;
 };
 
 /// Closes the impedance loop and prints, writes and records what it rendered.

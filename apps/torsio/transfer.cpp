@@ -6,10 +6,12 @@
 #include "model_doubts.hpp"
 #include "output.hpp"
 #include "progress_bar.hpp"
+#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/transfer_curve.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/report/html/change_reports.hpp"
 #include "torsio/sim/sheet_file.hpp"
 #include "verbs.hpp"
 
@@ -31,6 +33,7 @@ struct TransferFlags {
   std::string plot;
   std::uint64_t seed = kDefaultSeed;
   JsonOutput json;
+  ReportOutput report;
 };
 
 std::optional<torsio::TransferMethod> method_of(const std::string& text) {
@@ -84,7 +87,8 @@ torsio::Dataset load(const TransferFlags& flags, const torsio::ModelFile& base,
 void run(TransferFlags& flags) {
   std::vector<std::string> read = flags.test;
   read.push_back(flags.model);
-  flags.data.check_outputs({flags.output, flags.plot, flags.json.destination}, read);
+  flags.data.check_outputs(
+      {flags.output, flags.plot, flags.json.destination, flags.report.destination}, read);
   if (!flags.output.empty()) require_model_file(flags.output);
   require_ending("--plot", flags.plot, {".svg"});
   if (!flags.plot.empty() && flags.curve.empty())
@@ -107,6 +111,9 @@ void run(TransferFlags& flags) {
   if (flags.json.wants_tables()) print(torsio::transfer_text(evaluation, curve, target));
   flags.json.write(torsio::transfer_json(evaluation, curve, target));
   if (!flags.plot.empty()) write_text(flags.plot, torsio::transfer_svg(curve, target));
+  if (flags.report.is_wanted())
+    flags.report.write(
+        torsio::transfer_report(evaluation, curve, base, dataset, progress.listener()));
   if (flags.output.empty()) return;
   torsio::ModelFile file = evaluation.transfer.best().file;
   file.card.device_serial = flags.device_serial;
@@ -150,5 +157,6 @@ void add_transfer(CLI::App& app) {
   add_seed(*verb, flags->seed, "of the fit to the new data alone");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
   verb->callback([flags] { run(*flags); });
 }

@@ -24,3 +24,5 @@ void add_transfer(CLI::App& app);
 void add_tune_loop(CLI::App& app);
 void add_reproduce(CLI::App& app);
 void add_unpack(CLI::App& app);
+void add_bench(CLI::App& app);
+void add_doctor(CLI::App& app);

@@ -75,10 +75,10 @@ std::vector<Finding> Checker::run() {
 }
 
 void Checker::add(Verdict verdict, std::string check, std::string recording, std::string message,
-                  std::string advice) {
+                  std::string advice, std::vector<SampleRange> places) {
   const std::lock_guard lock(adding_);
-  findings_.push_back(
-      {verdict, std::move(check), std::move(recording), std::move(message), std::move(advice)});
+  findings_.push_back({verdict, std::move(check), std::move(recording), std::move(message),
+                       std::move(advice), std::move(places)});
 }
 
 /// Adds a PASS unless the check that ran meanwhile found something.

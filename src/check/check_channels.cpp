@@ -44,6 +44,26 @@ bool Checker::is_condition(const Recording& recording, const std::string& channe
   return std::ranges::find(recording.conditions(), channel) != recording.conditions().end();
 }
 
+namespace {
+
+/// Where a channel has such values; at most a hundred places, short distances between them left out.
+template <class Condition>
+std::vector<SampleRange> ranges_where(const Channel& channel, const Condition& is_found) {
+  constexpr std::size_t kMost = 100;
+  const std::size_t together = channel.values.size() / (10 * kMost) + 1;
+  std::vector<SampleRange> ranges;
+  for (std::size_t n = 0; n < channel.values.size(); ++n) {
+    if (!is_found(channel.values[n])) continue;
+    if (!ranges.empty() && (n - ranges.back().end < together || ranges.size() == kMost))
+      ranges.back().end = n + 1;
+    else
+      ranges.push_back({n, n + 1});
+  }
+  return ranges;
+}
+
+}  // namespace
+
 void Checker::check_missing() {
   pass_unless_found("missing values", "none", [&] {
     for_each_channel([&](const Recording& recording, const Channel& channel) {
@@ -59,7 +79,8 @@ void Checker::check_missing() {
           is_target
               ? "They are neither trained on nor scored."
               : fmt::format("An input must have every value. If it is a slower sensor: hold: [{}]",
-                            channel.name));
+                            channel.name),
+          ranges_where(channel, [](double value) { return !is_finite(value); }));
     });
   });
 }
@@ -100,7 +121,8 @@ void Checker::check_saturation() {
             fmt::format("{}: {:.1f} % of the samples are exactly {:g}", channel.name, 100.0 * share,
                         extreme),
             "If that is the sensor's limit, cut those parts out or use a sensor of larger "
-            "range.");
+            "range.",
+            ranges_where(channel, [&](double value) { return value == extreme; }));
       }
     });
   });
@@ -179,7 +201,8 @@ void Checker::check_frozen() {
                   "{:.{}f} % of its range",
                   channel.name, channel.values[rest.begin], duration_s,
                   recording.time_s(rest.begin), other.name, 100.0 * moved, moved < 0.1 ? 1 : 0),
-              "Check its bus. Cut that part out: a model would be trained on the constant value.");
+              "Check its bus. Cut that part out: a model would be trained on the constant value.",
+              {{rest.begin, rest.begin + rest.length()}});
           leave_out(r, rest);
           return;
         }
@@ -282,7 +305,8 @@ void Checker::check_gaps_of(std::size_t r) {
         (spoiled_[r] != 0 && is_source(name)))
       continue;
     add(Verdict::warn, "gaps", recording.name(), jump_text(recording, name, jump),
-        "Check for lost samples and a slipping sensor. Cut the recording in two there.");
+        "Check for lost samples and a slipping sensor. Cut the recording in two there.",
+        {{jump.sample, jump.sample + 1}});
   }
 }
 
@@ -300,7 +324,8 @@ void Checker::check_jump_of_input(std::size_t r) {
           fmt::format("; it comes from {}", source_of(recording, jump)),
       "Check whether that sensor slipped or lost counts or samples, or a part broke. Cut the "
       "recording in two "
-      "there, and determine the zero of each part.");
+      "there, and determine the zero of each part.",
+      {{jump.sample, jump.sample + 1}});
 }
 
 std::string Checker::jump_text(const Recording& recording, const std::string& name,

@@ -306,7 +306,11 @@ void Checker::check_change() {
               : fmt::format("at equal {} {} changes by {:.3g} {}, {}", spec_.inputs.front(),
                             dataset_.target, change->offset, unit_label(dataset_.target), when),
           "Check for a zero that slipped or drifted and for a part that broke or crept. A model "
-          "would learn the mean of before and after.");
+          "would learn the mean of before and after.",
+          change->is_gradual
+              ? std::vector<SampleRange>{}
+              : std::vector<SampleRange>{
+                    {change->sample, recording.channel(dataset_.target).values.size()}});
     }
   });
 }

@@ -121,6 +121,18 @@ bool Checker::hardly_moves(std::size_t r) const {
   return square < count * std::pow(kMotionOverNoise * usual_noise(course), 2);
 }
 
+namespace {
+
+/// The first hundred.
+std::vector<SampleRange> places_of(const std::vector<std::size_t>& samples) {
+  std::vector<SampleRange> places;
+  for (std::size_t i = 0; i < std::min<std::size_t>(samples.size(), 100); ++i)
+    places.push_back({samples[i], samples[i] + 1});
+  return places;
+}
+
+}  // namespace
+
 void Checker::check_spikes() {
   pass_unless_found("spikes", "no single sample is far from its neighbours", [&] {
     for_each_moving_channel([&](std::size_t r, const Recording& recording, const Channel& channel) {
@@ -136,7 +148,7 @@ void Checker::check_spikes() {
                       channel.name, spikes.size(), recording.time_s(spikes.front()),
                       std::abs(channel.values[spikes.front()] - channel.values[spikes.front() - 1]),
                       unit_label(channel.name)),
-          "Check the bus for invalid telegrams, and the log for lost digits.");
+          "Check the bus for invalid telegrams, and the log for lost digits.", places_of(spikes));
     });
   });
 }
@@ -159,7 +171,8 @@ void Checker::check_repeats() {
               recording.time_s(repeat->first), recording.time_s(repeat->again),
               static_cast<double>(repeat->length) / recording.sample_rate_Hz()),
           "No sensor repeats its noise: check the logger for a buffer that was written twice, and "
-          "cut the second one out.");
+          "cut the second one out.",
+          {{repeat->again, repeat->again + repeat->length}});
     });
   });
 }
@@ -183,7 +196,8 @@ bool Checker::check_cut(std::size_t r) {
   add(Verdict::warn, "gaps", recording.name(),
       fmt::format("several channels jump together at t = {:.4g} s, as if {:.2g} s were missing",
                   recording.time_s(cut->sample), cut->rows / recording.sample_rate_Hz()),
-      "Rows are missing although the stamps are even. Cut the recording in two there.");
+      "Rows are missing although the stamps are even. Cut the recording in two there.",
+      {{cut->sample, cut->sample + 1}});
   return true;
 }
 

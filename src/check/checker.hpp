@@ -46,7 +46,7 @@ class Checker {
 
  private:
   void add(Verdict verdict, std::string check, std::string recording, std::string message,
-           std::string advice = {});
+           std::string advice = {}, std::vector<SampleRange> places = {});
   void pass_unless_found(const std::string& check, std::string message,
                          const std::function<void()>& body);
   /// Calls body(r) for each recording, some at the same time; what they find comes in the order of

@@ -149,7 +149,7 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
         {.problem = "nothing to compare on: no recording has the role test",
          .advice =
              "Name held-out recordings with --test, or give them `role: test` in a manifest."});
-  Comparison comparison{.results = empty_results(dataset), .best = {}};
+  Comparison comparison{.results = empty_results(dataset), .models = {}, .best = {}};
   Results& results = comparison.results;
   InputSets input_sets(dataset, allow_leak);
   std::vector<ScoredModel> models;
@@ -163,6 +163,10 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
   for (const Role role : {Role::validation, Role::test})
     if (dataset.has_role(role))
       results.rankings.push_back(rank_on_common_samples(dataset, role, models));
+  for (const ScoredModel& model : models)
+    if (model.trained)
+      comparison.models.push_back({model.rows.front().family, model.rows.front().variant,
+                                   model.rows.front().input_set, model.trained->file});
   comparison.best =
       best_of(models, dataset.has_role(Role::validation) ? Role::validation : Role::test);
   for (ScoredModel& model : models) std::ranges::move(model.rows, std::back_inserter(results.rows));

@@ -3,8 +3,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "torsio/evaluate/results.hpp"
+#include "torsio/report/text_table.hpp"
 
 // Parts of the tables and documents of scores.
 namespace torsio {
@@ -15,6 +17,19 @@ namespace torsio {
 /// `results_json` before it becomes text.
 [[nodiscard]] nlohmann::ordered_json results_document(const Results& results);
 
+/// `ranked_table` before it becomes text.
+struct RankedRows {
+  TextTable table;
+  std::vector<const ResultRow*> rows;  ///< those that the table has, in its order
+  struct Other {
+    const ResultRow* row;
+    std::string reason;
+  };
+  std::vector<Other> others;  ///< not in the ranking
+};
+[[nodiscard]] RankedRows ranked_rows(const Results& results, Role split);
+/// "polynomial[branch=false] (with current)"
+[[nodiscard]] std::string model_label(const ResultRow& row);
 /// "polynomial[branch=false]"
 [[nodiscard]] std::string model_label(std::string_view family, std::string_view variant);
 /// Three decimals below 1e6; three significant digits in a table whose smallest error needs

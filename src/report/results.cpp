@@ -116,6 +116,11 @@ std::string model_label(std::string_view family, std::string_view variant) {
   return variant.empty() ? std::string(family) : fmt::format("{}[{}]", family, variant);
 }
 
+std::string model_label(const ResultRow& row) {
+  const std::string label = model_label(row.family, row.variant);
+  return row.input_set.empty() ? label : fmt::format("{} ({})", label, row.input_set);
+}
+
 std::string error_text(double value, double smallest) {
   constexpr double kTooSmallForThreePlaces = 0.005;
   if (smallest < kTooSmallForThreePlaces && value != 0.0) return fmt::format("{:.3g}", value);
@@ -181,10 +186,11 @@ std::string ranking_note(const Ranking& ranking) {
       ranking.common_samples, ranking.scored_samples);
 }
 
-std::string ranked_table(const Results& results, Role split) {
+RankedRows ranked_rows(const Results& results, Role split) {
   const std::vector<std::string> recordings = recordings_of(results, split);
   const bool has_sets = results.input_sets.size() > 1;
-  TextTable table;
+  RankedRows ranked;
+  TextTable& table = ranked.table;
   table.header({"model"});
   if (has_sets) table.header({"inputs"});
   table.header({"RMSE", "MAD", "max|e|", "fit %", "guard %", "in 1 sd %", "in 2 sd %"});
@@ -194,13 +200,12 @@ std::string ranked_table(const Results& results, Role split) {
   for (const std::string& recording : recordings) table.header({"RMSE " + recording});
   table.header({"step ns", "p99.9", "fit s", "parameters"});
 
-  std::string others;
-  std::vector<const ResultRow*> rows = in_order(results, split);
+  std::vector<const ResultRow*>& rows = ranked.rows;
+  rows = in_order(results, split);
   std::erase_if(rows, [&](const ResultRow* row) {
     const std::string reason = reason_outside_ranking(results, *row);
     if (reason.empty()) return false;
-    others += fmt::format("  {}{}: {}\n", model_label(row->family, row->variant),
-                          row->input_set.empty() ? "" : " (" + row->input_set + ")", reason);
+    ranked.others.push_back({row, reason});
     return true;
   });
   double smallest = 1.0;
@@ -228,8 +233,15 @@ std::string ranked_table(const Results& results, Role split) {
     if (row->leak) cells.front() += " (leak!)";
     table.row(std::move(cells));
   }
-  std::string text = table.text();
-  if (!others.empty()) text += "not in the ranking:\n" + others;
+  return ranked;
+}
+
+std::string ranked_table(const Results& results, Role split) {
+  const RankedRows ranked = ranked_rows(results, split);
+  std::string text = ranked.table.text();
+  if (!ranked.others.empty()) text += "not in the ranking:\n";
+  for (const RankedRows::Other& other : ranked.others)
+    text += fmt::format("  {}: {}\n", model_label(*other.row), other.reason);
   return text;
 }
 

@@ -363,7 +363,8 @@ TEST_F(MainJob, DrawsTheLoopOfEveryFamily) {
 TEST_F(MainJob, WritesAPageForTheBrowser) {
   record();
   ASSERT_EQ(torsio("compare a.csv --test b.csv --models linear --report out.html").exit_code, 0);
-  EXPECT_NE(contents("out.html").find("<h2>test records"), std::string::npos);
+  EXPECT_NE(contents("out.html").find("<h2>Models on the test recordings"), std::string::npos);
+  EXPECT_NE(contents("out.html").find("torsio compare a.csv --test b.csv"), std::string::npos);
 }
 
 TEST_F(MainJob, ListsAndDescribes) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -15,6 +16,12 @@ enum class Verdict : std::uint8_t { pass, warn, fail };
 
 [[nodiscard]] std::string_view name(Verdict verdict) noexcept;
 
+/// Samples [begin, end) of a recording.
+struct SampleRange {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
 /// The result of one check for one recording, or for all of them together.
 struct Finding {
   Verdict verdict = Verdict::pass;
@@ -22,6 +29,8 @@ struct Finding {
   std::string recording;  ///< empty: the recordings together
   std::string message;    ///< the measured values
   std::string advice;     ///< what to do; empty if nothing
+  /// Where in the recording; empty if it has no place, or is everywhere.
+  std::vector<SampleRange> places = {};
 };
 
 /// Checks whether a torque model can be trained on these recordings. Looks at each channel of the

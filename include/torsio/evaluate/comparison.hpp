@@ -23,8 +23,18 @@ namespace torsio {
                                                      std::string_view models,
                                                      const std::vector<std::string>& wanted_inputs);
 
+/// A model of a comparison, named as its rows are.
+struct ComparedModel {
+  std::string family;
+  std::string variant;
+  std::string input_set;
+  ModelFile file;
+};
+
 struct Comparison {
   Results results;
+  /// Every choice that could be fitted, in the order of the call; a card has no held-out scores.
+  std::vector<ComparedModel> models;
   /// First in the ranking on the validation recordings, or on the test recordings if there are no
   /// others: its card then states that its score was also used to select it. None if every fit
   /// failed or no ranking is possible.

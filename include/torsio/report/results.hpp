@@ -20,8 +20,4 @@ namespace torsio {
 /// recording of the split. Models that are not ranked come last with the reason.
 [[nodiscard]] std::string ranked_table(const Results& results, Role split);
 
-/// The ranked tables of every held-out split as one page without external files. All names in it
-/// are escaped.
-[[nodiscard]] std::string results_html(const Results& results);
-
 }  // namespace torsio

@@ -14,6 +14,8 @@ class TextTable {
   void header(const std::vector<std::string>& cells);  ///< appends columns
   void row(std::vector<std::string> cells);            ///< missing cells are empty
   [[nodiscard]] std::string text() const;
+  [[nodiscard]] const std::vector<std::string>& headings() const noexcept { return header_; }
+  [[nodiscard]] const std::vector<std::vector<std::string>>& rows() const noexcept { return rows_; }
 
  private:
   std::vector<std::string> header_;

@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "data_flags.hpp"
+#include "output.hpp"
+#include "progress_bar.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/report/text_table.hpp"
+#include "torsio/sim/bench_dataset.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct BenchFlags {
+  std::string models = "all";
+  std::string actuator = "dfki-50";
+  double rate_Hz = 1000.0;
+};
+
+void run(const BenchFlags& flags) {
+  const double period_ns = 1e9 / above_zero(flags.rate_Hz, "--loop-rate");
+  ProgressBar progress;
+  const torsio::Dataset dataset =
+      torsio::sweep_dataset(flags.actuator, kDefaultSeed, progress.listener());
+  const auto choices = torsio::model_choices(dataset, flags.models, {});
+  torsio::Comparison comparison =
+      torsio::compare(dataset, choices, kDefaultSeed, false, progress.listener());
+  auto& rows = comparison.results.rows;
+  std::erase_if(rows, [](const torsio::ResultRow& row) {
+    return row.recording || row.split != torsio::Role::test || row.status != "ok";
+  });
+  std::ranges::sort(rows, {}, [](const torsio::ResultRow& row) { return row.score.step_ns_p50; });
+  torsio::TextTable table;
+  table.header(
+      {"model", "step ns", "p99.9", "share of a cycle %", "joints in a cycle", "parameters"});
+  for (const torsio::ResultRow& row : rows) {
+    const double slow_ns = row.score.step_ns_p999;
+    table.row({row.variant.empty() ? row.family : fmt::format("{}[{}]", row.family, row.variant),
+               fmt::format("{:.0f}", row.score.step_ns_p50), fmt::format("{:.0f}", slow_ns),
+               fmt::format("{:.2g}", 100.0 * slow_ns / period_ns),
+               fmt::format("{:.0f}", std::max(period_ns / slow_ns, 0.0)),
+               fmt::format("{}", row.parameter_count)});
+  }
+  print(
+      fmt::format("{}\nOne step of the estimator on this machine, in a loop of {:g} Hz; share and "
+                  "joints by the "
+                  "99.9 % quantile.\nThe models are fitted to sweeps of a simulated {}.\n",
+                  table.text(), flags.rate_Hz, flags.actuator));
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app) {
+  auto flags = std::make_shared<BenchFlags>();
+  CLI::App* verb = app.add_subcommand(
+      "bench", "the time of a step of each family on this machine: what a loop can afford");
+  verb->footer("Example: torsio bench --loop-rate 2000 --models linear,grey_box,lstm");
+  verb->add_option("--models", flags->models, "as for compare")->capture_default_str();
+  verb->add_option("--actuator", flags->actuator, "the simulated bench")->capture_default_str();
+  verb->add_option("--loop-rate", flags->rate_Hz, "rate of the loop in Hz")->capture_default_str();
+  verb->callback([flags] { run(*flags); });
+}

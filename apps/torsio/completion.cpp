@@ -1,0 +1,98 @@
+#include "completion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "torsio/core/error.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+std::vector<const CLI::App*> verbs_of(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App* verb) { return !verb->get_group().empty(); });
+}
+
+/// "--json", "-o": every name of the options that the help shows.
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_group().empty() || option->get_positional()) continue;
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+/// The first line of a help text between single quotes.
+std::string quoted(const std::string& help) {
+  std::string text = help.substr(0, help.find('\n'));
+  std::erase(text, '\'');
+  return "'" + text + "'";
+}
+
+std::string bash_script(const CLI::App& app) {
+  std::string cases;
+  std::string verbs;
+  for (const CLI::App* verb : verbs_of(app)) {
+    verbs += verb->get_name() + " ";
+    cases += fmt::format("    {}) words='{}' ;;\n", verb->get_name(),
+                         fmt::join(option_names(*verb), " "));
+  }
+  return fmt::format(
+      "_torsio() {{\n"
+      "  local current=${{COMP_WORDS[COMP_CWORD]}} words\n"
+      "  case ${{COMP_WORDS[1]}} in\n{}  esac\n"
+      "  if ((COMP_CWORD == 1)); then words='{}{}'; elif [[ $current != -* ]]; then return; fi\n"
+      "  COMPREPLY=($(compgen -W \"$words\" -- \"$current\"))\n"
+      "}}\n"
+      "complete -o default -F _torsio torsio\n",
+      cases, verbs, fmt::join(option_names(app), " "));
+}
+
+std::string zsh_script(const CLI::App& app) {
+  std::string verbs;
+  std::string cases;
+  for (const CLI::App* verb : verbs_of(app)) {
+    std::string help = verb->get_description();
+    std::ranges::replace(help, ':', ';');
+    verbs += fmt::format("    {}\n", quoted(verb->get_name() + ":" + help));
+    cases += fmt::format("      {}) compadd -- {} ;;\n", verb->get_name(),
+                         fmt::join(option_names(*verb), " "));
+  }
+  return fmt::format(
+      "#compdef torsio\n_torsio() {{\n  local -a verbs=(\n{}  )\n"
+      "  if ((CURRENT == 2)); then\n    _describe verb verbs\n"
+      "  elif [[ $words[CURRENT] == -* ]]; then\n    case $words[2] in\n{}    esac\n"
+      "  else\n    _files\n  fi\n}}\ncompdef _torsio torsio\n",
+      verbs, cases);
+}
+
+std::string fish_script(const CLI::App& app) {
+  std::string script;
+  for (const CLI::App* verb : verbs_of(app)) {
+    script += fmt::format("complete -c torsio -n __fish_use_subcommand -a {} -d {}\n",
+                          verb->get_name(), quoted(verb->get_description()));
+    for (const CLI::Option* option : verb->get_options()) {
+      if (option->get_group().empty() || option->get_positional()) continue;
+      script +=
+          fmt::format("complete -c torsio -n '__fish_seen_subcommand_from {}'", verb->get_name());
+      for (const std::string& name : option->get_snames()) script += " -s " + name;
+      for (const std::string& name : option->get_lnames()) script += " -l " + name;
+      if (option->get_items_expected_max() > 0) script += " -r";
+      script += fmt::format(" -d {}\n", quoted(option->get_description()));
+    }
+  }
+  return script;
+}
+
+}  // namespace
+
+std::string completion_script(const CLI::App& app, const std::string& shell) {
+  if (shell == "bash") return bash_script(app);
+  if (shell == "zsh") return zsh_script(app);
+  if (shell == "fish") return fish_script(app);
+  throw torsio::UsageError(
+      {.place = "torsio completion", .expected = "bash, zsh or fish", .found = shell});
+}

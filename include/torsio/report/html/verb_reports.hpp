@@ -1,0 +1,72 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "torsio/check/advice.hpp"
+#include "torsio/check/check.hpp"
+#include "torsio/core/progress.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/evaluate/cross_validation.hpp"
+#include "torsio/evaluate/estimate_recording.hpp"
+#include "torsio/evaluate/fit_report.hpp"
+#include "torsio/report/html/report_document.hpp"
+#include "torsio/sim/closed_loop/impedance_tracking.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
+
+// The pages of the verbs. Each states its result in `summary`; the origin has what the data state (hashes), to which
+// the program adds its command and versions.
+namespace torsio {
+
+/// Ranking, error against the time of a step with the Pareto front, loops and time series of all
+/// models, residuals of the best, the card of the best; why a model failed.
+[[nodiscard]] ReportDocument comparison_report(const Comparison& comparison, const Dataset& dataset,
+                                               const Progress& progress = {});
+
+/// Means over the folds with their standard deviations, and the error in each fold.
+[[nodiscard]] ReportDocument cross_validation_report(const CrossValidation& validation,
+                                                     const Dataset& dataset);
+
+/// Scores of one model on each role and recording, and its pictures.
+[[nodiscard]] ReportDocument evaluation_report(const Results& results, const ModelFile& file,
+                                               const std::string& model, const Dataset& dataset,
+                                               const Progress& progress = {});
+
+/// The scores of `evaluation_report`, correlations of the residuals, coefficients with standard errors.
+[[nodiscard]] ReportDocument fit_page(const Results& results, const FitReport& report,
+                                      const TrainedModel& trained, const std::string& model,
+                                      const Dataset& dataset, const Progress& progress = {});
+
+/// Each finding, and the channels of each recording with the findings that have a place in it.
+/// @param dataset none: it could not be read, which is a finding
+[[nodiscard]] ReportDocument check_report(const std::vector<Finding>& findings,
+                                          const Dataset* dataset, const FeatureSpec& spec,
+                                          const Advice* advice);
+
+/// Inputs, estimate with its error bar, and faults of each recording.
+[[nodiscard]] ReportDocument estimate_report(const std::vector<EstimatedRecording>& estimated,
+                                             const std::vector<EstimateSummary>& summaries,
+                                             const ModelFile& file, const std::string& model);
+
+/// All channels of a simulated recording, and the torque over the twist.
+/// @param twist_rad of the spring, at every sample
+[[nodiscard]] ReportDocument simulation_report(const Recording& recording,
+                                               std::span<const double> twist_rad,
+                                               const std::string& title);
+
+/// Scores of the models, and reference, answer, error and each term of the command of one run.
+/// @param record of the first run of a model; empty: none
+[[nodiscard]] ReportDocument tracking_report(std::span<const TrackingRow> rows,
+                                             const Recording* record);
+
+/// Wanted, linear and rendered impedance as Bode and Nyquist diagrams, and the motion of the hand.
+[[nodiscard]] ReportDocument impedance_report(const ImpedanceRun& run);
+
+/// A page with the text of a verb and its figures.
+[[nodiscard]] ReportDocument text_report(std::string title, std::vector<std::string> summary,
+                                         const std::string& text,
+                                         std::vector<ReportFigure> figures = {});
+
+}  // namespace torsio

@@ -1,0 +1,65 @@
+#include "report/html/model_run.hpp"
+
+#include <cmath>
+
+#include "torsio/core/error.hpp"
+#include "torsio/evaluate/evaluate.hpp"
+#include "torsio/fit/common/inputs.hpp"
+
+namespace torsio {
+namespace {
+
+ModelRun run_model(const Dataset& dataset, const DatasetRecord& record, const ReportedModel& model,
+                   Role role) {
+  const Recording& recording = record.recording;
+  const Channel& target = recording.channel(dataset.target);
+  const Prediction prediction = predict(make_estimator(*model.file, recording.sample_rate_Hz()),
+                                        recording, {&target, dataset.initialise_samples});
+  const std::size_t samples = prediction.estimates.size();
+  ModelRun run{.label = model.label,
+               .value = std::vector<double>(samples, kNotMeasured),
+               .std_dev = std::vector<double>(samples, kNotMeasured),
+               .residual = std::vector<double>(samples, kNotMeasured),
+               .guarded = std::vector<std::uint8_t>(samples, 0)};
+  for (std::size_t n = 0; n < samples; ++n) {
+    const Estimate& estimate = prediction.estimates[n];
+    if (estimate.fault == Fault::warming_up) continue;
+    run.value[n] = estimate.value;
+    run.std_dev[n] = estimate.std_dev;
+    run.guarded[n] = estimate.fault != Fault::none ? 1 : 0;
+  }
+  for (const Segment& segment : record.segments) {
+    if (segment.role != role) continue;
+    for (std::size_t n = std::max(segment.begin, prediction.initialised); n < segment.end; ++n)
+      if (target.is_fresh(n)) run.residual[n] = run.value[n] - target.values[n];
+  }
+  return run;
+}
+
+}  // namespace
+
+RecordRuns run_models(const Dataset& dataset, const DatasetRecord& record,
+                      const std::vector<ReportedModel>& models, Role role) {
+  RecordRuns result{.recording = &record.recording,
+                    .input = {},
+                    .input_name = {},
+                    .target = &record.recording.channel(dataset.target),
+                    .runs = {},
+                    .failures = {}};
+  for (const ReportedModel& model : models) {
+    try {
+      result.runs.push_back(run_model(dataset, record, model, role));
+      if (!result.input.empty()) continue;
+      const FeatureSpec& features = model.file->settings.features;
+      result.input = first_feature(record.recording, features);
+      result.input_name = features.inputs.front();
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {
+      result.failures.push_back(model.label + ": " + error.what());
+    }
+  }
+  return result;
+}
+
+}  // namespace torsio

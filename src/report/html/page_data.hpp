@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "torsio/report/html/report_document.hpp"
+
+namespace torsio {
+
+/// The figures of a page for its script (web/src/document.ts).
+struct PageData {
+  std::string figures_json;    ///< contains no `<`, so that it cannot end the script element
+  std::string numbers_base64;  ///< all numbers as float, little endian
+};
+/// @param figures no `SvgFigure`; the k-th has the identifier "figure-k", from 1
+[[nodiscard]] PageData page_data(const std::vector<const ReportFigure*>& figures);
+
+}  // namespace torsio

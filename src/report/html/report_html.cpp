@@ -1,0 +1,132 @@
+#include <fmt/format.h>
+
+#include <string_view>
+
+#include "report/html/page_data.hpp"
+#include "report/html/page_files.hpp"
+#include "report/markup_text.hpp"
+#include "torsio/core/version.hpp"
+#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/plots.hpp"
+
+namespace torsio {
+namespace {
+
+std::string paragraph(const std::string& text) {
+  return text.empty() ? std::string() : fmt::format("<p>{}</p>\n", markup_text(text));
+}
+
+std::string cells_html(const std::vector<std::string>& cells) {
+  std::string html;
+  for (const std::string& cell : cells) html += fmt::format("<td>{}</td>", markup_text(cell));
+  return html;
+}
+
+/// Each row is a body of its own, so that its details move with it when the table is sorted.
+std::string table_html(const ReportTable& table) {
+  std::string html =
+      table.title.empty() ? "" : fmt::format("<h3>{}</h3>\n", markup_text(table.title));
+  html += fmt::format(
+      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" "
+      "aria-label=\"{}\"><table{}>\n<thead><tr>",
+      table.title.empty() ? "table" : markup_text(table.title),
+      table.is_words ? " class=\"words\"" : "");
+  for (const std::string& heading : table.headings)
+    html += fmt::format("<th scope=\"col\">{}</th>", markup_text(heading));
+  html += "</tr></thead>\n";
+  for (const ReportTable::Row& row : table.rows) {
+    html += "<tbody><tr>" + cells_html(row.cells) + "</tr>";
+    if (!row.details.empty())
+      html += fmt::format("<tr><td class=\"details\" colspan=\"{}\">{}</td></tr>",
+                          table.headings.size(), markup_text(row.details));
+    html += "</tbody>\n";
+  }
+  return html + "</table></div>\n";
+}
+
+/// The first curves of a figure, for a browser without JavaScript.
+std::string static_picture(const XyFigure& figure) {
+  std::vector<Curve> curves;
+  for (const XySeries& series : figure.series)
+    if (series.is_shown && series.style == CurveStyle::line)
+      curves.push_back({series.label, series.x, series.y});
+  if (curves.empty()) return {};
+  return svg_plot(curves, {figure.x.label, figure.y.label}, figure.title);
+}
+
+class Page {
+ public:
+  explicit Page(const ReportDocument& document) : document_(document) {}
+
+  std::string html() {
+    std::string body;
+    for (const ReportSection& section : document_.sections) body += section_html(section);
+    const PageData data = page_data(figures_);
+    return fmt::format(
+               "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\n"
+               "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+               "<meta name=\"generator\" content=\"torsio {}\">\n<title>{}</title>\n"
+               "<link rel=\"icon\" href=\"data:,\">\n<style>{}</style></head>\n<body>\n",
+               kVersion, markup_text(document_.title), page_style()) +
+           fmt::format("<header><h1>{}</h1></header>\n<main>\n", markup_text(document_.title)) +
+           summary_html() + body + origin_html() + "</main>\n" +
+           fmt::format("<footer><p>torsio {}</p></footer>\n", kVersion) +
+           "<script type=\"application/json\" id=\"report-figures\">" + data.figures_json +
+           "</script>\n<script type=\"text/plain\" id=\"report-numbers\">" + data.numbers_base64 +
+           "</script>\n<script>" + std::string(page_script()) + "</script>\n</body></html>\n";
+  }
+
+ private:
+  std::string summary_html() const {
+    std::string html;
+    for (const std::string& sentence : document_.summary)
+      html += fmt::format("{}{}", html.empty() ? "" : " ", markup_text(sentence));
+    return html.empty() ? html : fmt::format("<p class=\"summary\">{}</p>\n", html);
+  }
+
+  std::string section_html(const ReportSection& section) {
+    std::string html = fmt::format("<section>\n<h2>{}</h2>\n", markup_text(section.heading));
+    html += paragraph(section.text);
+    for (const ReportTable& table : section.tables) html += table_html(table);
+    for (const ReportFigure& figure : section.figures) html += figure_html(figure);
+    if (!section.preformatted.empty())
+      html += fmt::format(
+          "<details{}><summary>as text</summary><pre tabindex=\"0\">{}</pre></details>\n",
+          section.tables.empty() && section.figures.empty() ? " open" : "",
+          markup_text(section.preformatted));
+    return html + "</section>\n";
+  }
+
+  std::string figure_html(const ReportFigure& figure) {
+    if (const auto* svg = std::get_if<SvgFigure>(&figure))
+      return fmt::format("<figure><figcaption>{}</figcaption>{}</figure>\n",
+                         markup_text(svg->title), svg->svg);
+    const std::string id = fmt::format("figure-{}", figures_.size() + 1);
+    figures_.push_back(&figure);
+    std::string still;
+    const auto* xy = std::get_if<XyFigure>(&figure);
+    if (xy != nullptr && !has_picture_) still = static_picture(*xy);
+    has_picture_ = has_picture_ || !still.empty();
+    const std::string& title = xy != nullptr ? xy->title : std::get<TimeFigure>(figure).title;
+    return fmt::format("<figure><figcaption>{}</figcaption><div id=\"{}\"></div>{}</figure>\n",
+                       markup_text(title), id,
+                       still.empty() ? still : fmt::format("<noscript>{}</noscript>", still));
+  }
+
+  std::string origin_html() const {
+    if (document_.origin.empty()) return {};
+    ReportTable table{.title = {}, .headings = {"what", "value"}, .rows = {}, .is_words = true};
+    for (const auto& [what, value] : document_.origin) table.rows.push_back({{what, value}});
+    return fmt::format("<section>\n<h2>How this was made</h2>\n{}</section>\n", table_html(table));
+  }
+
+  const ReportDocument& document_;
+  std::vector<const ReportFigure*> figures_;
+  bool has_picture_ = false;
+};
+
+}  // namespace
+
+std::string report_html(const ReportDocument& document) { return Page(document).html(); }
+
+}  // namespace torsio

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/text_table.hpp"
+
+namespace torsio {
+
+[[nodiscard]] inline ReportTable report_table(const TextTable& table, std::string title = {}) {
+  ReportTable report{.title = std::move(title), .headings = table.headings(), .rows = {}};
+  for (const std::vector<std::string>& row : table.rows()) report.rows.push_back({row});
+  return report;
+}
+
+}  // namespace torsio

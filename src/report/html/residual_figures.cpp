@@ -1,0 +1,231 @@
+#include "report/html/residual_figures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+namespace {
+
+constexpr std::size_t kModels = 3;     // whose residuals are drawn
+constexpr std::size_t kPoints = 1500;  // in a scatter plot
+constexpr std::size_t kSpectrumSamples = 16384;
+constexpr std::size_t kFrequencies = 150;
+
+struct Context {
+  const RecordRuns& record;
+  std::string error_label;
+  double rate_Hz;
+
+  [[nodiscard]] std::size_t models() const { return std::min(record.runs.size(), kModels); }
+};
+
+/// Residuals of every k-th sample that is scored, over a quantity.
+XyFigure scatter(const Context& of, const std::string& title, const std::string& x_label,
+                 const std::vector<double>& x) {
+  XyFigure figure{.title = title, .x = {x_label}, .y = {of.error_label}, .series = {}};
+  for (std::size_t m = 0; m < of.models(); ++m) {
+    const ModelRun& run = of.record.runs[m];
+    std::vector<std::size_t> scored;
+    for (std::size_t n = 0; n < x.size(); ++n)
+      if (std::isfinite(x[n]) && std::isfinite(run.residual[n])) scored.push_back(n);
+    const std::size_t step = scored.size() / kPoints + 1;
+    XySeries series{
+        .label = run.label, .style = CurveStyle::points, .is_shown = m == 0, .x = {}, .y = {}};
+    for (std::size_t i = 0; i < scored.size(); i += step) {
+      series.x.push_back(x[scored[i]]);
+      series.y.push_back(run.residual[scored[i]]);
+    }
+    figure.series.push_back(std::move(series));
+  }
+  return figure;
+}
+
+/// Central differences over 0.1 s, which leave out the noise and the steps of an encoder.
+std::vector<double> rate_of(const std::vector<double>& x, double rate_Hz) {
+  const auto half = std::max<std::size_t>(static_cast<std::size_t>(0.05 * rate_Hz), 1);
+  std::vector<double> rate(x.size(), kNotMeasured);
+  for (std::size_t n = half; n + half < x.size(); ++n)
+    rate[n] = (x[n + half] - x[n - half]) * rate_Hz / (2.0 * static_cast<double>(half));
+  return rate;
+}
+
+std::vector<double> finite(const std::vector<double>& values) {
+  std::vector<double> kept;
+  std::ranges::copy_if(values, std::back_inserter(kept), [](double v) { return std::isfinite(v); });
+  return kept;
+}
+
+/// The density that the error bars claim: the mean of their normal distributions.
+double claimed_density(const ModelRun& run, double error) {
+  constexpr std::size_t kBars = 300;
+  const std::size_t step = run.std_dev.size() / kBars + 1;
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t n = 0; n < run.std_dev.size(); n += step) {
+    const double sigma = run.std_dev[n];
+    if (!(sigma > 0.0) || !std::isfinite(run.residual[n])) continue;
+    sum += std::exp(-0.5 * error * error / (sigma * sigma)) / sigma;
+    ++count;
+  }
+  return count > 0.0 ? sum / count / std::sqrt(2.0 * std::numbers::pi) : kNotMeasured;
+}
+
+XyFigure histogram(const Context& of) {
+  constexpr std::size_t kBins = 41;
+  const ModelRun& run = of.record.runs.front();
+  const std::vector<double> errors = finite(run.residual);
+  XyFigure figure{.title = "Distribution of the residuals of " + run.label,
+                  .x = {of.error_label},
+                  .y = {"density"},
+                  .series = {}};
+  double largest = 0.0;
+  for (const double error : errors) largest = std::max(largest, std::abs(error));
+  if (largest == 0.0) return figure;
+  const double width = 2.0 * largest / static_cast<double>(kBins);
+  XySeries columns{.label = "residuals", .style = CurveStyle::columns, .x = {}, .y = {}};
+  XySeries claimed{
+      .label = "claimed by the error bar", .role = CurveRole::measured, .x = {}, .y = {}};
+  columns.y.assign(kBins, 0.0);
+  for (const double error : errors) {
+    const auto bin = static_cast<std::size_t>((error + largest) / width);
+    columns.y[std::min(bin, kBins - 1)] += 1.0 / (width * static_cast<double>(errors.size()));
+  }
+  for (std::size_t k = 0; k < kBins; ++k) {
+    columns.x.push_back(-largest + (static_cast<double>(k) + 0.5) * width);
+    claimed.x.push_back(columns.x.back());
+    claimed.y.push_back(claimed_density(run, columns.x.back()));
+  }
+  figure.series = {std::move(columns), std::move(claimed)};
+  return figure;
+}
+
+XyFigure autocorrelation(const Context& of) {
+  constexpr std::size_t kLags = 200;
+  constexpr std::size_t kMaxSamples = 50'000;
+  XyFigure figure{.title = "Autocorrelation of the residuals",
+                  .x = {"lag [s]"},
+                  .y = {"correlation"},
+                  .series = {}};
+  for (std::size_t m = 0; m < of.models(); ++m) {
+    const std::vector<double>& e = of.record.runs[m].residual;
+    const std::size_t samples = std::min(e.size(), kMaxSamples);
+    const std::size_t stride = std::max<std::size_t>(samples / 10 / kLags, 1);
+    XySeries series{.label = of.record.runs[m].label, .x = {}, .y = {}};
+    double at_zero = 0.0;
+    for (std::size_t k = 0; k < kLags && k * stride < samples; ++k) {
+      double sum = 0.0;
+      std::size_t count = 0;
+      for (std::size_t n = k * stride; n < samples; ++n) {
+        const double product = e[n] * e[n - k * stride];
+        if (!std::isfinite(product)) continue;
+        sum += product;
+        ++count;
+      }
+      const double mean = count > 0 ? sum / static_cast<double>(count) : kNotMeasured;
+      if (k == 0) at_zero = mean;
+      series.x.push_back(static_cast<double>(k * stride) / of.rate_Hz);
+      series.y.push_back(mean / at_zero);
+    }
+    figure.series.push_back(std::move(series));
+  }
+  return figure;
+}
+
+/// The amplitude of a residual at frequencies that rise geometrically, from one section with a Hann window.
+XyFigure spectrum(const Context& of) {
+  XyFigure figure{.title = "Spectrum of the residuals",
+                  .x = {"frequency [Hz]", true},
+                  .y = {"amplitude of " + of.error_label, true},
+                  .series = {}};
+  for (std::size_t m = 0; m < of.models(); ++m) {
+    const ModelRun& run = of.record.runs[m];
+    const std::size_t samples = std::min(run.residual.size(), kSpectrumSamples);
+    const std::size_t begin = (run.residual.size() - samples) / 2;
+    const double lowest_Hz = 4.0 * of.rate_Hz / static_cast<double>(samples);
+    XySeries series{.label = run.label, .x = {}, .y = {}};
+    for (std::size_t k = 0; k < kFrequencies; ++k) {
+      const double frequency_Hz =
+          lowest_Hz * std::pow(0.5 * of.rate_Hz / lowest_Hz,
+                               static_cast<double>(k) / static_cast<double>(kFrequencies - 1));
+      const double turn = 2.0 * std::numbers::pi * frequency_Hz / of.rate_Hz;
+      double real = 0.0;
+      double imaginary = 0.0;
+      double weights = 0.0;
+      for (std::size_t n = 0; n < samples; ++n) {
+        const double error = run.residual[begin + n];
+        if (!std::isfinite(error)) continue;
+        const auto phase = static_cast<double>(n);
+        const double hann =
+            0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * phase / static_cast<double>(samples));
+        real += hann * error * std::cos(turn * phase);
+        imaginary += hann * error * std::sin(turn * phase);
+        weights += hann;
+      }
+      series.x.push_back(frequency_Hz);
+      series.y.push_back(weights > 0.0 ? 2.0 * std::hypot(real, imaginary) / weights
+                                       : kNotMeasured);
+    }
+    figure.series.push_back(std::move(series));
+  }
+  return figure;
+}
+
+/// Multiples of the standard deviation and the share of a normal distribution within them.
+constexpr std::array<double, 9> kMultiples = {0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0};
+
+XyFigure calibration(const Context& of) {
+  XyFigure figure{.title = "Error bars: claimed and found share of the samples",
+                  .x = {"claimed share within the error bar"},
+                  .y = {"found share"},
+                  .series = {}};
+  figure.series.push_back(
+      {.label = "calibrated", .role = CurveRole::limit, .x = {0, 1}, .y = {0, 1}});
+  for (std::size_t m = 0; m < of.models(); ++m) {
+    const ModelRun& run = of.record.runs[m];
+    XySeries series{.label = run.label, .x = {}, .y = {}};
+    for (const double multiple : kMultiples) {
+      std::size_t within = 0;
+      std::size_t all = 0;
+      for (std::size_t n = 0; n < run.residual.size(); ++n) {
+        if (!std::isfinite(run.residual[n]) || !(run.std_dev[n] > 0.0)) continue;
+        ++all;
+        if (std::abs(run.residual[n]) <= multiple * run.std_dev[n]) ++within;
+      }
+      series.x.push_back(std::erf(multiple / std::numbers::sqrt2));
+      series.y.push_back(all > 0 ? static_cast<double>(within) / static_cast<double>(all)
+                                 : kNotMeasured);
+    }
+    figure.series.push_back(std::move(series));
+  }
+  return figure;
+}
+
+}  // namespace
+
+std::vector<ReportFigure> residual_figures(const RecordRuns& record) {
+  if (record.runs.empty()) return {};
+  const Recording& recording = *record.recording;
+  const Context of{.record = record,
+                   .error_label = fmt::format("error [{}]", unit_label(record.target->name)),
+                   .rate_Hz = recording.sample_rate_Hz()};
+  std::vector<double> time_s(recording.size());
+  for (std::size_t n = 0; n < time_s.size(); ++n) time_s[n] = recording.time_s(n);
+  return {
+      scatter(of, "Residuals over the first input", record.input_name, record.input),
+      scatter(of, "Residuals over the rate of the first input",
+              fmt::format("d/dt {} [1/s]", record.input_name), rate_of(record.input, of.rate_Hz)),
+      scatter(of, "Residuals over the target", record.target->name, record.target->values),
+      scatter(of, "Residuals over time", "time [s]", time_s),
+      histogram(of),
+      calibration(of),
+      autocorrelation(of),
+      spectrum(of)};
+}
+
+}  // namespace torsio

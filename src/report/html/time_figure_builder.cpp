@@ -1,0 +1,91 @@
+#include "report/html/time_figure_builder.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+
+std::size_t values_of_figure(std::size_t samples) noexcept {
+  constexpr std::size_t kLong = 1'000'000;
+  return samples > kLong ? kValuesOfLongFigure : kValuesOfFigure;
+}
+
+TimeFigureBuilder::TimeFigureBuilder(std::string title, const Recording& recording,
+                                     std::size_t series, const std::vector<PlaceOfInterest>& places,
+                                     std::size_t max_values) {
+  OverviewPlan plan = plan_overview(recording.size(), series, places, max_values);
+  figure_.title = std::move(title);
+  figure_.start_s = recording.time_s(0);
+  figure_.rate_Hz = recording.sample_rate_Hz();
+  figure_.samples = recording.size();
+  figure_.bucket = plan.bucket;
+  figure_.windows = std::move(plan.windows);
+}
+
+void TimeFigureBuilder::panel(std::string label) {
+  figure_.panels.push_back({.label = std::move(label), .series = {}});
+}
+
+void TimeFigureBuilder::add(std::string label, CurveRole role, bool is_shown,
+                            std::span<const double> values) {
+  figure_.panels.back().series.push_back({.label = std::move(label),
+                                          .role = role,
+                                          .is_shown = is_shown,
+                                          .overview = overview_of(values, figure_.bucket),
+                                          .detail = detail_of(values, figure_.windows)});
+}
+
+void TimeFigureBuilder::mark(std::span<const std::uint8_t> flags, const std::string& label) {
+  const std::size_t together = std::max<std::size_t>(flags.size() / 500, 1);
+  for (std::size_t n = 0; n < flags.size();) {
+    if (flags[n] == 0) {
+      ++n;
+      continue;
+    }
+    std::size_t last = n;
+    for (std::size_t k = n; k < flags.size() && k - last <= together; ++k)
+      if (flags[k] != 0) last = k;
+    figure_.marks.push_back(
+        {.begin_s = figure_.start_s + static_cast<double>(n) / figure_.rate_Hz,
+         .end_s = figure_.start_s + static_cast<double>(last + 1) / figure_.rate_Hz,
+         .label = label});
+    n = last + 1;
+  }
+}
+
+void TimeFigureBuilder::add_channels(const Recording& recording,
+                                     const std::vector<std::string>& left_out) {
+  const std::size_t first = figure_.panels.size();
+  for (const Channel& channel : recording.channels()) {
+    if (std::ranges::find(left_out, channel.name) != left_out.end()) continue;
+    const std::string unit = unit_label(channel.name);
+    const bool is_shown = !channel.name.starts_with(kTruthPrefix);
+    const std::string label = unit.empty() ? channel.name : "[" + unit + "]";
+    const auto known = std::find_if(
+        figure_.panels.begin() + static_cast<std::ptrdiff_t>(first), figure_.panels.end(),
+        [&](const TimeFigure::Panel& panel) { return panel.label == label; });
+    if (known == figure_.panels.end()) {
+      panel(label);
+      add(channel.name, CurveRole::model, is_shown, channel.values);
+    } else {
+      known->series.push_back({.label = channel.name,
+                               .role = CurveRole::model,
+                               .is_shown = is_shown,
+                               .overview = overview_of(channel.values, figure_.bucket),
+                               .detail = detail_of(channel.values, figure_.windows)});
+    }
+  }
+}
+
+TimeFigure channels_figure(const Recording& recording, std::string title,
+                           std::vector<PlaceOfInterest> places, std::span<const double> motion) {
+  std::ranges::copy(reversals_of(motion), std::back_inserter(places));
+  TimeFigureBuilder builder(std::move(title), recording, recording.channels().size(), places,
+                            values_of_figure(recording.size()));
+  builder.add_channels(recording, {});
+  return builder.finish();
+}
+
+}  // namespace torsio

@@ -1,0 +1,48 @@
+import "./report.css";
+import { read_report } from "./document";
+import type { Figure, Report } from "./document";
+import { make_rows_open, make_sortable } from "./sortable_table";
+import { add_theme_button } from "./theme";
+import { TimeView } from "./time_figure";
+import { XyView } from "./xy_figure";
+
+function draw(report: Report, figure: Figure, place: HTMLElement): void {
+  if (figure.kind === "time") new TimeView(place, report, figure);
+  else new XyView(place, report, figure);
+}
+
+/** Figures are drawn when they come near the screen: the page opens at once. */
+function draw_when_near(report: Report): void {
+  const waiting = new Map<Element, Figure>();
+  const draw_now = (place: Element) => {
+    const figure = waiting.get(place);
+    if (!figure) return;
+    waiting.delete(place);
+    draw(report, figure, place as HTMLElement);
+  };
+  const near = new IntersectionObserver(
+    (entries) => {
+      for (const entry of entries)
+        if (entry.isIntersecting) {
+          near.unobserve(entry.target);
+          draw_now(entry.target);
+        }
+    },
+    { rootMargin: "600px" },
+  );
+  for (const figure of report.figures) {
+    const place = document.getElementById(figure.id);
+    if (!place) continue;
+    waiting.set(place, figure);
+    near.observe(place);
+  }
+  addEventListener("beforeprint", () => [...waiting.keys()].forEach(draw_now));
+}
+
+document.documentElement.classList.add("with-script");
+add_theme_button();
+document.querySelectorAll("table").forEach((table) => {
+  make_rows_open(table);
+  make_sortable(table);
+});
+draw_when_near(read_report());

@@ -1,0 +1,233 @@
+import uPlot from "uplot";
+import type { Mark, Report, TimeFigure, TimeSeries } from "./document";
+import { add_controls, add_legend, make_frame } from "./figure_frame";
+import type { Frame, LegendEntry, View } from "./figure_frame";
+import { StoredSamples } from "./sample_source";
+import type { SampleSource, Samples } from "./sample_source";
+import { css_colour, on_theme, series_colour, series_dash } from "./theme";
+
+const kFirstPanelHeight = 300;
+const kPanelHeight = 170;
+/** A measured curve can be seen below the model that follows it. */
+const kWidths: Record<string, number> = { measured: 3, lower: 0.5, upper: 0.5 };
+const kMaxPoints = 2000;
+
+interface Panel {
+  plot: uPlot;
+  source: SampleSource;
+}
+
+/** Without NaN, which uPlot would draw: null is a gap. */
+function with_gaps(values: Float32Array): (number | null)[] {
+  return Array.from(values, (value) => (Number.isNaN(value) ? null : value));
+}
+
+/** Panels of time series under each other, with one range of time. */
+export class TimeView implements View {
+  private readonly frame: Frame;
+  private readonly panels: Panel[] = [];
+  private readonly begin_s: number;
+  private readonly end_s: number;
+  private view: [number, number];
+  private is_waiting = false;
+
+  constructor(place: HTMLElement, report: Report, private readonly figure: TimeFigure) {
+    this.frame = make_frame(place, figure.title);
+    const entries: (LegendEntry & { at: [panel: number, series: number][] })[] = [];
+    const colours = new Map<string, number>();
+    figure.panels.forEach((panel, p) => {
+      panel.series.forEach((series, s) => {
+        const index = colour_index(colours, series);
+        const css = series_colour(series.role, index);
+        const known = entries.find((entry) => entry.label === series.label);
+        if (known) known.at.push([p, s + 1]);
+        else entries.push({ label: series.label, colour: css, shown: series.shown, at: [[p, s + 1]] });
+      });
+    });
+    figure.panels.forEach((panel, p) => {
+      const source = new StoredSamples(report, figure, panel.series);
+      this.panels.push({ plot: this.make_plot(panel.label, panel.series, colours, p), source });
+    });
+    this.begin_s = Math.min(...this.panels.map((panel) => panel.source.begin_s));
+    this.end_s = Math.max(...this.panels.map((panel) => panel.source.end_s));
+    this.view = [this.begin_s, this.end_s];
+    add_controls(this.frame, this);
+    this.add_windows();
+    add_legend(this.frame, entries, (index, shown) => {
+      for (const [panel, series] of entries[index].at) this.panels[panel].plot.setSeries(series, { show: shown });
+      this.hide_empty_panels();
+    });
+    this.update();
+    this.hide_empty_panels();
+    new ResizeObserver(() => this.resize()).observe(this.frame.canvas);
+    on_theme(() => this.panels.forEach(({ plot }) => plot.redraw(false)));
+  }
+
+  zoom(factor: number): void {
+    const middle = 0.5 * (this.view[0] + this.view[1]);
+    const half = 0.5 * factor * (this.view[1] - this.view[0]);
+    this.show(middle - half, middle + half);
+  }
+  pan(right: number): void {
+    const width = this.view[1] - this.view[0];
+    const begin = Math.min(Math.max(this.view[0] + right * width, this.begin_s), this.end_s - width);
+    this.show(begin, begin + width);
+  }
+  reset(): void {
+    this.show(this.begin_s, this.end_s);
+  }
+  /** The range of time that is shown. */
+  get range(): [number, number] {
+    return this.view;
+  }
+
+  show(begin_s: number, end_s: number): void {
+    const shortest = 4 / this.figure.rate_Hz;
+    const begin = Math.max(begin_s, this.begin_s);
+    const end = Math.min(Math.max(end_s, begin + shortest), this.end_s);
+    this.view = [Math.min(begin, end - shortest), end];
+    if (this.is_waiting) return;
+    this.is_waiting = true;
+    requestAnimationFrame(() => {
+      this.is_waiting = false;
+      this.update();
+    });
+  }
+
+  private update(): void {
+    const [begin, end] = this.view;
+    let shown: Samples | undefined;
+    for (const { plot, source } of this.panels) {
+      shown = source.range(begin, end, kMaxPoints);
+      plot.batch(() => {
+        plot.setData([shown!.time_s, ...shown!.values.map(with_gaps)] as unknown as uPlot.AlignedData, false);
+        plot.setScale("x", { min: begin, max: end });
+      });
+    }
+    this.frame.canvas.dataset.range = `${begin} ${end}`;
+    this.frame.note.textContent = shown?.complete
+      ? "Every sample is shown."
+      : `Lines show minima and maxima; ${where_detail_ends(this.figure)}.`;
+  }
+
+  private hide_empty_panels(): void {
+    for (const { plot } of this.panels) plot.root.hidden = !plot.series.slice(1).some((one) => one.show);
+  }
+
+  private width(): number {
+    return Math.max(this.frame.canvas.clientWidth, 280);
+  }
+
+  private resize(): void {
+    this.panels.forEach(({ plot }, index) => {
+      if (plot.width !== this.width()) plot.setSize({ width: this.width(), height: panel_height(index) });
+    });
+  }
+
+  private add_windows(): void {
+    if (this.figure.windows.length === 0) return;
+    const label = document.createElement("label");
+    const list = document.createElement("select");
+    list.append(new Option("all", ""));
+    this.figure.windows.forEach((window, index) => list.append(new Option(window.label, String(index))));
+    list.addEventListener("change", () => {
+      if (list.value === "") return this.reset();
+      const window = this.figure.windows[Number(list.value)];
+      const time_at = (sample: number) => this.figure.start_s + sample / this.figure.rate_Hz;
+      this.show(time_at(window.begin), time_at(window.end - 1));
+    });
+    label.append("Show ", list);
+    this.frame.toolbar.append(label);
+  }
+
+  private make_plot(label: string, series: TimeSeries[], colours: Map<string, number>, index: number): uPlot {
+    const grid = () => css_colour("--grid");
+    const text = () => css_colour("--text");
+    const axis = { stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 } };
+    const is_last = index + 1 === this.figure.panels.length;
+    return new uPlot(
+      {
+        width: this.width(),
+        height: panel_height(index),
+        scales: { x: { time: false, auto: false } },
+        legend: { show: false },
+        cursor: {
+          drag: { x: true, y: false, setScale: false },
+          sync: { key: this.figure.id },
+          bind: { dblclick: () => null },
+        },
+        axes: [
+          { ...axis, label: is_last ? "time [s]" : undefined, size: is_last ? 40 : 28 },
+          { ...axis, label, size: 64 },
+        ],
+        series: [
+          {},
+          ...series.map((one) => ({
+            label: one.label,
+            show: one.shown,
+            stroke: () => css_colour(series_colour(one.role, colours.get(colour_key(one)) ?? 0)),
+            dash: one.role === "limit" ? [4, 4] : series_dash(colours.get(colour_key(one)) ?? 0),
+            width: kWidths[one.role] ?? 1.25,
+            points: { show: false },
+          })),
+        ],
+        bands: bands_of(series),
+        hooks: {
+          drawClear: [(plot: uPlot) => draw_marks(plot, this.figure.marks)],
+          setSelect: [
+            (plot: uPlot) => {
+              if (plot.select.width < 4) return;
+              this.show(plot.posToVal(plot.select.left, "x"), plot.posToVal(plot.select.left + plot.select.width, "x"));
+              plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+            },
+          ],
+        },
+      },
+      [[], ...series.map(() => [])] as unknown as uPlot.AlignedData,
+      this.frame.canvas,
+    );
+  }
+}
+
+function where_detail_ends(figure: TimeFigure): string {
+  const stored = figure.windows.reduce((sum, window) => sum + window.end - window.begin, 0);
+  return stored === figure.samples
+    ? "zoom in to see every sample"
+    : `every sample is in this file only for the ${figure.windows.length} places in the list above, ` +
+        `elsewhere minima and maxima of ${figure.bucket} samples`;
+}
+
+function panel_height(index: number): number {
+  return index === 0 ? kFirstPanelHeight : kPanelHeight;
+}
+
+/** A model has one colour in all panels, and so has its error band. */
+function colour_key(series: TimeSeries): string {
+  return series.label.replace(/ (lower|upper) bound$/, "");
+}
+
+function colour_index(colours: Map<string, number>, series: TimeSeries): number {
+  const key = colour_key(series);
+  if (series.role !== "measured" && series.role !== "limit" && !colours.has(key)) colours.set(key, colours.size);
+  return colours.get(key) ?? 0;
+}
+
+function bands_of(series: TimeSeries[]): uPlot.Band[] {
+  const bands: uPlot.Band[] = [];
+  series.forEach((one, index) => {
+    if (one.role === "upper") bands.push({ series: [index + 1, index], fill: () => css_colour("--band") });
+  });
+  return bands;
+}
+
+/** Guards, faults and findings as shaded ranges of time. */
+function draw_marks(plot: uPlot, marks: Mark[]): void {
+  const { left, top, width, height } = plot.bbox;
+  for (const mark of marks) {
+    const begin = Math.max(plot.valToPos(mark.begin_s, "x", true), left);
+    const end = Math.min(plot.valToPos(mark.end_s, "x", true), left + width);
+    if (!(end >= begin)) continue;
+    plot.ctx.fillStyle = css_colour(mark.level === "fail" ? "--fail-area" : "--warn-area");
+    plot.ctx.fillRect(begin, top, Math.max(end - begin, 2), height);
+  }
+}
