@@ -31,6 +31,7 @@ void refuse_empty_values(CLI::App& app) {
   for (CLI::App* verb : app.get_subcommands({}))
     for (CLI::Option* option : verb->get_options())
       if (option->get_items_expected_max() > 0) option->check(refuse);
+  for (CLI::App* verb : app.get_subcommands({})) refuse_empty_values(*verb);
 }
 
 int run(int argc, char** argv) {
@@ -55,6 +56,7 @@ int run(int argc, char** argv) {
   add_transfer(app);
   add_track(app);
   add_tune_loop(app);
+  add_design(app);
   add_reproduce(app);
   add_unpack(app);
   // For the build, which installs the pages: in no help text.
