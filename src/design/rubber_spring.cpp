@@ -10,6 +10,7 @@
 #include <numbers>
 #include <optional>
 
+#include "bound_search.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -78,43 +79,17 @@ std::optional<RubberRing> best_ring(const RubberSpringDemand& demand) {
   return best;
 }
 
-struct Bound {
-  const char* name;
-  double RubberSpringDemand::*value;
-  double loosest;
-  double scale;  // to the unit
-  const char* unit;
-};
-
-/// The bounds that alone could make the design possible, with the value that each would need.
-std::string bounds_to_move(const RubberSpringDemand& demand) {
-  const std::array bounds{
-      Bound{"largest outer radius", &RubberSpringDemand::largest_outer_m,
-            20.0 * demand.largest_outer_m, 1e3, "mm"},
-      Bound{"least length", &RubberSpringDemand::least_length_m, 0.0, 1e3, "mm"},
-      Bound{"largest length", &RubberSpringDemand::largest_length_m, 20.0 * demand.largest_length_m,
-            1e3, "mm"},
-      Bound{"least inner radius", &RubberSpringDemand::least_inner_m, 0.0, 1e3, "mm"},
-      Bound{"least wall", &RubberSpringDemand::least_wall_m, 0.0, 1e3, "mm"},
-      Bound{"allowed stress", &RubberSpringDemand::allowed_stress_Pa,
-            20.0 * demand.allowed_stress_Pa, 1e-6, "MPa"}};
-  std::string text;
-  for (const Bound& bound : bounds) {
-    RubberSpringDemand moved = demand;
-    double loose = bound.loosest;
-    double tight = demand.*bound.value;
-    moved.*bound.value = loose;
-    if (!best_ring(moved)) continue;
-    for (int i = 0; i < 40; ++i) {  // feasible or not is monotonic in each bound
-      const double middle = 0.5 * (loose + tight);
-      moved.*bound.value = middle;
-      (best_ring(moved) ? loose : tight) = middle;
-    }
-    text += fmt::format("{}the {} of {:.4g} {} would have to move to {:.4g} {}",
-                        text.empty() ? "" : ", or ", bound.name, demand.*bound.value * bound.scale,
-                        bound.unit, loose * bound.scale, bound.unit);
-  }
-  return "infeasible: " + (text.empty() ? "no single bound that is moved makes it possible" : text);
+std::string bounds_of_ring_to_move(const RubberSpringDemand& demand) {
+  using D = RubberSpringDemand;
+  const std::array<DesignBound<D>, 6> bounds{
+      {{"largest outer radius", &D::largest_outer_m, 20.0 * demand.largest_outer_m, 1e3, "mm"},
+       {"least length", &D::least_length_m, 0.0, 1e3, "mm"},
+       {"largest length", &D::largest_length_m, 20.0 * demand.largest_length_m, 1e3, "mm"},
+       {"least inner radius", &D::least_inner_m, 0.0, 1e3, "mm"},
+       {"least wall", &D::least_wall_m, 0.0, 1e3, "mm"},
+       {"allowed stress", &D::allowed_stress_Pa, 20.0 * demand.allowed_stress_Pa, 1e-6, "MPa"}}};
+  return bounds_to_move<D>(demand, bounds,
+                           [](const D& moved) { return best_ring(moved).has_value(); });
 }
 
 /// Whether a ring of the grid meets all bounds but the stiffness.
@@ -282,7 +257,7 @@ RubberSpringDesign design_rubber_spring(const RubberSpringDemand& demand) {
   RubberSpringDesign design;
   const auto exact = best_ring(demand);
   if (!exact) {
-    design.infeasible = bounds_to_move(demand);
+    design.infeasible = bounds_of_ring_to_move(demand);
     return design;
   }
   design.exact = *exact;

@@ -17,7 +17,7 @@ struct DesignFigure {
 };
 
 struct DesignSection {
-  std::string name;  ///< "rounded"
+  std::string name = {};  ///< "rounded"
   std::vector<DesignFigure> figures = {};
 };
 
