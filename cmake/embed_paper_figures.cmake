@@ -3,12 +3,12 @@
 cmake_minimum_required(VERSION 3.25)
 
 set(header "paper,item,condition,quantity,value,unit")
-set(known_units Nm "Nm/deg" "Nm/(deg/s)" N m deg % -)
-set(known_quantities RMSE MAE MAD STD BF "MAD ratio" "mean error ratio" "error percentage" torque twist "peak force" "spring movement"
+set(known_units Nm "Nm/deg" "Nm/(deg/s)" N m mm "cm3/Nm" deg % -)
+set(known_quantities RMSE MAE MAD STD BF "MAD ratio" "mean error ratio" "error percentage" torque twist "peak force" "spring movement" "outer radius" "inner radius" length "axial force" "force at flat" "volume per torque"
   "p0 spring" "p1 spring" "p2 spring" "p3 spring" "p0 gear" "p1 gear" "p2 gear" "p3 gear")
 set(items_000 "Fig. 8" "Table 3" "section 3.1" "section 6.1")
 set(items_001 "Fig. 6")
-set(items_002 "Fig. 8" "Fig. 10" "Table III" "section III-C")
+set(items_002 "section II-B" "section II-C" "Table I" "Fig. 8" "Fig. 10" "Table III" "section III-C")
 set(items_003 "Table 3" "section 4.2.1" "section 4.3")
 set(items_004 "Table 4" "Table 5" "Table 6" "section 5.2")
 set(items_boucwen published)  # sources: docs/benchmarks.md

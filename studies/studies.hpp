@@ -8,6 +8,7 @@ namespace torsio {
 
 Study spring_models_001(const StudyOptions& options, const Progress& progress);
 Study inverse_models_001(const StudyOptions& options, const Progress& progress);
+Study design_002(const StudyOptions& options, const Progress& progress);
 Study sensor_models_002(const StudyOptions& options, const Progress& progress);
 Study slow_loops_002(const StudyOptions& options, const Progress& progress);
 Study collision_002(const StudyOptions& options, const Progress& progress);

@@ -20,6 +20,8 @@ constexpr std::array kStudies{
               spring_models_001},
     StudyInfo{"001-inverse", "001, section 4.2",
               "Errors of the inverse models, from torque to deflection", inverse_models_001},
+    StudyInfo{"002-design", "002, section II, Table I",
+              "The ring of rubber and the clutch of a torque sensor, sized again", design_002},
     StudyInfo{"002-table3", "002, Table III", "Errors of models of a rubber torque sensor",
               sensor_models_002, kPublishedSensorModels},
     StudyInfo{"002-slow", "002, Figure 8", "Slow loops, until its clutch slips and after it",

@@ -35,6 +35,7 @@ void refuse_empty_values(CLI::App& app) {
   for (CLI::App* verb : app.get_subcommands({}))
     for (CLI::Option* option : verb->get_options())
       if (option->get_items_expected_max() > 0) option->check(refuse);
+  for (CLI::App* verb : app.get_subcommands({})) refuse_empty_values(*verb);
 }
 
 /// What a person who types the name alone wants to know.
@@ -86,6 +87,7 @@ int run(int argc, char** argv) {
   add_transfer(app);
   add_track(app);
   add_tune_loop(app);
+  add_design(app);
   add_reproduce(app);
   add_unpack(app);
   add_convert(app);

@@ -78,19 +78,27 @@ std::string examples(const CLI::App& app) {
 
 }  // namespace
 
-void write_man_pages(const CLI::App& app, const std::string& folder) {
-  const std::string& program = app.get_name();
-  std::string overview = head(app, program, program) + section("COMMANDS");
-  std::string pages;
-  for (const CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) {
-    const std::string page = program + "-" + verb->get_name();
-    overview += entry(verb->get_name(), verb->get_description());
-    pages += fmt::format("{}\\fB{}\\fR(1)", pages.empty() ? "" : ",\n", roff(page));
-    const std::string text = head(*verb, page, fmt::format("{} {}", program, verb->get_name()));
-    write_text(fmt::format("{}/{}.1", folder, page),
-               fmt::format("{}{}{}{}\\fB{}\\fR(1)\n", text, examples(*verb), exit_status(),
-                           section("SEE ALSO"), roff(program)));
+namespace {
+
+/// The page of a program or verb and those of its verbs. @param above the page above; empty: none
+void write_page(const CLI::App& app, const std::string& folder, const std::string& page,
+                const std::string& name, const std::string& above) {
+  std::string text = head(app, page, name);
+  std::string pages = above.empty() ? "" : fmt::format("\\fB{}\\fR(1)", roff(above));
+  const auto verbs = app.get_subcommands([](const CLI::App*) { return true; });
+  if (!verbs.empty()) text += section("COMMANDS");
+  for (const CLI::App* verb : verbs) {
+    const std::string verb_page = page + "-" + verb->get_name();
+    text += entry(verb->get_name(), verb->get_description());
+    pages += fmt::format("{}\\fB{}\\fR(1)", pages.empty() ? "" : ",\n", roff(verb_page));
+    write_page(*verb, folder, verb_page, name + " " + verb->get_name(), page);
   }
-  write_text(folder + "/" + program + ".1",
-             overview + examples(app) + exit_status() + section("SEE ALSO") + pages + "\n");
+  write_text(folder + "/" + page + ".1",
+             text + examples(app) + exit_status() + section("SEE ALSO") + pages + "\n");
+}
+
+}  // namespace
+
+void write_man_pages(const CLI::App& app, const std::string& folder) {
+  write_page(app, folder, app.get_name(), app.get_name(), {});
 }

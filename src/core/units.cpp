@@ -73,6 +73,10 @@ constexpr auto kUnits = std::to_array<Unit>({
     {"kg", "kg"},
     {"g", "kg", 1e-3},
     {"J", "J"},
+    {"Pa", "Pa"},
+    {"kPa", "Pa", 1e3},
+    {"MPa", "Pa", 1e6},
+    {"GPa", "Pa", 1e9},
     {"K", "K"},
     {"degC", "K", 1.0, 273.15},
 });

@@ -1,0 +1,3 @@
+#include "design_flags.hpp"
+
+void add_design_actuator(CLI::App& /*design*/) {}

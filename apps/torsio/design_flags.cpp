@@ -1,0 +1,39 @@
+#include "design_flags.hpp"
+
+#include "data_flags.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/design/quantity.hpp"
+
+void DesignOutputs::add(CLI::App& verb, bool has_dxf) {
+  verb.add_option("--json", json.destination,
+                  "write the design as JSON to a file, or - for standard output");
+  verb.add_option("--yaml", yaml, "write the design as YAML to a file");
+  if (has_dxf) verb.add_option("--dxf", dxf, "write its outline as DXF to a file, in mm");
+}
+
+void DesignOutputs::check(const std::vector<std::string>& more) const {
+  std::vector<std::string> all{json.destination, yaml, dxf};
+  all.insert(all.end(), more.begin(), more.end());
+  DataFlags().check_outputs(all);
+  require_ending("--yaml", yaml, {".yaml", ".yml"});
+  require_ending("--dxf", dxf, {".dxf"});
+}
+
+void DesignOutputs::write(const torsio::DesignReport& report) const {
+  if (json.wants_tables()) print(torsio::design_text(report));
+  if (!yaml.empty()) write_text(yaml, torsio::design_yaml(report));
+  json.write(torsio::design_json(report));
+  if (!report.is_feasible)
+    throw torsio::Error({.place = "design " + report.design, .problem = report.infeasible});
+}
+
+double quantity(const std::string& text, const char* unit, const char* flag, double none) {
+  return text.empty() ? none : torsio::quantity_with_unit(text, unit, flag);
+}
+
+double needed(const std::string& text, const char* unit, const char* flag) {
+  if (text.empty())
+    throw torsio::UsageError(
+        {.place = flag, .expected = std::string("a value in ") + unit, .found = "nothing"});
+  return torsio::quantity_with_unit(text, unit, flag);
+}

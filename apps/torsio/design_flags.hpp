@@ -1,0 +1,31 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <string>
+#include <vector>
+
+#include "output.hpp"
+#include "torsio/design/report.hpp"
+
+/// Where a design is written, for every `torsio design`.
+struct DesignOutputs {
+  JsonOutput json;
+  std::string yaml;
+  std::string dxf;
+
+  void add(CLI::App& verb, bool has_dxf);
+  /// Refuses what cannot be written, before any work. @param more further outputs
+  void check(const std::vector<std::string>& more = {}) const;
+  /// Prints and writes the design. @throws torsio::Error for an infeasible one, after the documents
+  /// are written: then nothing else is.
+  void write(const torsio::DesignReport& report) const;
+};
+
+/// The value of a flag, with its unit. @throws torsio::UsageError; "" is `none`.
+[[nodiscard]] double quantity(const std::string& text, const char* unit, const char* flag,
+                              double none);
+/// The same for a flag that must be given.
+[[nodiscard]] double needed(const std::string& text, const char* unit, const char* flag);
+
+void add_design_spring(CLI::App& design);
+void add_design_actuator(CLI::App& design);

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string_view>
+
+namespace torsio {
+
+/// As `si_quantity`, but a number without its unit is refused: a length of 10 may be mm or m.
+/// @throws UsageError naming `place`; also if the number is negative.
+[[nodiscard]] double quantity_with_unit(std::string_view text, std::string_view expected_si,
+                                        std::string_view place);
+
+}  // namespace torsio

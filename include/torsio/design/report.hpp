@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "torsio/core/not_measured.hpp"
+
+namespace torsio {
+
+/// A number of a design, or a text where there is no number.
+struct DesignFigure {
+  std::string name;             ///< "outer_radius"
+  double value = kNotMeasured;  ///< in `unit`
+  std::string unit = {};        ///< as printed: "mm", "Nm/rad"; empty for a number without unit
+  std::string remark = {};
+  std::string text = {};  ///< in place of the value
+};
+
+struct DesignSection {
+  std::string name = {};  ///< "rounded"
+  std::vector<DesignFigure> figures = {};
+};
+
+/// The result of a design: what `torsio design` prints and writes.
+struct DesignReport {
+  std::string design;  ///< "rubber-spring"
+  bool is_feasible = true;
+  std::string infeasible = {};  ///< the bound that contradicts, and the value that it would need
+  std::vector<DesignSection> sections = {};
+  std::vector<std::string> notes = {};
+
+  /// @throws Error if there is no such figure.
+  [[nodiscard]] const DesignFigure& at(const std::string& section, const std::string& name) const;
+};
+
+[[nodiscard]] std::string design_text(const DesignReport& report);
+/// One JSON object; keys carry their units (docs/json.md).
+[[nodiscard]] std::string design_json(const DesignReport& report);
+/// The same keys as YAML.
+[[nodiscard]] std::string design_yaml(const DesignReport& report);
+
+}  // namespace torsio

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/design/belleville.hpp"
+
+namespace torsio {
+
+/// A material of metal springs, SI. The stresses are allowed values, not strengths.
+struct SpringMaterial {
+  std::string name;
+  std::string source;  ///< "printed: ...", "assumed: ..."
+  double elastic_modulus_Pa = 0.0;
+  double shear_modulus_Pa = 0.0;
+  double density_kg_m3 = 0.0;
+  double allowed_shear_Pa = 0.0;  ///< static
+  double fatigue_shear_Pa = 0.0;  ///< amplitude, fully reversed
+  double poisson = 0.3;
+};
+
+/// A strain-wave gear of a table, SI.
+struct GearChoice {
+  std::string name;
+  std::string source;
+  double ratio = 0.0;
+  double continuous_Nm = 0.0;
+  double peak_Nm = 0.0;
+  double stiffness_Nm_rad = 0.0;
+  double efficiency = 0.0;
+  double friction_Nm = 0.0;      ///< Coulomb, at the output
+  double viscous_Nms_rad = 0.0;  ///< at the output
+  double mass_kg = 0.0;
+};
+
+/// A motor of a table, SI.
+struct MotorChoice {
+  std::string name;
+  std::string source;
+  double torque_constant_Nm_A = 0.0;
+  double rotor_inertia_kg_m2 = 0.0;
+  double resistance_Ohm = 0.0;
+  double supply_V = 0.0;
+  double continuous_A = 0.0;
+  double peak_A = 0.0;
+  double mass_kg = 0.0;
+};
+
+// Tables are YAML; every quantity has its unit, every entry its source. docs/design/tables.md has the
+// formats. An empty path is the table that torsio ships (share/torsio/design).
+// @throws Error naming file, line, what was expected and found; Cancelled.
+[[nodiscard]] std::vector<BellevilleWasher> read_washers(const std::string& path,
+                                                         const Progress& progress = {});
+[[nodiscard]] std::vector<SpringMaterial> read_materials(const std::string& path,
+                                                         const Progress& progress = {});
+struct DriveTable {
+  std::vector<GearChoice> gears;
+  std::vector<MotorChoice> motors;
+};
+[[nodiscard]] DriveTable read_drives(const std::string& path, const Progress& progress = {});
+
+/// The entry of that name. @throws UsageError that lists the names.
+template <class Entry>
+[[nodiscard]] const Entry& find_entry(const std::vector<Entry>& table, std::string_view name,
+                                      std::string_view place);
+
+}  // namespace torsio

@@ -1,0 +1,95 @@
+#include "torsio/design/clutch.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "torsio/core/error.hpp"
+
+namespace torsio {
+namespace {
+
+void check(const ClutchDemand& d) {
+  const auto require = [](bool holds, const char* name, const char* expected, double found) {
+    if (!holds)
+      throw UsageError({.place = std::string("clutch: ") + name,
+                        .expected = expected,
+                        .found = fmt::format("{:g}", found)});
+  };
+  require(d.slip_Nm > 0.0 && std::isfinite(d.slip_Nm), "slip torque", "more than 0 Nm", d.slip_Nm);
+  require(d.inner_m >= 0.0 && d.outer_m > d.inner_m && std::isfinite(d.outer_m), "outer radius",
+          "more than the inner radius, in m", d.outer_m);
+  require(d.least_friction > 0.0 && d.least_friction <= d.friction, "least friction",
+          "above 0, at most the nominal friction", d.least_friction);
+  require(d.largest_friction >= d.friction && d.largest_friction < 2.0, "largest friction",
+          "at least the nominal friction, below 2", d.largest_friction);
+  require(d.surfaces >= 1 && d.surfaces <= 100, "surfaces", "1 to 100", d.surfaces);
+  require(d.parallel >= 1 && d.parallel <= 100, "washers in parallel", "1 to 100", d.parallel);
+  require(d.series >= 1 && d.series <= 100, "packs in series", "1 to 100", d.series);
+  check(d.washer);
+}
+
+}  // namespace
+
+double effective_arm(const ClutchDemand& d, double friction) {
+  const double cubes = std::pow(d.outer_m, 3) - std::pow(d.inner_m, 3);
+  const double squares = d.outer_m * d.outer_m - d.inner_m * d.inner_m;
+  return 2.0 * friction * d.surfaces * cubes / (3.0 * squares);
+}
+
+DesignReport design_clutch(const ClutchDemand& d) {
+  check(d);
+  DesignReport report{.design = "clutch"};
+  const double arm = effective_arm(d, d.friction);
+  const double axial_N = d.slip_Nm / arm;
+  const double wear_arm = 0.5 * d.friction * d.surfaces * (d.outer_m + d.inner_m);
+  const double area = std::numbers::pi * (d.outer_m * d.outer_m - d.inner_m * d.inner_m);
+  const double flat_N = force(d.washer, d.washer.cone_height_m) * d.parallel;
+  report.sections.push_back(
+      {"clutch",
+       {{"slip_torque", d.slip_Nm, "Nm"},
+        {"effective_arm", arm * 1e3, "mm", "slip torque over axial force, uniform pressure"},
+        {"axial_force", axial_N, "N"},
+        {"axial_force_uniform_wear", d.slip_Nm / wear_arm, "N"},
+        {"mean_pressure", axial_N / area * 1e-6, "MPa"},
+        {"torque_at_least_friction", effective_arm(d, d.least_friction) * axial_N, "Nm",
+         fmt::format("friction {:g}", d.least_friction)},
+        {"torque_at_largest_friction", effective_arm(d, d.largest_friction) * axial_N, "Nm",
+         fmt::format("friction {:g}", d.largest_friction)},
+        {"torque_at_flat", flat_N * arm, "Nm", "the bolt tightened until the washers are flat"}}});
+  if (axial_N > flat_N) {
+    report.is_feasible = false;
+    report.infeasible = fmt::format(
+        "infeasible: {} washer{} {} in parallel are flat at {:.4g} N: the washers in parallel "
+        "would "
+        "have to move from {} to {}, or the slip torque of {:.4g} Nm to {:.4g} Nm",
+        d.parallel, d.parallel == 1 ? "" : "s", d.washer.name, flat_N, d.parallel,
+        static_cast<int>(std::ceil(axial_N / flat_N * d.parallel)), d.slip_Nm, flat_N * arm);
+    return report;
+  }
+  const double s = travel(d.washer, axial_N / d.parallel);
+  const double stack_rate = rate(d.washer, s) * d.parallel / d.series;
+  report.sections.push_back(
+      {"washers",
+       {{"washer", kNotMeasured, "", d.washer.source, d.washer.name},
+        {"parallel", static_cast<double>(d.parallel)},
+        {"series", static_cast<double>(d.series)},
+        {"travel", s * 1e3, "mm", "of one washer"},
+        {"travel_of_height", s / d.washer.cone_height_m, "", "share of the travel to flat"},
+        {"stack_travel", s * d.series * 1e3, "mm"},
+        {"rate", stack_rate * 1e-3, "N/mm", "of the stack"},
+        {"torque_per_10_um", stack_rate * 10e-6 * arm, "Nm", "of travel of the bolt"},
+        {"force_at_flat", flat_N, "N"},
+        {"stress", stress(d.washer, s) * 1e-6, "MPa", "sigma_OM"}}});
+  if (s > 0.75 * d.washer.cone_height_m)
+    report.notes.emplace_back("The washers are beyond 0.75 of their travel, the usual limit.");
+  if (stack_rate * 10e-6 * arm > 0.05 * d.slip_Nm)
+    report.notes.push_back(fmt::format(
+        "10 um of the bolt change the slip torque by {:.1f} %: more washers in series make it "
+        "easier to adjust.",
+        100.0 * stack_rate * 10e-6 * arm / d.slip_Nm));
+  return report;
+}
+
+}  // namespace torsio

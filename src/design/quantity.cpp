@@ -1,0 +1,30 @@
+#include "torsio/design/quantity.hpp"
+
+#include <charconv>
+#include <string>
+
+#include "core/trimmed.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/core/units.hpp"
+
+namespace torsio {
+
+double quantity_with_unit(std::string_view text, std::string_view expected_si,
+                          std::string_view place) {
+  const std::string_view all = trimmed(text);
+  double number = 0.0;
+  const auto [end, code] = std::from_chars(all.data(), all.data() + all.size(), number);
+  if (code == std::errc{} && end == all.data() + all.size())
+    throw UsageError(
+        {.place = std::string(place),
+         .expected = "a number with its unit, a multiple of " + std::string(expected_si),
+         .found = "'" + std::string(text) + "'"});
+  const double value = si_quantity(text, expected_si, place);
+  if (value < 0.0)
+    throw UsageError({.place = std::string(place),
+                      .expected = "a value that is not negative",
+                      .found = "'" + std::string(text) + "'"});
+  return value;
+}
+
+}  // namespace torsio

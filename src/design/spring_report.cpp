@@ -1,0 +1,79 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <variant>
+
+#include "torsio/core/units.hpp"
+#include "torsio/design/spring.hpp"
+
+namespace torsio {
+
+DesignReport spring_report(const SpringDemand& d, const SpringDesign& design) {
+  DesignReport report{
+      .design = "spring", .is_feasible = design.is_feasible, .infeasible = design.infeasible};
+  report.sections.push_back(
+      {"demand",
+       {{"torque", d.torque_Nm, "Nm"},
+        {"angle", deg_from_rad(d.angle_rad), "deg"},
+        {"stiffness", d.torque_Nm / d.angle_rad, "Nm/rad"},
+        {"largest_diameter", d.largest_diameter_m * 1e3, "mm"},
+        {"largest_length", d.largest_length_m * 1e3, "mm"},
+        {"bore", d.bore_m * 1e3, "mm"},
+        {"material", kNotMeasured, "", d.material.source, d.material.name},
+        {"allowed_shear", d.material.allowed_shear_Pa / d.safety * 1e-6, "MPa"}}});
+  if (!design.is_feasible) return report;
+  DesignSection section = design.dimensions;
+  section.figures.insert(section.figures.begin(), DesignFigure{"kind", kNotMeasured, "", "",
+                                                               std::string(name_of(design.kind))});
+  report.sections.push_back(std::move(section));
+  const double k = design.stiffness_Nm_rad;
+  const double lsb_rad = 2.0 * std::numbers::pi / std::exp2(d.encoder_bits);
+  report.sections.push_back(
+      {"joint",
+       {{"stiffness", k, "Nm/rad"},
+        {"deflection", deg_from_rad(d.torque_Nm / k), "deg", "under the torque"},
+        {"mass", design.mass_kg * 1e3, "g", "of the spring without its ends"},
+        {"torque_resolution", k * lsb_rad, "Nm",
+         fmt::format("one step of an encoder of {:g} bits", d.encoder_bits)},
+        {"resonance", std::sqrt(k / d.load_inertia_kg_m2) / (2.0 * std::numbers::pi), "Hz",
+         fmt::format("with a load of {:g} kg m2, rotor held", d.load_inertia_kg_m2)}}});
+  report.notes.emplace_back(
+      "Formulae of slender springs without the ends: a measured stiffness replaces them.");
+  return report;
+}
+
+void set_spring(DataSheet& sheet, const SpringDemand& d, const SpringDesign& design) {
+  auto& spring = std::get<SpringSheet>(sheet.second);
+  spring.stiffness_Nm_rad = derived(design.stiffness_Nm_rad);
+  spring.stage_rad = assumed(0.0);
+  spring.stage_stiffness_Nm_rad = assumed(0.0);
+  spring.half_gap_rad = assumed(rad_from_deg(0.01));
+  spring.asymmetry = assumed(0.0);
+  // Half of the friction does not depend on the load.
+  spring.friction_Nm = assumed(0.5 * design.friction_share * d.torque_Nm);
+  spring.load_friction = assumed(0.5 * design.friction_share);
+  spring.curve.clear();
+  for (const auto& [angle, torque] : design.curve)
+    spring.curve.push_back({derived(angle), derived(torque)});
+  sheet.sensors.torque_range_Nm =
+      assumed(std::max(sheet.sensors.torque_range_Nm.value, 1.5 * d.torque_Nm));
+}
+
+DataSheet spring_sheet(const SpringDemand& d, const SpringDesign& design, const std::string& name) {
+  const DataSheet* base = nullptr;
+  for (const DataSheet& each : data_sheets()) {
+    if (each.family != ActuatorFamily::series_elastic) continue;
+    if (base == nullptr || base->rating.torque_Nm.value < d.torque_Nm) base = &each;
+  }
+  DataSheet sheet = *base;
+  sheet.name = name;
+  sheet.title = fmt::format("designed spring of {:.4g} Nm/rad in the drive of {}",
+                            design.stiffness_Nm_rad, base->name);
+  sheet.rating.torque_Nm = assumed(d.torque_Nm);
+  set_spring(sheet, d, design);
+  return sheet;
+}
+
+}  // namespace torsio
