@@ -200,9 +200,10 @@ ReportDocument transfer_report(const TransferEvaluation& evaluation, const Trans
                         .preformatted = transfer_text(evaluation, curve, target)};
   if (!curve.points.empty()) section.figures.emplace_back(learning_curve(curve, unit));
   document.sections.push_back(std::move(section));
-  append(document,
-         model_sections(dataset, {{"transferred", &evaluation.transfer.best().file}, {"base", &base}},
-                        progress));
+  append(
+      document,
+      model_sections(dataset, {{"transferred", &evaluation.transfer.best().file}, {"base", &base}},
+                     progress));
   return document;
 }
 
@@ -239,14 +240,15 @@ ReportDocument monitor_report(const std::vector<MonitorReplay>& replays,
                               const MonitorSettings& settings) {
   const auto stopped = std::ranges::count_if(
       replays, [](const MonitorReplay& replay) { return std::isfinite(replay.stopped_at_s); });
-  ReportDocument document{.title = "Replay through a monitor",
-                          .summary = {fmt::format("The monitor stopped in {} of {} recording(s).",
-                                                  stopped, replays.size()),
-                                      "A recording without a stop is no proof of a sound joint: "
-                                      "docs/safety.md states what none of the "
-                                      "checks detects."},
-                          .sections = {},
-                          .origin = {}};
+  ReportDocument document{
+      .title = "Replay through a monitor",
+      .summary = {fmt::format("The monitor stopped in {} of {} recording(s).", stopped,
+                              replays.size()),
+                  "A recording without a stop does not prove that the joint is sound: "
+                  "docs/safety.md states what none of the "
+                  "checks detects."},
+      .sections = {},
+      .origin = {}};
   document.sections.push_back(
       {.heading = "Findings", .preformatted = replays_text(replays, settings)});
   constexpr std::size_t kRecordings = 4;
