@@ -3,7 +3,7 @@
 
 #include "bindings.hpp"
 #include "data/log_table.hpp"
-#include "data/measured_recordings.hpp"
+#include "data/mapping/measured_recordings.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/data/mapping.hpp"

@@ -11,11 +11,11 @@
 #include <thread>
 #include <utility>
 
-#include "data/canonical_channels.hpp"
 #include "data/channel_names.hpp"
-#include "data/measured_recordings.hpp"
+#include "data/mapping/canonical_channels.hpp"
+#include "data/mapping/measured_recordings.hpp"
+#include "data/mapping/needed_definitions.hpp"
 #include "data/names.hpp"
-#include "data/needed_definitions.hpp"
 #include "data/read_log.hpp"
 #include "data/resample.hpp"
 #include "data/whole_samples.hpp"

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "data/mapping_yaml.hpp"
+#include "data/mapping/mapping_yaml.hpp"
 #include "data/names.hpp"
 #include "data/yaml_reader.hpp"
 #include "torsio/core/error.hpp"

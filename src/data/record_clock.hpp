@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "data/columns.hpp"
 #include "data/log_table.hpp"
+#include "data/mapping/columns.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/mapping.hpp"
 

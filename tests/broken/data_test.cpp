@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "data/csv/csv_table.hpp"
-#include "data/measured_recordings.hpp"
+#include "data/mapping/measured_recordings.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"
@@ -208,8 +208,8 @@ INSTANTIATE_TEST_SUITE_P(
                  {"t_s, pos_deg, tau, run", "take a manifest"}},
         BadInput{"TypoInAKey",
                  "\nchanels: {torque_Nm: tau}",
-                 {"map.yaml: line 2 (chanels): unknown key 'chanels'", "one of joints, channels, derive",
-                  "Did you mean 'channels'?"}},
+                 {"map.yaml: line 2 (chanels): unknown key 'chanels'",
+                  "one of joints, channels, derive", "Did you mean 'channels'?"}},
         BadInput{"TypoInAnInnerKey",
                  "clock: {rebild: true}",
                  {"map.yaml: line 1 (clock.rebild)", "Did you mean 'rebuild'?"}},

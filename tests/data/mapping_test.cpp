@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "data/csv/csv_table.hpp"
-#include "data/measured_recordings.hpp"
+#include "data/mapping/measured_recordings.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "data/bag/bag_records.hpp"
-#include "data/measured_recordings.hpp"
+#include "data/mapping/measured_recordings.hpp"
 #include "data/ros/message_topics.hpp"
 #include "torsio/core/error.hpp"
 

@@ -3,7 +3,7 @@
 #include <string_view>
 
 #include "data/csv/csv_table.hpp"
-#include "data/measured_recordings.hpp"
+#include "data/mapping/measured_recordings.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/csv.hpp"
 #include "torsio/data/manifest.hpp"

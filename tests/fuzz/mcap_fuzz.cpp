@@ -3,8 +3,8 @@
 #include <string_view>
 #include <vector>
 
+#include "data/mapping/measured_recordings.hpp"
 #include "data/mcap/mcap_records.hpp"
-#include "data/measured_recordings.hpp"
 #include "data/ros/message_topics.hpp"
 #include "torsio/core/error.hpp"
 

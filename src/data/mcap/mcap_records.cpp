@@ -8,7 +8,7 @@
 
 #include "data/little_endian.hpp"
 #include "data/names.hpp"
-#include "data/unpack_chunk.hpp"
+#include "data/ros/unpack_chunk.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

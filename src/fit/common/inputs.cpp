@@ -10,9 +10,9 @@
 #include <map>
 #include <utility>
 
-#include "data/canonical_channels.hpp"
 #include "data/channel_names.hpp"
-#include "data/needed_definitions.hpp"
+#include "data/mapping/canonical_channels.hpp"
+#include "data/mapping/needed_definitions.hpp"
 #include "numerics/least_squares.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"

@@ -1,4 +1,4 @@
-#include "data/columns.hpp"
+#include "data/mapping/columns.hpp"
 
 #include <fmt/format.h>
 
@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
-#include "data/column_advice.hpp"
 #include "data/log_table.hpp"
+#include "data/mapping/column_advice.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"

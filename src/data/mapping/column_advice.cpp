@@ -1,4 +1,4 @@
-#include "data/column_advice.hpp"
+#include "data/mapping/column_advice.hpp"
 
 #include <fmt/format.h>
 

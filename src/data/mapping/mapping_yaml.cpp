@@ -1,4 +1,4 @@
-#include "data/mapping_yaml.hpp"
+#include "data/mapping/mapping_yaml.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 #include <map>
 #include <utility>
 
-#include "data/columns.hpp"
+#include "data/mapping/columns.hpp"
+#include "data/mapping/ready_mappings.hpp"
 #include "data/names.hpp"
-#include "data/ready_mappings.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 

@@ -1,4 +1,4 @@
-#include "data/unpack_chunk.hpp"
+#include "data/ros/unpack_chunk.hpp"
 
 #include <bzlib.h>
 #include <lz4frame.h>

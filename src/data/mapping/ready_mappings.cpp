@@ -1,4 +1,4 @@
-#include "data/ready_mappings.hpp"
+#include "data/mapping/ready_mappings.hpp"
 
 #include <algorithm>
 #include <array>

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "data/channel_names.hpp"
-#include "data/columns.hpp"
 #include "data/csv/csv_table.hpp"
-#include "data/measured_recordings.hpp"
+#include "data/mapping/columns.hpp"
+#include "data/mapping/measured_recordings.hpp"
 #include "data/names.hpp"
 #include "data/record_clock.hpp"
 #include "data/whole_samples.hpp"
