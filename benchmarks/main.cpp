@@ -42,6 +42,8 @@ constexpr std::array kBenches{
     Bench{"grey_box_learn", grey_box_learn},
     Bench{"em_k100_iteration", em_k100_iteration, Peer{"Armadillo", write_em_inputs}},
     Bench{"csv_load", csv_load, Peer{"numpy.loadtxt"}},
+    Bench{"report_decimate", report_decimate},
+    Bench{"report_write", report_write},
     Bench{"grey_box_fit_files", grey_box_fit_files},
     Bench{"simulate_dfki_120", simulate_dfki_120},
     Bench{"simulate_single", simulate_single, Peer{"MuJoCo", write_simulate_inputs}},

@@ -14,6 +14,8 @@ Row dgmm_learn_5000_worst();
 Row grey_box_learn();
 Row em_k100_iteration();
 Row csv_load();
+Row report_decimate();
+Row report_write();
 Row grey_box_fit_files();
 Row simulate_dfki_120();
 Row simulate_single();

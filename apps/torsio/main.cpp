@@ -37,7 +37,7 @@ void refuse_empty_values(CLI::App& app) {
       if (option->get_items_expected_max() > 0) option->check(refuse);
 }
 
-/// What a person who types the name alone wants to know.
+/// Printed to a person who types the name alone.
 constexpr const char* kFirstSteps =
     "torsio fits models of a series-elastic actuator's spring and estimates the joint torque.\n\n"
     "  torsio demo                              the whole workflow on a simulated bench, with a "
@@ -63,7 +63,7 @@ void add_completion(CLI::App& app) {
 int run(int argc, char** argv) {
   if (argc == 1) {
     print(kFirstSteps);
-    return kCallWasWrong;  // of a script whose variables are empty
+    return kCallWasWrong;  // a script may have empty variables
   }
   CLI::App app(
       "Fits models of a series-elastic actuator's spring and estimates the joint torque with them.",

@@ -242,7 +242,7 @@ ReportDocument monitor_report(const std::vector<MonitorReplay>& replays,
   ReportDocument document{.title = "Replay through a monitor",
                           .summary = {fmt::format("The monitor stopped in {} of {} recording(s).",
                                                   stopped, replays.size()),
-                                      "A recording without a stop is no proof of a sound joint: "
+                                      "A recording without a stop does not prove a sound joint: "
                                       "docs/safety.md states what none of the "
                                       "checks detects."},
                           .sections = {},
