@@ -45,6 +45,8 @@ constexpr std::array kBenches{
     Bench{"mcap_read", mcap_read, Peer{"@mcap/core"}},
     Bench{"mat_read", mat_read, Peer{"scipy.io"}},
     Bench{"mat_read_v7", mat_read_v7, Peer{"scipy.io"}},
+    Bench{"report_decimate", report_decimate},
+    Bench{"report_write", report_write},
     Bench{"grey_box_fit_files", grey_box_fit_files},
     Bench{"simulate_dfki_120", simulate_dfki_120},
     Bench{"simulate_single", simulate_single, Peer{"MuJoCo", write_simulate_inputs}},

@@ -17,6 +17,8 @@ Row csv_load();
 Row mcap_read();
 Row mat_read();
 Row mat_read_v7();
+Row report_decimate();
+Row report_write();
 Row grey_box_fit_files();
 Row simulate_dfki_120();
 Row simulate_single();

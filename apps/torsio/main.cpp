@@ -38,7 +38,7 @@ void refuse_empty_values(CLI::App& app) {
   for (CLI::App* verb : app.get_subcommands({})) refuse_empty_values(*verb);
 }
 
-/// The first steps, for a call without arguments.
+/// Printed to a person who types the name alone.
 constexpr const char* kFirstSteps =
     "torsio fits models of a series-elastic actuator's spring and estimates the joint torque.\n\n"
     "  torsio demo                              the whole workflow on a simulated bench, with a "
@@ -64,7 +64,7 @@ void add_completion(CLI::App& app) {
 int run(int argc, char** argv) {
   if (argc == 1) {
     print(kFirstSteps);
-    return kCallWasWrong;  // such as a script with empty variables
+    return kCallWasWrong;  // a script may have empty variables
   }
   CLI::App app(
       "Fits models of a series-elastic actuator's spring and estimates the joint torque with them.",

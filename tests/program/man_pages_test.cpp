@@ -56,7 +56,7 @@ TEST_F(ManPages, OfEachVerbHasEveryOptionOfItsHelp) {
     const std::string page = contents("torsio-" + verb + ".1");
     const std::string help = torsio(verb + " --help").out;
     const std::vector<std::string> options = names_below(help, "Options:");
-    EXPECT_GE(options.size(), 2U) << verb;
+    EXPECT_GE(options.size(), 1U) << verb;
     for (const std::string& name : options)
       EXPECT_THAT(page, HasSubstr("\\fB" + with_minus_signs(name))) << verb;
     for (const std::string& name : names_below(help, "Positionals:"))

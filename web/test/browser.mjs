@@ -8,7 +8,7 @@ import { chromium } from "playwright-core";
 const [reports, pictures] = process.argv.slice(2);
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const kMaxMilliseconds = 1500;
-const kPictureHeight = 1900;
+const kPicture = { width: 900, height: 1500 };
 const problems = [];
 
 function expect(condition, what) {
@@ -107,14 +107,14 @@ async function panning_rate(page) {
 /** The page from its beginning to the end of the first time series, or of the first figures. */
 async function take_picture(page, path) {
   const size = page.viewportSize();
-  await page.setViewportSize({ width: size.width, height: kPictureHeight });
+  await page.setViewportSize(kPicture);
   await page.waitForTimeout(300);  // figures are drawn when they come near the screen
   const end = await page.evaluate(() => {
     const figures = [...document.querySelectorAll("figure")];
     const last = figures.find((figure) => figure.querySelector(".uplot")) ?? figures[0];
     return last ? last.getBoundingClientRect().bottom : innerHeight;
   });
-  const clip = { x: 0, y: 0, width: 1100, height: Math.min(Math.ceil(end) + 16, kPictureHeight) };
+  const clip = { x: 0, y: 0, width: kPicture.width, height: Math.min(Math.ceil(end) + 16, kPicture.height) };
   await page.screenshot({ path, clip, animations: "disabled" });
   await page.setViewportSize(size);
 }

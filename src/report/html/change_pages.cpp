@@ -240,15 +240,14 @@ ReportDocument monitor_report(const std::vector<MonitorReplay>& replays,
                               const MonitorSettings& settings) {
   const auto stopped = std::ranges::count_if(
       replays, [](const MonitorReplay& replay) { return std::isfinite(replay.stopped_at_s); });
-  ReportDocument document{
-      .title = "Replay through a monitor",
-      .summary = {fmt::format("The monitor stopped in {} of {} recording(s).", stopped,
-                              replays.size()),
-                  "A recording without a stop does not prove that the joint is sound: "
-                  "docs/safety.md states what none of the "
-                  "checks detects."},
-      .sections = {},
-      .origin = {}};
+  ReportDocument document{.title = "Replay through a monitor",
+                          .summary = {fmt::format("The monitor stopped in {} of {} recording(s).",
+                                                  stopped, replays.size()),
+                                      "A recording without a stop does not prove a sound joint: "
+                                      "docs/safety.md states what none of the "
+                                      "checks detects."},
+                          .sections = {},
+                          .origin = {}};
   document.sections.push_back(
       {.heading = "Findings", .preformatted = replays_text(replays, settings)});
   constexpr std::size_t kRecordings = 4;

@@ -117,11 +117,12 @@ ReportDocument comparison_report(const Comparison& comparison, const Dataset& da
         "{}.",
         model_label(best), ranked.rows.size(), name(split), error_text(ranked_error(best)),
         results.unit, error_text(best.score.metrics.max_abs), results.unit)};
-    document.summary.push_back(
-        fmt::format("{} % of its errors are within two of its error bars (95.4 % if these are "
-                    "right), and {} model(s) could "
-                    "not be ranked.",
-                    percent_text(best.score.within_2_std_dev), ranked.others.size()));
+    document.summary.push_back(fmt::format(
+        "{} % of its errors are within two of its error bars (95.4 % if these are right){}.",
+        percent_text(best.score.within_2_std_dev),
+        ranked.others.empty()
+            ? ""
+            : fmt::format("; {} more could not be ranked", ranked.others.size())));
   }
   for (const Role role : {Role::validation, Role::test})
     if (std::ranges::any_of(results.rows, [&](const ResultRow& row) { return row.split == role; }))

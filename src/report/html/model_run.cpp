@@ -1,7 +1,10 @@
 #include "report/html/model_run.hpp"
 
-#include <cmath>
+#include <algorithm>
+#include <optional>
+#include <utility>
 
+#include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/evaluate.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -46,18 +49,25 @@ RecordRuns run_models(const Dataset& dataset, const DatasetRecord& record,
                     .target = &record.recording.channel(dataset.target),
                     .runs = {},
                     .failures = {}};
-  for (const ReportedModel& model : models) {
+  std::vector<std::optional<ModelRun>> runs(models.size());
+  std::vector<std::string> failures(models.size());
+  for_each_chunk(models.size(), 0, [&](std::size_t m) {
     try {
-      result.runs.push_back(run_model(dataset, record, model, role));
-      if (!result.input.empty()) continue;
-      const FeatureSpec& features = model.file->settings.features;
-      result.input = first_feature(record.recording, features);
-      result.input_name = features.inputs.front();
-    } catch (const Cancelled&) {
-      throw;
+      runs[m] = run_model(dataset, record, models[m], role);
     } catch (const Error& error) {
-      result.failures.push_back(model.label + ": " + error.what());
+      failures[m] = models[m].label + ": " + error.what();
     }
+  });
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    if (!runs[m]) {
+      result.failures.push_back(std::move(failures[m]));
+      continue;
+    }
+    result.runs.push_back(std::move(*runs[m]));
+    if (!result.input.empty()) continue;
+    const FeatureSpec& features = models[m].file->settings.features;
+    result.input = first_feature(record.recording, features);
+    result.input_name = features.inputs.front();
   }
   return result;
 }

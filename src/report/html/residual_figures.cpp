@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include "torsio/core/units.hpp"
@@ -147,6 +148,17 @@ XyFigure spectrum(const Context& of) {
     const ModelRun& run = of.record.runs[m];
     const std::size_t samples = std::min(run.residual.size(), kSpectrumSamples);
     const std::size_t begin = (run.residual.size() - samples) / 2;
+    // Windowed once; what is not scored counts as 0 and not to the weights.
+    std::vector<double> windowed(samples, 0.0);
+    double weights = 0.0;
+    for (std::size_t n = 0; n < samples; ++n) {
+      const double error = run.residual[begin + n];
+      if (!std::isfinite(error)) continue;
+      const double hann = 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * static_cast<double>(n) /
+                                               static_cast<double>(samples));
+      windowed[n] = hann * error;
+      weights += hann;
+    }
     const double lowest_Hz = 4.0 * of.rate_Hz / static_cast<double>(samples);
     XySeries series{.label = run.label, .x = {}, .y = {}};
     for (std::size_t k = 0; k < kFrequencies; ++k) {
@@ -154,22 +166,15 @@ XyFigure spectrum(const Context& of) {
           lowest_Hz * std::pow(0.5 * of.rate_Hz / lowest_Hz,
                                static_cast<double>(k) / static_cast<double>(kFrequencies - 1));
       const double turn = 2.0 * std::numbers::pi * frequency_Hz / of.rate_Hz;
-      double real = 0.0;
-      double imaginary = 0.0;
-      double weights = 0.0;
-      for (std::size_t n = 0; n < samples; ++n) {
-        const double error = run.residual[begin + n];
-        if (!std::isfinite(error)) continue;
-        const auto phase = static_cast<double>(n);
-        const double hann =
-            0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * phase / static_cast<double>(samples));
-        real += hann * error * std::cos(turn * phase);
-        imaginary += hann * error * std::sin(turn * phase);
-        weights += hann;
+      const std::complex<double> step = std::polar(1.0, turn);
+      std::complex<double> phase = 1.0;
+      std::complex<double> sum = 0.0;
+      for (const double error : windowed) {
+        sum += error * phase;
+        phase *= step;
       }
       series.x.push_back(frequency_Hz);
-      series.y.push_back(weights > 0.0 ? 2.0 * std::hypot(real, imaginary) / weights
-                                       : kNotMeasured);
+      series.y.push_back(weights > 0.0 ? 2.0 * std::abs(sum) / weights : kNotMeasured);
     }
     figure.series.push_back(std::move(series));
   }
