@@ -19,16 +19,16 @@ using std::numbers::pi;
 constexpr std::array<std::string_view, 4> kNames{"rod", "tube", "coils", "discs"};
 constexpr std::array kKinds{SpringKind::rod, SpringKind::tube, SpringKind::coils,
                             SpringKind::discs};
-constexpr double kGrid_m = 0.1e-3;  // of diameters and lengths
+constexpr double kGrid_m = 0.1e-3;  // for diameters and lengths
 constexpr double kThinnestWall_m = 0.5e-3;
 constexpr double kBuckling = 2.0;         // margin of a tube (assumed)
-constexpr double kPreload = 1.1;          // of coil springs, over their largest travel
+constexpr double kPreload = 1.1;          // for coil springs, over their largest travel
 constexpr double kSlender = 5.2;          // free length over coil diameter, ends guided
 constexpr double kLever_m = 6e-3;         // along the circle, for each spring (assumed)
-constexpr double kDiscPreload = 0.375;    // of h0: discs move from 0 to 0.75 h0
-constexpr double kSolidFriction = 0.003;  // of a metal rod, over its torque (assumed)
+constexpr double kDiscPreload = 0.375;    // share of h0: discs move from 0 to 0.75 h0
+constexpr double kSolidFriction = 0.003;  // metal rod, over its torque (assumed)
 constexpr double kCoilFriction = 0.01;    // at the ends of the springs (assumed)
-constexpr double kDiscFriction = 0.02;    // of each pair of sliding faces (assumed)
+constexpr double kDiscFriction = 0.02;    // for each pair of sliding faces (assumed)
 
 double allowed(const SpringDemand& d) { return d.material.allowed_shear_Pa / d.safety; }
 double wanted(const SpringDemand& d) { return d.torque_Nm / d.angle_rad; }
