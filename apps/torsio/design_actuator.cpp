@@ -6,7 +6,6 @@
 #include "design_flags.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/design/actuator.hpp"
-#include "torsio/sim/sheet_file.hpp"
 
 namespace {
 
@@ -48,10 +47,12 @@ void run(const ActuatorFlags& flags) {
                                                : std::filesystem::path(flags.sheet).stem().string();
   const torsio::ActuatorDesign design =
       torsio::design_actuator(demand, torsio::read_drives(flags.drives), name);
+  const std::string sheet = design.is_feasible
+                                ? sheet_text(design.candidates[design.chosen].sheet, flags.sheet)
+                                : std::string();
   flags.outputs.write(torsio::actuator_report(demand, design));
   if (!flags.plot.empty()) write_text(flags.plot, torsio::pareto_svg(design));
-  if (!flags.sheet.empty())
-    write_text(flags.sheet, torsio::data_sheet_yaml(design.candidates[design.chosen].sheet));
+  if (!flags.sheet.empty()) write_text(flags.sheet, sheet);
 }
 
 }  // namespace

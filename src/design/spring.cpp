@@ -78,7 +78,8 @@ std::optional<SpringDesign> best_rod(const SpringDemand& d, SpringKind kind) {
   for (double outer = up(solid); outer <= d.largest_diameter_m + 1e-12; outer += kGrid_m) {
     SpringDesign design = rod_of(d, kind, outer);
     if (design.is_feasible) return design;
-    if (kind == SpringKind::rod) break;  // a thicker one is longer
+    // A thicker one is longer.
+    if (kind == SpringKind::rod || design.length_m > d.largest_length_m) break;
   }
   return std::nullopt;
 }

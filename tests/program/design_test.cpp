@@ -81,6 +81,10 @@ TEST_F(DesignVerb, RefusesACallBeforeAnyFileIsWritten) {
                kCallWasWrong, "contradict each other");
   expect_error(torsio("design spring --torqe 3Nm"), kCallWasWrong, "Did you mean '--torque'?");
   expect_error(torsio("design clutsch"), kCallWasWrong, "there is no verb 'clutsch'");
+  expect_error(
+      torsio("design spring --torque 50Nm --angle 5deg --max-diameter 60mm --max-length 90mm "
+             "--json a.json --sheet 'my joint.yaml'"),
+      kCallWasWrong, "my joint");
   EXPECT_EQ(contents("a.json"), "");
 }
 
