@@ -3,6 +3,7 @@
 #include "data_flags.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/design/quantity.hpp"
+#include "torsio/sim/sheet_file.hpp"
 
 void DesignOutputs::add(CLI::App& verb, bool has_dxf) {
   verb.add_option("--json", json.destination,
@@ -36,4 +37,11 @@ double needed(const std::string& text, const char* unit, const char* flag) {
     throw torsio::UsageError(
         {.place = flag, .expected = std::string("a value in ") + unit, .found = "nothing"});
   return torsio::quantity_with_unit(text, unit, flag);
+}
+
+std::string sheet_text(const torsio::DataSheet& sheet, const std::string& file) {
+  if (file.empty()) return {};
+  std::string text = torsio::data_sheet_yaml(sheet);
+  static_cast<void>(torsio::parse_data_sheet(text, file));
+  return text;
 }

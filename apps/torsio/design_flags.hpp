@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "output.hpp"
+#include "torsio/actuator/data_sheet.hpp"
 #include "torsio/design/report.hpp"
 
 /// Where a design is written, for every `torsio design`.
@@ -26,6 +27,10 @@ struct DesignOutputs {
                               double none);
 /// The same for a flag that must be given.
 [[nodiscard]] double needed(const std::string& text, const char* unit, const char* flag);
+
+/// The text of a sheet for the file that --sheet names, read again. @throws torsio::UsageError if
+/// `simulate` would refuse it, as for a name with a space; "" if no file is named.
+[[nodiscard]] std::string sheet_text(const torsio::DataSheet& sheet, const std::string& file);
 
 void add_design_spring(CLI::App& design);
 void add_design_actuator(CLI::App& design);

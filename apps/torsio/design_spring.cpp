@@ -6,7 +6,6 @@
 #include "torsio/core/error.hpp"
 #include "torsio/design/outline.hpp"
 #include "torsio/design/spring.hpp"
-#include "torsio/sim/sheet_file.hpp"
 
 namespace {
 
@@ -55,13 +54,15 @@ void run(const SpringFlags& flags) {
     throw torsio::UsageError({.place = "--dxf",
                               .expected = "a rod or a tube, whose outline can be written",
                               .found = std::string(torsio::name_of(design.kind))});
+  const std::string name = std::filesystem::path(flags.sheet).stem().string();
+  const std::string sheet =
+      design.is_feasible ? sheet_text(torsio::spring_sheet(demand, design, name), flags.sheet)
+                         : std::string();
   flags.outputs.write(torsio::spring_report(demand, design));
   if (!flags.outputs.dxf.empty())
     write_text(flags.outputs.dxf,
                torsio::dxf_of_rod(design.outer_m, design.inner_m, design.length_m));
-  if (!flags.sheet.empty())
-    write_text(flags.sheet, torsio::data_sheet_yaml(torsio::spring_sheet(
-                                demand, design, std::filesystem::path(flags.sheet).stem())));
+  if (!flags.sheet.empty()) write_text(flags.sheet, sheet);
 }
 
 }  // namespace

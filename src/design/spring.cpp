@@ -19,14 +19,14 @@ using std::numbers::pi;
 constexpr std::array<std::string_view, 4> kNames{"rod", "tube", "coils", "discs"};
 constexpr std::array kKinds{SpringKind::rod, SpringKind::tube, SpringKind::coils,
                             SpringKind::discs};
-constexpr double kGrid_m = 0.1e-3;  // grid of diameters and lengths
+constexpr double kGrid_m = 0.1e-3;  // for diameters and lengths
 constexpr double kThinnestWall_m = 0.5e-3;
 constexpr double kBuckling = 2.0;         // margin of a tube (assumed)
-constexpr double kPreload = 1.1;          // coil springs: over their largest travel
+constexpr double kPreload = 1.1;          // for coil springs, over their largest travel
 constexpr double kSlender = 5.2;          // free length over coil diameter, ends guided
 constexpr double kLever_m = 6e-3;         // along the circle, for each spring (assumed)
 constexpr double kDiscPreload = 0.375;    // share of h0: discs move from 0 to 0.75 h0
-constexpr double kSolidFriction = 0.003;  // friction of a metal rod over its torque (assumed)
+constexpr double kSolidFriction = 0.003;  // metal rod, over its torque (assumed)
 constexpr double kCoilFriction = 0.01;    // at the ends of the springs (assumed)
 constexpr double kDiscFriction = 0.02;    // for each pair of sliding faces (assumed)
 
@@ -78,7 +78,8 @@ std::optional<SpringDesign> best_rod(const SpringDemand& d, SpringKind kind) {
   for (double outer = up(solid); outer <= d.largest_diameter_m + 1e-12; outer += kGrid_m) {
     SpringDesign design = rod_of(d, kind, outer);
     if (design.is_feasible) return design;
-    if (kind == SpringKind::rod) break;  // a thicker one is longer
+    // A thicker one is longer.
+    if (kind == SpringKind::rod || design.length_m > d.largest_length_m) break;
   }
   return std::nullopt;
 }

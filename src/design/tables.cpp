@@ -113,14 +113,13 @@ DriveTable read_drives(const std::string& path, const Progress& progress) {
   DriveTable drives;
   for (const YamlValue& value : rows_of(table, "gears")) {
     const Row row(value, {"name", "source", "ratio", "continuous_torque", "peak_torque",
-                          "stiffness", "efficiency", "friction", "viscous", "mass"});
+                          "stiffness", "friction", "viscous", "mass"});
     drives.gears.push_back({.name = row.text("name"),
                             .source = row.source(),
                             .ratio = row.positive("ratio", "1"),
                             .continuous_Nm = row.positive("continuous_torque", "Nm"),
                             .peak_Nm = row.positive("peak_torque", "Nm"),
                             .stiffness_Nm_rad = row.positive("stiffness", "Nm_rad"),
-                            .efficiency = row.positive("efficiency", "1"),
                             .friction_Nm = row.positive("friction", "Nm"),
                             .viscous_Nms_rad = row.positive("viscous", "Nms_rad"),
                             .mass_kg = row.positive("mass", "kg")});

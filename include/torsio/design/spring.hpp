@@ -26,7 +26,7 @@ struct SpringDemand {
   double bore_m = 0.0;              ///< diameter that stays free for a cable
   double safety = 1.0;              ///< on the allowed stress
   double load_inertia_kg_m2 = 0.15;
-  double encoder_bits = 19.0;  ///< resolution of each of the two encoders around the spring
+  double encoder_bits = 19.0;  ///< resolution of the encoders around the spring
   SpringMaterial material = {};
   std::vector<BellevilleWasher> washers = {};  ///< for discs
 };

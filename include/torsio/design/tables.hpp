@@ -29,7 +29,6 @@ struct GearChoice {
   double continuous_Nm = 0.0;
   double peak_Nm = 0.0;
   double stiffness_Nm_rad = 0.0;
-  double efficiency = 0.0;
   double friction_Nm = 0.0;      ///< Coulomb, at the output
   double viscous_Nms_rad = 0.0;  ///< at the output
   double mass_kg = 0.0;

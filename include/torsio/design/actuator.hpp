@@ -1,0 +1,89 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "torsio/actuator/data_sheet.hpp"
+#include "torsio/design/report.hpp"
+#include "torsio/design/spring.hpp"
+#include "torsio/design/tables.hpp"
+
+namespace torsio {
+
+/// What a joint has to do, SI.
+struct ActuatorDemand {
+  double continuous_Nm = 0.0;
+  double peak_Nm = 0.0;
+  double speed_rad_s = 0.0;       ///< under the continuous torque
+  double deflection_rad = 0.0;    ///< spring, under the peak torque
+  double bandwidth_rad_s = 0.0;   ///< torque loop, as tune-loop --bandwidth
+  double impedance_Nm_rad = 0.0;  ///< stiffest impedance that must be passive up to 1 Hz
+  double collision_N = std::numeric_limits<double>::infinity();  ///< at the tip of the link
+  double reach_m = 0.5;                                          ///< length of the link
+  double link_inertia_kg_m2 = 0.15;
+  double contact_stiffness_N_m = 75e3;  ///< obstacle (assumed: a hand)
+  double torque_resolution_Nm = std::numeric_limits<double>::infinity();
+  SpringDemand envelope = {};  ///< envelope, bore, material, safety, encoder of the spring
+};
+
+/// A requirement of a demand beside what a drive reaches.
+struct DriveLimit {
+  std::string name;
+  double wanted = 0.0;
+  double reached = 0.0;
+  std::string unit;
+  bool is_upper = false;  ///< the reached value may be at most the wanted one
+  [[nodiscard]] bool is_met() const noexcept {
+    return is_upper ? reached <= wanted : reached >= wanted;
+  }
+  /// How far it is from the demand: 1 or more where it is met.
+  [[nodiscard]] double share() const noexcept {
+    return is_upper ? wanted / reached : reached / wanted;
+  }
+};
+
+/// A gear with a motor and the spring.
+struct DriveCandidate {
+  GearChoice gear;
+  MotorChoice motor;
+  DataSheet sheet;
+  double mass_kg = 0.0;
+  double loop_Hz = 0.0;         ///< largest bandwidth of the torque loop with stable margins
+  double lowest_loop_Hz = 0.0;  ///< below it the spring alone is faster
+  double collision_N = 0.0;
+  double peak_s = 0.0;  ///< how long the peak torque lasts from cold
+  std::vector<DriveLimit> limits = {};
+  [[nodiscard]] bool is_feasible() const noexcept;
+  /// The limit that is furthest from the demand.
+  [[nodiscard]] const DriveLimit& binding() const;
+};
+
+struct ActuatorDesign {
+  SpringDesign spring;
+  std::vector<DriveCandidate> candidates;  ///< by mass
+  std::size_t chosen = 0;                  ///< the lightest that meets all, else the nearest
+  bool is_feasible = false;
+  std::string infeasible = {};
+};
+
+/// Tries all gears and motors of a table with the spring of the demand. Equations: docs/design.
+/// @throws UsageError for a demand that is impossible or contradicts itself.
+[[nodiscard]] ActuatorDesign design_actuator(const ActuatorDemand& demand, const DriveTable& drives,
+                                             const std::string& name);
+
+/// Torque and speed that the simulated plant of a sheet reaches: the speed under the continuous
+/// torque with the rated current, and the spring's torque with the peak current, output locked.
+struct DriveTrial {
+  double speed_rad_s = 0.0;
+  double peak_Nm = 0.0;
+};
+[[nodiscard]] DriveTrial try_drive(const DataSheet& sheet, double continuous_Nm);
+
+[[nodiscard]] DesignReport actuator_report(const ActuatorDemand& demand,
+                                           const ActuatorDesign& design);
+/// Mass against the largest bandwidth of the torque loop: the candidates that meet the demand, the
+/// Pareto front and the choice, as SVG.
+[[nodiscard]] std::string pareto_svg(const ActuatorDesign& design);
+
+}  // namespace torsio
