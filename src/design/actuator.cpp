@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "sim/plant/plant.hpp"
 #include "torsio/control/joint_impedance.hpp"
@@ -157,6 +158,7 @@ DriveCandidate candidate_of(const ActuatorDemand& d, const SpringDesign& spring,
         stiffness * kTurn / std::exp2(d.envelope.encoder_bits), "Nm", true);
   // The loop is analysed only for a drive that is strong enough.
   if (!c.is_feasible()) return c;
+  c.is_loop_analysed = true;
   c.loop_Hz = largest_loop_Hz(sheet, c.lowest_loop_Hz);
   add("bandwidth of the torque loop", d.bandwidth_rad_s / kTurn, c.loop_Hz, "Hz");
   if (d.impedance_Nm_rad > 0.0 && c.loop_Hz > 0.0) {
@@ -227,8 +229,10 @@ ActuatorDesign design_actuator(const ActuatorDemand& demand, const DriveTable& d
   std::ranges::stable_sort(design.candidates, {}, &DriveCandidate::mass_kg);
   const auto found = std::ranges::find_if(design.candidates, &DriveCandidate::is_feasible);
   design.is_feasible = found != design.candidates.end();
-  const auto nearest = std::ranges::max_element(
-      design.candidates, {}, [](const DriveCandidate& c) { return c.binding().share(); });
+  // A drive whose loop was analysed meets all other limits, and is nearer than one that does not.
+  const auto nearest = std::ranges::max_element(design.candidates, {}, [](const DriveCandidate& c) {
+    return std::pair(c.is_loop_analysed, c.binding().share());
+  });
   const auto chosen = design.is_feasible ? found : nearest;
   design.chosen = static_cast<std::size_t>(chosen - design.candidates.begin());
   if (!design.is_feasible) {

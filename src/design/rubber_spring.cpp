@@ -208,6 +208,8 @@ void check(const RubberSpringDemand& d) {
   ordered("least inner radius and wall", d.least_inner_m + d.least_wall_m, d.largest_outer_m, 1e3,
           "mm");
   ordered("least inner radius", d.least_inner_m, d.largest_outer_m, 1e3, "mm");
+  ordered("hardness tolerance", d.hardness_tolerance, 100.0, 1.0, "Shore");
+  ordered("tolerance of the dimensions", d.dimension_tolerance_m, d.largest_outer_m, 1e3, "mm");
   ordered("weight of the length", d.weight_length, 1e9, 1.0, "");
   if (!(d.safety >= 1.0))
     throw UsageError({.place = "rubber spring: safety factor",

@@ -71,6 +71,10 @@ TEST(DesignedActuator, NamesTheLimitThatBinds) {
                            "move to "),
       std::string::npos)
       << fast.infeasible;
+  demand = demand_of(45, 90, 60, 0.3);
+  demand.impedance_Nm_rad = 1000.0;
+  const std::string stiff = design_actuator(demand, read_drives({}), "joint").infeasible;
+  EXPECT_NE(stiff.find("passive stiffness up to 1 Hz binds"), std::string::npos) << stiff;
   demand = demand_of(1000, 1500, 10, 0.5);
   EXPECT_FALSE(design_actuator(demand, read_drives({}), "joint").is_feasible);
 }

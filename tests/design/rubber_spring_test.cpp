@@ -129,6 +129,9 @@ TEST(RubberSpring, RefusesWhatCannotBe) {
   demand.safety = 0.5;
   EXPECT_THROW((void)design_rubber_spring(demand), UsageError);
   demand = demand_002();
+  demand.hardness_tolerance = std::nan("");
+  EXPECT_THROW((void)design_rubber_spring(demand), UsageError);
+  demand = demand_002();
   demand.torque_Nm = -1.0;
   EXPECT_THROW((void)design_rubber_spring(demand), UsageError);
 }

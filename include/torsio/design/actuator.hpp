@@ -49,8 +49,9 @@ struct DriveCandidate {
   MotorChoice motor;
   DataSheet sheet;
   double mass_kg = 0.0;
-  double loop_Hz = 0.0;         ///< largest bandwidth of the torque loop with stable margins
-  double lowest_loop_Hz = 0.0;  ///< below it the spring alone is faster
+  bool is_loop_analysed = false;  ///< only if all other limits are met
+  double loop_Hz = 0.0;           ///< largest bandwidth of the torque loop with stable margins
+  double lowest_loop_Hz = 0.0;    ///< below it the spring alone is faster
   double collision_N = 0.0;
   double peak_s = 0.0;  ///< how long the peak torque lasts from cold
   std::vector<DriveLimit> limits = {};
