@@ -55,8 +55,8 @@ TEST_F(Report, ThatCannotBeWrittenIsRefusedBeforeTheWork) {
 }
 
 TEST_F(Report, OfAComparisonStatesWhyAModelFailed) {
-  const Outcome outcome =
-      torsio("compare a.csv --test b.csv --models linear,dynamic_bouc_wen:iterations=1 --report out.html");
+  const Outcome outcome = torsio(
+      "compare a.csv --test b.csv --models linear,dynamic_bouc_wen:iterations=1 --report out.html");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const std::string page = contents("out.html");
   const std::size_t others = page.find("Not in the ranking");
