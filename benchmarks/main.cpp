@@ -82,6 +82,8 @@ constexpr std::array kBenches{
     Bench{"slip_bank_step", slip_bank_step},
     Bench{"grey_box_step", grey_box_step},
     Bench{"c_step", c_step},
+    Bench{"batch_4096_grey_box", batch_4096_grey_box},
+    Bench{"batch_4096_lstm32", batch_4096_lstm32},
     Bench{"frols_40k", frols_40k, Peer{"numpy", write_frols_40k}},
     Bench{"viscoelastic_step", viscoelastic_step},
     Bench{"hw_fit_40k", hw_fit_40k, Peer{"Octave optim", write_hw_40k}},

@@ -14,6 +14,8 @@ Row dgmm_learn_5000_worst();
 Row grey_box_learn();
 Row em_k100_iteration();
 Row csv_load();
+Row batch_4096_grey_box();
+Row batch_4096_lstm32();
 Row mcap_read();
 Row mat_read();
 Row mat_read_v7();

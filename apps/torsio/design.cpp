@@ -153,7 +153,8 @@ void add_design(CLI::App& app) {
   CLI::App* design =
       app.add_subcommand("design", "size springs, clutch and actuator before they are built");
   design->footer(
-      "Example: torsio design spring --torque 120Nm --angle 6deg --max-diameter 20mm\n"
+      "Example: torsio design spring --torque 120Nm --angle 6deg --max-diameter 20mm "
+      "--max-length 120mm\n"
       "Every length, torque and stress needs its unit. torsio design VERB --help shows the flags.");
   design->require_subcommand(1);
   add_rubber_spring(*design);

@@ -61,13 +61,13 @@ SpringDesign rod_of(const SpringDemand& d, SpringKind kind, double outer) {
       rod_stiffness(outer, design.inner_m, design.length_m, d.material.shear_modulus_Pa);
   design.mass_kg = ring_mass(d, outer, design.inner_m, design.length_m);
   design.friction_share = kSolidFriction;
-  design.dimensions = {
-      "spring",
-      {{"outer_diameter", outer * 1e3, "mm"},
-       {"inner_diameter", design.inner_m * 1e3, "mm"},
-       {"length", design.length_m * 1e3, "mm", "between its ends"},
-       {"shear_stress", stress * 1e-6, "MPa"},
-       {"fatigue_margin", d.material.fatigue_shear_Pa / stress, "", "fully reversed torque"}}};
+  design.dimensions = {"spring",
+                       {{"outer_diameter", outer * 1e3, "mm"},
+                        {"inner_diameter", design.inner_m * 1e3, "mm"},
+                        {"length", design.length_m * 1e3, "mm", "between its ends"},
+                        {"shear_stress", stress * 1e-6, "MPa"},
+                        {"fatigue_margin", d.material.fatigue_shear_Pa / stress, "",
+                         "fully reversed torque; below 1 it does not last"}}};
   if (kind == SpringKind::tube)
     design.dimensions.figures.push_back({"buckling_stress", buckling * 1e-6, "MPa"});
   return design;
