@@ -37,7 +37,7 @@ struct LobeMesh {
 [[nodiscard]] LobeMesh mesh_lobe(const LobeShape& shape, const MeshDensity& density);
 
 /// Smallest determinant of the map from the reference triangle [mm^2] over all corners and middles
-/// of edges; a positive value means that no element is inverted.
+/// of the edges. No element is inverted where this is positive.
 [[nodiscard]] double smallest_jacobian_mm2(const LobeMesh& mesh);
 
 /// Area of the curved triangles [mm^2], by quadrature that is exact for them.
