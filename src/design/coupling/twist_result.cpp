@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <sstream>
@@ -11,6 +12,8 @@
 
 namespace torsio::design {
 namespace {
+
+constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 using Row = std::vector<double>;
 struct Blocks {
@@ -45,7 +48,7 @@ std::map<int, Blocks> read_blocks(const std::string& text) {
       for (std::string word; words >> word;) {
         char* end = nullptr;
         const double value = std::strtod(word.c_str(), &end);
-        row.push_back(*end == '\0' ? value : NAN);
+        row.push_back(*end == '\0' ? value : kNotANumber);
       }
       if (!row.empty()) rows->push_back(std::move(row));
     }
@@ -67,7 +70,8 @@ std::array<double, 2> torques_N(const LobeMesh& mesh, const Blocks& blocks) {
   std::array<double, 2> sums = {};
   for (std::size_t i = 0; i < blocks.forces.size(); ++i) {
     const int number = static_cast<int>(blocks.forces[i][0]) - 1;
-    if (number < 0 || static_cast<std::size_t>(number) >= mesh.nodes.size()) return {NAN, NAN};
+    if (number < 0 || static_cast<std::size_t>(number) >= mesh.nodes.size())
+      return {kNotANumber, kNotANumber};
     const MeshNode& node = mesh.nodes[static_cast<std::size_t>(number)];
     const double x_mm = node.x_mm + blocks.displacements[i][1];
     const double y_mm = node.y_mm + blocks.displacements[i][2];

@@ -90,7 +90,7 @@ Exit run(const std::filesystem::path& folder, const SolverLimits& limits) {
   return result;
 }
 
-/// What the solver's log and its end say about a run that did not reach every twist.
+/// Cause of a run that did not reach every twist, from its log and its end.
 std::string cause(const Exit& exit, const std::string& log, const std::filesystem::path& folder,
                   const SolverLimits& limits) {
   std::error_code ignored;

@@ -36,8 +36,8 @@ struct LobeMesh {
 ///         number of them or a grading outside 1 to 3.
 [[nodiscard]] LobeMesh mesh_lobe(const LobeShape& shape, const MeshDensity& density);
 
-/// Smallest determinant of the map from the reference triangle [mm^2] over all corners and middles
-/// of the edges. No element is inverted where this is positive.
+/// Smallest determinant of the map from the reference triangle [mm^2] over all six nodes. Where it
+/// is positive, no element is inverted.
 [[nodiscard]] double smallest_jacobian_mm2(const LobeMesh& mesh);
 
 /// Area of the curved triangles [mm^2], by quadrature that is exact for them.
