@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <sstream>
 
 #include "torsio/core/error.hpp"
 
@@ -53,6 +55,23 @@ TEST(LobeTwist, TakesNoResultFromAProgramThatSucceedsWithoutOutput) {
   const TwistCurve curve = twist_lobe(coarse_delta(), kRubber, {1.0}, {.program = "true"});
   EXPECT_TRUE(curve.steps.empty());
   EXPECT_THAT(curve.stopped_by, HasSubstr("no result"));
+}
+
+TEST(LobeTwist, ReadsRecordedOutputAndKeepsTheStepsBeforeADefect) {
+  const LobeMesh mesh = mesh_lobe(paper_lobe("delta"), {.radial = 2, .across = 2, .grading = 1.0});
+  std::ifstream file(RECORDED_OUTPUT "/delta_2x2_1_and_3_degrees.dat");
+  std::ostringstream recorded;
+  recorded << file.rdbuf();
+  const std::string text = recorded.str();
+  const TwistCurve whole = read_twists(mesh, {1.0, 3.0}, text);
+  ASSERT_EQ(whole.steps.size(), 2U) << whole.stopped_by;
+  EXPECT_EQ(whole.stopped_by, "");
+  const double ratio = whole.steps[1].torque_N / whole.steps[0].torque_N;
+  EXPECT_GT(ratio, 3.0);  // compression stiffens the lobe
+  EXPECT_LT(ratio, 4.5);
+  const TwistCurve cut = read_twists(mesh, {1.0, 3.0}, text.substr(0, text.size() - 200));
+  ASSERT_EQ(cut.steps.size(), 1U);
+  EXPECT_THAT(cut.stopped_by, HasSubstr("twist of 3 degrees not reached"));
 }
 
 // Reference: 79.0 Nmm/mm and 34.4 Nmm/mm on an 8 x 6 mesh of wedges with K/G = 500, from another
