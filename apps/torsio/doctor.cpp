@@ -20,12 +20,14 @@ namespace {
 
 std::string instruction_sets() {
 #if defined(__x86_64__)
+  // NOLINTBEGIN(readability-implicit-bool-conversion): int with GCC, bool with Clang
   std::string text = "SSE2";
   if (__builtin_cpu_supports("ssse3") != 0) text += ", SSSE3";
   if (__builtin_cpu_supports("sse4.2") != 0) text += ", SSE4.2";
   if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0)
     text += ", AVX2 with FMA";
   if (__builtin_cpu_supports("avx512f") != 0) text += ", AVX-512";
+#undef has
   return text;
 #elif defined(__aarch64__)
   return "NEON";
@@ -55,7 +57,7 @@ bool is_realtime_kernel() {
 
 std::string memory_text() {
   constexpr double kMebi = 1024.0 * 1024.0;
-  const double page = static_cast<double>(::sysconf(_SC_PAGESIZE));
+  const auto page = static_cast<double>(::sysconf(_SC_PAGESIZE));
   return fmt::format("{:.0f} MiB, of them {:.0f} MiB free",
                      page * static_cast<double>(::sysconf(_SC_PHYS_PAGES)) / kMebi,
                      page * static_cast<double>(::sysconf(_SC_AVPHYS_PAGES)) / kMebi);
@@ -63,6 +65,7 @@ std::string memory_text() {
 
 /// The first of some programs in PATH; empty: none.
 std::string program_in_path(std::initializer_list<const char*> names) {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): the environment is not written
   const char* const path = std::getenv("PATH");
   for (std::string rest = path == nullptr ? "" : path; !rest.empty();) {
     const std::size_t end = rest.find(':');
@@ -76,6 +79,7 @@ std::string program_in_path(std::initializer_list<const char*> names) {
 }
 
 std::string data_text() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): the environment is not written
   const char* const folder = std::getenv("TORSIO_DATA");
   if (folder == nullptr) return "TORSIO_DATA is not set: no public recordings";
   return std::filesystem::is_directory(folder) ? folder : fmt::format("{}: no such folder", folder);

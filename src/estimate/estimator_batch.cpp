@@ -290,9 +290,17 @@ Estimate EstimatorBatch::Rows::ordinary_step(std::size_t row) noexcept {
   });
   if (!is_network) {
     const auto bytes = state(row).subspan(core_bytes);
-    model_state.read(bytes);
-    estimate = worker.model.step(now);
-    model_state.write(bytes);
+    if (model_state.is_valid()) {
+      model_state.read(bytes);
+      estimate = worker.model.step(now);
+      model_state.write(bytes);
+    } else {
+      StateBytes from(StateBytes::Task::read, bytes);
+      detail::visit_state_of(worker.model, from);
+      estimate = worker.model.step(now);
+      StateBytes to(bytes);
+      detail::visit_state_of(worker.model, to);
+    }
   }
   if (estimate.fault != Fault::none || !std::isfinite(estimate.value))
     return unusable(row, estimate);

@@ -73,6 +73,10 @@ class StateBytes {
     visit_at_most(number, static_cast<std::uint8_t>(most));
     if (task_ == Task::read && is_valid_) enumerator = static_cast<Enum>(number);
   }
+  /// The members exchange their memory in a step: `StateSegments` cannot be used.
+  void refuse_list() noexcept {
+    if (task_ == Task::list) fail();
+  }
   /// The object cannot be saved, or the bytes are not its own.
   void fail() noexcept { is_valid_ = false; }
 
@@ -123,13 +127,16 @@ class StateSegments {
   explicit StateSegments(const Visit& visit) {
     StateBytes bytes(segments_);
     visit(bytes);
+    is_valid_ = bytes.is_valid();
   }
+  [[nodiscard]] bool is_valid() const noexcept { return is_valid_; }
   /// @param bytes written by `write` or by the object's own `visit_state`
   void read(std::span<const std::byte> bytes) const noexcept;
   void write(std::span<std::byte> bytes) const noexcept;
 
  private:
   std::vector<StateSegment> segments_;
+  bool is_valid_ = false;
 };
 
 /// A hash of numbers and texts, which differs for the states of different models; not a protection

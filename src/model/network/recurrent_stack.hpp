@@ -50,6 +50,7 @@ class RecurrentStack {
 
   /// The members that change in a step, padding included: whatever vectors the machine has.
   void visit_state(detail::StateBytes& bytes) noexcept {
+    bytes.refuse_list();  // a step exchanges the hidden state and its next one
     for (Packed& layer : layers_) bytes.visit(layer.hidden, layer.cell);
   }
 
