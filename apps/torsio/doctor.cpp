@@ -27,7 +27,7 @@ std::string instruction_sets() {
   if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0)
     text += ", AVX2 with FMA";
   if (__builtin_cpu_supports("avx512f") != 0) text += ", AVX-512";
-#undef has
+  // NOLINTEND(readability-implicit-bool-conversion)
   return text;
 #elif defined(__aarch64__)
   return "NEON";
