@@ -22,8 +22,9 @@ RubberSpringDemand demand_002() {
 constexpr RubberRing kPublishedRing{0.010, 0.0082, 0.004};
 
 void add(QuantityTable& table, const char* condition, const char* quantity, double value,
-         const char* unit, std::optional<PaperFigure> published = {}, std::string remark = {}) {
-  table.rows.push_back({condition, quantity, value, unit, std::move(published), std::move(remark)});
+         const char* unit, std::optional<PaperFigure> published = {},
+         const std::string& remark = {}) {
+  table.rows.push_back({condition, quantity, value, unit, published, remark});
 }
 
 }  // namespace

@@ -71,7 +71,9 @@ std::optional<RubberRing> best_ring(const RubberSpringDemand& demand) {
   for (int i = 1; i < kSearch; ++i) take(from + i * step);
   if (!best) return best;
   // The best of the grid is refined in ever smaller steps.
-  for (double width = step; width > 1e-12; width *= 0.5) {
+  constexpr int kHalvings = 40;
+  double width = step;
+  for (int i = 0; i < kHalvings; ++i, width *= 0.5) {
     const double middle = best->outer_m;
     take(middle - 0.5 * width);
     take(middle + 0.5 * width);

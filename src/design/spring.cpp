@@ -75,7 +75,9 @@ SpringDesign rod_of(const SpringDemand& d, SpringKind kind, double outer) {
 
 std::optional<SpringDesign> best_rod(const SpringDemand& d, SpringKind kind) {
   const double solid = std::cbrt(16.0 * d.torque_Nm / (pi * allowed(d)));
-  for (double outer = up(solid); outer <= d.largest_diameter_m + 1e-12; outer += kGrid_m) {
+  const double first = up(solid);
+  for (int i = 0; first + i * kGrid_m <= d.largest_diameter_m + 1e-12; ++i) {
+    const double outer = first + i * kGrid_m;
     SpringDesign design = rod_of(d, kind, outer);
     if (design.is_feasible) return design;
     // A thicker one is longer.
@@ -136,9 +138,10 @@ std::optional<SpringDesign> best_coils(const SpringDemand& d) {
   std::optional<SpringDesign> best;
   for (const int n : {2, 4, 6, 8})
     for (const double wire_mm : kWires_mm)
-      for (double index = 4.0; index <= 12.0; index += 0.5)
-        for (double share = 0.4; share < 0.99; share += 0.02) {
-          auto design = coils_of(d, n, wire_mm * 1e-3, index, 0.5 * share * d.largest_diameter_m);
+      for (int twice_index = 8; twice_index <= 24; ++twice_index)
+        for (int percent = 40; percent < 99; percent += 2) {
+          const double radius = 0.005 * percent * d.largest_diameter_m;
+          auto design = coils_of(d, n, wire_mm * 1e-3, 0.5 * twice_index, radius);
           if (design && (!best || design->mass_kg < best->mass_kg)) best = std::move(design);
         }
   return best;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <variant>
 
+#include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/design/spring.hpp"
 
@@ -67,6 +68,7 @@ DataSheet spring_sheet(const SpringDemand& d, const SpringDesign& design, const 
     if (each.family != ActuatorFamily::series_elastic) continue;
     if (base == nullptr || base->rating.torque_Nm.value < d.torque_Nm) base = &each;
   }
+  if (base == nullptr) throw Error({.problem = "no series-elastic drive is known"});
   DataSheet sheet = *base;
   sheet.name = name;
   sheet.title = fmt::format("designed spring of {:.4g} Nm/rad in the drive of {}",

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <utility>
 
 #include "data/yaml_reader.hpp"
 #include "shipped_tables.hpp"
@@ -22,14 +23,14 @@ YamlValue document(const std::string& path, std::string_view shipped, const char
 /// An entry of a table: its values in SI, each read once.
 class Row {
  public:
-  Row(const YamlValue& value, std::initializer_list<std::string_view> keys) : value_(value) {
+  Row(YamlValue value, std::initializer_list<std::string_view> keys) : value_(std::move(value)) {
     value_.allow_only(keys);
   }
   [[nodiscard]] std::string text(std::string_view key) const { return value_.at(key).text(); }
   /// "printed: ..." or "assumed: ...".
   [[nodiscard]] std::string source() const {
     const YamlValue source = value_.at("source");
-    const std::string text = source.text();
+    std::string text = source.text();
     if (!text.starts_with("printed") && !text.starts_with("assumed"))
       source.refuse("a source that begins with 'printed' or 'assumed'");
     return text;

@@ -59,7 +59,10 @@ double jacobian_mm2(const LobeMesh& mesh, const std::array<int, 6>& triangle, do
   const double t = 1.0 - r - s;
   const std::array<double, 6> by_r = {1 - 4 * t, 4 * r - 1, 0, 4 * (t - r), 4 * s, -4 * s};
   const std::array<double, 6> by_s = {1 - 4 * t, 0, 4 * s - 1, -4 * r, 4 * r, 4 * (t - s)};
-  double xr = 0, xs = 0, yr = 0, ys = 0;
+  double xr = 0.0;
+  double xs = 0.0;
+  double yr = 0.0;
+  double ys = 0.0;
   for (std::size_t i = 0; i < 6; ++i) {
     const MeshNode& node = mesh.nodes[static_cast<std::size_t>(triangle[i])];
     xr += by_r[i] * node.x_mm;
@@ -88,10 +91,14 @@ LobeMesh mesh_lobe(const LobeShape& shape, const MeshDensity& density) {
           2.0 * graded(static_cast<double>(j) / columns, density.grading) - 1.0, outer_end_rad));
   for (int i = 0; i < rows; i += 2) {
     for (int j = 0; j < columns; j += 2) {
-      const int a = number(i, j), b = number(i + 2, j);
-      const int c = number(i + 2, j + 2), d = number(i, j + 2);
-      const int ab = number(i + 1, j), bc = number(i + 2, j + 1);
-      const int cd = number(i + 1, j + 2), da = number(i, j + 1);
+      const int a = number(i, j);
+      const int b = number(i + 2, j);
+      const int c = number(i + 2, j + 2);
+      const int d = number(i, j + 2);
+      const int ab = number(i + 1, j);
+      const int bc = number(i + 2, j + 1);
+      const int cd = number(i + 1, j + 2);
+      const int da = number(i, j + 1);
       const int middle = number(i + 1, j + 1);
       if ((i < density.radial) == (j < density.across)) {
         mesh.triangles.push_back({a, b, c, ab, bc, middle});

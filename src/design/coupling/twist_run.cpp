@@ -1,11 +1,13 @@
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -65,15 +67,16 @@ struct Exit {
 }
 
 Exit run(const std::filesystem::path& folder, const SolverLimits& limits) {
-  std::string program = limits.program, option = "-i", job = "lobe", env = "env";
-  std::string one = "OMP_NUM_THREADS=1", also_one = "OPENBLAS_NUM_THREADS=1";
-  char* arguments[] = {env.data(),    one.data(), also_one.data(), program.data(),
-                       option.data(), job.data(), nullptr};
+  std::array<std::string, 6> words{
+      "env", "OMP_NUM_THREADS=1", "OPENBLAS_NUM_THREADS=1", limits.program, "-i", "lobe"};
+  std::array<char*, words.size() + 1> arguments{};
+  std::ranges::transform(words, arguments.begin(), [](std::string& word) { return word.data(); });
   const std::string directory = folder.string();
   const pid_t child = ::fork();
   if (child < 0) throw Error({.place = limits.program, .problem = "cannot start a process"});
   if (child == 0)
-    become_solver(directory.c_str(), arguments, static_cast<rlim_t>(limits.memory_MiB) << 20);
+    become_solver(directory.c_str(), arguments.data(),
+                  static_cast<rlim_t>(limits.memory_MiB) << 20);
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::duration<double>(limits.time_s);
   Exit result;
