@@ -9,6 +9,7 @@
 #include <limits>
 #include <variant>
 
+#include "model/grey_box/grey_box_rows.hpp"
 #include "model/network/dense_stack.hpp"
 #include "model/network/gru.hpp"
 #include "model/network/lstm.hpp"
@@ -44,7 +45,7 @@ class NetworkRows {
       first += count;
     }
   }
-  [[nodiscard]] const Estimate& estimate(std::size_t row) const noexcept { return estimates_[row]; }
+  [[nodiscard]] Estimate estimate(std::size_t row) const noexcept { return estimates_[row]; }
 
   /// From the bytes of the model's state. @returns false, without effect, while it warms up.
   [[nodiscard]] bool read(std::size_t row, std::span<const std::byte> bytes) noexcept {
@@ -90,22 +91,26 @@ class NetworkRows {
   std::vector<Estimate> estimates_;
 };
 
-struct NoNetwork {};
-using Networks = std::variant<NoNetwork, NetworkRows<LstmLayer>, NetworkRows<GruLayer>>;
+/// A model that is evaluated for all rows together; the first: none, the rows are evaluated one by one.
+using ModelRows =
+    std::variant<std::monostate, NetworkRows<LstmLayer>, NetworkRows<GruLayer>, GreyBoxRows>;
 
-Networks networks_of(const AnyModel& model, std::size_t rows) {
+ModelRows model_rows_of(const AnyModel& model, std::size_t rows) {
   if (const auto* const lstm = model.get_if<Lstm>())
     return NetworkRows<LstmLayer>(lstm->parameters(), rows);
   if (const auto* const gru = model.get_if<Gru>())
     return NetworkRows<GruLayer>(gru->parameters(), rows);
-  return NoNetwork{};
+  const auto* const box = model.get_if<GreyBox>();
+  if (box != nullptr && GreyBoxRows::supports(box->parameters())) return GreyBoxRows(*box, rows);
+  return {};
 }
 
-/// use(network), if there is one; else `otherwise`. std::visit could throw.
+/// use(rows), if there are any; else `otherwise`. std::visit could throw.
 template <class Use>
-bool use_network(Networks& networks, bool otherwise, const Use& use) noexcept {
-  if (auto* const lstm = std::get_if<NetworkRows<LstmLayer>>(&networks)) return use(*lstm);
-  if (auto* const gru = std::get_if<NetworkRows<GruLayer>>(&networks)) return use(*gru);
+bool use_rows(ModelRows& rows, bool otherwise, const Use& use) noexcept {
+  if (auto* const lstm = std::get_if<NetworkRows<LstmLayer>>(&rows)) return use(*lstm);
+  if (auto* const gru = std::get_if<NetworkRows<GruLayer>>(&rows)) return use(*gru);
+  if (auto* const box = std::get_if<GreyBoxRows>(&rows)) return use(*box);
   return otherwise;
 }
 
@@ -169,7 +174,7 @@ struct EstimatorBatch::Rows {
   std::vector<std::byte> start;       ///< the state after a reset
   std::vector<std::byte> states;      ///< rows x state_bytes
   FeatureColumns columns;
-  Networks networks;
+  ModelRows model_rows;
   std::vector<std::uint8_t> is_at_rest;
   std::vector<std::uint8_t> is_ordinary;
   std::vector<double> previous_raw;  ///< rows x channels, of rows at rest
@@ -186,7 +191,7 @@ EstimatorBatch::Rows::Rows(const EstimatorSettings& settings, const AnyModel& mo
       channels(worker.core.raw_inputs().size()),
       inputs(model.input_count()),
       columns(settings.features, settings.sample_rate_Hz, rows),
-      networks(networks_of(model, rows)),
+      model_rows(model_rows_of(model, rows)),
       is_at_rest(rows, 0),
       is_ordinary(rows, 0),
       previous_raw(rows * channels),
@@ -222,8 +227,8 @@ void EstimatorBatch::Rows::leave_rest(std::size_t row) noexcept {
   read(worker.core, state(row).first(core_bytes));
   worker.core.continue_after(previous_raw.data() + row * channels, last_value[row]);
   write(worker.core, state(row).first(core_bytes));
-  use_network(networks, false, [&](auto& network) {
-    network.write(row, state(row).subspan(core_bytes));
+  use_rows(model_rows, false, [&](auto& together) {
+    together.write(row, state(row).subspan(core_bytes));
     return true;
   });
 }
@@ -231,8 +236,8 @@ void EstimatorBatch::Rows::leave_rest(std::size_t row) noexcept {
 void EstimatorBatch::Rows::find_rest(std::size_t row) noexcept {
   if (!columns.is_supported() || !worker.core.is_at_rest()) return;
   if (!columns.read(row, state(row))) return;
-  const bool is_warm = use_network(networks, true, [&](auto& network) {
-    return network.read(row, state(row).subspan(core_bytes));
+  const bool is_warm = use_rows(model_rows, true, [&](auto& together) {
+    return together.read(row, state(row).subspan(core_bytes));
   });
   if (!is_warm) return;
   std::ranges::copy(worker.core.previous_raw(),
@@ -284,11 +289,11 @@ void EstimatorBatch::Rows::find_ordinary(std::size_t first, std::size_t rows,
 Estimate EstimatorBatch::Rows::ordinary_step(std::size_t row) noexcept {
   Estimate estimate;
   const Features now = std::span<const double>(features).subspan(row * inputs, inputs);
-  const bool is_network = use_network(networks, false, [&](const auto& network) {
-    estimate = network.estimate(row);
+  const bool is_together = use_rows(model_rows, false, [&](const auto& together) {
+    estimate = together.estimate(row);
     return true;
   });
-  if (!is_network) {
+  if (!is_together) {
     const auto bytes = state(row).subspan(core_bytes);
     if (model_state.is_valid()) {
       model_state.read(bytes);
@@ -336,8 +341,8 @@ void EstimatorBatch::Rows::step(std::span<const double> raw,
   for (std::size_t first = 0; first < count; first += FeatureColumns::kBlock)
     find_ordinary(first, std::min(FeatureColumns::kBlock, count - first),
                   raw.data() + first * channels);
-  use_network(networks, false, [&](auto& network) {
-    network.step(features);
+  use_rows(model_rows, false, [&](auto& together) {
+    together.step(features);
     return true;
   });
   for (std::size_t row = 0; row < count; ++row)

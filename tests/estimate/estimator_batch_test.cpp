@@ -20,6 +20,7 @@
 #include "support/examples/network.hpp"
 #include "support/random_network.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/core/matrix.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
@@ -65,11 +66,38 @@ Lstm wide_lstm() {
   return Lstm(test::random_network<Lstm>({.units = {32}, .hidden = {}, .warm_up_samples = 3}, 8));
 }
 
+/// Every kind of term that a grey box may have, with knots at several places.
+GreyBox::Parameters grey_box_with_banks(std::size_t friction_knots) {
+  GreyBox::Parameters parameters;
+  std::vector<double> friction;
+  for (std::size_t k = 0; k < friction_knots; ++k)
+    friction.push_back(-0.05 + 0.04 * static_cast<double>(k));
+  parameters.terms = {.curve_knots = {-0.05, -0.01, 0.02, 0.04},
+                      .thresholds = {0.001, 0.004, 0.02},
+                      .friction_knots = friction,
+                      .time_constants_s = {0.02, 0.3},
+                      .rate_scales = {0.0, 0.02},
+                      .sample_period_s = 0.001,
+                      .banks = {{.input = 1, .thresholds = {0.002}, .force_knots = friction},
+                                {.input = 1,
+                                 .is_integrated = true,
+                                 .thresholds = {1e-6, 1e-5},
+                                 .curve_knots = {-0.01, -0.002, 0.003, 0.008},
+                                 .product_knots = {-0.02, 0.0, 0.03},
+                                 .time_constants_s = {0.05}}}};
+  Random random(friction_knots);
+  parameters.coefficients.values = Matrix(1, parameters.terms.columns());
+  for (double& each : parameters.coefficients.values.values) each = random.normal();
+  return parameters;
+}
+
 std::vector<AnyModel> models() {
   return {example<Lstm>(),
           example<Gru>(),
           wide_lstm(),
           example<GreyBox>(),
+          GreyBox(grey_box_with_banks(1)),
+          GreyBox(grey_box_with_banks(3)),
           example<MaxwellSlipModel>(),
           example<Narx<Linear>>(),
           example<Polynomial>(),

@@ -119,6 +119,17 @@ void GreyBoxTerms::set_state(std::span<const double> state) noexcept {
   }
 }
 
+void GreyBoxTerms::get_last(std::span<double> inputs) const noexcept {
+  inputs[0] = last_;
+  for (std::size_t k = 0; k < banks_.size(); ++k) inputs[k + 1] = banks_[k].last();
+}
+
+void GreyBoxTerms::set_last(std::span<const double> inputs) noexcept {
+  last_ = inputs[0];
+  is_started_ = true;
+  for (std::size_t k = 0; k < banks_.size(); ++k) banks_[k].set_last(inputs[k + 1]);
+}
+
 void GreyBoxTerms::jump_banks(Features features, std::span<double> state) const noexcept {
   for (std::size_t k = 0; k < banks_.size(); ++k) {
     banks_[k].jump(features[structure_.banks[k].input], state);

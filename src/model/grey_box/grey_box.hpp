@@ -99,6 +99,15 @@ class GreyBoxTerms {
   /// Last x; 0 before the first.
   [[nodiscard]] double position() const noexcept { return last_; }
 
+  /// Whether x and the input of every bank have had a value since the reset.
+  [[nodiscard]] bool is_started() const noexcept {
+    return is_started_ && std::ranges::all_of(banks_, &InputBankTerms::is_started);
+  }
+  /// The last x and the last input of each bank. @param inputs 1 + number of banks
+  void get_last(std::span<double> inputs) const noexcept TORSIO_REALTIME;
+  /// As if these had been the last inputs.
+  void set_last(std::span<const double> inputs) noexcept TORSIO_REALTIME;
+
   /// s_i / r_i, then v_j, then the same of each bank.
   [[nodiscard]] std::span<const double> state() const noexcept { return state_; }
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;

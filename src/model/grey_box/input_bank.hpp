@@ -97,6 +97,14 @@ class InputBankTerms {
   /// What is not finite is passed over. @param state `bank.states()` numbers
   void set_state(std::span<const double> state) noexcept TORSIO_REALTIME;
 
+  /// Last u, and whether there was one since the reset.
+  [[nodiscard]] double last() const noexcept { return last_; }
+  [[nodiscard]] bool is_started() const noexcept { return is_started_; }
+  void set_last(double u) noexcept {
+    last_ = u;
+    is_started_ = true;
+  }
+
   /// The state if u were here at once: nothing relaxes on the way.
   void jump(double u, std::span<double> state) const noexcept TORSIO_REALTIME;
 

@@ -90,6 +90,14 @@ class SlipBank {
     return sum(weights);
   }
 
+  /// The increment by which the elements move: 0 instead of NaN, the largest number instead of infinity, so
+  /// that no product with a stiffness is NaN.
+  [[nodiscard]] static double finite(double increment) noexcept {
+    constexpr double kLargest = std::numeric_limits<double>::max();
+    if (std::abs(increment) <= kLargest) return increment;
+    return std::isnan(increment) ? 0.0 : std::copysign(kLargest, increment);
+  }
+
   /// The members that change in a step.
   void visit_state(detail::StateBytes& bytes) noexcept { bytes.visit(force_); }
 
@@ -112,13 +120,6 @@ class SlipBank {
     const double force = force_[i] + stiffness_[i] * dx;
     const double above = force < -limit ? -limit : force;
     return above > limit ? limit : above;
-  }
-
-  /// So that no product with a stiffness is NaN.
-  [[nodiscard]] static double finite(double increment) noexcept {
-    constexpr double kLargest = std::numeric_limits<double>::max();
-    if (std::abs(increment) <= kLargest) return increment;
-    return std::isnan(increment) ? 0.0 : std::copysign(kLargest, increment);
   }
 
   std::size_t size_ = 0;
