@@ -22,12 +22,12 @@ class GreyBoxRows {
   /// Whether the coefficients are not scheduled and there is no residual.
   [[nodiscard]] static bool supports(const GreyBox::Parameters& parameters) noexcept;
 
-  /// @param model of which `supports` holds
+  /// @param model one for which `supports` holds
   GreyBoxRows(const GreyBox& model, std::size_t rows);
 
   /// @param features rows x inputs
   void step(std::span<const double> features) noexcept TORSIO_REALTIME;
-  /// Of the last `step`.
+  /// The estimate of the last `step`.
   [[nodiscard]] Estimate estimate(std::size_t row) const noexcept { return {.value = value_[row]}; }
 
   /// From the bytes of a model's state. @returns false, without effect, before the model's first step.
@@ -47,8 +47,7 @@ class GreyBoxRows {
   /// Slip elements and relaxations over one input.
   struct Motion {
     std::size_t input = 0;
-    double period_s =
-        0.0;  ///< of an integrated input; 0: the slip elements follow the input itself
+    double period_s = 0.0;  ///< sample period, if the slip elements follow the integral; else 0
     std::vector<double> stiffness = {};  ///< 1 / r_i
     std::vector<double> decay = {};
     std::vector<double> gain = {};
@@ -56,8 +55,8 @@ class GreyBoxRows {
   };
   /// What the inputs did in this tick.
   struct Moves {
-    Block travel;     ///< of the coordinate of the slip elements
-    Block increment;  ///< of the input
+    Block travel;     ///< the increment of the coordinate of the slip elements
+    Block increment;  ///< the increment of the input
     std::array<std::uint8_t, kGroup> is_usable;
   };
 
@@ -80,12 +79,12 @@ class GreyBoxRows {
 
   GreyBoxTerms terms_;  ///< takes up the state of a row
   std::vector<double> coefficients_;
-  std::vector<Motion> motions_;  ///< that of x, then one for each bank
+  std::vector<Motion> motions_;  ///< the motion of x, then one for each bank
   std::size_t state_columns_ = 0;
   detail::AlignedVector<Block> states_;  ///< groups x columns
-  std::vector<double> row_state_;        ///< of one row, as `GreyBoxTerms::state`
-  std::vector<double> row_inputs_;       ///< last inputs of one row, one for each motion
-  std::vector<Block> inputs_;            ///< of the group
+  std::vector<double> row_state_;   ///< the state of one row, in the order of `GreyBoxTerms::state`
+  std::vector<double> row_inputs_;  ///< last inputs of one row, one for each motion
+  std::vector<Block> inputs_;       ///< the features of the group
   Cells cells_;
   std::vector<double> value_;
 };
