@@ -59,6 +59,7 @@ void Monitor::clear() noexcept {
   disagreeing_count_ = 0;
   findings_count_ = 0;
   is_threshold_too_large_ = false;
+  is_warming_up_ = false;
   active_ = 0;
   late_ = 0;
   silent_since_s_ = kNotMeasured;
@@ -306,8 +307,9 @@ void Monitor::decide(double t_s) noexcept {
     reason_ = stop_found_;
     return;
   }
-  // Before it is armed every finding begins the proof again, warnings included.
-  if (active_ != 0 || is_threshold_too_large_) {
+  // Before it is armed every finding begins the proof again, warnings included. A source that warms up has
+  // not been compared with any other.
+  if (active_ != 0 || is_threshold_too_large_ || is_warming_up_) {
     silent_since_s_ = kNotMeasured;
     state_ = State::unproven;
     return;
@@ -323,6 +325,7 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
   disagreeing_count_ = 0;
   findings_count_ = 0;
   is_threshold_too_large_ = false;
+  is_warming_up_ = false;
   stop_found_ = {};
   check_period(t_s);
   if (sources.size() != settings_.sources.size() || signals.size() != settings_.signals.size()) {
@@ -337,7 +340,9 @@ Monitor::State Monitor::step(double t_s, std::span<const Estimate> sources,
   std::size_t left = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     check_source(i, sources[i]);
-    if (!is_lost(sources[i]) && sources[i].fault != Fault::warming_up) ++left;
+    const bool is_warming_up = sources[i].fault == Fault::warming_up;
+    is_warming_up_ = is_warming_up_ || is_warming_up;
+    if (!is_lost(sources[i]) && !is_warming_up) ++left;
   }
   if (sources.size() > 1 && left < 2)
     find(

@@ -728,14 +728,26 @@ TEST(Monitor, ContinuesWithoutOneOfThreeSourcesForAWhile) {
 
 TEST(Monitor, ASourceThatWarmsUpIsNotUsedAndNoFinding) {
   Loop loop;
+  loop.start();
   loop.sources[2].fault = Fault::warming_up;
   loop.sources[2].value = 1000.0;
-  loop.start();
   loop.step_for(2000);
   EXPECT_TRUE(loop.monitor.is_watching());
   EXPECT_EQ(loop.monitor.active(), 0U);
   loop.sources[1].fault = Fault::warming_up;
   EXPECT_EQ(loop.ticks_to_stop(), 1) << "fewer than two are left";
+}
+
+// A monitor was once armed before a source could be compared, and stopped after that.
+TEST(Monitor, IsNotReadyWhileASourceWarmsUp) {
+  Loop loop;
+  loop.sources[2].fault = Fault::warming_up;
+  loop.step_for(2000);
+  EXPECT_EQ(loop.monitor.state(), State::unproven);
+  EXPECT_EQ(loop.monitor.active(), 0U);
+  loop.sources[2].fault = Fault::none;
+  loop.start();
+  EXPECT_TRUE(loop.monitor.is_watching());
 }
 
 TEST(Monitor, ALossThatEndsIsCompensatedByFourTimesItsLength) {

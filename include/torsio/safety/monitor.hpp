@@ -129,7 +129,7 @@ struct DriftSums {
 
 /// Decides in every tick whether a joint may move with the torque that its sources estimate.
 ///
-///     unproven  --every check silent for proof_s, and armed-->  watching
+///     unproven  --every check silent and no source warming up for proof_s, and armed-->  watching
 ///     watching  --a check whose action is stop-->  stopped  --reset-->  unproven
 ///
 /// A stop is latched: only `reset` ends it, and the joint may move again after the proof and `arm`
@@ -146,7 +146,7 @@ struct DriftSums {
 ///   `largest_hidden_travel`; at rest there is no travel.
 ///
 /// The monitor is not ready while a pair's h, without the ceiling, is above largest_armed, as long
-/// as the friction of a drive is unknown.
+/// as the friction of a drive is unknown, nor while a source warms up, for nothing is compared with it.
 ///
 /// Every comparison is written so that NaN is a fault, but that of the novelty, which most models do
 /// not have. Source: specification 3.9 for the residuals; Page 1954 for the cumulative sum; states
@@ -258,6 +258,7 @@ class Monitor {
   std::uint32_t late_ = 0;
   double silent_since_s_ = kNotMeasured;
   bool is_threshold_too_large_ = false;
+  bool is_warming_up_ = false;
   double reset_t_s_ = -std::numeric_limits<double>::infinity();
   double before_reset_s_ = -std::numeric_limits<double>::infinity();  ///< last tick before it
 };
