@@ -80,7 +80,7 @@ struct CalibratedMonitor {
 ///   above their 90 % quantile, which gives the threshold for the wanted rate, at least 1.05 times
 ///   the largest one observed. The ceiling is 1.25 times the largest h since
 ///   the pair was first narrow enough to be armed. If a required disagreement is given, it is at most
-///   the largest of the floor, 0.7 times what is required, and the threshold of |d| in every state, so
+///   the largest of the floor, 0.8 times what is required, and the threshold of |d| in every state, so
 ///   that error bars that grow further do not hide what has to be found.
 /// - Error bars, correlation of the sources' errors and factors of the combination: where the
 ///   recordings have the measured torque.

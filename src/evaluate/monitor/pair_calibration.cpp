@@ -16,7 +16,7 @@ namespace {
 constexpr double kArmedShare = 0.8;  // threshold that is armed, over the required disagreement
 constexpr double kCeilingMargin = 1.25;
 /// The least ceiling, over the required disagreement: the rest is for a difference without a fault.
-constexpr double kCeilingShare = 0.7;
+constexpr double kCeilingShare = 0.8;
 constexpr double kDriftWindow_s = 60.0;
 
 /// The differences of two sources in the recordings.

@@ -27,7 +27,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kResultVersion = 4;  // version of the results of units
+constexpr int kResultVersion = 5;  // version of the results of units
 constexpr std::size_t kInjectionsAUnit = 32;
 constexpr std::size_t kJointsAUnit = 16;
 constexpr double kUnitHours = 1.0;  // hours of each joint

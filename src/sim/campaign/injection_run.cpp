@@ -18,7 +18,7 @@ constexpr double kLatestStart_s = 20.0;
 constexpr double kWindow_s = 20.0;      // in which the disagreement must reach its limit
 constexpr double kSmallWindow_s = 5.0;  // a small one need not reach it
 constexpr double kMissed_s = 1.0;
-constexpr double kPause_s = 0.01;  // after which a disagreement has ended
+constexpr double kPause_s = 0.005;  // after which a disagreement has ended
 constexpr double kNearImpact_s = 0.1;
 constexpr double kSearchImpact_s = 30.0;
 constexpr int kMaxAttempts = 8;
@@ -95,8 +95,11 @@ struct Attempt {
   std::size_t reached_tick = 0;                ///< the last one in which it was at the limit
   bool is_lasting = false;     ///< it has lasted as long as a stop may take, and counts
   std::size_t late_steps = 0;  ///< steps of the loop since an overrun began
-  int watched_ticks = 0;       ///< after the onset of a fault at power-up
-  bool would_watch = false;    ///< with the sound signals, while that fault lasts
+  // Of a fault at power-up, which may disagree several times before it ends.
+  int watched_ticks = 0;          ///< in the disagreement in progress
+  bool would_watch = false;       ///< with the sound signals, in that disagreement
+  int longest_watched_ticks = 0;  ///< of the disagreements that lasted
+  bool has_lasted = false;        ///< in one of them the monitor would have watched
   bool is_done = false;
 };
 
@@ -196,7 +199,9 @@ class Injections {
     if (of.sound) {
       of.sound->step(bench.time_s(), bench.sound(lane),
                      bench.condition(lane).torque_constant_factor);
-      const double difference = of.monitor.changed_difference_Nm(*of.sound) / rated_Nm_;
+      const double difference =
+          of.monitor.changed_difference_Nm(*of.sound, run_.fault.onset != FaultOnset::start) /
+          rated_Nm_;
       if (std::isfinite(difference))
         outcome.disagreement = std::max(outcome.disagreement, difference);
       is_reached = !(difference < run_.limit_share);
@@ -211,13 +216,16 @@ class Injections {
     if (is_reached && !of.onset_tick) of.onset_tick = tick;
     if (of.onset_tick == tick)
       outcome.near_impact = bench.duty(lane).since_impact_s() < kNearImpact_s;
-    if (of.is_lasting || !of.onset_tick) return;
+    const bool is_start = run_.fault.onset == FaultOnset::start;
+    if (!of.onset_tick || (of.is_lasting && !is_start)) return;
     if (is_reached) {
-      of.is_lasting = run_.fault.onset == FaultOnset::start ||
-                      tick - *of.onset_tick >= ticks_of(run_.fault.limit_s);
+      of.is_lasting = of.is_lasting || tick - *of.onset_tick >= ticks_of(run_.fault.limit_s);
     } else if (tick - of.reached_tick > ticks_of(kPause_s)) {
-      ++outcome.brief;
+      if (!of.is_lasting) ++outcome.brief;
       of.onset_tick.reset();
+      of.is_lasting = false;
+      of.watched_ticks = 0;
+      of.would_watch = false;
     }
   }
 
@@ -244,7 +252,7 @@ class Injections {
     }
   }
 
-  // Not to be armed is right as long as the sensor is not; to watch is wrong from the onset on. A
+  // Not to be armed is right as long as the sensor is not; to watch is wrong while a disagreement lasts. A
   // joint whose monitor would not watch with the sound signals either shows nothing.
   static void decide_start(std::size_t tick, Attempt& of, Outcome& outcome) {
     const ScheduledFault& fault = of.drawn.faults.front();
@@ -253,16 +261,20 @@ class Injections {
     if (is_faulty && of.onset_tick) {
       of.watched_ticks += monitor.is_watching() ? 1 : 0;
       of.would_watch = of.would_watch || of.sound->monitor().is_watching();
+      if (of.is_lasting && of.would_watch) {
+        of.longest_watched_ticks = std::max(of.longest_watched_ticks, of.watched_ticks);
+        of.has_lasted = true;
+      }
     }
     if (is_faulty) return;
     of.is_done = true;
-    outcome.latency_ticks = of.watched_ticks;
+    outcome.latency_ticks = of.longest_watched_ticks;
     if (monitor.latest().action != MonitorAction::off)
       outcome.check = static_cast<int>(monitor.latest().check);
-    if (!of.would_watch) {
+    if (!of.has_lasted) {
       outcome.kind = Outcome::Kind::unreached;
     } else {
-      outcome.kind = of.watched_ticks < static_cast<int>(ticks_of(kMissed_s))
+      outcome.kind = of.longest_watched_ticks < static_cast<int>(ticks_of(kMissed_s))
                          ? Outcome::Kind::detected
                          : Outcome::Kind::missed;
     }

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
 #include "data/names.hpp"
+#include "safety/valid_source.hpp"
 #include "sim/sensed_channels.hpp"
 #include "torsio/core/error.hpp"
 
@@ -46,28 +48,35 @@ Monitor::State JointMonitor::step(double t_s, const Measurement& measured,
   return monitor().state();
 }
 
-double JointMonitor::changed_difference_Nm(const JointMonitor& sound) const noexcept {
+namespace {
+
+/// The largest difference of two sources. @param value_of (source) -> number
+template <class Value>
+double largest_difference(std::span<const Estimate> sources, bool only_valid,
+                          const Value& value_of) noexcept {
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -lowest;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (only_valid && !detail::is_valid(sources[i])) continue;
+    lowest = std::min(lowest, value_of(i));
+    highest = std::max(highest, value_of(i));
+  }
+  return highest > lowest ? highest - lowest : 0.0;
+}
+
+}  // namespace
+
+double JointMonitor::changed_difference_Nm(const JointMonitor& sound,
+                                           bool only_valid) const noexcept {
   const std::span<const Estimate> own = monitored_.estimates();
   const std::span<const Estimate> other = sound.monitored_.estimates();
-  double lowest = 0.0;
-  double highest = 0.0;
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    const double change = own[i].value - other[i].value;
-    lowest = i == 0 ? change : std::min(lowest, change);
-    highest = i == 0 ? change : std::max(highest, change);
-  }
-  return highest - lowest;
+  return largest_difference(own, only_valid,
+                            [&](std::size_t i) { return own[i].value - other[i].value; });
 }
 
 double JointMonitor::difference_Nm() const noexcept {
-  double lowest = 0.0;
-  double highest = 0.0;
-  for (std::size_t i = 0; i < monitored_.estimates().size(); ++i) {
-    const double value = monitored_.estimates()[i].value;
-    lowest = i == 0 ? value : std::min(lowest, value);
-    highest = i == 0 ? value : std::max(highest, value);
-  }
-  return highest - lowest;
+  const std::span<const Estimate> own = monitored_.estimates();
+  return largest_difference(own, true, [&](std::size_t i) { return own[i].value; });
 }
 
 bool uses(const MonitoredTorque& monitored, std::string_view channel) {

@@ -26,8 +26,10 @@ class JointMonitor {
   [[nodiscard]] const MonitoredTorque& monitored() const noexcept { return monitored_; }
 
   /// The largest difference between two sources, each without that of `sound`.
-  [[nodiscard]] double changed_difference_Nm(const JointMonitor& sound) const noexcept;
-  /// The largest difference between two sources.
+  /// @param only_valid pass over sources that report a fault: they are not compared
+  [[nodiscard]] double changed_difference_Nm(const JointMonitor& sound,
+                                             bool only_valid) const noexcept;
+  /// The largest difference between two valid sources.
   [[nodiscard]] double difference_Nm() const noexcept;
 
  private:

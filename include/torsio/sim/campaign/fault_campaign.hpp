@@ -50,7 +50,7 @@ struct Latencies {
 /// Injections of one class into one group. The disagreement of an injection is the largest
 /// difference between two sources that the fault causes: what changes against a monitor with the
 /// sound signals. It counts if it stays at `limit_share` of the rated torque or more for the
-/// limit of its class (pauses of up to 10 ms included). A shorter one is counted as brief. Latencies
+/// limit of its class (pauses of up to 5 ms included). A shorter one is counted as brief. Latencies
 /// count from where it reaches that share, and are 0 if the monitor stopped before; for a signal
 /// that is missing, not finite or wraps, and for the loop, from the injection. At power-up, only
 /// joints count whose monitor would watch with the sound signals.

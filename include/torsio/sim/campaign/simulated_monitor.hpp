@@ -20,7 +20,7 @@ struct SimulatedCalibration {
   double training_s = 2400.0;     ///< length of the training recordings together, with a load cell
   double fault_free_hours = 3.2;  ///< for the thresholds
   double false_alarms_per_hour = 1e-4;
-  double least_threshold_share = 0.06;  ///< smallest threshold over the largest torque of the work
+  double least_threshold_share = 0.12;  ///< smallest threshold over the largest torque of the work
   double required_share = 0.2;          ///< likewise: the disagreement that has to be found
   /// Specimen whose spring was calibrated; the joint's own is another one, or has another variant.
   unsigned spring_serial = 3;
