@@ -116,14 +116,15 @@ std::string text_of(const TuneFlags& flags, const Tuned& loop) {
   row("free", loop.free);
   return fmt::format(
       "{}: deflection control on the current at {} Hz, bandwidth {:.4g} Hz, damping {:.3g}\n"
+      "-3 dB from wanted to actual deflection at {:.4g} Hz with the output locked\n"
       "spring {:.4g} Nm/rad, drive {:.4g} kg m2 at the joint, {:.4g} Nm/A, derivative filtered at "
       "{:g} Hz\n{}\nstable for any gain between the least and the margin:\n{}\n{}"
       "an impedance on it{} is passive up to {:.3g} Hz with at most {} Nm/rad\n",
       flags.actuator, kRate_Hz, settings.bandwidth_rad_s / kTurn, settings.damping,
-      joint.stiffness_Nm_rad, joint.drive.inertia(), joint.drive.torque_per_current(),
-      settings.rate_cutoff_Hz, of_gains.text(), table.text(), passivity_text(loop.passive),
-      loop.observer_Hz ? ", without the observer," : "", kContact_rad_s / kTurn,
-      number(loop.passive_Nm_rad));
+      loop.controller.cutoff_rad_s() / kTurn, joint.stiffness_Nm_rad, joint.drive.inertia(),
+      joint.drive.torque_per_current(), settings.rate_cutoff_Hz, of_gains.text(), table.text(),
+      passivity_text(loop.passive), loop.observer_Hz ? ", without the observer," : "",
+      kContact_rad_s / kTurn, number(loop.passive_Nm_rad));
 }
 
 Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -145,6 +146,7 @@ Json json_of(const TuneFlags& flags, const Tuned& loop) {
           {"sample_rate_Hz", kRate_Hz},
           {"bandwidth_Hz", settings.bandwidth_rad_s / kTurn},
           {"damping", settings.damping},
+          {"cutoff_Hz", loop.controller.cutoff_rad_s() / kTurn},
           {"observer_Hz", loop.observer_Hz ? Json(*loop.observer_Hz) : Json(nullptr)},
           {"gains",
            {{"proportional_A_rad", gains.proportional},

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <numbers>
 
 #include "control/loop_design.hpp"
 #include "core/checks.hpp"
@@ -140,6 +142,50 @@ LinearSystem DeflectionController::reference_path() const {
                             LinearSystem::difference(sample_rate_Hz_);
   return linear_pid(settings_.speed_loop, settings_.rate_cutoff_Hz, sample_rate_Hz_) *
          (loop + rate);
+}
+
+namespace {
+
+std::complex<double> tracking_of(const SeriesElasticJoint& joint, const JointFeedback& feedback,
+                                 const LinearSystem& reference, double rad_s) {
+  const std::complex<double> s(0.0, rad_s);
+  const std::complex<double> current = current_path(joint, reference.sample_rate_Hz(), rad_s);
+  const Drive& drive = joint.drive;
+  return current * reference.response(rad_s) /
+         (s * (drive.inertia() * s + drive.viscous_Nms_rad) + joint.stiffness_Nm_rad +
+          current * (feedback.deflection.response(rad_s) + s * feedback.speed.response(rad_s)));
+}
+
+}  // namespace
+
+std::complex<double> DeflectionController::tracking(double rad_s) const {
+  return tracking_of(settings_.joint, feedback(), reference_path(), rad_s);
+}
+
+double DeflectionController::cutoff_rad_s() const {
+  constexpr int kGrid = 400;
+  constexpr int kHalvings = 40;
+  constexpr double kLowestShare = 1e-4;  // of the Nyquist frequency
+  const JointFeedback own = feedback();
+  const LinearSystem reference = reference_path();
+  const auto is_below = [&](double rad_s) {
+    return std::norm(tracking_of(settings_.joint, own, reference, rad_s)) < 0.5;
+  };
+  const double highest = std::numbers::pi * sample_rate_Hz_;
+  double low = kLowestShare * highest;
+  for (int n = 1; n <= kGrid; ++n) {
+    double high = highest * std::pow(kLowestShare, 1.0 - static_cast<double>(n) / kGrid);
+    if (n < kGrid && !is_below(high)) {
+      low = high;
+      continue;
+    }
+    for (int i = 0; i < kHalvings; ++i) {
+      const double middle = 0.5 * (low + high);
+      (is_below(middle) ? high : low) = middle;
+    }
+    return high;
+  }
+  return highest;
 }
 
 Margins DeflectionController::margins_of(const Pid::Gains& gains, JointOutput output) const {

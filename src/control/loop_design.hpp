@@ -1,5 +1,6 @@
 #pragma once
 
+#include <complex>
 #include <string_view>
 
 #include "torsio/control/joint_impedance.hpp"
@@ -24,6 +25,10 @@ namespace torsio {
 /// The loop cut at the current: feedback, one sample of delay, hold, joint.
 [[nodiscard]] LinearSystem open_loop(const SeriesElasticJoint& joint, const JointFeedback& feedback,
                                      JointOutput output);
+
+/// H(jω) of `impedance`: from the wanted current to the torque of the drive at the joint.
+[[nodiscard]] std::complex<double> current_path(const SeriesElasticJoint& joint,
+                                                double sample_rate_Hz, double rad_s);
 
 /// @throws Error naming the output and the phase margin if the loop is unstable when it is closed.
 void require_stable(std::string_view place, const LinearSystem& loop, JointOutput output);

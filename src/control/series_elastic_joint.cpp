@@ -99,15 +99,18 @@ void require_stable(std::string_view place, const LinearSystem& loop, JointOutpu
        .advice = "Take less bandwidth, smaller gains or a higher sample rate."});
 }
 
-std::complex<double> impedance(const SeriesElasticJoint& joint, const JointFeedback& feedback,
-                               double rad_s) {
+Complex current_path(const SeriesElasticJoint& joint, double sample_rate_Hz, double rad_s) {
+  const Complex s(0.0, rad_s);
+  const double period_s = 1.0 / sample_rate_Hz;
+  const Complex late = std::exp(-s * period_s);
+  return late * (1.0 - late) / (s * period_s * (1.0 + s * joint.drive.current_time_constant_s)) *
+         joint.drive.torque_per_current();
+}
+
+Complex impedance(const SeriesElasticJoint& joint, const JointFeedback& feedback, double rad_s) {
   const Drive& drive = joint.drive;
   const Complex s(0.0, rad_s);
-  const double period_s = 1.0 / feedback.deflection.sample_rate_Hz();
-  const Complex late = std::exp(-s * period_s);
-  const Complex current = late * (1.0 - late) /
-                          (s * period_s * (1.0 + s * drive.current_time_constant_s)) *
-                          drive.torque_per_current();
+  const Complex current = current_path(joint, feedback.deflection.sample_rate_Hz(), rad_s);
   const Complex inner = s * (drive.inertia() * s + drive.viscous_Nms_rad) +
                         current * s * feedback.speed.response(rad_s);
   return joint.stiffness_Nm_rad / s * (inner + current * feedback.joint.response(rad_s)) /

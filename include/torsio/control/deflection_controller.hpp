@@ -1,5 +1,6 @@
 #pragma once
 
+#include <complex>
 #include <optional>
 
 #include "torsio/control/pid.hpp"
@@ -85,6 +86,14 @@ class DeflectionController {
   [[nodiscard]] LinearSystem reference_path() const;
   /// Margins of the loop with these gains, opened at the current. Allocates.
   [[nodiscard]] Margins margins_of(const Pid::Gains& gains, JointOutput output) const;
+
+  /// From the wanted to the actual deflection with the output locked, within the limits, below the
+  /// Nyquist frequency; H and C as in `impedance`, R the reference path:
+  ///
+  ///     δ / δ* = H R / (J N² s² + b s + K + H (C_δ + s C_θ̇))
+  [[nodiscard]] std::complex<double> tracking(double rad_s) const;
+  /// The lowest frequency [rad/s] at which `tracking` is 3 dB below 1; below ω for a damping above 0.71.
+  [[nodiscard]] double cutoff_rad_s() const;
 
   [[nodiscard]] static Pid::Gains gains_for(const Settings& settings);
 
