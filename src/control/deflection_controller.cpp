@@ -165,7 +165,7 @@ std::complex<double> DeflectionController::tracking(double rad_s) const {
 double DeflectionController::cutoff_rad_s() const {
   constexpr int kGrid = 400;
   constexpr int kHalvings = 40;
-  constexpr double kLowestShare = 1e-4;  // of the Nyquist frequency
+  constexpr double kLowestShare = 1e-4;  // share of the Nyquist frequency
   const JointFeedback own = feedback();
   const LinearSystem reference = reference_path();
   const auto is_below = [&](double rad_s) {

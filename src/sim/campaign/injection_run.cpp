@@ -95,10 +95,10 @@ struct Attempt {
   std::size_t reached_tick = 0;                ///< the last one in which it was at the limit
   bool is_lasting = false;     ///< it has lasted as long as a stop may take, and counts
   std::size_t late_steps = 0;  ///< steps of the loop since an overrun began
-  // Of a fault at power-up, which may disagree several times before it ends.
+  // A fault at power-up may cause several disagreements before it ends.
   int watched_ticks = 0;          ///< in the disagreement in progress
   bool would_watch = false;       ///< with the sound signals, in that disagreement
-  int longest_watched_ticks = 0;  ///< of the disagreements that lasted
+  int longest_watched_ticks = 0;  ///< the most in a disagreement that lasted
   bool has_lasted = false;        ///< in one of them the monitor would have watched
   bool is_done = false;
 };
