@@ -11,7 +11,8 @@ namespace {
 
 struct ActuatorFlags {
   torsio::ActuatorDemand demand;
-  std::string continuous, peak, speed, deflection, bandwidth = "8Hz", impedance, collision, reach;
+  std::string continuous, peak, speed, deflection, bandwidth = "8Hz", impedance, softest;
+  std::string collision, reach;
   std::string diameter = "100mm", length = "120mm", bore, resolution;
   std::string drives, materials, washers, material = "50CrV4", sheet, plot;
   DesignOutputs outputs;
@@ -25,6 +26,8 @@ torsio::ActuatorDemand demand_of(const ActuatorFlags& flags) {
   demand.deflection_rad = needed(flags.deflection, "rad", "--deflection");
   demand.bandwidth_rad_s = angular_frequency_rad_s(flags.bandwidth, "--bandwidth");
   demand.impedance_Nm_rad = quantity(flags.impedance, "Nm_rad", "--impedance", 0.0);
+  demand.softest_Nm_rad =
+      quantity(flags.softest, "Nm_rad", "--softest-impedance", demand.softest_Nm_rad);
   demand.collision_N = quantity(flags.collision, "N", "--collision", demand.collision_N);
   demand.reach_m = quantity(flags.reach, "m", "--reach", demand.reach_m);
   demand.torque_resolution_Nm =
@@ -71,10 +74,12 @@ void add_design_actuator(CLI::App& design) {
   verb->add_option("--peak", flags->peak, "torque for a moment, 80Nm");
   verb->add_option("--speed", flags->speed, "under the continuous torque, 60deg/s");
   verb->add_option("--deflection", flags->deflection, "of the spring under the peak torque, 5deg");
-  verb->add_option("--bandwidth", flags->bandwidth, "of the torque loop, in Hz or rad_s")
+  verb->add_option("--bandwidth", flags->bandwidth, "-3 dB of the torque loop, in Hz or rad_s")
       ->capture_default_str();
   verb->add_option("--impedance", flags->impedance,
                    "stiffest impedance that must be passive up to 1 Hz, 300Nm/rad");
+  verb->add_option("--softest-impedance", flags->softest,
+                   "softest impedance that must be rendered at 1 Hz, 20Nm/rad");
   verb->add_option("--collision", flags->collision, "largest force at the link's tip, 150N");
   verb->add_option("--reach", flags->reach, "length of the link; 0.5m if not given");
   verb->add_option("--link-inertia", flags->demand.link_inertia_kg_m2, "in kg m2")

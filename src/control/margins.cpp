@@ -3,6 +3,7 @@
 #include <limits>
 #include <numbers>
 
+#include "control/frequency_response.hpp"
 #include "control/loop_design.hpp"
 #include "torsio/control/linear_system.hpp"
 #include "torsio/core/error.hpp"
@@ -29,16 +30,16 @@ double crossing(double below_rad_s, double above_rad_s, const Value& value) {
 /// Between π and −π, of the angle that is left to −1.
 double phase_margin(std::complex<double> response) { return std::arg(-response); }
 
-void take_crossover(const LinearSystem& loop, double frequency_rad_s, Margins& found) {
-  const double phase_rad = phase_margin(loop.response(frequency_rad_s));
+void take_crossover(FrequencyResponse& loop, double frequency_rad_s, Margins& found) {
+  const double phase_rad = phase_margin(loop.at(frequency_rad_s));
   if (std::abs(phase_rad) < std::abs(found.phase_rad)) {
     found.phase_rad = phase_rad;
     found.crossover_rad_s = frequency_rad_s;
   }
 }
 
-void take_real(const LinearSystem& loop, double frequency_rad_s, Margins& found) {
-  const double real = loop.response(frequency_rad_s).real();
+void take_real(FrequencyResponse& loop, double frequency_rad_s, Margins& found) {
+  const double real = loop.at(frequency_rad_s).real();
   if (!(real < 0.0)) return;
   const double factor = -1.0 / real;
   if (factor >= 1.0 && factor < found.gain) {
@@ -60,19 +61,20 @@ Margins margins(const LinearSystem& loop) {
     throw Error({.place = "margins", .expected = "a loop with one input and one output"});
   constexpr double kNone = std::numeric_limits<double>::infinity();
   Margins found = {.is_stable = is_stable_closed(loop), .phase_rad = kNone, .gain = kNone};
-  const auto excess = [&](double rad_s) { return std::abs(loop.response(rad_s)) - 1.0; };
-  const auto imaginary = [&](double rad_s) { return loop.response(rad_s).imag(); };
+  FrequencyResponse response(loop);
+  const auto excess = [&](double rad_s) { return std::abs(response.at(rad_s)) - 1.0; };
+  const auto imaginary = [&](double rad_s) { return response.at(rad_s).imag(); };
   const double highest_rad_s = std::numbers::pi * loop.sample_rate_Hz();
   const double step = std::pow(kLowestShare, -1.0 / kGrid);
   double last_rad_s = kLowestShare * highest_rad_s;
-  std::complex<double> last = loop.response(last_rad_s);
+  std::complex<double> last = response.at(last_rad_s);
   for (int n = 0; n < kGrid; ++n) {
     const double next_rad_s = n + 1 < kGrid ? last_rad_s * step : highest_rad_s;
-    const std::complex<double> next = loop.response(next_rad_s);
+    const std::complex<double> next = response.at(next_rad_s);
     if ((std::abs(last) > 1.0) != (std::abs(next) > 1.0))
-      take_crossover(loop, crossing(last_rad_s, next_rad_s, excess), found);
+      take_crossover(response, crossing(last_rad_s, next_rad_s, excess), found);
     if ((last.imag() > 0.0) != (next.imag() > 0.0))
-      take_real(loop, crossing(last_rad_s, next_rad_s, imaginary), found);
+      take_real(response, crossing(last_rad_s, next_rad_s, imaginary), found);
     last_rad_s = next_rad_s;
     last = next;
   }

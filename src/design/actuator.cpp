@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "sim/plant/plant.hpp"
+#include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/control/joint_impedance.hpp"
-#include "torsio/control/torque_controller.hpp"
+#include "torsio/control/series_elastic_joint.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
@@ -18,12 +21,16 @@ namespace {
 
 constexpr double kRate_Hz = 1000.0;
 constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kContact_rad_s = kTurn;  // up to 1 Hz
 constexpr double kSpeedCutoff_Hz = 40.0;
+constexpr double kLeastPhase_rad = rad_from_deg(30.0);  // margins of a loop
+constexpr double kLeastGain = 2.0;
 constexpr double kFastestLoop_Hz = 40.0;
 // Copper above its stator and the stator above its surroundings, as `ElectricalSheet`.
 constexpr double kCopperShare = 0.3;
 constexpr double kCopper_s = 10.0;
 constexpr double kStator_s = 600.0;
+constexpr double kAmbient_K = 293.15;
 
 DataSheet sheet_of(const ActuatorDemand& d, const SpringDesign& spring, const GearChoice& gear,
                    const MotorChoice& motor, const std::string& name) {
@@ -75,6 +82,17 @@ double speed_of(const DataSheet& sheet, double torque_Nm, double largest_A) {
   return std::max(0.0, std::min(by_voltage, by_current));
 }
 
+/// The current that may flow for any time: at most the motor's continuous one, and the stator stays below
+/// the temperature from which on the current is reduced (`ElectricalSheet`, 20 degC around it).
+double thermal_current_A(const DataSheet& sheet) {
+  const ElectricalSheet of = electrical_sheet(sheet);
+  const double loss_W = (of.derating_begins_K.value - kAmbient_K) / of.stator_ambient_K_W.value;
+  const double copper_rise_K = loss_W * (of.copper_stator_K_W.value + of.stator_ambient_K_W.value);
+  const double resistance_Ohm =
+      sheet.motor.winding_resistance_Ohm.value * (1.0 + kCopperResistanceRise_1_K * copper_rise_K);
+  return std::min(sheet.rating.current_A.value, std::sqrt(loss_W / resistance_Ohm));
+}
+
 /// How long a current may flow from cold until the copper has the temperature that the continuous
 /// current gives it; infinite for the continuous one.
 double time_at(double ratio) {
@@ -97,26 +115,63 @@ DeflectionController::Settings loop_settings(const DataSheet& sheet, double band
   return {.joint = series_elastic_joint(sheet), .bandwidth_rad_s = bandwidth_Hz * kTurn};
 }
 
-bool is_stable(const DataSheet& sheet, double bandwidth_Hz) {
+/// The loop that `tune-loop` proposes for a bandwidth, if it has margins with its output locked and free.
+std::optional<DeflectionController> sound_loop(const DataSheet& sheet, double bandwidth_Hz) {
   try {
-    const TorqueLoopCore core({.deflection = loop_settings(sheet, bandwidth_Hz)}, kRate_Hz);
-    return true;
+    DeflectionController loop(loop_settings(sheet, bandwidth_Hz), kRate_Hz);
+    for (const JointOutput output : {JointOutput::locked, JointOutput::free}) {
+      const Margins found = loop.margins_of(loop.gains(), output);
+      if (found.phase_rad < kLeastPhase_rad || found.gain < kLeastGain) return std::nullopt;
+    }
+    return loop;
   } catch (const Error&) {
-    return false;
+    return std::nullopt;
   }
 }
 
-/// The largest bandwidth of stable margins, by `tune-loop`'s own check; 0 if there is none.
-double largest_loop_Hz(const DataSheet& sheet, double lowest_Hz) {
-  double low = 1.02 * lowest_Hz;
-  if (!is_stable(sheet, low)) return 0.0;
-  double high = std::max(kFastestLoop_Hz, 2.0 * low);
-  if (is_stable(sheet, high)) return high;
-  for (int i = 0; i < 12; ++i) {
+/// Largest number between two where a property holds that holds at `low`, and not beyond some number.
+template <class Holds>
+double largest_with(double low, double high, const Holds& holds) {
+  constexpr int kHalvings = 9;
+  if (holds(high)) return high;
+  for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (low + high);
-    (is_stable(sheet, middle) ? low : high) = middle;
+    (holds(middle) ? low : high) = middle;
   }
   return low;
+}
+
+double cutoff_Hz(const DataSheet& sheet, double bandwidth_Hz) {
+  const auto loop = sound_loop(sheet, bandwidth_Hz);
+  return loop ? loop->cutoff_rad_s() / kTurn : 0.0;
+}
+
+/// Least and largest bandwidth for `tune-loop` at which the loop has margins, if there are any.
+struct LoopRange {
+  double least_Hz = 0.0;
+  double most_Hz = 0.0;
+};
+std::optional<LoopRange> loop_range(const DriveCandidate& c) {
+  const double least_Hz = 1.02 * c.lowest_loop_Hz;
+  if (!sound_loop(c.sheet, least_Hz)) return std::nullopt;
+  return LoopRange{least_Hz,
+                   largest_with(least_Hz, std::max(kFastestLoop_Hz, 2.0 * least_Hz),
+                                [&](double Hz) { return sound_loop(c.sheet, Hz).has_value(); })};
+}
+
+/// The least bandwidth for `tune-loop` that reaches the demand, and the impedances of that loop.
+void tune(DriveCandidate& c, const LoopRange& range, double wanted_Hz) {
+  const auto is_slow = [&](double Hz) { return cutoff_Hz(c.sheet, Hz) < wanted_Hz; };
+  c.tune_Hz = range.least_Hz;
+  // `largest_with` ends below the demand: 1 % more reaches it.
+  if (is_slow(range.least_Hz))
+    c.tune_Hz =
+        std::min(1.01 * largest_with(range.least_Hz, range.most_Hz, is_slow), range.most_Hz);
+  const auto loop = sound_loop(c.sheet, c.tune_Hz);
+  if (!loop) return;
+  c.softest_Nm_rad = std::abs(impedance(loop->settings().joint, loop->feedback(), kContact_rad_s)) *
+                     kContact_rad_s;
+  c.stiffest_Nm_rad = passive_stiffness(*loop, 0.0, kContact_rad_s, kSpeedCutoff_Hz);
 }
 
 /// Upper estimate of the force of a collision without control: link and rotor each give their
@@ -148,10 +203,10 @@ DriveCandidate candidate_of(const ActuatorDemand& d, const SpringDesign& spring,
     c.limits.push_back({of, wanted, reached, unit, is_upper});
   };
   add("continuous torque (thermal limit)", d.continuous_Nm,
-      std::min(gear.continuous_Nm, torque_of(sheet, motor.continuous_A)), "Nm");
+      std::min(gear.continuous_Nm, torque_of(sheet, thermal_current_A(sheet))), "Nm");
   add("peak torque", d.peak_Nm, std::min(gear.peak_Nm, torque_of(sheet, motor.peak_A)), "Nm");
   add("speed at the continuous torque", deg_from_rad(d.speed_rad_s),
-      deg_from_rad(speed_of(sheet, d.continuous_Nm, motor.continuous_A)), "deg/s");
+      deg_from_rad(speed_of(sheet, d.continuous_Nm, thermal_current_A(sheet))), "deg/s");
   if (std::isfinite(d.collision_N)) add("collision force", d.collision_N, c.collision_N, "N", true);
   if (std::isfinite(d.torque_resolution_Nm))
     add("torque resolution", d.torque_resolution_Nm,
@@ -159,17 +214,16 @@ DriveCandidate candidate_of(const ActuatorDemand& d, const SpringDesign& spring,
   // The loop is analysed only for a drive that is strong enough.
   if (!c.is_feasible()) return c;
   c.is_loop_analysed = true;
-  c.loop_Hz = largest_loop_Hz(sheet, c.lowest_loop_Hz);
-  add("bandwidth of the torque loop", d.bandwidth_rad_s / kTurn, c.loop_Hz, "Hz");
-  if (d.impedance_Nm_rad > 0.0 && c.loop_Hz > 0.0) {
-    const double loop_Hz = std::max(d.bandwidth_rad_s / kTurn, 1.05 * c.lowest_loop_Hz);
-    const double reached =
-        loop_Hz > c.loop_Hz
-            ? 0.0
-            : passive_stiffness(DeflectionController(loop_settings(sheet, loop_Hz), kRate_Hz), 0.0,
-                                kTurn, kSpeedCutoff_Hz);
-    add("passive stiffness up to 1 Hz", d.impedance_Nm_rad, reached, "Nm/rad");
-  }
+  const double wanted_Hz = d.bandwidth_rad_s / kTurn;
+  const auto range = loop_range(c);
+  if (range) c.loop_Hz = cutoff_Hz(sheet, range->most_Hz);
+  add("-3 dB of the torque loop", wanted_Hz, c.loop_Hz, "Hz");
+  if (!c.is_feasible()) return c;
+  tune(c, *range, wanted_Hz);
+  if (d.impedance_Nm_rad > 0.0)
+    add("passive stiffness up to 1 Hz", d.impedance_Nm_rad, c.stiffest_Nm_rad, "Nm/rad");
+  if (std::isfinite(d.softest_Nm_rad))
+    add("softest impedance at 1 Hz", d.softest_Nm_rad, c.softest_Nm_rad, "Nm/rad", true);
   return c;
 }
 
@@ -194,11 +248,20 @@ void check(const ActuatorDemand& d) {
          .expected = fmt::format("at least the continuous torque of {:g} Nm", d.continuous_Nm),
          .found = fmt::format("{:g} Nm", d.peak_Nm),
          .advice = "The demands contradict each other."});
-  if (!(d.collision_N > 0.0 && d.torque_resolution_Nm > 0.0 && d.impedance_Nm_rad >= 0.0))
-    throw UsageError({.place = "actuator: collision force, resolution, impedance",
-                      .expected = "numbers that are not negative",
-                      .found = fmt::format("{:g} N, {:g} Nm, {:g} Nm/rad", d.collision_N,
-                                           d.torque_resolution_Nm, d.impedance_Nm_rad)});
+  if (!(d.collision_N > 0.0 && d.torque_resolution_Nm > 0.0 && d.impedance_Nm_rad >= 0.0 &&
+        d.softest_Nm_rad > 0.0))
+    throw UsageError(
+        {.place = "actuator: collision force, resolution, impedance",
+         .expected = "numbers that are not negative",
+         .found = fmt::format("{:g} N, {:g} Nm, {:g} to {:g} Nm/rad", d.collision_N,
+                              d.torque_resolution_Nm, d.softest_Nm_rad, d.impedance_Nm_rad)});
+  if (d.impedance_Nm_rad > 0.0 && std::isfinite(d.softest_Nm_rad) &&
+      d.softest_Nm_rad >= d.impedance_Nm_rad)
+    throw UsageError({.place = "actuator: impedance",
+                      .expected = fmt::format("a stiffest one above the softest of {:g} Nm/rad",
+                                              d.softest_Nm_rad),
+                      .found = fmt::format("{:g} Nm/rad", d.impedance_Nm_rad),
+                      .advice = "The demands contradict each other."});
 }
 
 }  // namespace
@@ -246,6 +309,41 @@ ActuatorDesign design_actuator(const ActuatorDemand& demand, const DriveTable& d
   return design;
 }
 
+namespace {
+
+/// Temperatures after any length of time under a current, from the copper loss of a second with the
+/// output locked; the resistance rises with the temperature.
+void find_temperatures(const DataSheet& sheet, double current_A, DriveTrial& trial) {
+  constexpr double kStep_s = 1e-3;
+  constexpr int kSettle = 1000;
+  constexpr int kSteps = 2000;
+  constexpr int kIterations = 100;
+  const ElectricalDrive::Parameters parameters = electrical_parameters(sheet, 1);
+  Plant plant(plant_parameters(sheet));
+  plant.use(parameters);
+  const Load locked{.is_locked = true};
+  plant.reset(0.0, locked);
+  double first_J = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    if (i == kSettle) first_J = plant.electrical()->energy().copper_J;
+    if (plant.step({.current_A = current_A}, locked, kStep_s) != Fault::none) return;
+  }
+  const double cold_W =
+      (plant.electrical()->energy().copper_J - first_J) / ((kSteps - kSettle) * kStep_s);
+  const MotorThermal& thermal = parameters.thermal;
+  double copper_K = parameters.ambient_K;
+  for (int i = 0; i < kIterations; ++i) {
+    const double loss_W =
+        cold_W * (1.0 + kCopperResistanceRise_1_K * (copper_K - parameters.ambient_K));
+    trial.stator_K = parameters.ambient_K + loss_W * thermal.stator_ambient_K_W;
+    copper_K = trial.stator_K + loss_W * thermal.copper_stator_K_W;
+  }
+  trial.copper_K = copper_K;
+  trial.derating_K = parameters.derating_begins_K;
+}
+
+}  // namespace
+
 DriveTrial try_drive(const DataSheet& sheet, double continuous_Nm) {
   constexpr double kStep_s = 1e-3;
   DriveTrial trial;
@@ -270,6 +368,8 @@ DriveTrial try_drive(const DataSheet& sheet, double continuous_Nm) {
     if (plant.step({.current_A = share * peak_A}, locked, kStep_s) != Fault::none) return trial;
   }
   trial.peak_Nm = plant.torques().second_Nm;
+  find_temperatures(
+      sheet, with_friction(sheet, continuous_Nm) / drive_of(sheet).torque_per_current(), trial);
   return trial;
 }
 

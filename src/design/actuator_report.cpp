@@ -12,14 +12,18 @@
 namespace torsio {
 namespace {
 
+constexpr double kZero_K = 273.15;  // 0 degC
+
 DesignSection demand_section(const ActuatorDemand& d) {
   return {"demand",
           {{"continuous_torque", d.continuous_Nm, "Nm"},
            {"peak_torque", d.peak_Nm, "Nm"},
            {"speed", deg_from_rad(d.speed_rad_s), "deg/s", "under the continuous torque"},
            {"deflection", deg_from_rad(d.deflection_rad), "deg", "under the peak torque"},
-           {"bandwidth", d.bandwidth_rad_s / (2.0 * std::numbers::pi), "Hz"},
-           {"impedance", d.impedance_Nm_rad, "Nm/rad", "passive up to 1 Hz"},
+           {"bandwidth", d.bandwidth_rad_s / (2.0 * std::numbers::pi), "Hz",
+            "-3 dB of the torque loop, output locked"},
+           {"stiffest_impedance", d.impedance_Nm_rad, "Nm/rad", "passive up to 1 Hz"},
+           {"softest_impedance", d.softest_Nm_rad, "Nm/rad", "at 1 Hz"},
            {"collision_force", d.collision_N, "N"},
            {"reach", d.reach_m, "m"},
            {"link_inertia", d.link_inertia_kg_m2, "kg m^2"}}};
@@ -78,8 +82,15 @@ DesignReport actuator_report(const ActuatorDemand& d, const ActuatorDesign& desi
          design.spring.stiffness_Nm_rad * 2.0 * std::numbers::pi /
              std::exp2(d.envelope.encoder_bits),
          "Nm", "one step of the encoder"},
+        {"tune_loop", c.tune_Hz, "Hz", "--bandwidth of tune-loop and track for the demand"},
         {"slowest_loop", c.lowest_loop_Hz, "Hz", "bandwidths below: the spring alone is faster"}}});
   report.sections.push_back(limits_section(c));
+  if (c.loop_Hz > 0.0)
+    report.sections.push_back(
+        {"impedance",
+         {{"softest", c.softest_Nm_rad, "Nm/rad",
+           "|torque / angle| at 1 Hz with the wanted torque 0, without dry friction"},
+          {"stiffest", c.stiffest_Nm_rad, "Nm/rad", "passive up to 1 Hz"}}});
   report.sections.push_back(map_section(d, c));
   DesignSection spring = design.spring.dimensions;
   spring.name = "spring";
@@ -90,9 +101,17 @@ DesignReport actuator_report(const ActuatorDemand& d, const ActuatorDesign& desi
         {"simulated",
          {{"speed", deg_from_rad(trial.speed_rad_s), "deg/s",
            "rated current against the continuous torque"},
-          {"peak_torque", trial.peak_Nm, "Nm", "peak current, output locked"}}});
+          {"peak_torque", trial.peak_Nm, "Nm", "peak current, output locked"},
+          {"copper", trial.copper_K - kZero_K, "degC",
+           "with --electrical, under the continuous torque for any time"},
+          {"stator", trial.stator_K - kZero_K, "degC",
+           fmt::format("the current is reduced from {:g} degC on", trial.derating_K - kZero_K)}}});
     if (trial.speed_rad_s < d.speed_rad_s)
       report.notes.emplace_back("The simulated drive does not reach the speed of the demand.");
+    if (trial.stator_K > trial.derating_K)
+      report.notes.emplace_back(
+          "Under the continuous torque the simulated motor becomes too hot: its current is "
+          "reduced.");
     if (trial.peak_Nm < d.peak_Nm)
       report.notes.emplace_back("The simulated drive does not reach the peak torque.");
   }
@@ -130,7 +149,7 @@ std::string pareto_svg(const ActuatorDesign& design) {
   return svg_plot({{"drives that meet the demand", mass, loop},
                    {"Pareto front", front_mass, front_loop},
                    {"choice", mark_mass, mark_loop}},
-                  {"mass [kg]", "largest bandwidth of the torque loop [Hz]"},
+                  {"mass [kg]", "largest -3 dB frequency of the torque loop [Hz]"},
                   "Drives for the demand");
 }
 

@@ -53,6 +53,25 @@ TEST(DeflectionController, FollowsAStepAsTheSecondOrderSystemDoes) {
   }
 }
 
+TEST(DeflectionController, FollowsASineOfItsCutoffWithTheRootOfAHalf) {
+  for (const char* actuator : kActuators) {
+    SCOPED_TRACE(actuator);
+    const auto settings = settings_of(actuator);
+    DeflectionController controller(settings, kRate_Hz);
+    const double rad_s = controller.cutoff_rad_s();
+    EXPECT_NEAR(std::abs(controller.tracking(rad_s)), std::sqrt(0.5), 1e-6);
+    EXPECT_NEAR(std::abs(controller.tracking(1e-3)), 1.0, 1e-3);
+    SpringJoint joint(settings.joint, JointOutput::locked);
+    double largest_rad = 0.0;
+    for (int n = 0; n < 20'000; ++n) {
+      const double wanted_rad = 1e-3 * std::sin(rad_s * n / kRate_Hz);
+      joint.step(controller.step(wanted_rad, joint.deflection_rad()).command, 1.0 / kRate_Hz);
+      if (n > 10'000) largest_rad = std::max(largest_rad, joint.deflection_rad());
+    }
+    EXPECT_NEAR(largest_rad, std::sqrt(0.5) * 1e-3, 0.01 * 1e-3);
+  }
+}
+
 TEST(DeflectionController, HoldsADeflectionAgainstALockedOutput) {
   for (const char* actuator : kActuators) {
     const auto settings = settings_of(actuator);

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "control/frequency_response.hpp"
 #include "control/loop_design.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/random.hpp"
@@ -124,6 +125,25 @@ TEST(Margins, OfAnIntegratorWithDelayAreThoseOfTheTextbook) {
   EXPECT_NEAR(found.gain_rad_s, std::numbers::pi / 3.0 * kRate_Hz, 1e-6);
   EXPECT_NEAR(found.gain, 1.0 / 0.05, 1e-9);
   EXPECT_EQ(found.least_gain, 0.0);
+}
+
+TEST(FrequencyResponse, IsThatOfTheSystemForAnyMatrices) {
+  Random random(5);
+  for (std::size_t order = 0; order < 9; ++order) {
+    const auto any = [&](std::size_t rows, std::size_t columns) {
+      Matrix made(rows, columns);
+      for (double& value : made.values) value = random.normal();
+      return made;
+    };
+    const LinearSystem system({any(order, order), any(order, 2), any(2, order), any(2, 2)},
+                              kRate_Hz);
+    FrequencyResponse response(system, 1, 0);
+    for (const double rad_s : {0.0, 1.0, 37.0, 900.0, 3000.0}) {
+      const Complex expected = system.response(rad_s, 1, 0);
+      EXPECT_LT(std::abs(response.at(rad_s) - expected), 1e-9 * (1.0 + std::abs(expected)))
+          << order << ", " << rad_s;
+    }
+  }
 }
 
 TEST(Margins, AgreeWithThePolesOnWhereStabilityEnds) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "torsio/control/torque_controller.hpp"
+#include "torsio/control/deflection_controller.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/sim/sheet_file.hpp"
@@ -51,13 +51,16 @@ TEST(DesignedActuator, MeetsItsDemandInSimulationOrNamesTheLimit) {
     const DriveTrial trial = try_drive(sheet, demand.continuous_Nm);
     EXPECT_GE(trial.speed_rad_s, demand.speed_rad_s);
     EXPECT_GE(trial.peak_Nm, demand.peak_Nm);
-    // The loop that tune-loop proposes is stable at the bandwidth of the demand, or the spring alone
-    // is faster.
-    const double lowest = design.candidates[design.chosen].lowest_loop_Hz * kTurn;
-    EXPECT_NO_THROW(TorqueLoopCore(
-        {.deflection = {.joint = series_elastic_joint(sheet),
-                        .bandwidth_rad_s = std::max(demand.bandwidth_rad_s, 1.05 * lowest)}},
-        1000.0));
+    EXPECT_LT(trial.stator_K, trial.derating_K);
+    EXPECT_GT(trial.copper_K, trial.stator_K);
+    // The loop that tune-loop proposes reaches the bandwidth of the demand with its margins.
+    const DeflectionController loop(
+        {.joint = series_elastic_joint(sheet),
+         .bandwidth_rad_s = design.candidates[design.chosen].tune_Hz * kTurn},
+        1000.0);
+    EXPECT_GE(loop.cutoff_rad_s(), demand.bandwidth_rad_s);
+    EXPECT_GE(loop.margins_of(loop.gains(), JointOutput::free).gain, 2.0);
+    EXPECT_GE(loop.margins_of(loop.gains(), JointOutput::locked).phase_rad, rad_from_deg(30.0));
   }
   EXPECT_GE(met, 8);
 }
@@ -75,6 +78,12 @@ TEST(DesignedActuator, NamesTheLimitThatBinds) {
   demand.impedance_Nm_rad = 1000.0;
   const std::string stiff = design_actuator(demand, read_drives({}), "joint").infeasible;
   EXPECT_NE(stiff.find("passive stiffness up to 1 Hz binds"), std::string::npos) << stiff;
+  demand.impedance_Nm_rad = 0.0;
+  demand.softest_Nm_rad = 1.0;
+  const std::string soft = design_actuator(demand, read_drives({}), "joint").infeasible;
+  EXPECT_NE(soft.find("softest impedance at 1 Hz binds"), std::string::npos) << soft;
+  demand.impedance_Nm_rad = 0.5;
+  EXPECT_THROW((void)design_actuator(demand, read_drives({}), "joint"), UsageError);
   demand = demand_of(1000, 1500, 10, 0.5);
   EXPECT_FALSE(design_actuator(demand, read_drives({}), "joint").is_feasible);
 }

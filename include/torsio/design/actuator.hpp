@@ -17,8 +17,10 @@ struct ActuatorDemand {
   double peak_Nm = 0.0;
   double speed_rad_s = 0.0;       ///< under the continuous torque
   double deflection_rad = 0.0;    ///< spring, under the peak torque
-  double bandwidth_rad_s = 0.0;   ///< torque loop, as tune-loop --bandwidth
+  double bandwidth_rad_s = 0.0;   ///< -3 dB of the torque loop, output locked
   double impedance_Nm_rad = 0.0;  ///< stiffest impedance that must be passive up to 1 Hz
+  /// Softest impedance that must be rendered at 1 Hz.
+  double softest_Nm_rad = std::numeric_limits<double>::infinity();
   double collision_N = std::numeric_limits<double>::infinity();  ///< at the tip of the link
   double reach_m = 0.5;                                          ///< length of the link
   double link_inertia_kg_m2 = 0.15;
@@ -50,8 +52,12 @@ struct DriveCandidate {
   DataSheet sheet;
   double mass_kg = 0.0;
   bool is_loop_analysed = false;  ///< only if all other limits are met
-  double loop_Hz = 0.0;           ///< largest bandwidth of the torque loop with stable margins
-  double lowest_loop_Hz = 0.0;    ///< below it the spring alone is faster
+  double loop_Hz = 0.0;           ///< largest -3 dB frequency of the torque loop with margins
+  double tune_Hz = 0.0;         ///< the bandwidth of tune-loop with which the loop meets the demand
+  double lowest_loop_Hz = 0.0;  ///< bandwidth of tune-loop below which the spring alone is faster
+  double softest_Nm_rad =
+      0.0;  ///< |torque / angle| at 1 Hz with the wanted torque 0, no dry friction
+  double stiffest_Nm_rad = 0.0;  ///< impedance that is passive up to 1 Hz
   double collision_N = 0.0;
   double peak_s = 0.0;  ///< how long the peak torque lasts from cold
   std::vector<DriveLimit> limits = {};
@@ -73,11 +79,15 @@ struct ActuatorDesign {
 [[nodiscard]] ActuatorDesign design_actuator(const ActuatorDemand& demand, const DriveTable& drives,
                                              const std::string& name);
 
-/// Torque and speed that the simulated plant of a sheet reaches: the speed under the continuous
-/// torque with the rated current, and the spring's torque with the peak current, output locked.
+/// What the simulated plant of a sheet reaches: the speed under the continuous torque with the rated
+/// current, the spring's torque with the peak current, output locked, and, with inverter and current
+/// control (`ElectricalDrive`), the final temperatures under the current of the continuous torque.
 struct DriveTrial {
   double speed_rad_s = 0.0;
   double peak_Nm = 0.0;
+  double copper_K = 0.0;
+  double stator_K = 0.0;
+  double derating_K = 0.0;  ///< temperature of the stator at which the current is reduced
 };
 [[nodiscard]] DriveTrial try_drive(const DataSheet& sheet, double continuous_Nm);
 
