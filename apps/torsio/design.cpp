@@ -84,6 +84,10 @@ void add_rubber_spring(CLI::App& design) {
   verb->add_option("--min-length", flags->shortest, "least length; 4mm if not given");
   verb->add_option("--max-length", flags->longest, "largest length; 10mm if not given");
   verb->add_option("--wall", flags->wall, "least wall; 1mm if not given");
+  verb->add_option("--constraint", flags->demand.constraints,
+                   "a further one, as 'length <= 0.6 * outer_radius'; may be given more than once")
+      ->take_all()
+      ->allow_extra_args(false);
   verb->add_option("--volume-weight", flags->demand.weight_volume,
                    "a, on the volume per torque in mm^3/Nm")
       ->capture_default_str();

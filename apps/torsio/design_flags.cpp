@@ -9,23 +9,25 @@ void DesignOutputs::add(CLI::App& verb, bool has_dxf) {
   verb.add_option("--json", json.destination,
                   "write the design as JSON to a file, or - for standard output");
   verb.add_option("--yaml", yaml, "write the design as YAML to a file");
+  report.add(verb);
   if (has_dxf) verb.add_option("--dxf", dxf, "write its outline as DXF to a file, in mm");
 }
 
 void DesignOutputs::check(const std::vector<std::string>& more) const {
-  std::vector<std::string> all{json.destination, yaml, dxf};
+  std::vector<std::string> all{json.destination, yaml, dxf, report.destination};
   all.insert(all.end(), more.begin(), more.end());
   DataFlags().check_outputs(all);
   require_ending("--yaml", yaml, {".yaml", ".yml"});
   require_ending("--dxf", dxf, {".dxf"});
 }
 
-void DesignOutputs::write(const torsio::DesignReport& report) const {
-  if (json.wants_tables()) print(torsio::design_text(report));
-  if (!yaml.empty()) write_text(yaml, torsio::design_yaml(report));
-  json.write(torsio::design_json(report));
-  if (!report.is_feasible)
-    throw torsio::Error({.place = "design " + report.design, .problem = report.infeasible});
+void DesignOutputs::write(const torsio::DesignReport& design) const {
+  if (json.wants_tables()) print(torsio::design_text(design));
+  if (!yaml.empty()) write_text(yaml, torsio::design_yaml(design));
+  json.write(torsio::design_json(design));
+  if (report.is_wanted()) report.write(torsio::design_page(design));
+  if (!design.is_feasible)
+    throw torsio::Error({.place = "design " + design.design, .problem = design.infeasible});
 }
 
 double quantity(const std::string& text, const char* unit, const char* flag, double none) {

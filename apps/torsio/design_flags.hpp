@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "output.hpp"
+#include "report_output.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/design/report.hpp"
 
@@ -13,13 +14,14 @@ struct DesignOutputs {
   JsonOutput json;
   std::string yaml;
   std::string dxf;
+  ReportOutput report;
 
   void add(CLI::App& verb, bool has_dxf);
   /// Refuses what cannot be written, before any work. @param more further outputs
   void check(const std::vector<std::string>& more = {}) const;
   /// Prints and writes the design. @throws torsio::Error for an infeasible one, after the documents
   /// are written: then nothing else is.
-  void write(const torsio::DesignReport& report) const;
+  void write(const torsio::DesignReport& design) const;
 };
 
 /// The value of a flag, with its unit. @throws torsio::UsageError; "" is `none`.

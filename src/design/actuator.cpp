@@ -149,7 +149,7 @@ double cutoff_Hz(const DataSheet& sheet, double bandwidth_Hz) {
 /// Least and largest bandwidth for `tune-loop` at which the loop has margins, if there are any.
 struct LoopRange {
   double least_Hz = 0.0;
-  double most_Hz = 0.0;
+  double largest_Hz = 0.0;
 };
 std::optional<LoopRange> loop_range(const DriveCandidate& c) {
   const double least_Hz = 1.02 * c.lowest_loop_Hz;
@@ -166,7 +166,7 @@ void tune(DriveCandidate& c, const LoopRange& range, double wanted_Hz) {
   // `largest_with` ends below the demand: 1 % more reaches it.
   if (is_slow(range.least_Hz))
     c.tune_Hz =
-        std::min(1.01 * largest_with(range.least_Hz, range.most_Hz, is_slow), range.most_Hz);
+        std::min(1.01 * largest_with(range.least_Hz, range.largest_Hz, is_slow), range.largest_Hz);
   const auto loop = sound_loop(c.sheet, c.tune_Hz);
   if (!loop) return;
   c.softest_Nm_rad = std::abs(impedance(loop->settings().joint, loop->feedback(), kContact_rad_s)) *
@@ -216,7 +216,7 @@ DriveCandidate candidate_of(const ActuatorDemand& d, const SpringDesign& spring,
   c.is_loop_analysed = true;
   const double wanted_Hz = d.bandwidth_rad_s / kTurn;
   const auto range = loop_range(c);
-  if (range) c.loop_Hz = cutoff_Hz(sheet, range->most_Hz);
+  if (range) c.loop_Hz = cutoff_Hz(sheet, range->largest_Hz);
   add("-3 dB of the torque loop", wanted_Hz, c.loop_Hz, "Hz");
   if (!c.is_feasible()) return c;
   tune(c, *range, wanted_Hz);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
+#include "torsio/control/deflection_controller.hpp"
 #include "torsio/control/drive.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/design/actuator.hpp"
@@ -38,26 +40,114 @@ DesignSection limits_section(const DriveCandidate& c) {
   return section;
 }
 
+double current_under(const DriveCandidate& c, double torque_Nm) {
+  const FrictionSheet& f = c.sheet.friction;
+  const double load = torque_Nm * (1.0 + f.static_ratio.value * f.load_factor.value) +
+                      f.static_ratio.value * f.coulomb_Nm.value;
+  return load / drive_of(c.sheet).torque_per_current();
+}
+
+/// Speed [rad/s] under a torque that the supply permits.
+double supply_speed(const DriveCandidate& c, double torque_Nm) {
+  const Drive drive = drive_of(c.sheet);
+  const double viscous = c.sheet.friction.viscous_Nms_rad.value;
+  return std::max(0.0, (drive.supply_V - drive.resistance_Ohm * current_under(c, torque_Nm)) /
+                           (drive.torque_per_current() +
+                            drive.resistance_Ohm * viscous / drive.torque_per_current()));
+}
+
 /// Speed under shares of the peak torque at the peak current, and where the supply ends it.
 DesignSection map_section(const ActuatorDemand& d, const DriveCandidate& c) {
   DesignSection section{"torque_speed"};
-  const Drive drive = drive_of(c.sheet);
   for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-    const FrictionSheet& f = c.sheet.friction;
     const double torque = share * d.peak_Nm;
-    const double load = torque * (1.0 + f.static_ratio.value * f.load_factor.value) +
-                        f.static_ratio.value * f.coulomb_Nm.value;
-    const double current = load / drive.torque_per_current();
-    const double speed = std::max(
-        0.0, (drive.supply_V - drive.resistance_Ohm * current) /
-                 (drive.torque_per_current() +
-                  drive.resistance_Ohm * f.viscous_Nms_rad.value / drive.torque_per_current()));
+    const double current = current_under(c, torque);
     section.figures.push_back(
-        {fmt::format("speed_at_{:.4g}_Nm", torque), deg_from_rad(speed), "deg/s",
+        {fmt::format("speed_at_{:.4g}_Nm", torque), deg_from_rad(supply_speed(c, torque)), "deg/s",
          fmt::format("{:.3g} A at rest{}", current,
                      current > c.motor.continuous_A ? ", for a time" : ", continuous")});
   }
   return section;
+}
+
+/// Mass against bandwidth: the drives that meet the demand, the Pareto front, the choice.
+XyFigure pareto_figure(const ActuatorDesign& design) {
+  XySeries all{
+      .label = "drives that meet the demand", .style = CurveStyle::points, .x = {}, .y = {}};
+  XySeries front{.label = "Pareto front", .role = CurveRole::limit, .x = {}, .y = {}};
+  XySeries choice{.label = "choice",
+                  .style = CurveStyle::points,
+                  .role = CurveRole::measured,
+                  .x = {},
+                  .y = {}};
+  for (const DriveCandidate& c : design.candidates) {  // by mass
+    if (!c.is_feasible()) continue;
+    all.x.push_back(c.mass_kg);
+    all.y.push_back(c.loop_Hz);
+    all.names.push_back(c.gear.name + " with " + c.motor.name);
+    if (!front.y.empty() && c.loop_Hz <= front.y.back()) continue;
+    front.x.push_back(c.mass_kg);
+    front.y.push_back(c.loop_Hz);
+  }
+  if (design.is_feasible) {
+    const DriveCandidate& c = design.candidates[design.chosen];
+    choice.x = {c.mass_kg};
+    choice.y = {c.loop_Hz};
+    choice.names = {c.gear.name + " with " + c.motor.name};
+  }
+  return {.title = "Drives for the demand",
+          .x = {"mass [kg]"},
+          .y = {"largest -3 dB frequency of the torque loop [Hz]"},
+          .series = {all, front, choice}};
+}
+
+/// Speed over torque that the supply permits, the torque that the motor holds for any time, and the demand.
+XyFigure map_figure(const ActuatorDemand& d, const DriveCandidate& c) {
+  constexpr int kPoints = 50;
+  const double peak_Nm = c.limits[1].reached;
+  XySeries most{.label = "at the peak current", .role = CurveRole::limit, .x = {}, .y = {}};
+  for (int i = 0; i <= kPoints; ++i) {
+    most.x.push_back(peak_Nm * i / kPoints);
+    most.y.push_back(deg_from_rad(supply_speed(c, most.x.back())));
+  }
+  most.x.push_back(peak_Nm);
+  most.y.push_back(0.0);
+  const double continuous_Nm = c.limits[0].reached;
+  const XySeries thermal{.label = "for any time",
+                         .x = {continuous_Nm, continuous_Nm},
+                         .y = {0.0, deg_from_rad(supply_speed(c, continuous_Nm))}};
+  const XySeries demand{.label = "demand",
+                        .style = CurveStyle::points,
+                        .role = CurveRole::measured,
+                        .x = {d.continuous_Nm, d.peak_Nm},
+                        .y = {deg_from_rad(d.speed_rad_s), 0.0},
+                        .names = {"continuous", "peak"}};
+  return {.title = "Torque and speed at the joint",
+          .x = {"torque [Nm]"},
+          .y = {"speed [deg/s]"},
+          .series = {most, thermal, demand}};
+}
+
+/// Amplitude of the deflection over that of the wanted one, with the tuning of the demand.
+XyFigure loop_figure(const ActuatorDemand& d, const DriveCandidate& c) {
+  constexpr int kPoints = 120;
+  const double turn = 2.0 * std::numbers::pi;
+  const DeflectionController loop(
+      {.joint = series_elastic_joint(c.sheet), .bandwidth_rad_s = c.tune_Hz * turn}, 1000.0);
+  XySeries gain{.label = "torque loop, output locked", .x = {}, .y = {}};
+  for (int i = 0; i <= kPoints; ++i) {
+    gain.x.push_back(0.1 * std::pow(1000.0, static_cast<double>(i) / kPoints));
+    gain.y.push_back(20.0 * std::log10(std::abs(loop.tracking(gain.x.back() * turn))));
+  }
+  const XySeries demand{.label = "demand",
+                        .style = CurveStyle::points,
+                        .role = CurveRole::measured,
+                        .x = {d.bandwidth_rad_s / turn},
+                        .y = {-3.01}};
+  return {.title = "Torque over wanted torque",
+          .x = {"frequency [Hz]", true},
+          .y = {"amplitude [dB]"},
+          .series = {gain, demand}};
 }
 
 }  // namespace
@@ -95,7 +185,10 @@ DesignReport actuator_report(const ActuatorDemand& d, const ActuatorDesign& desi
   DesignSection spring = design.spring.dimensions;
   spring.name = "spring";
   report.sections.push_back(std::move(spring));
+  note_fatigue(report, d.envelope, design.spring);
+  report.pictures = {pareto_figure(design), map_figure(d, c)};
   if (design.is_feasible) {
+    report.pictures.push_back(loop_figure(d, c));
     const DriveTrial trial = try_drive(c.sheet, d.continuous_Nm);
     report.sections.push_back(
         {"simulated",
@@ -124,33 +217,11 @@ DesignReport actuator_report(const ActuatorDemand& d, const ActuatorDesign& desi
 }
 
 std::string pareto_svg(const ActuatorDesign& design) {
-  std::vector<double> mass;
-  std::vector<double> loop;
-  std::vector<double> front_mass;
-  std::vector<double> front_loop;
-  for (const DriveCandidate& c : design.candidates) {  // by mass
-    if (!c.is_feasible()) continue;
-    mass.push_back(c.mass_kg);
-    loop.push_back(c.loop_Hz);
-    if (!front_loop.empty() && c.loop_Hz <= front_loop.back()) continue;
-    front_mass.push_back(c.mass_kg);
-    front_loop.push_back(c.loop_Hz);
-  }
-  std::vector<double> mark_mass;
-  std::vector<double> mark_loop;
-  if (design.is_feasible) {
-    const DriveCandidate& c = design.candidates[design.chosen];
-    for (const auto& [x, y] :
-         {std::pair{-1.0, 0.0}, {0.0, 1.0}, {1.0, 0.0}, {0.0, -1.0}, {-1.0, 0.0}}) {
-      mark_mass.push_back(c.mass_kg * (1.0 + 0.01 * x));
-      mark_loop.push_back(c.loop_Hz * (1.0 + 0.01 * y));
-    }
-  }
-  return svg_plot({{"drives that meet the demand", mass, loop},
-                   {"Pareto front", front_mass, front_loop},
-                   {"choice", mark_mass, mark_loop}},
-                  {"mass [kg]", "largest -3 dB frequency of the torque loop [Hz]"},
-                  "Drives for the demand");
+  const XyFigure figure = pareto_figure(design);
+  std::vector<Curve> curves;
+  for (const XySeries& series : figure.series)
+    curves.push_back({.label = series.label, .x = series.x, .y = series.y});
+  return svg_plot(curves, {figure.x.label, figure.y.label}, figure.title);
 }
 
 }  // namespace torsio

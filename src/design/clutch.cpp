@@ -30,6 +30,40 @@ void check(const ClutchDemand& d) {
   check(d.washer);
 }
 
+XyFigure force_figure(const ClutchDemand& d, double travel_m) {
+  constexpr int kPoints = 60;
+  XySeries stack{.label = "stack of washers", .x = {}, .y = {}};
+  for (int i = 0; i <= kPoints; ++i) {
+    const double s = d.washer.cone_height_m * i / kPoints;
+    stack.x.push_back(s * d.series * 1e3);
+    stack.y.push_back(force(d.washer, s) * d.parallel);
+  }
+  return {.title = "Axial force over the travel of the stack",
+          .x = {"travel [mm]"},
+          .y = {"force [N]"},
+          .series = {stack,
+                     {.label = "in use",
+                      .style = CurveStyle::points,
+                      .role = CurveRole::measured,
+                      .x = {travel_m * d.series * 1e3},
+                      .y = {force(d.washer, travel_m) * d.parallel}}}};
+}
+
+XyFigure friction_figure(const ClutchDemand& d, double axial_N) {
+  const auto torque = [&](double friction) { return effective_arm(d, friction) * axial_N; };
+  return {.title = "Slip torque over the coefficient of friction",
+          .x = {"friction"},
+          .y = {"slip torque [Nm]"},
+          .series = {{.label = "at this axial force",
+                      .x = {d.least_friction, d.largest_friction},
+                      .y = {torque(d.least_friction), torque(d.largest_friction)}},
+                     {.label = "nominal",
+                      .style = CurveStyle::points,
+                      .role = CurveRole::measured,
+                      .x = {d.friction},
+                      .y = {torque(d.friction)}}}};
+}
+
 }  // namespace
 
 double effective_arm(const ClutchDemand& d, double friction) {
@@ -82,6 +116,7 @@ DesignReport design_clutch(const ClutchDemand& d) {
         {"torque_per_10_um", stack_rate * 10e-6 * arm, "Nm", "of travel of the bolt"},
         {"force_at_flat", flat_N, "N"},
         {"stress", stress(d.washer, s) * 1e-6, "MPa", "sigma_OM"}}});
+  report.pictures = {force_figure(d, s), friction_figure(d, axial_N)};
   if (s > 0.75 * d.washer.cone_height_m)
     report.notes.emplace_back("The washers are beyond 0.75 of their travel, the usual limit.");
   if (stack_rate * 10e-6 * arm > 0.05 * d.slip_Nm)

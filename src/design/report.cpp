@@ -97,4 +97,28 @@ std::string design_yaml(const DesignReport& report) {
   return text;
 }
 
+ReportDocument design_page(const DesignReport& report) {
+  ReportDocument page{
+      .title = "Design: " + report.design, .summary = {}, .sections = {}, .origin = {}};
+  page.summary.emplace_back(report.is_feasible ? "The design meets all bounds."
+                                               : report.infeasible);
+  for (const std::string& note : report.notes) page.summary.push_back(note);
+  if (!report.pictures.empty()) {
+    ReportSection pictures{.heading = "Pictures"};
+    for (const XyFigure& picture : report.pictures) pictures.figures.emplace_back(picture);
+    page.sections.push_back(std::move(pictures));
+  }
+  for (const DesignSection& section : report.sections) {
+    ReportTable table{.headings = {"quantity", "value", "unit", "remark"}, .rows = {}};
+    for (const DesignFigure& figure : section.figures)
+      table.rows.push_back(
+          {.cells = {figure.name, figure.text.empty() ? number(figure.value) : figure.text,
+                     figure.unit, figure.remark}});
+    std::string heading = section.name;
+    std::ranges::replace(heading, '_', ' ');
+    page.sections.push_back({.heading = std::move(heading), .tables = {std::move(table)}});
+  }
+  return page;
+}
+
 }  // namespace torsio

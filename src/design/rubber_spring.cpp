@@ -7,10 +7,14 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "bound_search.hpp"
+#include "ring_constraint.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -81,6 +85,99 @@ std::optional<RubberRing> best_ring(const RubberSpringDemand& demand) {
   return best;
 }
 
+using Constraints = std::vector<RingConstraint>;
+
+bool holds(Constraints& constraints, const RubberRing& ring, const RubberSpringDemand& demand) {
+  constexpr double kRounding_SI = 1e-12;
+  return std::ranges::all_of(
+      constraints, [&](RingConstraint& each) { return each.slack(ring, demand) >= -kRounding_SI; });
+}
+
+/// The ring of an outer radius and a length with the stiffness of the demand, if it is within the bounds.
+std::optional<RubberRing> ring_of(const RubberSpringDemand& demand, double outer, double length) {
+  const auto least = shortest(demand, outer);
+  if (!least || length < least->length_m || length > demand.largest_length_m) return std::nullopt;
+  const double inner = fourth(outer) - volume_factor(demand) * length;
+  if (inner < fourth(demand.least_inner_m)) return std::nullopt;
+  return RubberRing{outer, std::pow(inner, 0.25), length};
+}
+
+/// The ring of an outer radius with the least objective that meets the constraints.
+std::optional<RubberRing> best_length(const RubberSpringDemand& demand, Constraints& constraints,
+                                      double outer, int steps) {
+  const auto least = shortest(demand, outer);
+  if (!least) return std::nullopt;
+  std::optional<RubberRing> best;
+  double best_value = 0.0;
+  const auto take = [&](double length) {
+    const auto ring = ring_of(demand, outer, length);
+    if (!ring || !holds(constraints, *ring, demand)) return;
+    const double value = objective(*ring, demand);
+    if (best && value >= best_value) return;
+    best = ring;
+    best_value = value;
+  };
+  const double step = (demand.largest_length_m - least->length_m) / steps;
+  for (int i = 0; i <= steps; ++i) take(least->length_m + i * step);
+  if (!best) return best;
+  constexpr int kHalvings = 30;
+  double width = step;
+  for (int i = 0; i < kHalvings; ++i, width *= 0.5) {
+    const double middle = best->length_m;
+    take(middle - 0.5 * width);
+    take(middle + 0.5 * width);
+  }
+  return best;
+}
+
+std::optional<RubberRing> best_constrained(const RubberSpringDemand& demand,
+                                           Constraints& constraints) {
+  const auto free = best_ring(demand);
+  if (!free || holds(constraints, *free, demand)) return free;
+  constexpr int kRadii = 400;
+  constexpr int kLengths = 200;
+  constexpr int kHalvings = 30;
+  std::optional<RubberRing> best;
+  double best_value = 0.0;
+  const auto take = [&](double outer) {
+    if (outer <= 0.0 || outer > demand.largest_outer_m) return;
+    const auto ring = best_length(demand, constraints, outer, kLengths);
+    if (!ring) return;
+    const double value = objective(*ring, demand);
+    if (best && value >= best_value) return;
+    best = ring;
+    best_value = value;
+  };
+  const double step = (demand.largest_outer_m - demand.least_inner_m) / kRadii;
+  for (int i = kRadii; i > 0; --i) take(demand.least_inner_m + i * step);
+  double width = step;
+  for (int i = 0; best && i < kHalvings; ++i, width *= 0.5) {
+    const double middle = best->outer_m;
+    take(middle - 0.5 * width);
+    take(middle + 0.5 * width);
+  }
+  return best;
+}
+
+/// The largest slack of a constraint over the rings within the bounds.
+double largest_slack(const RubberSpringDemand& demand, RingConstraint& constraint) {
+  constexpr int kSteps = 100;
+  double largest = -std::numeric_limits<double>::infinity();
+  for (int i = 1; i <= kSteps; ++i) {
+    const double outer =
+        demand.least_inner_m + (demand.largest_outer_m - demand.least_inner_m) * i / kSteps;
+    const auto least = shortest(demand, outer);
+    if (!least) continue;
+    for (int j = 0; j <= kSteps; ++j) {
+      const auto ring =
+          ring_of(demand, outer,
+                  least->length_m + (demand.largest_length_m - least->length_m) * j / kSteps);
+      if (ring) largest = std::max(largest, constraint.slack(*ring, demand));
+    }
+  }
+  return largest;
+}
+
 std::string bounds_of_ring_to_move(const RubberSpringDemand& demand) {
   using D = RubberSpringDemand;
   const std::array<DesignBound<D>, 6> bounds{
@@ -92,6 +189,18 @@ std::string bounds_of_ring_to_move(const RubberSpringDemand& demand) {
        {"allowed stress", &D::allowed_stress_Pa, 20.0 * demand.allowed_stress_Pa, 1e-6, "MPa"}}};
   return bounds_to_move<D>(demand, bounds,
                            [](const D& moved) { return best_ring(moved).has_value(); });
+}
+
+/// The bounds alone permit a ring, the constraints do not.
+std::string constraints_to_move(const RubberSpringDemand& demand, Constraints& constraints) {
+  std::string text = "infeasible: no ring within the bounds meets the constraints";
+  for (RingConstraint& each : constraints) {
+    const double slack = largest_slack(demand, each);
+    if (slack < 0.0)
+      text += fmt::format("; '{}' would have to be relaxed by at least {:.4g} (SI)", each.text(),
+                          -slack);
+  }
+  return text;
 }
 
 /// Whether a ring of the grid meets all bounds but the stiffness.
@@ -107,7 +216,8 @@ bool is_within(const RubberSpringDemand& demand, const RubberRing& ring) {
 
 /// The nearest ring of the grid; if that leaves a bound, the neighbour within them whose stiffness
 /// is nearest.
-std::optional<RubberRing> rounded(const RubberSpringDemand& demand, const RubberRing& exact) {
+std::optional<RubberRing> rounded(const RubberSpringDemand& demand, Constraints& constraints,
+                                  const RubberRing& exact) {
   const auto on_grid = [&](double value, int offset) {
     return (std::round(value / demand.grid_m) + offset) * demand.grid_m;
   };
@@ -120,7 +230,7 @@ std::optional<RubberRing> rounded(const RubberSpringDemand& demand, const Rubber
                           on_grid(exact.inner_m, index / 5 % 5 - 2),
                           on_grid(exact.length_m, index / 25 - 2)};
     if (ring.inner_m < 0.0 || ring.length_m <= 0.0 || ring.outer_m <= ring.inner_m) continue;
-    if (!is_within(demand, ring)) continue;
+    if (!is_within(demand, ring) || !holds(constraints, ring, demand)) continue;
     if (n == 0) return ring;
     const double error = std::abs(std::log(stiffness(ring, modulus(demand)) / wanted));
     if (!best || error < least) {
@@ -149,7 +259,7 @@ Eigen::Vector3d gradient(const Values& of, const RubberRing& ring) {
 
 /// Lagrange multipliers of the bounds that the optimum lies on: ∇f = Σ λ ∇g.
 std::vector<ActiveConstraint> active_constraints(const RubberSpringDemand& demand,
-                                                 const RubberRing& ring) {
+                                                 Constraints& constraints, const RubberRing& ring) {
   std::vector<std::pair<const char*, Values>> all{{"stiffness (1)", [&](const RubberRing& r) {
                                                      return std::log(stiffness(r, modulus(demand)));
                                                    }}};
@@ -170,15 +280,43 @@ std::vector<ActiveConstraint> active_constraints(const RubberSpringDemand& deman
       [](const RubberRing& r) { return (r.outer_m - r.inner_m) / kMm; });
   add("stress (2)", shear_stress(ring, demand.torque_Nm) / allowed * kMm, kMm,
       [&](const RubberRing& r) { return std::log(shear_stress(r, demand.torque_Nm)); });
+  const std::size_t bounds = all.size();
+  for (RingConstraint& each : constraints) {
+    // A share of its change over a millimetre of any dimension.
+    const Values slack = [&](const RubberRing& r) { return each.slack(r, demand); };
+    if (each.slack(ring, demand) <= 1e-5 * gradient(slack, ring).norm())
+      all.emplace_back(each.text().c_str(), slack);
+  }
   Eigen::MatrixXd slopes(3, static_cast<Eigen::Index>(all.size()));
   for (std::size_t i = 0; i < all.size(); ++i)
     slopes.col(static_cast<Eigen::Index>(i)) = gradient(all[i].second, ring);
   const Eigen::VectorXd multipliers = slopes.completeOrthogonalDecomposition().solve(
       gradient([&](const RubberRing& r) { return objective(r, demand); }, ring));
   std::vector<ActiveConstraint> active;
-  for (std::size_t i = 0; i < all.size(); ++i)
-    active.push_back({all[i].first, multipliers[static_cast<Eigen::Index>(i)]});
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::string name = all[i].first;
+    active.push_back({name, multipliers[static_cast<Eigen::Index>(i)],
+                      i >= bounds           ? "SI unit of its slack"
+                      : name.ends_with(")") ? "unit of its logarithm"
+                                            : "mm"});
+  }
   return active;
+}
+
+/// Outer radius and the objective of the best ring with it.
+std::vector<std::pair<double, double>> objective_over_radius(const RubberSpringDemand& demand,
+                                                             Constraints& constraints) {
+  constexpr int kRadii = 200;
+  constexpr int kLengths = 50;
+  std::vector<std::pair<double, double>> search;
+  for (int i = 1; i <= kRadii; ++i) {
+    const double outer =
+        demand.least_inner_m + (demand.largest_outer_m - demand.least_inner_m) * i / kRadii;
+    const auto ring = constraints.empty() ? shortest(demand, outer)
+                                          : best_length(demand, constraints, outer, kLengths);
+    if (ring) search.emplace_back(outer, objective(*ring, demand));
+  }
+  return search;
 }
 
 void check(const RubberSpringDemand& d) {
@@ -259,15 +397,20 @@ double stiffness_tolerance(const RubberRing& ring, const RubberSpringDemand& dem
 RubberSpringDesign design_rubber_spring(const RubberSpringDemand& demand) {
   check(demand);
   RubberSpringDesign design;
-  const auto exact = best_ring(demand);
+  Constraints constraints;
+  constraints.reserve(demand.constraints.size());
+  for (const std::string& text : demand.constraints) constraints.emplace_back(text);
+  const auto exact = best_constrained(demand, constraints);
   if (!exact) {
-    design.infeasible = bounds_of_ring_to_move(demand);
+    design.infeasible = best_ring(demand) ? constraints_to_move(demand, constraints)
+                                          : bounds_of_ring_to_move(demand);
     return design;
   }
   design.exact = *exact;
   design.objective = objective(*exact, demand);
-  design.active = active_constraints(demand, *exact);
-  const auto on_grid = rounded(demand, *exact);
+  design.active = active_constraints(demand, constraints, *exact);
+  design.search = objective_over_radius(demand, constraints);
+  const auto on_grid = rounded(demand, constraints, *exact);
   if (!on_grid) {
     design.infeasible = fmt::format(
         "infeasible: no ring on a grid of {:g} mm is within the bounds; the exact one is r1 "

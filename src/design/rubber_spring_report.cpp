@@ -80,6 +80,61 @@ DesignSection comparison_section(const RubberRing& ring, double torque_Nm) {
   return section;
 }
 
+XyFigure outline_figure(const RubberRing& ring) {
+  const double length = ring.length_m * 1e3;
+  const double outer = ring.outer_m * 1e3;
+  const double inner = ring.inner_m * 1e3;
+  const double gap = kNotMeasured;  // between the halves of the section
+  return {.title = "Section of the ring along its axis",
+          .x = {"along the axis [mm]"},
+          .y = {"radius [mm]"},
+          .series = {{.label = "rubber",
+                      .x = {0.0, length, length, 0.0, 0.0, gap, 0.0, length, length, 0.0, 0.0},
+                      .y = {inner, inner, outer, outer, inner, gap, -inner, -inner, -outer, -outer,
+                            -inner}}},
+          .is_equal = true};
+}
+
+XyFigure torque_figure(const RubberRing& ring, const RubberSpringDemand& demand) {
+  const double k = stiffness(ring, demand.correction * demand.shear_modulus_Pa);
+  const double spread = std::exp(stiffness_tolerance(ring, demand));
+  const double end_rad = demand.torque_Nm / k;
+  const auto line = [&](const char* label, CurveRole role, double factor) {
+    return XySeries{.label = label,
+                    .role = role,
+                    .x = {0.0, deg_from_rad(end_rad)},
+                    .y = {0.0, k * factor * end_rad}};
+  };
+  return {.title = "Torque over deflection",
+          .x = {"deflection [deg]"},
+          .y = {"torque [Nm]"},
+          .series = {line("rounded", CurveRole::model, 1.0),
+                     line("stiff end of the tolerance", CurveRole::limit, spread),
+                     line("soft end of the tolerance", CurveRole::limit, 1.0 / spread),
+                     {.label = "demand",
+                      .style = CurveStyle::points,
+                      .role = CurveRole::measured,
+                      .x = {deg_from_rad(demand.angle_rad)},
+                      .y = {demand.torque_Nm}}}};
+}
+
+XyFigure search_figure(const RubberSpringDesign& design) {
+  XySeries search{.label = "best ring of a radius", .x = {}, .y = {}};
+  for (const auto& [outer_m, value] : design.search) {
+    search.x.push_back(outer_m * 1e3);
+    search.y.push_back(value);
+  }
+  return {.title = "Objective over the outer radius, where a ring is possible",
+          .x = {"outer radius [mm]"},
+          .y = {"objective"},
+          .series = {search,
+                     {.label = "optimum",
+                      .style = CurveStyle::points,
+                      .role = CurveRole::measured,
+                      .x = {design.exact.outer_m * 1e3},
+                      .y = {design.objective}}}};
+}
+
 }  // namespace
 
 std::span<const TorqueSensor> torque_sensors_002() noexcept { return kSensors002; }
@@ -108,13 +163,12 @@ DesignReport rubber_spring_report(const RubberSpringDemand& demand) {
   report.sections.push_back(ring_section("rounded", design.rounded, demand));
   DesignSection active{"active"};
   for (const ActiveConstraint& each : design.active)
-    active.figures.push_back(
-        {each.name, each.multiplier, "",
-         each.name.ends_with(")") ? "objective per unit of its logarithm" : "objective per mm"});
+    active.figures.push_back({each.name, each.multiplier, "", "objective per " + each.unit});
   report.sections.push_back(std::move(active));
   report.sections.push_back(sensitivity_section(design.rounded, demand));
   report.sections.push_back(comparison_section(design.rounded, demand.torque_Nm));
   const RubberRing& ring = design.rounded;
+  report.pictures = {outline_figure(ring), torque_figure(ring, demand), search_figure(design)};
   if (report.at("rounded", "shear_strain").value > 1.0)
     report.notes.emplace_back("The shear strain exceeds 1: the linear formula is not reliable.");
   if (ring.length_m < ring.outer_m - ring.inner_m)

@@ -10,6 +10,42 @@
 #include "torsio/design/spring.hpp"
 
 namespace torsio {
+namespace {
+
+XyFigure torque_figure(const SpringDemand& d, const SpringDesign& design) {
+  XySeries spring{.label = "spring", .x = {}, .y = {}};
+  const auto add = [&](double angle_rad, double torque_Nm) {
+    spring.x.push_back(deg_from_rad(angle_rad));
+    spring.y.push_back(torque_Nm);
+  };
+  const double end_rad = d.torque_Nm / design.stiffness_Nm_rad;
+  if (design.curve.empty()) {
+    add(-end_rad, -d.torque_Nm);
+    add(end_rad, d.torque_Nm);
+  }
+  for (const auto& [angle, torque] : design.curve) add(angle, torque);
+  const XySeries demand{.label = "demand",
+                        .style = CurveStyle::points,
+                        .role = CurveRole::measured,
+                        .x = {deg_from_rad(d.angle_rad)},
+                        .y = {d.torque_Nm}};
+  return {.title = "Torque over deflection",
+          .x = {"deflection [deg]"},
+          .y = {"torque [Nm]"},
+          .series = {spring, demand}};
+}
+
+}  // namespace
+
+void note_fatigue(DesignReport& report, const SpringDemand& d, const SpringDesign& design) {
+  const auto margin =
+      std::ranges::find(design.dimensions.figures, "fatigue_margin", &DesignFigure::name);
+  if (margin == design.dimensions.figures.end() || !(margin->value < 1.0)) return;
+  report.notes.push_back(
+      fmt::format("The spring does not last under this torque in both directions: --safety {:.2g} "
+                  "makes it last.",
+                  std::ceil(10.0 * d.safety / margin->value) / 10.0));
+}
 
 DesignReport spring_report(const SpringDemand& d, const SpringDesign& design) {
   DesignReport report{
@@ -40,6 +76,12 @@ DesignReport spring_report(const SpringDemand& d, const SpringDesign& design) {
          fmt::format("one step of an encoder of {:g} bits", d.encoder_bits)},
         {"resonance", std::sqrt(k / d.load_inertia_kg_m2) / (2.0 * std::numbers::pi), "Hz",
          fmt::format("with a load of {:g} kg m2, rotor held", d.load_inertia_kg_m2)}}});
+  report.pictures.push_back(torque_figure(d, design));
+  note_fatigue(report, d, design);
+  const bool is_rod = design.kind == SpringKind::rod || design.kind == SpringKind::tube;
+  if (is_rod && design.length_m < 2.0 * design.outer_m)
+    report.notes.emplace_back(
+        "The length is below two diameters: the ends determine the stiffness.");
   report.notes.emplace_back(
       "Formulae of slender springs without the ends: a measured stiffness replaces them.");
   return report;

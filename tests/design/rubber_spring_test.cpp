@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -85,6 +87,67 @@ TEST(RubberSpring, NamesTheBoundThatWouldHaveToMove) {
       design.infeasible.find("the largest outer radius of 8 mm would have to move to 8.574 mm"),
       std::string::npos)
       << design.infeasible;
+}
+
+TEST(RubberSpring, MeetsAConstraintThatCouplesRadiusAndLength) {
+  RubberSpringDemand demand = demand_002();
+  demand.constraints = {"length >= 0.6 * outer_radius"};
+  const RubberSpringDesign design = design_rubber_spring(demand);
+  ASSERT_TRUE(design.is_feasible);
+  // The objective falls with the outer radius: both bounds are active.
+  EXPECT_NEAR(design.exact.outer_m, 0.010, 1e-9);
+  EXPECT_NEAR(design.exact.length_m, 0.006, 1e-9);
+  EXPECT_NEAR(stiffness(design.exact, demand.shear_modulus_Pa), 0.5 / demand.angle_rad, 1e-9);
+  ASSERT_EQ(design.active.size(), 3U);
+  const ActiveConstraint& active = design.active.back();
+  EXPECT_EQ(active.name, demand.constraints[0]);
+  // The multiplier is the change of the objective with the slack that is demanded.
+  RubberSpringDemand tighter = demand;
+  tighter.constraints = {"length >= 0.6 * outer_radius + 1e-6"};
+  EXPECT_NEAR((design_rubber_spring(tighter).objective - design.objective) / 1e-6,
+              active.multiplier, 2e-3 * active.multiplier);
+  // One that the free optimum meets changes nothing.
+  demand.constraints = {"wall <= 5mm", "volume <= 500 * 1mm^3"};
+  EXPECT_EQ(design_rubber_spring(demand).objective, design_rubber_spring(demand_002()).objective);
+}
+
+TEST(RubberSpring, IsNoWorseThanAnyRingOfAGridThatMeetsTheConstraints) {
+  RubberSpringDemand demand = demand_002();
+  demand.constraints = {"strain * 4 <= 1 + outer_radius / 20mm",
+                        "inner_radius >= 3mm + length / 8"};
+  const RubberSpringDesign design = design_rubber_spring(demand);
+  ASSERT_TRUE(design.is_feasible);
+  const double c =
+      2.0 * demand.torque_Nm / demand.angle_rad / (std::numbers::pi * demand.shear_modulus_Pa);
+  for (double outer = 0.002; outer <= demand.largest_outer_m; outer += 0.05e-3)
+    for (double length = demand.least_length_m; length <= demand.largest_length_m;
+         length += 0.02e-3) {
+      const double inner = std::pow(std::max(std::pow(outer, 4) - c * length, 0.0), 0.25);
+      const RubberRing ring{outer, inner, length};
+      const double strain = shear_stress(ring, demand.torque_Nm) / demand.shear_modulus_Pa;
+      const bool is_met = 4.0 * strain <= 1.0 + outer / 0.020 && inner >= 0.003 + length / 8.0 &&
+                          shear_stress(ring, demand.torque_Nm) <= demand.allowed_stress_Pa &&
+                          outer - inner >= demand.least_wall_m;
+      if (!is_met) continue;
+      EXPECT_GE(objective(ring, demand), design.objective * (1.0 - 1e-6)) << outer;
+    }
+}
+
+TEST(RubberSpring, NamesAConstraintThatNoRingMeets) {
+  RubberSpringDemand demand = demand_002();
+  demand.constraints = {"volume <= 100 * 1mm^3"};
+  const RubberSpringDesign design = design_rubber_spring(demand);
+  EXPECT_FALSE(design.is_feasible);
+  EXPECT_NE(design.infeasible.find("'volume <= 100 * 1mm^3' would have to be relaxed by at least "
+                                   "3.048e-07"),
+            std::string::npos)
+      << design.infeasible;
+  for (const char* wrong : {"length", "length = 3mm", "length <= 3mm <= wall", "lenght <= 3mm",
+                            "lag(length, 1) <= 3mm", "length <= (3mm", "length <="}) {
+    SCOPED_TRACE(wrong);
+    demand.constraints = {wrong};
+    EXPECT_THROW((void)design_rubber_spring(demand), UsageError);
+  }
 }
 
 TEST(RubberSpring, TakesAMeasuredFactorIntoTheStiffness) {

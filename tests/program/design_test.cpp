@@ -16,8 +16,10 @@ class DesignVerb : public Program {
 
 TEST_F(DesignVerb, WritesARubberSpringInAllFormats) {
   const Outcome table = torsio(
-      "design rubber-spring --torque 0.5Nm --angle 15deg --json a.json --yaml a.yaml --dxf a.dxf");
+      "design rubber-spring --torque 0.5Nm --angle 15deg --json a.json --yaml a.yaml --dxf a.dxf "
+      "--report a.html --constraint 'wall <= 5mm'");
   ASSERT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_NE(contents("a.html").find("Section of the ring along its axis"), std::string::npos);
   EXPECT_NE(table.out.find("8.23326"), std::string::npos) << table.out;
   const auto json = nlohmann::json::parse(contents("a.json"));
   EXPECT_NEAR(json.at("rounded").at("inner_radius_mm"), 8.2, 1e-9);

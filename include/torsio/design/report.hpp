@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "torsio/core/not_measured.hpp"
+#include "torsio/report/html/report_document.hpp"
 
 namespace torsio {
 
@@ -28,6 +29,7 @@ struct DesignReport {
   std::string infeasible = {};  ///< the bound that contradicts, and the value that it would need
   std::vector<DesignSection> sections = {};
   std::vector<std::string> notes = {};
+  std::vector<XyFigure> pictures = {};
 
   /// @throws Error if there is no such figure.
   [[nodiscard]] const DesignFigure& at(const std::string& section, const std::string& name) const;
@@ -38,5 +40,7 @@ struct DesignReport {
 [[nodiscard]] std::string design_json(const DesignReport& report);
 /// The same keys as YAML.
 [[nodiscard]] std::string design_yaml(const DesignReport& report);
+/// The figures as tables, and the pictures.
+[[nodiscard]] ReportDocument design_page(const DesignReport& report);
 
 }  // namespace torsio

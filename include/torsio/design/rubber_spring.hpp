@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "torsio/design/report.hpp"
@@ -32,6 +33,9 @@ struct RubberSpringDemand {
   double grid_m = 0.0001;
   double hardness_tolerance = 5.0;  ///< Shore
   double dimension_tolerance_m = 0.05e-3;
+  /// Further ones, `length <= 0.6 * outer_radius`: expressions of outer_radius, inner_radius, wall,
+  /// length [m], volume [m³], stress [Pa], strain, stiffness [Nm/rad].
+  std::vector<std::string> constraints = {};
 };
 
 struct RubberRing {
@@ -43,7 +47,8 @@ struct RubberRing {
 /// A bound that the optimum lies on.
 struct ActiveConstraint {
   std::string name;
-  double multiplier = 0.0;  ///< change of the objective per mm of the bound, or per unit of ln k
+  double multiplier = 0.0;  ///< change of the objective per `unit` of the bound
+  std::string unit = {};    ///< "mm", "unit of its logarithm"
 };
 
 struct RubberSpringDesign {
@@ -53,6 +58,8 @@ struct RubberSpringDesign {
   RubberRing rounded;      ///< on the grid, and within the bounds again
   double objective = 0.0;  ///< at the exact optimum: a V/T + b L in mm^3/Nm and mm
   std::vector<ActiveConstraint> active;
+  /// Outer radius [m] and the objective of the best ring with it, where there is one.
+  std::vector<std::pair<double, double>> search = {};
 };
 
 /// Stiffness κ π G (r1⁴ − r2⁴) / (2 L) [Nm/rad]: torsion of a ring (St Venant). Source: 002 (1).
@@ -68,7 +75,8 @@ struct RubberSpringDesign {
 ///
 /// With (1) as an equality, r2⁴ = r1⁴ − c L with c = 2 T / (π G θ), and (2) is a least length
 /// L >= G θ r1 / [s]. For a given r1 the objective rises with L, so that the shortest allowed ring is
-/// the best and r1 remains, which is searched. Decision 0024.
+/// the best and r1 remains, which is searched. Where further constraints do not hold for that ring, L
+/// is searched as well for each r1. Decision 0024.
 /// @throws UsageError for a demand that is not finite, or bounds that contradict each other.
 [[nodiscard]] RubberSpringDesign design_rubber_spring(const RubberSpringDemand& demand);
 

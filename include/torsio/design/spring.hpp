@@ -76,6 +76,9 @@ struct SpringDesign {
 /// The design with encoder resolution as torque, resonance and fatigue margin.
 [[nodiscard]] DesignReport spring_report(const SpringDemand& demand, const SpringDesign& design);
 
+/// Adds a note with the safety factor that makes a spring last that does not.
+void note_fatigue(DesignReport& report, const SpringDemand& demand, const SpringDesign& design);
+
 /// A data sheet for `torsio simulate` with this spring in the drive of the papers that is next in
 /// torque (assumed). @param name of the sheet
 [[nodiscard]] DataSheet spring_sheet(const SpringDemand& demand, const SpringDesign& design,
