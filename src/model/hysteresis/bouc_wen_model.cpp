@@ -22,6 +22,7 @@ Unloaded unload(double share, double travel, double rho, double exponent) noexce
   const auto slope = [&](double z) {
     return rho == 0.0 ? 1.0 : 1.0 + rho * std::pow(std::min(std::abs(z), 1.0), exponent);
   };
+  share = std::max(share, -1.0);  // a state that was loaded may have any number
   while (share < 0.0 && travel > 0.0) {
     const double to_zero = -share / slope(0.5 * share);
     const double step = std::min(travel, rho == 0.0 ? 1.0 : kLongestStep / slope(share));

@@ -3,6 +3,8 @@
 #include <rapidcheck.h>
 
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <string>
@@ -357,6 +359,22 @@ TEST(HysteresisModels, RefuseWhatBreaksTheirPromises) {
               HasSubstr("slope of the first input"));
   EXPECT_THAT(refusal(test::example<ExponentialLoading>(), [](auto& p) { p.falling_decay = -1.0; }),
               HasSubstr("exponential_loading: decay"));
+}
+
+TEST(BoucWenModel, AStepEndsAlsoAfterAStateWithAnAbsurdForce) {
+  auto model = test::example<BoucWenModel>();
+  static_cast<void>(torques(model, {0.0, 0.001, 0.002}));
+  detail::StateBytes counted;
+  model.visit_state(counted);
+  std::vector<std::byte> bytes(counted.position());
+  detail::StateBytes to(bytes);
+  model.visit_state(to);
+  const double absurd = -1e300;
+  std::memcpy(bytes.data() + bytes.size() - sizeof absurd, &absurd, sizeof absurd);
+  detail::StateBytes from(detail::StateBytes::Task::read, bytes);
+  model.visit_state(from);
+  for (const double torque : torques(model, {0.003, 0.004, -0.004}))
+    EXPECT_TRUE(std::isfinite(torque));
 }
 
 }  // namespace
