@@ -12,6 +12,7 @@ Study design_002(const StudyOptions& options, const Progress& progress);
 Study sensor_models_002(const StudyOptions& options, const Progress& progress);
 Study slow_loops_002(const StudyOptions& options, const Progress& progress);
 Study collision_002(const StudyOptions& options, const Progress& progress);
+Study coupling_003(const StudyOptions& options, const Progress& progress);
 Study models_003(const StudyOptions& options, const Progress& progress);
 Study redundancy_000(const StudyOptions& options, const Progress& progress);
 Study transfer_000(const StudyOptions& options, const Progress& progress);

@@ -168,7 +168,7 @@ struct StudyInfo {
   std::string_view title;
   Study (*run)(const StudyOptions& options, const Progress& progress);
   std::span<const PaperEntry> published = {};  ///< every figure that its table shows beside ours
-  bool needs_recordings = false;  ///< in TORSIO_DATA or ../shared/data: must be named to be run
+  bool must_be_named = false;  ///< needs recordings (TORSIO_DATA or ../shared/data) or a solver
   bool has_picture = false;       ///< `Study::picture_svg` is set
 };
 

@@ -155,7 +155,7 @@ void add_clutch(CLI::App& design) {
 
 void add_design(CLI::App& app) {
   CLI::App* design =
-      app.add_subcommand("design", "size springs, clutch and actuator before they are built");
+      app.add_subcommand("design", "size springs, clutch, coupling and actuator before they are built");
   design->footer(
       "Example: torsio design spring --torque 120Nm --angle 6deg --max-diameter 20mm "
       "--max-length 120mm\n"
@@ -165,4 +165,5 @@ void add_design(CLI::App& app) {
   add_clutch(*design);
   add_design_spring(*design);
   add_design_actuator(*design);
+  add_design_coupling(*design);
 }

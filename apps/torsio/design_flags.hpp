@@ -36,3 +36,4 @@ struct DesignOutputs {
 
 void add_design_spring(CLI::App& design);
 void add_design_actuator(CLI::App& design);
+void add_design_coupling(CLI::App& design);

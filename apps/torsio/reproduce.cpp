@@ -53,7 +53,7 @@ void run(const ReproduceFlags& flags) {
   for (const std::string& item : flags.items) wanted.push_back(&torsio::find_study(item));
   if (wanted.empty())
     for (const torsio::StudyInfo& info : torsio::studies())
-      if (!info.needs_recordings) wanted.push_back(&info);
+      if (!info.must_be_named) wanted.push_back(&info);
   check_plot(flags, wanted);
   DataFlags().check_outputs({flags.json.destination, flags.plot, flags.report.destination});
   require_ending("--plot", flags.plot, {".svg"});
@@ -97,9 +97,10 @@ void add_reproduce(CLI::App& app) {
       "reproduce", "run the papers' experiments and compare the published figures with ours");
   verb->footer(
       "Example: torsio reproduce 001-models --repeats 1\n"
-      "Without an item all experiments that need no recordings are run: almost an hour on two "
-      "cores. public-benchmarks and model-comparison read recordings in TORSIO_DATA or "
-      "../shared/data.");
+      "Without an item all experiments that need no recordings or solver are run: almost an hour "
+      "on "
+      "two cores. public-benchmarks and model-comparison read recordings in TORSIO_DATA or "
+      "../shared/data; 003-coupling runs CalculiX (apt-get install calculix-ccx).");
   verb->add_option("ITEM", flags->items, "name of an experiment; --list shows them");
   verb->add_flag("--list", flags->list, "show the experiments");
   verb->add_flag("--quick", flags->options.is_quick,

@@ -94,6 +94,7 @@ double distance_to_bond_ends_mm(const LobeMesh& mesh, double x_mm, double y_mm) 
 /// nearly incompressible solution has. `places` is of the first step: reference coordinates.
 bool fill_strains(const LobeMesh& mesh, const Blocks& blocks, const std::vector<Row>& places,
                   TwistStep& step) {
+  step.element_strains.assign(mesh.triangles.size(), 0.0);
   for (std::size_t i = 0; i < blocks.strains.size(); ++i) {
     const Row& e = blocks.strains[i];
     const double mean = 0.5 * (e[2] + e[3]);
@@ -104,6 +105,9 @@ bool fill_strains(const LobeMesh& mesh, const Blocks& blocks, const std::vector<
     if (!(small > 0.0 && volume >= 0.9 && volume <= 1.1)) return false;
     const double strain = 0.5 * std::log(large);
     const double distance_mm = distance_to_bond_ends_mm(mesh, places[i][2], places[i][3]);
+    if (!(e[0] >= 1.0 && e[0] <= static_cast<double>(mesh.triangles.size()))) return false;
+    double& of_element = step.element_strains[static_cast<std::size_t>(e[0]) - 1];
+    of_element = std::max(of_element, strain);
     step.strain = std::max(step.strain, strain);
     if (distance_mm >= 0.3) step.strain_outside_300um = std::max(step.strain_outside_300um, strain);
     if (distance_mm >= 0.8) step.strain_outside_800um = std::max(step.strain_outside_800um, strain);

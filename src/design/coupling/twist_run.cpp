@@ -66,7 +66,8 @@ struct Exit {
   ::_exit(kNotInstalled);
 }
 
-Exit run(const std::filesystem::path& folder, const SolverLimits& limits) {
+Exit run(const std::filesystem::path& folder, const SolverLimits& limits,
+         const std::stop_token& stop) {
   std::array<std::string, 6> words{
       "env", "OMP_NUM_THREADS=1", "OPENBLAS_NUM_THREADS=1", limits.program, "-i", "lobe"};
   std::array<char*, words.size() + 1> arguments{};
@@ -82,10 +83,8 @@ Exit run(const std::filesystem::path& folder, const SolverLimits& limits) {
   Exit result;
   int status = 0;
   while (::waitpid(child, &status, WNOHANG) == 0) {
-    if (!result.out_of_time && Clock::now() >= end) {
-      result.out_of_time = true;
-      ::kill(child, SIGKILL);
-    }
+    result.out_of_time = Clock::now() >= end;
+    if (result.out_of_time || stop.stop_requested()) ::kill(child, SIGKILL);
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   if (WIFEXITED(status)) result.code = WEXITSTATUS(status);
@@ -111,7 +110,8 @@ std::string cause(const Exit& exit, const std::string& log, const std::filesyste
 }  // namespace
 
 TwistCurve twist_lobe(const LobeMesh& mesh, const Rubber& rubber,
-                      const std::vector<double>& twists_deg, const SolverLimits& limits) {
+                      const std::vector<double>& twists_deg, const SolverLimits& limits,
+                      std::stop_token stop) {
   const TemporaryFolder folder;
   const std::filesystem::path input = folder.path() / "lobe.inp";
   std::ofstream file(input);
@@ -121,7 +121,8 @@ TwistCurve twist_lobe(const LobeMesh& mesh, const Rubber& rubber,
     throw Error({.place = input.string(),
                  .problem = "cannot write the solver's input",
                  .advice = "free space on the disk, or set TMPDIR"});
-  const Exit exit = run(folder.path(), limits);
+  const Exit exit = run(folder.path(), limits, stop);
+  if (stop.stop_requested()) throw Cancelled();
   if (exit.code == kNotInstalled)
     throw Error({.place = limits.program,
                  .problem = "the solver is not installed",

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iostream>
+#include <numbers>
 #include <sstream>
 
 #include "torsio/core/error.hpp"
@@ -87,6 +89,53 @@ TEST(LobeTwist, ReproducesTheTorquesOfDeltaAtSixDegrees) {
   ASSERT_EQ(stretched.steps.size(), 2U) << stretched.stopped_by;
   EXPECT_NEAR(std::abs(stretched.steps[1].torque_N), 34.4, 0.35);
   EXPECT_LT(stretched.steps[1].torque_N * compressed.steps[2].torque_N, 0.0);
+}
+
+/// A ring between the radii 5 and 10 mm as a mesh; its outer edge is the upper flank.
+LobeMesh ring(int radial, int around) {
+  LobeMesh mesh;
+  const int columns = 2 * around;
+  for (int i = 0; i <= 2 * radial; ++i)
+    for (int k = 0; k < columns; ++k) {
+      const double radius_mm = 5.0 + 5.0 * i / (2.0 * radial);
+      const double angle_rad = 2.0 * std::numbers::pi * k / columns;
+      mesh.nodes.push_back({radius_mm * std::cos(angle_rad), radius_mm * std::sin(angle_rad)});
+    }
+  const auto node = [&](int i, int k) { return i * columns + k % columns; };
+  for (int i = 0; i < 2 * radial; i += 2)
+    for (int k = 0; k < columns; k += 2) {
+      const int middle = node(i + 1, k + 1);
+      mesh.triangles.push_back({node(i, k), node(i + 2, k), node(i + 2, k + 2), node(i + 1, k),
+                                node(i + 2, k + 1), middle});
+      mesh.triangles.push_back({node(i, k), node(i + 2, k + 2), node(i, k + 2), middle,
+                                node(i + 1, k + 2), node(i, k + 1)});
+    }
+  for (int k = 0; k < columns; ++k) {
+    mesh.upper_flank.push_back(node(2 * radial, k));
+    mesh.lower_flank.push_back(node(0, k));
+  }
+  return mesh;
+}
+
+// Azimuthal shear of a bonded ring is exact for neo-Hooke: M / L = 4 pi G phi / (1/a^2 - 1/b^2).
+TEST(LobeTwist, ConvergesToTheExactTorqueOfABondedRing) {
+  if (!solver_installed()) GTEST_SKIP() << "CalculiX (ccx) is not installed";
+  constexpr double kTwist_deg = 15.0;
+  const double exact_N =
+      4.0 * std::numbers::pi * kTwist_deg * std::numbers::pi / 180.0 / (1.0 / 25.0 - 1.0 / 100.0);
+  std::vector<double> errors;
+  for (const int radial : {4, 8}) {
+    const LobeMesh mesh = ring(radial, 8 * radial);
+    ASSERT_GT(smallest_jacobian_mm2(mesh), 0.0);
+    const TwistCurve curve = twist_lobe(mesh, kRubber, {5.0, kTwist_deg}, {});
+    ASSERT_EQ(curve.steps.size(), 2U) << curve.stopped_by;
+    errors.push_back(std::abs(std::abs(curve.steps[1].torque_N) / exact_N - 1.0));
+  }
+  const double order = std::log2(errors[0] / errors[1]);
+  std::cout << "torque: " << 100.0 * errors[0] << " % on 4 x 32, " << 100.0 * errors[1]
+            << " % on 8 x 64, order " << order << "\n";
+  EXPECT_LT(errors[1], 0.01);
+  EXPECT_GT(order, 1.5);
 }
 
 TEST(LobeTwist, KeepsTheStepsBeforeTheOneThatDoesNotConverge) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -24,11 +25,12 @@ struct SolverLimits {
 
 /// One converged step. Torque and strains are of one lobe in plane strain.
 struct TwistStep {
-  double twist_deg = 0.0;             ///< > 0: the lobe is compressed, < 0: stretched
-  double torque_N = 0.0;              ///< torque per length, Nmm/mm, of the upper flank
-  double strain = 0.0;                ///< largest logarithmic principal strain anywhere
-  double strain_outside_300um = 0.0;  ///< farther than 0.3 mm from every end of a bond
-  double strain_outside_800um = 0.0;  ///< farther than 0.8 mm; converges with the mesh
+  double twist_deg = 0.0;                    ///< > 0: the lobe is compressed, < 0: stretched
+  double torque_N = 0.0;                     ///< torque per length, Nmm/mm, of the upper flank
+  double strain = 0.0;                       ///< largest logarithmic principal strain anywhere
+  double strain_outside_300um = 0.0;         ///< farther than 0.3 mm from every end of a bond
+  double strain_outside_800um = 0.0;         ///< farther than 0.8 mm; converges with the mesh
+  std::vector<double> element_strains = {};  ///< largest of each triangle, in their order
 };
 
 /// The steps up to the last one that converged, and why the solver stopped there.
@@ -51,9 +53,10 @@ struct TwistCurve {
 
 /// Runs the solver as a process of its own in a temporary folder, which is removed afterwards. The
 /// exit code is not trusted: steps come from the output alone.
-/// @throws Error if the solver is not installed or its input cannot be written.
+/// @param stop kills the solver within some milliseconds
+/// @throws Error if the solver is not installed or its input cannot be written; Cancelled.
 [[nodiscard]] TwistCurve twist_lobe(const LobeMesh& mesh, const Rubber& rubber,
                                     const std::vector<double>& twists_deg,
-                                    const SolverLimits& limits);
+                                    const SolverLimits& limits, std::stop_token stop = {});
 
 }  // namespace torsio::design
