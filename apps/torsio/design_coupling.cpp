@@ -10,6 +10,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/design/coupling/coupling.hpp"
+#include "torsio/design/coupling/coupling_search.hpp"
 
 namespace {
 
@@ -18,7 +19,9 @@ struct CouplingFlags {
   std::string angle, length, modulus, torque, strain, metric = "0.8mm";
   std::string half_width, root, flank, taper, slot;
   std::string mesh = "medium";
-  std::string sheet, plot;
+  std::string sheet, plot, resume;
+  std::size_t shapes = 0;
+  std::uint64_t seed = 1;
   DesignOutputs outputs;
 };
 
@@ -63,11 +66,46 @@ std::optional<torsio::design::CouplingLimit> limit_of(const CouplingFlags& flags
   return torsio::design::CouplingLimit{strain, metric};
 }
 
+double positive(double value, const char* flag) {
+  if (!(value > 0.0))
+    throw torsio::UsageError(
+        {.place = flag, .expected = "above 0", .found = fmt::format("{:.6g}", value)});
+  return value;
+}
+
+double shear_modulus_MPa(const CouplingFlags& flags) {
+  return 1e-6 * positive(needed(flags.modulus, "Pa", "--shear-modulus"), "--shear-modulus");
+}
+
+/// `--search`: a shape that carries more than the seven.
+void search(const CouplingFlags& flags) {
+  for (const auto& [flag, value] :
+       {std::pair{"--angle", &flags.angle}, std::pair{"--measured-torque", &flags.torque},
+        std::pair{"--sheet", &flags.sheet}, std::pair{"--plot", &flags.plot}})
+    if (!value->empty())
+      throw torsio::UsageError(
+          {.place = flag,
+           .expected = "a call without --search",
+           .found = *value,
+           .advice = "Give the dimensions of the best shape to a second call."});
+  torsio::design::CouplingSearchSettings settings{
+      .demand = flags.demand, .shapes = flags.shapes, .seed = flags.seed, .resume = flags.resume};
+  settings.shear_modulus_MPa = shear_modulus_MPa(flags);
+  settings.demand.length_mm = kMillimetres * quantity(flags.length, "m", "--length",
+                                                      settings.demand.length_mm / kMillimetres);
+  if (const auto limit = limit_of(flags)) settings.limit = *limit;
+  settings.limit.metric = torsio::design::strain_metric(flags.metric);
+  ProgressBar progress;
+  const auto found = torsio::design::search_couplings(settings, progress.listener());
+  flags.outputs.write(torsio::design::coupling_search_report(settings, found));
+}
+
 void run(const CouplingFlags& flags) {
   using namespace torsio::design;
   flags.outputs.check({flags.sheet, flags.plot});
   require_ending("--sheet", flags.sheet, {".yaml", ".yml"});
   require_ending("--plot", flags.plot, {".svg"});
+  if (flags.shapes > 0) return search(flags);
   if (flags.modulus.empty() == flags.torque.empty())
     throw torsio::UsageError(
         {.place = "--shear-modulus, --measured-torque",
@@ -76,17 +114,10 @@ void run(const CouplingFlags& flags) {
          .advice = "the hardness fixes the modulus only within a factor of 4 to 5"});
   const CouplingDemand demand = demand_of(flags);
   const auto limit = limit_of(flags);
-  const auto positive = [](double value, const char* flag) {
-    if (!(value > 0.0))
-      throw torsio::UsageError(
-          {.place = flag, .expected = "above 0", .found = fmt::format("{:.6g}", value)});
-    return value;
-  };
   double modulus_MPa = 0.0;
   double measured_Nm = 0.0;
   if (flags.torque.empty())
-    modulus_MPa =
-        1e-6 * positive(needed(flags.modulus, "Pa", "--shear-modulus"), "--shear-modulus");
+    modulus_MPa = shear_modulus_MPa(flags);
   else
     measured_Nm = positive(needed(flags.torque, "Nm", "--measured-torque"), "--measured-torque");
   ProgressBar progress;
@@ -130,6 +161,8 @@ void add_design_coupling(CLI::App& design) {
   verb->footer(
       "Example: torsio design coupling --geometry delta --angle 6deg --measured-torque 13.6Nm\n"
       "           --sheet coupling.yaml --plot coupling.svg\n"
+      "Example: torsio design coupling --search 60 --shear-modulus 4MPa --strain-limit 60pct\n"
+      "           --resume shapes.jsonl --report search.html\n"
       "Needs CalculiX: apt-get install calculix-ccx. Torques of both directions are equal.");
   verb->add_option("--geometry", flags->demand.geometry,
                    "alpha, beta, gamma, delta, epsilon, zeta or eta of paper 003")
@@ -154,12 +187,25 @@ void add_design_coupling(CLI::App& design) {
   verb->add_option("--mesh", flags->mesh,
                    "fine, medium or coarse; a coarser one follows where it does not converge")
       ->capture_default_str();
+  verb->add_option(
+          "--layers", flags->demand.layers,
+          "layers of elements along half of the length; 0: plane strain, to compare shapes")
+      ->capture_default_str();
   verb->add_option("--jobs", flags->demand.jobs, "solvers at the same time, 1 or 2")
       ->capture_default_str();
   verb->add_option("--time-limit", flags->demand.limits.time_s, "of one run of the solver, in s")
       ->capture_default_str();
   verb->add_option("--sheet", flags->sheet, "write a data sheet for torsio simulate, FILE.yaml");
   verb->add_option("--plot", flags->plot, "draw mesh, strain and torque into an SVG file");
+  verb->add_option(
+          "--search", flags->shapes,
+          "look for a shape with more torque and twist at the strain limit than the seven, "
+          "with so many trials")
+      ->check(CLI::Range(1, 10000));
+  verb->add_option("--seed", flags->seed, "of the search")->capture_default_str();
+  verb->add_option("--resume", flags->resume,
+                   "of the search: file that keeps each result, so that a search that was stopped "
+                   "continues");
   flags->outputs.add(*verb, false);
   verb->callback([flags] { run(*flags); });
 }

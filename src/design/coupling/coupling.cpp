@@ -30,6 +30,10 @@ void check(const CouplingDemand& d) {
                       .expected = "20 to 10000, the bulk modulus over the shear modulus",
                       .found = fmt::format("{:.6g}", d.bulk_ratio),
                       .advice = "the bulk modulus of rubber is about 2000 MPa, a ratio of 500"});
+  if (d.layers < 0 || d.layers > 20)
+    throw UsageError({.place = "layers of elements",
+                      .expected = "0 (plane strain) to 20",
+                      .found = fmt::format("{}", d.layers)});
   check_lobe(d.shape);
 }
 
@@ -47,6 +51,8 @@ LobeCurve best_curve(const CouplingDemand& demand, double angle_deg, const std::
   LobeCurve best;
   for (std::size_t i = std::min(demand.finest_mesh, meshes.size() - 1); i < meshes.size(); ++i) {
     LobeMesh mesh = mesh_lobe(demand.shape, meshes[i]);
+    mesh.layers = demand.layers;
+    mesh.half_length_mm = 0.5 * demand.length_mm;
     TwistCurve curve = twist_lobe(mesh, rubber, twists_to(angle_deg), demand.limits, stop);
     const bool is_whole = curve.stopped_by.empty();
     if (best.mesh.nodes.empty() || curve.steps.size() > best.curve.steps.size())

@@ -49,7 +49,8 @@ DesignSection mesh_section(const CouplingDemand& d, const CouplingTwist& twist) 
     const bool is_whole = lobe->curve.stopped_by.empty();
     section.figures.push_back(
         {name, static_cast<double>(lobe->mesh.triangles.size()), "",
-         fmt::format("triangles, {} x {}{}{}", lobe->density.radial, lobe->density.across,
+         fmt::format("triangles, {} x {}{}{}{}", lobe->density.radial, lobe->density.across,
+                     d.layers > 0 ? fmt::format(", {} layers of wedges on them", d.layers) : "",
                      is_coarser ? "; the finer mesh stopped earlier" : "",
                      is_whole ? "" : "; " + lobe->curve.stopped_by)});
   }
@@ -118,7 +119,8 @@ DesignReport coupling_report(const CouplingDemand& demand, const CouplingTwist& 
       {"material",
        {{"shear_modulus", shear_modulus_MPa, "MPa", calibration},
         {"bulk_modulus", demand.bulk_ratio * shear_modulus_MPa, "MPa", "assumed, by the ratio"},
-        {"law", kNotMeasured, "", "assumed", "neo-Hooke, plane strain, bonded"}}});
+        {"law", kNotMeasured, "", "assumed",
+         demand.layers > 0 ? "neo-Hooke, solid, bonded" : "neo-Hooke, plane strain, bonded"}}});
   report.sections.push_back(mesh_section(demand, twist));
   const Points curve = torque_curve(twist, demand.length_mm, shear_modulus_MPa);
   DesignSection torques{"torque", {}};
@@ -148,8 +150,11 @@ DesignReport coupling_report(const CouplingDemand& demand, const CouplingTwist& 
     }
   }
   report.notes = {
-      "Plane strain overestimates the torque by 20 to 35 % where the length is about three slot "
-      "widths: it is for the comparison of shapes.",
+      demand.layers > 0
+          ? "The ends of the lobes are free: the torque is less than in plane strain."
+          : "Plane strain overestimates the torque by 20 to 35 % where the length is about three "
+            "slot "
+            "widths: it is for the comparison of shapes; --layers 3 computes a solid.",
       "The hardness fixes the shear modulus only within a factor of 4 to 5; a measured torque "
       "fixes "
       "it for this model.",

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -64,49 +65,81 @@ bool complete(const std::vector<Row>& rows, std::size_t count, std::size_t colum
          });
 }
 
-/// Torques per length of the upper and of the lower flank, at the turned position of the nodes.
+/// The plane node of a number in the deck; none if there is no such one.
+const MeshNode* node_of(const LobeMesh& mesh, double number) {
+  const auto levels = static_cast<std::size_t>(2 * mesh.layers + 1);
+  if (!(number >= 1.0 && number <= static_cast<double>(levels * mesh.nodes.size()))) return nullptr;
+  return &mesh.nodes[(static_cast<std::size_t>(number) - 1) % mesh.nodes.size()];
+}
+
+/// Torques over length of the upper and of the lower flank, at the turned position of the nodes.
 std::array<double, 2> torques_N(const LobeMesh& mesh, const Blocks& blocks) {
   const std::set<int> upper(mesh.upper_flank.begin(), mesh.upper_flank.end());
+  const double length_mm = mesh.layers > 0 ? mesh.half_length_mm : 1.0;
   std::array<double, 2> sums = {};
   for (std::size_t i = 0; i < blocks.forces.size(); ++i) {
-    const int number = static_cast<int>(blocks.forces[i][0]) - 1;
-    if (number < 0 || static_cast<std::size_t>(number) >= mesh.nodes.size())
-      return {kNotANumber, kNotANumber};
-    const MeshNode& node = mesh.nodes[static_cast<std::size_t>(number)];
-    const double x_mm = node.x_mm + blocks.displacements[i][1];
-    const double y_mm = node.y_mm + blocks.displacements[i][2];
-    sums[upper.contains(number) ? 0 : 1] += x_mm * blocks.forces[i][2] - y_mm * blocks.forces[i][1];
+    const MeshNode* const node = node_of(mesh, blocks.forces[i][0]);
+    if (node == nullptr) return {kNotANumber, kNotANumber};
+    const double x_mm = node->x_mm + blocks.displacements[i][1];
+    const double y_mm = node->y_mm + blocks.displacements[i][2];
+    const bool is_upper = upper.contains(static_cast<int>(node - mesh.nodes.data()));
+    sums[is_upper ? 0 : 1] += (x_mm * blocks.forces[i][2] - y_mm * blocks.forces[i][1]) / length_mm;
   }
   return sums;
 }
 
-double distance_to_bond_ends_mm(const LobeMesh& mesh, double x_mm, double y_mm) {
-  double distance_mm = HUGE_VAL;
+/// Rows of forces and displacements: the nodes of both flanks in all levels that have them.
+std::size_t flank_rows(const LobeMesh& mesh) {
+  std::set<int> corners;
+  for (const auto& triangle : mesh.triangles)
+    corners.insert(triangle.begin(), triangle.begin() + 3);
+  const auto layers = static_cast<std::size_t>(mesh.layers);
+  std::size_t rows = 0;
   for (const auto* flank : {&mesh.upper_flank, &mesh.lower_flank})
-    for (const int end : {flank->front(), flank->back()}) {
-      const MeshNode& node = mesh.nodes[static_cast<std::size_t>(end)];
-      distance_mm = std::min(distance_mm, std::hypot(x_mm - node.x_mm, y_mm - node.y_mm));
+    for (const int node : *flank) rows += layers + 1 + (corners.contains(node) ? layers : 0);
+  return rows;
+}
+
+/// In a solid, the bond ends at the free end, too.
+double distance_to_bond_ends_mm(const LobeMesh& mesh, const Row& place) {
+  double distance_mm = HUGE_VAL;
+  double from_flanks_mm = HUGE_VAL;
+  for (const auto* flank : {&mesh.upper_flank, &mesh.lower_flank})
+    for (const int index : *flank) {
+      const MeshNode& node = mesh.nodes[static_cast<std::size_t>(index)];
+      const double in_plane_mm = std::hypot(place[2] - node.x_mm, place[3] - node.y_mm);
+      from_flanks_mm = std::min(from_flanks_mm, in_plane_mm);
+      if (index == flank->front() || index == flank->back())
+        distance_mm = std::min(distance_mm, in_plane_mm);
     }
+  if (mesh.layers > 0)
+    distance_mm = std::min(distance_mm, std::hypot(from_flanks_mm, mesh.half_length_mm - place[4]));
   return distance_mm;
 }
 
-/// Fills the strains from Green-Lagrange components in the plane; false for a volume ratio that no
-/// nearly incompressible solution has. `places` is of the first step: reference coordinates.
+/// Fills the strains from Green-Lagrange components, whose eigenvalues e give the stretches √(1 + 2 e);
+/// false for a volume ratio that no nearly incompressible solution has. `places` is of the first step:
+/// reference coordinates.
 bool fill_strains(const LobeMesh& mesh, const Blocks& blocks, const std::vector<Row>& places,
                   TwistStep& step) {
   step.element_strains.assign(mesh.triangles.size(), 0.0);
+  const std::size_t elements =
+      mesh.triangles.size() * static_cast<std::size_t>(std::max(mesh.layers, 1));
   for (std::size_t i = 0; i < blocks.strains.size(); ++i) {
-    const Row& e = blocks.strains[i];
-    const double mean = 0.5 * (e[2] + e[3]);
-    const double radius = std::hypot(0.5 * (e[2] - e[3]), e[5]);
-    const double large = 1.0 + 2.0 * (mean + radius);
-    const double small = 1.0 + 2.0 * (mean - radius);
-    const double volume = std::sqrt(std::max(large * small, 0.0));
-    if (!(small > 0.0 && volume >= 0.9 && volume <= 1.1)) return false;
-    const double strain = 0.5 * std::log(large);
-    const double distance_mm = distance_to_bond_ends_mm(mesh, places[i][2], places[i][3]);
-    if (!(e[0] >= 1.0 && e[0] <= static_cast<double>(mesh.triangles.size()))) return false;
-    double& of_element = step.element_strains[static_cast<std::size_t>(e[0]) - 1];
+    const Row& e = blocks.strains[i];  // element, point, xx, yy, zz, xy, xz, yz
+    Eigen::Matrix3d green;
+    green << e[2], e[5], e[6], e[5], e[3], e[7], e[6], e[7], e[4];
+    const Eigen::Vector3d values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>()
+                                       .computeDirect(green, Eigen::EigenvaluesOnly)
+                                       .eigenvalues();
+    const Eigen::Array3d squares = 1.0 + 2.0 * values.array();
+    const double volume = std::sqrt(std::max(squares.prod(), 0.0));
+    if (!(squares.minCoeff() > 0.0 && volume >= 0.9 && volume <= 1.1)) return false;
+    const double strain = 0.5 * std::log(squares.maxCoeff());
+    const double distance_mm = distance_to_bond_ends_mm(mesh, places[i]);
+    if (!(e[0] >= 1.0 && e[0] <= static_cast<double>(elements))) return false;
+    double& of_element =
+        step.element_strains[(static_cast<std::size_t>(e[0]) - 1) % mesh.triangles.size()];
     of_element = std::max(of_element, strain);
     step.strain = std::max(step.strain, strain);
     if (distance_mm >= 0.3) step.strain_outside_300um = std::max(step.strain_outside_300um, strain);
@@ -121,7 +154,7 @@ TwistCurve read_twists(const LobeMesh& mesh, const std::vector<double>& twists_d
                        const std::string& dat_text) {
   std::map<int, Blocks> blocks = read_blocks(dat_text);
   TwistCurve curve;
-  const std::size_t flank_nodes = mesh.upper_flank.size() + mesh.lower_flank.size();
+  const std::size_t flank_nodes = flank_rows(mesh);
   for (std::size_t k = 0; k < twists_deg.size(); ++k) {
     const auto stop = [&](const char* why) {
       curve.stopped_by = fmt::format("twist of {} degrees not reached: {}", twists_deg[k], why);

@@ -30,7 +30,10 @@ struct CouplingDemand {
   double length_mm = 10.0;
   double bulk_ratio = 500.0;    ///< K / G
   std::size_t finest_mesh = 1;  ///< index in `coupling_meshes`
-  std::size_t jobs = 2;         ///< solvers at the same time; no more than 2 are used
+  /// Layers of elements along half of the length, for a torque that is to be promised; 0: plane strain,
+  /// for the comparison of shapes.
+  int layers = 0;
+  std::size_t jobs = 2;  ///< solvers at the same time; no more than 2 are used
   SolverLimits limits = {};
 };
 

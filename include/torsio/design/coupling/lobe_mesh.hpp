@@ -27,6 +27,10 @@ struct LobeMesh {
   std::vector<std::array<int, 6>> triangles;
   std::vector<int> upper_flank;  ///< bonded nodes with y > 0
   std::vector<int> lower_flank;  ///< bonded nodes with y < 0
+  /// Layers of wedges between the middle of the lobe's length, a plane of symmetry, and its free end;
+  /// 0: plane strain.
+  int layers = 0;
+  double half_length_mm = 0.0;  ///< if there are layers
 };
 
 /// Maps a grid of quadrilaterals onto the lobe and splits each into two triangles; at every end of

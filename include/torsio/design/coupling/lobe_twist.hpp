@@ -23,10 +23,10 @@ struct SolverLimits {
   std::size_t memory_MiB = 2048;
 };
 
-/// One converged step. Torque and strains are of one lobe in plane strain.
+/// One converged step of one lobe.
 struct TwistStep {
   double twist_deg = 0.0;                    ///< > 0: the lobe is compressed, < 0: stretched
-  double torque_N = 0.0;                     ///< torque per length, Nmm/mm, of the upper flank
+  double torque_N = 0.0;                     ///< torque over length, Nmm/mm, of the upper flank
   double strain = 0.0;                       ///< largest logarithmic principal strain anywhere
   double strain_outside_300um = 0.0;         ///< farther than 0.3 mm from every end of a bond
   double strain_outside_800um = 0.0;         ///< farther than 0.8 mm; converges with the mesh
@@ -39,8 +39,8 @@ struct TwistCurve {
   std::string stopped_by;  ///< empty if every twist was reached
 };
 
-/// Input deck of CalculiX 2.20: both bonded flanks turn by half of each twist. The material needs
-/// finite, positive moduli.
+/// Input deck of CalculiX 2.20: both bonded flanks turn by half of each twist, and do not move along the
+/// axis. The material needs finite, positive moduli.
 /// @throws UsageError for such a material, or for twists that are none or beyond 30 degrees.
 [[nodiscard]] std::string twist_deck(const LobeMesh& mesh, const Rubber& rubber,
                                      const std::vector<double>& twists_deg);

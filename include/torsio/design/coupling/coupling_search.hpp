@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "torsio/core/progress.hpp"
+#include "torsio/design/coupling/coupling.hpp"
+#include "torsio/design/report.hpp"
+
+namespace torsio::design {
+
+/// A shape at the strain limit.
+struct LimitPoint {
+  double angle_deg = 0.0;
+  double torque_Nm = 0.0;
+  double work_J = 0.0;  ///< stored up to there: the integral of the torque over the twist
+};
+
+/// The twist at which a shape reaches the limit, on meshes not finer than `demand.finest_mesh`; the
+/// angle of the demand has no effect. None if the solver does not converge that far, or the limit is
+/// beyond 20 degrees.
+/// @throws as `twist_coupling`
+[[nodiscard]] std::optional<LimitPoint> limit_point(CouplingDemand demand, double shear_modulus_MPa,
+                                                    const CouplingLimit& limit,
+                                                    const Progress& progress = {});
+
+struct CouplingSearchSettings {
+  CouplingDemand demand = {};  ///< outer radius, length, material, limits of the solver
+  double shear_modulus_MPa = 4.0;
+  CouplingLimit limit = {};
+  std::size_t shapes = 60;  ///< shapes to try besides the seven of paper 003
+  std::uint64_t seed = 1;
+  double least_jaw_mm = 1.0;
+  std::string resume = {};  ///< file that keeps each result; empty: none
+};
+
+struct CouplingCandidate {
+  std::string name;  ///< "delta"; empty for a shape of the search
+  LobeShape shape = {};
+  std::optional<LimitPoint> at_limit = {};  ///< on the coarse mesh
+  bool is_on_front = false;  ///< no other shape has at least as much torque and twist
+};
+
+/// A shape beside the best of the seven on one mesh.
+struct CouplingGain {
+  std::string mesh;  ///< "medium"
+  std::optional<LimitPoint> best;
+  std::optional<LimitPoint> reference;
+  /// Least of the ratios of torque and of twist, less 1: both are larger by at least this share.
+  [[nodiscard]] std::optional<double> gain() const;
+};
+
+struct CouplingSearch {
+  std::vector<CouplingCandidate> candidates;  ///< the seven first, in their order
+  std::size_t reference = 0;                  ///< the one of the seven with the most work
+  std::size_t best = 0;                       ///< largest gain over the reference
+  std::vector<CouplingGain> gains;            ///< coarse, medium, fine
+};
+
+/// Shapes of more torque and twist at a strain limit within diameter and length. The seven geometries
+/// are evaluated first; then shapes are drawn around those on the Pareto front of torque and twist
+/// and evaluated on the coarse mesh, one after the other, the scatter falling from a fifth to a fiftieth
+/// of the range of each dimension. The best one and its reference are evaluated again on the medium and
+/// fine meshes. Deterministic for a seed.
+/// @throws as `twist_coupling`; Error if none of the seven reaches the limit, or the resume file is of
+/// another search.
+[[nodiscard]] CouplingSearch search_couplings(const CouplingSearchSettings& settings,
+                                              const Progress& progress = {});
+
+[[nodiscard]] DesignReport coupling_search_report(const CouplingSearchSettings& settings,
+                                                  const CouplingSearch& search);
+
+}  // namespace torsio::design
