@@ -17,7 +17,7 @@ namespace {
 struct CouplingFlags {
   torsio::design::CouplingDemand demand;
   std::string angle, length, modulus, torque, strain, metric = "0.8mm";
-  std::string half_width, root, flank, taper, slot;
+  std::string half_width, root, flank, taper, slot, ring;
   std::string mesh = "medium";
   std::string sheet, plot, resume;
   std::size_t shapes = 0;
@@ -46,6 +46,7 @@ torsio::design::CouplingDemand demand_of(const CouplingFlags& flags) {
   shape.root_radius_mm = length_mm(flags.root, "--root-radius", shape.root_radius_mm);
   shape.flank_radius_mm = length_mm(flags.flank, "--flank-radius", shape.flank_radius_mm);
   shape.taper_mm = length_mm(flags.taper, "--taper", shape.taper_mm);
+  shape.ring_radius_mm = length_mm(flags.ring, "--ring-radius", shape.ring_radius_mm);
   if (!flags.slot.empty())
     shape.slot_angle_deg = torsio::deg_from_rad(needed(flags.slot, "rad", "--slot-angle"));
   demand.angle_deg = torsio::deg_from_rad(needed(flags.angle, "rad", "--angle"));
@@ -179,6 +180,8 @@ void add_design_coupling(CLI::App& design) {
   verb->add_option("--flank-radius", flags->flank, "likewise; below 0: convex jaw");
   verb->add_option("--slot-angle", flags->slot, "between the flanks of a slot, likewise");
   verb->add_option("--taper", flags->taper, "recess of the outer face, likewise");
+  verb->add_option("--ring-radius", flags->ring,
+                   "inner radius of a ring of rubber that joins the lobes; no ring if not given");
   verb->add_option("--strain-limit", flags->strain, "find the twist of this strain, 60pct");
   verb->add_option("--strain-metric", flags->metric,
                    "distance from the ends of a bond within which strains are left out: 0.8mm, "

@@ -24,7 +24,7 @@ class RingConstraint {
  private:
   std::string text_;
   FeaturePipeline difference_;
-  std::vector<double> values_;  ///< of the names in the expression
+  std::vector<double> values_;  ///< values of the names in the expression
 };
 
 }  // namespace torsio

@@ -30,6 +30,7 @@ struct DesignReport {
   std::vector<DesignSection> sections = {};
   std::vector<std::string> notes = {};
   std::vector<XyFigure> pictures = {};
+  std::vector<SvgFigure> drawings = {};
 
   /// @throws Error if there is no such figure.
   [[nodiscard]] const DesignFigure& at(const std::string& section, const std::string& name) const;

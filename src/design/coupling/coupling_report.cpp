@@ -37,6 +37,8 @@ DesignSection shape_section(const CouplingDemand& d) {
            length("half_width", "mm", s.half_width_mm, paper.half_width_mm,
                   "assumed; chosen on Table 2 of paper 003"),
            length("taper", "mm", s.taper_mm, paper.taper_mm, "assumed"),
+           length("ring_radius", "mm", s.ring_radius_mm, paper.ring_radius_mm,
+                  "0: no ring; its radii are not printed"),
            {"thinnest_jaw", thinnest_jaw_mm(s), "mm"}}};
 }
 
@@ -81,13 +83,23 @@ std::string colour(double share) {
 }
 
 std::string lobe_picture(const LobeCurve& lobe, const char* name, double full) {
-  constexpr double kScale = 60.0;  // pixels per mm
+  constexpr double kWidth = 400.0;  // pixels
+  constexpr double kHeight = 270.0;
+  constexpr double kMiddle = 180.0;
   double least_x_mm = HUGE_VAL;
-  for (const MeshNode& node : lobe.mesh.nodes) least_x_mm = std::min(least_x_mm, node.x_mm);
+  double largest_x_mm = 0.0;
+  double largest_y_mm = 0.0;
+  for (const MeshNode& node : lobe.mesh.nodes) {
+    least_x_mm = std::min(least_x_mm, node.x_mm);
+    largest_x_mm = std::max(largest_x_mm, node.x_mm);
+    largest_y_mm = std::max(largest_y_mm, node.y_mm);
+  }
+  const double scale = std::min(kWidth / (largest_x_mm - least_x_mm), 0.5 * kHeight / largest_y_mm);
   const auto& steps = lobe.curve.steps;
   std::string svg = fmt::format(
-      "<text x=\"20\" y=\"24\" font-family=\"sans-serif\" font-size=\"14\">{} lobe{}, logarithmic "
-      "strain: blue 0, red {:.0f} %</text>\n",
+      "<text x=\"20\" y=\"24\" font-family=\"sans-serif\" font-size=\"14\">{}{}, strain: blue 0, "
+      "red "
+      "{:.0f} %</text>\n",
       name,
       steps.empty() ? ", no converged step"
                     : fmt::format(" at {:.4g} deg", std::abs(steps.back().twist_deg)),
@@ -99,13 +111,46 @@ std::string lobe_picture(const LobeCurve& lobe, const char* name, double full) {
     for (const std::size_t k : {0U, 3U, 1U, 4U, 2U, 5U}) {
       const MeshNode& node = lobe.mesh.nodes[static_cast<std::size_t>(corners[k])];
       fmt::format_to(std::back_inserter(svg), "{:.1f},{:.1f} ",
-                     40.0 + kScale * (node.x_mm - least_x_mm), 220.0 - kScale * node.y_mm);
+                     20.0 + scale * (node.x_mm - least_x_mm), kMiddle - scale * node.y_mm);
     }
     fmt::format_to(std::back_inserter(svg),
                    "\" fill=\"{}\" stroke=\"#333\" stroke-width=\"0.4\"/>\n",
                    steps.empty() ? "#fff" : colour(steps.back().element_strains[i] / full));
   }
   return svg;
+}
+
+XyFigure curve_figure(const Points& curve) {
+  XySeries torque{.label = "coupling", .x = {}, .y = {}};
+  for (const auto& [angle_deg, torque_Nm] : curve) {
+    torque.x.push_back(angle_deg);
+    torque.y.push_back(torque_Nm);
+  }
+  return {
+      .title = "Torque over twist", .x = {"twist [deg]"}, .y = {"torque [Nm]"}, .series = {torque}};
+}
+
+XyFigure strain_figure(const CouplingTwist& twist) {
+  XyFigure figure{.title = "Largest logarithmic strain over twist",
+                  .x = {"twist [deg]"},
+                  .y = {"strain [%]"},
+                  .series = {}};
+  for (const auto& [name, lobe] :
+       {std::pair{"compressed", &twist.compressed}, std::pair{"stretched", &twist.stretched}})
+    for (const auto& [metric, of] : {std::pair{StrainMetric::outside_800um, ", outside 0.8 mm"},
+                                     std::pair{StrainMetric::outside_300um, ", outside 0.3 mm"}}) {
+      XySeries series{
+          .label = std::string(name) + of,
+          .role = metric == StrainMetric::outside_800um ? CurveRole::model : CurveRole::limit,
+          .x = {0.0},
+          .y = {0.0}};
+      for (const TwistStep& step : lobe->curve.steps) {
+        series.x.push_back(std::abs(step.twist_deg));
+        series.y.push_back(100.0 * strain_of(step, metric));
+      }
+      figure.series.push_back(std::move(series));
+    }
+  return figure;
 }
 
 }  // namespace
@@ -149,6 +194,8 @@ DesignReport coupling_report(const CouplingDemand& demand, const CouplingTwist& 
                           : "the largest twist: a larger angle is needed");
     }
   }
+  report.pictures = {curve_figure(curve), strain_figure(twist)};
+  report.drawings = {{"Strains and torque", coupling_svg(twist, curve)}};
   report.notes = {
       demand.layers > 0
           ? "The ends of the lobes are free: the torque is less than in plane strain."
@@ -158,8 +205,11 @@ DesignReport coupling_report(const CouplingDemand& demand, const CouplingTwist& 
       "The hardness fixes the shear modulus only within a factor of 4 to 5; a measured torque "
       "fixes "
       "it for this model.",
-      "Six bonded lobes without the inner ring; nothing is extrapolated beyond the last converged "
-      "step."};
+      demand.shape.ring_radius_mm > 0.0
+          ? "Six bonded lobes and their ring; nothing is extrapolated beyond the last converged "
+            "step."
+          : "Six bonded lobes without the inner ring; nothing is extrapolated beyond the last "
+            "converged step."};
   return report;
 }
 

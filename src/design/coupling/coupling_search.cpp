@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <utility>
@@ -129,44 +130,156 @@ bool dominates(const LimitPoint& one, const LimitPoint& other) {
 }
 
 void find_front(std::vector<CouplingCandidate>& candidates) {
-  for (CouplingCandidate& each : candidates)
+  for (CouplingCandidate& each : candidates) {
+    const auto& point = each.at_limit[kCoarse];
     each.is_on_front =
-        each.at_limit && std::ranges::none_of(candidates, [&](const CouplingCandidate& other) {
-          return other.at_limit && dominates(*other.at_limit, *each.at_limit);
+        point && std::ranges::none_of(candidates, [&](const auto& other) {
+          return other.at_limit[kCoarse] && dominates(*other.at_limit[kCoarse], *point);
         });
-}
-
-double gain_of(const LimitPoint& point, const LimitPoint& reference) {
-  return std::min(point.torque_Nm / reference.torque_Nm, point.angle_deg / reference.angle_deg) -
-         1.0;
-}
-
-/// The candidate with the largest gain over a reference.
-std::size_t best_over(const std::vector<CouplingCandidate>& candidates,
-                      const LimitPoint& reference) {
-  std::size_t best = 0;
-  double largest = -1.0;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (!candidates[i].at_limit) continue;
-    const double gain = gain_of(*candidates[i].at_limit, reference);
-    if (gain <= largest) continue;
-    largest = gain;
-    best = i;
   }
-  return best;
+}
+
+/// The gain on a mesh; on the fine one, the smaller one of that and of the medium one.
+double gain_of(const CouplingCandidate& candidate, const CouplingCandidate& reference,
+               std::size_t mesh) {
+  const auto on = [&](std::size_t m) {
+    return CouplingGain{"", candidate.at_limit.at(m), reference.at_limit.at(m)}.gain().value_or(
+        -1.0);
+  };
+  return mesh == 0 ? std::min(on(0), on(1)) : on(mesh);
+}
+
+/// Candidates with the largest gains on a mesh, the best one first.
+std::vector<std::size_t> best_on(const std::vector<CouplingCandidate>& candidates,
+                                 std::size_t reference, std::size_t mesh, std::size_t count) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (candidates[i].at_limit[mesh]) order.push_back(i);
+  std::ranges::stable_sort(order, std::greater<>(), [&](std::size_t i) {
+    return gain_of(candidates[i], candidates[reference], mesh);
+  });
+  order.resize(std::min(order.size(), count));
+  return order;
 }
 
 std::size_t reference_of(const std::vector<CouplingCandidate>& seven) {
   const auto work = [](const CouplingCandidate& each) {
-    return each.at_limit ? each.at_limit->work_J : -1.0;
+    return each.at_limit[kCoarse] ? each.at_limit[kCoarse]->work_J : -1.0;
   };
   const auto most = std::ranges::max_element(seven, {}, work);
-  if (!most->at_limit)
+  if (!most->at_limit[kCoarse])
     throw Error({.place = "search for a coupling",
                  .problem = "none of the seven geometries reaches the strain limit",
                  .advice = "Take a smaller limit."});
   return static_cast<std::size_t>(most - seven.begin());
 }
+
+LobeShape scaled(LobeShape shape, double outer_radius_mm) {
+  const double scale = outer_radius_mm / shape.outer_radius_mm;
+  for (double LobeShape::*length :
+       {&LobeShape::outer_radius_mm, &LobeShape::root_radius_mm, &LobeShape::half_width_mm,
+        &LobeShape::flank_radius_mm, &LobeShape::taper_mm})
+    shape.*length *= scale;
+  return shape;
+}
+
+/// The shapes of one mesh that are drawn, and how far from each other.
+struct Stage {
+  std::size_t mesh;
+  std::size_t shapes;
+  double widest;
+  double narrowest;
+};
+
+class Search {
+ public:
+  Search(const CouplingSearchSettings& settings, const Progress& progress)
+      : settings_(settings),
+        progress_(progress),
+        evaluator_(settings),
+        random_(settings.seed),
+        stages_{{{kCoarse, settings.shapes, 0.2, 0.02},
+                 {1, settings.shapes / 3, 0.05, 0.02},
+                 {0, settings.shapes / 6, 0.03, 0.01}}} {
+    expected_ = paper_lobes().size() + stages_[0].shapes + stages_[1].shapes + stages_[2].shapes +
+                2 * (kKept + 1);
+  }
+
+  CouplingSearch found() {
+    auto& candidates = found_.candidates;
+    for (const NamedLobe& lobe : paper_lobes()) {
+      candidates.push_back({.name = std::string(lobe.name),
+                            .shape = scaled(lobe.shape, settings_.demand.shape.outer_radius_mm)});
+      evaluate(candidates.size() - 1, kCoarse);
+    }
+    found_.reference = reference_of(candidates);
+    for (const Stage& stage : stages_) run(stage);
+    find_front(candidates);
+    const auto best = best_on(candidates, found_.reference, 0, 1);
+    found_.best = best.empty() ? found_.reference : best.front();
+    for (std::size_t mesh = kCoarse + 1; mesh-- > 0;)
+      found_.gains.push_back({kMeshNames.at(mesh), candidates[found_.best].at_limit.at(mesh),
+                              candidates[found_.reference].at_limit.at(mesh)});
+    return std::move(found_);
+  }
+
+ private:
+  static constexpr std::size_t kKept = 4;  // shapes that the next mesh takes over
+
+  void run(const Stage& stage) {
+    auto& candidates = found_.candidates;
+    if (stage.mesh < kCoarse) {
+      evaluate(found_.reference, stage.mesh);
+      for (const std::size_t i : best_on(candidates, found_.reference, stage.mesh + 1, kKept))
+        evaluate(i, stage.mesh);
+    }
+    for (std::size_t i = 0; i < stage.shapes; ++i) {
+      const double share = static_cast<double>(i) / static_cast<double>(stage.shapes);
+      const double scatter = stage.widest * std::pow(stage.narrowest / stage.widest, share);
+      const LobeShape& parent = candidates[parent_of(stage, i)].shape;
+      candidates.push_back(
+          {.name = {}, .shape = drawn(parent, scatter, settings_.least_jaw_mm, random_)});
+      evaluate(candidates.size() - 1, stage.mesh);
+      if (stage.mesh == 0) evaluate(candidates.size() - 1, 1);
+    }
+  }
+
+  /// On the coarse mesh every second shape comes from anywhere on the front, all others from the best one.
+  std::size_t parent_of(const Stage& stage, std::size_t i) {
+    auto& candidates = found_.candidates;
+    if (stage.mesh == kCoarse && i % 2 == 1) {
+      find_front(candidates);
+      std::vector<std::size_t> front;
+      for (std::size_t k = 0; k < candidates.size(); ++k)
+        if (candidates[k].is_on_front) front.push_back(k);
+      return front[static_cast<std::size_t>(random_.uniform() * static_cast<double>(front.size()))];
+    }
+    const auto best = best_on(candidates, found_.reference, stage.mesh, 1);
+    return best.empty() ? found_.reference : best.front();
+  }
+
+  void evaluate(std::size_t candidate, std::size_t mesh) {
+    auto& point = found_.candidates[candidate].at_limit.at(mesh);
+    if (point) return;
+    point = evaluator_.at(
+        found_.candidates[candidate].shape, mesh, [&](double fraction, std::string_view) {
+          return !progress_ || progress_(std::min(1.0, (static_cast<double>(done_) + fraction) /
+                                                           static_cast<double>(expected_)),
+                                         fmt::format("shape {}, {} mesh", found_.candidates.size(),
+                                                     kMeshNames.at(mesh)));
+        });
+    ++done_;
+  }
+
+  const CouplingSearchSettings& settings_;
+  const Progress& progress_;
+  Evaluator evaluator_;
+  Random random_;
+  std::array<Stage, 3> stages_;
+  CouplingSearch found_;
+  std::size_t done_ = 0;
+  std::size_t expected_ = 0;
+};
 
 }  // namespace
 
@@ -200,65 +313,12 @@ std::optional<LimitPoint> limit_point(CouplingDemand demand, double shear_modulu
 
 std::optional<double> CouplingGain::gain() const {
   if (!best || !reference) return std::nullopt;
-  return gain_of(*best, *reference);
+  return std::min(best->torque_Nm / reference->torque_Nm, best->angle_deg / reference->angle_deg) -
+         1.0;
 }
 
 CouplingSearch search_couplings(const CouplingSearchSettings& settings, const Progress& progress) {
-  constexpr double kWidest = 0.2;
-  constexpr double kNarrowest = 0.02;
-  Evaluator evaluator(settings);
-  CouplingSearch search;
-  const std::size_t all = paper_lobes().size() + settings.shapes + 2 * kCoarse;
-  std::size_t done = 0;
-  const auto evaluated = [&](const LobeShape& shape, std::size_t mesh) {
-    const auto point = evaluator.at(shape, mesh, [&](double fraction, std::string_view) {
-      return !progress ||
-             progress((static_cast<double>(done) + fraction) / static_cast<double>(all),
-                      fmt::format("shape {} of {}", done + 1, all));
-    });
-    ++done;
-    return point;
-  };
-  for (const NamedLobe& lobe : paper_lobes()) {
-    LobeShape shape = lobe.shape;
-    const double scale = settings.demand.shape.outer_radius_mm / shape.outer_radius_mm;
-    for (double LobeShape::*length :
-         {&LobeShape::outer_radius_mm, &LobeShape::root_radius_mm, &LobeShape::half_width_mm,
-          &LobeShape::flank_radius_mm, &LobeShape::taper_mm})
-      shape.*length *= scale;
-    search.candidates.push_back({.name = std::string(lobe.name), .shape = shape});
-    search.candidates.back().at_limit = evaluated(shape, kCoarse);
-  }
-  search.reference = reference_of(search.candidates);
-  const LimitPoint reference = *search.candidates[search.reference].at_limit;
-  Random random(settings.seed);
-  for (std::size_t i = 0; i < settings.shapes; ++i) {
-    find_front(search.candidates);
-    // Every second one from the shape with the largest gain, the others from anywhere on the front.
-    std::vector<std::size_t> front;
-    for (std::size_t k = 0; k < search.candidates.size(); ++k)
-      if (search.candidates[k].is_on_front) front.push_back(k);
-    const auto any = static_cast<std::size_t>(random.uniform() * static_cast<double>(front.size()));
-    const std::size_t parent = i % 2 == 0 ? best_over(search.candidates, reference) : front[any];
-    const double share = static_cast<double>(i) / static_cast<double>(settings.shapes);
-    const double scatter = kWidest * std::pow(kNarrowest / kWidest, share);
-    CouplingCandidate next{
-        .name = {},
-        .shape = drawn(search.candidates[parent].shape, scatter, settings.least_jaw_mm, random)};
-    next.at_limit = evaluated(next.shape, kCoarse);
-    search.candidates.push_back(std::move(next));
-  }
-  find_front(search.candidates);
-  search.best = best_over(search.candidates, reference);
-  const CouplingCandidate& best = search.candidates[search.best];
-  search.gains.push_back({kMeshNames.at(kCoarse), best.at_limit, reference});
-  for (std::size_t mesh = kCoarse; mesh-- > 0;) {
-    CouplingGain gain{.mesh = kMeshNames.at(mesh), .best = {}, .reference = {}};
-    gain.best = evaluated(best.shape, mesh);
-    gain.reference = evaluated(search.candidates[search.reference].shape, mesh);
-    search.gains.push_back(std::move(gain));
-  }
-  return search;
+  return Search(settings, progress).found();
 }
 
 }  // namespace torsio::design

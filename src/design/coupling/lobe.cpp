@@ -37,7 +37,7 @@ Point on_chord(const LobeShape& shape, double radius_mm) {
 
 void check_numbers(const LobeShape& s) {
   for (const double value : {s.outer_radius_mm, s.root_radius_mm, s.half_width_mm, s.slot_angle_deg,
-                             s.flank_radius_mm, s.taper_mm})
+                             s.flank_radius_mm, s.taper_mm, s.ring_radius_mm})
     if (!std::isfinite(value)) refuse("finite numbers", fmt::format("{}", value), "");
   if (!(s.root_radius_mm > 0.0 && s.outer_radius_mm > s.root_radius_mm))
     refuse("0 < root radius < outer radius",
@@ -52,6 +52,9 @@ void check_numbers(const LobeShape& s) {
   if (!(s.taper_mm >= 0.0 && s.taper_mm < 0.5 * (s.outer_radius_mm - s.root_radius_mm)))
     refuse("a taper from 0 to half of the lobe's height", fmt::format("{} mm", s.taper_mm),
            "choose a smaller taper");
+  if (!(s.ring_radius_mm >= 0.0 && s.ring_radius_mm < 0.95 * s.root_radius_mm))
+    refuse("a radius of the ring from 0 (no ring) to 0.95 times the root radius",
+           fmt::format("{} mm", s.ring_radius_mm), "choose a smaller radius");
 }
 
 }  // namespace

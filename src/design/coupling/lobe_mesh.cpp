@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <vector>
 
 #include "torsio/core/error.hpp"
 
@@ -73,6 +75,77 @@ double jacobian_mm2(const LobeMesh& mesh, const std::array<int, 6>& triangle, do
   return xr * ys - xs * yr;
 }
 
+/// Two triangles of six nodes of a quadrilateral whose nodes are at (row, column), both even.
+template <class Number>
+void add_pair(LobeMesh& mesh, const Number& number, int i, int j, bool is_rising) {
+  const int a = number(i, j);
+  const int b = number(i + 2, j);
+  const int c = number(i + 2, j + 2);
+  const int d = number(i, j + 2);
+  const int ab = number(i + 1, j);
+  const int bc = number(i + 2, j + 1);
+  const int cd = number(i + 1, j + 2);
+  const int da = number(i, j + 1);
+  const int middle = number(i + 1, j + 1);
+  if (is_rising) {
+    mesh.triangles.push_back({a, b, c, ab, bc, middle});
+    mesh.triangles.push_back({a, c, d, middle, cd, da});
+  } else {
+    mesh.triangles.push_back({a, b, d, ab, middle, da});
+    mesh.triangles.push_back({b, c, d, bc, cd, middle});
+  }
+}
+
+/// The ring below the lobe and below both halves of jaws beside it: radial lines through the nodes of
+/// the lobe's root. The lobe's nodes are the first ones of the mesh, `columns` + 1 at its root.
+void add_ring(LobeMesh& mesh, const LobeShape& shape, const MeshDensity& density, int columns) {
+  constexpr double kPitch_rad = std::numbers::pi / 6.0;
+  const int rows = 2 * std::max(2, density.radial / 2);
+  const int side = 2 * std::max(2, density.across / 2);
+  const double end_rad = flank_angle_rad(shape, shape.root_radius_mm);
+  const int first = static_cast<int>(mesh.nodes.size());
+  const int all = columns + 2 * side;
+  const auto is_shared = [&](int i, int j) {
+    return i == rows && j >= side && j <= side + columns;
+  };
+  const auto angle_rad = [&](int j) {
+    if (j < side) return -std::lerp(kPitch_rad, end_rad, static_cast<double>(j) / side);
+    if (j > side + columns)
+      return std::lerp(end_rad, kPitch_rad, static_cast<double>(j - side - columns) / side);
+    const MeshNode& root = mesh.nodes[static_cast<std::size_t>(j - side)];
+    return std::atan2(root.y_mm, root.x_mm);
+  };
+  const auto number = [&](int i, int j) {
+    if (is_shared(i, j)) return j - side;
+    // The last row lacks the shared nodes.
+    const int skipped = i == rows && j > side + columns ? columns + 1 : 0;
+    return first + i * (all + 1) + j - skipped;
+  };
+  std::vector<double> angles(static_cast<std::size_t>(all) + 1);
+  for (int j = 0; j <= all; ++j) angles[static_cast<std::size_t>(j)] = angle_rad(j);
+  for (int i = 0; i <= rows; ++i) {
+    const double radius_mm =
+        std::lerp(shape.ring_radius_mm, shape.root_radius_mm, static_cast<double>(i) / rows);
+    for (int j = 0; j <= all; ++j) {
+      if (is_shared(i, j)) continue;
+      const double angle = angles[static_cast<std::size_t>(j)];
+      mesh.nodes.push_back({radius_mm * std::cos(angle), radius_mm * std::sin(angle)});
+    }
+  }
+  for (int i = 0; i < rows; i += 2)
+    for (int j = 0; j < all; j += 2) add_pair(mesh, number, i, j, j < all / 2);
+  for (int j = 0; j < side; ++j) {
+    mesh.lower_flank.push_back(number(rows, j));
+    mesh.upper_flank.push_back(number(rows, all - j));
+  }
+  for (int i = 0; i < rows; ++i) {
+    mesh.lower_flank.push_back(number(i, 0));
+    mesh.upper_flank.push_back(number(i, all));
+  }
+  mesh.bond_ends.push_back(number(0, 0));
+  mesh.bond_ends.push_back(number(0, all));
+}
+
 }  // namespace
 
 LobeMesh mesh_lobe(const LobeShape& shape, const MeshDensity& density) {
@@ -89,30 +162,15 @@ LobeMesh mesh_lobe(const LobeShape& shape, const MeshDensity& density) {
       mesh.nodes.push_back(mapped(
           shape, graded(static_cast<double>(i) / rows, density.grading),
           2.0 * graded(static_cast<double>(j) / columns, density.grading) - 1.0, outer_end_rad));
-  for (int i = 0; i < rows; i += 2) {
-    for (int j = 0; j < columns; j += 2) {
-      const int a = number(i, j);
-      const int b = number(i + 2, j);
-      const int c = number(i + 2, j + 2);
-      const int d = number(i, j + 2);
-      const int ab = number(i + 1, j);
-      const int bc = number(i + 2, j + 1);
-      const int cd = number(i + 1, j + 2);
-      const int da = number(i, j + 1);
-      const int middle = number(i + 1, j + 1);
-      if ((i < density.radial) == (j < density.across)) {
-        mesh.triangles.push_back({a, b, c, ab, bc, middle});
-        mesh.triangles.push_back({a, c, d, middle, cd, da});
-      } else {
-        mesh.triangles.push_back({a, b, d, ab, middle, da});
-        mesh.triangles.push_back({b, c, d, bc, cd, middle});
-      }
-    }
-  }
+  for (int i = 0; i < rows; i += 2)
+    for (int j = 0; j < columns; j += 2)
+      add_pair(mesh, number, i, j, (i < density.radial) == (j < density.across));
   for (int i = 0; i <= rows; ++i) {
     mesh.lower_flank.push_back(number(i, 0));
     mesh.upper_flank.push_back(number(i, columns));
   }
+  mesh.bond_ends = {number(0, 0), number(0, columns), number(rows, 0), number(rows, columns)};
+  if (shape.ring_radius_mm > 0.0) add_ring(mesh, shape, density, columns);
   return mesh;
 }
 

@@ -102,18 +102,19 @@ std::size_t flank_rows(const LobeMesh& mesh) {
 
 /// In a solid, the bond ends at the free end, too.
 double distance_to_bond_ends_mm(const LobeMesh& mesh, const Row& place) {
-  double distance_mm = HUGE_VAL;
-  double from_flanks_mm = HUGE_VAL;
-  for (const auto* flank : {&mesh.upper_flank, &mesh.lower_flank})
-    for (const int index : *flank) {
+  const auto from = [&](const std::vector<int>& nodes) {
+    double least_mm = HUGE_VAL;
+    for (const int index : nodes) {
       const MeshNode& node = mesh.nodes[static_cast<std::size_t>(index)];
-      const double in_plane_mm = std::hypot(place[2] - node.x_mm, place[3] - node.y_mm);
-      from_flanks_mm = std::min(from_flanks_mm, in_plane_mm);
-      if (index == flank->front() || index == flank->back())
-        distance_mm = std::min(distance_mm, in_plane_mm);
+      least_mm = std::min(least_mm, std::hypot(place[2] - node.x_mm, place[3] - node.y_mm));
     }
+    return least_mm;
+  };
+  double distance_mm = from(mesh.bond_ends);
   if (mesh.layers > 0)
-    distance_mm = std::min(distance_mm, std::hypot(from_flanks_mm, mesh.half_length_mm - place[4]));
+    distance_mm =
+        std::min(distance_mm, std::hypot(std::min(from(mesh.upper_flank), from(mesh.lower_flank)),
+                                         mesh.half_length_mm - place[4]));
   return distance_mm;
 }
 

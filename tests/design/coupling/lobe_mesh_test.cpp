@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
+#include <set>
+#include <utility>
 
 #include "torsio/core/error.hpp"
 
@@ -71,6 +74,28 @@ TEST(LobeMesh, IsSymmetricAndSharesEveryEndOfABondBetweenTwoTriangles) {
   }
 }
 
+TEST(LobeMesh, HasTheAreaOfTheRingAndNoNodeTwice) {
+  for (const NamedLobe& lobe : paper_lobes()) {
+    SCOPED_TRACE(std::string(lobe.name));
+    LobeShape shape = lobe.shape;
+    shape.taper_mm = 0.0;
+    const LobeMesh alone = mesh_lobe(shape, {});
+    shape.ring_radius_mm = 3.0;
+    const LobeMesh mesh = mesh_lobe(shape, {});
+    EXPECT_GT(smallest_jacobian_mm2(mesh), 0.0);
+    const double ring_mm2 =
+        std::numbers::pi / 6.0 * (shape.root_radius_mm * shape.root_radius_mm - 9.0);
+    EXPECT_NEAR(mesh_area_mm2(mesh) - mesh_area_mm2(alone), ring_mm2, 1e-4 * ring_mm2);
+    std::set<std::pair<double, double>> places;
+    for (const MeshNode& node : mesh.nodes) places.emplace(node.x_mm, node.y_mm);
+    EXPECT_EQ(places.size(), mesh.nodes.size());
+    std::set<int> used;
+    for (const auto& triangle : mesh.triangles) used.insert(triangle.begin(), triangle.end());
+    EXPECT_EQ(used.size(), mesh.nodes.size());
+    EXPECT_EQ(mesh.upper_flank.size(), mesh.lower_flank.size());
+  }
+}
+
 TEST(LobeMesh, TapersTheOuterFaceByTheStatedDepth) {
   const LobeShape shape = paper_lobe("beta");
   const MeshDensity density = {.radial = 4, .across = 4, .grading = 1.0};
@@ -99,6 +124,7 @@ TEST(LobeMesh, RefusesShapesThatCannotBeBuilt) {
   EXPECT_THAT(message({.outer_radius_mm = 5.0}), HasSubstr("root radius"));
   EXPECT_THAT(message({.half_width_mm = NAN}), HasSubstr("finite"));
   EXPECT_THAT(message({.taper_mm = 3.0}), HasSubstr("taper"));
+  EXPECT_THAT(message({.ring_radius_mm = 5.4}), HasSubstr("radius of the ring"));
   EXPECT_THAT(message({}, {.radial = 3}), HasSubstr("even numbers"));
   EXPECT_THAT(message({}, {.grading = 0.5}), HasSubstr("grading"));
   EXPECT_THROW((void)paper_lobe("theta"), UsageError);

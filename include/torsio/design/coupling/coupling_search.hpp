@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -40,8 +41,9 @@ struct CouplingSearchSettings {
 struct CouplingCandidate {
   std::string name;  ///< "delta"; empty for a shape of the search
   LobeShape shape = {};
-  std::optional<LimitPoint> at_limit = {};  ///< on the coarse mesh
-  bool is_on_front = false;  ///< no other shape has at least as much torque and twist
+  /// On the fine, medium and coarse mesh, as `coupling_meshes`; those that were not tried are empty.
+  std::array<std::optional<LimitPoint>, 3> at_limit = {};
+  bool is_on_front = false;  ///< no other shape has at least as much torque and twist, coarse mesh
 };
 
 /// A shape beside the best of the seven on one mesh.
@@ -56,15 +58,17 @@ struct CouplingGain {
 struct CouplingSearch {
   std::vector<CouplingCandidate> candidates;  ///< the seven first, in their order
   std::size_t reference = 0;                  ///< the one of the seven with the most work
-  std::size_t best = 0;                       ///< largest gain over the reference
-  std::vector<CouplingGain> gains;            ///< coarse, medium, fine
+  /// Largest gain over the reference on the medium and the fine mesh, the smaller one of both.
+  std::size_t best = 0;
+  std::vector<CouplingGain> gains;  ///< coarse, medium, fine
 };
 
 /// Shapes of more torque and twist at a strain limit within diameter and length. The seven geometries
 /// are evaluated first; then shapes are drawn around those on the Pareto front of torque and twist
 /// and evaluated on the coarse mesh, one after the other, the scatter falling from a fifth to a fiftieth
-/// of the range of each dimension. The best one and its reference are evaluated again on the medium and
-/// fine meshes. Deterministic for a seed.
+/// of the range of each dimension. Since coarse meshes hide strains, the four best are evaluated on the
+/// medium mesh, where a third as many shapes are drawn around the best one; the four best of those on the
+/// fine mesh, with a sixth as many. Deterministic for a seed.
 /// @throws as `twist_coupling`; Error if none of the seven reaches the limit, or the resume file is of
 /// another search.
 [[nodiscard]] CouplingSearch search_couplings(const CouplingSearchSettings& settings,

@@ -18,6 +18,8 @@ struct LobeShape {
   double slot_angle_deg = 0.0;   ///< included angle of the two flanks of a slot
   double flank_radius_mm = 0.0;  ///< 0: straight; > 0: concave jaw, < 0: convex jaw
   double taper_mm = 0.0;         ///< recess of the free outer face; assumed where it is not 0
+  /// Inner radius of the ring of rubber that joins the lobes, bonded to the tips of the jaws; 0: no ring.
+  double ring_radius_mm = 0.0;
 };
 
 struct NamedLobe {

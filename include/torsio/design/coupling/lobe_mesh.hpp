@@ -25,15 +25,17 @@ struct MeshNode {
 struct LobeMesh {
   std::vector<MeshNode> nodes;
   std::vector<std::array<int, 6>> triangles;
-  std::vector<int> upper_flank;  ///< bonded nodes with y > 0
-  std::vector<int> lower_flank;  ///< bonded nodes with y < 0
+  std::vector<int> upper_flank;  ///< nodes with y > 0 that move with a jaw
+  std::vector<int> lower_flank;  ///< nodes with y < 0 that move with a jaw
+  std::vector<int> bond_ends;    ///< where strains are singular: ends of bonds, edges of jaws
   /// Layers of wedges between the middle of the lobe's length, a plane of symmetry, and its free end;
   /// 0: plane strain.
   int layers = 0;
   double half_length_mm = 0.0;  ///< if there are layers
 };
 
-/// Maps a grid of quadrilaterals onto the lobe and splits each into two triangles; at every end of
+/// Maps a grid of quadrilaterals onto the lobe, and one onto its share of the ring, if there is one,
+/// which is cut in the middle of the jaws, where it moves with them; splits each into two triangles; at every end of
 /// a bond two triangles share the corner, which delays the inversion of the corner's element.
 /// Every node of a flank lies on its arc or line, every node of a face on its arc.
 /// @throws UsageError for a lobe that `check_lobe` refuses, or for fewer than 2 divisions, an odd
