@@ -63,12 +63,12 @@ struct CouplingSearch {
   std::vector<CouplingGain> gains;  ///< coarse, medium, fine
 };
 
-/// Shapes of more torque and twist at a strain limit within diameter and length. The seven geometries
-/// are evaluated first; then shapes are drawn around those on the Pareto front of torque and twist
-/// and evaluated on the coarse mesh, one after the other, the scatter falling from a fifth to a fiftieth
-/// of the range of each dimension. Since coarse meshes hide strains, the four best are evaluated on the
-/// medium mesh, where a third as many shapes are drawn around the best one; the four best of those on the
-/// fine mesh, with a sixth as many. Deterministic for a seed.
+/// Shapes of more torque and twist at a strain limit within diameter and length. The seven geometries are
+/// evaluated first. Then shapes are drawn around those on the Pareto front of torque and twist and
+/// evaluated on the coarse mesh, one after the other; the scatter falls from a fifth to a fiftieth of each
+/// dimension's range. Since coarse meshes hide strains, the four best are evaluated on the medium mesh,
+/// where a third as many shapes are drawn around the best one, and the four best of those on the fine mesh,
+/// with a sixth as many. Deterministic for a seed.
 /// @throws as `twist_coupling`; Error if none of the seven reaches the limit, or the resume file is of
 /// another search.
 [[nodiscard]] CouplingSearch search_couplings(const CouplingSearchSettings& settings,
