@@ -27,6 +27,7 @@ endmacro()
 if(TORSIO_BUILD_LAB)
   torsio_debian_package(program torsio science "The program torsio, its manual pages and documents.")
   set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libmatio11")  # loaded when a MATLAB file is read
+  set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "calculix-ccx")  # run by design coupling
 endif()
 if(TORSIO_BUILD_C)
   get_target_property(abi torsio_c SOVERSION)
