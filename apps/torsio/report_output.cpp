@@ -40,7 +40,9 @@ std::string problem_of(const Parse& parse, const std::string& text) {
     static_cast<void>(parse(text));
     return {};
   } catch (const torsio::UsageError& error) {
-    return error.what();
+    // CLI11 writes the name of the option before it.
+    const std::string problem = error.what();
+    return problem.substr(problem.find(": ") + 2);
   }
 }
 

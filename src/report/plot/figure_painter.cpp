@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "report/plot/simplified_line.hpp"
 #include "torsio/report/html/decimation.hpp"
 
 namespace torsio {
@@ -16,7 +17,10 @@ constexpr double kText = 7.0;
 constexpr double kLineHeight = 9.5;
 constexpr double kTickLength = 2.5;
 constexpr double kBottom = 24.0;  ///< for the numbers and the label of the horizontal axis
-constexpr double kStep = 0.25;    ///< between drawn points
+constexpr double kStep = 0.25;    ///< between minimum and maximum of a time series
+/// Of a drawn line from the points: less than half a dot of 300 to the inch.
+constexpr double kDeviation = 0.1;
+constexpr double kMostPoints = 8000.0;  ///< of a line
 
 /// Cairo writes a coordinate of SVG with up to six digits; of a sixteenth these are at most four.
 double rounded(double position) { return std::round(16.0 * position) / 16.0; }
@@ -185,26 +189,25 @@ void FigurePainter::clip(const PlotArea& frame) {
 
 void FigurePainter::line(const std::vector<double>& x, const std::vector<double>& y,
                          const PlotAxis& x_axis, const PlotAxis& y_axis) {
-  double last_x = 0.0;
-  double last_y = 0.0;
-  bool is_gap = true;
-  for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i) {
-    const double at_x = x_axis.at(x[i]);
-    const double at_y = y_axis.at(y[i]);
-    if (!std::isfinite(at_x) || !std::isfinite(at_y)) {
-      is_gap = true;
-      continue;
-    }
-    const bool is_last = i + 1 == x.size();
-    if (!is_gap && !is_last && std::hypot(at_x - last_x, at_y - last_y) < kStep / detail_) continue;
-    if (is_gap)
-      cairo_move_to(cairo_, rounded(at_x), rounded(at_y));
+  const std::size_t count = std::min(x.size(), y.size());
+  const auto most = static_cast<std::size_t>(kMostPoints * detail_);
+  const std::size_t stride = (count + most - 1) / most;
+  std::vector<PlotPoint> part;
+  const auto finish = [&] {
+    if (part.empty()) return;
+    const std::vector<PlotPoint> kept = simplified(part, kDeviation / detail_);
+    cairo_move_to(cairo_, rounded(kept.front().x), rounded(kept.front().y));
+    for (const PlotPoint& point : kept) cairo_line_to(cairo_, rounded(point.x), rounded(point.y));
+    part.clear();
+  };
+  for (std::size_t i = 0; i < count; i += std::max<std::size_t>(stride, 1)) {
+    const PlotPoint point{x_axis.at(x[i]), y_axis.at(y[i])};
+    if (std::isfinite(point.x) && std::isfinite(point.y))
+      part.push_back(point);
     else
-      cairo_line_to(cairo_, rounded(at_x), rounded(at_y));
-    is_gap = false;
-    last_x = at_x;
-    last_y = at_y;
+      finish();
   }
+  finish();
 }
 
 void FigurePainter::points(const XySeries& series, const PlotAxis& x, const PlotAxis& y) {

@@ -19,7 +19,7 @@ namespace torsio {
 namespace {
 
 constexpr double kPointsPerMm = 72.0 / 25.4;
-constexpr double kPixelsPerPoint = 300.0 / 72.0;
+constexpr double kDotsPerInch = 300.0;
 constexpr double kLeastPanel_mm = 22.0;
 constexpr double kHead_mm = 16.0;
 
@@ -48,12 +48,13 @@ double height_mm(const ReportFigure& figure, const PlotSize& size) {
   return std::max(size.height_mm, panels > 1.0 ? kHead_mm + panels * kLeastPanel_mm : 0.0);
 }
 
-Surface surface_of(PlotFormat format, double width, double height, std::string& bytes) {
+Surface surface_of(PlotFormat format, double width, double height, double scale,
+                   std::string& bytes) {
   if (format == PlotFormat::png)
-    return {cairo_image_surface_create(CAIRO_FORMAT_RGB24,
-                                       static_cast<int>(std::lround(width * kPixelsPerPoint)),
-                                       static_cast<int>(std::lround(height * kPixelsPerPoint))),
-            cairo_surface_destroy};
+    return {
+        cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(std::lround(width * scale)),
+                                   static_cast<int>(std::lround(height * scale))),
+        cairo_surface_destroy};
   if (format == PlotFormat::svg)
     return {cairo_svg_surface_create_for_stream(append, &bytes, width, height),
             cairo_surface_destroy};
@@ -76,18 +77,20 @@ std::string drawn(const std::vector<const ReportFigure*>& figures, PlotFormat fo
   double height = 0.0;
   for (const ReportFigure* figure : figures) height += height_mm(*figure, size) * kPointsPerMm;
   const double width = size.width_mm * kPointsPerMm;
+  // Of a picture of dots the resolution is reduced, of lines the number of points.
+  const double scale = kDotsPerInch * detail / 72.0;
   std::string bytes;
-  const Surface surface = surface_of(format, width, height, bytes);
+  const Surface surface = surface_of(format, width, height, scale, bytes);
   std::vector<std::string> texts;
   {
     const Cairo cairo(cairo_create(surface.get()), cairo_destroy);
-    if (format == PlotFormat::png) cairo_scale(cairo.get(), kPixelsPerPoint, kPixelsPerPoint);
+    if (format == PlotFormat::png) cairo_scale(cairo.get(), scale, scale);
     cairo_set_source_rgb(cairo.get(), 1.0, 1.0, 1.0);
     cairo_paint(cairo.get());
     cairo_select_font_face(cairo.get(), "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
                            CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_font_size(cairo.get(), 7.0);
-    FigurePainter painter(cairo.get(), detail);
+    FigurePainter painter(cairo.get(), format == PlotFormat::png ? 1.0 : detail);
     PlotArea area{.left = 2.0, .top = 0.0, .width = width - 4.0, .height = 0.0};
     for (const ReportFigure* figure : figures) {
       area.height = height_mm(*figure, size) * kPointsPerMm;
@@ -105,6 +108,9 @@ std::string drawn(const std::vector<const ReportFigure*>& figures, PlotFormat fo
     require(cairo_surface_status(surface.get()));
   }
   if (format == PlotFormat::svg) {
+    // Cairo counts the surfaces of a process in this name, which nothing refers to.
+    const std::size_t name = bytes.find(" id=\"surface");
+    if (name != std::string::npos) bytes.erase(name, bytes.find('>', name) - name);
     const std::size_t at = bytes.find('>', bytes.find("<svg")) + 1;
     bytes.insert(at, fmt::format("\n<title>{}</title>\n<desc>{}</desc>",
                                  markup_text(title_of(*figures.front())),
@@ -186,10 +192,10 @@ std::string figure_plot(const std::vector<const ReportFigure*>& figures, PlotFor
                       .found = figures.empty() ? "none" : "a figure that is SVG already"});
   std::string bytes;
   double detail = 1.0;
-  for (int attempt = 0; attempt < 6; ++attempt) {
+  for (int attempt = 0; attempt < 8; ++attempt) {
     bytes = drawn(figures, format, size, detail);
     if (bytes.size() <= kMaxPlotBytes) return bytes;
-    detail *= 0.5;
+    detail *= 0.7;
   }
   throw UsageError({.place = "--plot",
                     .expected = fmt::format("a picture of at most {} bytes", kMaxPlotBytes),

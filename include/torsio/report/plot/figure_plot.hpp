@@ -39,7 +39,7 @@ inline constexpr std::size_t kMaxPlotBytes = 200'000;
 /// Draws figures under each other, as their page shows them at first: the curves with `is_shown`. Text is DejaVu Sans
 /// of 7 points, colours are those of Okabe and Ito (2008), curves are told apart by dashes, too. Lines keep the minimum
 /// and maximum of each step of the grid of points. The same figures give the same bytes.
-/// @return the bytes of a file; PNG has 300 dots per inch; SVG has the texts in its `desc` element, because cairo draws
+/// @return the bytes of a file; PNG has 300 dots per inch or, where it would be too large, fewer; SVG has the texts in its `desc` element, because cairo draws
 /// letters as outlines.
 /// @throws UsageError for a figure that is SVG already; Error if cairo fails.
 [[nodiscard]] std::string figure_plot(const std::vector<const ReportFigure*>& figures,
