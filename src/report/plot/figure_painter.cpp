@@ -18,9 +18,9 @@ constexpr double kLineHeight = 9.5;
 constexpr double kTickLength = 2.5;
 constexpr double kBottom = 24.0;  ///< for the numbers and the label of the horizontal axis
 constexpr double kStep = 0.25;    ///< between minimum and maximum of a time series
-/// Of a drawn line from the points: less than half a dot of 300 to the inch.
+/// Largest distance of a drawn line from its points: less than half a dot of 300 to the inch.
 constexpr double kDeviation = 0.1;
-constexpr double kMostPoints = 8000.0;  ///< of a line
+constexpr double kMaxPoints = 8000.0;  ///< in a line
 
 /// Cairo writes a coordinate of SVG with up to six digits; of a sixteenth these are at most four.
 double rounded(double position) { return std::round(16.0 * position) / 16.0; }
@@ -190,7 +190,7 @@ void FigurePainter::clip(const PlotArea& frame) {
 void FigurePainter::line(const std::vector<double>& x, const std::vector<double>& y,
                          const PlotAxis& x_axis, const PlotAxis& y_axis) {
   const std::size_t count = std::min(x.size(), y.size());
-  const auto most = static_cast<std::size_t>(kMostPoints * detail_);
+  const auto most = static_cast<std::size_t>(kMaxPoints * detail_);
   const std::size_t stride = (count + most - 1) / most;
   std::vector<PlotPoint> part;
   const auto finish = [&] {

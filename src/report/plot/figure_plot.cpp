@@ -77,7 +77,7 @@ std::string drawn(const std::vector<const ReportFigure*>& figures, PlotFormat fo
   double height = 0.0;
   for (const ReportFigure* figure : figures) height += height_mm(*figure, size) * kPointsPerMm;
   const double width = size.width_mm * kPointsPerMm;
-  // Of a picture of dots the resolution is reduced, of lines the number of points.
+  // PNG becomes smaller by its resolution, the others by the number of points.
   const double scale = kDotsPerInch * detail / 72.0;
   std::string bytes;
   const Surface surface = surface_of(format, width, height, scale, bytes);

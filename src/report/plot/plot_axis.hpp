@@ -23,7 +23,7 @@ class PlotAxis {
   [[nodiscard]] std::vector<Tick> ticks() const;
 
  private:
-  PlotRange range_;  ///< of the decimal logarithms on a logarithmic axis
+  PlotRange range_;  ///< decimal logarithms on a logarithmic axis
   bool is_logarithmic_;
   double from_;
   double to_;
