@@ -53,7 +53,8 @@ torsio::Dataset load(const AdaptFlags& flags, const torsio::ModelFile& file,
 void run(AdaptFlags& flags) {
   std::vector<std::string> read = flags.test;
   read.push_back(flags.model);
-  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination}, read);
+  flags.data.check_outputs(
+      {flags.output, flags.json.destination, flags.report.destination, flags.report.plot}, read);
   require_model_file(flags.output);
   const auto settings = torsio::adaptation_settings(flags.method, parse_settings(flags.settings));
   const torsio::ModelFile file = torsio::load_model(flags.model);

@@ -51,7 +51,8 @@ torsio::Dataset load(const AttributeFlags& flags, const torsio::ModelFile& file,
 }
 
 void run(AttributeFlags& flags) {
-  flags.data.check_outputs({flags.json.destination, flags.report.destination}, {flags.model});
+  flags.data.check_outputs({flags.json.destination, flags.report.destination, flags.report.plot},
+                           {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   ProgressBar progress;
   const torsio::Dataset dataset = load(flags, file, progress.listener());

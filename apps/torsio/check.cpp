@@ -100,7 +100,8 @@ void run(CheckFlags& flags) {
     throw torsio::UsageError({.place = "--want",
                               .problem = "it states the intended use for --advise",
                               .advice = "Add --advise."});
-  flags.data.check_outputs({flags.json.destination, flags.report.destination}, flags.test);
+  flags.data.check_outputs({flags.json.destination, flags.report.destination, flags.report.plot},
+                           flags.test);
   const Checked result = checked(flags);
   const torsio::Verdict verdict = torsio::worst(result.findings);
   if (flags.json.wants_tables()) {

@@ -32,8 +32,9 @@ struct CompareFlags {
 };
 
 void run(CompareFlags& flags) {
-  flags.data.check_outputs({flags.output, flags.report.destination, flags.json.destination},
-                           flags.test);
+  flags.data.check_outputs(
+      {flags.output, flags.report.destination, flags.report.plot, flags.json.destination},
+      flags.test);
   require_model_file(flags.output);
   ProgressBar progress;
   const torsio::Dataset dataset =

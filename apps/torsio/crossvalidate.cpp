@@ -63,7 +63,7 @@ void warn_of_other_motions_in_folds(torsio::Dataset dataset, const torsio::Featu
 
 void run(CrossValidateFlags& flags) {
   const auto settings = parse_settings(flags.settings);  // before a stray value is read as a file
-  flags.data.check_outputs({flags.json.destination, flags.report.destination});
+  flags.data.check_outputs({flags.json.destination, flags.report.destination, flags.report.plot});
   const torsio::FoldScheme scheme{.folds = flags.folds,
                                   .embargo_s = torsio::si_quantity(flags.embargo, "s", "--embargo"),
                                   .by = flags.by};

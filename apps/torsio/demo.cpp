@@ -62,8 +62,9 @@ std::string deployment(const DemoFlags& flags, const torsio::Dataset& dataset,
 }
 
 void run(DemoFlags& flags) {
-  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination},
-                           flags.test);
+  flags.data.check_outputs(
+      {flags.output, flags.json.destination, flags.report.destination, flags.report.plot},
+      flags.test);
   require_model_file(flags.output);
   ProgressBar progress;
   const bool is_simulated = flags.data.recordings.empty();

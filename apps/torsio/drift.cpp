@@ -39,7 +39,7 @@ void run_campaign(DriftFlags& flags) {
                               .expected = "no model file: each simulated joint gets its own",
                               .found = flags.model});
   DataFlags().check_outputs(
-      {flags.json.destination, flags.settings.resume, flags.report.destination});
+      {flags.json.destination, flags.settings.resume, flags.report.destination, flags.report.plot});
   flags.settings.specimens = flags.campaign;
   ProgressBar progress;
   const torsio::DriftCampaignResult result =
@@ -60,7 +60,8 @@ void run(DriftFlags& flags) {
                               .advice = "torsio drift joint.safetensors today.csv"});
   std::vector<std::string> models{flags.model};
   if (!flags.reference.empty()) models.push_back(flags.reference);
-  flags.data.check_outputs({flags.json.destination, flags.report.destination}, models);
+  flags.data.check_outputs({flags.json.destination, flags.report.destination, flags.report.plot},
+                           models);
   const torsio::ModelFile file = torsio::load_model(flags.model, flags.serial);
   flags.data.target = file.settings.target;
   flags.data.use_model_mapping(file.card.mapping, flags.model);

@@ -27,8 +27,9 @@ struct EstimateFlags {
 };
 
 void run(EstimateFlags& flags) {
-  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination},
-                           {flags.model});
+  flags.data.check_outputs(
+      {flags.output, flags.json.destination, flags.report.destination, flags.report.plot},
+      {flags.model});
   require_ending("--output", flags.output, {".csv", ".gz"});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   flags.data.use_model_mapping(file.card.mapping, flags.model);

@@ -66,8 +66,9 @@ void require_no_flags_of_recordings(const EvaluateFlags& flags) {
 }
 
 void run(EvaluateFlags& flags) {
-  flags.data.check_outputs({flags.predictions, flags.json.destination, flags.report.destination},
-                           {flags.model});
+  flags.data.check_outputs(
+      {flags.predictions, flags.json.destination, flags.report.destination, flags.report.plot},
+      {flags.model});
   const torsio::ModelFile file = torsio::load_model(flags.model);
   if (flags.data.recordings.empty()) {
     require_no_flags_of_recordings(flags);

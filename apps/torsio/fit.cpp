@@ -125,6 +125,7 @@ void run_each_joint(const FitFlags& flags) {
     place(one.output);
     place(one.json.destination);
     place(one.report.destination);
+    place(one.report.plot);
     remark(fmt::format("joint {}", joint));
     run_one(one);
   }
@@ -147,8 +148,9 @@ void run_one(FitFlags& flags) {
         {.place = "torsio fit",
          .problem = fmt::format("{} missing", fmt::join(missing, " and ")),
          .advice = "Example: torsio fit sweep.csv --model dgmm -o joint.safetensors"});
-  flags.data.check_outputs({flags.output, flags.json.destination, flags.report.destination},
-                           flags.validation);
+  flags.data.check_outputs(
+      {flags.output, flags.json.destination, flags.report.destination, flags.report.plot},
+      flags.validation);
   require_model_file(flags.output);
   ProgressBar progress;
   const torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());

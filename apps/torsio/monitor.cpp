@@ -29,7 +29,6 @@ struct MonitorFlags {
   std::vector<std::string> files;  ///< a monitor file, then recordings
   std::string serial;
   std::string output;
-  std::string plot;
   bool calibrate = false;
   CalibrateFlags calibration;
   SimulatedMonitorFlags simulated;
@@ -68,10 +67,11 @@ Mode mode_of(const MonitorFlags& flags) {
   if (is_simulated)
     return {"--actuator",
             {"FILES", "--actuator", "--monitors", "--fault-free-calibration-hours", "--inject",
-             "--faults", "--duration", "--seed", "--output", "--plot", "--json", "--report"}};
+             "--faults", "--duration", "--seed", "--output", "--plot", "--plot-figure",
+             "--plot-size", "--json", "--report"}};
   return {"a monitor file with recordings",
-          {"FILES", "--mapping", "--rate", "--output", "--plot", "--device-serial", "--json",
-           "--report"}};
+          {"FILES", "--mapping", "--rate", "--output", "--plot", "--plot-figure", "--plot-size",
+           "--device-serial", "--json", "--report"}};
 }
 
 /// @throws torsio::UsageError for an option that this call would not use.
@@ -105,7 +105,8 @@ std::vector<torsio::MonitorReplay> replay_recordings(MonitorFlags& flags,
                                 .advice = "torsio monitor joint.monitor.json log.csv"});
   flags.data.recordings.assign(flags.files.begin() + 1, flags.files.end());
   flags.data.check_outputs(
-      {flags.output, flags.plot, flags.json.destination, flags.report.destination}, {monitor_file});
+      {flags.output, flags.json.destination, flags.report.destination, flags.report.plot},
+      {monitor_file});
   const torsio::MonitoredTorque monitored =
       torsio::load_monitor(monitor_file, {.serial = flags.serial});
   const torsio::MonitorFile file = torsio::read_monitor(monitor_file);
@@ -145,13 +146,13 @@ std::vector<torsio::MonitorReplay> replay_joint(MonitorFlags& flags,
                               .found = fmt::format("{} files", flags.files.size())});
   const std::string monitor_file = flags.files.empty() ? "" : flags.files.front();
   flags.data.check_outputs(
-      {flags.output, flags.plot, flags.json.destination, flags.report.destination}, {monitor_file});
+      {flags.output, flags.json.destination, flags.report.destination, flags.report.plot},
+      {monitor_file});
   return {replay_simulated(flags.simulated, monitor_file, settings)};
 }
 
 void replay(MonitorFlags& flags) {
   require_ending("--output", flags.output, {".csv", ".gz"});
-  require_ending("--plot", flags.plot, {".svg"});
   torsio::MonitorSettings settings;
   const std::vector<torsio::MonitorReplay> replays = flags.simulated.actuators.empty()
                                                          ? replay_recordings(flags, settings)
@@ -162,7 +163,6 @@ void replay(MonitorFlags& flags) {
     for (const torsio::MonitorReplay& each : replays) estimated.push_back(each.estimated);
     torsio::write_estimates(estimated, flags.output, torsio::FaultColumn::number);
   }
-  if (!flags.plot.empty()) write_text(flags.plot, torsio::replay_svg(replays.front(), settings));
   if (flags.json.wants_tables() && !is_standard_output(flags.output))
     print(torsio::replays_text(replays, settings));
   flags.json.write(torsio::replays_json(replays, settings));
@@ -214,7 +214,6 @@ void add_monitor(CLI::App& app) {
   verb->add_option("-o,--output", flags->output,
                    "CSV file with the torques and the state of the monitor; with --calibrate: the "
                    "monitor file to write");
-  verb->add_option("--plot", flags->plot, "SVG file with the torques of the first recording");
   verb->add_option("--device-serial", flags->serial,
                    "serial number of the joint; a monitor of another one is refused");
   verb->add_flag("--calibrate", flags->calibrate,

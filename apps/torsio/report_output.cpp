@@ -5,9 +5,11 @@
 #include <iterator>
 
 #include "output.hpp"
+#include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/json_text.hpp"
+#include "torsio/report/plot/figure_plot.hpp"
 
 namespace {
 
@@ -31,6 +33,19 @@ std::string shell_word(const std::string& word) {
   return quoted + "'";
 }
 
+/// What is wrong with the value of an option; empty: nothing.
+template <class Parse>
+std::string problem_of(const Parse& parse, const std::string& text) {
+  try {
+    static_cast<void>(parse(text));
+    return {};
+  } catch (const torsio::UsageError& error) {
+    // CLI11 writes the name of the option before it.
+    const std::string problem = error.what();
+    return problem.substr(problem.find(": ") + 2);
+  }
+}
+
 }  // namespace
 
 void keep_command_line(int argc, char** argv) {
@@ -39,7 +54,7 @@ void keep_command_line(int argc, char** argv) {
   command_line() = text;
 }
 
-void ReportOutput::add(CLI::App& verb) {
+void ReportOutput::add_page(CLI::App& verb) {
   verb.add_option("--report", destination,
                   "write a page with pictures, which a browser opens without a network")
       ->option_text("FILE.html")
@@ -51,7 +66,33 @@ void ReportOutput::add(CLI::App& verb) {
       });
 }
 
+void ReportOutput::add(CLI::App& verb, std::string preferred) {
+  preferred_figure = std::move(preferred);
+  add_page(verb);
+  CLI::Option* picture =
+      verb.add_option("--plot", plot, "draw a figure of the page for a paper: SVG, PNG or PDF")
+          ->option_text("FILE")
+          ->check([](const std::string& path) { return problem_of(torsio::plot_format, path); });
+  verb.add_option("--plot-figure", plot_figures,
+                  "figures to draw, under each other: words of their titles, separated by commas")
+      ->option_text("WORDS")
+      ->delimiter(',')
+      ->needs(picture);
+  verb.add_option("--plot-size", plot_size, "width and height of a figure (default: 85x64mm)")
+      ->option_text("SIZE")
+      ->check([](const std::string& text) { return problem_of(torsio::plot_size, text); })
+      ->needs(picture);
+}
+
 void ReportOutput::write(torsio::ReportDocument document) const {
+  if (!plot.empty()) {
+    write_text(plot,
+               torsio::figure_plot(
+                   figures_of(document, plot_figures, preferred_figure), torsio::plot_format(plot),
+                   plot_size.empty() ? torsio::PlotSize() : torsio::plot_size(plot_size)));
+    remark("figure written to " + plot);
+  }
+  if (destination.empty()) return;
   std::vector<std::pair<std::string, std::string>> origin = {
       {"command", command_line()},
       {"torsio", torsio::kVersion},

@@ -112,6 +112,6 @@ void add_reproduce(CLI::App& app) {
                    "write the figures as JSON to a file, or - for standard output");
   verb->add_option("--plot", flags->plot,
                    "draw the figure of an experiment that has one into an SVG file");
-  flags->report.add(*verb);
+  flags->report.add_page(*verb);
   verb->callback([flags] { run(*flags); });
 }

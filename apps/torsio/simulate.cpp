@@ -17,7 +17,6 @@
 #include "torsio/data/write.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/json_text.hpp"
-#include "torsio/report/plots.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/sim/experiment.hpp"
 #include "torsio/sim/sheet_file.hpp"
@@ -44,7 +43,6 @@ struct SimulateFlags {
   std::string age;
   std::string describe;
   std::string yaml;
-  std::string plot;
   std::uint64_t seed = kDefaultSeed;
   bool with_truth = false;
   bool is_electrical = false;
@@ -235,16 +233,6 @@ Json recording_json(const SimulateFlags& flags, const torsio::ExperimentSpec& sp
   return document;
 }
 
-/// The torque over the twist.
-std::string loop_picture(const SimulateFlags& flags, const torsio::DataSheet& sheet,
-                         const torsio::Recording& recording) {
-  std::vector<double> twist_deg = torsio::measured_twist(sheet, recording);
-  for (double& twist : twist_deg) twist = torsio::deg_from_rad(twist);
-  return torsio::svg_plot({{"", twist_deg, recording.channel("torque_Nm").values}},
-                          {"deflection [deg]", "torque [Nm]"},
-                          fmt::format("{} {}", flags.actuator, flags.experiment));
-}
-
 /// Prints text or, with --json, JSON.
 void show(const SimulateFlags& flags, const std::string& text, const Json& document) {
   if (flags.json.wants_tables()) print(text);
@@ -291,15 +279,13 @@ void run(const SimulateFlags& flags) {
                               .advice = "torsio simulate --list shows all names; example: "
                                         "torsio simulate dfki-50 sweep -o sweep.csv"});
   DataFlags().check_outputs(
-      {flags.output, flags.json.destination, flags.plot, flags.report.destination},
+      {flags.output, flags.json.destination, flags.report.destination, flags.report.plot},
       {flags.faults, sheet_file(flags.actuator)});
-  require_ending("--plot", flags.plot, {".svg"});
   ProgressBar progress;
   const torsio::DataSheet sheet = torsio::find_data_sheet(flags.actuator, progress.listener());
   const torsio::ExperimentSpec spec = experiment_spec(flags, sheet, progress.listener());
   const torsio::Recording recording = torsio::simulate(sheet, spec, progress.listener());
   torsio::write_recording(recording, flags.output, progress.listener());
-  if (!flags.plot.empty()) write_text(flags.plot, loop_picture(flags, sheet, recording));
   flags.json.write(torsio::json_text(recording_json(flags, spec, recording)));
   if (flags.report.is_wanted())
     flags.report.write(
@@ -357,7 +343,6 @@ void add_simulate(CLI::App& app) {
                  "the motor has windings and field-oriented current control; phase and supply "
                  "currents and the stator temperature are recorded. With --describe: its values");
   verb->add_flag("--truth", flags->with_truth, "add the truth_ channels, which no sensor measures");
-  verb->add_option("--plot", flags->plot, "plot the torque over the deflection into an SVG file");
   verb->add_flag("--list", flags->list, "show actuators with their variants, and experiments");
   verb->add_option(
       "--describe", flags->describe,

@@ -246,7 +246,8 @@ void check(TrackFlags& flags) {
   read.push_back(flags.faults);
   read.push_back(flags.replayed);
   if (torsio::is_sheet_file(flags.actuator)) read.push_back(flags.actuator);
-  flags.data.check_outputs({flags.record, flags.json.destination, flags.report.destination}, read);
+  flags.data.check_outputs(
+      {flags.record, flags.json.destination, flags.report.destination, flags.report.plot}, read);
   if (flags.seeds < 1 || flags.seeds > kMaxSeeds)
     throw torsio::UsageError({.place = "--seeds",
                               .expected = fmt::format("1 to {}", kMaxSeeds),

@@ -30,7 +30,6 @@ struct TransferFlags {
   std::vector<std::string> curve;
   std::string output;
   std::string device_serial;
-  std::string plot;
   std::uint64_t seed = kDefaultSeed;
   JsonOutput json;
   ReportOutput report;
@@ -88,13 +87,8 @@ void run(TransferFlags& flags) {
   std::vector<std::string> read = flags.test;
   read.push_back(flags.model);
   flags.data.check_outputs(
-      {flags.output, flags.plot, flags.json.destination, flags.report.destination}, read);
+      {flags.output, flags.json.destination, flags.report.destination, flags.report.plot}, read);
   if (!flags.output.empty()) require_model_file(flags.output);
-  require_ending("--plot", flags.plot, {".svg"});
-  if (!flags.plot.empty() && flags.curve.empty())
-    throw torsio::UsageError({.place = "--plot",
-                              .expected = "--curve with the times of the learning curve",
-                              .found = "none"});
   const torsio::TransferOptions options{.method = method_of(flags.method),
                                         .ratios = ratios_of(flags)};
   const std::vector<double> times = curve_times(flags);
@@ -110,7 +104,6 @@ void run(TransferFlags& flags) {
   const std::string& target = base.settings.target;
   if (flags.json.wants_tables()) print(torsio::transfer_text(evaluation, curve, target));
   flags.json.write(torsio::transfer_json(evaluation, curve, target));
-  if (!flags.plot.empty()) write_text(flags.plot, torsio::transfer_svg(curve, target));
   if (flags.report.is_wanted())
     flags.report.write(
         torsio::transfer_report(evaluation, curve, base, dataset, progress.listener()));
@@ -150,13 +143,12 @@ void add_transfer(CLI::App& app) {
   verb->add_option("--curve", flags->curve,
                    "times of a learning curve, separated by commas: 2s,5s,10s")
       ->delimiter(',');
-  verb->add_option("--plot", flags->plot, "SVG file with the learning curve");
   verb->add_option("-o,--output", flags->output,
                    "model file of the new joint; untouched unless all else succeeds");
   verb->add_option("--serial", flags->device_serial, "serial number of the new joint");
   add_seed(*verb, flags->seed, "of the fit to the new data alone");
   verb->add_option("--json", flags->json.destination,
                    "write the results as JSON to a file, or - for standard output");
-  flags->report.add(*verb);
+  flags->report.add(*verb, "Error over the time of the new data");
   verb->callback([flags] { run(*flags); });
 }

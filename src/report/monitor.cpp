@@ -287,10 +287,4 @@ std::string accuracy_json(const std::vector<FusedAccuracy>& actuators) {
   return json_text(document);
 }
 
-std::string replay_svg(const MonitorReplay& replay, const MonitorSettings& settings) {
-  const std::vector<double> time_s = times(replay.estimated.channels);
-  return svg_plot(curves_of(replay, settings, time_s, 0, time_s.size()), {"t [s]", "torque [Nm]"},
-                  fmt::format("{}: {}", replay.estimated.channels.name(), verdict(replay)));
-}
-
 }  // namespace torsio

@@ -24,6 +24,14 @@ struct PlotRange {
   }
 };
 
+/// The largest of 1, 2, 5 times a power of ten that divides the width into at least four.
+inline double tick_step(double width) {
+  const double power = std::pow(10.0, std::floor(std::log10(width / 4.0)));
+  for (const double factor : {5.0, 2.0})
+    if (factor * power <= width / 4.0) return factor * power;
+  return power;
+}
+
 template <class Use>
 void for_each_point(const Curve& curve, const Use& use) {
   for (std::size_t i = 0; i < curve.x.size(); ++i)

@@ -22,14 +22,6 @@ constexpr double kBottom = 46.0;
 constexpr double kSeen = 0.8;  // pixels
 constexpr std::array<std::string_view, 4> kColours = {"#1f5fa8", "#c8501e", "#2d8a4e", "#7a3e9d"};
 
-/// The largest of 1, 2, 5 times a power of ten that divides the width into at least four.
-double tick_step(double width) {
-  const double power = std::pow(10.0, std::floor(std::log10(width / 4.0)));
-  for (const double factor : {5.0, 2.0})
-    if (factor * power <= width / 4.0) return factor * power;
-  return power;
-}
-
 /// A range widened to whole ticks, and its position on the picture.
 class Axis {
  public:

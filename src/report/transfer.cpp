@@ -8,7 +8,6 @@
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/report/json_text.hpp"
-#include "torsio/report/plots.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {
@@ -133,30 +132,6 @@ std::string transfer_json(const TransferEvaluation& evaluation, const TransferCu
            {"notes", evaluation.notes}};
   if (curve.base_helps_until_s) all["base_helps_until_s"] = *curve.base_helps_until_s;
   return json_text(all);
-}
-
-std::string transfer_svg(const TransferCurve& curve, const std::string& target) {
-  struct Line {
-    const char* label;
-    double TransferCurve::Point::*value;
-  };
-  std::vector<double> seconds;
-  for (const TransferCurve::Point& point : curve.points) seconds.push_back(point.seconds);
-  std::vector<std::vector<double>> errors;
-  std::vector<Curve> curves;
-  const std::vector<Line> lines{{"base", &TransferCurve::Point::base_rmse},
-                                {"constant offset", &TransferCurve::Point::offset_rmse},
-                                {"transferred", &TransferCurve::Point::chosen_rmse},
-                                {"new data alone", &TransferCurve::Point::own_rmse}};
-  errors.reserve(lines.size());
-  for (const Line& line : lines) {
-    std::vector<double>& values = errors.emplace_back();
-    for (const TransferCurve::Point& point : curve.points) values.push_back(point.*line.value);
-    curves.push_back({.label = line.label, .x = seconds, .y = values});
-  }
-  return svg_plot(
-      curves, {.x = "time of the new data (s)", .y = fmt::format("RMSE ({})", unit_label(target))},
-      "Learning curve of a transferred model");
 }
 
 }  // namespace torsio

@@ -327,8 +327,11 @@ TEST_F(BrokenCalls, NameTheOutputThatCannotBeAFile) {
   expect_error(torsio("fit b.csv --model linear -o -"), kCallWasWrong, "standard output");
   expect_error(torsio("compare b.csv --test a.csv -o ."), kCallWasWrong, "found a folder");
   expect_error(torsio("simulate dfki-50 sweep -o ."), kCallWasWrong, "found a folder");
-  expect_error(torsio("simulate dfki-50 sweep -o a.csv --plot p.png"), kCallWasWrong,
-               "--plot: expected a file that ends in .svg, found p.png");
+  expect_error(torsio("simulate dfki-50 sweep -o a.csv --plot p.gif"), kCallWasWrong,
+               "--plot: expected a file that ends in .svg, .png or .pdf, found p.gif");
+  expect_error(torsio("compare b.csv --test a.csv --plot no/such/p.pdf"), kCallWasWrong, "no/such");
+  expect_error(torsio("simulate dfki-50 sweep -o a.csv --plot p.svg --plot-size 85x9mm"),
+               kCallWasWrong, "from 40 to 400");
   expect_error(torsio("fit a.csv --model linear -o no/such/folder/m.safetensors"), kCallWasWrong,
                "no/such/folder");
 }

@@ -128,7 +128,7 @@ TEST_F(MonitorVerb, RefusesWhatCannotMonitorBeforeAnyWork) {
                  "add --signal 'gear_angle_rad'");
   EXPECT_EQ(contents("x.json"), "");
   expect_refused("monitor c.csv j.monitor.json", kCallWasWrong, "the monitor file first");
-  expect_refused("monitor j.monitor.json c.csv --plot stop.png", kCallWasWrong, ".svg");
+  expect_refused("monitor j.monitor.json c.csv --plot stop.gif", kCallWasWrong, ".svg");
   ASSERT_EQ(shell("touch simm").exit_code, 0);
   expect_refused("monitor --actuator dfki-50 --monitors simm/x", kCallWasWrong, "--monitors");
 }

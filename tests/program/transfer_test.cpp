@@ -58,7 +58,6 @@ TEST_F(TransferVerb, RefusesWhatItCannotUse) {
   expect_refused(call + "--method data_sheets", 2, "rated torque of both joints");
   expect_refused(call + "--actuator dfki-50", 2, "both or none");
   expect_refused(call + "--curve 5s,50s", 2, "ascending times of at most 10 s");
-  expect_refused(call + "--plot curve.svg", 2, "--curve");
   expect_refused(call + "--stiffness-ratio -1", 2, "must be positive");
   ASSERT_EQ(shell("sed '1s/gear_angle_rad/other_rad/' new.csv > lacks.csv; "
                   "awk -F, -v OFS=, 'NR > 1 {$6 = 1.5} {print}' new.csv > dead.csv; "

@@ -7,8 +7,20 @@ export function on_theme(redraw: () => void): void {
   changed.push(redraw);
 }
 
+/** Of the present theme: the style of the page is asked once for each colour, not at each drawing. */
+const colours = new Map<string, string>();
 export function css_colour(name: string): string {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  let colour = colours.get(name);
+  if (colour === undefined) {
+    colour = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+    colours.set(name, colour);
+  }
+  return colour;
+}
+
+function redraw_all(): void {
+  colours.clear();
+  changed.forEach((redraw) => redraw());
 }
 
 const kColours = 8;
@@ -40,7 +52,7 @@ export function add_theme_button(): void {
   button.className = "theme";
   const update = () => {
     button.textContent = is_dark() ? "Light colours" : "Dark colours";
-    changed.forEach((redraw) => redraw());
+    redraw_all();
   };
   button.addEventListener("click", () => {
     document.documentElement.dataset.theme = is_dark() ? "light" : "dark";

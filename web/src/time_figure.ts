@@ -15,6 +15,10 @@ const kMaxPoints = 2000;
 interface Panel {
   plot: uPlot;
   source: SampleSource;
+  /** Whether the panel is on or near the screen: others are drawn when they come there. */
+  is_near: boolean;
+  /** The range of time that was drawn last. */
+  drawn: [number, number] | null;
 }
 
 /** Without NaN, which uPlot would draw: null is a gap. */
@@ -46,7 +50,8 @@ export class TimeView implements View {
     });
     figure.panels.forEach((panel, p) => {
       const source = new StoredSamples(report, figure, panel.series);
-      this.panels.push({ plot: this.make_plot(panel.label, panel.series, colours, p), source });
+      const plot = this.make_plot(panel.label, panel.series, colours, p);
+      this.panels.push({ plot, source, is_near: true, drawn: null });
     });
     this.begin_s = Math.min(...this.panels.map((panel) => panel.source.begin_s));
     this.end_s = Math.max(...this.panels.map((panel) => panel.source.end_s));
@@ -59,6 +64,7 @@ export class TimeView implements View {
     });
     this.update();
     this.hide_empty_panels();
+    this.watch_panels();
     new ResizeObserver(() => this.resize()).observe(this.frame.canvas);
     on_theme(() => this.panels.forEach(({ plot }) => plot.redraw(false)));
   }
@@ -97,21 +103,46 @@ export class TimeView implements View {
   private update(): void {
     const [begin, end] = this.view;
     let shown: Samples | undefined;
-    for (const { plot, source } of this.panels) {
-      shown = source.range(begin, end, kMaxPoints);
-      plot.batch(() => {
-        plot.setData([shown!.time_s, ...shown!.values.map(with_gaps)] as unknown as uPlot.AlignedData, false);
-        plot.setScale("x", { min: begin, max: end });
+    for (const panel of this.panels) {
+      const is_drawn = panel.drawn?.[0] === begin && panel.drawn[1] === end;
+      if (is_drawn || !panel.is_near || panel.plot.root.hidden) continue;
+      panel.drawn = [begin, end];
+      const samples = panel.source.range(begin, end, kMaxPoints);
+      shown = samples;
+      panel.plot.batch(() => {
+        panel.plot.setData([samples.time_s, ...samples.values.map(with_gaps)] as unknown as uPlot.AlignedData, false);
+        panel.plot.setScale("x", { min: begin, max: end });
       });
     }
     this.frame.canvas.dataset.range = `${begin} ${end}`;
-    this.frame.note.textContent = shown?.complete
+    if (!shown) return;
+    this.frame.note.textContent = shown.complete
       ? "Every sample is shown."
       : `Lines show minima and maxima; ${where_detail_ends(this.figure)}.`;
   }
 
   private hide_empty_panels(): void {
     for (const { plot } of this.panels) plot.root.hidden = !plot.series.slice(1).some((one) => one.show);
+    this.update();
+  }
+
+  /** Panels that cannot be seen are not drawn while the range of time moves; before printing all are. */
+  private watch_panels(): void {
+    const near = new IntersectionObserver(
+      (entries) => {
+        for (const { target, isIntersecting } of entries) {
+          const panel = this.panels.find(({ plot }) => plot.root === target);
+          if (panel) panel.is_near = isIntersecting;
+        }
+        this.update();
+      },
+      { rootMargin: "100px" },
+    );
+    this.panels.forEach(({ plot }) => near.observe(plot.root));
+    addEventListener("beforeprint", () => {
+      this.panels.forEach((panel) => (panel.is_near = true));
+      this.update();
+    });
   }
 
   private width(): number {

@@ -22,7 +22,4 @@ namespace torsio {
 [[nodiscard]] std::string accuracy_text(const std::vector<FusedAccuracy>& actuators);
 [[nodiscard]] std::string accuracy_json(const std::vector<FusedAccuracy>& actuators);
 
-/// The torque of every source and the combined one over time, as an SVG picture.
-[[nodiscard]] std::string replay_svg(const MonitorReplay& replay, const MonitorSettings& settings);
-
 }  // namespace torsio

@@ -16,7 +16,4 @@ namespace torsio {
 [[nodiscard]] std::string transfer_json(const TransferEvaluation& evaluation,
                                         const TransferCurve& curve, const std::string& target);
 
-/// The errors over the time of the new data.
-[[nodiscard]] std::string transfer_svg(const TransferCurve& curve, const std::string& target);
-
 }  // namespace torsio

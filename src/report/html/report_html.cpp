@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <map>
 #include <string_view>
 
 #include "report/html/page_data.hpp"
@@ -23,14 +24,14 @@ std::string cells_html(const std::vector<std::string>& cells) {
 }
 
 /// Each row is a body of its own, so that its details move with it when the table is sorted.
-std::string table_html(const ReportTable& table) {
+/// @param label unique in the page, as a region must have a name of its own
+std::string table_html(const ReportTable& table, const std::string& label) {
   std::string html =
       table.title.empty() ? "" : fmt::format("<h3>{}</h3>\n", markup_text(table.title));
   html += fmt::format(
       "<div class=\"scroll\" tabindex=\"0\" role=\"region\" "
       "aria-label=\"{}\"><table{}>\n<thead><tr>",
-      table.title.empty() ? "table" : markup_text(table.title),
-      table.is_words ? " class=\"words\"" : "");
+      markup_text(label), table.is_words ? " class=\"words\"" : "");
   for (const std::string& heading : table.headings)
     html += fmt::format("<th scope=\"col\">{}</th>", markup_text(heading));
   html += "</tr></thead>\n";
@@ -87,7 +88,8 @@ class Page {
   std::string section_html(const ReportSection& section) {
     std::string html = fmt::format("<section>\n<h2>{}</h2>\n", markup_text(section.heading));
     html += paragraph(section.text);
-    for (const ReportTable& table : section.tables) html += table_html(table);
+    for (const ReportTable& table : section.tables)
+      html += table_html(table, unique_label(table.title.empty() ? section.heading : table.title));
     for (const ReportFigure& figure : section.figures) html += figure_html(figure);
     if (!section.preformatted.empty())
       html += fmt::format(
@@ -113,15 +115,22 @@ class Page {
                        still.empty() ? still : fmt::format("<noscript>{}</noscript>", still));
   }
 
-  std::string origin_html() const {
+  std::string unique_label(const std::string& name) {
+    const std::size_t count = ++labels_[name];
+    return count == 1 ? name : fmt::format("{} ({})", name, count);
+  }
+
+  std::string origin_html() {
     if (document_.origin.empty()) return {};
     ReportTable table{.title = {}, .headings = {"what", "value"}, .rows = {}, .is_words = true};
     for (const auto& [what, value] : document_.origin) table.rows.push_back({{what, value}});
-    return fmt::format("<section>\n<h2>How this was made</h2>\n{}</section>\n", table_html(table));
+    return fmt::format("<section>\n<h2>How this was made</h2>\n{}</section>\n",
+                       table_html(table, unique_label("How this was made")));
   }
 
   const ReportDocument& document_;
   std::vector<const ReportFigure*> figures_;
+  std::map<std::string, std::size_t> labels_;
   bool has_picture_ = false;
 };
 

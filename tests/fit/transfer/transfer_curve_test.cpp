@@ -99,14 +99,13 @@ TEST(EvaluateTransfer, NeedsSomethingToScoreOn) {
       HasSubstr("no part of the recordings is left"));
 }
 
-TEST(TransferCurve, HasAPointForEachTimeAndThePictureOfThem) {
+TEST(TransferCurve, HasAPointForEachTime) {
   const TransferCurve curve = transfer_curve(base_model(), new_joint(), {0.5, 1.0, 4.0}, {}, 1);
   ASSERT_EQ(curve.points.size(), 3U);
   for (const TransferCurve::Point& point : curve.points) {
     EXPECT_GT(point.base_rmse, 0.0);
     EXPECT_FALSE(point.method.empty());
   }
-  EXPECT_THAT(transfer_svg(curve, "torque_Nm"), HasSubstr("new data alone"));
   EXPECT_THAT(
       transfer_text(evaluate_transfer(base_model(), new_joint(), {}, 1), curve, "torque_Nm"),
       HasSubstr("Learning curve"));
