@@ -97,7 +97,7 @@ void add_rubber_spring(CLI::App& design) {
   verb->add_option("--hardness-tolerance", flags->demand.hardness_tolerance, "Shore points")
       ->capture_default_str();
   verb->add_option("--tolerance", flags->tolerance, "of each dimension; 0.05mm if not given");
-  flags->outputs.add(*verb, true);
+  flags->outputs.add(*verb, true, "Section");
   verb->callback([flags] { run(*flags); });
 }
 
@@ -147,15 +147,15 @@ void add_clutch(CLI::App& design) {
       ->capture_default_str();
   verb->add_option("--series", flags->demand.series, "such packs against each other")
       ->capture_default_str();
-  flags->outputs.add(*verb, false);
+  flags->outputs.add(*verb, false, "Axial force");
   verb->callback([flags] { run(*flags); });
 }
 
 }  // namespace
 
 void add_design(CLI::App& app) {
-  CLI::App* design =
-      app.add_subcommand("design", "size springs, clutch, coupling and actuator before they are built");
+  CLI::App* design = app.add_subcommand(
+      "design", "size springs, clutch, coupling and actuator before they are built");
   design->footer(
       "Example: torsio design spring --torque 120Nm --angle 6deg --max-diameter 20mm "
       "--max-length 120mm\n"

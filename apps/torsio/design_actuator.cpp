@@ -14,7 +14,7 @@ struct ActuatorFlags {
   std::string continuous, peak, speed, deflection, bandwidth = "8Hz", impedance, softest;
   std::string collision, reach;
   std::string diameter = "100mm", length = "120mm", bore, resolution;
-  std::string drives, materials, washers, material = "50CrV4", sheet, plot;
+  std::string drives, materials, washers, material = "50CrV4", sheet;
   DesignOutputs outputs;
 };
 
@@ -42,9 +42,8 @@ torsio::ActuatorDemand demand_of(const ActuatorFlags& flags) {
 }
 
 void run(const ActuatorFlags& flags) {
-  flags.outputs.check({flags.sheet, flags.plot});
+  flags.outputs.check({flags.sheet});
   require_ending("--sheet", flags.sheet, {".yaml", ".yml"});
-  require_ending("--plot", flags.plot, {".svg"});
   const torsio::ActuatorDemand demand = demand_of(flags);
   const std::string name = flags.sheet.empty() ? std::string("designed")
                                                : std::filesystem::path(flags.sheet).stem().string();
@@ -54,7 +53,6 @@ void run(const ActuatorFlags& flags) {
                                 ? sheet_text(design.candidates[design.chosen].sheet, flags.sheet)
                                 : std::string();
   flags.outputs.write(torsio::actuator_report(demand, design));
-  if (!flags.plot.empty()) write_text(flags.plot, torsio::pareto_svg(design));
   if (!flags.sheet.empty()) write_text(flags.sheet, sheet);
 }
 
@@ -98,7 +96,6 @@ void add_design_actuator(CLI::App& design) {
   verb->add_option("--material", flags->material, "its name in the table")->capture_default_str();
   verb->add_option("--washers", flags->washers, "YAML table; the shipped one if not given");
   verb->add_option("--sheet", flags->sheet, "write a data sheet for simulate, track and tune-loop");
-  verb->add_option("--plot", flags->plot, "draw the Pareto picture into an SVG file");
-  flags->outputs.add(*verb, false);
+  flags->outputs.add(*verb, false, "Drives");
   verb->callback([flags] { run(*flags); });
 }

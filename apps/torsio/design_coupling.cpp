@@ -209,6 +209,6 @@ void add_design_coupling(CLI::App& design) {
   verb->add_option("--resume", flags->resume,
                    "of the search: file that keeps each result, so that a search that was stopped "
                    "continues");
-  flags->outputs.add(*verb, false);
+  flags->outputs.add(*verb, false, "");
   verb->callback([flags] { run(*flags); });
 }

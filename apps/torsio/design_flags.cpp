@@ -5,16 +5,19 @@
 #include "torsio/design/quantity.hpp"
 #include "torsio/sim/sheet_file.hpp"
 
-void DesignOutputs::add(CLI::App& verb, bool has_dxf) {
+void DesignOutputs::add(CLI::App& verb, bool has_dxf, const std::string& preferred_figure) {
   verb.add_option("--json", json.destination,
                   "write the design as JSON to a file, or - for standard output");
   verb.add_option("--yaml", yaml, "write the design as YAML to a file");
-  report.add(verb);
+  if (preferred_figure.empty())
+    report.add_page(verb);
+  else
+    report.add(verb, preferred_figure);
   if (has_dxf) verb.add_option("--dxf", dxf, "write its outline as DXF to a file, in mm");
 }
 
 void DesignOutputs::check(const std::vector<std::string>& more) const {
-  std::vector<std::string> all{json.destination, yaml, dxf, report.destination};
+  std::vector<std::string> all{json.destination, yaml, dxf, report.destination, report.plot};
   all.insert(all.end(), more.begin(), more.end());
   DataFlags().check_outputs(all);
   require_ending("--yaml", yaml, {".yaml", ".yml"});
@@ -25,7 +28,9 @@ void DesignOutputs::write(const torsio::DesignReport& design) const {
   if (json.wants_tables()) print(torsio::design_text(design));
   if (!yaml.empty()) write_text(yaml, torsio::design_yaml(design));
   json.write(torsio::design_json(design));
-  if (report.is_wanted()) report.write(torsio::design_page(design));
+  ReportOutput page = report;
+  if (!design.is_feasible) page.plot.clear();  // there is nothing to draw
+  if (page.is_wanted()) page.write(torsio::design_page(design));
   if (!design.is_feasible)
     throw torsio::Error({.place = "design " + design.design, .problem = design.infeasible});
 }

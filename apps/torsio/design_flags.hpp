@@ -16,7 +16,8 @@ struct DesignOutputs {
   std::string dxf;
   ReportOutput report;
 
-  void add(CLI::App& verb, bool has_dxf);
+  /// @param preferred_figure word of the title of the figure that --plot draws; empty: the verb has its own
+  void add(CLI::App& verb, bool has_dxf, const std::string& preferred_figure);
   /// Refuses what cannot be written, before any work. @param more further outputs
   void check(const std::vector<std::string>& more = {}) const;
   /// Prints and writes the design. @throws torsio::Error for an infeasible one, after the documents

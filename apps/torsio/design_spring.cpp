@@ -93,6 +93,6 @@ void add_design_spring(CLI::App& design) {
   verb->add_option("--encoder-bits", flags->bits, "of the encoders around the spring")
       ->capture_default_str();
   verb->add_option("--sheet", flags->sheet, "write a data sheet for torsio simulate, FILE.yaml");
-  flags->outputs.add(*verb, true);
+  flags->outputs.add(*verb, true, "Torque over");
   verb->callback([flags] { run(*flags); });
 }

@@ -9,7 +9,6 @@
 #include "torsio/control/drive.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/design/actuator.hpp"
-#include "torsio/report/plots.hpp"
 
 namespace torsio {
 namespace {
@@ -214,14 +213,6 @@ DesignReport actuator_report(const ActuatorDemand& d, const ActuatorDesign& desi
                   "chosen.",
                   feasible, design.candidates.size()));
   return report;
-}
-
-std::string pareto_svg(const ActuatorDesign& design) {
-  const XyFigure figure = pareto_figure(design);
-  std::vector<Curve> curves;
-  for (const XySeries& series : figure.series)
-    curves.push_back({.label = series.label, .x = series.x, .y = series.y});
-  return svg_plot(curves, {figure.x.label, figure.y.label}, figure.title);
 }
 
 }  // namespace torsio

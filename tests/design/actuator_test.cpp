@@ -108,11 +108,15 @@ TEST(DesignedActuator, RefusesWhatContradictsItself) {
 }
 
 TEST(DesignedActuator, HasAParetoPicture) {
-  const ActuatorDesign design =
-      design_actuator(demand_of(30, 60, 60, 0.15), read_drives({}), "joint");
-  const std::string picture = pareto_svg(design);
-  EXPECT_NE(picture.find("Pareto front"), std::string::npos);
-  EXPECT_NE(picture.find("<svg"), std::string::npos);
+  const ActuatorDemand demand = demand_of(30, 60, 60, 0.15);
+  const ActuatorDesign design = design_actuator(demand, read_drives({}), "joint");
+  const DesignReport report = actuator_report(demand, design);
+  ASSERT_EQ(report.pictures.size(), 3U);
+  const XyFigure& pareto = report.pictures.front();
+  EXPECT_EQ(pareto.title, "Drives for the demand");
+  const XySeries& front = pareto.series[1];
+  ASSERT_FALSE(front.x.empty());
+  EXPECT_TRUE(std::ranges::is_sorted(front.x) && std::ranges::is_sorted(front.y));
 }
 
 }  // namespace

@@ -93,8 +93,4 @@ struct DriveTrial {
 
 [[nodiscard]] DesignReport actuator_report(const ActuatorDemand& demand,
                                            const ActuatorDesign& design);
-/// Mass against the largest bandwidth of the torque loop: the candidates that meet the demand, the
-/// Pareto front and the choice, as SVG.
-[[nodiscard]] std::string pareto_svg(const ActuatorDesign& design);
-
 }  // namespace torsio
