@@ -16,8 +16,8 @@ enum class PlotFormat : std::uint8_t { svg, png, pdf };
 /// @throws UsageError with the list of the endings.
 [[nodiscard]] PlotFormat plot_format(std::string_view path);
 
-/// The size of each figure; a column of most journals is 85 mm wide. A figure with several panels is made taller where a panel
-/// would be less than 22 mm high.
+/// The size of each figure; a column of most journals is 85 mm wide.
+/// A figure with several panels is made taller where a panel would be less than 22 mm high.
 struct PlotSize {
   double width_mm = 85.0;
   double height_mm = 64.0;
