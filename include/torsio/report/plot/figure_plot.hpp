@@ -16,8 +16,8 @@ enum class PlotFormat : std::uint8_t { svg, png, pdf };
 /// @throws UsageError with the list of the endings.
 [[nodiscard]] PlotFormat plot_format(std::string_view path);
 
-/// The size of each figure; a column of most journals is 85 mm wide. A figure with several panels is made taller where a panel
-/// would be less than 22 mm high.
+/// The size of each figure; a column of most journals is 85 mm wide.
+/// A figure with several panels is made taller where a panel would be less than 22 mm high.
 struct PlotSize {
   double width_mm = 85.0;
   double height_mm = 64.0;
@@ -37,10 +37,10 @@ inline constexpr std::size_t kMaxPlotBytes = 200'000;
                                                           std::string_view preferred = {});
 
 /// Draws figures under each other, as their page shows them at first: the curves with `is_shown`. Text is DejaVu Sans
-/// in 7 points. The colours are by Okabe and Ito (2008); dashes distinguish the curves, too. Minima and maxima of a time
-/// series stay. The same figures give the same bytes.
-/// @return the bytes of a file; PNG has 300 dots per inch or, where it would be too large, fewer; SVG has the texts in its `desc` element, because cairo draws
-/// letters as outlines.
+/// in 7 points. The colours are by Okabe and Ito (2008); dashes distinguish the curves, too. Minima and maxima of a
+/// time series stay. The same figures give the same bytes.
+/// @return the bytes of a file; PNG has 300 dots per inch or, where it would be too large, fewer; SVG has the texts in
+/// its `desc` element, because cairo draws letters as outlines.
 /// @throws UsageError for a figure that is SVG already; Error if cairo fails.
 [[nodiscard]] std::string figure_plot(const std::vector<const ReportFigure*>& figures,
                                       PlotFormat format, const PlotSize& size = {});
