@@ -140,9 +140,9 @@ TEST(CalibrateMonitor, ACeilingEndsTheGrowthOfAThreshold) {
   const CalibratedMonitor required =
       with_two_error_bars(4.0, {.false_alarms_per_hour = 40.0, .required_Nm = 5.0});
   EXPECT_GT(largest_Nm, 5.0);
-  EXPECT_NEAR(required.monitor.pairs[0].ceiling_Nm, 3.5, 1e-9);
+  EXPECT_NEAR(required.monitor.pairs[0].ceiling_Nm, 4.0, 1e-9);
   EXPECT_NEAR(required.pairs[0].detected_in_these_states_Nm,
-              required.pairs[0].largest_difference_Nm + 3.5, 1e-9);
+              required.pairs[0].largest_difference_Nm + 4.0, 1e-9);
   EXPECT_THAT(calibration_text(monitor),
               testing::AllOf(HasSubstr("detected in these states Nm"),
                              HasSubstr("which a difference must exceed for 5 ms")));

@@ -31,16 +31,16 @@ TEST(SimulatedMonitor, FindsAFaultOfEachSensorOfASeriesElasticJoint) {
   EXPECT_TRUE(monitor.sources[0].friction.has_value());
   EXPECT_TRUE(monitor.calibrated.is_extrapolated);
   const auto replay = [&](const std::string& injection) {
-    DutyRun work{.seed = 77, .duration_s = 12.0};
+    DutyRun work{.seed = 77, .duration_s = 20.0};
     if (!injection.empty()) work.faults.faults = {parse_injection(injection, sheet)};
     return replay_monitor(monitor.monitored(), duty_recording(sheet, work));
   };
   EXPECT_TRUE(std::isnan(replay("").stopped_at_s));
   for (const std::string injection :
-       {"motor_angle=nan@8s", "gear_angle=0.1deg@8s", "joint_angle=2deg@8s", "current=3A@8s"}) {
+       {"motor_angle=nan@16s", "gear_angle=0.1deg@16s", "joint_angle=2deg@16s", "current=3A@16s"}) {
     const MonitorReplay found = replay(injection);
-    EXPECT_GE(found.stopped_at_s, 8.0) << injection;
-    EXPECT_LE(found.stopped_at_s, 8.02) << injection;
+    EXPECT_GE(found.stopped_at_s, 16.0) << injection;
+    EXPECT_LE(found.stopped_at_s, 16.02) << injection;
   }
 
   // From its files it is the same.
