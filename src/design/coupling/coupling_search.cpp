@@ -317,6 +317,11 @@ std::optional<double> CouplingGain::gain() const {
          1.0;
 }
 
+std::optional<double> CouplingGain::work_gain() const {
+  if (!best || !reference) return std::nullopt;
+  return best->work_J / reference->work_J - 1.0;
+}
+
 CouplingSearch search_couplings(const CouplingSearchSettings& settings, const Progress& progress) {
   return Search(settings, progress).found();
 }

@@ -73,7 +73,7 @@ TEST_F(CouplingSearchLaw, TakesWhatTheResumeFileHasAndComparesWithTheMostWork) {
   const DesignReport report = coupling_search_report(settings_, search);
   EXPECT_EQ(report.at("fine_mesh", "gain").value, 0.0);
   EXPECT_EQ(report.at("geometries_of_paper_003", "delta_torque").text, "not reached");
-  EXPECT_THAT(report.notes.front(), HasSubstr("not confirmed"));
+  EXPECT_THAT(report.notes.front(), HasSubstr("no gain of 10 %"));
 }
 
 TEST_F(CouplingSearchLaw, RefusesResultsOfAnotherSearchAndAMissingSolver) {
@@ -99,6 +99,7 @@ TEST(CouplingGain, IsTheLeastOfTorqueAndTwist) {
       .best = LimitPoint{.angle_deg = 11.0, .torque_Nm = 24.0, .work_J = 1.0},
       .reference = LimitPoint{.angle_deg = 10.0, .torque_Nm = 20.0, .work_J = 1.0}};
   EXPECT_NEAR(*gain.gain(), 0.1, 1e-12);
+  EXPECT_NEAR(*gain.work_gain(), 0.0, 1e-12);
 }
 
 }  // namespace

@@ -53,6 +53,8 @@ struct CouplingGain {
   std::optional<LimitPoint> reference;
   /// Least of the ratios of torque and of twist, less 1: both are larger by at least this share.
   [[nodiscard]] std::optional<double> gain() const;
+  /// Ratio of the stored work, less 1.
+  [[nodiscard]] std::optional<double> work_gain() const;
 };
 
 struct CouplingSearch {
