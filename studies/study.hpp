@@ -169,7 +169,7 @@ struct StudyInfo {
   Study (*run)(const StudyOptions& options, const Progress& progress);
   std::span<const PaperEntry> published = {};  ///< every figure that its table shows beside ours
   bool must_be_named = false;  ///< needs recordings (TORSIO_DATA or ../shared/data) or a solver
-  bool has_picture = false;       ///< `Study::picture_svg` is set
+  bool has_picture = false;    ///< `Study::picture_svg` is set
 };
 
 /// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets

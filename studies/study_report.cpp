@@ -20,9 +20,7 @@ namespace torsio {
 
 namespace {
 
-std::string number(double value) {
-  return std::isnan(value) ? "-" : fmt::format("{:.4g}", value);
-}
+std::string number(double value) { return std::isnan(value) ? "-" : fmt::format("{:.4g}", value); }
 
 /// A column of a table of rows.
 template <class Row>

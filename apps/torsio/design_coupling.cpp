@@ -35,6 +35,12 @@ std::size_t mesh_level(const std::string& name) {
       {.place = "--mesh", .expected = "fine, medium or coarse", .found = name});
 }
 
+/// A quantity that may be below 0, unlike `quantity`.
+double signed_quantity(const std::string& text, const char* unit, const char* flag, double none) {
+  if (!text.starts_with('-')) return text.empty() ? none : quantity(text, unit, flag, none);
+  return -needed(text.substr(1), unit, flag);
+}
+
 torsio::design::CouplingDemand demand_of(const CouplingFlags& flags) {
   torsio::design::CouplingDemand demand = flags.demand;
   torsio::design::LobeShape& shape = demand.shape;
@@ -44,11 +50,13 @@ torsio::design::CouplingDemand demand_of(const CouplingFlags& flags) {
   };
   shape.half_width_mm = length_mm(flags.half_width, "--half-width", shape.half_width_mm);
   shape.root_radius_mm = length_mm(flags.root, "--root-radius", shape.root_radius_mm);
-  shape.flank_radius_mm = length_mm(flags.flank, "--flank-radius", shape.flank_radius_mm);
+  shape.flank_radius_mm = kMillimetres * signed_quantity(flags.flank, "m", "--flank-radius",
+                                                         shape.flank_radius_mm / kMillimetres);
   shape.taper_mm = length_mm(flags.taper, "--taper", shape.taper_mm);
   shape.ring_radius_mm = length_mm(flags.ring, "--ring-radius", shape.ring_radius_mm);
   if (!flags.slot.empty())
-    shape.slot_angle_deg = torsio::deg_from_rad(needed(flags.slot, "rad", "--slot-angle"));
+    shape.slot_angle_deg =
+        torsio::deg_from_rad(signed_quantity(flags.slot, "rad", "--slot-angle", 0.0));
   demand.angle_deg = torsio::deg_from_rad(needed(flags.angle, "rad", "--angle"));
   demand.length_mm = length_mm(flags.length, "--length", demand.length_mm);
   demand.finest_mesh = mesh_level(flags.mesh);

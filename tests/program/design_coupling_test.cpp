@@ -27,6 +27,9 @@ TEST_F(DesignCoupling, RefusesACallBeforeAnySolverIsStarted) {
                "alpha, beta, gamma, delta");
   expect_error(torsio(coupling + rubber + "--angle 3deg --half-width 5mm"), kCallWasWrong,
                "jaws between the lobes");
+  // A flank radius below 0 is a convex jaw, and is read as such.
+  expect_error(torsio(coupling + rubber + "--angle 3deg --flank-radius -1mm"), kCallWasWrong,
+               "at least half the flank's chord");
   expect_error(torsio(coupling + rubber + "--angle 3deg --bulk-ratio 0"), kCallWasWrong,
                "bulk modulus of rubber");
   expect_error(torsio(coupling + rubber + "--angle 40deg"), kCallWasWrong, "0.01 to 30 degrees");
