@@ -90,6 +90,9 @@ double shear_modulus_MPa(const CouplingFlags& flags) {
 void search(const CouplingFlags& flags) {
   for (const auto& [flag, value] :
        {std::pair{"--angle", &flags.angle}, std::pair{"--measured-torque", &flags.torque},
+        std::pair{"--half-width", &flags.half_width}, std::pair{"--root-radius", &flags.root},
+        std::pair{"--flank-radius", &flags.flank}, std::pair{"--slot-angle", &flags.slot},
+        std::pair{"--taper", &flags.taper}, std::pair{"--ring-radius", &flags.ring},
         std::pair{"--sheet", &flags.sheet}, std::pair{"--plot", &flags.plot}})
     if (!value->empty())
       throw torsio::UsageError(

@@ -40,6 +40,8 @@ TEST_F(DesignCoupling, RefusesACallBeforeAnySolverIsStarted) {
   expect_error(torsio(coupling + "--search 5"), kCallWasWrong, "--shear-modulus");
   expect_error(torsio(coupling + rubber + "--search 5 --angle 3deg"), kCallWasWrong,
                "a call without --search");
+  expect_error(torsio(coupling + rubber + "--search 5 --half-width 2mm"), kCallWasWrong,
+               "a call without --search");
   expect_error(torsio(coupling + rubber + "--search 0"), kCallWasWrong, "--search");
   expect_error(torsio(coupling + rubber + "--angle 3deg --layers 50"), kCallWasWrong, "layers");
   EXPECT_EQ(contents("a.json"), "");
