@@ -88,9 +88,9 @@ std::optional<RubberRing> best_ring(const RubberSpringDemand& demand) {
 using Constraints = std::vector<RingConstraint>;
 
 bool holds(Constraints& constraints, const RubberRing& ring, const RubberSpringDemand& demand) {
-  constexpr double kRounding_SI = 1e-12;
+  constexpr double kSmallSlack = 1e-12;
   return std::ranges::all_of(
-      constraints, [&](RingConstraint& each) { return each.slack(ring, demand) >= -kRounding_SI; });
+      constraints, [&](RingConstraint& each) { return each.slack(ring, demand) >= -kSmallSlack; });
 }
 
 /// The ring of an outer radius and a length with the stiffness of the demand, if it is within the bounds.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <future>
@@ -89,7 +90,7 @@ CouplingTwist twist_coupling(const CouplingDemand& demand, const Progress& progr
   if (demand.jobs < 1) throw UsageError({.place = "jobs", .expected = "1 or more", .found = "0"});
   std::stop_source stop;
   CouplingTwist twist;
-  LobeCurve* const targets[kLobes] = {&twist.compressed, &twist.stretched};
+  const std::array<LobeCurve*, kLobes> targets{&twist.compressed, &twist.stretched};
   // The first lobe runs beside the second one, or before it.
   std::vector<std::future<LobeCurve>> runs;
   const auto start = [&](std::size_t lobe) {
@@ -105,7 +106,7 @@ CouplingTwist twist_coupling(const CouplingDemand& demand, const Progress& progr
                                 lobe == 0 ? "compressed lobe" : "stretched lobe"))
         stop.request_stop();
     try {
-      *targets[lobe] = runs[lobe].get();
+      *targets.at(lobe) = runs[lobe].get();
     } catch (...) {
       stop.request_stop();  // the futures wait for their ends
       throw;

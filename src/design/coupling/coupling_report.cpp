@@ -222,8 +222,8 @@ DataSheet coupling_sheet(const Points& curve, const std::string& name) {
   design.is_feasible = true;
   design.stiffness_Nm_rad = demand.torque_Nm / demand.angle_rad;
   design.friction_share = kFrictionShare;
-  for (auto point = curve.rbegin(); point != curve.rend(); ++point)
-    if (point->first > 0.0) design.curve.emplace_back(-rad_from_deg(point->first), -point->second);
+  for (std::size_t i = curve.size(); i-- > 1;)  // the first point is 0
+    design.curve.emplace_back(-rad_from_deg(curve[i].first), -curve[i].second);
   for (const auto& [angle_deg, torque_Nm] : curve)
     design.curve.emplace_back(rad_from_deg(angle_deg), torque_Nm);
   return spring_sheet(demand, design, name);

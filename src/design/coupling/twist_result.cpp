@@ -67,7 +67,7 @@ bool complete(const std::vector<Row>& rows, std::size_t count, std::size_t colum
 
 /// The plane node of a number in the deck; none if there is no such one.
 const MeshNode* node_of(const LobeMesh& mesh, double number) {
-  const auto levels = static_cast<std::size_t>(2 * mesh.layers + 1);
+  const auto levels = 2 * static_cast<std::size_t>(mesh.layers) + 1;
   if (!(number >= 1.0 && number <= static_cast<double>(levels * mesh.nodes.size()))) return nullptr;
   return &mesh.nodes[(static_cast<std::size_t>(number) - 1) % mesh.nodes.size()];
 }

@@ -111,7 +111,7 @@ std::string cause(const Exit& exit, const std::string& log, const std::filesyste
 
 TwistCurve twist_lobe(const LobeMesh& mesh, const Rubber& rubber,
                       const std::vector<double>& twists_deg, const SolverLimits& limits,
-                      std::stop_token stop) {
+                      const std::stop_token& stop) {
   const TemporaryFolder folder;
   const std::filesystem::path input = folder.path() / "lobe.inp";
   std::ofstream file(input);

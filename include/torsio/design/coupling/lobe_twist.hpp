@@ -57,6 +57,6 @@ struct TwistCurve {
 /// @throws Error if the solver is not installed or its input cannot be written; Cancelled.
 [[nodiscard]] TwistCurve twist_lobe(const LobeMesh& mesh, const Rubber& rubber,
                                     const std::vector<double>& twists_deg,
-                                    const SolverLimits& limits, std::stop_token stop = {});
+                                    const SolverLimits& limits, const std::stop_token& stop = {});
 
 }  // namespace torsio::design
