@@ -38,7 +38,7 @@ std::string table_html(const ReportTable& table, const std::string& label) {
   for (const ReportTable::Row& row : table.rows) {
     html += "<tbody><tr>" + cells_html(row.cells) + "</tr>";
     if (!row.details.empty())
-      html += fmt::format("<tr><td class=\"details\" colspan=\"{}\">{}</td></tr>",
+      html += fmt::format(R"(<tr><td class="details" colspan="{}">{}</td></tr>)",
                           table.headings.size(), markup_text(row.details));
     html += "</tbody>\n";
   }
@@ -72,7 +72,7 @@ class Page {
            fmt::format("<header><h1>{}</h1></header>\n<main>\n", markup_text(document_.title)) +
            summary_html() + body + origin_html() + "</main>\n" +
            fmt::format("<footer><p>torsio {}</p></footer>\n", kVersion) +
-           "<script type=\"application/json\" id=\"report-figures\">" + data.figures_json +
+           R"(<script type="application/json" id="report-figures">)" + data.figures_json +
            "</script>\n<script type=\"text/plain\" id=\"report-numbers\">" + data.numbers_base64 +
            "</script>\n<script>" + std::string(page_script()) + "</script>\n</body></html>\n";
   }

@@ -37,7 +37,7 @@ bool is_bound(CurveRole role) { return role == CurveRole::lower || role == Curve
 
 /// Minima and maxima of at most `count` steps of a series.
 std::vector<double> reduced(const std::vector<float>& overview, std::size_t count) {
-  const std::vector<double> values(overview.begin(), overview.end());
+  std::vector<double> values(overview.begin(), overview.end());
   if (values.size() <= 2 * count) return values;
   const std::vector<float> kept = overview_of(values, values.size() / count + 1);
   return {kept.begin(), kept.end()};
