@@ -289,6 +289,10 @@ std::optional<LimitPoint> limit_point(CouplingDemand demand, double shear_modulu
   demand.angle_deg = kFirst_deg;
   for (int run = 0; run < kRuns; ++run) {
     const CouplingTwist twist = twist_coupling(demand, progress);
+    // A coarser mesh that took over hides strains: it is no result of this one.
+    const int radial = coupling_meshes().at(demand.finest_mesh).radial;
+    if (twist.compressed.density.radial != radial || twist.stretched.density.radial != radial)
+      return std::nullopt;
     const auto curve = torque_curve(twist, demand.length_mm, shear_modulus_MPa);
     if (const auto angle_deg = angle_at_strain(twist, limit.strain, limit.metric)) {
       LimitPoint point{.angle_deg = *angle_deg, .torque_Nm = *torque_at(curve, *angle_deg)};

@@ -106,7 +106,9 @@ DesignReport coupling_search_report(const CouplingSearchSettings& settings,
   const CouplingCandidate& best = search.candidates[search.best];
   report.sections.push_back(shape_section(best.shape));
   for (const CouplingGain& gain : search.gains)
-    report.sections.push_back(gain_section(gain, reference));
+    if (gain.best ||
+        gain.mesh != "coarse")  // shapes of the later meshes are not tried on the coarse one
+      report.sections.push_back(gain_section(gain, reference));
   report.pictures = {front_figure(search)};
   const auto least = [&](const auto& of) {
     return std::min(of(search.gains.at(1)).value_or(-1.0), of(search.gains.at(2)).value_or(-1.0));

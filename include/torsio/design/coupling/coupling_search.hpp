@@ -20,9 +20,8 @@ struct LimitPoint {
   double work_J = 0.0;  ///< stored up to there: the integral of the torque over the twist
 };
 
-/// The twist at which a shape reaches the limit, on meshes not finer than `demand.finest_mesh`; the
-/// angle of the demand has no effect. None if the solver does not converge that far, or the limit is
-/// beyond 20 degrees.
+/// The twist at which a shape reaches the limit on the mesh `demand.finest_mesh`; the angle of the demand has
+/// no effect. None if the solver does not converge that far on it, or the limit is beyond 20 degrees.
 /// @throws as `twist_coupling`
 [[nodiscard]] std::optional<LimitPoint> limit_point(CouplingDemand demand, double shear_modulus_MPa,
                                                     const CouplingLimit& limit,
