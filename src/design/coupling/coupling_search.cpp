@@ -289,7 +289,7 @@ std::optional<LimitPoint> limit_point(CouplingDemand demand, double shear_modulu
   demand.angle_deg = kFirst_deg;
   for (int run = 0; run < kRuns; ++run) {
     const CouplingTwist twist = twist_coupling(demand, progress);
-    // A coarser mesh that took over hides strains: it is no result of this one.
+    // A coarser mesh, which is tried where this one does not converge, hides strains.
     const int radial = coupling_meshes().at(demand.finest_mesh).radial;
     if (twist.compressed.density.radial != radial || twist.stretched.density.radial != radial)
       return std::nullopt;
