@@ -160,7 +160,7 @@ void run(const CouplingFlags& flags) {
                                 ? std::string()
                                 : sheet_text(coupling_sheet(curve, name), flags.sheet);
   flags.outputs.write(report);
-  if (!flags.plot.empty()) write_text(flags.plot, coupling_svg(twist, curve));
+  if (!flags.plot.empty()) write_text(flags.plot, report.drawings.front().svg);
   if (!flags.sheet.empty()) write_text(flags.sheet, sheet);
 }
 

@@ -4,16 +4,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/row_major_map.hpp"
+
 namespace torsio {
 namespace {
 
 using Complex = std::complex<double>;
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-Eigen::Map<const RowMajor> eigen(const Matrix& matrix) {
-  return {matrix.values.data(), static_cast<Eigen::Index>(matrix.rows),
-          static_cast<Eigen::Index>(matrix.columns)};
-}
 
 /// The library's division guards against overflow, which takes most of the time here.
 Complex quotient(const Complex& a, const Complex& b) { return a * std::conj(b) / std::norm(b); }
@@ -32,12 +28,13 @@ FrequencyResponse::FrequencyResponse(const LinearSystem& system, std::size_t out
       states_(order_) {
   if (order_ == 0) return;
   const auto& [a, b, c, d] = system.matrices();
-  const Eigen::HessenbergDecomposition<Eigen::MatrixXd> form(eigen(a));
+  const Eigen::HessenbergDecomposition<Eigen::MatrixXd> form(row_major_map(a));
   const Eigen::MatrixXd q = form.matrixQ();
   const RowMajor hessenberg = form.matrixH();
-  const Eigen::VectorXd of_input = q.transpose() * eigen(b).col(static_cast<Eigen::Index>(input));
+  const Eigen::VectorXd of_input =
+      q.transpose() * row_major_map(b).col(static_cast<Eigen::Index>(input));
   const Eigen::VectorXd of_output =
-      (eigen(c).row(static_cast<Eigen::Index>(output)) * q).transpose();
+      (row_major_map(c).row(static_cast<Eigen::Index>(output)) * q).transpose();
   std::copy_n(hessenberg.data(), hessenberg_.size(), hessenberg_.begin());
   std::copy_n(of_input.data(), order_, input_.begin());
   std::copy_n(of_output.data(), order_, output_.begin());

@@ -11,6 +11,7 @@
 #include "control/loop_design.hpp"
 #include "core/checks.hpp"
 #include "core/matrix_functions.hpp"
+#include "core/row_major_map.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"
 
@@ -19,13 +20,7 @@ namespace {
 
 constexpr auto kPlace = "linear system";
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Eigen::Index;
-
-Eigen::Map<const RowMajor> eigen(const Matrix& matrix) {
-  return {matrix.values.data(), static_cast<Index>(matrix.rows),
-          static_cast<Index>(matrix.columns)};
-}
 
 Matrix table(const RowMajor& matrix) {
   Matrix result(static_cast<std::size_t>(matrix.rows()), static_cast<std::size_t>(matrix.cols()));
@@ -84,8 +79,8 @@ LinearSystem LinearSystem::held(const Matrices& continuous, double sample_rate_H
   const LinearSystem checked(continuous, sample_rate_Hz);
   const auto states = static_cast<Index>(checked.order());
   const auto inputs = static_cast<Index>(checked.input_count());
-  const RowMajor exponent = joined(eigen(continuous.a), eigen(continuous.b), zeros(inputs, states),
-                                   zeros(inputs, inputs)) /
+  const RowMajor exponent = joined(row_major_map(continuous.a), row_major_map(continuous.b),
+                                   zeros(inputs, states), zeros(inputs, inputs)) /
                             sample_rate_Hz;
   const RowMajor both = matrix_exponential(exponent);
   return LinearSystem({table(both.topLeftCorner(states, states)),
@@ -133,17 +128,18 @@ std::complex<double> LinearSystem::response(double frequency_rad_s, std::size_t 
   const double direct = d(output, input);
   if (order() == 0) return direct;
   const std::complex<double> z = std::polar(1.0, frequency_rad_s / sample_rate_Hz_);
-  Eigen::MatrixXcd resolvent = -eigen(a).cast<std::complex<double>>();
+  Eigen::MatrixXcd resolvent = -row_major_map(a).cast<std::complex<double>>();
   resolvent.diagonal().array() += z;
   const Eigen::VectorXcd states = resolvent.partialPivLu().solve(
-      eigen(b).col(static_cast<Index>(input)).cast<std::complex<double>>());
-  return (eigen(c).row(static_cast<Index>(output)).cast<std::complex<double>>() * states)(0) +
+      row_major_map(b).col(static_cast<Index>(input)).cast<std::complex<double>>());
+  return (row_major_map(c).row(static_cast<Index>(output)).cast<std::complex<double>>() *
+          states)(0) +
          direct;
 }
 
 double LinearSystem::spectral_radius() const {
   if (order() == 0) return 0.0;
-  return eigenvalues(eigen(matrices_.a)).cwiseAbs().maxCoeff();
+  return eigenvalues(row_major_map(matrices_.a)).cwiseAbs().maxCoeff();
 }
 
 LinearSystem LinearSystem::closed() const {
@@ -151,15 +147,15 @@ LinearSystem LinearSystem::closed() const {
   require_fit(input_count() == output_count(), "inputs of a closed loop", output_count(),
               input_count());
   const auto size = static_cast<Index>(d.rows);
-  const Eigen::FullPivLU<RowMajor> direct(RowMajor::Identity(size, size) + eigen(d));
+  const Eigen::FullPivLU<RowMajor> direct(RowMajor::Identity(size, size) + row_major_map(d));
   if (!direct.isInvertible())
     throw Error({.place = kPlace, .problem = "the feedback around a direct path has no solution"});
   const RowMajor inverse = direct.inverse();
-  const RowMajor input = eigen(b) * inverse;
-  const RowMajor output = inverse * eigen(c);
-  return LinearSystem(
-      {table(eigen(a) - input * eigen(c)), table(input), table(output), table(inverse * eigen(d))},
-      sample_rate_Hz_);
+  const RowMajor input = row_major_map(b) * inverse;
+  const RowMajor output = inverse * row_major_map(c);
+  return LinearSystem({table(row_major_map(a) - input * row_major_map(c)), table(input),
+                       table(output), table(inverse * row_major_map(d))},
+                      sample_rate_Hz_);
 }
 
 LinearSystem operator*(const LinearSystem& after, const LinearSystem& before) {
@@ -171,13 +167,13 @@ LinearSystem operator*(const LinearSystem& after, const LinearSystem& before) {
   const auto first = static_cast<Index>(before.order());
   const auto second = static_cast<Index>(after.order());
   RowMajor b(first + second, static_cast<Index>(before.input_count()));
-  b << eigen(b1), RowMajor(eigen(b2) * eigen(d1));
+  b << row_major_map(b1), RowMajor(row_major_map(b2) * row_major_map(d1));
   RowMajor c(static_cast<Index>(after.output_count()), first + second);
-  c << RowMajor(eigen(d2) * eigen(c1)), eigen(c2);
-  return LinearSystem(
-      {table(joined(eigen(a1), zeros(first, second), eigen(b2) * eigen(c1), eigen(a2))), table(b),
-       table(c), table(eigen(d2) * eigen(d1))},
-      after.sample_rate_Hz());
+  c << RowMajor(row_major_map(d2) * row_major_map(c1)), row_major_map(c2);
+  return LinearSystem({table(joined(row_major_map(a1), zeros(first, second),
+                                    row_major_map(b2) * row_major_map(c1), row_major_map(a2))),
+                       table(b), table(c), table(row_major_map(d2) * row_major_map(d1))},
+                      after.sample_rate_Hz());
 }
 
 LinearSystem side_by_side(const LinearSystem& one, const LinearSystem& other) {
@@ -188,15 +184,15 @@ LinearSystem side_by_side(const LinearSystem& one, const LinearSystem& other) {
   const auto& [a2, b2, c2, d2] = other.matrices();
   const auto block = [](const Matrix& top_left, const Matrix& bottom_right) {
     return joined(
-        eigen(top_left),
+        row_major_map(top_left),
         zeros(static_cast<Index>(top_left.rows), static_cast<Index>(bottom_right.columns)),
         zeros(static_cast<Index>(bottom_right.rows), static_cast<Index>(top_left.columns)),
-        eigen(bottom_right));
+        row_major_map(bottom_right));
   };
   RowMajor c(static_cast<Index>(c1.rows), static_cast<Index>(c1.columns + c2.columns));
-  c << eigen(c1), eigen(c2);
+  c << row_major_map(c1), row_major_map(c2);
   RowMajor d(static_cast<Index>(d1.rows), static_cast<Index>(d1.columns + d2.columns));
-  d << eigen(d1), eigen(d2);
+  d << row_major_map(d1), row_major_map(d2);
   return LinearSystem({table(block(a1, a2)), table(block(b1, b2)), table(c), table(d)},
                       one.sample_rate_Hz());
 }
@@ -207,9 +203,10 @@ LinearSystem operator+(const LinearSystem& one, const LinearSystem& other) {
   const LinearSystem both = side_by_side(one, other);
   const auto inputs = static_cast<Index>(one.input_count());
   const auto& [a, b, c, d] = both.matrices();
-  return LinearSystem({a, table(eigen(b).leftCols(inputs) + eigen(b).rightCols(inputs)), c,
-                       table(eigen(d).leftCols(inputs) + eigen(d).rightCols(inputs))},
-                      one.sample_rate_Hz());
+  return LinearSystem(
+      {a, table(row_major_map(b).leftCols(inputs) + row_major_map(b).rightCols(inputs)), c,
+       table(row_major_map(d).leftCols(inputs) + row_major_map(d).rightCols(inputs))},
+      one.sample_rate_Hz());
 }
 
 }  // namespace torsio

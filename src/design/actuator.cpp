@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "drive_load.hpp"
 #include "sim/plant/plant.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/control/joint_impedance.hpp"
@@ -30,7 +31,6 @@ constexpr double kFastestLoop_Hz = 40.0;
 constexpr double kCopperShare = 0.3;
 constexpr double kCopper_s = 10.0;
 constexpr double kStator_s = 600.0;
-constexpr double kAmbient_K = 293.15;
 
 DataSheet sheet_of(const ActuatorDemand& d, const SpringDesign& spring, const GearChoice& gear,
                    const MotorChoice& motor, const std::string& name) {
@@ -56,12 +56,6 @@ DataSheet sheet_of(const ActuatorDemand& d, const SpringDesign& spring, const Ge
   return sheet;
 }
 
-/// What the friction of gear and drive adds to a torque at the joint, starting from rest.
-double with_friction(const DataSheet& sheet, double torque_Nm) {
-  const FrictionSheet& f = sheet.friction;
-  return torque_Nm + f.static_ratio.value * (f.coulomb_Nm.value + f.load_factor.value * torque_Nm);
-}
-
 /// Torque at the joint that a current holds against the friction.
 double torque_of(const DataSheet& sheet, double current_A) {
   const FrictionSheet& f = sheet.friction;
@@ -70,24 +64,21 @@ double torque_of(const DataSheet& sheet, double current_A) {
          (1.0 + f.static_ratio.value * f.load_factor.value);
 }
 
-/// Speed under a torque that supply and current allow: U = R i + k_t N ω, N k_t i = T + friction.
+/// Speed under a torque that supply and current allow.
 double speed_of(const DataSheet& sheet, double torque_Nm, double largest_A) {
-  const Drive drive = drive_of(sheet);
-  const double per_A = drive.torque_per_current();
-  const double load = with_friction(sheet, torque_Nm);
-  const double viscous = sheet.friction.viscous_Nms_rad.value;
-  const double by_voltage = (drive.supply_V - drive.resistance_Ohm * load / per_A) /
-                            (per_A + drive.resistance_Ohm * viscous / per_A);
-  const double by_current = (per_A * largest_A - load) / viscous;
-  return std::max(0.0, std::min(by_voltage, by_current));
+  const double by_current =
+      (drive_of(sheet).torque_per_current() * largest_A - with_friction(sheet, torque_Nm)) /
+      sheet.friction.viscous_Nms_rad.value;
+  return std::max(0.0, std::min(supply_speed(sheet, torque_Nm), by_current));
 }
 
 /// The current that may flow for any time: at most the motor's continuous one, and the stator stays below
 /// the temperature from which on the current is reduced (`ElectricalSheet`, 20 degC around it).
 double thermal_current_A(const DataSheet& sheet) {
-  const ElectricalSheet of = electrical_sheet(sheet);
-  const double loss_W = (of.derating_begins_K.value - kAmbient_K) / of.stator_ambient_K_W.value;
-  const double copper_rise_K = loss_W * (of.copper_stator_K_W.value + of.stator_ambient_K_W.value);
+  const ElectricalDrive::Parameters of = electrical_parameters(sheet, 1);
+  const double loss_W = (of.derating_begins_K - of.ambient_K) / of.thermal.stator_ambient_K_W;
+  const double copper_rise_K =
+      loss_W * (of.thermal.copper_stator_K_W + of.thermal.stator_ambient_K_W);
   const double resistance_Ohm =
       sheet.motor.winding_resistance_Ohm.value * (1.0 + kCopperResistanceRise_1_K * copper_rise_K);
   return std::min(sheet.rating.current_A.value, std::sqrt(loss_W / resistance_Ohm));
@@ -195,18 +186,18 @@ DriveCandidate candidate_of(const ActuatorDemand& d, const SpringDesign& spring,
   const double stiffness = spring.stiffness_Nm_rad;
   const Drive drive = drive_of(sheet);
   c.lowest_loop_Hz = std::sqrt(stiffness / drive.inertia()) / kTurn;
-  c.peak_s =
-      time_at(with_friction(sheet, d.peak_Nm) / drive.torque_per_current() / motor.continuous_A);
+  c.peak_s = time_at(current_under(sheet, d.peak_Nm) / motor.continuous_A);
   c.collision_N = collision_force(d, sheet);
   const auto add = [&](const char* of, double wanted, double reached, const char* unit,
                        bool is_upper = false) {
     c.limits.push_back({of, wanted, reached, unit, is_upper});
   };
+  const double thermal_A = thermal_current_A(sheet);
   add("continuous torque (thermal limit)", d.continuous_Nm,
-      std::min(gear.continuous_Nm, torque_of(sheet, thermal_current_A(sheet))), "Nm");
+      std::min(gear.continuous_Nm, torque_of(sheet, thermal_A)), "Nm");
   add("peak torque", d.peak_Nm, std::min(gear.peak_Nm, torque_of(sheet, motor.peak_A)), "Nm");
   add("speed at the continuous torque", deg_from_rad(d.speed_rad_s),
-      deg_from_rad(speed_of(sheet, d.continuous_Nm, thermal_current_A(sheet))), "deg/s");
+      deg_from_rad(speed_of(sheet, d.continuous_Nm, thermal_A)), "deg/s");
   if (std::isfinite(d.collision_N)) add("collision force", d.collision_N, c.collision_N, "N", true);
   if (std::isfinite(d.torque_resolution_Nm))
     add("torque resolution", d.torque_resolution_Nm,

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "drive_load.hpp"
 #include "torsio/control/deflection_controller.hpp"
 #include "torsio/control/drive.hpp"
 #include "torsio/core/units.hpp"
@@ -39,20 +40,8 @@ DesignSection limits_section(const DriveCandidate& c) {
   return section;
 }
 
-double current_under(const DriveCandidate& c, double torque_Nm) {
-  const FrictionSheet& f = c.sheet.friction;
-  const double load = torque_Nm * (1.0 + f.static_ratio.value * f.load_factor.value) +
-                      f.static_ratio.value * f.coulomb_Nm.value;
-  return load / drive_of(c.sheet).torque_per_current();
-}
-
-/// Speed [rad/s] under a torque that the supply permits.
-double supply_speed(const DriveCandidate& c, double torque_Nm) {
-  const Drive drive = drive_of(c.sheet);
-  const double viscous = c.sheet.friction.viscous_Nms_rad.value;
-  return std::max(0.0, (drive.supply_V - drive.resistance_Ohm * current_under(c, torque_Nm)) /
-                           (drive.torque_per_current() +
-                            drive.resistance_Ohm * viscous / drive.torque_per_current()));
+double reached_speed_deg_s(const DriveCandidate& c, double torque_Nm) {
+  return deg_from_rad(std::max(0.0, supply_speed(c.sheet, torque_Nm)));
 }
 
 /// Speed under shares of the peak torque at the peak current, and where the supply ends it.
@@ -60,9 +49,9 @@ DesignSection map_section(const ActuatorDemand& d, const DriveCandidate& c) {
   DesignSection section{"torque_speed"};
   for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
     const double torque = share * d.peak_Nm;
-    const double current = current_under(c, torque);
+    const double current = current_under(c.sheet, torque);
     section.figures.push_back(
-        {fmt::format("speed_at_{:.4g}_Nm", torque), deg_from_rad(supply_speed(c, torque)), "deg/s",
+        {fmt::format("speed_at_{:.4g}_Nm", torque), reached_speed_deg_s(c, torque), "deg/s",
          fmt::format("{:.3g} A at rest{}", current,
                      current > c.motor.continuous_A ? ", for a time" : ", continuous")});
   }
@@ -107,14 +96,14 @@ XyFigure map_figure(const ActuatorDemand& d, const DriveCandidate& c) {
   XySeries most{.label = "at the peak current", .role = CurveRole::limit, .x = {}, .y = {}};
   for (int i = 0; i <= kPoints; ++i) {
     most.x.push_back(peak_Nm * i / kPoints);
-    most.y.push_back(deg_from_rad(supply_speed(c, most.x.back())));
+    most.y.push_back(reached_speed_deg_s(c, most.x.back()));
   }
   most.x.push_back(peak_Nm);
   most.y.push_back(0.0);
   const double continuous_Nm = c.limits[0].reached;
   const XySeries thermal{.label = "for any time",
                          .x = {continuous_Nm, continuous_Nm},
-                         .y = {0.0, deg_from_rad(supply_speed(c, continuous_Nm))}};
+                         .y = {0.0, reached_speed_deg_s(c, continuous_Nm)}};
   const XySeries demand{.label = "demand",
                         .style = CurveStyle::points,
                         .role = CurveRole::measured,

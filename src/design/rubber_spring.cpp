@@ -53,36 +53,53 @@ std::optional<RubberRing> shortest(const RubberSpringDemand& demand, double oute
   return RubberRing{outer, std::pow(std::max(inner, 0.0), 0.25), length};
 }
 
+/// The ring with the least objective of those that it was given.
+class BestRing {
+ public:
+  explicit BestRing(const RubberSpringDemand& demand) : demand_(&demand) {}
+
+  void take(const std::optional<RubberRing>& ring) {
+    if (!ring) return;
+    const double value = objective(*ring, *demand_);
+    if (best_ && value >= value_) return;
+    best_ = ring;
+    value_ = value;
+  }
+  /// Tries values of a dimension beside that of the best one so far, in ever smaller steps.
+  /// @param at (value) -> ring, if there is one
+  template <class At>
+  void refine(double RubberRing::*dimension, double step, int halvings, const At& at) {
+    double width = step;
+    for (int i = 0; best_ && i < halvings; ++i, width *= 0.5) {
+      const double middle = (*best_).*dimension;
+      take(at(middle - 0.5 * width));
+      take(at(middle + 0.5 * width));
+    }
+  }
+  [[nodiscard]] const std::optional<RubberRing>& ring() const { return best_; }
+
+ private:
+  const RubberSpringDemand* demand_;
+  std::optional<RubberRing> best_;
+  double value_ = 0.0;
+};
+
 /// The radii that can be an optimum or the only feasible one: both bounds, and where the stress
 /// reaches the longest ring; between them the search.
 std::optional<RubberRing> best_ring(const RubberSpringDemand& demand) {
-  std::optional<RubberRing> best;
-  double best_value = 0.0;
-  const auto take = [&](double outer) {
-    if (outer <= 0.0 || outer > demand.largest_outer_m) return;
-    const auto ring = shortest(demand, outer);
-    if (!ring) return;
-    const double value = objective(*ring, demand);
-    if (best && value >= best_value) return;
-    best = ring;
-    best_value = value;
+  constexpr int kHalvings = 40;
+  const auto at = [&](double outer) {
+    return outer > 0.0 && outer <= demand.largest_outer_m ? shortest(demand, outer) : std::nullopt;
   };
   const double from = demand.least_inner_m;
   const double step = (demand.largest_outer_m - from) / kSearch;
-  take(demand.largest_outer_m);
-  take(demand.largest_length_m * demand.allowed_stress_Pa /
-       (demand.safety * modulus(demand) * demand.angle_rad));
-  for (int i = 1; i < kSearch; ++i) take(from + i * step);
-  if (!best) return best;
-  // The best of the grid is refined in ever smaller steps.
-  constexpr int kHalvings = 40;
-  double width = step;
-  for (int i = 0; i < kHalvings; ++i, width *= 0.5) {
-    const double middle = best->outer_m;
-    take(middle - 0.5 * width);
-    take(middle + 0.5 * width);
-  }
-  return best;
+  BestRing best(demand);
+  best.take(at(demand.largest_outer_m));
+  best.take(at(demand.largest_length_m * demand.allowed_stress_Pa /
+               (demand.safety * modulus(demand) * demand.angle_rad)));
+  for (int i = 1; i < kSearch; ++i) best.take(at(from + i * step));
+  best.refine(&RubberRing::outer_m, step, kHalvings, at);
+  return best.ring();
 }
 
 using Constraints = std::vector<RingConstraint>;
@@ -93,41 +110,30 @@ bool holds(Constraints& constraints, const RubberRing& ring, const RubberSpringD
       constraints, [&](RingConstraint& each) { return each.slack(ring, demand) >= -kSmallSlack; });
 }
 
-/// The ring of an outer radius and a length with the stiffness of the demand, if it is within the bounds.
-std::optional<RubberRing> ring_of(const RubberSpringDemand& demand, double outer, double length) {
-  const auto least = shortest(demand, outer);
-  if (!least || length < least->length_m || length > demand.largest_length_m) return std::nullopt;
-  const double inner = fourth(outer) - volume_factor(demand) * length;
+/// The ring of the outer radius of the shortest one and a length, if it is within the bounds.
+std::optional<RubberRing> longer(const RubberSpringDemand& demand, const RubberRing& shortest,
+                                 double length) {
+  if (length < shortest.length_m || length > demand.largest_length_m) return std::nullopt;
+  const double inner = fourth(shortest.outer_m) - volume_factor(demand) * length;
   if (inner < fourth(demand.least_inner_m)) return std::nullopt;
-  return RubberRing{outer, std::pow(inner, 0.25), length};
+  return RubberRing{shortest.outer_m, std::pow(inner, 0.25), length};
 }
 
 /// The ring of an outer radius with the least objective that meets the constraints.
 std::optional<RubberRing> best_length(const RubberSpringDemand& demand, Constraints& constraints,
                                       double outer, int steps) {
+  constexpr int kHalvings = 30;
   const auto least = shortest(demand, outer);
   if (!least) return std::nullopt;
-  std::optional<RubberRing> best;
-  double best_value = 0.0;
-  const auto take = [&](double length) {
-    const auto ring = ring_of(demand, outer, length);
-    if (!ring || !holds(constraints, *ring, demand)) return;
-    const double value = objective(*ring, demand);
-    if (best && value >= best_value) return;
-    best = ring;
-    best_value = value;
+  const auto at = [&](double length) {
+    const auto ring = longer(demand, *least, length);
+    return ring && holds(constraints, *ring, demand) ? ring : std::nullopt;
   };
   const double step = (demand.largest_length_m - least->length_m) / steps;
-  for (int i = 0; i <= steps; ++i) take(least->length_m + i * step);
-  if (!best) return best;
-  constexpr int kHalvings = 30;
-  double width = step;
-  for (int i = 0; i < kHalvings; ++i, width *= 0.5) {
-    const double middle = best->length_m;
-    take(middle - 0.5 * width);
-    take(middle + 0.5 * width);
-  }
-  return best;
+  BestRing best(demand);
+  for (int i = 0; i <= steps; ++i) best.take(at(least->length_m + i * step));
+  best.refine(&RubberRing::length_m, step, kHalvings, at);
+  return best.ring();
 }
 
 std::optional<RubberRing> best_constrained(const RubberSpringDemand& demand,
@@ -137,26 +143,16 @@ std::optional<RubberRing> best_constrained(const RubberSpringDemand& demand,
   constexpr int kRadii = 400;
   constexpr int kLengths = 200;
   constexpr int kHalvings = 30;
-  std::optional<RubberRing> best;
-  double best_value = 0.0;
-  const auto take = [&](double outer) {
-    if (outer <= 0.0 || outer > demand.largest_outer_m) return;
-    const auto ring = best_length(demand, constraints, outer, kLengths);
-    if (!ring) return;
-    const double value = objective(*ring, demand);
-    if (best && value >= best_value) return;
-    best = ring;
-    best_value = value;
+  const auto at = [&](double outer) {
+    return outer > 0.0 && outer <= demand.largest_outer_m
+               ? best_length(demand, constraints, outer, kLengths)
+               : std::nullopt;
   };
   const double step = (demand.largest_outer_m - demand.least_inner_m) / kRadii;
-  for (int i = kRadii; i > 0; --i) take(demand.least_inner_m + i * step);
-  double width = step;
-  for (int i = 0; best && i < kHalvings; ++i, width *= 0.5) {
-    const double middle = best->outer_m;
-    take(middle - 0.5 * width);
-    take(middle + 0.5 * width);
-  }
-  return best;
+  BestRing best(demand);
+  for (int i = kRadii; i > 0; --i) best.take(at(demand.least_inner_m + i * step));
+  best.refine(&RubberRing::outer_m, step, kHalvings, at);
+  return best.ring();
 }
 
 /// The largest slack of a constraint over the rings within the bounds.
@@ -170,8 +166,8 @@ double largest_slack(const RubberSpringDemand& demand, RingConstraint& constrain
     if (!least) continue;
     for (int j = 0; j <= kSteps; ++j) {
       const auto ring =
-          ring_of(demand, outer,
-                  least->length_m + (demand.largest_length_m - least->length_m) * j / kSteps);
+          longer(demand, *least,
+                 least->length_m + (demand.largest_length_m - least->length_m) * j / kSteps);
       if (ring) largest = std::max(largest, constraint.slack(*ring, demand));
     }
   }

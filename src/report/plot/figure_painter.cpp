@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <set>
 #include <utility>
 
@@ -104,7 +105,7 @@ void FigurePainter::text(const std::string& text, double x, double y, Align alig
   cairo_save(cairo_);
   cairo_set_source_rgb(cairo_, 0.0, 0.0, 0.0);
   cairo_translate(cairo_, x, y);
-  if (is_upright) cairo_rotate(cairo_, -0.5 * 3.14159265358979);
+  if (is_upright) cairo_rotate(cairo_, -0.5 * std::numbers::pi);
   cairo_move_to(cairo_, -share * text_width(text), 0.0);
   cairo_show_text(cairo_, text.c_str());
   cairo_restore(cairo_);

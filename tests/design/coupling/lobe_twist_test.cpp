@@ -93,6 +93,16 @@ TEST(LobeTwist, ReproducesTheTorquesOfDeltaAtSixDegrees) {
   EXPECT_LT(stretched.steps[1].torque_N * compressed.steps[2].torque_N, 0.0);
 }
 
+/// Two triangles between the circles i and i + 2 and the rays k and k + 2.
+template <class Node>
+void add_quadrilateral(LobeMesh& mesh, const Node& node, int i, int k) {
+  const int middle = node(i + 1, k + 1);
+  mesh.triangles.push_back(
+      {node(i, k), node(i + 2, k), node(i + 2, k + 2), node(i + 1, k), node(i + 2, k + 1), middle});
+  mesh.triangles.push_back(
+      {node(i, k), node(i + 2, k + 2), node(i, k + 2), middle, node(i + 1, k + 2), node(i, k + 1)});
+}
+
 /// A ring between the radii 5 and 10 mm as a mesh; its outer edge is the upper flank.
 LobeMesh ring(int radial, int around) {
   LobeMesh mesh;
@@ -105,13 +115,7 @@ LobeMesh ring(int radial, int around) {
     }
   const auto node = [&](int i, int k) { return i * columns + k % columns; };
   for (int i = 0; i < 2 * radial; i += 2)
-    for (int k = 0; k < columns; k += 2) {
-      const int middle = node(i + 1, k + 1);
-      mesh.triangles.push_back({node(i, k), node(i + 2, k), node(i + 2, k + 2), node(i + 1, k),
-                                node(i + 2, k + 1), middle});
-      mesh.triangles.push_back({node(i, k), node(i + 2, k + 2), node(i, k + 2), middle,
-                                node(i + 1, k + 2), node(i, k + 1)});
-    }
+    for (int k = 0; k < columns; k += 2) add_quadrilateral(mesh, node, i, k);
   for (int k = 0; k < columns; ++k) {
     mesh.upper_flank.push_back(node(2 * radial, k));
     mesh.lower_flank.push_back(node(0, k));
@@ -226,13 +230,7 @@ LobeMesh disc(double radius_mm, int radial, int around) {
     mesh.triangles.push_back(
         {0, node(2, k), node(2, k + 2), node(1, k), node(2, k + 1), node(1, k + 2)});
   for (int i = 2; i < 2 * radial; i += 2)
-    for (int k = 0; k < columns; k += 2) {
-      const int middle = node(i + 1, k + 1);
-      mesh.triangles.push_back({node(i, k), node(i + 2, k), node(i + 2, k + 2), node(i + 1, k),
-                                node(i + 2, k + 1), middle});
-      mesh.triangles.push_back({node(i, k), node(i + 2, k + 2), node(i, k + 2), middle,
-                                node(i + 1, k + 2), node(i, k + 1)});
-    }
+    for (int k = 0; k < columns; k += 2) add_quadrilateral(mesh, node, i, k);
   return mesh;
 }
 
