@@ -118,7 +118,7 @@ Estimate ModelInverse::guarded(double torque_Nm, Features features) noexcept {
   }
   std::ranges::copy(features, asked_.begin());
   asked_.front() = estimate.value;
-  const double weight = core_.excursion(asked_);
+  const double weight = core_.excursion(asked_).borders;
   if (weight > 1.0) {
     answer.fault = Fault::outside_training_range;
     return answer;

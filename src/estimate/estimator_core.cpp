@@ -20,6 +20,13 @@
 namespace torsio::detail {
 namespace {
 
+/// Beyond the range of the first input, as a share of its width: where the value of a model that
+/// continues remains in use. As much as `widen_for_physics` gives an equation of motion.
+constexpr double kReach = 1.0;
+/// An error bar at twice the largest rate of a symmetric training, half a width outside, is twice that
+/// at the border.
+constexpr double kExcursionGain = 2.0;
+
 /// An error bar that is positive and finite; NaN for any other.
 double evidence(double std_dev) noexcept {
   return std::isfinite(std_dev) && std_dev > 0.0 ? std_dev : kNotMeasured;
@@ -147,6 +154,7 @@ std::uint64_t identity_of(const EstimatorSettings& settings) noexcept {
 }  // namespace
 
 EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input_count,
+                             const FamilyTraits& traits,
                              const std::function<ModelMemory(const InputRanges&)>& memory)
     : settings_(std::move(settings)),
       pipeline_(settings_.features, settings_.sample_rate_Hz),
@@ -156,16 +164,7 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
   check_settings(settings_, model_input_count);
   check_zeroed(settings_.zeroed_channels, raw_inputs());
   const FeatureRanges& ranges = settings_.ranges;
-  for (std::size_t i = 0; i < model_input_count; ++i) {
-    const double low = ranges.lowest[i];
-    const double high = ranges.highest[i];
-    const double slack = tolerance(low, high);
-    // Never 0, not even for a feature that was constant in training: no value may jump.
-    const double border = ranges.margin * (high - low) + slack;
-    ranges_.push_back({.lowest = low - slack, .highest = high + slack, .border = border});
-    check_finite("guards.ranges with margin",
-                 std::array{low - slack - border, high + slack + border});
-  }
+  for (std::size_t i = 0; i < model_input_count; ++i) ranges_.push_back(range_of(i, traits));
   check_disturbances(settings_.disturbances, raw_inputs().size());
   first_width_ = ranges_.front().highest - ranges_.front().lowest;
   assumes_jumps_ = settings_.disturbances.largest_step.empty();
@@ -183,6 +182,33 @@ EstimatorCore::EstimatorCore(EstimatorSettings settings, std::size_t model_input
   for (std::size_t i = 0; i < model_input_count; ++i)
     widths_.push_back(ranges.highest[i] - ranges.lowest[i]);
   state_identity_ = identity_of(settings_);
+}
+
+EstimatorCore::Range EstimatorCore::range_of(std::size_t feature,
+                                             const FamilyTraits& traits) const {
+  const double low = settings_.ranges.lowest[feature];
+  const double high = settings_.ranges.highest[feature];
+  const double width = high - low;
+  const double slack = tolerance(low, high);
+  // Never 0, not even for a feature that was constant in training: no value may jump.
+  const double border = settings_.ranges.margin * width + slack;
+  check_finite("guards.ranges with margin",
+               std::array{low - slack - border, high + slack + border});
+  Range range{.lowest = low - slack,
+              .highest = high + slack,
+              .border = border,
+              .per_width = width > 0.0 ? 1.0 / width : 0.0,
+              .reach = 0.0,
+              .held = border};
+  // An excursion is a motion, and not a wrong sensor, only if jumps are detected.
+  if (!traits.is_spring || settings_.disturbances.largest_step.empty()) return range;
+  if (feature == 0 && traits.continues) {
+    range.reach = kReach * width;
+    range.held = range.reach + border;
+  } else if (feature > 0 && pipeline_.is_rate(feature)) {
+    range.reach = std::numeric_limits<double>::infinity();
+  }
+  return range;
 }
 
 void EstimatorCore::set_zero(std::string_view channel, double value) {
@@ -254,18 +280,18 @@ EstimatorCore::Conditioned EstimatorCore::condition(std::span<const double> raw)
   input.features = features;
   input.for_model = features;
   input.excursion = excursion(features);
-  const bool is_outside = input.excursion > 1.0;
+  const bool is_outside = input.excursion.is_outside();
   // An unknown zero explains an excursion without a jump.
   const bool may_have_jumped = in_jump_ || (assumes_jumps_ && unset_zeros_.empty());
   in_jump_ = jumped || is_wrong_rate_ || (is_outside && may_have_jumped);
   if (in_jump_) {
     exclude(input);
-  } else if (is_outside && has_memory_) {
+  } else if (is_outside) {
     limit(input);
   }
   if (input.for_model.empty()) return input;
   excluded_ticks_ = 0.0;
-  if (input.excursion <= 1.0) memory_error_.follow(features);
+  if (!is_outside) memory_error_.follow(features);
   input.restarted = needs_reset_;
   needs_reset_ = false;
   has_run_ = true;
@@ -277,15 +303,15 @@ void EstimatorCore::exclude(Conditioned& input) noexcept {
   poisoned_ = true;
   interrupt(1.0);
   if (has_memory_) input.for_model = {};
-  if (input.excursion <= 1.0) input.excursion = std::numeric_limits<double>::infinity();
+  input.excursion.fallback = std::numeric_limits<double>::infinity();
 }
 
 // A continuous excursion is a motion: the memory misses no more than what the first input travelled
 // beyond its border.
 void EstimatorCore::limit(Conditioned& input) noexcept {
   for (std::size_t i = 0; i < limited_.size(); ++i)
-    limited_[i] = std::clamp(input.features[i], ranges_[i].lowest - ranges_[i].border,
-                             ranges_[i].highest + ranges_[i].border);
+    limited_[i] = std::clamp(input.features[i], ranges_[i].lowest - ranges_[i].held,
+                             ranges_[i].highest + ranges_[i].held);
   input.for_model = limited_;
   const double missed = std::abs(input.features[0] - limited_[0]);
   if (!has_run_) return;
@@ -303,12 +329,13 @@ Estimate EstimatorCore::held(Fault fault) const noexcept {
 Estimate EstimatorCore::apply_guards(const Conditioned& input,
                                      const Estimate& raw_estimate) noexcept {
   const Features features = input.features;
-  const bool inside = input.excursion <= 1.0;
+  const Excursion& excursion = input.excursion;
+  const bool is_in_use = excursion.fallback <= 1.0;
   const double std_dev = model_std_dev(raw_estimate);
   Estimate out;
   if (is_wrong_rate_) {
     out.fault = Fault::wrong_rate;
-  } else if (!inside) {
+  } else if (!is_in_use) {
     out.fault = Fault::outside_training_range;
   } else if (!is_settled()) {
     out.fault = Fault::warming_up;
@@ -320,18 +347,25 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
     out.fault = Fault::recovering;
   }
   if (out.fault == Fault::none) {
-    if (input.excursion > 0.0) {
-      out = blended(features, raw_estimate.value, std_dev, input.excursion);
+    if (excursion.fallback > 0.0) {
+      out = blended(features, raw_estimate.value, std_dev, excursion.fallback);
     } else {
       out.value = raw_estimate.value;
       out.std_dev = std_dev;
     }
     if (!memory_error_.is_zero()) out.std_dev = std::hypot(out.std_dev, memory_error_.bound());
     if (start_std_dev_ > 0.0) out.std_dev = std::hypot(out.std_dev, start_std_dev_);
+    out.std_dev *= 1.0 + kExcursionGain * excursion.share;
+    // Two extrapolations: the further beyond the range, the less evidence there is for either.
+    if (excursion.first > 0.0)
+      out.std_dev = std::hypot(
+          out.std_dev, std::min(excursion.first, 1.0) * (out.value - fallback_value(features)));
+    if (excursion.borders > 1.0) out.fault = Fault::outside_training_range;
   } else {
     out.value = fallback_value(features);
     // The fallback's residuals are evidence only where it was fitted.
-    if (inside && !is_wrong_rate_) out.std_dev = evidence(settings_.fallback.residual_std);
+    if (!excursion.is_outside() && !is_wrong_rate_)
+      out.std_dev = evidence(settings_.fallback.residual_std);
   }
   out.novelty = raw_estimate.novelty;
   if (!unset_zeros_.empty()) {
@@ -343,12 +377,17 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
   return out;
 }
 
-double EstimatorCore::excursion(Features features) const noexcept {
-  double worst = 0.0;
+EstimatorCore::Excursion EstimatorCore::excursion(Features features) const noexcept {
+  Excursion worst;
   for (std::size_t i = 0; i < features.size(); ++i) {
     const Range& range = ranges_[i];
     const double left_by = std::max(range.lowest - features[i], features[i] - range.highest);
-    if (left_by > 0.0) worst = std::max(worst, left_by / range.border);
+    if (!(left_by > 0.0)) continue;
+    worst.borders = std::max(worst.borders, left_by / range.border);
+    worst.fallback = std::max(worst.fallback, (left_by - range.reach) / range.border);
+    if (!(range.reach > 0.0)) continue;
+    worst.share = std::max(worst.share, left_by * range.per_width);
+    if (i == 0) worst.first = left_by * range.per_width;
   }
   return worst;
 }

@@ -1,5 +1,6 @@
-// On simulated benches the first proposal of the advice lowers the error on an independent test
-// more than the same recordings made once more; docs/what_to_record.md has cases where it does not.
+// On simulated benches the first proposal of the advice lowers the error on an independent test, or the
+// share of it that is outside of the training range, more than the same recordings made once more;
+// docs/what_to_record.md has cases where it does not.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,11 +28,14 @@ struct BenchCase {
   double largest_Nm;  ///< torque of the intended use
   double lowest_Hz;
   double highest_Hz;
+  /// Whether the recordings lack fast motions only. The error of a model that does not depend on the
+  /// rate does not show this; the share of the samples outside of its training range does.
+  bool is_too_slow = false;
 };
 std::ostream& operator<<(std::ostream& out, const BenchCase& each) { return out << each.name; }
 
 const BenchCase kCases[] = {
-    {"SlowMotionOnly", "dfki-50", {{50, 0.1}, {25, 0.1}}, 50, 0.05, 2.0},
+    {"SlowMotionOnly", "dfki-50", {{50, 0.1}, {25, 0.1}}, 50, 0.05, 2.0, true},
     {"SmallMotionOnly", "dfki-120:bouc-wen", {{30, 0.2}, {15, 0.2}}, 120, 0.05, 1.0},
     {"FastMotionOnly", "elastomer", {{5, 2.0}, {2.5, 2.0}}, 5, 0.03, 3.0},
 };
@@ -41,18 +45,23 @@ Recording in_use(const BenchCase& each, double duration_s, std::uint64_t seed) {
                                 duration_s, seed);
 }
 
-double test_rmse(Dataset dataset, const Recording& held_out, const FeatureSpec& features) {
+/// RMSE on an independent test, or the share of its samples outside of the training range.
+double shortcoming(const BenchCase& each, Dataset dataset, const Recording& held_out,
+                   const FeatureSpec& features) {
   test::add_record(dataset, held_out, Role::test);
   const TrainedModel trained =
       train_model(dataset, {.family = "maxwell_slip", .features = features}, 1);
   for (const ResultRow& row : evaluate_model(trained.file, dataset).rows)
-    if (row.split == Role::test && !row.recording) return row.score.metrics.rmse;
+    if (row.split == Role::test && !row.recording)
+      return each.is_too_slow ? static_cast<double>(row.score.guarded_samples) /
+                                    static_cast<double>(row.score.metrics.samples)
+                              : row.score.metrics.rmse;
   return kNotMeasured;
 }
 
 class AdviceOnABench : public testing::TestWithParam<std::tuple<BenchCase, std::uint64_t>> {};
 
-TEST_P(AdviceOnABench, FirstProposalLowersTheErrorMoreThanTheSameAgain) {
+TEST_P(AdviceOnABench, FirstProposalHelpsMoreThanTheSameAgain) {
   const auto& [each, seed] = GetParam();
   Dataset dataset;
   for (const test::TorqueTriangle& wave : each.recorded)
@@ -90,9 +99,9 @@ TEST_P(AdviceOnABench, FirstProposalLowersTheErrorMoreThanTheSameAgain) {
                      Role::train);
 
   const Recording held_out = in_use(each, 60.0, 900 + seed);
-  const double before = test_rmse(dataset, held_out, features);
-  const double proposed = test_rmse(with_proposed, held_out, features);
-  const double same = test_rmse(with_same, held_out, features);
+  const double before = shortcoming(each, dataset, held_out, features);
+  const double proposed = shortcoming(each, with_proposed, held_out, features);
+  const double same = shortcoming(each, with_same, held_out, features);
   EXPECT_LT(proposed, 0.9 * same) << "before " << before << ": " << first.recording;
   EXPECT_LT(proposed, 0.9 * before) << first.recording;
 }

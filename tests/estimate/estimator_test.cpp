@@ -171,6 +171,58 @@ TEST(Estimator, HandsOverToTheFallbackAcrossTheBorder) {
   }
 }
 
+/// A spring that extrapolates linearly.
+class Continuing : public Scripted {
+ public:
+  using Scripted::Scripted;
+  static constexpr FamilyTraits kTraits{.continues = true};
+};
+
+/// Deflection and its rate, trained on -1..1 and -2..2, with steps of at most 1.
+template <class Model>
+BasicEstimator<Model> of_a_motion(const Estimate& output) {
+  EstimatorSettings with_rate = settings();
+  with_rate.features.inputs = {"gear_angle_rad", "motor_speed_rad_s"};
+  with_rate.ranges = {.lowest = {-1.0, -2.0}, .highest = {1.0, 2.0}, .margin = 0.05};
+  with_rate.fallback.slope = {7.0, 0.0};
+  with_rate.disturbances.largest_step = {1.0, 100.0};
+  return {with_rate, Model({.output = output, .is_fixed = true, .inputs = 2})};
+}
+
+TEST(Estimator, UsesTheModelAtARateBeyondItsRangeAndReportsIt) {
+  auto estimator = of_a_motion<Scripted>({.value = 10.0, .std_dev = 2.0});
+  EXPECT_EQ(estimator.step({{0.5, 2.0}}).fault, Fault::none);
+  const Estimate twice = estimator.step({{0.5, 4.0}});
+  EXPECT_EQ(twice.fault, Fault::outside_training_range);
+  EXPECT_EQ(twice.value, 10.0);
+  EXPECT_NEAR(twice.std_dev, 2.0 * (1.0 + 2.0 * 0.5), 1e-6) << "half a width beyond";
+  EXPECT_EQ(estimator.step({{0.5, -60.0}}).value, 10.0) << "however fast";
+  EXPECT_EQ(estimator.step({{0.5, 0.0}}).fault, Fault::none);
+}
+
+TEST(Estimator, UsesAModelThatContinuesUpToOneWidthBeyondItsRange) {
+  auto estimator = of_a_motion<Continuing>({.value = 10.0, .std_dev = 2.0});
+  const Estimate beyond = estimator.step({{2.0, 0.0}});
+  EXPECT_EQ(beyond.fault, Fault::outside_training_range);
+  EXPECT_EQ(beyond.value, 10.0);
+  const double fallback = 0.5 + 7.0 * 2.0;
+  EXPECT_NEAR(beyond.std_dev, std::hypot(2.0 * (1.0 + 2.0 * 0.5), 0.5 * (10.0 - fallback)), 1e-6);
+  const Estimate far = estimator.step({{3.2, 0.0}});
+  EXPECT_EQ(far.value, 0.5 + 7.0 * 3.2) << "the fallback beyond the width and the border";
+  EXPECT_TRUE(std::isnan(far.std_dev));
+  auto other = of_a_motion<Scripted>({.value = 10.0, .std_dev = 2.0});
+  EXPECT_EQ(other.step({{2.0, 0.0}}).value, fallback) << "a model that does not continue";
+}
+
+TEST(Estimator, DoesNotUseAModelThatContinuesAfterAJump) {
+  auto estimator = of_a_motion<Continuing>({.value = 10.0, .std_dev = 2.0});
+  EXPECT_EQ(estimator.step({{-0.9, 0.0}}).value, 10.0);
+  const Estimate jumped = estimator.step({{1.5, 0.0}});
+  EXPECT_EQ(jumped.value, 0.5 + 7.0 * 1.5);
+  EXPECT_TRUE(std::isnan(jumped.std_dev));
+  EXPECT_EQ(estimator.step({{1.4, 0.0}}).value, 0.5 + 7.0 * 1.4) << "until it is inside again";
+}
+
 TEST(Estimator, ReturnsNoErrorBarForABlendWithoutEvidence) {
   ScriptedEstimator estimator = with_output({.value = 10.0});
   EXPECT_TRUE(std::isnan(step(estimator, 1.05).std_dev));

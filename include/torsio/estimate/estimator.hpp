@@ -53,7 +53,10 @@ Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> r
 ///   because the position of a channel without a zero is unknown.
 /// - `outside_training_range`: a feature is beyond the border, or a raw input has changed by more than
 ///   `kJumpFactor` times its largest step in training; linear fallback, without error bar: there is
-///   no evidence.
+///   no evidence. Without a jump it is the model's value for a rate of a spring, limited to its range, and
+///   for the first input of a model that continues (`FamilyTraits::continues`), up to one width of the
+///   range beyond. Its error bar is that of the model times 1 + 2 s, with s the share of the width by which
+///   the worst feature has left its range, and contains s |model - fallback| for the first one.
 /// - `warming_up`: filters have not settled since `reset()`, a long gap or a jump; linear fallback. An unknown
 ///   state of `stop` or `dahl` in the inputs is not a fault, but is contained in the error bar.
 /// - `recovering`: inputs that the memory of the model has not received can still change its output by
@@ -66,7 +69,7 @@ Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> r
 /// a plain `rate(x)` shows the whole step over the gap in one tick; after a longer gap the filters
 /// restart and warm up, and the model recovers. A model with memory is not stepped after a jump until
 /// the features are inside their ranges, and in an excursion without a jump it is stepped with the
-/// features limited to their ranges and borders. A model without an error bar of its own gets that of the residual table.
+/// features limited to their ranges and borders, or to where its value is used. A model without an error bar of its own gets that of the residual table.
 template <Model M>
 class BasicEstimator {
  public:

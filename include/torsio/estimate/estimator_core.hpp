@@ -14,6 +14,7 @@
 #include "torsio/core/state_bytes.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/estimate/memory_error.hpp"
+#include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
@@ -35,8 +36,18 @@ class EstimatorCore {
   /// finite.
   template <Model M>
   EstimatorCore(EstimatorSettings settings, const M& model)
-      : EstimatorCore(std::move(settings), model.input_count(),
+      : EstimatorCore(std::move(settings), model.input_count(), traits_of_model(model),
                       [&model](const InputRanges& ranges) { return memory_of(model, ranges); }) {}
+
+  /// How far features have left their ranges: 0 inside.
+  struct Excursion {
+    double borders = 0.0;  ///< the worst feature's, in widths of its border; above 1 it is reported
+    /// As a share of the width of its range, the worst feature's for which the model remains in use.
+    double share = 0.0;
+    double first = 0.0;     ///< the first feature's, likewise
+    double fallback = 0.0;  ///< weight of the fallback; from 1 on it replaces the model
+    [[nodiscard]] bool is_outside() const noexcept { return borders > 1.0 || fallback > 1.0; }
+  };
 
   /// One tick's raw channels after the pipeline.
   struct Conditioned {
@@ -46,7 +57,7 @@ class EstimatorCore {
     /// What the model is to be stepped with: the features, limited to their ranges and borders. Empty:
     /// the model is not to be stepped.
     Features for_model;
-    double excursion = 0.0;  ///< see `excursion`; infinite in a tick that must not be used
+    Excursion excursion = {};  ///< its fallback is infinite in a tick that must not be used
   };
 
   [[nodiscard]] const EstimatorSettings& settings() const noexcept { return settings_; }
@@ -71,9 +82,7 @@ class EstimatorCore {
   Conditioned condition(std::span<const double> raw) noexcept TORSIO_REALTIME;
   /// The last value from good inputs, with the reason why it is held.
   [[nodiscard]] Estimate held(Fault fault) const noexcept TORSIO_REALTIME;
-  /// How far the worst feature has left its range, in widths of its border: 0 inside, above 1
-  /// beyond the border.
-  [[nodiscard]] double excursion(Features features) const noexcept TORSIO_REALTIME;
+  [[nodiscard]] Excursion excursion(Features features) const noexcept TORSIO_REALTIME;
   /// Applies the guards to `raw_estimate`, the model's output for these features; where they are not
   /// for the model, any.
   Estimate apply_guards(const Conditioned& input,
@@ -129,10 +138,14 @@ class EstimatorCore {
   struct Range {
     double lowest = 0.0;
     double highest = 0.0;
-    double border = 0.0;  ///< width, on either side, of the transition to the fallback
+    double border = 0.0;     ///< width, on either side, of the transition to the fallback
+    double per_width = 0.0;  ///< 1 / the width of the range; 0 for a constant feature
+    double reach = 0.0;      ///< beyond the range, where the transition to the fallback begins
+    double held = 0.0;  ///< beyond the range, the value at which a model with memory receives it
   };
 
   EstimatorCore(EstimatorSettings settings, std::size_t model_input_count,
+                const FamilyTraits& traits,
                 const std::function<ModelMemory(const InputRanges&)>& memory);
 
   /// The error bar of the model's output: its own, or that of its region.
@@ -154,6 +167,8 @@ class EstimatorCore {
 
   EstimatorSettings settings_;
   FeaturePipeline pipeline_;
+  [[nodiscard]] Range range_of(std::size_t feature, const FamilyTraits& traits) const;
+
   std::vector<Range> ranges_;   ///< per feature, tolerance included
   double first_width_ = 0.0;    ///< width of the range of the first feature
   bool assumes_jumps_ = false;  ///< the largest steps of the training are not known

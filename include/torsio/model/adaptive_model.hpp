@@ -39,6 +39,7 @@ class AdaptiveModel {
   [[nodiscard]] std::size_t input_count() const noexcept { return model_.input_count(); }
   [[nodiscard]] std::size_t parameter_count() const noexcept { return model_.parameter_count(); }
 
+  [[nodiscard]] FamilyTraits traits() const noexcept { return model_.traits(); }
   [[nodiscard]] ModelMemory memory(const InputRanges& ranges) const {
     return model_.memory(ranges);
   }

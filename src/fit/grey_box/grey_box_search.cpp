@@ -11,11 +11,12 @@ namespace torsio {
 namespace {
 
 constexpr double kWorthwhile = 0.99;
-/// Blocks of a recording resemble their neighbours: what gains less on them seldom gains on another motion.
-constexpr double kWorthwhileOnBlocks = 0.95;
+/// For one or two recordings. Blocks resemble their neighbours: what gains less on them seldom gains on
+/// another motion.
+constexpr double kWorthwhileOfFew = 0.95;
 /// All banks together.
 constexpr double kTogether = 0.9;
-constexpr double kTogetherOnBlocks = 0.8;
+constexpr double kTogetherOfFew = 0.8;
 
 /// One step up any sequence from `at`.
 std::vector<GreyBoxChoice> steps_up(const GreyBoxChoice& at, bool has_rates) {
@@ -124,12 +125,11 @@ GreyBoxSearch::Candidate GreyBoxSearch::choose_banks(const GreyBoxChoice& main,
     }
     return choices;
   };
-  const bool is_by_block = !sums_.is_by_record && sums_.folds > 1;
+  // Two records in turn are hardly more evidence for another motion than blocks of one.
+  const bool is_weak = sums_.folds > 1 && sums_.records <= 2;
   const Candidate start = rated(without);
-  const Candidate chosen =
-      climbed(start, is_by_block ? kWorthwhileOnBlocks : kWorthwhile, next, progress);
-  return chosen.score < (is_by_block ? kTogetherOnBlocks : kTogether) * start.score ? chosen
-                                                                                    : start;
+  const Candidate chosen = climbed(start, is_weak ? kWorthwhileOfFew : kWorthwhile, next, progress);
+  return chosen.score < (is_weak ? kTogetherOfFew : kTogether) * start.score ? chosen : start;
 }
 
 GreyBoxSearch::Candidate GreyBoxSearch::choose(bool passive, const Progress& progress) const {

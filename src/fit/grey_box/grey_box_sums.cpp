@@ -16,7 +16,7 @@ namespace torsio {
 namespace {
 
 constexpr std::size_t kMaxSummed = 100000;  // rows; of more every n-th is taken
-constexpr std::size_t kRecordsToLeaveOut = 3;
+constexpr std::size_t kLevelsToLeaveOut = 3;
 
 /// [lowest, highest] first input. @throws Error if that range is empty, or has few samples.
 std::pair<double, double> range_of(const TrainingData& data) {
@@ -90,13 +90,12 @@ std::size_t usable_samples(const Sequence& sequence) {
 
 /// Records in turn, blocks, or the schedule's inner knots.
 void choose_folds(GreyBoxSums& sums, const TrainingData& data) {
-  std::size_t records = 0;
   for (const Sequence& sequence : data.sequences)
-    if (usable_samples(sequence) > 0) ++records;
-  sums.is_by_record = sums.levels == 1 && records >= kRecordsToLeaveOut;
-  sums.folds = sums.levels >= kRecordsToLeaveOut ? 1
-               : sums.is_by_record               ? std::min(records, 2 * kFolds)
-                                                 : kFolds;
+    if (usable_samples(sequence) > 0) ++sums.records;
+  sums.is_by_record = sums.levels == 1 && sums.records > 1;
+  sums.folds = sums.levels >= kLevelsToLeaveOut ? 1
+               : sums.is_by_record              ? std::min(sums.records, 2 * kFolds)
+                                                : kFolds;
 }
 
 /// Adds one row of terms to their products.

@@ -38,6 +38,7 @@ struct GreyBoxSums {
   bool are_banks_chosen =
       false;  ///< `all` has the finest terms of the first input, and chosen banks
   std::size_t samples = 0;
+  std::size_t records = 0;  ///< with samples in use
 };
 
 /// Runs once through the data. @param schedule as `groups_by` takes it

@@ -18,6 +18,7 @@
 #include "model/mixture/dgmm.hpp"
 #include "model/network/mlp.hpp"
 #include "torsio/core/state_bytes.hpp"
+#include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -229,6 +230,7 @@ struct GreyBoxResidual {
 class GreyBox {
  public:
   static constexpr std::string_view kFamily = "grey_box";
+  static constexpr FamilyTraits kTraits{.continues = true};
 
   struct Parameters {
     using Family = GreyBox;

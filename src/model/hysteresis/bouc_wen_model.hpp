@@ -7,6 +7,7 @@
 
 #include "model/hysteresis/increment.hpp"
 #include "torsio/core/state_bytes.hpp"
+#include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -26,6 +27,7 @@ namespace torsio {
 class BoucWenModel {
  public:
   static constexpr std::string_view kFamily = "bouc_wen";
+  static constexpr FamilyTraits kTraits{.continues = true};
 
   struct Parameters {
     using Family = BoucWenModel;

@@ -9,6 +9,7 @@
 #include "model/hysteresis/increment.hpp"
 #include "model/hysteresis/slip_bank.hpp"
 #include "torsio/core/state_bytes.hpp"
+#include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -42,6 +43,7 @@ template <class Operator>
 class OperatorSum {
  public:
   static constexpr std::string_view kFamily = Operator::kFamily;
+  static constexpr FamilyTraits kTraits{.continues = true};
 
   struct Parameters {
     using Family = OperatorSum;

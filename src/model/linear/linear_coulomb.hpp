@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "model/common/schedule.hpp"
+#include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/model.hpp"
 
 namespace torsio {
@@ -19,6 +20,7 @@ namespace torsio {
 class LinearCoulomb {
  public:
   static constexpr std::string_view kFamily = "linear_coulomb";
+  static constexpr FamilyTraits kTraits{.continues = true};
 
   struct Parameters {
     using Family = LinearCoulomb;

@@ -8,6 +8,7 @@
 #include "model/viscoelastic/spring_dashpot_network.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/core/state_bytes.hpp"
+#include "torsio/model/common/family_traits.hpp"
 #include "torsio/model/common/memory.hpp"
 #include "torsio/model/common/model.hpp"
 
@@ -28,6 +29,7 @@ namespace torsio {
 class Viscoelastic {
  public:
   static constexpr std::string_view kFamily = "viscoelastic";
+  static constexpr FamilyTraits kTraits{.continues = true};
 
   struct Parameters {
     using Family = Viscoelastic;

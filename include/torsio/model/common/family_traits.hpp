@@ -16,6 +16,10 @@ struct FamilyTraits {
   /// An equation of motion, which holds beyond the inputs that it was fitted to: the range guard
   /// adds as much room again on either side.
   bool extrapolates = false;
+  /// A spring that extrapolates linearly in the first input, with its hysteresis, unlike a polynomial or a
+  /// network: up to one width of the range beyond it the estimator uses its value and not the fallback's
+  /// (docs/decisions/0027-beyond-the-range.md).
+  bool continues = false;
   /// The output is an integral of the input. The error of its first samples is that of a drift that
   /// has hardly begun, so it does not show how uncertain the start is.
   bool integrates = false;
@@ -29,6 +33,15 @@ template <class Family>
     return Family::kTraits;
   } else {
     return {};
+  }
+}
+
+template <class M>
+[[nodiscard]] FamilyTraits traits_of_model(const M& model) noexcept {
+  if constexpr (requires { model.traits(); }) {
+    return model.traits();
+  } else {
+    return traits_of<M>();
   }
 }
 
