@@ -31,8 +31,8 @@ TEST_F(TransferVerb, MakesAModelOfTheNewJoint) {
       "transfer base.safetensors new.csv --test walk.csv --base-actuator dfki-120 --actuator "
       "dfki-50 --curve 5s,10s --plot curve.svg --serial J-11 -o new.safetensors --json t.json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  for (const char* const text :
-       {"data_sheets", "scaled", "refit", "chosen", "10 s of new data", "Learning curve, RMSE in Nm"})
+  for (const char* const text : {"data_sheets", "scaled", "refit", "chosen", "10 s of new data",
+                                 "Learning curve, RMSE in Nm"})
     EXPECT_NE(outcome.out.find(text), std::string::npos) << text << "\n" << outcome.out;
   const auto json = nlohmann::json::parse(contents("t.json"));
   double base = 0.0;

@@ -266,12 +266,19 @@ void add_banks(FittedGreyBox& fitted, const GreyBoxChoice& main, const TrainingD
   keep(fitted, search, chosen, data, search.held_out_error(main));
 }
 
+/// A box, and the error where a contiguous fifth of a single recording is held out; 0: none was.
+struct ChosenBox {
+  FittedGreyBox fitted;
+  double spans_rmse = 0.0;
+};
+
 /// The box of the terms that predict best what is held out.
-FittedGreyBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, double rate_share,
-                         const Progress& progress) {
+ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, double rate_share,
+                     const Progress& progress) {
   const GreyBoxSearch search(data, options.schedule, rate_share);
   const GreyBoxSearch::Candidate chosen = search.choose(options.passive, progress);
-  FittedGreyBox fitted;
+  ChosenBox box;
+  FittedGreyBox& fitted = box.fitted;
   fitted.parameters = search.fitted(chosen.choice);
   fitted.held_out_rmse = chosen.held_out_error;
   fitted.notes.push_back(fmt::format("{}; held out ({}): RMSE {:.4g}, linear model {:.4g}",
@@ -280,7 +287,19 @@ FittedGreyBox chosen_box(const TrainingData& data, const GreyBoxOptions& options
                                      search.held_out_error({})));
   if (!options.passive && options.banks && data.input_count() > 1)
     add_banks(fitted, chosen.choice, data, options, rate_share, progress);
-  return fitted;
+  if (search.has_one_record() && fitted.parameters.terms.banks.empty()) {
+    const GreyBoxSums spans = gather_spans(data, fitted.parameters.terms);
+    box.spans_rmse = GreyBoxCandidate(spans, chosen.choice).held_out().rmse;
+  }
+  return box;
+}
+
+/// Error bars as wide as the error on the most different part of the data.
+void widen(FittedGreyBox& fitted, double spans_rmse) {
+  if (!(spans_rmse > fitted.held_out_rmse)) return;
+  fitted.held_out_rmse = spans_rmse;
+  fitted.notes.push_back(
+      fmt::format("error bars are those of held-out contiguous fifths: RMSE {:.4g}", spans_rmse));
 }
 
 }  // namespace
@@ -294,16 +313,19 @@ FittedGreyBox fit_grey_box(const TrainingData& data, const GreyBoxOptions& optio
                       .problem = "a learned residual may give energy",
                       .advice = "Leave one of them away."});
   report_progress(context.progress, 0.0, "gathering the terms of grey_box");
-  FittedGreyBox fitted = chosen_box(data, options, kRateShares[0], context.progress);
+  ChosenBox box = chosen_box(data, options, kRateShares[0], context.progress);
   const bool has_rates =
       std::ranges::any_of(data.inputs, [](const auto& input) { return input.is_rate; });
   if (has_rates) {
-    FittedGreyBox other = chosen_box(data, options, kRateShares[1], context.progress);
-    if (other.held_out_rmse < kClearly * fitted.held_out_rmse) fitted = std::move(other);
+    ChosenBox other = chosen_box(data, options, kRateShares[1], context.progress);
+    if (other.fitted.held_out_rmse < kClearly * box.fitted.held_out_rmse) box = std::move(other);
   }
   const bool may_learn = options.residual != ResidualKind::none && !options.passive;
+  FittedGreyBox& fitted = box.fitted;
+  const double without = fitted.held_out_rmse;
   if (may_learn) learn_residual(fitted, data, options, context);
-  return fitted;
+  widen(fitted, box.spans_rmse * fitted.held_out_rmse / without);
+  return std::move(box.fitted);
 }
 
 }  // namespace torsio

@@ -55,8 +55,9 @@ struct GreyBoxOptions {
   }
 };
 
-/// `held_out_rmse`: root mean square error on what was held out, the residual's share taken off: what
-/// error bars are to be wide as.
+/// `held_out_rmse`: root mean square error on what was held out, the residual's share taken off; of a
+/// single record the larger of those on blocks and on contiguous fifths: what error bars are to be wide
+/// as.
 using FittedGreyBox = Fitted<GreyBox>;
 
 /// Chooses terms by cross-validation and fits them by least squares, slip forces and branches >= 0
@@ -65,7 +66,7 @@ using FittedGreyBox = Fitted<GreyBox>;
 /// Starting from the linear model, the step (more knots of the curve, more slip elements, more
 /// knots of their forces, signed forces, relaxation, viscous and dry friction of rates, less
 /// smoothing) that lowers the held-out error most is taken as long as it lowers it by 1 %. Held out
-/// are: the records one at a time, if there are three; of a schedule the inner knots, one at a
+/// are: the records one at a time, if there are two; of a schedule the inner knots, one at a
 /// time, interpolated over the others; else fifths of interleaved blocks. Every candidate is
 /// evaluated on sums that are computed once (AᵀA of all terms, for each fold), so the search does
 /// not read the data again. Smoothing: λ n Σ (second difference)² over the knots of curve and

@@ -50,6 +50,10 @@ class GreyBoxSearch {
   [[nodiscard]] std::string description_of(const GreyBoxChoice& choice,
                                            const TrainingData& data) const;
   [[nodiscard]] const char* what_was_held_out() const;
+  /// Whether blocks of a single recording are held out.
+  [[nodiscard]] bool has_one_record() const noexcept {
+    return sums_.records == 1 && sums_.levels == 1;
+  }
 
   /// Rates terms of the first input alone by the root mean square error on what was held out, and
   /// those beside banks by the geometric mean of the folds' errors: recordings of another kind each have

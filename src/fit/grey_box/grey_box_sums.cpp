@@ -118,25 +118,35 @@ class RowSum {
   std::vector<std::pair<std::size_t, double>> row_;  ///< what is not 0
 };
 
-/// Range of the first input in all records but those of each fold.
+/// The fold of a sample in use. @param sample its place among the `usable` ones of its record
+std::size_t fold_of(const GreyBoxSums& sums, std::size_t record, std::size_t sample,
+                    std::size_t usable) {
+  if (sums.folds == 1) return 0;
+  if (sums.is_by_record) return record % sums.folds;
+  return sums.is_by_span ? sample * sums.folds / usable : interleaved_fold(sample, usable);
+}
+
+/// Range of the first input in all samples but those of each fold.
 std::vector<SampleRange> ranges_of_others(const GreyBoxSums& sums, const TrainingData& data) {
   std::vector<SampleRange> ranges(sums.folds);
   std::size_t record = 0;
   for (const Sequence& sequence : data.sequences) {
-    if (usable_samples(sequence) == 0) continue;
-    const std::size_t own = record++ % sums.folds;
-    for (std::size_t n = 0; n < sequence.use.size(); ++n) {
+    const std::size_t usable = usable_samples(sequence);
+    if (usable == 0) continue;
+    for (std::size_t n = 0, sample = 0; n < sequence.use.size(); ++n) {
       if (sequence.use[n] == 0) continue;
+      const std::size_t own = fold_of(sums, record, sample++, usable);
       for (std::size_t fold = 0; fold < sums.folds; ++fold)
         if (fold != own) ranges[fold].take(sequence.features(n, 0));
     }
+    ++record;
   }
   return ranges;
 }
 
 void add_data(GreyBoxSums& sums, const TrainingData& data) {
   const std::vector<SampleRange> others =
-      sums.is_by_record ? ranges_of_others(sums, data) : std::vector<SampleRange>{};
+      sums.beyond.empty() ? std::vector<SampleRange>{} : ranges_of_others(sums, data);
   const std::size_t stride = (sums.samples + kMaxSummed - 1) / kMaxSummed;
   RowSum row;
   std::size_t record = 0;
@@ -151,15 +161,13 @@ void add_data(GreyBoxSums& sums, const TrainingData& data) {
       terms.move(features);
       if (sequence.use[n] == 0) continue;
       const bool is_in_gap = !sums.gap.empty() && is_next_to_border(own, usable);
-      const std::size_t fold = sums.is_by_record ? record % sums.folds
-                               : sums.folds == 1 ? 0
-                                                 : interleaved_fold(own, usable);
+      const std::size_t fold = fold_of(sums, record, own, usable);
       ++own;
       if (used++ % stride != 0) continue;
       const std::size_t level = knot_at(sums.frame, features);
       row.add(is_in_gap ? sums.gap[level] : sums.cells[level * sums.folds + fold], terms, features,
               sequence.target[n]);
-      if (sums.is_by_record && !others[fold].holds(features[0]))
+      if (!others.empty() && !others[fold].holds(features[0]))
         row.add(sums.beyond[fold], terms, features, sequence.target[n]);
     }
     if (usable > 0) ++record;
@@ -180,7 +188,7 @@ void add(NormalEquations& sum, const NormalEquations& part, double sign) {
 namespace {
 
 GreyBoxSums sums_of(const TrainingData& data, CoefficientSchedule frame,
-                    GreyBoxTerms::Structure all, bool with_gap) {
+                    GreyBoxTerms::Structure all, bool with_gap, bool is_by_span = false) {
   const std::size_t levels = std::max<std::size_t>(frame.knots.size(), 1);
   GreyBoxSums sums{.all = std::move(all),
                    .is_rate = {},
@@ -192,9 +200,10 @@ GreyBoxSums sums_of(const TrainingData& data, CoefficientSchedule frame,
                    .samples = data.usable_samples()};
   for (const auto& input : data.inputs) sums.is_rate.push_back(input.is_rate ? 1 : 0);
   choose_folds(sums, data);
+  sums.is_by_span = is_by_span && sums.levels == 1 && !sums.is_by_record;
   const NormalEquations none(sums.all.columns());
   sums.cells.assign(sums.levels * sums.folds, none);
-  if (sums.is_by_record) sums.beyond = sums.cells;
+  if (sums.is_by_record || sums.is_by_span) sums.beyond = sums.cells;
   if (with_gap && !sums.is_by_record && sums.folds > 1) sums.gap.assign(sums.levels, none);
   add_data(sums, data);
   return sums;
@@ -212,6 +221,12 @@ GreyBoxSums gather_banks(const TrainingData& data, const std::string& schedule,
   GreyBoxTerms::Structure all = chosen;
   all.banks = finest_banks(data, frame.scheduled ? frame.feature : 0);
   GreyBoxSums sums = sums_of(data, std::move(frame), std::move(all), true);
+  sums.is_main_chosen = true;
+  return sums;
+}
+
+GreyBoxSums gather_spans(const TrainingData& data, const GreyBoxTerms::Structure& chosen) {
+  GreyBoxSums sums = sums_of(data, {}, chosen, false, true);
   sums.is_main_chosen = true;
   return sums;
 }

@@ -25,10 +25,11 @@ struct GreyBoxSums {
   CoefficientSchedule frame;           ///< without values
   std::size_t levels = 1;              ///< levels of the schedule
   std::size_t folds = 1;               ///< 1: levels are held out instead
-  bool is_by_record = false;           ///< a fold is some records; else blocks
+  bool is_by_record = false;           ///< a fold is some records; else blocks or a span
+  bool is_by_span = false;             ///< a fold is a contiguous fifth of the only record
   std::vector<NormalEquations> cells;  ///< [level * folds + fold]
   /// For each cell, the samples beyond the first input's range in all other cells; empty unless
-  /// folds are records. A guard replaces the model's value there, so these samples are not used to
+  /// folds are records or spans. A guard replaces the model's value there, so these samples are not used to
   /// choose terms.
   std::vector<NormalEquations> beyond;
   /// For each level, the samples next to the borders of blocks, which are fitted to in the end but
@@ -51,6 +52,11 @@ struct GreyBoxSums {
 /// are held out, a tenth of each block is a gap to the next one.
 /// @param chosen without banks
 [[nodiscard]] GreyBoxSums gather_banks(const TrainingData& data, const std::string& schedule,
+                                       const GreyBoxTerms::Structure& chosen);
+
+/// Sums of one record over terms that have been chosen, without banks, with its contiguous fifths as
+/// folds: what they have of another motion than the rest is not in neighbouring blocks.
+[[nodiscard]] GreyBoxSums gather_spans(const TrainingData& data,
                                        const GreyBoxTerms::Structure& chosen);
 
 /// As `gather`, beside banks that have been chosen, with the gaps of `gather_banks`.

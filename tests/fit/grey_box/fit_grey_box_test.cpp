@@ -78,6 +78,16 @@ TEST(FitGreyBox, FindsAStiffeningSpringWithFrictionToItsNoise) {
   EXPECT_THAT(fitted.notes[0], HasSubstr("slip elements"));
 }
 
+TEST(FitGreyBox, HasErrorBarsOfThePartOfARecordingThatDiffers) {
+  TrainingData data = spring_data(1);
+  Sequence& sequence = data.sequences[0];
+  const std::size_t samples = sequence.target.size();
+  for (std::size_t n = samples - samples / 5; n < samples; ++n) sequence.target[n] += 1.0;
+  const Fitted<GreyBox> fitted = fit_grey_box(data, kBoxAlone);
+  EXPECT_GT(fitted.held_out_rmse, 0.45) << "of blocks, which contain both parts, at most 0.4";
+  EXPECT_THAT(fitted.notes, testing::Contains(HasSubstr("contiguous fifths")));
+}
+
 TEST(GreyBoxSums, AreThoseOfTheCompleteTableOfTerms) {
   TrainingData data = spring_data(1);
   for (std::size_t k = 1; k < 4; ++k)
