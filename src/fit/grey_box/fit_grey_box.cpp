@@ -287,7 +287,10 @@ ChosenBox chosen_box(const TrainingData& data, const GreyBoxOptions& options, do
                                      search.held_out_error({})));
   if (!options.passive && options.banks && data.input_count() > 1)
     add_banks(fitted, chosen.choice, data, options, rate_share, progress);
-  if (search.has_one_record() && fitted.parameters.terms.banks.empty()) {
+  // With few strokes every fifth is another part of the motion.
+  constexpr std::size_t kLeastStrokes = 20;
+  if (search.has_one_record() && fitted.parameters.terms.banks.empty() &&
+      strokes_of(data) >= kLeastStrokes) {
     const GreyBoxSums spans = gather_spans(data, fitted.parameters.terms);
     box.spans_rmse = GreyBoxCandidate(spans, chosen.choice).held_out().rmse;
   }
