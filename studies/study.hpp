@@ -89,6 +89,8 @@ struct ComparisonRow : StudyRow {
   double step_ns = kNotMeasured;         ///< mean of the runs' medians
   double within_std_dev = kNotMeasured;  ///< mean of `Score::within_std_dev`; NaN: no error bar
   double within_2_std_dev = kNotMeasured;
+  double mean_std_dev = kNotMeasured;     ///< mean of `Score::mean_std_dev`
+  double without_std_dev = kNotMeasured;  ///< mean of `Score::without_std_dev`
   std::size_t diverged = 0;
   std::string failure = {};  ///< why a fit failed; the study continues
 

@@ -111,6 +111,8 @@ std::string share(double within) {
   return std::isfinite(within) ? fmt::format("{:.1f}", 100.0 * within) : "-";
 }
 
+std::string width(double std_dev) { return std::isfinite(std_dev) ? number(std_dev) : "-"; }
+
 /// Why a row is not ranked, in a few words.
 std::string unranked(const ComparisonRow& row) {
   if (row.diverged > 0) return diverged_runs(row.diverged, row.runs);
@@ -130,6 +132,8 @@ std::vector<Column<ComparisonRow>> columns_of(const ComparisonTable& table,
                         : std::string("-");
            }},
           {"% of max", [](const Row& row) { return fmt::format("{:.1f}", row.percent); }},
+          {"mean sd", [](const Row& row) { return width(row.mean_std_dev); }},
+          {"no sd %", [](const Row& row) { return share(row.without_std_dev); }},
           {"in 1 sd %", [](const Row& row) { return share(row.within_std_dev); }},
           {"in 2 sd %", [](const Row& row) { return share(row.within_2_std_dev); }},
           {"step ns", [](const Row& row) { return fmt::format("{:.0f}", row.step_ns); }},
@@ -205,7 +209,7 @@ const ComparisonRow* row_of(const ComparisonTable& table, const std::string& con
 std::string verdict_text(const ComparisonTable& of, const std::string& unit) {
   TextTable table;
   table.header({"condition", "best", fmt::format("RMSE {}", unit), of.subject, "/ best",
-                "within 5 %", "in 1 sd %", "in 2 sd %", "step ns"});
+                "within 5 %", "mean sd", "no sd %", "in 1 sd %", "in 2 sd %", "step ns"});
   std::size_t near = 0;
   const std::vector<StudyVerdict> all = verdicts(of);
   for (const StudyVerdict& verdict : all) {
@@ -215,6 +219,8 @@ std::string verdict_text(const ComparisonTable& of, const std::string& unit) {
                verdict.rmse ? number(*verdict.rmse) : "not ranked",
                verdict.rmse ? fmt::format("{:.3f}", *verdict.rmse / verdict.best_rmse) : "-",
                verdict.is_near_best() ? "yes" : "no",
+               row != nullptr ? width(row->mean_std_dev) : "-",
+               row != nullptr ? share(row->without_std_dev) : "-",
                row != nullptr ? share(row->within_std_dev) : "-",
                row != nullptr ? share(row->within_2_std_dev) : "-",
                row != nullptr ? fmt::format("{:.0f}", row->step_ns) : "-"});
@@ -234,8 +240,10 @@ std::string text_of(const LoopTable& table, const std::string& unit) {
 
 std::string text_of(const ComparisonTable& table, const std::string& unit) {
   return fmt::format(
-      "\n{}\n{}/ best: RMSE over the lowest of the condition; {}in 1 sd %, in 2 sd %: samples "
-      "whose error is at most one, two error bars (calibrated: 68 and 95)\n",
+      "\n{}\n{}/ best: RMSE over the lowest of the condition; {}mean sd: mean error bar; no sd %: "
+      "samples without one; in 1 sd %, in 2 sd %: samples whose error is at most one error bar, "
+      "two "
+      "error bars (calibrated: 68 and 95)\n",
       verdict_text(table, unit), table_text(table, unit), kPercentOfMax);
 }
 
@@ -314,6 +322,8 @@ void write(Json& document, const ComparisonTable& table) {
                      {"step_ns", row.step_ns},
                      {"within_std_dev", row.within_std_dev},
                      {"within_2_std_dev", row.within_2_std_dev},
+                     {"mean_std_dev", row.mean_std_dev},
+                     {"without_std_dev", row.without_std_dev},
                      {"failure", row.failure.empty() ? Json(nullptr) : Json(row.failure)}});
     document["rows"].push_back(std::move(json));
   }

@@ -40,6 +40,8 @@ void StudyRows::Sum::add(const ResultRow& row, double largest_target) {
   if (row.status == "diverged") ++diverged;
   within.add(row.score.within_std_dev);
   within_2.add(row.score.within_2_std_dev);
+  std_dev.add(row.score.mean_std_dev);
+  without.add(row.score.without_std_dev);
   step_ns.add(row.score.step_ns_p50);
   fit_percent.add(row.score.metrics.fit_percent);
   fit_seconds.add(row.fit_seconds);
@@ -135,6 +137,8 @@ std::vector<ComparisonRow> StudyRows::comparisons() const {
     row.step_ns = sum.step_ns.mean();
     row.within_std_dev = sum.within.mean();
     row.within_2_std_dev = sum.within_2.mean();
+    row.mean_std_dev = sum.std_dev.mean();
+    row.without_std_dev = sum.without.mean();
     row.diverged = sum.diverged;
     row.failure = sum.failure;
   });

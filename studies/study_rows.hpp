@@ -75,7 +75,7 @@ class StudyRows {
  private:
   struct Sum {
     RunningMean rmse, percent, largest, one_step, fit_percent, fit_seconds, within, within_2,
-        step_ns;
+        std_dev, without, step_ns;
     double max_abs = 0.0;
     std::size_t blank = 0;
     std::size_t samples = 0;

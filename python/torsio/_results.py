@@ -130,6 +130,8 @@ class Score:
     reason: str
     mode: str = "free_run"
     fold: str = ""
+    mean_std_dev: float = math.nan  #: mean error bar of the samples that have one
+    without_std_dev: float = math.nan  #: share of the samples without an error bar
     common_rmse: float = math.nan  #: on the samples that no compared model guarded; ranks
 
 

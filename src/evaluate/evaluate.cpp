@@ -48,14 +48,20 @@ std::vector<const std::vector<double>*> raw_channels(const Estimator& estimator,
   return channels;
 }
 
-/// Counts how often the target is within one and two error bars.
+/// Counts how often the target is within one and two error bars, and adds up their width.
 struct Coverage {
   std::size_t samples = 0;
+  std::size_t without = 0;
   std::size_t within = 0;
   std::size_t within_2 = 0;
+  double sum = 0.0;
 
   void add(const Estimate& estimate, double target) {
-    if (!std::isfinite(estimate.std_dev)) return;
+    if (!std::isfinite(estimate.std_dev)) {
+      ++without;
+      return;
+    }
+    sum += estimate.std_dev;
     const double error = std::abs(estimate.value - target);
     ++samples;
     if (error <= estimate.std_dev) ++within;
@@ -63,6 +69,13 @@ struct Coverage {
   }
   [[nodiscard]] double share(std::size_t count) const {
     return samples == 0 ? kNotMeasured : static_cast<double>(count) / static_cast<double>(samples);
+  }
+  [[nodiscard]] double mean() const {
+    return samples == 0 ? kNotMeasured : sum / static_cast<double>(samples);
+  }
+  [[nodiscard]] double without_share() const {
+    const std::size_t all = samples + without;
+    return all == 0 ? kNotMeasured : static_cast<double>(without) / static_cast<double>(all);
   }
 };
 
@@ -123,6 +136,8 @@ struct Tally {
             .common = {},
             .within_std_dev = coverage.share(coverage.within),
             .within_2_std_dev = coverage.share(coverage.within_2),
+            .mean_std_dev = coverage.mean(),
+            .without_std_dev = coverage.without_share(),
             .step_ns_p50 = quantile(step_ns, 0.5),
             .step_ns_p999 = quantile(step_ns, 0.999)};
   }

@@ -43,6 +43,8 @@ Json row_json(const ResultRow& row, const Metrics& metrics, std::string_view mod
   if (mode == kFreeRun) {
     json["within_std_dev"] = json_number(row.score.within_std_dev);
     json["within_2_std_dev"] = json_number(row.score.within_2_std_dev);
+    json["mean_std_dev"] = json_number(row.score.mean_std_dev);
+    json["without_std_dev"] = json_number(row.score.without_std_dev);
     const Metrics& common = row.score.common;
     json["common_samples"] = common.samples;
     json["common_rmse"] = json_number(common.rmse);

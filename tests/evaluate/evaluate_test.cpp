@@ -43,9 +43,14 @@ TEST(Evaluate, CountsHowOftenTheTruthIsWithinTheErrorBar) {
   for (double& std_dev : file.settings.residuals.std_dev) std_dev *= 2.0;
   const Score wider = evaluate(make_estimator(file), dataset, Role::test).together;
   EXPECT_EQ(wider.within_std_dev, estimate.within_2_std_dev);
+  EXPECT_GT(estimate.mean_std_dev, 0.05);
+  EXPECT_EQ(wider.mean_std_dev, 2.0 * estimate.mean_std_dev);
+  EXPECT_LT(estimate.without_std_dev, 0.5);
   file.settings.residuals = {};
-  EXPECT_TRUE(
-      std::isnan(evaluate(make_estimator(file), dataset, Role::test).together.within_std_dev));
+  const Score without = evaluate(make_estimator(file), dataset, Role::test).together;
+  EXPECT_TRUE(std::isnan(without.within_std_dev));
+  EXPECT_TRUE(std::isnan(without.mean_std_dev));
+  EXPECT_EQ(without.without_std_dev, 1.0);
 }
 
 TEST(Evaluate, ScoresOnlyFreshSamples) {

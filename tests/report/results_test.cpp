@@ -25,10 +25,27 @@ TEST(ResultsJson, HasTheFieldsOfTheContract) {
   // Two models, each on train (two records and together) and test (one record and together).
   ASSERT_EQ(json.at("results").size(), 2U * 5U);
   for (const auto& row : json.at("results"))
-    for (const char* field :
-         {"family", "split", "recording", "mode", "rmse", "mad", "std_abs", "max_abs",
-          "fit_percent", "samples", "initialised_samples", "within_std_dev", "within_2_std_dev",
-          "step_ns_p50", "step_ns_p999", "fit_seconds", "parameter_count", "status", "reason"})
+    for (const char* field : {"family",
+                              "split",
+                              "recording",
+                              "mode",
+                              "rmse",
+                              "mad",
+                              "std_abs",
+                              "max_abs",
+                              "fit_percent",
+                              "samples",
+                              "initialised_samples",
+                              "within_std_dev",
+                              "within_2_std_dev",
+                              "mean_std_dev",
+                              "without_std_dev",
+                              "step_ns_p50",
+                              "step_ns_p999",
+                              "fit_seconds",
+                              "parameter_count",
+                              "status",
+                              "reason"})
       EXPECT_TRUE(row.contains(field)) << field;
 }
 

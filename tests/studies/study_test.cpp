@@ -166,6 +166,8 @@ TEST(Studies, WithASubjectReportRatiosAndWhyARowIsNotRanked) {
   box.step_ns = 90.0;
   box.within_std_dev = 0.66;
   box.within_2_std_dev = 0.93;
+  box.mean_std_dev = 0.12;
+  box.without_std_dev = 0.04;
   ComparisonRow diverged = row("arx", 0.01);
   diverged.diverged = 1;
   ComparisonRow failed = row("viscoelastic", kNotMeasured);
@@ -177,11 +179,12 @@ TEST(Studies, WithASubjectReportRatiosAndWhyARowIsNotRanked) {
                     .table = ComparisonTable{.rows = {box, row("bouc_wen", 0.1), diverged, failed},
                                              .subject = "grey_box"}};
   const std::string text = study_text(info, study);
-  EXPECT_THAT(text, testing::ContainsRegex("grey_box +0.103 +1.03 +1.5 +66.0 +93.0 +90"));
+  EXPECT_THAT(text,
+              testing::ContainsRegex("grey_box +0.103 +1.03 +1.5 +0.12 +4.0 +66.0 +93.0 +90"));
   EXPECT_THAT(text, testing::ContainsRegex("arx +0.01 +- .*diverged in 1 of 1"));
   EXPECT_THAT(text, testing::ContainsRegex("viscoelastic +failed: no convergence"));
-  EXPECT_THAT(
-      text, testing::ContainsRegex("new lever +bouc_wen +0.1 +0.103 +1.030 +yes +66.0 +93.0 +90"));
+  EXPECT_THAT(text, testing::ContainsRegex(
+                        "new lever +bouc_wen +0.1 +0.103 +1.030 +yes +0.12 +4.0 +66.0 +93.0 +90"));
   EXPECT_THAT(text, HasSubstr("lowest in 1 of 1"));
   const auto json = nlohmann::json::parse(study_json(info, study));
   EXPECT_EQ(json["schema_version"], 1);

@@ -28,6 +28,8 @@ struct Score {
   /// NaN if none had one. A calibrated Gaussian error bar gives 0.683 and 0.954.
   double within_std_dev = kNotMeasured;
   double within_2_std_dev = kNotMeasured;
+  double mean_std_dev = kNotMeasured;     ///< mean error bar of the scored samples that have one
+  double without_std_dev = kNotMeasured;  ///< share of the scored samples without an error bar
   double step_ns_p50 = kNotMeasured;  ///< time of `Estimator::step` without the cost of the clock
   double step_ns_p999 = kNotMeasured;
 };
