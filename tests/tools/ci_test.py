@@ -1,0 +1,53 @@
+"""What .ci/run prints and returns, with a ./run that does nothing but print, or fails in one of its commands."""
+import unittest
+
+from repository import SOURCE, RepositoryTest
+
+RUN = """#!/usr/bin/env bash
+echo "$1 with ${*:2}" >&2
+[[ $1 != FAILING ]] || exit 7
+[[ $1 != test ]] || printf '100%% tests passed, 0 tests failed out of 3\\nTotal Test time (real) = 2.00 sec\\n'
+[[ $1 != lint ]] || echo 'lint: 1 of 3 files, no finding; no time was left for 2' >&2
+"""
+
+
+class Ci(RepositoryTest):
+    scripts = (".ci/run",)
+
+    def ci(self, failing="nothing", seconds=0):
+        self.write(run=RUN.replace("FAILING", failing))
+        (self.root / "run").chmod(0o755)
+        ci = (SOURCE / ".ci/run").read_text()
+        self.assertIn("minutes=30 ", ci)
+        (self.root / ".ci/run").write_text(ci.replace("minutes=30 ", f"minutes=30 SECONDS={seconds} "))
+        done = self.run_in(".ci/run")
+        return done.returncode, done.stdout
+
+    def test_ends_with_the_times_and_what_time_did_not_suffice_for(self):
+        status, text = self.ci()
+        self.assertEqual(status, 0, text)
+        self.assertIn("fuzz with 20 20\n", text)
+        self.assertIn("lint with --recent 10\n", text)
+        self.assertRegex(text, r"(?s)ci: format +0 min 0\d s\nci: build and tests +0 min .*ci: headers .*ci: fuzz .*ci: lint "
+                         r".*\nci: lint: 1 of 3 files, no finding; no time was left for 2\nci: passed after +0 min \d\d s\n"
+                         r"100% tests passed.*\nTotal Test time.*\n$")
+
+    def test_leaves_out_the_fuzz_targets_and_limits_clang_tidy_where_the_tests_were_slow(self):
+        status, text = self.ci(seconds=17 * 60)
+        self.assertEqual(status, 0, text)
+        self.assertNotIn("fuzz with", text)
+        self.assertIn("ci: no time was left for the fuzz targets", text)
+        self.assertIn("lint with --recent 10\n", text)
+        self.assertIn("lint with --recent 4\n", self.ci(seconds=25 * 60)[1])
+
+    def test_ends_with_a_part_that_fails(self):
+        for part, name, following in (("format", "format", "test"), ("test", "build and tests", "headers"),
+                                      ("fuzz", "fuzz", "lint")):
+            status, text = self.ci(part)
+            self.assertEqual(status, 7, text)
+            self.assertRegex(text, rf"ci: {name} +failed\n")
+            self.assertIn("ci: failed after", text)
+            self.assertNotIn(f"{following} with", text)
+
+
+unittest.main()
