@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <iostream>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <string_view>
 #include <vector>
@@ -163,8 +163,30 @@ TYPED_TEST(DisturbanceLaws, ADependenceOnPastInputsIsDeclared) {
   EXPECT_EQ(used.step(features.row(199)).value, fresh.step(features.row(199)).value);
 }
 
-// Nothing can detect a disturbance that a sound joint could have made, so there is no limit to test.
-TYPED_TEST(DisturbanceLaws, PrintsTheErrorAfterADisturbanceWithinTheRange) {
+/// The largest error after a disturbance that nothing can detect, in error bars.
+struct Remainder {
+  double at_once = 0.0;
+  double after_1_s = 0.0;
+};
+
+/// 1.2 times what was measured. The rate of the deflection is filtered, which leaves up to 0.038 at
+/// once (mlp), also where the model has no memory. The memory of a model adds to it:
+constexpr Remainder kOfTheInputs{.at_once = 0.046, .after_1_s = 1e-8};
+const std::map<std::string_view, Remainder> kRemainders{
+    // The offset of a slip element lasts until the element slips again.
+    {"maxwell_slip", {.at_once = 0.61, .after_1_s = 0.61}},
+    {"prandtl_ishlinskii", {.at_once = 0.61, .after_1_s = 0.61}},
+    // The branches relax, the slowest one by a factor of 8 in 1 s.
+    {"viscoelastic", {.at_once = 0.44, .after_1_s = 0.053}},
+    // The hysteretic force decays with the travel, not with the time.
+    {"dynamic_bouc_wen", {.at_once = 0.56, .after_1_s = 0.51}},
+    // Its position is an integral of the input, so that what was missed is missing for ever.
+    {"rigid_drive", {.at_once = 24.3, .after_1_s = 20.3}},
+};
+
+// Nothing can detect a disturbance that a sound joint could have made: 1 s of an input that is up to
+// 40 % too small. Only what remains of it afterwards can be limited.
+TYPED_TEST(DisturbanceLaws, WhatRemainsOfADisturbanceWithinTheRangeIsLimited) {
   const std::vector<Estimate> expected = run(this->estimator_, this->x_);
   std::vector<double> x = this->x_;
   const double rate = rate_Hz(this->model_);
@@ -175,17 +197,21 @@ TYPED_TEST(DisturbanceLaws, PrintsTheErrorAfterADisturbanceWithinTheRange) {
     x[n] *= 1.0 - 0.4 * std::pow(std::sin(std::numbers::pi * share), 2.0);
   }
   const std::vector<Estimate> found = run(this->estimator_, x);
-  double worst = 0.0;
-  double late = 0.0;
+  Remainder worst;
+  std::size_t compared = 0;
   for (std::size_t n = begin + samples; n < found.size(); ++n) {
     if (found[n].fault != Fault::none || expected[n].fault != Fault::none) continue;
     const double error = std::abs(found[n].value - expected[n].value) / found[n].std_dev;
-    worst = std::max(worst, error);
-    if (n > begin + 2 * samples) late = std::max(late, error);
+    worst.at_once = std::max(worst.at_once, error);
+    if (n > begin + 2 * samples) worst.after_1_s = std::max(worst.after_1_s, error);
+    ++compared;
   }
-  std::cout << "[ error    ] " << TypeParam::kFamily << ": " << worst
-            << " error bars after 1 s of an input that was up to 40 % too small, " << late
-            << " one second later\n";
+  // Hardly any sample has a fault, or there would be nothing to compare.
+  EXPECT_GE(compared, 4 * samples);
+  const auto own = kRemainders.find(TypeParam::kFamily);
+  const Remainder limit = own == kRemainders.end() ? kOfTheInputs : own->second;
+  EXPECT_LE(worst.at_once, limit.at_once);
+  EXPECT_LE(worst.after_1_s, limit.after_1_s);
 }
 
 }  // namespace
