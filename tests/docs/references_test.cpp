@@ -1,4 +1,4 @@
-// What the documents name exists: tests, files and headings that they link to, faults, verbs of the program. A
+// What the documents name exists: tests, files and headings that they link to, faults, verbs of the program, studies. A
 // name that was changed elsewhere is reported here, and by nothing else.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +12,7 @@
 #include <iterator>
 #include <map>
 #include <set>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -213,18 +214,47 @@ Names verbs_of(std::string_view source) {
   return verbs;
 }
 
-/// @returns the words after `torsio` in code, inline or in a block, that are no verbs
-Found unknown_verbs(std::string_view markdown, const Names& verbs) {
-  constexpr std::string_view kProgram = "torsio ";
+/// @returns the calls of the program in code, inline or in a block, as words
+std::vector<Found> calls_in(std::string_view markdown) {
   Found codes = inline_code(prose(markdown));
   for (const std::string& line : lines_of(markdown))
-    if (line.starts_with("    torsio ")) codes.push_back(line.substr(4));
-  Found unknown;
+    if (line.starts_with("    ")) codes.push_back(line.substr(4));
+  std::vector<Found> calls;
   for (const std::string& code : codes) {
-    if (!code.starts_with(kProgram)) continue;
-    const std::string verb =
-        code.substr(kProgram.size(), code.find_first_of(" \n", kProgram.size()) - kProgram.size());
-    if (!verb.empty() && is_lower(verb.front()) && !verbs.contains(verb)) unknown.push_back(verb);
+    std::istringstream text(code);
+    const Found words(std::istream_iterator<std::string>(text), {});
+    if (words.size() > 1 && words[0] == "torsio") calls.push_back(words);
+  }
+  return calls;
+}
+
+/// @returns the words after `torsio` that are not a verb
+Found unknown_verbs(std::string_view markdown, const Names& verbs) {
+  Found unknown;
+  for (const Found& call : calls_in(markdown))
+    if (is_lower(call[1].front()) && !verbs.contains(call[1])) unknown.push_back(call[1]);
+  return unknown;
+}
+
+/// @returns the names of the studies in their table
+Names studies_of(std::string_view source) {
+  constexpr std::string_view kStudy = "StudyInfo{\"";
+  Names studies;
+  for (auto at = source.find(kStudy); at != std::string_view::npos;
+       at = source.find(kStudy, at + 1)) {
+    const auto begin = at + kStudy.size();
+    studies.emplace(source.substr(begin, source.find('"', begin) - begin));
+  }
+  return studies;
+}
+
+/// @returns the words after `torsio reproduce`, up to an option, that are not a study
+Found unknown_studies(std::string_view markdown, const Names& studies) {
+  Found unknown;
+  for (const Found& call : calls_in(markdown)) {
+    if (call[1] != "reproduce") continue;
+    for (std::size_t i = 2; i < call.size() && call[i].front() != '-' && call[i] != "#"; ++i)
+      if (!is_upper(call[i].front()) && !studies.contains(call[i])) unknown.push_back(call[i]);
   }
   return unknown;
 }
@@ -330,6 +360,23 @@ TEST(Documents, CallOnlyVerbsThatExist) {
   EXPECT_GT(verbs.size(), 20U);
   for_each_document([&](const fs::path&, const std::string& text) {
     EXPECT_THAT(unknown_verbs(text, verbs), IsEmpty());
+  });
+}
+
+TEST(Documents, AStudyThatDoesNotExistIsFound) {
+  const Names studies = studies_of("kStudies{StudyInfo{\"001-a\", \"b\"},\n StudyInfo{\"few\",");
+  EXPECT_THAT(studies, ElementsAre("001-a", "few"));
+  EXPECT_THAT(unknown_studies("`torsio reproduce few 002-a --seed 1`, `torsio reproduce ITEM`\n\n"
+                              "    torsio reproduce 001-a\n    torsio reproduce 001-b # c\n",
+                              studies),
+              ElementsAre("002-a", "001-b"));
+}
+
+TEST(Documents, ReproduceOnlyStudiesThatExist) {
+  const Names studies = studies_of(contents(kRoot / "studies/study.cpp"));
+  EXPECT_GT(studies.size(), 15U);
+  for_each_document([&](const fs::path&, const std::string& text) {
+    EXPECT_THAT(unknown_studies(text, studies), IsEmpty());
   });
 }
 
