@@ -133,7 +133,7 @@ TEST(ModelInverse, HasTheVerdictOfTheEstimatorDuringAndAfterAJump) {
   }
 }
 
-// The inverse answers for the deflection that it requests: where the measured one is does not matter.
+// The inverse has the verdict of the deflection that it requests, wherever the measured one is.
 TEST(ModelInverse, GivesItsVerdictOnTheRequestedDeflection) {
   ModelInverse inverse(trained(), test::example<Linear>());
   Estimate request;
