@@ -14,7 +14,7 @@
 
 /// The flags of every verb that reads recordings.
 struct DataFlags {
-  std::vector<std::string> recordings;  ///< CSV, CSV.gz or a dataset manifest (.yaml)
+  std::vector<std::string> recordings;  ///< logs of any format that is read, or manifests (.yaml)
   std::string mapping;
   std::string joint;
   std::string rate;

@@ -33,7 +33,7 @@ std::string order_and_note(const torsio::Ranking& ranking) {
   return (ranking.is_possible() ? "best first\n" : "not ranked\n") + torsio::ranking_note(ranking);
 }
 
-/// "4", or "2 of 4" if a guard replaced the models in the others.
+/// "4", or "2 of 4" if a guard excluded the others.
 std::string folds_shown(const torsio::CrossValidation& validation) {
   const auto& rankings = validation.results.rankings;
   const auto ranked = std::ranges::count_if(rankings, &torsio::Ranking::is_possible);
@@ -96,8 +96,8 @@ std::string evaluation_text(const torsio::Results& results) {
 std::string first_failure(const torsio::Results& results) {
   if (std::ranges::any_of(results.rows,
                           [](const torsio::ResultRow& row) { return row.status == "ok"; }))
-    return "no model can be ranked: guards replaced the models by their linear fallback in more "
-           "than half of the samples";
+    return "no model can be ranked: guards reported faults of the models in more than half of the "
+           "samples";
   for (const torsio::ResultRow& row : results.rows)
     if (row.status != "ok") return "no model could be fitted; " + row.family + ": " + row.reason;
   return "no model could be scored";

@@ -160,7 +160,9 @@ void Checker::check_range() {
           fmt::format("{}: tested on {:.4g} to {:.4g}, trained on {:.4g} to {:.4g}",
                       spec_.inputs[j], tested.lowest[j], tested.highest[j], trained.lowest[j],
                       trained.highest[j]),
-          "Models are not valid there: the range guard returns its linear fallback.");
+          "Models are not valid there: estimates have the fault outside_training_range, and most "
+          "models "
+          "are replaced by the linear fallback.");
     }
   });
 }

@@ -99,34 +99,30 @@ double ModelInverse::on_the_line(double torque_Nm, Features features) const noex
   return rest_Nm / line.slope.front();
 }
 
-Estimate ModelInverse::guarded(double torque_Nm, Features features) noexcept {
-  const double line_rad = on_the_line(torque_Nm, features);
+// The same verdict as of an estimator, at the deflection that is requested in place of the measured one.
+Estimate ModelInverse::guarded(double torque_Nm, const Core::Conditioned& input) noexcept {
+  const double line_rad = on_the_line(torque_Nm, input.features);
   Estimate answer = {.value = line_rad};
-  if (!core_.is_settled()) {
-    answer.fault = Fault::warming_up;
-    return answer;
-  }
-  if (core_.is_recovering(torque_Nm)) {
-    answer.fault = Fault::recovering;
-    return answer;
-  }
-  const Estimate estimate = model_.invert(torque_Nm, features);
-  answer.novelty = estimate.novelty;
-  if (estimate.fault != Fault::none || !std::isfinite(estimate.value)) {
-    answer.fault = estimate.fault != Fault::none ? estimate.fault : Fault::model_not_finite;
-    return answer;
-  }
-  std::ranges::copy(features, asked_.begin());
-  asked_.front() = estimate.value;
-  const double weight = core_.excursion(asked_).borders;
-  if (weight > 1.0) {
+  if (core_.is_in_jump()) {
     answer.fault = Fault::outside_training_range;
     return answer;
   }
-  const double near_rad = std::max(std::min(estimate.value, line_rad + max_departure_rad_),
-                                   line_rad - max_departure_rad_);
-  answer.value = std::lerp(near_rad, line_rad, weight);
-  answer.std_dev = estimate.std_dev;
+  const Estimate inverted = model_.invert(torque_Nm, input.for_model);
+  answer.novelty = inverted.novelty;
+  std::ranges::copy(input.features, asked_.begin());
+  const bool has_inverse = inverted.fault == Fault::none && std::isfinite(inverted.value);
+  asked_.front() = has_inverse ? inverted.value : line_rad;
+  const Core::Excursion excursion = core_.excursion(asked_);
+  answer.fault = core_.replaced_for(excursion, inverted, core_.residual_std_at(torque_Nm));
+  if (answer.fault != Fault::none) return answer;
+  answer.value = std::max(std::min(inverted.value, line_rad + max_departure_rad_),
+                          line_rad - max_departure_rad_);
+  answer.std_dev = inverted.std_dev;
+  if (excursion.verdict() == Core::Verdict::blend)
+    answer.value = std::lerp(answer.value, line_rad, excursion.fallback);
+  if (excursion.share > 0.0)
+    answer.std_dev = Core::widened(answer.std_dev, excursion, answer.value - line_rad);
+  if (excursion.is_outside()) answer.fault = Fault::outside_training_range;
   return answer;
 }
 
@@ -134,21 +130,19 @@ Estimate ModelInverse::step(double torque_Nm, const JointSample& sample) noexcep
   if (is_asked_) store(asked_);
   is_asked_ = false;
   follows_answer_ = false;
-  const detail::EstimatorCore::Conditioned input = core_.condition(inputs_.from(sample));
+  const Core::Conditioned input = core_.condition(inputs_.from(sample));
   if (input.fault != Fault::none || !std::isfinite(torque_Nm))
     return {.value = last_rad_,
             .fault = input.fault != Fault::none ? input.fault : Fault::input_not_finite};
   if (input.restarted) model_.reset();
   const bool has_state = !model_.state().empty();
-  const bool is_jump = input.for_model.empty();
-  if (is_stepped_ && !has_state && !is_jump) store(input.for_model);
-  Estimate answer = is_jump ? Estimate{.value = on_the_line(torque_Nm, input.features),
-                                       .fault = Fault::outside_training_range}
-                            : guarded(torque_Nm, input.features);
+  const bool is_received = !input.for_model.empty();
+  if (is_stepped_ && !has_state && is_received) store(input.for_model);
+  Estimate answer = guarded(torque_Nm, input);
   zero_rad_ = sample.spring_deflection_rad() - input.features.front();
-  if (has_state && !is_jump) {
+  if (has_state && is_received) {
     // What the loop makes of the answer is not known yet: the memory goes there in the next step.
-    std::ranges::copy(input.features, asked_.begin());
+    std::ranges::copy(input.for_model, asked_.begin());
     follows_answer_ = answer.fault != Fault::warming_up;
     if (follows_answer_) asked_.front() = answer.value;
     is_asked_ = true;

@@ -330,24 +330,11 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
                                      const Estimate& raw_estimate) noexcept {
   const Features features = input.features;
   const Excursion& excursion = input.excursion;
-  const bool is_in_use = excursion.fallback <= 1.0;
   const double std_dev = model_std_dev(raw_estimate);
   Estimate out;
-  if (is_wrong_rate_) {
-    out.fault = Fault::wrong_rate;
-  } else if (!is_in_use) {
-    out.fault = Fault::outside_training_range;
-  } else if (!is_settled()) {
-    out.fault = Fault::warming_up;
-  } else if (raw_estimate.fault != Fault::none) {
-    out.fault = raw_estimate.fault;
-  } else if (!std::isfinite(raw_estimate.value)) {
-    out.fault = Fault::model_not_finite;
-  } else if (memory_error_.may_exceed(std_dev)) {
-    out.fault = Fault::recovering;
-  }
+  out.fault = replaced_for(excursion, raw_estimate, std_dev);
   if (out.fault == Fault::none) {
-    if (excursion.fallback > 0.0) {
+    if (excursion.verdict() == Verdict::blend) {
       out = blended(features, raw_estimate.value, std_dev, excursion.fallback);
     } else {
       out.value = raw_estimate.value;
@@ -355,12 +342,9 @@ Estimate EstimatorCore::apply_guards(const Conditioned& input,
     }
     if (!memory_error_.is_zero()) out.std_dev = std::hypot(out.std_dev, memory_error_.bound());
     if (start_std_dev_ > 0.0) out.std_dev = std::hypot(out.std_dev, start_std_dev_);
-    out.std_dev *= 1.0 + kExcursionGain * excursion.share;
-    // Two extrapolations: the further beyond the range, the less evidence there is for either.
-    if (excursion.first > 0.0)
-      out.std_dev = std::hypot(
-          out.std_dev, std::min(excursion.first, 1.0) * (out.value - fallback_value(features)));
-    if (excursion.borders > 1.0) out.fault = Fault::outside_training_range;
+    if (excursion.share > 0.0)
+      out.std_dev = widened(out.std_dev, excursion, out.value - fallback_value(features));
+    if (excursion.is_outside()) out.fault = Fault::outside_training_range;
   } else {
     out.value = fallback_value(features);
     // The fallback's residuals are evidence only where it was fitted.
@@ -390,6 +374,13 @@ EstimatorCore::Excursion EstimatorCore::excursion(Features features) const noexc
     if (i == 0) worst.first = left_by * range.per_width;
   }
   return worst;
+}
+
+// Two extrapolations: the further beyond the range, the less evidence there is for either.
+double EstimatorCore::widened(double std_dev, const Excursion& excursion,
+                              double departure) noexcept {
+  return std::hypot(std_dev * (1.0 + kExcursionGain * excursion.share),
+                    std::min(excursion.first, 1.0) * departure);
 }
 
 double EstimatorCore::model_std_dev(const Estimate& raw_estimate) const noexcept {

@@ -80,7 +80,7 @@ std::string held_out_list(const CrossValidation& validation) {
     text += fmt::format("  {}: {} samples of {}", fold.name, fold.held_out_samples,
                         fmt::join(fold.recordings, ", "));
     if (ranking.common_samples < ranking.scored_samples)
-      text += fmt::format("; a guard replaced models in {} % of them{}",
+      text += fmt::format("; a guard reported a fault in {} % of them{}",
                           percent_text(ranking.guarded_share()),
                           ranking.is_possible() ? "" : ", not in the ranking");
     text += "\n";

@@ -171,20 +171,20 @@ std::string ranking_note(const Ranking& ranking) {
   const double guarded = ranking.guarded_share();
   if (!ranking.is_possible())
     return fmt::format(
-        "NO RANKING: in {:.1f} % of the samples a guard replaced the models by their linear "
-        "fallback.\n"
-        "Errors are on all samples, in the order of the call: they show the fallback, not the "
-        "models.\n"
+        "NO RANKING: in {:.1f} % of the samples a guard reported a fault of a model.\n"
+        "Errors are on all samples, in the order of the call: they show fallbacks, or models "
+        "beyond "
+        "their data.\n"
         "Record training data of that range (torsio check shows it), or test inside it.\n",
         100.0 * guarded);
   if (guarded > kCannotBeIgnored)
     return fmt::format(
-        "WARNING: in {:.1f} % of the samples a guard replaced models by their linear fallback.\n"
+        "WARNING: in {:.1f} % of the samples a guard reported a fault of a model.\n"
         "Errors are on the other {:.1f} %; torsio check shows which inputs leave the range of the "
         "training data.\n",
         100.0 * guarded, 100.0 * (1.0 - guarded));
   return fmt::format(
-      "errors on {} of {} samples; in the others a guard replaced a model by its linear fallback\n",
+      "errors on {} of {} samples; in the others a guard reported a fault of a model\n",
       ranking.common_samples, ranking.scored_samples);
 }
 

@@ -306,8 +306,9 @@ std::string tracking_text(std::span<const TrackingRow> rows) {
   const std::string summary = fmt::format(
       "{} ({}), output {}, {} of {:.4g} Nm{}, {} run{} per model\n{}{}errors: of the joint's "
       "torque "
-      "without noise, without the first 2 s; limits: number of limit events;\nfallback: steps on "
-      "the linear fallback; cycles: runs with a limit cycle;\n"
+      "without noise, without the first 2 s; limits: number of limit events;\nfallback: steps with "
+      "a "
+      "fault of the inverse; cycles: runs with a limit cycle;\n"
       "-3 dB Hz: frequency at which the response to a sweep has fallen to 0.71, - if it has not, "
       "or never was above\n",
       first.actuator, first.variant, name(first.output), first.reference, first.amplitude_Nm,

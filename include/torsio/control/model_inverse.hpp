@@ -19,11 +19,13 @@ namespace torsio {
 /// A model of the torque, inverted: δ = E[δ | τ*, δ̇, …] with everything but δ as measured
 /// (`AnyModel::invert`; specification 3.1 for mixtures).
 ///
-/// Guarded as an `Estimator` is: where another input, or the result, has left its range in
-/// training, the inverse changes over to that of the linear fallback; until the filters have
-/// settled, and where the model has no inverse, the linear fallback alone is used. A slow sweep
-/// contains no information about the fast motions of a torque loop (specification 6), so the result
-/// may depart from the linear fallback only by so many of its residual standard deviations.
+/// Guarded as an `Estimator` is, with its faults in its order and its verdict beyond the training range
+/// (`EstimatorCore::Excursion`), but at the deflection that is requested, wherever the measured one is.
+/// Where the model is not used, and where it has no inverse, the result is that of the linear fallback.
+/// With `outside_training_range` it must not be used but for a controlled stop, even where it is the
+/// model's. A slow sweep contains no information about the fast motions of a torque loop
+/// (specification 6), so the result may depart from the linear fallback only by so many of its residual
+/// standard deviations, within the range and beyond it.
 ///
 /// The memory of a model with state follows the deflection that is requested, not the measured one:
 /// with the measured one it would interpret a joint that sticks as a spring that is stiff, and
@@ -51,11 +53,13 @@ class ModelInverse {
   }
 
  private:
+  using Core = detail::EstimatorCore;
+
   void store(Features features) noexcept;
   [[nodiscard]] double on_the_line(double torque_Nm, Features features) const noexcept;
-  Estimate guarded(double torque_Nm, Features features) noexcept;
+  Estimate guarded(double torque_Nm, const Core::Conditioned& input) noexcept;
 
-  detail::EstimatorCore core_;
+  Core core_;
   AnyModel model_;
   detail::JointInputs inputs_;
   double max_departure_rad_;

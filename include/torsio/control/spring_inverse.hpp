@@ -9,7 +9,7 @@
 namespace torsio {
 
 /// Computes the deflection [rad] that gives a wanted torque from the joint's measurements in this
-/// tick. The value is finite in every case; `fault` reports where it is a fallback's. A
+/// tick. The value is finite in every case; `fault` reports where it is not that of a model within its data. A
 /// user-defined inverse satisfies this concept. One that also has `follow(rad) noexcept` receives
 /// after each step the deflection that the loop really requested, which a limit may have cut.
 template <class I>

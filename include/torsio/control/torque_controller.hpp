@@ -53,8 +53,9 @@ class TorqueLoopCore {
     double observer_A = 0.0;
     double transfer_A = 0.0;  ///< after a change of gains or a fault
     bool is_limited = false;
-    Fault inverse = Fault::none;  ///< the inverse used its linear fallback; the output is usable
-    Fault fault = Fault::none;    ///< a reference or a measurement could not be used
+    Fault inverse =
+        Fault::none;  ///< fault of the inverse; the output is usable for a controlled stop
+    Fault fault = Fault::none;  ///< a reference or a measurement could not be used
   };
 
   /// @throws Error as `DeflectionController`, if a setting is out of range, if the loop with the
@@ -105,8 +106,8 @@ class TorqueLoopCore {
 ///     δ* = inverse(τ*),   i = deflection controller(δ*, δ) + i_r + i_f + d,   |i| <= i_peak
 ///
 /// A reference that is not finite is a fault, and the last finite one is used; without a usable
-/// measurement the current fades to 0. Where the inverse uses its linear fallback the loop
-/// continues and `Output::inverse` reports it. Source: paper 000 section 4, 001 section 6;
+/// measurement the current fades to 0. Where the inverse has a fault the loop continues with its value,
+/// and `Output::inverse` reports it. Source: paper 000 section 4, 001 section 6;
 /// specification 3.11.
 template <SpringInverse I>
 class TorqueController {

@@ -13,7 +13,8 @@ enum class Fault : std::uint8_t {
   input_count_wrong,  ///< the caller passed another number of inputs than `raw_inputs()` lists
   warming_up,         ///< filters, differentiators or hidden state have not settled since `reset()`
   zero_not_set,  ///< a channel whose zero was taken from each training record has none yet (`set_zero`)
-  outside_training_range,  ///< an input left its range in training, or changed faster than there; linear fallback, or a model that continues
+  /// An input left its range in training, or jumped; linear fallback, or the model's value without evidence.
+  outside_training_range,
   recovering,  ///< the memory of the model has missed inputs that still influence the output; linear fallback
   wrong_rate,        ///< the loop does not run at the sample rate of the estimator; linear fallback
   model_not_finite,  ///< the model produced NaN or infinity; linear fallback in use

@@ -38,11 +38,20 @@ Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> r
 /// error bar.
 ///
 /// `value` is finite in every case. Within the training range of every feature it is the model's
-/// alone. Just outside, over a border of the width `margin`, model and fallback are blended: the
-/// fallback's weight w grows linearly with the worst feature's excursion, from 0 at the range to 1
-/// at the border's end, so that no value jumps; std_dev^2 = (1-w) model's + w fallback's + w (1-w)
-/// (model - fallback)^2, and the fault is still `none`. Where `fault` is not `none`, the value must
-/// not be used as the model's. The first of these that holds is reported:
+/// alone, and beyond a border of the width `margin` the fault is `outside_training_range`. What the value
+/// is outside is the verdict of `detail::EstimatorCore::Excursion`, which `ModelInverse` has, too:
+///
+/// - the model's in use: a rate of a spring beyond its range, which the model receives limited to it, and
+///   the first input of a model that continues (`FamilyTraits::continues`), up to one width of the range
+///   beyond. The error bar is that of the model times 1 + 2 s, with s the share of the width by which the
+///   worst feature has left its range, and contains s |model - fallback| for the first one.
+/// - a blend over the border, from the end of the range or of that width: the fallback's weight w grows
+///   linearly with the worst feature's excursion, from 0 to 1, so that no value jumps; std_dev^2 = (1-w)
+///   model's + w fallback's + w (1-w) (model - fallback)^2.
+/// - the fallback's beyond, after a jump, and with the faults below where they state it.
+///
+/// Where `fault` is not `none`, the value must not be used as the model's. The first of these that holds is
+/// reported; `outside_training_range` where the model is still in use comes last:
 ///
 /// - `input_count_wrong`, `input_not_finite`: the tick cannot be used and nothing is stepped; the
 ///   last value from usable inputs (0 if none), without error bar.
@@ -52,11 +61,8 @@ Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> r
 ///   off by the slope times that zero, without error bar. It has priority over the range,
 ///   because the position of a channel without a zero is unknown.
 /// - `outside_training_range`: a feature is beyond the border, or a raw input has changed by more than
-///   `kJumpFactor` times its largest step in training; linear fallback, without error bar: there is
-///   no evidence. Without a jump it is the model's value for a rate of a spring, limited to its range, and
-///   for the first input of a model that continues (`FamilyTraits::continues`), up to one width of the
-///   range beyond. Its error bar is that of the model times 1 + 2 s, with s the share of the width by which
-///   the worst feature has left its range, and contains s |model - fallback| for the first one.
+///   `kJumpFactor` times its largest step in training: there is no evidence. The value as above; the linear
+///   fallback has no error bar there.
 /// - `warming_up`: filters have not settled since `reset()`, a long gap or a jump; linear fallback. An unknown
 ///   state of `stop` or `dahl` in the inputs is not a fault, but is contained in the error bar.
 /// - `recovering`: inputs that the memory of the model has not received can still change its output by
@@ -69,7 +75,8 @@ Estimate estimator_step(EstimatorCore& core, M& model, std::span<const double> r
 /// a plain `rate(x)` shows the whole step over the gap in one tick; after a longer gap the filters
 /// restart and warm up, and the model recovers. A model with memory is not stepped after a jump until
 /// the features are inside their ranges, and in an excursion without a jump it is stepped with the
-/// features limited to their ranges and borders, or to where its value is used. A model without an error bar of its own gets that of the residual table.
+/// features limited to their ranges and borders, or to where its value is used. A model without an error bar
+/// gets one from the residual table.
 template <Model M>
 class BasicEstimator {
  public:

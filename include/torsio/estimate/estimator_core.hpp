@@ -39,13 +39,26 @@ class EstimatorCore {
       : EstimatorCore(std::move(settings), model.input_count(), traits_of_model(model),
                       [&model](const InputRanges& ranges) { return memory_of(model, ranges); }) {}
 
-  /// How far features have left their ranges: 0 inside.
+  /// What is made of the model's value for features that have left their ranges.
+  enum class Verdict : std::uint8_t {
+    use_model,
+    blend,      ///< with the fallback, whose weight is `Excursion::fallback`
+    fall_back,  ///< the fallback alone
+  };
+
+  /// How far features have left their ranges: 0 inside. The rule of docs/decisions/0027-beyond-the-range.md,
+  /// for estimators and for `ModelInverse`.
   struct Excursion {
     double borders = 0.0;  ///< the worst feature's, in widths of its border; above 1 it is reported
     /// As a share of the width of its range, the worst feature's for which the model remains in use.
     double share = 0.0;
     double first = 0.0;     ///< the first feature's, likewise
-    double fallback = 0.0;  ///< weight of the fallback; from 1 on it replaces the model
+    double fallback = 0.0;  ///< weight of the fallback; above 1 it replaces the model
+    [[nodiscard]] Verdict verdict() const noexcept {
+      if (!(fallback > 0.0)) return Verdict::use_model;
+      return fallback <= 1.0 ? Verdict::blend : Verdict::fall_back;
+    }
+    /// Whether it is reported as `outside_training_range`, also where the model remains in use.
     [[nodiscard]] bool is_outside() const noexcept { return borders > 1.0 || fallback > 1.0; }
   };
 
@@ -83,17 +96,31 @@ class EstimatorCore {
   /// The last value from good inputs, with the reason why it is held.
   [[nodiscard]] Estimate held(Fault fault) const noexcept TORSIO_REALTIME;
   [[nodiscard]] Excursion excursion(Features features) const noexcept TORSIO_REALTIME;
+  /// The first reason why the fallback replaces `raw_estimate`, a model's output with this error bar in
+  /// the unit of the target; none where the model is in use.
+  [[nodiscard]] Fault replaced_for(const Excursion& excursion, const Estimate& raw_estimate,
+                                   double std_dev) const noexcept TORSIO_REALTIME {
+    if (is_wrong_rate_) return Fault::wrong_rate;
+    if (excursion.verdict() == Verdict::fall_back) return Fault::outside_training_range;
+    if (!is_settled()) return Fault::warming_up;
+    if (raw_estimate.fault != Fault::none) return raw_estimate.fault;
+    if (!std::isfinite(raw_estimate.value)) return Fault::model_not_finite;
+    return memory_error_.may_exceed(std_dev) ? Fault::recovering : Fault::none;
+  }
+  /// The error bar of a value in use, which differs by so much from that of the fallback.
+  [[nodiscard]] static double widened(double std_dev, const Excursion& excursion,
+                                      double departure) noexcept TORSIO_REALTIME;
+  /// The error bar of the residuals in the region of `value`; NaN: none.
+  [[nodiscard]] double residual_std_at(double value) const noexcept TORSIO_REALTIME;
+  /// A raw input has jumped, and no tick since then has been inside the ranges: the last conditioned one
+  /// must not be used.
+  [[nodiscard]] bool is_in_jump() const noexcept { return in_jump_; }
   /// Applies the guards to `raw_estimate`, the model's output for these features; where they are not
   /// for the model, any.
   Estimate apply_guards(const Conditioned& input,
                         const Estimate& raw_estimate) noexcept TORSIO_REALTIME;
   /// The model was reset because its output was not finite.
   void lose_memory() noexcept TORSIO_REALTIME { memory_error_.lose(); }
-  /// Whether the error that is caused by inputs that the model's memory did not receive may exceed the
-  /// error bar at `value`.
-  [[nodiscard]] bool is_recovering(double value) const noexcept TORSIO_REALTIME {
-    return memory_error_.may_exceed(residual_std_at(value));
-  }
   [[nodiscard]] bool model_has_memory() const noexcept { return has_memory_; }
   /// The ticks do not come at the sample rate, until this is called with false.
   void set_wrong_rate(bool is_wrong) noexcept TORSIO_REALTIME {
@@ -155,7 +182,6 @@ class EstimatorCore {
                                  double weight) const noexcept;
   [[nodiscard]] double fallback_value(Features features) const noexcept;
   [[nodiscard]] double start_std_dev_now() const noexcept;
-  [[nodiscard]] double residual_std_at(double value) const noexcept;
   /// The first input could not be used for so many ticks, the last ones of `excluded_ticks_`.
   void interrupt(double ticks) noexcept;
   /// Whether a raw input has changed faster than in training since the last tick, whose inputs are

@@ -97,7 +97,7 @@ struct CrossValidation {
   Results results;
   FoldPlan plan;  ///< without segments
   /// Lowest mean `common_rmse` first; models that failed in a fold come last, since their mean is
-  /// over other folds, and so do those that a guard replaced in more than half of a fold in which
+  /// over other folds, and so do those that a guard reported in more than half of a fold in which
   /// other models ran. In the order of the choices if no ranking is possible.
   std::vector<FoldSummary> ranking;
 

@@ -19,7 +19,7 @@ struct Score {
   Metrics metrics;
   Metrics one_step = {};  ///< one-step-ahead errors of a model with feedback; else 0 samples
   std::size_t initialised_samples = 0;  ///< not scored: filters not settled
-  std::size_t guarded_samples = 0;      ///< scored, but with the fallback of a guard
+  std::size_t guarded_samples = 0;      ///< scored, but with a fault
   std::size_t diverged_samples = 0;     ///< guarded samples at which the model diverged or was NaN
   /// On the samples that no model of the ranking guarded (`compare`, `cross_validate`); 0 samples:
   /// not ranked.
@@ -61,7 +61,7 @@ struct Corrections {
 /// target is new and finite. They are the same samples for every model.
 struct MeasuredEstimates {
   std::vector<double> values;  ///< NaN: not scored, filters not settled
-  std::vector<bool> guarded;   ///< scored, but with the fallback of a guard
+  std::vector<bool> guarded;   ///< scored, but with a fault
 };
 
 /// Scores of each recording that has segments of `role`, and of all of them together.

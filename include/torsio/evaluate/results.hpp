@@ -29,8 +29,8 @@ struct ResultRow {
   bool leak = false;          ///< an input was computed from the target, or the target from it
 };
 
-/// The samples on which the models of one split are ranked: those that no ranked model guarded. A
-/// guard replaces a model by its linear fallback, so that errors there are none of the model.
+/// The samples on which the models of one split are ranked: those that no ranked model guarded. Errors
+/// there are those of the linear fallback, or of a model beyond its training range.
 struct Ranking {
   Role split = Role::test;
   std::size_t scored_samples = 0;  ///< scored by at least one of the models

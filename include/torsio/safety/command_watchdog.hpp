@@ -30,7 +30,7 @@ class CommandWatchdog {
     /// command that is written while a tick begins. One that is further ahead is refused, and none
     /// counts for longer than `timeout_s` from now.
     double longest_ahead_s = 0.002;
-    /// How long the loop may continue with a fault, such as an inverse on its linear fallback.
+    /// How long the loop may continue with a fault, such as that of an inverse.
     double longest_fault_s = std::numeric_limits<double>::infinity();
   };
   /// The latest command, as in `Mailbox::Letter`.

@@ -311,8 +311,19 @@ Estimate GreyBox::invert(double target, Features features) noexcept {
   double error_low = error_at(low);
   double error_high = error_at(high);
   if (!(error_low * error_high <= 0.0)) {
-    const double nearer = std::abs(error_low) < std::abs(error_high) ? low : high;
-    return {.value = nearer, .fault = Fault::outside_training_range};
+    // Beyond its ends the curve continues; the nearer one is left.
+    const bool is_low = std::abs(error_low) < std::abs(error_high);
+    const double end = is_low ? low : high;
+    const double beyond = kInversionReach * (high - low);
+    if (is_low) {
+      high = std::exchange(low, low - beyond);
+      error_high = std::exchange(error_low, error_at(low));
+    } else {
+      low = std::exchange(high, high + beyond);
+      error_low = std::exchange(error_high, error_at(high));
+    }
+    if (!(error_low * error_high <= 0.0))
+      return {.value = end, .fault = Fault::outside_training_range};
   }
   // Secants between the ends of the bracket; an end that stays twice is weighed down (Illinois), and
   // now and then the bracket is halved, should that still crawl.

@@ -282,11 +282,12 @@ class GreyBox {
 
   /// The first input at which the output would be `target` after an immediate change from the
   /// present input, the others as given and the residual as at the present input (secants kept
-  /// inside a bracket, at most `kInversionSteps`). Where the ends of the curve do not enclose the
-  /// target, the nearer end is returned with `Fault::outside_training_range`; where the schedule
-  /// uses the first input, `Fault::model_not_finite`.
+  /// inside a bracket, at most `kInversionSteps`). Where neither the curve nor its continuation beyond
+  /// the nearer end, `kInversionReach` times as long, encloses the target, that end is returned with
+  /// `Fault::outside_training_range`; where the schedule uses the first input, `Fault::model_not_finite`.
   [[nodiscard]] Estimate invert(double target, Features features) noexcept TORSIO_REALTIME;
   static constexpr int kInversionSteps = 100;
+  static constexpr double kInversionReach = 1.5;  ///< further than an estimator uses the value
 
  private:
   [[nodiscard]] double at_jump(const ScheduledCoefficients::Position& at, double x,

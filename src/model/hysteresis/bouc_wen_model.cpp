@@ -116,10 +116,17 @@ void BoucWenModel::set_state(std::span<const double> state) noexcept {
 Estimate BoucWenModel::invert(double target, Features features) const noexcept {
   const double elastic = parameters_.elastic_share * parameters_.stiffness;
   const double hysteresis = (1.0 - parameters_.elastic_share) * parameters_.stiffness * largest_;
-  return bracketed_inverse(target - parameters_.bias - other_inputs(parameters_.slopes, features),
-                           parameters_.centre, parameters_.half_range, [&](double x) {
-                             return elastic * x + hysteresis * share_after(increment_.to(x));
-                           });
+  const auto within = [&](double half_range) {
+    return bracketed_inverse(target - parameters_.bias - other_inputs(parameters_.slopes, features),
+                             parameters_.centre, half_range, [&](double x) {
+                               return elastic * x + hysteresis * share_after(increment_.to(x));
+                             });
+  };
+  constexpr double kWider = 4.0;  // the model continues, further than an estimator uses its value
+  const Estimate inside = within(parameters_.half_range);
+  if (inside.fault == Fault::none) return inside;
+  const Estimate beyond = within(kWider * parameters_.half_range);
+  return beyond.fault == Fault::none ? beyond : inside;
 }
 
 }  // namespace torsio

@@ -72,7 +72,7 @@ class BoucWenModel {
   [[nodiscard]] std::span<const double> state() const noexcept { return {&share_, 1}; }
   void set_state(std::span<const double> state) noexcept;
 
-  /// As `Backlash::invert`.
+  /// As `Backlash::invert`, but up to one and a half times the range beyond its ends.
   [[nodiscard]] Estimate invert(double target, Features features) const noexcept TORSIO_REALTIME;
 
   /// The members that change in a step.

@@ -169,11 +169,17 @@ TEST(GreyBox, InvertsFromWhereItIsWithinItsCurve) {
   }
 }
 
-TEST(GreyBox, ReportsATargetBeyondItsCurve) {
+TEST(GreyBox, InvertsTheContinuationOfItsCurveAndReportsATargetBeyondIt) {
   GreyBox::Parameters parameters = plain();
   parameters.coefficients.values.values = {-10.0, 0.0, 20.0, 0.0, 0.0};
   GreyBox box(parameters);
-  const Estimate found = box.invert(50.0, std::array{0.0});
+  for (const double target : {50.0, -20.0}) {
+    const Estimate beyond = box.invert(target, std::array{0.0});
+    EXPECT_EQ(beyond.fault, Fault::none);
+    EXPECT_GT(std::abs(beyond.value), 1.0);
+    EXPECT_NEAR(estimate(box, beyond.value), target, 1e-9);
+  }
+  const Estimate found = box.invert(500.0, std::array{0.0});
   EXPECT_EQ(found.value, 1.0);
   EXPECT_EQ(found.fault, Fault::outside_training_range);
 }

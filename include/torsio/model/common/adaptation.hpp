@@ -135,7 +135,7 @@ enum class UpdateOutcome : std::uint8_t {
   limited,      ///< they have changed, limited by `largest_change` or the sign that they must keep
   paused,       ///< by the caller
   warming_up,   ///< filters or hidden state have not settled
-  no_estimate,  ///< no step since the last reference, or a guard replaced the model's value
+  no_estimate,  ///< no step since the last reference, or a guard reported a fault
   reference_not_finite,  ///< NaN or infinite: not measured
   reference_stale,       ///< older than `oldest_reference_s`, or frozen
   reference_saturated,   ///< at the end of the sensor's range

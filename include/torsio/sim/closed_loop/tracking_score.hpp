@@ -28,7 +28,7 @@ struct TrackingScore {
   std::optional<LimitCycle> limit_cycle = {};
   std::size_t limit_events = 0;    ///< number of times that a limit became active
   double limited_s = 0.0;          ///< total time of active limits
-  std::size_t inverse_faults = 0;  ///< steps on the linear fallback of the inverse
+  std::size_t inverse_faults = 0;  ///< steps with a fault of the inverse
   std::size_t loop_faults = 0;     ///< ticks without a usable reference or measurement
 };
 
