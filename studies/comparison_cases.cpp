@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "studies/study.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/data/manifest.hpp"
 #include "torsio/data/recording.hpp"
@@ -17,7 +18,6 @@
 namespace torsio {
 namespace {
 
-constexpr std::uint64_t kScored = 50;  // seeds of test runs
 /// The samples of a DFKI bench's load cell (125 Hz), without its known latency: a log of 1 kHz
 /// contains no more information about the torque, at eight times the cost.
 Recording at_load_cell(const Recording& log, const DataSheet& sheet) {
@@ -71,7 +71,7 @@ ComparisonCase torque_loop(const std::string& actuator, std::uint64_t seed,
     add(made,
         {.actuator = actuator,
          .experiment = experiment,
-         .seed = seed + (role == Role::test ? kScored : 10 + made.dataset.records.size()),
+         .seed = seed + (role == Role::test ? kFirstTestSeed : 10 + made.dataset.records.size()),
          .torque_amplitude_Nm = share * rated_Nm},
         role, progress);
   };
@@ -88,12 +88,12 @@ ComparisonCase elastomer(const std::string& actuator, std::uint64_t seed,
       .inputs = {"spring_deflection_rad", "lowpass(rate(spring_deflection_rad), 10Hz)"}};
   made.dataset.initialise_samples = 0;  // every run starts at rest
   add(made, {.actuator = actuator, .experiment = "triangles", .seed = seed}, Role::train, progress);
-  add(made, {.actuator = actuator, .experiment = "random-walk", .seed = seed + kScored}, Role::test,
-      progress, actuator + ", random walk");
+  add(made, {.actuator = actuator, .experiment = "random-walk", .seed = seed + kFirstTestSeed},
+      Role::test, progress, actuator + ", random walk");
   add(made,
       {.actuator = actuator,
        .experiment = "slow-cycles",
-       .seed = seed + kScored + 1,
+       .seed = seed + kFirstTestSeed + 1,
        .duration_s = 100.0},
       Role::test, progress, actuator + ", slow cycles");
   return made;
@@ -106,7 +106,7 @@ ComparisonCase rubber(std::uint64_t seed, const Progress& progress) {
   made.dataset.initialise_samples = 0;
   add(made, {.actuator = kActuator, .experiment = "grid", .seed = seed}, Role::train, progress);
   for (std::size_t k = 0; k < 4; ++k)
-    add(made, {.actuator = kActuator, .experiment = "multisine", .seed = seed + kScored + k},
+    add(made, {.actuator = kActuator, .experiment = "multisine", .seed = seed + kFirstTestSeed + k},
         Role::test, progress);
   return made;
 }
@@ -126,7 +126,7 @@ ComparisonCase pushes(const std::string& actuator, double duration_s, std::uint6
       add(made,
           {.actuator = actuator,
            .experiment = "human-torque",
-           .seed = seed + made.dataset.records.size() + (role == Role::test ? kScored : 0),
+           .seed = seed + made.dataset.records.size() + (role == Role::test ? kFirstTestSeed : 0),
            .duration_s = duration_s,
            .torque_amplitude_Nm = torque_Nm,
            .is_impedance_zero = is_zero},
@@ -194,28 +194,29 @@ ComparisonCase one_cam(const std::string& cam, const Progress& progress) {
 }
 
 /// A printed drive: trained on one preload, tested on two others.
-struct Drive {
+struct PrintedDrive {
   const char* name;
   std::array<const char*, 3> files;
 };
-constexpr std::array kDrives{Drive{"base910_reamed",
-                                   {"2024-07-17__12-24-38__torqueramp__base910_reamed1",
-                                    "2024-07-17__12-40-35__torqueramp__base910_reamed5",
-                                    "2024-07-17__12-45-13__torqueramp__base910_reamed6"}},
-                             Drive{"base_onyx_runin",
-                                   {"2024-07-18__10-58-26__torqueramp__base_onyx_runin1",
-                                    "2024-07-18__11-02-28__torqueramp__base_onyx_runin5",
-                                    "2024-07-18__11-17-26__torqueramp__base_onyx_runin6"}},
-                             Drive{"split_onyx_runin",
-                                   {"2024-07-18__16-28-57__torqueramp__split_onyx_runin1",
-                                    "2024-07-18__16-32-24__torqueramp__split_onyx_runin5",
-                                    "2024-07-18__16-49-32__torqueramp__split_onyx_runin6"}},
-                             Drive{"split_onyx_6pre",
-                                   {"2024-07-18__18-30-11__torqueramp__split_onyx_6pre1",
-                                    "2024-07-18__18-33-20__torqueramp__split_onyx_6pre5",
-                                    "2024-07-18__18-36-30__torqueramp__split_onyx_6pre6"}}};
+constexpr std::array kPrintedDrives{
+    PrintedDrive{"base910_reamed",
+                 {"2024-07-17__12-24-38__torqueramp__base910_reamed1",
+                  "2024-07-17__12-40-35__torqueramp__base910_reamed5",
+                  "2024-07-17__12-45-13__torqueramp__base910_reamed6"}},
+    PrintedDrive{"base_onyx_runin",
+                 {"2024-07-18__10-58-26__torqueramp__base_onyx_runin1",
+                  "2024-07-18__11-02-28__torqueramp__base_onyx_runin5",
+                  "2024-07-18__11-17-26__torqueramp__base_onyx_runin6"}},
+    PrintedDrive{"split_onyx_runin",
+                 {"2024-07-18__16-28-57__torqueramp__split_onyx_runin1",
+                  "2024-07-18__16-32-24__torqueramp__split_onyx_runin5",
+                  "2024-07-18__16-49-32__torqueramp__split_onyx_runin6"}},
+    PrintedDrive{"split_onyx_6pre",
+                 {"2024-07-18__18-30-11__torqueramp__split_onyx_6pre1",
+                  "2024-07-18__18-33-20__torqueramp__split_onyx_6pre5",
+                  "2024-07-18__18-36-30__torqueramp__split_onyx_6pre6"}}};
 
-ComparisonCase cycloidal(const Drive& drive, const Progress& progress) {
+ComparisonCase cycloidal(const PrintedDrive& drive, const Progress& progress) {
   std::string manifest = std::string(kCycloidal) + "files:\n";
   for (std::size_t i = 0; i < drive.files.size(); ++i)
     manifest += fmt::format("  - {{file: cycloidal/{}.csv.gz, role: {}, name: variant_{}}}\n",
@@ -276,7 +277,7 @@ std::vector<ComparisonPlan> recorded_plans() {
     plans.push_back(
         {fmt::format("{}, held-out blocks", cam), "",
          [=](std::uint64_t /*seed*/, const Progress& progress) { return one_cam(cam, progress); }});
-  for (const Drive& drive : kDrives)
+  for (const PrintedDrive& drive : kPrintedDrives)
     plans.push_back({fmt::format("cycloidal {}, other preloads", drive.name), "",
                      [&drive](std::uint64_t /*seed*/, const Progress& progress) {
                        return cycloidal(drive, progress);

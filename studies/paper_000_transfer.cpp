@@ -24,7 +24,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 100.0;
+constexpr double kTransferRate_Hz = 100.0;
 constexpr double kBase_s = 540.0;
 constexpr double kTest_s = 180.0;
 constexpr double kOffset_s = 1.0;                   // 100 samples
@@ -44,7 +44,7 @@ Recording sweep(const std::string& actuator, double load, double duration_s, std
                             .seed = seed,
                             .duration_s = duration_s,
                             .lever_m = lever_m(data_sheet(actuator), load)}),
-                  kRate_Hz);
+                  kTransferRate_Hz);
 }
 
 TrainedModel base_model(const StudyOptions& options, std::uint64_t seed, const Progress& progress) {
@@ -107,7 +107,7 @@ void add_joint(const std::string& joint, const ModelFile& base, const StudyOptio
   Dataset dataset;
   Recording recording = sweep(joint, kTestLoad, options.is_quick ? 60.0 : kTest_s, seed);
   const std::size_t samples = recording.size();
-  const auto at = [](double time_s) { return static_cast<std::size_t>(time_s * kRate_Hz); };
+  const auto at = [](double time_s) { return static_cast<std::size_t>(time_s * kTransferRate_Hz); };
   // All methods are scored on what follows the longer part.
   dataset.records.push_back({std::move(recording),
                              {{.begin = 0, .end = at(kOffset_s), .role = Role::train},
@@ -136,7 +136,7 @@ Study transfer_000(const StudyOptions& options, const Progress& progress) {
           "base: mixture of {} components of {} from position-controlled swings with four loads of "
           "{:g} s at {:g} Hz; each joint then swings with another load. The offset is the mean of "
           "the first 100 samples; our methods have {:g} s; all are scored on what follows these",
-          options.is_quick ? 300 : 5000, kBase, options.is_quick ? 60.0 : kBase_s, kRate_Hz,
+          options.is_quick ? 300 : 5000, kBase, options.is_quick ? 60.0 : kBase_s, kTransferRate_Hz,
           kNew_s),
       .unit = "Nm",
       .options = options};

@@ -25,7 +25,6 @@ constexpr double kFullScale_Nm = 0.5;  // where the clutch slips
 constexpr const char* kTwist = "input_angle_rad - joint_angle_rad";
 constexpr const char* kTwistRate = "lowpass(rate(input_angle_rad - joint_angle_rad), 10Hz)";
 constexpr const char* kMultisine = "multisine";
-constexpr std::uint64_t kScored = 50;  // seeds of test recordings
 /// A network with memory is not valid before; the other models are not scored there either.
 constexpr std::size_t kWarmUp = 200;
 
@@ -36,7 +35,7 @@ constexpr const char* kTable2 =
     "21.5113/11.8339/-5.4362/-6.5416/-8.7194/5.9948/-2.5506/-5.3729/-5.1467";
 
 /// A model of the table: what it is called, and how `--models` would ask for it.
-struct Candidate {
+struct SensorCandidate {
   std::string label;
   std::string model;
   bool has_rate = false;  ///< given the twist's rate besides
@@ -44,7 +43,7 @@ struct Candidate {
 
 /// The candidates of the paper: n_y = n_u = 8 (Table II), that is 7 past torques and 8 twists,
 /// trained one step ahead with the number of updates of Algorithm 1.
-std::vector<Candidate> papers_candidates(bool is_quick) {
+std::vector<SensorCandidate> papers_candidates(bool is_quick) {
   const std::string one_step = "input_lags=7:output_lags=7:training=one_step";
   const int updates = is_quick ? 2000 : 200000;
   const auto pgpr = [&](const char* mode, const char* kernel) {
@@ -66,7 +65,7 @@ std::vector<Candidate> papers_candidates(bool is_quick) {
 }
 
 /// The same models, but that they learn to forget errors of what is fed back to them.
-std::vector<Candidate> our_candidates(bool is_quick) {
+std::vector<SensorCandidate> our_candidates(bool is_quick) {
   const std::string noise = "input_lags=7:output_lags=7:training=noise:feedback_noise=0.05";
   return {{"NN, noise", fmt::format("narx_mlp:{}:epochs={}", noise, is_quick ? 3 : 30)},
           {"improved PGPR, noise",
@@ -79,26 +78,26 @@ std::vector<Candidate> our_candidates(bool is_quick) {
           {"GRU", fmt::format("gru:layers={}:epochs={}", is_quick ? 8 : 32, is_quick ? 2 : 30)}};
 }
 
-std::vector<Candidate> baselines() {
+std::vector<SensorCandidate> baselines() {
   return {{"linear", "linear"},
           {"linear, friction", "linear_coulomb", true},
           {"ARX 5", "arx"},
           {"ARX 15", "arx:input_lags=7:output_lags=7"}};
 }
 
-std::vector<Candidate> all_candidates(bool is_quick) {
-  std::vector<Candidate> candidates = baselines();
+std::vector<SensorCandidate> all_candidates(bool is_quick) {
+  std::vector<SensorCandidate> candidates = baselines();
   for (const auto& more : {papers_candidates(is_quick), our_candidates(is_quick)})
     candidates.insert(candidates.end(), more.begin(), more.end());
   return candidates;
 }
 
 /// The candidates of the other tests: none of them is still warming up when the clutch slips.
-std::vector<Candidate> few_candidates(bool is_quick) {
-  std::vector<Candidate> candidates = all_candidates(is_quick);
+std::vector<SensorCandidate> few_candidates(bool is_quick) {
+  std::vector<SensorCandidate> candidates = all_candidates(is_quick);
   constexpr std::array<std::string_view, 4> kFew{"linear", "ARX 5", "improved PGPR, corrected",
                                                  "variational GP, noise"};
-  std::erase_if(candidates, [&](const Candidate& candidate) {
+  std::erase_if(candidates, [&](const SensorCandidate& candidate) {
     return std::ranges::find(kFew, candidate.label) == kFew.end();
   });
   return candidates;
@@ -109,7 +108,7 @@ Recording recorded(const std::string& experiment, std::uint64_t seed) {
       {.actuator = kActuator, .experiment = experiment, .seed = seed, .with_truth = true});
 }
 
-struct Bench {
+struct SensorBench {
   Dataset dataset;
   StudyConditions conditions = {};
 
@@ -126,8 +125,8 @@ struct Bench {
 
 /// Trained on the grid. No model is initialised with the measured torque: all start from rest, as
 /// the bench.
-Bench trained_on_grid(std::uint64_t seed) {
-  Bench bench;
+SensorBench trained_on_grid(std::uint64_t seed) {
+  SensorBench bench;
   Recording grid = recorded("grid", seed);
   const std::size_t samples = grid.size();
   bench.dataset.records.push_back({std::move(grid), whole_record(samples, Role::train)});
@@ -144,11 +143,12 @@ std::size_t first_slip(const Recording& recording) {
       slip.begin());
 }
 
-void compare_into(StudyRows& rows, const Bench& bench, const std::vector<Candidate>& candidates,
-                  std::uint64_t seed, const Progress& progress) {
+void compare_into(StudyRows& rows, const SensorBench& bench,
+                  const std::vector<SensorCandidate>& candidates, std::uint64_t seed,
+                  const Progress& progress) {
   std::vector<ModelChoice> choices;
   std::vector<std::pair<std::string, std::string>> models;  // name of each choice
-  for (const Candidate& candidate : candidates) {
+  for (const SensorCandidate& candidate : candidates) {
     std::vector<std::string> inputs{kTwist};
     if (candidate.has_rate) inputs.emplace_back(kTwistRate);
     choices.push_back(model_choices(bench.dataset, candidate.model, inputs).front());
@@ -191,12 +191,12 @@ std::vector<std::string> verdicts(const std::vector<ErrorRow>& rows) {
 }
 
 Study study_of(std::string protocol, const StudyOptions& options,
-               const std::vector<Candidate>& candidates) {
+               const std::vector<SensorCandidate>& candidates) {
   Study study{.protocol = std::move(protocol),
               .unit = "Nm",
               .options = options,
               .plants = {study_plant(kActuator)}};
-  for (const Candidate& candidate : candidates)
+  for (const SensorCandidate& candidate : candidates)
     study.notes.push_back(fmt::format("model {}: {}", candidate.label, candidate.model));
   return study;
 }
@@ -212,9 +212,9 @@ Study beyond_slip(Study study, const std::vector<std::string>& experiments,
   StudyRows rows;
   for (std::size_t k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = repeat_seed(options, k);
-    Bench bench = trained_on_grid(seed);
+    SensorBench bench = trained_on_grid(seed);
     for (const std::string& experiment : experiments) {
-      const Recording recording = recorded(experiment, seed + kScored);
+      const Recording recording = recorded(experiment, seed + kFirstTestSeed);
       const std::size_t slip = first_slip(recording);
       bench.add_test(recording, experiment + ", clutch holds", 0, slip);
       if (slip < recording.size())
@@ -230,7 +230,7 @@ Study beyond_slip(Study study, const std::vector<std::string>& experiments,
 }  // namespace
 
 Study sensor_models_002(const StudyOptions& options, const Progress& progress) {
-  const std::vector<Candidate> candidates = all_candidates(options.is_quick);
+  const std::vector<SensorCandidate> candidates = all_candidates(options.is_quick);
   Study study = study_of(
       "trained on the grid of sines, 0.05 to 1 Hz and 4 to 9 deg, tested in free run on other "
       "multisines from rest, scored after 4 s; no measured torque is fed back; input: twist of "
@@ -240,9 +240,9 @@ Study sensor_models_002(const StudyOptions& options, const Progress& progress) {
   const std::size_t multisines = options.is_quick ? 2 : 8;
   for (std::size_t k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = repeat_seed(options, k);
-    Bench bench = trained_on_grid(seed);
+    SensorBench bench = trained_on_grid(seed);
     for (std::size_t i = 0; i < multisines; ++i) {
-      const Recording recording = recorded(kMultisine, seed + kScored + i);
+      const Recording recording = recorded(kMultisine, seed + kFirstTestSeed + i);
       bench.add_test(recording, kMultisine, kWarmUp, recording.size());
     }
     compare_into(rows, bench, candidates, seed, nth_of(progress, k, options.repeats, kActuator));

@@ -61,7 +61,7 @@ Study design_002(const StudyOptions& options, const Progress& /*progress*/) {
   for (const PaperFigure& printed : kPaperFigures) {
     if (printed.paper != "002" || printed.item != "Table I") continue;
     const auto sensors = torque_sensors_002();
-    const auto sensor = std::ranges::find(sensors, printed.condition, &TorqueSensor::name);
+    const auto sensor = std::ranges::find(sensors, printed.condition, &PublishedTorqueSensor::name);
     table.rows.push_back({"Table I", fmt::format("volume per torque, {}", printed.condition),
                           sensor->volume_cm3 / sensor->torque_Nm, "cm3/Nm", printed});
   }

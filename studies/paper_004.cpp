@@ -28,8 +28,6 @@ constexpr const char* kTwistRate =
     "lowpass(rate(motor_angle_rad / 2 - wave_generator_angle_rad), 10Hz)";
 constexpr const char* kGeneratorSpeed = "lowpass(rate(wave_generator_angle_rad), 10Hz)";
 
-constexpr std::uint64_t kScored = 50;  // seeds of test recordings
-
 using InputSet = std::pair<std::string, std::vector<std::string>>;
 const InputSet kSet1{"I", {kTwist, kMotorTorque, kAcceleration}};
 const InputSet kSet2{"II", {kTwist, kMotorTorque}};
@@ -155,7 +153,7 @@ Study torque_levels_004(const StudyOptions& options, const Progress& progress) {
     for (const double level_Nm : kLevels_Nm)
       pushes.push_back({.torque_Nm = level_Nm,
                         .condition = fmt::format("{:g} Nm", level_Nm),
-                        .seed_offset = kScored + pushes.size(),
+                        .seed_offset = kFirstTestSeed + pushes.size(),
                         .role = Role::test});
     compare_into(rows, pushes, kSet2, options, repeat_seed(options, k),
                  nth_of(progress, k, options.repeats, "torque levels"));
@@ -197,7 +195,7 @@ Study impedances_004(const StudyOptions& options, const Progress& progress) {
             {.torque_Nm = 15.0,
              .is_impedance_zero = is_zero,
              .condition = fmt::format("trained {}, tested {}", of.name, is_zero ? "zero" : "high"),
-             .seed_offset = kScored + (is_zero ? 1 : 0),
+             .seed_offset = kFirstTestSeed + (is_zero ? 1 : 0),
              .role = Role::test});
       compare_into(rows, pushes, of.set, options, repeat_seed(options, k),
                    nth_of(progress, k * cases.size() + c, options.repeats * cases.size(),

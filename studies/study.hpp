@@ -21,6 +21,9 @@ struct StudyOptions {
   bool is_quick = false;    ///< shorter recordings and smaller networks, as a quick test
 };
 
+/// The seeds of test recordings begin here: no training recording has one of them.
+inline constexpr std::uint64_t kFirstTestSeed = 50;
+
 /// A figure that a paper prints, as it prints it.
 struct PaperFigure {
   std::string_view paper;      ///< its number in docs/sources.md

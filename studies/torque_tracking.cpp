@@ -30,8 +30,7 @@ using Kind = TorqueReference::Kind;
 
 constexpr std::array kVariants{"maxwell-slip", "bouc-wen", "lugre"};
 constexpr double kQuick_s = 20.0;
-constexpr std::uint64_t kScored = 50;  // seeds of test runs
-constexpr double kObserver_Hz = 8.0;   // loop with feed-forward and observer
+constexpr double kObserver_Hz = 8.0;  // loop with feed-forward and observer
 
 /// The task of a loop (specification 6).
 struct Task {
@@ -188,7 +187,7 @@ void run_tests(const Trial& trial, bool is_helped, TrackingRows& rows, const Pro
                       .measures_bandwidth = false};
     if (is_helped) spec.observer_cutoff_Hz = kObserver_Hz;
     if (trial.is_quick) spec.reference.duration_s = kQuick_s;
-    const std::array<std::uint64_t, 1> seeds{trial.seed + kScored};
+    const std::array<std::uint64_t, 1> seeds{trial.seed + kFirstTestSeed};
     const std::string condition =
         fmt::format("{}, {:g} Nm {}, {}{}", trial.actuator, task.amplitude_Nm,
                     task.output == JointOutput::locked ? "locked" : "free", name(kind),

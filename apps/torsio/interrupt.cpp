@@ -17,7 +17,7 @@ std::atomic<int> interrupted = 0;
 static_assert(std::atomic<int>::is_always_lock_free);
 std::atomic<int> is_terminal = 0;
 
-void print(std::string_view text) {
+void print_to_terminal(std::string_view text) {
   [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
 }
 
@@ -25,8 +25,8 @@ void print(std::string_view text) {
 // for the signal. Only functions that POSIX allows in a signal handler are called here.
 void end_at_once() {
   torsio::OutputFile::remove_unfinished();
-  if (is_terminal != 0) print("\r\033[K");  // the progress bar
-  print("torsio: stopped on request; no file is half-written\n");
+  if (is_terminal != 0) print_to_terminal("\r\033[K");  // the progress bar
+  print_to_terminal("torsio: stopped on request; no file is half-written\n");
   end_as_interrupted();
 }
 

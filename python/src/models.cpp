@@ -33,7 +33,7 @@ py::tuple pickled(const Model& model) {
   return py::make_tuple(kPickleVersion, bytes_of(model), model.notes, table, model.fit_seconds);
 }
 
-Model unpickled(const py::tuple& state) {
+Model model_unpickled(const py::tuple& state) {
   check_pickle(state, 5, "Model");
   Model model = from_bytes(state[1].cast<py::bytes>(), "");
   model.notes = state[2].cast<std::vector<std::string>>();
@@ -129,7 +129,7 @@ void bind_models(py::module_& module) {
                     inputs + ">";
            })
       .def(py::pickle([](const Model& self) { return pickled(self); },
-                      [](const py::tuple& state) { return unpickled(state); }));
+                      [](const py::tuple& state) { return model_unpickled(state); }));
   module.def(
       "load", loaded, py::arg("path"), py::kw_only(), py::arg("serial") = "",
       "Reads a model file.\n\nserial: that of the joint; a model of another one is refused.");

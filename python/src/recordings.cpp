@@ -185,7 +185,7 @@ py::tuple pickled(const py::object& self) {
                         recording.mapping, recording.source.file, recording.source.sha256);
 }
 
-Recording unpickled(const py::tuple& state) {
+Recording recording_unpickled(const py::tuple& state) {
   check_pickle(state, 11, "Recording");
   Recording recording(state[1].cast<std::string>(), state[2].cast<double>(),
                       state[3].cast<double>());
@@ -275,7 +275,7 @@ void bind_recording(py::module_& module) {
           py::arg("path"), "Writes t_s and every channel.")
       .def("__repr__", short_text)
       .def(py::pickle([](const py::object& self) { return pickled(self); },
-                      [](const py::tuple& state) { return unpickled(state); }));
+                      [](const py::tuple& state) { return recording_unpickled(state); }));
 }
 
 }  // namespace

@@ -27,14 +27,14 @@ constexpr double kEarlyRest = 0.01;
 constexpr double kHeldOutShare = 0.6;
 constexpr std::size_t kLeastParts = 3;
 constexpr double kShortest_s = 8e-3;
-constexpr auto kHinges = std::to_array<double>({-0.5, 0.0, 0.5});  // the input is scaled
-constexpr std::size_t kStops = 20;
+constexpr auto kDelayHinges = std::to_array<double>({-0.5, 0.0, 0.5});  // the input is scaled
+constexpr std::size_t kDelayStops = 20;
 constexpr double kSmallestStop = 0.004;  ///< share of half the range
 constexpr auto kLoadedStops = std::to_array<std::size_t>({4, 8, 12});
 constexpr auto kRelaxations_s = std::to_array<double>({0.02, 0.2, 2.0, 20.0});
-constexpr Eigen::Index kFree = 3 + static_cast<Eigen::Index>(kHinges.size());
+constexpr Eigen::Index kFree = 3 + static_cast<Eigen::Index>(kDelayHinges.size());
 constexpr Eigen::Index kColumns =
-    kFree + static_cast<Eigen::Index>(kStops + kLoadedStops.size() + kRelaxations_s.size());
+    kFree + static_cast<Eigen::Index>(kDelayStops + kLoadedStops.size() + kRelaxations_s.size());
 constexpr std::size_t kParts = 4;
 constexpr double kSpeedHalfWindow_s = 0.02;
 constexpr double kScaleShare = 0.1;
@@ -78,14 +78,15 @@ Eigen::MatrixXd spring_columns(const std::vector<double>& input,
   const Extent extent = extent_of(input);
   const double middle = 0.5 * (extent.lowest + extent.highest);
   const double scale = extent.width() > 0.0 ? 2.0 / extent.width() : 0.0;
-  std::array<double, kStops> limits{};
-  for (std::size_t k = 0; k < kStops; ++k)
-    limits[k] = std::pow(kSmallestStop, static_cast<double>(k) / static_cast<double>(kStops - 1));
+  std::array<double, kDelayStops> limits{};
+  for (std::size_t k = 0; k < kDelayStops; ++k)
+    limits[k] =
+        std::pow(kSmallestStop, static_cast<double>(k) / static_cast<double>(kDelayStops - 1));
   std::array<double, kRelaxations_s.size()> follow{};
   for (std::size_t k = 0; k < follow.size(); ++k)
     follow[k] = -std::expm1(-1.0 / (kRelaxations_s[k] * sample_rate_Hz));
   Eigen::MatrixXd columns(static_cast<Eigen::Index>(samples.size()), kColumns);
-  std::array<double, kStops> stops{};
+  std::array<double, kDelayStops> stops{};
   std::array<double, kRelaxations_s.size()> slow{};
   double last = kNotMeasured;
   std::size_t i = 0;
@@ -94,7 +95,7 @@ Eigen::MatrixXd spring_columns(const std::vector<double>& input,
       if (!is_finite(input[i])) continue;
       const double z = scale * (input[i] - middle);
       if (!is_finite(last)) slow.fill(z), last = z;
-      for (std::size_t k = 0; k < kStops; ++k)
+      for (std::size_t k = 0; k < kDelayStops; ++k)
         stops[k] = std::clamp(stops[k] + z - last, -limits[k], limits[k]);
       for (std::size_t k = 0; k < slow.size(); ++k) slow[k] += follow[k] * (z - slow[k]);
       last = z;
@@ -102,7 +103,7 @@ Eigen::MatrixXd spring_columns(const std::vector<double>& input,
     Eigen::Index column = 0;
     const auto put = [&](double value) { columns(row, column++) = value; };
     put(1.0), put(last), put(last * last * last);
-    for (const double hinge : kHinges) put(std::max(last - hinge, 0.0));
+    for (const double hinge : kDelayHinges) put(std::max(last - hinge, 0.0));
     for (const double stop : stops) put(stop);
     for (const std::size_t k : kLoadedStops) put(stops[k] * std::abs(last));
     for (const double each : slow) put(last - each);

@@ -9,8 +9,8 @@
 namespace torsio {
 namespace {
 
-constexpr std::array kHinges{-0.5, 0.0, 0.5};
-constexpr std::size_t kStops = 8;  // from the half range down to 1/128 of it
+constexpr std::array kQuickHinges{-0.5, 0.0, 0.5};
+constexpr std::size_t kQuickStops = 8;  // from the half range down to 1/128 of it
 constexpr std::array<std::size_t, 2> kLoadedStops{2,
                                                   4};  // with a friction that grows with the load
 constexpr std::array kRelaxations_s{0.02, 0.2, 2.0, 20.0};
@@ -19,7 +19,8 @@ constexpr double kRidge = 1e-6;
 
 std::vector<double> thresholds() {
   std::vector<double> result;
-  for (std::size_t j = 0; j < kStops; ++j) result.push_back(std::ldexp(1.0, -static_cast<int>(j)));
+  for (std::size_t j = 0; j < kQuickStops; ++j)
+    result.push_back(std::ldexp(1.0, -static_cast<int>(j)));
   return result;
 }
 
@@ -53,7 +54,7 @@ class QuickModel::Rows {
     const auto put = [&](double value) { row_[column++] = value; };
     put(1.0);
     put(z);
-    for (const double hinge : kHinges) put(std::max(z - hinge, 0.0));
+    for (const double hinge : kQuickHinges) put(std::max(z - hinge, 0.0));
     for (const double force : stops_.forces()) put(force);
     for (const std::size_t j : kLoadedStops) put(stops_.forces()[j] * std::abs(z));
     for (std::size_t l = 0; l < slow_.size(); ++l) {
@@ -98,8 +99,8 @@ QuickModel::QuickModel(const TrainingData& data, const std::vector<ConditionValu
   };
   column(true, true);
   column(true, true);
-  for (std::size_t i = 0; i < kHinges.size(); ++i) column(true, false);
-  for (std::size_t i = 0; i < kStops + kLoadedStops.size(); ++i) column(false, false);
+  for (std::size_t i = 0; i < kQuickHinges.size(); ++i) column(true, false);
+  for (std::size_t i = 0; i < kQuickStops + kLoadedStops.size(); ++i) column(false, false);
   for (std::size_t i = 0; i < kRelaxations_s.size(); ++i) column(false, false);
   for (std::size_t j = 1; j < data.input_count(); ++j) {
     double square = 0.0;

@@ -23,7 +23,7 @@ std::string unit_of(const std::string& name) {
 }
 
 /// The SI name of the conditions of all recordings.
-std::vector<std::string> conditions_of(const Dataset& dataset) {
+std::vector<std::string> condition_names(const Dataset& dataset) {
   std::vector<std::string> names;
   for (const DatasetRecord& record : dataset.records)
     for (const std::string& name : record.recording.conditions())
@@ -52,7 +52,7 @@ WantedRange parse_wanted(const std::string& text, const Dataset& dataset, const 
     unit = input_unit == "1" ? "1_s" : input_unit + "_s";
     if (find_unit(unit) == nullptr) unit = "1";
   } else {
-    const std::vector<std::string> conditions = conditions_of(dataset);
+    const std::vector<std::string> conditions = condition_names(dataset);
     const auto parts = split_channel_name(name);
     const std::string si = parts ? parts->si() : name;
     if (std::ranges::find(conditions, si) == conditions.end()) {

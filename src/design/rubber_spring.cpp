@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "bound_search.hpp"
+#include "powers.hpp"
 #include "ring_constraint.hpp"
 #include "torsio/core/error.hpp"
 
@@ -26,8 +27,6 @@ constexpr double kSoftest = 30.0;  // Shore A
 constexpr double kHardest = 80.0;
 constexpr int kSearch = 4000;       // radii between the bounds
 constexpr double kRounding = 1e-9;  // relative, in comparisons with a bound
-
-double fourth(double x) { return x * x * x * x; }
 
 /// Modulus with the measured correction.
 double modulus(const RubberSpringDemand& demand) {

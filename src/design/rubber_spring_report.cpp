@@ -15,19 +15,20 @@ using std::numbers::pi;
 // Table I of 002 as printed: the volume is that of the printed box or cylinder.
 constexpr double kNone = kNotMeasured;
 const std::array kSensors002{
-    TorqueSensor{"Jo", "linear compression", 30.0, 18.0 * 77.0 * 36.0 * 1e-3, kNone, kNone},
-    TorqueSensor{"Agarwal1 (LC-sensor)", "linear compression", 30.0, 44.0 * 36.0 * 17.0 * 1e-3, 0.5,
-                 53.86},
-    TorqueSensor{"Agarwal2 (HT-sensor)", "helical torsion", 40.0, 38.0 * 38.0 * 24.0 * 1e-3, 0.3,
-                 115.52},
-    TorqueSensor{"Baldoni3", "linear compression", kNone, pi / 4.0 * 17.0 * 17.0 * 28.0 * 1e-3, 0.2,
-                 31.78},
-    TorqueSensor{"Baldoni4", "linear compression", kNone, pi / 4.0 * 16.0 * 16.0 * 30.0 * 1e-3, 0.2,
-                 30.16},
-    TorqueSensor{"Refour", "linear compression", kNone, kNone, kNone, kNone},
-    TorqueSensor{"Guo", "wave spring", kNone, 56.0 * 19.0 * 19.0 * 1e-3, kNone, kNone},
-    TorqueSensor{"Bianchi", "structural", kNone, kNone, 0.99, kNone},
-    TorqueSensor{"Proposed", "rubber", 23.0, 29.5 * 18.0 * 24.0 * 1e-3, 0.5, 25.49}};
+    PublishedTorqueSensor{"Jo", "linear compression", 30.0, 18.0 * 77.0 * 36.0 * 1e-3, kNone,
+                          kNone},
+    PublishedTorqueSensor{"Agarwal1 (LC-sensor)", "linear compression", 30.0,
+                          44.0 * 36.0 * 17.0 * 1e-3, 0.5, 53.86},
+    PublishedTorqueSensor{"Agarwal2 (HT-sensor)", "helical torsion", 40.0,
+                          38.0 * 38.0 * 24.0 * 1e-3, 0.3, 115.52},
+    PublishedTorqueSensor{"Baldoni3", "linear compression", kNone,
+                          pi / 4.0 * 17.0 * 17.0 * 28.0 * 1e-3, 0.2, 31.78},
+    PublishedTorqueSensor{"Baldoni4", "linear compression", kNone,
+                          pi / 4.0 * 16.0 * 16.0 * 30.0 * 1e-3, 0.2, 30.16},
+    PublishedTorqueSensor{"Refour", "linear compression", kNone, kNone, kNone, kNone},
+    PublishedTorqueSensor{"Guo", "wave spring", kNone, 56.0 * 19.0 * 19.0 * 1e-3, kNone, kNone},
+    PublishedTorqueSensor{"Bianchi", "structural", kNone, kNone, 0.99, kNone},
+    PublishedTorqueSensor{"Proposed", "rubber", 23.0, 29.5 * 18.0 * 24.0 * 1e-3, 0.5, 25.49}};
 
 DesignSection ring_section(const std::string& name, const RubberRing& ring,
                            const RubberSpringDemand& demand) {
@@ -71,7 +72,7 @@ DesignSection comparison_section(const RubberRing& ring, double torque_Nm) {
     section.figures.push_back(
         {std::string(name), ratio, "cm^3/Nm", fmt::format("{}{}", principle, remark)});
   };
-  for (const TorqueSensor& sensor : torque_sensors_002())
+  for (const PublishedTorqueSensor& sensor : torque_sensors_002())
     add(sensor.name, sensor.principle, sensor.volume_cm3 / sensor.torque_Nm,
         std::isfinite(sensor.ratio_cm3_Nm) ? fmt::format(", printed {}", sensor.ratio_cm3_Nm)
                                            : ", size or torque not printed");
@@ -137,7 +138,7 @@ XyFigure search_figure(const RubberSpringDesign& design) {
 
 }  // namespace
 
-std::span<const TorqueSensor> torque_sensors_002() noexcept { return kSensors002; }
+std::span<const PublishedTorqueSensor> torque_sensors_002() noexcept { return kSensors002; }
 
 double sensor_volume_cm3(const RubberRing& ring) {
   // 29.5 x 24 mm across and 18 mm along a ring of 20 mm and 4 mm.

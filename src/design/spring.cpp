@@ -16,7 +16,7 @@ namespace torsio {
 namespace {
 
 using std::numbers::pi;
-constexpr std::array<std::string_view, 4> kNames{"rod", "tube", "coils", "discs"};
+constexpr std::array<std::string_view, 4> kShapeNames{"rod", "tube", "coils", "discs"};
 constexpr std::array kKinds{SpringKind::rod, SpringKind::tube, SpringKind::coils,
                             SpringKind::discs};
 constexpr double kGrid_m = 0.1e-3;  // for diameters and lengths
@@ -264,16 +264,17 @@ void check(const SpringDemand& d) {
 }  // namespace
 
 std::string_view name_of(SpringKind kind) noexcept {
-  return kNames.at(static_cast<std::size_t>(kind));
+  return kShapeNames.at(static_cast<std::size_t>(kind));
 }
 
 SpringKind spring_kind(std::string_view name) {
-  const auto* const found = std::ranges::find(kNames, name);
-  if (found != kNames.end()) return kKinds.at(static_cast<std::size_t>(found - kNames.begin()));
+  const auto* const found = std::ranges::find(kShapeNames, name);
+  if (found != kShapeNames.end())
+    return kKinds.at(static_cast<std::size_t>(found - kShapeNames.begin()));
   throw UsageError({.place = "spring kind",
-                    .expected = fmt::format("one of {}", fmt::join(kNames, ", ")),
+                    .expected = fmt::format("one of {}", fmt::join(kShapeNames, ", ")),
                     .found = "'" + std::string(name) + "'",
-                    .advice = did_you_mean(name, kNames)});
+                    .advice = did_you_mean(name, kShapeNames)});
 }
 
 SpringDesign design_spring(const SpringDemand& demand, SpringKind kind) {

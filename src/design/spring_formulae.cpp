@@ -1,13 +1,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "powers.hpp"
 #include "torsio/design/spring.hpp"
 
 namespace torsio {
 namespace {
 
 using std::numbers::pi;
-double fourth(double x) { return x * x * x * x; }
 
 }  // namespace
 

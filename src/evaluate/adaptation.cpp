@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t kReportEvery = 64;
 
 /// Errors before each update.
-struct Tally {
+struct AdaptationTally {
   MetricsAccumulator frozen;
   MetricsAccumulator adapted;
 
@@ -52,7 +52,8 @@ class Replay {
   }
 
   /// @param frozen the estimates of the frozen model for the same recording.
-  void run(const Prediction& frozen, Tally& own, Tally& together, const Progress& progress) {
+  void run(const Prediction& frozen, AdaptationTally& own, AdaptationTally& together,
+           const Progress& progress) {
     const std::size_t samples = record_.recording.size();
     const DenormalsOff denormals_off;
     adaptive_.reset();
@@ -67,7 +68,7 @@ class Replay {
       const Estimate output = adaptive_.step(raw_);
       if (!is_lesson(record_, n)) continue;
       if (output.fault == Fault::none && target_.is_fresh(n))
-        for (Tally* tally : {&own, &together}) {
+        for (AdaptationTally* tally : {&own, &together}) {
           tally->adapted.add(output.value, target_.values[n]);
           tally->frozen.add(frozen.estimates[n].value, target_.values[n]);
         }
@@ -183,12 +184,12 @@ AdaptedModel adapt_model(const ModelFile& model, const Dataset& dataset,
   const TrainingData lessons = training_data(dataset, model.settings.features, Role::train);
   require_trainable(lessons);
   AdaptedModel adapted{.file = model};
-  Tally together;
+  AdaptationTally together;
   const std::size_t parts = dataset.records.size() + 2;
   for (std::size_t i = 0; i < dataset.records.size(); ++i) {
     const DatasetRecord& record = dataset.records[i];
     if (!record.has_role(Role::train)) continue;
-    Tally own;
+    AdaptationTally own;
     const Prediction output = predict(frozen, record.recording);
     require_plausible(record, dataset.target, output);
     Replay(adaptive, record, dataset.target)

@@ -11,7 +11,7 @@
 namespace torsio {
 namespace {
 
-constexpr auto kRoles = std::to_array<Role>({Role::train, Role::test});
+constexpr auto kFoldRoles = std::to_array<Role>({Role::train, Role::test});
 
 FoldStatistic statistic(const std::vector<const ResultRow*>& rows, Metrics Score::*metrics,
                         double Metrics::*member) {
@@ -146,7 +146,7 @@ CrossValidation cross_validate(Dataset dataset, const std::vector<ModelChoice>& 
     std::vector<ScoredModel> models;
     for (const ModelChoice& choice : choices) {
       const Progress part = part_of(progress, done++, fits, choice.family + ", " + fold.name);
-      models.push_back(fit_and_score(dataset, input_sets, choice, seed, kRoles, part));
+      models.push_back(fit_and_score(dataset, input_sets, choice, seed, kFoldRoles, part));
       models.back().trained.reset();
     }
     results.rankings.push_back(rank_on_common_samples(dataset, Role::test, models));

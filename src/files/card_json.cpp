@@ -22,10 +22,10 @@ namespace {
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr std::string_view kAdvice = "The card is damaged: fit the model again.";
+constexpr std::string_view kCardAdvice = "The card is damaged: fit the model again.";
 
 /// Before anything else is read: another version may mean anything.
-void check_version(const JsonObject& card, const std::string& place) {
+void check_card_version(const JsonObject& card, const std::string& place) {
   const std::uint64_t version = card.whole_number("format_version");
   if (version == kModelFormatVersion) return;
   throw Error({.place = place + "/format_version",
@@ -95,8 +95,8 @@ std::string card_json(const ModelFile& model) {
 
 ModelFile model_of_card(std::string_view text, const std::string& place) {
   const json parsed = parse_json(text, place);
-  const JsonObject card(parsed, place, kAdvice);
-  check_version(card, place);
+  const JsonObject card(parsed, place, kCardAdvice);
+  check_card_version(card, place);
   ModelFile model{
       .card = {}, .settings = {}, .parameters = empty_parameters(card.text("family"), place)};
   model.settings.target = card.text("target");

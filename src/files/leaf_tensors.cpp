@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kLongestEmpty = 65536;
 
-[[noreturn]] void refuse(std::string place, std::string expected, std::string found) {
+[[noreturn]] void refuse_tensor(std::string place, std::string expected, std::string found) {
   throw Error({.place = std::move(place),
                .expected = std::move(expected),
                .found = std::move(found),
@@ -31,9 +31,9 @@ template <class T>
 const std::vector<T>& values_of(const Tensor& tensor, const std::string& place,
                                 std::size_t dimensions, std::string_view wanted) {
   const auto* values = std::get_if<std::vector<T>>(&tensor.values);
-  if (values == nullptr) refuse(place, std::string(wanted), "another element type");
+  if (values == nullptr) refuse_tensor(place, std::string(wanted), "another element type");
   if (tensor.shape.size() != dimensions)
-    refuse(place, std::string(wanted), fmt::format("shape {}", shape_text(tensor.shape)));
+    refuse_tensor(place, std::string(wanted), fmt::format("shape {}", shape_text(tensor.shape)));
   return *values;
 }
 
@@ -45,8 +45,8 @@ void check_numbers(const Tensor& tensor, const std::string& place, bool may_be_n
             return std::isfinite(value) || (may_be_nan && std::isnan(value));
           });
           if (bad != values.end())
-            refuse(place, "finite numbers",
-                   fmt::format("{} at index {}", *bad, bad - values.begin()));
+            refuse_tensor(place, "finite numbers",
+                          fmt::format("{} at index {}", *bad, bad - values.begin()));
         }
       },
       tensor.values);
@@ -64,8 +64,8 @@ void read_table(const Tensor& tensor, const std::string& place, std::string_view
   // An empty table has a shape that no file size bounds; a family may take memory by it.
   const std::size_t longest = std::max(tensor.shape[0], tensor.shape[1]);
   if (table.values.empty() && longest > kLongestEmpty)
-    refuse(place, fmt::format("an empty table of at most {} rows or columns", kLongestEmpty),
-           shape_text(tensor.shape));
+    refuse_tensor(place, fmt::format("an empty table of at most {} rows or columns", kLongestEmpty),
+                  shape_text(tensor.shape));
   table.rows = tensor.shape[0];
   table.columns = tensor.shape[1];
 }
@@ -95,14 +95,14 @@ void read_tensor(const Tensor& tensor, const std::string& place, double& value) 
 void read_tensor(const Tensor& tensor, const std::string& place, bool& value) {
   const std::uint8_t number =
       values_of<std::uint8_t>(tensor, place, 0, "one U8 of shape []").front();
-  if (number > 1) refuse(place, "0 or 1", fmt::format("{}", number));
+  if (number > 1) refuse_tensor(place, "0 or 1", fmt::format("{}", number));
   value = number == 1;
 }
 
 void read_tensor(const Tensor& tensor, const std::string& place, std::size_t& value) {
   const std::int64_t number =
       values_of<std::int64_t>(tensor, place, 0, "one I64 of shape []").front();
-  if (number < 0) refuse(place, "a number from 0", fmt::format("{}", number));
+  if (number < 0) refuse_tensor(place, "a number from 0", fmt::format("{}", number));
   value = static_cast<std::size_t>(number);
 }
 
@@ -133,16 +133,16 @@ std::size_t list_size(const Safetensors& contents, const std::string& name, std:
     // It is not an element; it is either another field or unknown.
     if (error != std::errc() || end == rest.data() + rest.size() || *end != '.') continue;
     if (index >= kMaxElements)
-      refuse(fmt::format("{}: /{}", file, at->first),
-             fmt::format("at most {} elements of {}", kMaxElements, name),
-             fmt::format("one of index {}", index));
+      refuse_tensor(fmt::format("{}: /{}", file, at->first),
+                    fmt::format("at most {} elements of {}", kMaxElements, name),
+                    fmt::format("one of index {}", index));
     if (index >= seen.size()) seen.resize(index + 1);
     seen[index] = true;
   }
   const auto missing = std::ranges::find(seen, false);
   if (missing != seen.end())
-    refuse(fmt::format("{}: /{}.{}", file, name, missing - seen.begin()), "a tensor of that name",
-           fmt::format("none, but {}.{}", name, seen.size() - 1));
+    refuse_tensor(fmt::format("{}: /{}.{}", file, name, missing - seen.begin()),
+                  "a tensor of that name", fmt::format("none, but {}.{}", name, seen.size() - 1));
   return seen.size();
 }
 
@@ -167,13 +167,14 @@ std::size_t alternative_index(const Safetensors& contents, const std::string& na
     const std::string place = fmt::format("{}: /{}", file, at->first);
     const auto found = std::ranges::find(alternatives, alternative);
     if (alternative.empty() || alternative.size() == rest.size() || found == alternatives.end())
-      refuse(place, expected, fmt::format("'{}'", alternative));
+      refuse_tensor(place, expected, fmt::format("'{}'", alternative));
     if (chosen != alternatives.end() && chosen != found)
-      refuse(place, expected, fmt::format("{} and {}", *chosen, *found));
+      refuse_tensor(place, expected, fmt::format("{} and {}", *chosen, *found));
     chosen = found;
   }
   if (chosen == alternatives.end()) chosen = std::ranges::find(alternatives, std::string_view());
-  if (chosen == alternatives.end()) refuse(fmt::format("{}: /{}", file, name), expected, "none");
+  if (chosen == alternatives.end())
+    refuse_tensor(fmt::format("{}: /{}", file, name), expected, "none");
   return static_cast<std::size_t>(chosen - alternatives.begin());
 }
 
@@ -181,7 +182,7 @@ Tensor take_tensor(Safetensors& contents, const std::string& name, std::string_v
                    bool may_be_nan) {
   auto node = contents.tensors.extract(name);
   std::string place = fmt::format("{}: /{}", file, name);
-  if (node.empty()) refuse(std::move(place), "a tensor", "none");
+  if (node.empty()) refuse_tensor(std::move(place), "a tensor", "none");
   check_numbers(node.mapped(), place, may_be_nan);
   return std::move(node.mapped());
 }

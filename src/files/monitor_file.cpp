@@ -28,7 +28,7 @@ using nlohmann::ordered_json;
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRateTolerance = 1e-3;
-constexpr std::string_view kAdvice =
+constexpr std::string_view kMonitorAdvice =
     "The monitor file is damaged: calibrate the monitor again (torsio monitor --calibrate).";
 
 /// JSON has no infinity: a limit that is none is null.
@@ -212,7 +212,7 @@ ordered_json monitor_json(const MonitorFile& file) {
   return document;
 }
 
-void check_version(const JsonObject& document, const std::string& place) {
+void check_monitor_version(const JsonObject& document, const std::string& place) {
   if (document.optional_text("format") != "torsio monitor")
     throw Error({.place = place,
                  .expected = "a monitor file, as torsio monitor --calibrate writes it",
@@ -355,9 +355,9 @@ void save_monitor(const std::filesystem::path& path, const MonitorFile& file) {
 MonitorFile read_monitor(const std::filesystem::path& path) {
   const std::string place = path.string();
   const std::vector<std::byte> bytes = read_whole_file(path, kMaxFileBytes);
-  const json parsed = parse_json(text_of(bytes), place, kAdvice);
-  const JsonObject document(parsed, place, kAdvice);
-  check_version(document, place);
+  const json parsed = parse_json(text_of(bytes), place, kMonitorAdvice);
+  const JsonObject document(parsed, place, kMonitorAdvice);
+  check_monitor_version(document, place);
   MonitorFile file = file_of(document, place);
   if (!file.valid_until.empty()) check_date(file.valid_until, place + "/valid_until");
   const Redundancy redundancy(file.redundancy);

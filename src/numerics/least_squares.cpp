@@ -4,12 +4,11 @@
 #include <algorithm>
 #include <string>
 
+#include "core/row_major_map.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
-
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr double kDependent = 1e-10;
 

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/row_major_map.hpp"
+
 namespace torsio {
 namespace {
 
@@ -97,7 +99,6 @@ class Search {
   /// The triangle of J, its columns scaled, and what else a step is computed from.
   bool linearise() {
     if (!problem_.evaluate(found_.theta, residuals_, jacobian_)) return false;
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const auto rows = static_cast<Index>(problem_.residuals);
     const Eigen::Map<const Eigen::VectorXd> r(residuals_.data(), rows);
     Eigen::MatrixXd jacobian = Eigen::Map<const RowMajor>(jacobian_.data(), rows, count_);

@@ -5,15 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/row_major_map.hpp"
 #include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 namespace {
 
 using Index = Eigen::Index;
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double kDependent = 1e-10;
+constexpr double kDependentColumn = 1e-10;
 
 /// The problem with columns of length 1, and what the method keeps about it.
 class ActiveSet {
@@ -85,7 +85,7 @@ class ActiveSet {
     if (!(product_(j, j) > 0.0)) return false;
     if (passive_.empty()) return true;
     const Eigen::VectorXd along = product_(passive_, j);
-    return product_(j, j) - along.dot(factors().solve(along)) > kDependent;
+    return product_(j, j) - along.dot(factors().solve(along)) > kDependentColumn;
   }
 
   [[nodiscard]] Eigen::VectorXd passive_solution() const {

@@ -10,6 +10,7 @@
 
 #include "core/all_finite.hpp"
 #include "core/report_progress.hpp"
+#include "core/row_major_map.hpp"
 #include "numerics/levenberg_marquardt.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
@@ -155,7 +156,6 @@ ParameterUncertainty uncertainty_of(const ResidualProblem& problem, std::span<co
   std::vector<double> residuals(problem.residuals);
   std::vector<double> values(problem.residuals * theta.size());
   if (samples <= count || !evaluate(problem, theta, typical, residuals, values)) return found;
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Eigen::MatrixXd jacobian = Eigen::Map<const RowMajor>(values.data(), residual_count, count);
   Eigen::VectorXd scale(count);
   for (Eigen::Index j = 0; j < count; ++j)

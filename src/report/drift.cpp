@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string number(double value) {
+std::string short_number(double value) {
   return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-";
 }
 std::string signed_number(double value) {
@@ -92,7 +92,7 @@ std::string drift_text(const Drift& drift, const std::string& target) {
   table.header(
       {"quantity", "model", "unit", "change", "%", "95 % interval", "tolerance", "verdict"});
   for (const DriftQuantity& of : drift.quantities)
-    table.row({of.name, number(of.before), of.unit, signed_number(of.change),
+    table.row({of.name, short_number(of.before), of.unit, signed_number(of.change),
                signed_number(100.0 * of.relative), interval(of), healthy(of), verdict_of(of)});
   const std::string unit = unit_label(target);
   std::string text = fmt::format(
@@ -103,8 +103,9 @@ std::string drift_text(const Drift& drift, const std::string& target) {
       "RMSE of the model: {} {} according to its file, {} {} now, {} {} with the zero set, {} {} "
       "with "
       "all\nchanges above corrected. {}\n",
-      number(drift.calibration_rmse), unit, number(drift.rmse), unit, number(drift.zeroed_rmse),
-      unit, number(drift.corrected_rmse), unit, advice_sentence(drift));
+      short_number(drift.calibration_rmse), unit, short_number(drift.rmse), unit,
+      short_number(drift.zeroed_rmse), unit, short_number(drift.corrected_rmse), unit,
+      advice_sentence(drift));
   text += fmt::format("{} samples compared, {:.0f} of them independent", drift.samples,
                       drift.effective_samples);
   if (drift.outside_samples > 0)

@@ -16,7 +16,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::string_view kActuators = "elastomer";
+constexpr std::string_view kElastomerActuators = "elastomer";
 constexpr Load kLocked{.is_locked = true};
 constexpr double kLowestTriangle_Hz = 0.4;
 constexpr double kHighestTriangle_Hz = 4.0;
@@ -24,7 +24,7 @@ constexpr double kTriangleAmplitude_Nm = 5.0;
 constexpr double kTriangles_s = 30.0;
 constexpr double kCycle_Hz = 0.05;
 constexpr double kSlowCycles = 30.0;
-constexpr double kPhase_s = 60.0;  // duration of a phase of `hold`
+constexpr double kPhase_s = 60.0;  // duration of a phase of `elastomer_hold`
 constexpr double kHoldRamp_Nm_s = 10.0;
 constexpr double kWalkAmplitude_Nm = 2.0;
 
@@ -123,7 +123,7 @@ BenchProgram slow_cycles(const DataSheet& sheet, const ExperimentSpec& spec) {
   return torque_tracking(sheet, duration_s, Triangle({amplitude_Nm, kCycle_Hz}, kBenchRate_Hz));
 }
 
-BenchProgram static_cycle(const DataSheet& /*sheet*/, const ExperimentSpec& spec) {
+BenchProgram elastomer_static_cycle(const DataSheet& /*sheet*/, const ExperimentSpec& spec) {
   return static_cycle_program(spec.torque_amplitude_Nm.value_or(kTriangleAmplitude_Nm));
 }
 
@@ -157,7 +157,7 @@ BenchProgram multisine(const DataSheet& sheet, const ExperimentSpec& spec) {
 }
 
 /// Creep under a torque, relaxation with the rotor clamped where it came to, recovery without load.
-BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
+BenchProgram elastomer_hold(const DataSheet& sheet, const ExperimentSpec& spec) {
   const double amplitude_Nm = spec.torque_amplitude_Nm.value_or(3.0);
   return {.start = kLocked,
           .duration_s = 3.0 * kPhase_s,
@@ -176,9 +176,9 @@ BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
           }};
 }
 
-constexpr auto kTable = std::to_array<ExperimentEntry>({
+constexpr auto kElastomerTable = std::to_array<ExperimentEntry>({
     {.info = {.name = "triangles",
-              .actuators = kActuators,
+              .actuators = kElastomerActuators,
               .description = "a PI torque loop makes triangles, output locked: a sequence of 0.4 "
                              "to 4 Hz and 5 to 2 Nm",
               .amplitude_unit = "Nm"},
@@ -188,7 +188,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .program = triangles},
     {.info =
          {.name = "slow-cycles",
-          .actuators = kActuators,
+          .actuators = kElastomerActuators,
           .description =
               "30 triangles at 0.05 Hz, output locked, of 6 Nm or what creeping glue lets reach",
           .amplitude_unit = "Nm"},
@@ -196,21 +196,21 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .highest_torque_share = 1.0,
      .program = slow_cycles},
     {.info = {.name = "static-cycle",
-              .actuators = kActuators,
+              .actuators = kElastomerActuators,
               .description = "rotor held, a torque ramp of +-5 Nm pulls on the output at 0.05 Hz",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
      .highest_torque_share = 0.9,
-     .program = static_cycle},
+     .program = elastomer_static_cycle},
     {.info = {.name = "chirp",
-              .actuators = kActuators,
+              .actuators = kElastomerActuators,
               .description = "the torque loop follows a chirp of 3 Nm, 0.05 to 8 Hz in 100 s",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
      .highest_torque_share = 1.0,
      .program = chirp},
     {.info = {.name = "random-walk",
-              .actuators = kActuators,
+              .actuators = kElastomerActuators,
               .description =
                   "the torque loop follows noise below 1 Hz with the RMS of a chirp of 2 Nm",
               .amplitude_unit = "Nm"},
@@ -218,7 +218,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .highest_torque_share = kWalkAmplitude,
      .program = random_walk},
     {.info = {.name = "multisine",
-              .actuators = kActuators,
+              .actuators = kElastomerActuators,
               .description =
                   "the torque loop follows eight sines, 0.05 to 8 Hz and together at most 4 Nm",
               .amplitude_unit = "Nm"},
@@ -226,17 +226,17 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .highest_torque_share = 1.0,
      .program = multisine},
     {.info = {.name = "hold",
-              .actuators = kActuators,
+              .actuators = kElastomerActuators,
               .description =
                   "3 Nm are held for 60 s, then the rotor for 60 s, then no torque for 60 s",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::elastomer,
      .highest_torque_share = 0.9,
-     .program = hold},
+     .program = elastomer_hold},
 });
 
 }  // namespace
 
-std::span<const ExperimentEntry> elastomer_experiments() noexcept { return kTable; }
+std::span<const ExperimentEntry> elastomer_experiments() noexcept { return kElastomerTable; }
 
 }  // namespace torsio

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kLargest = 1e6;    // largest amount in its unit: everything remains finite
 constexpr double kSmallest = 1e-9;  // smallest amount with an effect
-constexpr double kLongest_s = 1e6;
+constexpr double kLatestFault_s = 1e6;
 constexpr std::string_view kSpring = "spring";
 constexpr std::string_view kFriction = "friction";
 constexpr std::string_view kTorqueConstant = "torque-constant";
@@ -117,12 +117,12 @@ void require_within(const ScheduledFault& fault, std::string_view what, double v
 }
 
 void check_times(const ScheduledFault& fault, double run_s) {
-  require_within(fault, "at", fault.start_s, 0.0, kLongest_s, "s");
+  require_within(fault, "at", fault.start_s, 0.0, kLatestFault_s, "s");
   if (!(fault.start_s < run_s))
     refuse(fault, "at", fmt::format("a time within the run, before {}", text(run_s, "s")),
            text(fault.start_s, "s"),
            "Begin the fault earlier, or let the run last longer (--duration).");
-  if (fault.duration_s) require_within(fault, "for", *fault.duration_s, 1e-6, kLongest_s, "s");
+  if (fault.duration_s) require_within(fault, "for", *fault.duration_s, 1e-6, kLatestFault_s, "s");
 }
 
 std::string_view channel_unit(std::string_view channel) {
@@ -212,9 +212,9 @@ void check_fault(const ScheduledFault& fault, const DataSheet& sheet, double run
                    "Nm/rad");
   if (rule->kind == FaultKind::wrap) check_turns(fault);
   if (rule->kind == FaultKind::spike)
-    require_within(fault, "every", fault.every_s, 0.0, kLongest_s, "s");
+    require_within(fault, "every", fault.every_s, 0.0, kLatestFault_s, "s");
   if (rule->kind == FaultKind::drift && !rule->part.empty())
-    require_within(fault, "over", fault.over_s, 0.0, kLongest_s, "s");
+    require_within(fault, "over", fault.over_s, 0.0, kLatestFault_s, "s");
 }
 
 }  // namespace torsio

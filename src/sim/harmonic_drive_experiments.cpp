@@ -8,7 +8,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::string_view kActuators = "harmonic-drive";
+constexpr std::string_view kHarmonicDriveActuators = "harmonic-drive";
 constexpr double kHumanTorque_Nm = 20.0;
 constexpr double kHumanFrequency_Hz = 0.4;
 constexpr double kHighestHumanTorque_Nm = 50.0;
@@ -41,11 +41,11 @@ BenchProgram human_torque(const DataSheet& sheet, const ExperimentSpec& spec) {
           }};
 }
 
-BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
+BenchProgram harmonic_drive_static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
   return static_cycle_program(sheet.sensors.torque_range_Nm.value, LoadCell::external);
 }
 
-BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
+BenchProgram harmonic_drive_hold(const DataSheet& sheet, const ExperimentSpec& spec) {
   return {.start = {},
           .load_cell = LoadCell::external,
           .duration_s = 60.0,
@@ -56,9 +56,9 @@ BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
           }};
 }
 
-constexpr auto kTable = std::to_array<ExperimentEntry>({
+constexpr auto kHarmonicDriveTable = std::to_array<ExperimentEntry>({
     {.info = {.name = "human-torque",
-              .actuators = kActuators,
+              .actuators = kHarmonicDriveActuators,
               .description =
                   "a hand pushes the output back and forth, about +-20 Nm at 0.4 Hz, against "
                   "the impedance controller",
@@ -69,25 +69,27 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .has_impedance = true,
      .program = human_torque},
     {.info = {.name = "static-cycle",
-              .actuators = kActuators,
+              .actuators = kHarmonicDriveActuators,
               .description =
                   "rotor held, a torque ramp over the load cell's range of +-100 Nm pulls "
                   "on the output at 0.05 Hz"},
      .family = ActuatorFamily::harmonic_drive,
-     .program = static_cycle},
+     .program = harmonic_drive_static_cycle},
     {.info = {.name = "hold",
-              .actuators = kActuators,
+              .actuators = kHarmonicDriveActuators,
               .description = "the impedance controller holds the output, against a constant torque "
                              "if an amplitude is given",
               .amplitude_unit = "Nm"},
      .family = ActuatorFamily::harmonic_drive,
      .highest_torque_Nm = kHighestHumanTorque_Nm,
      .has_impedance = true,
-     .program = hold},
+     .program = harmonic_drive_hold},
 });
 
 }  // namespace
 
-std::span<const ExperimentEntry> harmonic_drive_experiments() noexcept { return kTable; }
+std::span<const ExperimentEntry> harmonic_drive_experiments() noexcept {
+  return kHarmonicDriveTable;
+}
 
 }  // namespace torsio

@@ -23,9 +23,9 @@
 namespace torsio {
 namespace {
 
-constexpr std::string_view kActuators = "rubber-clutch";
+constexpr std::string_view kRubberClutchActuators = "rubber-clutch";
 /// The rubber alone, on the rotor's inertia, swings at 30 rad/s: a lever's loop would follow it.
-constexpr double kBandwidth_rad_s = 200.0;
+constexpr double kClutchBandwidth_rad_s = 200.0;
 
 constexpr double kAmplitude_rad = rad_from_deg(9.0);
 constexpr double kFrequency_Hz = 0.4;
@@ -152,14 +152,15 @@ class SineWalk {
 template <class Reference>
 BenchProgram turning(const DataSheet& sheet, const Load& load, double duration_s,
                      Reference reference) {
-  return {.start = load,
-          .duration_s = duration_s,
-          .next = [load, reference = std::move(reference),
-                   loop = PositionLoop(plant_parameters(sheet), kBenchRate_Hz, kBandwidth_rad_s)](
-                      const Measurement& measured) mutable -> BenchAction {
-            return {.command = {.current_A = loop.step(reference.step(), measured.motor_angle_rad)},
-                    .load = load};
-          }};
+  return {
+      .start = load,
+      .duration_s = duration_s,
+      .next = [load, reference = std::move(reference),
+               loop = PositionLoop(plant_parameters(sheet), kBenchRate_Hz, kClutchBandwidth_rad_s)](
+                  const Measurement& measured) mutable -> BenchAction {
+        return {.command = {.current_A = loop.step(reference.step(), measured.motor_angle_rad)},
+                .load = load};
+      }};
 }
 
 constexpr Load kClamped{.is_locked = true};
@@ -188,7 +189,7 @@ BenchProgram grid(const DataSheet& sheet, const ExperimentSpec& spec) {
     throw UsageError({.place = "grid frequency",
                       .expected = fmt::format("0 < Hz <= {}", kHighestFrequency_Hz),
                       .found = fmt::format("{}", frequency_Hz),
-                      .advice = "For a constant angle use the experiment hold."});
+                      .advice = "For a constant angle use the experiment rubber_clutch_hold."});
   }
   const SinePoint point{spec.angle_amplitude_rad.value_or(kAmplitude_rad), frequency_Hz};
   return turning(sheet, kClamped, kPointPeriods / frequency_Hz,
@@ -240,7 +241,7 @@ BenchProgram slip(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
   return along(sheet, kClamped, Path({up, down, home}));
 }
 
-BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
+BenchProgram rubber_clutch_hold(const DataSheet& sheet, const ExperimentSpec& spec) {
   return along(sheet, kClamped,
                Path({{.to_rad = spec.angle_amplitude_rad.value_or(kAmplitude_rad),
                       .speed_rad_s = kFast_rad_s,
@@ -262,13 +263,13 @@ BenchProgram collision(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
   return program;
 }
 
-BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
+BenchProgram rubber_clutch_static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
   return static_cycle_program(kCycleShare * sheet.rating.torque_Nm.value);
 }
 
-constexpr auto kTable = std::to_array<ExperimentEntry>({
+constexpr auto kRubberClutchTable = std::to_array<ExperimentEntry>({
     {.info = {.name = "grid",
-              .actuators = kActuators,
+              .actuators = kRubberClutchActuators,
               .description =
                   "input angle on a sine; without --amplitude and --frequency 220 of them: "
                   "4 to 9 deg at 0.05 to 1 Hz",
@@ -278,7 +279,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .has_frequency = true,
      .program = grid},
     {.info = {.name = "multisine",
-              .actuators = kActuators,
+              .actuators = kRubberClutchActuators,
               .description = "input angle on five sines below 1 Hz that reach 4 to 9 deg together, "
                              "drawn from the seed",
               .amplitude_unit = "rad"},
@@ -286,40 +287,40 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .highest_angle_rad = kAmplitude_rad,
      .program = multisine},
     {.info = {.name = "slow-cycles",
-              .actuators = kActuators,
+              .actuators = kRubberClutchActuators,
               .description = "input angle at 1 rad/min until the clutch slips, both ways, twice"},
      .family = ActuatorFamily::rubber_clutch,
      .program = slow_cycles},
     {.info =
          {.name = "slip",
-          .actuators = kActuators,
+          .actuators = kRubberClutchActuators,
           .description =
               "10 deg/s to 20 deg, so that the clutch slips, a rest, and back, in both directions"},
      .family = ActuatorFamily::rubber_clutch,
      .program = slip},
     {.info = {.name = "collision",
-              .actuators = kActuators,
+              .actuators = kRubberClutchActuators,
               .description = "a link with 2.5 kg swings at 10 deg/s against a wall, and the drive "
                              "continues; torque_Nm is that of the contact"},
      .family = ActuatorFamily::rubber_clutch,
      .program = collision},
     {.info = {.name = "hold",
-              .actuators = kActuators,
+              .actuators = kRubberClutchActuators,
               .description = "input angle to 9 deg at 10 deg/s; the rubber relaxes for 30 s",
               .amplitude_unit = "rad"},
      .family = ActuatorFamily::rubber_clutch,
      .highest_angle_rad = kAmplitude_rad,
-     .program = hold},
+     .program = rubber_clutch_hold},
     {.info = {.name = "static-cycle",
-              .actuators = kActuators,
+              .actuators = kRubberClutchActuators,
               .description = "rotor held, a torque ramp of +-80 % of the rated torque pulls on the "
                              "output at 0.05 Hz"},
      .family = ActuatorFamily::rubber_clutch,
-     .program = static_cycle},
+     .program = rubber_clutch_static_cycle},
 });
 
 }  // namespace
 
-std::span<const ExperimentEntry> rubber_clutch_experiments() noexcept { return kTable; }
+std::span<const ExperimentEntry> rubber_clutch_experiments() noexcept { return kRubberClutchTable; }
 
 }  // namespace torsio

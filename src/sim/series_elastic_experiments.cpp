@@ -15,7 +15,7 @@
 namespace torsio {
 namespace {
 
-constexpr std::string_view kActuators = "dfki-*";
+constexpr std::string_view kSeriesElasticActuators = "dfki-*";
 constexpr double kSweepSpeed_rad_s = rad_from_deg(10.0);
 constexpr double kSweepAcceleration_rad_s2 = rad_from_deg(30.0);
 constexpr double kShortChirp_s = 10.0;
@@ -56,11 +56,11 @@ BenchProgram sweep(const DataSheet& sheet, const ExperimentSpec& spec) {
           }};
 }
 
-BenchProgram static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
+BenchProgram series_elastic_static_cycle(const DataSheet& sheet, const ExperimentSpec& /*spec*/) {
   return static_cycle_program(sheet.rating.torque_Nm.value);
 }
 
-BenchProgram hold(const DataSheet& sheet, const ExperimentSpec& spec) {
+BenchProgram series_elastic_hold(const DataSheet& sheet, const ExperimentSpec& spec) {
   const Load load = bench_lever(sheet, spec);
   return {.start = load,
           .start_angle_rad = kHold_rad,
@@ -126,26 +126,26 @@ BenchProgram short_chirp(const DataSheet& sheet, const ExperimentSpec& spec) {
   return program;
 }
 
-constexpr auto kTable = std::to_array<ExperimentEntry>({
+constexpr auto kSeriesElasticTable = std::to_array<ExperimentEntry>({
     {.info = {.name = "sweep",
-              .actuators = kActuators,
+              .actuators = kSeriesElasticActuators,
               .description = "a lever with 9 kg is moved back and forth at 10 deg/s, +-170 deg "
                              "(dfki-28: +-60 deg)"},
      .has_lever = true,
      .program = sweep},
     {.info = {.name = "static-cycle",
-              .actuators = kActuators,
+              .actuators = kSeriesElasticActuators,
               .description =
                   "rotor held, a torque ramp of +-rated torque pulls on the output at 0.05 Hz"},
-     .program = static_cycle},
+     .program = series_elastic_static_cycle},
     {.info = {.name = "hold",
-              .actuators = kActuators,
+              .actuators = kSeriesElasticActuators,
               .description =
                   "the position loop holds a lever with 9 kg level, 90 deg from hanging"},
      .has_lever = true,
-     .program = hold},
+     .program = series_elastic_hold},
     {.info = {.name = "chirp",
-              .actuators = kActuators,
+              .actuators = kSeriesElasticActuators,
               .description = "a deflection loop follows a torque chirp, 0.01 to 0.3 Hz in 100 s; "
                              "output locked, or with a lever and 9 kg free to swing",
               .amplitude_unit = "Nm"},
@@ -153,7 +153,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .highest_torque_share = 1.0,
      .program = chirp},
     {.info = {.name = "short-chirp",
-              .actuators = kActuators,
+              .actuators = kSeriesElasticActuators,
               .description =
                   "as chirp, of half the rated torque, 0.05 to 0.3 Hz in its duration of "
                   "10 s or another",
@@ -161,7 +161,7 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
      .highest_torque_share = 1.0,
      .program = short_chirp},
     {.info = {.name = "random-walk",
-              .actuators = kActuators,
+              .actuators = kSeriesElasticActuators,
               .description = "as chirp, the torque being noise below 1 Hz with the same RMS",
               .amplitude_unit = "Nm"},
      .has_lever = true,
@@ -171,12 +171,14 @@ constexpr auto kTable = std::to_array<ExperimentEntry>({
 
 }  // namespace
 
-std::span<const ExperimentEntry> series_elastic_experiments() noexcept { return kTable; }
+std::span<const ExperimentEntry> series_elastic_experiments() noexcept {
+  return kSeriesElasticTable;
+}
 
 SweepProtocol sweep_protocol(const DataSheet& sheet) {
   if (sheet.family != ActuatorFamily::series_elastic)
     throw UsageError({.place = "sweep",
-                      .expected = fmt::format("one of {}", kActuators),
+                      .expected = fmt::format("one of {}", kSeriesElasticActuators),
                       .found = std::string(sheet.name),
                       .advice = "the other actuators have no lever to sweep"});
   const double incline_rad = rad_from_deg(37.8);

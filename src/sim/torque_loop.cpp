@@ -10,7 +10,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kBandwidth_rad_s = 100.0;
+constexpr double kTorqueBandwidth_rad_s = 100.0;
 constexpr double kDamping = 0.9;
 constexpr double kIntegralShare = 0.2;  // share of the bandwidth
 constexpr double kSpeedCutoff_Hz = 120.0;
@@ -24,7 +24,7 @@ TorqueLoop::TorqueLoop(const PlantParameters& plant, double stiffness_Nm_rad, do
       speed_filter_(kSpeedCutoff_Hz, sample_rate_Hz) {
   const double ratio = total_ratio(plant);
   const double inertia_kg_m2 = plant.rotor_inertia_kg_m2 * ratio * ratio;
-  const double stiffest_Nm_rad = inertia_kg_m2 * kBandwidth_rad_s * kBandwidth_rad_s;
+  const double stiffest_Nm_rad = inertia_kg_m2 * kTorqueBandwidth_rad_s * kTorqueBandwidth_rad_s;
   if (!(stiffness_Nm_rad > 0.0 && stiffness_Nm_rad < stiffest_Nm_rad)) {
     throw Error({.place = "torque loop",
                  .problem = "no gains for this stiffness",
@@ -34,8 +34,9 @@ TorqueLoop::TorqueLoop(const PlantParameters& plant, double stiffness_Nm_rad, do
   inverse_stiffness_ = 1.0 / stiffness_Nm_rad;
   feed_forward_A_Nm_ = 1.0 / (ratio * plant.motor.torque_constant_Nm_A);
   proportional_A_Nm_ = (stiffest_Nm_rad / stiffness_Nm_rad - 1.0) * feed_forward_A_Nm_;
-  integral_A_Nm_s_ = kIntegralShare * kBandwidth_rad_s * (proportional_A_Nm_ + feed_forward_A_Nm_);
-  derivative_As_rad_ = 2.0 * kDamping * kBandwidth_rad_s * inertia_kg_m2 * feed_forward_A_Nm_;
+  integral_A_Nm_s_ =
+      kIntegralShare * kTorqueBandwidth_rad_s * (proportional_A_Nm_ + feed_forward_A_Nm_);
+  derivative_As_rad_ = 2.0 * kDamping * kTorqueBandwidth_rad_s * inertia_kg_m2 * feed_forward_A_Nm_;
 }
 
 void TorqueLoop::reset() noexcept {

@@ -170,7 +170,7 @@ TEST(RubberSpring, RoundsToAGridWithinTheBounds) {
 
 TEST(RubberSpring, ComparesItselfWithTableIOfThePaper) {
   int printed = 0;
-  for (const TorqueSensor& sensor : torque_sensors_002()) {
+  for (const PublishedTorqueSensor& sensor : torque_sensors_002()) {
     if (!(sensor.ratio_cm3_Nm > 0.0)) continue;
     ++printed;
     EXPECT_NEAR(sensor.volume_cm3 / sensor.torque_Nm, sensor.ratio_cm3_Nm, 0.005) << sensor.name;

@@ -38,6 +38,10 @@ class Random {
 
   /// Uniform in [0, 1), a multiple of 2^-53.
   double uniform() noexcept { return static_cast<double>(bits() >> 11U) * 0x1p-53; }
+  /// Uniform in [lowest, highest).
+  double uniform(double lowest, double highest) noexcept {
+    return lowest + (highest - lowest) * uniform();
+  }
 
   /// Standard normal, by Marsaglia's polar method. `std::log` may differ in its last bit between
   /// platforms; the sequence of `bits()` does not.

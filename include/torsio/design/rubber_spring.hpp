@@ -84,7 +84,7 @@ struct RubberSpringDesign {
 [[nodiscard]] DesignReport rubber_spring_report(const RubberSpringDemand& demand);
 
 /// A row of Table I of paper 002.
-struct TorqueSensor {
+struct PublishedTorqueSensor {
   std::string_view name;
   std::string_view principle;
   double weight_g;      ///< NaN: not printed
@@ -92,7 +92,7 @@ struct TorqueSensor {
   double torque_Nm;     ///< NaN: not printed
   double ratio_cm3_Nm;  ///< printed; NaN: none
 };
-[[nodiscard]] std::span<const TorqueSensor> torque_sensors_002() noexcept;
+[[nodiscard]] std::span<const PublishedTorqueSensor> torque_sensors_002() noexcept;
 /// Volume [cm³] of a sensor around a ring: a box that exceeds the ring as the printed one of 002
 /// (29.5 x 18 x 24 mm) exceeds its ring (assumed).
 [[nodiscard]] double sensor_volume_cm3(const RubberRing& ring);

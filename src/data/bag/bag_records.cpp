@@ -16,7 +16,7 @@ namespace {
 // The kinds of records that are read: field "op" of their headers.
 constexpr std::uint8_t kMessage = 0x02;
 constexpr std::uint8_t kBagHeader = 0x03;
-constexpr std::uint8_t kChunk = 0x05;
+constexpr std::uint8_t kChunkRecord = 0x05;
 constexpr std::uint8_t kConnection = 0x07;
 
 constexpr std::int64_t kNanoseconds = 1'000'000'000;
@@ -100,7 +100,7 @@ bool BagRecords::next(LogMessage& message) {
     if (kind == kBagHeader) {
       // Zero until the recorder closes the file.
       is_unfinished_ = number<std::uint64_t>(record, "index_pos") == 0;
-    } else if (kind == kChunk) {
+    } else if (kind == kChunkRecord) {
       open_chunk(record);
     } else if (take(record, message)) {
       return true;

@@ -22,7 +22,6 @@ using Json = nlohmann::json;
 constexpr double kFirst_deg = 4.0;
 constexpr double kLargest_deg = 20.0;
 constexpr int kRuns = 4;
-constexpr std::size_t kCoarse = 2;  // index in `coupling_meshes`
 constexpr std::array kMeshNames{"fine", "medium", "coarse"};
 
 /// A dimension that the search varies. The flank is varied by its curvature, which is continuous where
@@ -131,10 +130,10 @@ bool dominates(const LimitPoint& one, const LimitPoint& other) {
 
 void find_front(std::vector<CouplingCandidate>& candidates) {
   for (CouplingCandidate& each : candidates) {
-    const auto& point = each.at_limit[kCoarse];
+    const auto& point = each.at_limit[kCoarseMesh];
     each.is_on_front =
         point && std::ranges::none_of(candidates, [&](const auto& other) {
-          return other.at_limit[kCoarse] && dominates(*other.at_limit[kCoarse], *point);
+          return other.at_limit[kCoarseMesh] && dominates(*other.at_limit[kCoarseMesh], *point);
         });
   }
 }
@@ -164,10 +163,10 @@ std::vector<std::size_t> best_on(const std::vector<CouplingCandidate>& candidate
 
 std::size_t reference_of(const std::vector<CouplingCandidate>& seven) {
   const auto work = [](const CouplingCandidate& each) {
-    return each.at_limit[kCoarse] ? each.at_limit[kCoarse]->work_J : -1.0;
+    return each.at_limit[kCoarseMesh] ? each.at_limit[kCoarseMesh]->work_J : -1.0;
   };
   const auto most = std::ranges::max_element(seven, {}, work);
-  if (!most->at_limit[kCoarse])
+  if (!most->at_limit[kCoarseMesh])
     throw Error({.place = "search for a coupling",
                  .problem = "none of the seven geometries reaches the strain limit",
                  .advice = "Take a smaller limit."});
@@ -198,7 +197,7 @@ class Search {
         progress_(progress),
         evaluator_(settings),
         random_(settings.seed),
-        stages_{{{kCoarse, settings.shapes, 0.2, 0.02},
+        stages_{{{kCoarseMesh, settings.shapes, 0.2, 0.02},
                  {1, settings.shapes / 3, 0.05, 0.02},
                  {0, settings.shapes / 6, 0.03, 0.01}}} {
     expected_ = paper_lobes().size() + stages_[0].shapes + stages_[1].shapes + stages_[2].shapes +
@@ -210,14 +209,14 @@ class Search {
     for (const NamedLobe& lobe : paper_lobes()) {
       candidates.push_back({.name = std::string(lobe.name),
                             .shape = scaled(lobe.shape, settings_.demand.shape.outer_radius_mm)});
-      evaluate(candidates.size() - 1, kCoarse);
+      evaluate(candidates.size() - 1, kCoarseMesh);
     }
     found_.reference = reference_of(candidates);
     for (const Stage& stage : stages_) run(stage);
     find_front(candidates);
     const auto best = best_on(candidates, found_.reference, 0, 1);
     found_.best = best.empty() ? found_.reference : best.front();
-    for (std::size_t mesh = kCoarse + 1; mesh-- > 0;)
+    for (std::size_t mesh = kCoarseMesh + 1; mesh-- > 0;)
       found_.gains.push_back({kMeshNames.at(mesh), candidates[found_.best].at_limit.at(mesh),
                               candidates[found_.reference].at_limit.at(mesh)});
     return std::move(found_);
@@ -228,7 +227,7 @@ class Search {
 
   void run(const Stage& stage) {
     auto& candidates = found_.candidates;
-    if (stage.mesh < kCoarse) {
+    if (stage.mesh < kCoarseMesh) {
       evaluate(found_.reference, stage.mesh);
       for (const std::size_t i : best_on(candidates, found_.reference, stage.mesh + 1, kKept))
         evaluate(i, stage.mesh);
@@ -247,7 +246,7 @@ class Search {
   /// On the coarse mesh every second shape comes from anywhere on the front, all others from the best one.
   std::size_t parent_of(const Stage& stage, std::size_t i) {
     auto& candidates = found_.candidates;
-    if (stage.mesh == kCoarse && i % 2 == 1) {
+    if (stage.mesh == kCoarseMesh && i % 2 == 1) {
       find_front(candidates);
       std::vector<std::size_t> front;
       for (std::size_t k = 0; k < candidates.size(); ++k)

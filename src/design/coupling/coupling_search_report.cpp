@@ -7,14 +7,13 @@
 namespace torsio::design {
 namespace {
 
-constexpr double kUseful = 0.1;     // gain that the search looks for
-constexpr std::size_t kCoarse = 2;  // index in `coupling_meshes`
+constexpr double kUseful = 0.1;  // gain that the search looks for
 
 DesignSection seven_section(const CouplingSearch& search) {
   DesignSection section{"geometries_of_paper_003"};
   for (const CouplingCandidate& each : search.candidates) {
     if (each.name.empty()) continue;
-    const auto& point = each.at_limit[kCoarse];
+    const auto& point = each.at_limit[kCoarseMesh];
     section.figures.push_back(
         {each.name + "_torque", point ? point->torque_Nm : kNotMeasured, "Nm",
          point ? fmt::format("at {:.4g} deg, {:.3g} J stored{}", point->angle_deg, point->work_J,
@@ -66,7 +65,7 @@ XyFigure front_figure(const CouplingSearch& search) {
                  .y = {}};
   std::vector<LimitPoint> front;
   for (const CouplingCandidate& each : search.candidates) {
-    const auto& point = each.at_limit[kCoarse];
+    const auto& point = each.at_limit[kCoarseMesh];
     if (!point) continue;
     XySeries& series = each.name.empty() ? tried : seven;
     series.x.push_back(point->angle_deg);

@@ -20,8 +20,8 @@ constexpr double kTolerance = 0.2;  // 10 K, and the load at which the drive sli
 constexpr double kSmallest = 0.5;
 constexpr double kSlidingShare = 0.05;  // share of the quantile of the speed
 constexpr double kSpeedQuantile = 0.95;
-constexpr double kLeastFriction = 0.5;  // over the error of the reference
-constexpr std::size_t kDirection = 2;   // column of sgn w
+constexpr double kLeastDriveFriction = 0.5;  // over the error of the reference
+constexpr std::size_t kDirection = 2;        // column of sgn w
 
 /// The motor current among the inputs of the reference; empty: it has none.
 std::string current_of(const ModelFile& reference, double sample_rate_Hz) {
@@ -119,7 +119,7 @@ std::optional<DriftQuantity> drive_friction(const ModelFile& reference, const Da
   const Matrix columns = columns_of(of, before);
   const DirectionFit fit = fit_directions(columns, of.residual, options.resamples, options.seed);
   const double error = fit.residual_rms();
-  if (!(before > kLeastFriction * error)) {
+  if (!(before > kLeastDriveFriction * error)) {
     result.reason =
         "the reference has no friction of the drive above its error: give it an input with the "
         "direction of motion, as tanh(lowpass(rate(motor_angle_rad), 50Hz) / 0.6), and --set "

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::array kFactors{1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0};
 constexpr double kLargestRatio = 1.01;
-constexpr std::size_t kEvery = 11;  // sums of squares over a minute need no more
+constexpr std::size_t kFactorsEvery = 11;  // sums of squares over a minute need no more
 
 /// Squared errors over a segment of a recording.
 struct ErrorSums {
@@ -21,27 +21,27 @@ struct ErrorSums {
   double combined = 0.0;
 };
 
-struct Segment {
+struct RunSegment {
   const MeasuredRun* run;
   std::size_t begin;
   std::size_t end;
 };
 
-std::vector<Segment> segments_of(std::span<const MeasuredRun> runs, std::size_t length) {
-  std::vector<Segment> segments;
+std::vector<RunSegment> segments_of(std::span<const MeasuredRun> runs, std::size_t length) {
+  std::vector<RunSegment> segments;
   for (const MeasuredRun& run : runs)
     for (std::size_t begin = 0; begin < run.torque_Nm.size(); begin += length)
       segments.push_back({&run, begin, std::min(begin + length, run.torque_Nm.size())});
   return segments;
 }
 
-ErrorSums error_sums(const RedundancySettings& settings, const Segment& segment) {
+ErrorSums error_sums(const RedundancySettings& settings, const RunSegment& segment) {
   Redundancy redundancy(settings);
   const MeasuredRun& run = *segment.run;
   const std::vector<SourceRun>& sources = *run.sources;
   ErrorSums sums{.sources = std::vector<double>(sources.size(), 0.0)};
   std::vector<Estimate> estimates(sources.size());
-  for (std::size_t n = segment.begin; n < segment.end; n += kEvery) {
+  for (std::size_t n = segment.begin; n < segment.end; n += kFactorsEvery) {
     bool is_usable = std::isfinite(run.torque_Nm[n]);
     for (std::size_t i = 0; i < sources.size(); ++i) {
       estimates[i].value = sources[i].value_Nm[n];
@@ -62,9 +62,9 @@ std::vector<double> combination_factors(const RedundancySettings& settings,
                                         std::span<const MeasuredRun> runs, std::size_t segment) {
   const DenormalsOff denormals_off;
   const std::size_t count = settings.sources.size();
-  const std::vector<Segment> segments = segments_of(runs, segment);
+  const std::vector<RunSegment> segments = segments_of(runs, segment);
   std::vector<double> totals(count, 0.0);
-  for (const Segment& each : segments) {
+  for (const RunSegment& each : segments) {
     const ErrorSums sums = error_sums(settings, each);
     for (std::size_t i = 0; i < count; ++i) totals[i] += sums.sources[i];
   }
@@ -74,7 +74,7 @@ std::vector<double> combination_factors(const RedundancySettings& settings,
   for (const double factor : kFactors) {
     tried.error_bar_factors.assign(count, factor);
     tried.error_bar_factors[best] = 1.0;
-    const bool is_enough = std::ranges::all_of(segments, [&](const Segment& each) {
+    const bool is_enough = std::ranges::all_of(segments, [&](const RunSegment& each) {
       const ErrorSums sums = error_sums(tried, each);
       return std::sqrt(sums.combined) <= kLargestRatio * std::sqrt(sums.sources[best]);
     });

@@ -32,8 +32,8 @@ class PairStatistics {
         watched_(samples_of(kCalibrationBlock_s, rate_Hz)) {}
 
   void add_spreads(const std::vector<SourceRun>& runs) {
-    constexpr std::size_t kEvery = 97;  // the median needs no more
-    for (std::size_t n = 0; n < runs[0].value_Nm.size(); n += kEvery)
+    constexpr std::size_t kMedianEvery = 97;  // the median needs no more
+    for (std::size_t n = 0; n < runs[0].value_Nm.size(); n += kMedianEvery)
       if (is_valid(runs, n)) spreads_.push_back(spread(runs, n));
   }
 

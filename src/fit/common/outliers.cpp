@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kShareOutside = 1e-3;  // 99.9 % are inside
 
-struct Range {
+struct RobustRange {
   double middle = 0.0;
   double width = 0.0;
 };
@@ -23,7 +23,7 @@ std::vector<double> first(std::vector<double>& values, std::size_t count, Before
 }
 
 /// The shortest interval without `outside` values. Both lists have one value more than that.
-Range shortest_range(const std::vector<double>& lowest, const std::vector<double>& highest) {
+RobustRange shortest_range(const std::vector<double>& lowest, const std::vector<double>& highest) {
   const std::size_t outside = lowest.size() - 1;
   std::size_t best = 0;
   const auto width = [&](std::size_t below) { return highest[outside - below] - lowest[below]; };
@@ -40,7 +40,7 @@ struct Side {
 
 /// @param outermost first, the values of one side
 /// @param most outliers
-Side side_of(const std::vector<double>& outermost, const Range& range, std::size_t most) {
+Side side_of(const std::vector<double>& outermost, const RobustRange& range, std::size_t most) {
   Side side;
   for (std::size_t i = 0; i < most && i + 1 < outermost.size(); ++i) {
     if (!(std::abs(outermost[i] - range.middle) > 0.5 * kOutlierStretch * range.width)) break;
@@ -60,7 +60,7 @@ OutlierLimits outlier_limits(std::vector<double>& values) {
   const std::size_t outside = static_cast<std::size_t>(kShareOutside * samples) + 1;
   const std::vector<double> lowest = first(values, outside, std::less<>());
   const std::vector<double> highest = first(values, outside, std::greater<>());
-  Range range = shortest_range(lowest, highest);
+  RobustRange range = shortest_range(lowest, highest);
   if (!(range.width > 0.0)) range.width = std::max(1.0, std::abs(range.middle));
   const bool lower_first = range.middle - lowest.front() > highest.front() - range.middle;
   Side below = side_of(lowest, range, lower_first ? most : 0);

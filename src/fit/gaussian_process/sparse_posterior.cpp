@@ -19,14 +19,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Jitter kJitter{.first = 1e-8};
+constexpr Jitter kPosteriorJitter{.first = 1e-8};
 constexpr std::size_t kChunk = 512;
 
 /// L of K with its jitter. @returns the jitter, negative if K has none.
 double lower_factor(const Kernel& kernel, const Matrix& points, MatrixXd& lower) {
   const PackedPoints packed(points);
   SquareMatrix factor(points.rows);
-  const double jitter = factorise_covariance(kernel, points, packed, 0.0, kJitter, factor);
+  const double jitter = factorise_covariance(kernel, points, packed, 0.0, kPosteriorJitter, factor);
   const auto size = static_cast<Index>(points.rows);
   lower.setZero(size, size);
   for (std::size_t i = 0; i < points.rows; ++i)

@@ -17,7 +17,7 @@ constexpr std::size_t kThresholds = 8;
 /// The largest threshold is this share of half the range. Elements with larger ones hardly slip: they
 /// follow the coordinate itself, and with it what loads the drive at this angle.
 constexpr double kLargestThreshold = 0.25;
-constexpr std::array<std::size_t, BankChoice::kMaxSlips + 1> kSlips{0, 2, 4, 8};
+constexpr std::array<std::size_t, BankChoice::kMaxSlips + 1> kBankSlips{0, 2, 4, 8};
 constexpr std::array kPeriods{1.0, 4.0, 16.0};  // time constants, in samples
 
 std::size_t knots_at(std::size_t level) { return (std::size_t{1} << level) + 1; }
@@ -126,7 +126,7 @@ InputBank bank_of(const InputBank& finest, const BankChoice& choice) {
     return evenly(fine.front(), fine.back(), count);
   };
   InputBank own{.input = finest.input, .is_integrated = finest.is_integrated};
-  const std::size_t slips = finest.thresholds.empty() ? 0 : kSlips[choice.slips];
+  const std::size_t slips = finest.thresholds.empty() ? 0 : kBankSlips[choice.slips];
   for (std::size_t i = 0; i < slips; ++i)
     own.thresholds.push_back(finest.thresholds[finest_of(i, slips)]);
   own.force_knots =

@@ -16,7 +16,7 @@ namespace torsio {
 namespace {
 
 using nearest_kernel::kFarAway;
-using nearest_kernel::kLanes;
+constexpr std::size_t kSearchLanes = nearest_kernel::kLanes;
 
 void check_range(const char* name, double value, double low, double high) {
   if (value >= low && value <= high) return;
@@ -93,7 +93,7 @@ OnlineMixture::OnlineMixture(Standardisation standardisation, const OnlineMixtur
   pairings_.resize(slots);
   means_ = Matrix(slots, dimension_);
   scatters_ = Matrix(slots, dimension_ * dimension_);
-  search_.assign((slots + kLanes - 1) / kLanes * kLanes * dimension_, kFarAway);
+  search_.assign((slots + kSearchLanes - 1) / kSearchLanes * kSearchLanes * dimension_, kFarAway);
   sample_.resize(dimension_);
   merged_.resize(dimension_ * dimension_);
   lightest_.reserve(settings_.merge_candidates + 1);
@@ -119,8 +119,8 @@ void OnlineMixture::learn(std::span<const double> sample) {
 OnlineMixture::Nearest OnlineMixture::nearest(std::span<const double> at) const {
   std::array<float, kMaxMixtureQuantities> point;
   for (std::size_t j = 0; j < dimension_; ++j) point[j] = static_cast<float>(at[j]);
-  const std::size_t found = nearest_kernel::nearest(search_.data(), (size_ + kLanes - 1) / kLanes,
-                                                    dimension_, point.data());
+  const std::size_t found = nearest_kernel::nearest(
+      search_.data(), (size_ + kSearchLanes - 1) / kSearchLanes, dimension_, point.data());
   double square = 0.0;
   for (std::size_t j = 0; j < dimension_; ++j) {
     const double offset = at[j] - means_(found, j);
@@ -155,8 +155,10 @@ void OnlineMixture::place(std::size_t component) {
 void OnlineMixture::set_mean(std::size_t component, std::span<const double> mean) {
   ++versions_[component];
   std::copy(mean.begin(), mean.end(), means_.row(component).begin());
-  float* point = search_.data() + component / kLanes * kLanes * dimension_ + component % kLanes;
-  for (std::size_t j = 0; j < dimension_; ++j) point[j * kLanes] = static_cast<float>(mean[j]);
+  float* point = search_.data() + component / kSearchLanes * kSearchLanes * dimension_ +
+                 component % kSearchLanes;
+  for (std::size_t j = 0; j < dimension_; ++j)
+    point[j * kSearchLanes] = static_cast<float>(mean[j]);
 }
 
 void OnlineMixture::find_lightest() {
@@ -185,7 +187,8 @@ const OnlineMixture::Pairing& OnlineMixture::pairing(std::size_t component) {
 }
 
 std::size_t OnlineMixture::neighbour(std::size_t component) {
-  float* point = search_.data() + component / kLanes * kLanes * dimension_ + component % kLanes;
+  float* point = search_.data() + component / kSearchLanes * kSearchLanes * dimension_ +
+                 component % kSearchLanes;
   const float kept = *point;
   *point = kFarAway;  // hides the component from its own search
   const std::size_t found = nearest(means_.row(component)).component;

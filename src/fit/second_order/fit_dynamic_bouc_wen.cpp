@@ -20,8 +20,6 @@
 namespace torsio {
 namespace {
 
-using Parameters = DynamicBoucWen::Parameters;
-
 /// A mass on a spring: what a Bouc-Wen element is not yet part of.
 struct Oscillator {
   double rate_per_s = 0.0;     ///< sqrt(k / m)
@@ -30,7 +28,7 @@ struct Oscillator {
   double miss = HUGE_VAL;  ///< sum of squares over the target's
 };
 
-Parameters of(const Oscillator& oscillator, Parameters with) {
+DynamicBoucWen::Parameters of(const Oscillator& oscillator, DynamicBoucWen::Parameters with) {
   with.stiffness = oscillator.stiffness;
   with.mass = oscillator.stiffness / (oscillator.rate_per_s * oscillator.rate_per_s);
   with.damping = 2.0 * oscillator.damping_ratio * oscillator.stiffness / oscillator.rate_per_s;
@@ -38,7 +36,7 @@ Parameters of(const Oscillator& oscillator, Parameters with) {
 }
 
 /// Computes stiffness and miss: from rest, the compliance that explains most of the target.
-void evaluate(Oscillator& oscillator, const TrainingData& data, Parameters with) {
+void evaluate(Oscillator& oscillator, const TrainingData& data, DynamicBoucWen::Parameters with) {
   constexpr std::size_t kMaxSamples = 8000;
   oscillator.stiffness = 1.0;
   with = of(oscillator, with);
@@ -62,7 +60,7 @@ void evaluate(Oscillator& oscillator, const TrainingData& data, Parameters with)
   oscillator.miss = 1.0 - output_target * output_target / (output_output * target_target);
 }
 
-Oscillator best_oscillator(const TrainingData& data, const Parameters& with,
+Oscillator best_oscillator(const TrainingData& data, const DynamicBoucWen::Parameters& with,
                            const Progress& progress) {
   constexpr int kRates = 60;
   const double slowest = 2.0 * std::numbers::pi * data.sample_rate_Hz / 4000.0;
@@ -86,14 +84,15 @@ Oscillator best_oscillator(const TrainingData& data, const Parameters& with,
 }
 
 /// The parameters that are searched: the mass on its spring, the element, gains but the first.
-std::vector<double> listed(const Parameters& p, bool with_exponent) {
+std::vector<double> listed(const DynamicBoucWen::Parameters& p, bool with_exponent) {
   std::vector<double> all{p.mass, p.damping, p.stiffness, p.hysteretic_stiffness, p.loss, p.skew};
   if (with_exponent) all.push_back(p.exponent);
   all.insert(all.end(), p.gains.begin() + 1, p.gains.end());
   return all;
 }
 
-Parameters with_listed(Parameters p, std::span<const double> listed) {
+DynamicBoucWen::Parameters with_listed(DynamicBoucWen::Parameters p,
+                                       std::span<const double> listed) {
   const std::array fields{&p.mass, &p.damping, &p.stiffness, &p.hysteretic_stiffness,
                           &p.loss, &p.skew,    &p.exponent};
   const std::size_t further = p.gains.size() - 1;
@@ -110,7 +109,7 @@ double largest_target(const TrainingData& data) {
 }
 
 /// As `listed`; typical sizes from a mass on a spring of about the same motion.
-std::vector<SearchedParameter> searched(const Parameters& linear, double largest,
+std::vector<SearchedParameter> searched(const DynamicBoucWen::Parameters& linear, double largest,
                                         const TrainingData& data, bool with_exponent) {
   const std::string y = unit_label(data.target);
   const std::string u = unit_label(data.inputs[0].expression);
@@ -138,7 +137,8 @@ std::vector<SearchedParameter> searched(const Parameters& linear, double largest
   return all;
 }
 
-SimulatedModel simulated(std::vector<SearchedParameter> parameters, const Parameters& with) {
+SimulatedModel simulated(std::vector<SearchedParameter> parameters,
+                         const DynamicBoucWen::Parameters& with) {
   return {.parameters = std::move(parameters),
           .run =
               [with](std::span<const double> values, std::span<const double> state,
@@ -150,8 +150,8 @@ SimulatedModel simulated(std::vector<SearchedParameter> parameters, const Parame
 }
 
 /// The spring shared between the linear and the hysteretic part, bent to either side.
-std::vector<std::vector<double>> hysteretic_starts(const Parameters& linear, double largest,
-                                                   bool with_exponent) {
+std::vector<std::vector<double>> hysteretic_starts(const DynamicBoucWen::Parameters& linear,
+                                                   double largest, bool with_exponent) {
   struct Bend {
     double loss;
     double skew;
@@ -159,7 +159,7 @@ std::vector<std::vector<double>> hysteretic_starts(const Parameters& linear, dou
   std::vector<std::vector<double>> starts;
   for (const double share : {0.2, 0.5, 0.8})
     for (const Bend bend : {Bend{0.3, 0.0}, Bend{0.5, -0.5}, Bend{1.5, 0.5}, Bend{1.5, -2.0}}) {
-      Parameters p = linear;
+      DynamicBoucWen::Parameters p = linear;
       p.stiffness = (1.0 - share) * linear.stiffness;
       p.hysteretic_stiffness = share * linear.stiffness;
       const double size =
@@ -182,13 +182,13 @@ Fitted<DynamicBoucWen> fit_dynamic_bouc_wen(const TrainingData& data,
   const bool searches_exponent = std::isnan(options.exponent);
   std::vector<double> gains(data.input_count(), 0.0);
   gains[0] = 1.0;
-  Parameters linear{.exponent = searches_exponent ? 1.5 : options.exponent,
-                    .gains = gains,
-                    .time = {.sample_period_s = 1.0 / data.sample_rate_Hz,
-                             .substeps = options.substeps,
-                             .input_order = options.input_order},
-                    .lowest = stops.lowest,
-                    .highest = stops.highest};
+  DynamicBoucWen::Parameters linear{.exponent = searches_exponent ? 1.5 : options.exponent,
+                                    .gains = gains,
+                                    .time = {.sample_period_s = 1.0 / data.sample_rate_Hz,
+                                             .substeps = options.substeps,
+                                             .input_order = options.input_order},
+                                    .lowest = stops.lowest,
+                                    .highest = stops.highest};
   linear = of(best_oscillator(data, linear, progress), linear);
   const double largest = largest_target(data);
   SimulationFitOptions search{.first_horizon = options.first_horizon,

@@ -22,8 +22,6 @@
 namespace torsio {
 namespace {
 
-using Parameters = RigidDrive::Parameters;
-
 /// Samples of a free run that determine its start: in the fit as in a score (`--initialise`).
 constexpr std::size_t kStartSamples = 50;
 
@@ -40,49 +38,49 @@ struct Scale {
   }
 };
 
-/// A number of `Parameters` that may be searched for.
+/// A number of `RigidDrive::Parameters` that may be searched for.
 struct Field {
   SearchedParameter searched;
-  double& (*place)(Parameters&);
+  double& (*place)(RigidDrive::Parameters&);
   double start = 0.0;
 };
 
-/// The place of a number of `Parameters`.
-template <double Parameters::*Member>
-double& of_drive(Parameters& parameters) {
+/// The place of a number of `RigidDrive::Parameters`.
+template <double RigidDrive::Parameters::*Member>
+double& of_drive(RigidDrive::Parameters& parameters) {
   return parameters.*Member;
 }
 
 /// The place of a number of its `VariableFriction`, which it has from then on.
 template <double VariableFriction::*Member>
-double& of_variable(Parameters& parameters) {
+double& of_variable(RigidDrive::Parameters& parameters) {
   if (!parameters.variable_friction) parameters.variable_friction.emplace();
   return (*parameters.variable_friction).*Member;
 }
 
-std::vector<Field> basic_fields(const Parameters& p, const Scale& scale) {
+std::vector<Field> basic_fields(const RigidDrive::Parameters& p, const Scale& scale) {
   return {{{.name = "inertia",
             .unit = scale.per_target(" s^2"),
             .typical = p.inertia,
             .lowest = 1e-3 * p.inertia},
-           of_drive<&Parameters::inertia>,
+           of_drive<&RigidDrive::Parameters::inertia>,
            p.inertia},
           {{.name = "viscous",
             .unit = scale.per_target(" s"),
             .typical = std::max(p.viscous, p.coulomb / scale.speed),
             .lowest = 0.0},
-           of_drive<&Parameters::viscous>,
+           of_drive<&RigidDrive::Parameters::viscous>,
            p.viscous},
           {{.name = "coulomb",
             .unit = scale.force_unit,
             .typical = std::max(p.coulomb, 0.1 * p.viscous * scale.speed),
             .lowest = 0.0},
-           of_drive<&Parameters::coulomb>,
+           of_drive<&RigidDrive::Parameters::coulomb>,
            p.coulomb},
           {{.name = "offset",
             .unit = scale.force_unit,
             .typical = std::max(p.coulomb, 0.1 * p.viscous * scale.speed)},
-           of_drive<&Parameters::offset>,
+           of_drive<&RigidDrive::Parameters::offset>,
            p.offset}};
 }
 
@@ -92,80 +90,80 @@ std::string energy_unit(const Scale& scale) {
 
 struct Term {
   std::string_view name;
-  std::vector<Field> (*fields)(const Parameters&, const Scale&);
+  std::vector<Field> (*fields)(const RigidDrive::Parameters&, const Scale&);
 };
 
 const std::array<Term, 9> kTerms{{
     {"stribeck",
-     [](const Parameters&, const Scale& scale) {
+     [](const RigidDrive::Parameters&, const Scale& scale) {
        return std::vector<Field>{
            {{.name = "static_ratio", .unit = "", .typical = 1.0, .lowest = 1.0, .highest = 20.0},
-            of_drive<&Parameters::static_ratio>,
+            of_drive<&RigidDrive::Parameters::static_ratio>,
             1.3},
            {{.name = "stribeck_speed",
              .unit = scale.target_unit.empty() ? "" : scale.target_unit + "/s",
              .typical = 0.05 * scale.speed,
              .lowest = 1e-3 * scale.speed,
              .highest = scale.speed},
-            of_drive<&Parameters::stribeck_speed>,
+            of_drive<&RigidDrive::Parameters::stribeck_speed>,
             0.05 * scale.speed}};
      }},
     {"lugre",
-     [](const Parameters&, const Scale& scale) {
+     [](const RigidDrive::Parameters&, const Scale& scale) {
        return std::vector<Field>{{{.name = "bristle",
                                    .unit = scale.target_unit,
                                    .typical = 1e-3 * scale.travel,
                                    .lowest = 1e-6 * scale.travel,
                                    .highest = 0.1 * scale.travel},
-                                  of_drive<&Parameters::bristle>,
+                                  of_drive<&RigidDrive::Parameters::bristle>,
                                   1e-3 * scale.travel}};
      }},
     {"asymmetry",
-     [](const Parameters& p, const Scale& scale) {
+     [](const RigidDrive::Parameters& p, const Scale& scale) {
        return std::vector<Field>{{{.name = "viscous_asymmetry",
                                    .unit = scale.per_target(" s"),
                                    .typical = 0.1 * std::max(p.viscous, p.coulomb / scale.speed)},
-                                  of_drive<&Parameters::viscous_asymmetry>,
+                                  of_drive<&RigidDrive::Parameters::viscous_asymmetry>,
                                   0.0}};
      }},
     {"quadratic",
-     [](const Parameters& p, const Scale& scale) {
+     [](const RigidDrive::Parameters& p, const Scale& scale) {
        const double size = std::max(p.viscous, p.coulomb / scale.speed) / scale.speed;
        return std::vector<Field>{
            {{.name = "viscous_quadratic",
              .unit = scale.per_target(" s^2") + (scale.target_unit.empty() ? "" : "^2"),
              .typical = size,
              .lowest = 0.0},
-            of_drive<&Parameters::viscous_quadratic>,
+            of_drive<&RigidDrive::Parameters::viscous_quadratic>,
             0.05 * size}};
      }},
     {"spring",
-     [](const Parameters& p, const Scale& scale) {
+     [](const RigidDrive::Parameters& p, const Scale& scale) {
        return std::vector<Field>{
            {{.name = "spring",
              .unit = scale.per_target(""),
              .typical = std::max(p.coulomb, 0.1 * p.viscous * scale.speed) / scale.travel},
-            of_drive<&Parameters::spring>,
+            of_drive<&RigidDrive::Parameters::spring>,
             0.0}};
      }},
     {"position",
-     [](const Parameters&, const Scale& scale) {
+     [](const RigidDrive::Parameters&, const Scale& scale) {
        return std::vector<Field>{
            {{.name = "coulomb_slope",
              .unit = scale.target_unit.empty() ? "" : fmt::format("1/{}", scale.target_unit),
              .typical = 1.0 / scale.travel},
-            of_drive<&Parameters::coulomb_slope>,
+            of_drive<&RigidDrive::Parameters::coulomb_slope>,
             0.0}};
      }},
     {"load",
-     [](const Parameters&, const Scale&) {
+     [](const RigidDrive::Parameters&, const Scale&) {
        return std::vector<Field>{
            {{.name = "load_share", .unit = "", .typical = 0.05, .lowest = 0.0, .highest = 0.9},
             of_variable<&VariableFriction::load_share>,
             0.02}};
      }},
     {"dwell",
-     [](const Parameters&, const Scale&) {
+     [](const RigidDrive::Parameters&, const Scale&) {
        return std::vector<Field>{
            {{.name = "dwell_gain", .unit = "", .typical = 0.2, .lowest = 0.0, .highest = 20.0},
             of_variable<&VariableFriction::dwell_gain>,
@@ -175,7 +173,7 @@ const std::array<Term, 9> kTerms{{
             0.5}};
      }},
     {"heating",
-     [](const Parameters& p, const Scale& scale) {
+     [](const RigidDrive::Parameters& p, const Scale& scale) {
        const double power = scale.speed * (p.coulomb + p.viscous * scale.speed);
        const double size = 0.1 / (10.0 * std::max(power, 1e-300));  // 10 % after 10 s
        return std::vector<Field>{
@@ -222,8 +220,8 @@ std::string names_of(const TermSet& set) {
 }
 
 /// Sets the searched parameters; the gains of the inputs after the first follow them.
-Parameters with_fields(Parameters p, const std::vector<Field>& fields,
-                       std::span<const double> values) {
+RigidDrive::Parameters with_fields(RigidDrive::Parameters p, const std::vector<Field>& fields,
+                                   std::span<const double> values) {
   for (std::size_t i = 0; i < fields.size(); ++i) fields[i].place(p) = values[i];
   std::ranges::copy(values.subspan(fields.size()), p.gains.begin() + 1);
   return p;
@@ -233,14 +231,14 @@ Parameters with_fields(Parameters p, const std::vector<Field>& fields,
 struct Candidate {
   std::vector<Field> fields;
   SimulatedModel model;
-  Parameters with;
+  RigidDrive::Parameters with;
 
-  [[nodiscard]] Parameters parameters(std::span<const double> values) const {
+  [[nodiscard]] RigidDrive::Parameters parameters(std::span<const double> values) const {
     return with_fields(with, fields, values);
   }
 };
 
-Candidate candidate(const Parameters& with, const Scale& scale, const TermSet& set) {
+Candidate candidate(const RigidDrive::Parameters& with, const Scale& scale, const TermSet& set) {
   Candidate made{.fields = basic_fields(with, scale), .model = {}, .with = with};
   for (const Term* term : set) {
     const std::vector<Field> more = term->fields(with, scale);
@@ -260,7 +258,7 @@ Candidate candidate(const Parameters& with, const Scale& scale, const TermSet& s
 }
 
 /// The basic numbers of a guess, its further gains, and the terms where they start.
-std::vector<double> start_of(const Candidate& made, Parameters guess) {
+std::vector<double> start_of(const Candidate& made, RigidDrive::Parameters guess) {
   constexpr std::size_t kBasic = 4;
   std::vector<double> start;
   for (std::size_t i = 0; i < made.fields.size(); ++i)
@@ -305,8 +303,8 @@ struct Choice {
 };
 
 /// Forward selection: the term that helps most, as long as one helps.
-Choice chosen_terms(const Parameters& with, const Scale& scale, const TrainingData& data,
-                    const Progress& progress) {
+Choice chosen_terms(const RigidDrive::Parameters& with, const Scale& scale,
+                    const TrainingData& data, const Progress& progress) {
   constexpr std::size_t kBlocks = 4;
   // Blocks of one record are much alike: a term that only repeats them gains some percent, too.
   constexpr double kWorthIt = 0.9;
@@ -355,7 +353,7 @@ Fitted<RigidDrive> fit_rigid_drive(const TrainingData& data, const RigidDriveOpt
   const InverseDynamics inverse = inverse_dynamics(data, options.gain);
   std::vector<double> gains(data.input_count(), 0.0);
   gains[0] = options.gain;
-  std::vector<Parameters> guesses;
+  std::vector<RigidDrive::Parameters> guesses;
   for (const DriveGuess& guess : inverse.guesses)
     guesses.push_back({.inertia = guess.inertia,
                        .viscous = guess.viscous,
@@ -380,9 +378,9 @@ Fitted<RigidDrive> fit_rigid_drive(const TrainingData& data, const RigidDriveOpt
   Candidate made = candidate(guesses.front(), scale, {});
   std::vector<std::vector<double>> starts;
   starts.reserve(guesses.size());
-  for (const Parameters& guess : guesses) starts.push_back(start_of(made, guess));
+  for (const RigidDrive::Parameters& guess : guesses) starts.push_back(start_of(made, guess));
   SimulationFit fit = fit_by_simulation(made.model, data, starts, search);
-  const Parameters basic = made.parameters(fit.parameters);
+  const RigidDrive::Parameters basic = made.parameters(fit.parameters);
   Choice choice{.terms = named.value_or(TermSet{}), .notes = {}};
   if (!named) choice = chosen_terms(basic, scale, data, progress);
   if (!choice.terms.empty()) {

@@ -41,10 +41,6 @@ constexpr double kLargestFriction = 0.50;
 constexpr const char* kStiffness = "stiffness";
 constexpr const char* kFriction = "friction";
 
-double between(Random& random, double lowest, double highest) {
-  return lowest + (highest - lowest) * random.uniform();
-}
-
 /// The recordings of the calibration, and those afterwards, which differ in their motion.
 std::vector<ExperimentSpec> calibration_motions(const DataSheet& sheet) {
   const auto of = [](const char* experiment) { return ExperimentSpec{.experiment = experiment}; };
@@ -70,8 +66,8 @@ std::vector<ExperimentSpec> later_motions(const DataSheet& sheet, Random& random
   const SweepProtocol protocol = sweep_protocol(sheet);
   motions.push_back(
       {.experiment = "sweep",
-       .lever_m = between(random, protocol.train_lever_m[1], protocol.train_lever_m[2]),
-       .inclination_rad = between(random, 0.0, 0.5)});
+       .lever_m = random.uniform(protocol.train_lever_m[1], protocol.train_lever_m[2]),
+       .inclination_rad = random.uniform(0.0, 0.5)});
   motions.push_back({.experiment = "random-walk"});
   return motions;
 }
@@ -97,10 +93,10 @@ struct Mounting {
 
   Mounting(const DataSheet& sheet, Random& random) {
     const double range_Nm = sheet.sensors.torque_range_Nm.value;
-    zero_Nm = range_Nm * between(random, -kZeroSpread, kZeroSpread);
-    gain = between(random, 1.0 - kGainSpread, 1.0 + kGainSpread) *
-           std::cos(between(random, 0.0, kLargestTilt_rad));
-    bending_Nm = range_Nm * between(random, -kBendingSpread, kBendingSpread);
+    zero_Nm = range_Nm * random.uniform(-kZeroSpread, kZeroSpread);
+    gain = random.uniform(1.0 - kGainSpread, 1.0 + kGainSpread) *
+           std::cos(random.uniform(0.0, kLargestTilt_rad));
+    bending_Nm = range_Nm * random.uniform(-kBendingSpread, kBendingSpread);
   }
 
   [[nodiscard]] Recording of(const Recording& before) const {
@@ -172,7 +168,7 @@ std::array<DriftSpecimen, 2> examined(const DriftCampaignSettings& settings, std
   const ModelFile model = calibrated(sheet, settings.family, random);
   const auto examine = [&](const DataSheet& now, DriftSpecimen specimen, bool is_remounted) {
     const double temperature_K = OperatingConditions::kReference_K +
-                                 between(random, -kTemperatureSpread_K, kTemperatureSpread_K);
+                                 random.uniform(-kTemperatureSpread_K, kTemperatureSpread_K);
     Dataset dataset =
         recorded(now, later_motions(sheet, random), temperature_K, Role::test, random);
     if (is_remounted) {
@@ -188,11 +184,11 @@ std::array<DriftSpecimen, 2> examined(const DriftCampaignSettings& settings, std
   // Each actuator takes turns, so that each gets both.
   if ((number / actuators.size() + number) % 2 == 0) {
     changed.changed = kStiffness;
-    changed.amount = sign * between(random, kSmallestStiffness, kLargestStiffness);
+    changed.amount = sign * random.uniform(kSmallestStiffness, kLargestStiffness);
     wear.stiffness = 1.0 + changed.amount;
   } else {
     changed.changed = kFriction;
-    changed.amount = sign * between(random, kSmallestFriction, kLargestFriction);
+    changed.amount = sign * random.uniform(kSmallestFriction, kLargestFriction);
     wear.friction = 1.0 + changed.amount;
   }
   const DriftSpecimen after = examine(worn(sheet, wear), changed, false);

@@ -80,26 +80,22 @@ Duty::Duty(const DataSheet& sheet, const DutySettings& settings, std::uint64_t s
   to_ = drawn_weight();
   from_ = to_;
   load_ = {.inertia_kg_m2 = to_.inertia_kg_m2, .gravity_Nm = to_.gravity_Nm};
-  wanted_rad_ = between(-0.5, 0.5) * limits_.range_rad;
+  wanted_rad_ = random_.uniform(-0.5, 0.5) * limits_.range_rad;
   rest_left_ = ticks_between(kShortestRest_s, kShortRest_s);
   next_weight_ = ticks_between(kShortestWeight_s, kLongestWeight_s);
   next_impact_ = ticks_between(0.0, 2.0 * kImpactGap_s);
-  temperature_K_ = between(settings_.coldest_K, settings_.hottest_K);
-  wear_ = between(settings_.min_friction, settings_.max_friction);
-}
-
-double Duty::between(double lowest, double highest) noexcept {
-  return lowest + (highest - lowest) * random_.uniform();
+  temperature_K_ = random_.uniform(settings_.coldest_K, settings_.hottest_K);
+  wear_ = random_.uniform(settings_.min_friction, settings_.max_friction);
 }
 
 std::size_t Duty::ticks_between(double shortest_s, double longest_s) noexcept {
-  return 1 + static_cast<std::size_t>(between(shortest_s, longest_s) * kBenchRate_Hz);
+  return 1 + static_cast<std::size_t>(random_.uniform(shortest_s, longest_s) * kBenchRate_Hz);
 }
 
 // The lever is short enough for the loop, whatever its weight.
 Duty::Weight Duty::drawn_weight() noexcept {
   const double gravity_Nm = settings_.gravity_share * limits_.torque_Nm * random_.uniform();
-  const double length_m = kLeverAt1Nm_m * std::cbrt(limits_.torque_Nm) * between(0.5, 1.0);
+  const double length_m = kLeverAt1Nm_m * std::cbrt(limits_.torque_Nm) * random_.uniform(0.5, 1.0);
   return {.gravity_Nm = gravity_Nm,
           .inertia_kg_m2 = std::clamp(gravity_Nm * length_m / 9.81, 0.0,
                                       std::max(limits_.load_inertia_kg_m2, 0.0))};
@@ -110,7 +106,7 @@ void Duty::begin_move() {
   const double speed_rad_s = top_speed_rad_s_ * std::pow(kSlowestShare, random_.uniform());
   const double acceleration_rad_s2 =
       std::min(kInertialShare * limits_.torque_Nm / inertia_kg_m2, top_speed_rad_s_ / kReachTop_s);
-  double to_rad = between(-1.0, 1.0) * limits_.range_rad;
+  double to_rad = random_.uniform(-1.0, 1.0) * limits_.range_rad;
   const double least_rad = kShortestWay_share * limits_.range_rad;
   if (std::abs(to_rad - wanted_rad_) < least_rad)
     to_rad = wanted_rad_ > 0.0 ? wanted_rad_ - least_rad : wanted_rad_ + least_rad;
@@ -149,7 +145,7 @@ void Duty::begin_impact() noexcept {
   next_impact_ = tick_ + 1 + static_cast<std::size_t>(gap_s * kBenchRate_Hz);
   // Always the same count of draws.
   const std::size_t ticks = ticks_between(kShortestImpact_s, kLongestImpact_s);
-  const double share = between(0.2, 1.0);
+  const double share = random_.uniform(0.2, 1.0);
   const double sign = random_.uniform() < 0.5 ? -1.0 : 1.0;
   const double left_Nm = limits_.torque_Nm * (0.95 - kImpactReserve) -
                          std::abs(load_.gravity_Nm * std::sin(wanted_rad_));
@@ -181,10 +177,10 @@ double Duty::since_impact_s() const noexcept {
 // Each hour has its own temperature and wear, which are approached exponentially.
 void Duty::step_condition() noexcept {
   if (tick_ % kHourTicks == 0) {
-    wanted_K_ = between(temperature_K_, settings_.hottest_K);
-    wanted_wear_ = between(settings_.min_friction, settings_.max_friction);
+    wanted_K_ = random_.uniform(temperature_K_, settings_.hottest_K);
+    wanted_wear_ = random_.uniform(settings_.min_friction, settings_.max_friction);
     if (tick_ != 0 && random_.uniform() < 0.5)
-      wanted_K_ = between(settings_.coldest_K, settings_.hottest_K);
+      wanted_K_ = random_.uniform(settings_.coldest_K, settings_.hottest_K);
   }
   const double share = static_cast<double>(kConditionTicks) / kBenchRate_Hz / kConditionTime_s;
   temperature_K_ += share * (wanted_K_ - temperature_K_);

@@ -51,7 +51,6 @@ class Duty {
     double gravity_Nm = 0.0;
     double inertia_kg_m2 = 0.0;
   };
-  [[nodiscard]] double between(double lowest, double highest) noexcept;
   [[nodiscard]] std::size_t ticks_between(double shortest_s, double longest_s) noexcept;
   [[nodiscard]] Weight drawn_weight() noexcept;
   void begin_move();

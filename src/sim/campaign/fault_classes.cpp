@@ -71,9 +71,6 @@ std::vector<Sensor> sensors_of(const DataSheet& sheet, const MonitoredTorque& mo
   return sensors;
 }
 
-double between(Random& random, double lowest, double highest) {
-  return lowest + (highest - lowest) * random.uniform();
-}
 double between_powers(Random& random, double lowest, double highest) {
   return lowest * std::pow(highest / lowest, random.uniform());
 }
@@ -174,7 +171,7 @@ class Classes {
         [part](Random& random, double size) {
           return fault({.what = part,
                         .kind = FaultKind::broken,
-                        .amount = between(random, 0.0, std::max(0.6 - 0.4 * size, 0.0))});
+                        .amount = random.uniform(0.0, std::max(0.6 - 0.4 * size, 0.0))});
         });
     const double stiffness_Nm_rad =
         std::min(10.0 * second_stage_stiffness(sheet), 0.9 * stiffest_stop(sheet));
@@ -184,7 +181,7 @@ class Classes {
           return fault(
               {.what = part,
                .kind = FaultKind::bottom,
-               .amount = std::max(between(random, 0.05, 0.4) * twist_rad / (1.0 + size), 1.1e-4),
+               .amount = std::max(random.uniform(0.05, 0.4) * twist_rad / (1.0 + size), 1.1e-4),
                .stop_stiffness_Nm_rad = stiffness_Nm_rad});
         });
   }
@@ -229,7 +226,7 @@ class Classes {
         [encoders = encoders_](Random& random, double) {
           return fault({.what = one_of(encoders, random).channel,
                         .kind = FaultKind::zero,
-                        .duration_s = between(random, 0.5, 5.0)});
+                        .duration_s = random.uniform(0.5, 5.0)});
         });
   }
 

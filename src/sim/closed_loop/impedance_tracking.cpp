@@ -24,15 +24,14 @@ namespace torsio {
 namespace {
 
 using Complex = std::complex<double>;
-using Kind = ImpedanceSpec::Kind;
 
-constexpr auto kPlace = "impedance";
+constexpr auto kImpedance = "impedance";
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kLargestAmplitude_Nm = 50.0;  // as the experiments of the bench
-constexpr double kShortest_s = 10.0;
-constexpr double kLongest_s = 3600.0;
-constexpr double kFurthest_rad = 200.0;  // 30 turns: beyond it the loop diverges
-constexpr double kSettling_s = 3.0;      // ten times M / d of the output
+constexpr double kShortestImpedance_s = 10.0;
+constexpr double kLongestImpedance_s = 3600.0;
+constexpr double kFurthest_rad = 200.0;       // 30 turns: beyond it the loop diverges
+constexpr double kImpedanceSettling_s = 3.0;  // ten times M / d of the output
 constexpr double kPeriods = 8.0;
 constexpr double kShortestMeasured_s = 4.0;
 // A whole number of ticks a period, so that the harmonics are orthogonal to each other and to a
@@ -63,7 +62,7 @@ struct Linear {
 
 void require(bool holds, const char* what, std::string expected, double found) {
   if (holds) return;
-  throw UsageError({.place = fmt::format("{} {}", kPlace, what),
+  throw UsageError({.place = fmt::format("{} {}", kImpedance, what),
                     .expected = std::move(expected),
                     .found = fmt::format("{:g}", found)});
 }
@@ -77,8 +76,9 @@ void check(const ImpedanceSpec& spec) {
           "above 0 Nm/rad", spec.torque_gain_Nm_rad);
   require(spec.amplitude_Nm > 0.0 && spec.amplitude_Nm <= kLargestAmplitude_Nm, "amplitude",
           fmt::format("above 0 and at most {:g} Nm", kLargestAmplitude_Nm), spec.amplitude_Nm);
-  require(spec.duration_s >= kShortest_s && spec.duration_s <= kLongest_s, "duration",
-          fmt::format("{:g} to {:g} s", kShortest_s, kLongest_s), spec.duration_s);
+  require(spec.duration_s >= kShortestImpedance_s && spec.duration_s <= kLongestImpedance_s,
+          "duration", fmt::format("{:g} to {:g} s", kShortestImpedance_s, kLongestImpedance_s),
+          spec.duration_s);
 }
 
 double largest_passive_Nm_rad(const TubeImpedance::Settings& settings, double damping_Nms_rad) {
@@ -94,7 +94,7 @@ void require_passive(const TubeImpedance::Settings& settings, const ImpedanceSpe
                                        spec.damping_Nms_rad, spec.torque_gain_Nm_rad);
   const std::string unstable = "unstable without dry friction";
   throw UsageError(
-      {.place = kPlace,
+      {.place = kImpedance,
        .problem = fmt::format("not passive up to {:g} Hz", ImpedanceRun::kPassiveTo_Hz),
        .expected = largest_Nm_rad > 0.0
                        ? fmt::format("at most {:.4g} Nm/rad with {}", largest_Nm_rad, with)
@@ -114,7 +114,7 @@ class ImpedanceBench {
                  std::uint64_t seed)
       : bench_(
             sheet,
-            {.name = kPlace,
+            {.name = kImpedance,
              .duration_s = duration_s,
              .seed = seed,
              .conditions = {},
@@ -135,7 +135,7 @@ class ImpedanceBench {
       const BenchTruth truth = bench_.truth();
       const PlantState& state = truth.plant.state();
       if (!(std::abs(state.joint_angle_rad) < kFurthest_rad))
-        throw Error({.place = fmt::format("{} at {:g} s", kPlace, bench_.time_s()),
+        throw Error({.place = fmt::format("{} at {:g} s", kImpedance, bench_.time_s()),
                      .problem = "the angle of the joint grows without bound",
                      .expected = fmt::format("an angle within {:g} rad", kFurthest_rad),
                      .found = fmt::format("{:g} rad", state.joint_angle_rad)});
@@ -177,7 +177,7 @@ ImpedancePoint point_at(double frequency_Hz, const DataSheet& sheet,
   const auto whole_periods_s = [&](double least_s) {
     return std::ceil(least_s * frequency_Hz) / frequency_Hz;
   };
-  const double settling_s = whole_periods_s(kSettling_s);
+  const double settling_s = whole_periods_s(kImpedanceSettling_s);
   const double measured_s = whole_periods_s(std::max(kShortestMeasured_s, kPeriods / frequency_Hz));
   const auto first = static_cast<std::size_t>(std::lround(settling_s * kBenchRate_Hz));
   ImpedanceBench bench(sheet, settings, settling_s + measured_s, seed);
@@ -271,7 +271,7 @@ void move_hand(ImpedanceRun& run, const DataSheet& sheet, const TubeImpedance::S
 
 TubeImpedance::Settings impedance_settings(const DataSheet& sheet, const ImpedanceSpec& spec) {
   if (sheet.family != ActuatorFamily::harmonic_drive)
-    throw UsageError({.place = kPlace,
+    throw UsageError({.place = kImpedance,
                       .expected = "an actuator with a torsion tube before its harmonic drive, "
                                   "harmonic-drive",
                       .found = sheet.name,
@@ -279,11 +279,11 @@ TubeImpedance::Settings impedance_settings(const DataSheet& sheet, const Impedan
                                 "a torque loop (docs/control.md)."});
   check(spec);
   TubeImpedance::Settings settings = TubeImpedance::settings_of(
-      sheet, spec.kind == Kind::high ? TubeImpedance::kHigh : TubeImpedance::kZero);
+      sheet, spec.kind == ImpedanceSpec::Kind::high ? TubeImpedance::kHigh : TubeImpedance::kZero);
   // A rigid tube twists too little for its encoders.
   if (sheet.variant == "rigid") settings.twist = TubeImpedance::Twist::tube_and_gear;
-  settings.relies_on_friction = spec.kind == Kind::high;
-  if (spec.kind != Kind::wanted) return settings;
+  settings.relies_on_friction = spec.kind == ImpedanceSpec::Kind::high;
+  if (spec.kind != ImpedanceSpec::Kind::wanted) return settings;
   settings.gains = TubeImpedance::gains_for(settings, spec.stiffness_Nm_rad, spec.damping_Nms_rad,
                                             spec.torque_gain_Nm_rad);
   require_passive(settings, spec);
@@ -300,7 +300,7 @@ ImpedanceRun track_impedance(const DataSheet& sheet, const ImpedanceSpec& spec, 
       .seed = seed,
       .gains = settings.gains,
       .stiffness_Nm_rad = TubeImpedance(settings, kBenchRate_Hz).stiffness(),
-      .damping_Nms_rad = spec.kind == Kind::wanted ? spec.damping_Nms_rad : 0.0,
+      .damping_Nms_rad = spec.kind == ImpedanceSpec::Kind::wanted ? spec.damping_Nms_rad : 0.0,
       .passive_to_Hz = Linear(settings).passive_to_Hz(),
       .record = Recording("", kBenchRate_Hz)};
   run.largest_passive_Nm_rad = largest_passive_Nm_rad(settings, run.damping_Nms_rad);

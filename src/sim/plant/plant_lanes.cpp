@@ -16,7 +16,7 @@
 namespace torsio {
 namespace {
 
-constexpr auto kPlace = "plant batch";
+constexpr auto kBatch = "plant batch";
 
 /// One plant after another, as in a message.
 struct Named {
@@ -89,7 +89,7 @@ void require_no_tables(std::span<const PlantParameters> parameters) {
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const auto* const spring = std::get_if<Spring::Parameters>(&parameters[i].second);
     if (spring == nullptr || spring->table.empty()) continue;
-    throw Error({.place = kPlace,
+    throw Error({.place = kBatch,
                  .expected = "springs without a table of their torque curve",
                  .found = fmt::format("a table of {} points at plant {}", spring->table.size(), i),
                  .advice = "step this plant with Plant"});
@@ -99,7 +99,7 @@ void require_no_tables(std::span<const PlantParameters> parameters) {
 PlantBlocks blocks_for(std::span<const PlantParameters> parameters) {
   if (parameters.empty()) {
     throw Error(
-        {.place = kPlace, .problem = "nothing to simulate", .expected = "plants", .found = "none"});
+        {.place = kBatch, .problem = "nothing to simulate", .expected = "plants", .found = "none"});
   }
   PlantBlocks blocks;
   const PlantParameters& first = parameters.front();
@@ -107,7 +107,7 @@ PlantBlocks blocks_for(std::span<const PlantParameters> parameters) {
   const std::size_t kernel = kernel_of(blocks, first);
   for (std::size_t i = 1; i < parameters.size(); ++i) {
     if (kernel_of(blocks, parameters[i]) == kernel) continue;
-    throw Error({.place = kPlace,
+    throw Error({.place = kBatch,
                  .problem = "plants of different kinds",
                  .expected = fmt::format("{}, as plant 0 is", kind(first)),
                  .found = fmt::format("{} at plant {}", kind(parameters[i]), i),
@@ -117,7 +117,7 @@ PlantBlocks blocks_for(std::span<const PlantParameters> parameters) {
     make_blocks(blocks, kernel, parameters.size());
     return blocks;
   }
-  throw Error({.place = kPlace,
+  throw Error({.place = kBatch,
                .problem = "a chain of stages that only Plant takes",
                .expected = "gear + (Maxwell-slip, Bouc-Wen or LuGre spring, bonded or unbonded "
                            "elastomer, gear), or slip clutch + rubber spring",

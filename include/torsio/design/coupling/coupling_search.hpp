@@ -13,6 +13,8 @@
 
 namespace torsio::design {
 
+inline constexpr std::size_t kCoarseMesh = 2;  ///< index in `coupling_meshes`
+
 /// A shape at the strain limit.
 struct LimitPoint {
   double angle_deg = 0.0;
