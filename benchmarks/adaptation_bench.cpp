@@ -7,8 +7,8 @@
 
 #include "dgmm_bench.hpp"
 #include "fitted_grey_box.hpp"
-#include "model/grey_box/grey_box_adapter.hpp"
-#include "model/mixture/dgmm_adapter.hpp"
+#include "model/dgmm_adapter.hpp"
+#include "model/grey_box_adapter.hpp"
 #include "rows.hpp"
 #include "torsio/model/any_model.hpp"
 

@@ -14,7 +14,7 @@
 #include "model/network/network_bank.hpp"
 #include "rows.hpp"
 #include "support/random_network.hpp"
-#include "torsio/model/network/last_layer_adapter.hpp"
+#include "torsio/model/last_layer_adapter.hpp"
 
 namespace torsio::bench {
 namespace {

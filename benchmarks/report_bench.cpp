@@ -7,7 +7,7 @@
 
 #include "rows.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/report/html/decimation.hpp"
+#include "torsio/report/document/decimation.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 
 namespace torsio::bench {

@@ -1,5 +1,5 @@
-# One export set each for runtime with files, realtime, lab and onnx, so that a robot that links runtime and files does not need the
-# libraries of the lab. The components are the Debian packages of packages.cmake.
+# One export set for the libraries that need the same ones of others: a robot that links runtime and files needs neither
+# the readers of recordings nor cairo, and a program that fits models no cairo. The components are the Debian packages of packages.cmake.
 include(CMakePackageConfigHelpers)
 set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
@@ -15,7 +15,11 @@ if(TORSIO_BUILD_LAB)
     install(DIRECTORY ${PROJECT_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program
             FILES_MATCHING PATTERN "*.1")
   endif()
-  install(TARGETS torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS torsio_data torsio_learn torsio_bench torsio_trials EXPORT torsioLearnTargets FILE_SET HEADERS
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT torsioLearnTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
+  install(TARGETS torsio_report torsio_design torsio_coupling torsio_lab EXPORT torsioLabTargets FILE_SET HEADERS
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT torsioLabTargets NAMESPACE torsio:: DESTINATION ${torsio_package_dir})
   install(FILES cmake/Findlz4.cmake cmake/Findcairo.cmake DESTINATION ${torsio_package_dir})
 endif()

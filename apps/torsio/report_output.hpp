@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 /// `--report FILE.html`: the result of a verb as a page; `--plot FILE`: figures of this page as a picture.
 struct ReportOutput {

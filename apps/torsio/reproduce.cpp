@@ -12,7 +12,7 @@
 #include "studies/study.hpp"
 #include "studies/study_report.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 #include "torsio/report/text_table.hpp"
 #include "verbs.hpp"
 

@@ -2,10 +2,10 @@
 
 #include <string>
 
-#include "model/grey_box/grey_box_adapter.hpp"
-#include "model/mixture/dgmm_adapter.hpp"
+#include "model/dgmm_adapter.hpp"
+#include "model/grey_box_adapter.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/model/network/last_layer_adapter.hpp"
+#include "torsio/model/last_layer_adapter.hpp"
 
 namespace torsio {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "torsio/core/not_measured.hpp"
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 namespace torsio {
 

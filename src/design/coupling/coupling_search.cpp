@@ -10,7 +10,7 @@
 #include <numbers>
 #include <utility>
 
-#include "sim/campaign/unit_file.hpp"
+#include "files/unit_file.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 

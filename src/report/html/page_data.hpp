@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 namespace torsio {
 

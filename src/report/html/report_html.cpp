@@ -7,7 +7,7 @@
 #include "report/html/page_files.hpp"
 #include "report/markup_text.hpp"
 #include "torsio/core/version.hpp"
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 #include "torsio/report/plots.hpp"
 
 namespace torsio {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "torsio/data/recording.hpp"
-#include "torsio/report/html/decimation.hpp"
+#include "torsio/report/document/decimation.hpp"
 
 namespace torsio {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "report/plot/simplified_line.hpp"
-#include "torsio/report/html/decimation.hpp"
+#include "torsio/report/document/decimation.hpp"
 
 namespace torsio {
 namespace {

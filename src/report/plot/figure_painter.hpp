@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "report/plot/plot_axis.hpp"
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 namespace torsio {
 

@@ -11,10 +11,10 @@
 
 #include "actuator/stage_wear.hpp"
 #include "actuator/text_hash.hpp"
+#include "files/unit_file.hpp"
 #include "numerics/event_bounds.hpp"
 #include "numerics/parallel.hpp"
 #include "numerics/shared_progress.hpp"
-#include "sim/campaign/unit_file.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"

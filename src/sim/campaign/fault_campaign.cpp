@@ -12,6 +12,7 @@
 #include "actuator/text_hash.hpp"
 #include "fault_classes.hpp"
 #include "fault_free_run.hpp"
+#include "files/unit_file.hpp"
 #include "injection_run.hpp"
 #include "numerics/event_bounds.hpp"
 #include "numerics/parallel.hpp"
@@ -20,7 +21,6 @@
 #include "sim/experiment_table.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/sim/campaign.hpp"
-#include "unit_file.hpp"
 
 namespace torsio {
 namespace {

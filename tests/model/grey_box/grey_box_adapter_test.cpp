@@ -1,4 +1,4 @@
-#include "model/grey_box/grey_box_adapter.hpp"
+#include "model/grey_box_adapter.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

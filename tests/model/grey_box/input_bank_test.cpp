@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "model/grey_box/grey_box.hpp"
-#include "model/grey_box/grey_box_adapter.hpp"
+#include "model/grey_box_adapter.hpp"
 #include "support/error_message.hpp"
 #include "support/grey_box_examples.hpp"
 #include "torsio/model/adaptive_model.hpp"

@@ -1,4 +1,4 @@
-#include "model/mixture/dgmm_adapter.hpp"
+#include "model/dgmm_adapter.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

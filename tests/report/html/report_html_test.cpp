@@ -5,7 +5,7 @@
 #include <string>
 
 #include "report/html/page_files.hpp"
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 namespace torsio {
 namespace {

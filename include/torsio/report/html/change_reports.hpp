@@ -10,7 +10,7 @@
 #include "torsio/evaluate/monitor_replay.hpp"
 #include "torsio/evaluate/transfer_curve.hpp"
 #include "torsio/report/attribution.hpp"
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 // The pages of the verbs that take a model file to other data or ask what it uses, as in `verb_reports.hpp`.
 namespace torsio {

@@ -7,7 +7,7 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 namespace torsio {
 

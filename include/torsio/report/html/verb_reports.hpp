@@ -12,7 +12,7 @@
 #include "torsio/evaluate/cross_validation.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
 #include "torsio/evaluate/fit_report.hpp"
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 #include "torsio/sim/closed_loop/impedance_tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/report/html/report_document.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 namespace torsio {
 

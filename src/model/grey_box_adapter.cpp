@@ -1,4 +1,4 @@
-#include "model/grey_box/grey_box_adapter.hpp"
+#include "model/grey_box_adapter.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "unit_file.hpp"
+#include "files/unit_file.hpp"
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
