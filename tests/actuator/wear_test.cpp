@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <variant>
 
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
@@ -13,6 +13,7 @@ namespace torsio {
 namespace {
 
 using test::error_message;
+using test::kNaN;
 
 TEST(Wear, ChangesNothingByDefault) {
   const OperatingConditions conditions;
@@ -75,7 +76,6 @@ TEST(Wear, RefusesWhatNoBenchReaches) {
   const auto message = [](const OperatingConditions& conditions) {
     return error_message([&] { check(conditions); });
   };
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(message({.temperature_K = 40.0}),
             "temperature: expected 233.15 to 358.15 K (-40 to 85 degC), found 40");
   EXPECT_NE(message({.temperature_K = kNaN}).find("temperature: expected"), std::string::npos);

@@ -15,6 +15,7 @@
 #include "support/examples/linear.hpp"
 #include "support/examples/network.hpp"
 #include "support/grey_box_examples.hpp"
+#include "support/numbers.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 
@@ -22,12 +23,11 @@ namespace torsio {
 namespace {
 
 using test::error_message;
+using test::kInfinity;
+using test::kNaN;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<std::byte> good_bytes() {
   return model_bytes(test::example_model_file(test::example<LinearCoulomb>()));

@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -11,6 +10,7 @@
 #include "support/example_model_file.hpp"
 #include "support/examples/grey_box.hpp"
 #include "support/examples/network.hpp"
+#include "support/numbers.hpp"
 #include "torsio.h"
 
 namespace torsio::test {
@@ -25,7 +25,6 @@ TEST_P(CInterface, StepAndStateNeverTouchTheHeap) {
   ASSERT_EQ(torsio_set_zero(joint, "joint_angle_rad", 0.01), 0);
   std::vector<char> state(torsio_state_size(joint));
   ASSERT_FALSE(state.empty());
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   constexpr int kSteps = 1'000'000;
   int usable = 0;
   EXPECT_EQ(heap_calls_during([&] {

@@ -78,7 +78,7 @@ Dataset zeroed_differently() {
   return dataset;
 }
 
-const char* const kDeflection = "gear_angle_rad - joint_angle_rad";
+const char* const kDeflectionFormula = "gear_angle_rad - joint_angle_rad";
 
 const Case kRefused[] = {
     {"every_sample_stale", [] { return one(stale(0)); }, {}, "nothing to use with role train"},
@@ -97,7 +97,7 @@ const Case kRefused[] = {
      "nothing to use with role train"},
     {"a_filter_that_never_settles",
      [] { return one(bench_recording("slow")); },
-     {kDeflection, "lowpass(gear_angle_rad, 0.01Hz)"},
+     {kDeflectionFormula, "lowpass(gear_angle_rad, 0.01Hz)"},
      "nothing to use with role train"},
     {"constant_at_its_new_samples",
      [] {
@@ -114,11 +114,11 @@ const Case kRefused[] = {
      "expected at least one input that changes"},
     {"an_input_that_is_infinite",
      [] { return one(bench_recording("infinite")); },
-     {kDeflection, "1 / (joint_angle_rad - joint_angle_rad)"},
+     {kDeflectionFormula, "1 / (joint_angle_rad - joint_angle_rad)"},
      "no sample is left to learn from"},
     {"an_input_with_squares_that_overflow",
      [] { return one(bench_recording("large")); },
-     {kDeflection, "joint_angle_rad * 1e150"},
+     {kDeflectionFormula, "joint_angle_rad * 1e150"},
      "whose squares can be summed"},
     {"angles_with_squares_that_overflow",
      [] { return one(scaled_angles(1e200)); },
@@ -194,7 +194,7 @@ TEST(CheckTraining, WarnsOfARecordingThatIsNotUsed) {
 TEST(CheckTraining, WarnsOfFewUsableSamplesAndOfInputsThatAreNotFinite) {
   EXPECT_EQ(training_findings(one(stale(10))).front().verdict, Verdict::warn);
   const auto findings =
-      training_findings(one(bench_recording("root")), {kDeflection, "joint_angle_rad^0.5"});
+      training_findings(one(bench_recording("root")), {kDeflectionFormula, "joint_angle_rad^0.5"});
   ASSERT_EQ(findings.size(), 1U);
   EXPECT_NE(findings.front().message.find("not finite in"), std::string::npos);
 }

@@ -25,18 +25,18 @@ DatasetRecord sine_and_rest(Role role) {
   return {std::move(recording), {{.begin = 0, .end = 10000, .role = role}}};
 }
 
-const FeatureSpec kDeflection{.inputs = {"spring_deflection_rad"}, .definitions = {}};
+const FeatureSpec kDeflectionFeature{.inputs = {"spring_deflection_rad"}, .definitions = {}};
 
 TEST(Motion, OfASineIsItsAmplitudeSpeedAndFrequency) {
   DatasetRecord record = sine_and_rest(Role::train);
-  const Motion motion = motion_of(record, Role::train, kDeflection);
+  const Motion motion = motion_of(record, Role::train, kDeflectionFeature);
   EXPECT_NEAR(motion.amplitude, 0.02, 2e-4);
   EXPECT_NEAR(motion.frequency_Hz, 0.5, 0.01);
   EXPECT_NEAR(motion.rms_speed, 0.02 * std::numbers::pi / std::numbers::sqrt2, 5e-4);
   EXPECT_LT(motion.rest_share, 0.05);
   record.segments = {{.begin = 0, .end = 20000, .role = Role::train}};
-  EXPECT_NEAR(motion_of(record, Role::train, kDeflection).rest_share, 0.5, 0.03);
-  EXPECT_EQ(motion_of(record, Role::test, kDeflection).rms_speed, 0.0) << "no such samples";
+  EXPECT_NEAR(motion_of(record, Role::train, kDeflectionFeature).rest_share, 0.5, 0.03);
+  EXPECT_EQ(motion_of(record, Role::test, kDeflectionFeature).rms_speed, 0.0) << "no such samples";
 }
 
 /// The held-out recordings of a bench with two training recordings whose motion is of another kind.

@@ -7,12 +7,13 @@
 #include <numbers>
 #include <vector>
 
+#include "support/numbers.hpp"
 #include "torsio/signal/excitation.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kRate_Hz;
 
 TEST(Strokes, OfATriangleHaveItsAmplitudeAndFrequency) {
   Triangle triangle({.amplitude = 0.05, .frequency_Hz = 0.5}, kRate_Hz);

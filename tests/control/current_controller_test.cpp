@@ -3,18 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <string>
 
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 
 namespace torsio {
 namespace {
 
+using test::kNaN;
+
 constexpr double kPwm_Hz = 30e3;
 constexpr double kSupply_V = 48.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 CurrentController::Settings settings() {
   return {.windings = {.resistance_Ohm = 0.4,

@@ -6,27 +6,29 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <string>
 
 #include "spring_joint.hpp"
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
+using test::any_random;
+using test::kInfinity;
+using test::kNaN;
+using test::kRate_Hz;
 using test::SpringJoint;
 using Actuation = DeflectionController::Actuation;
 
-constexpr double kRate_Hz = 1000.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::array kActuators = {"dfki-28", "dfki-50", "dfki-120", "dfki-300", "elastomer"};
+constexpr std::array kWithoutClutch = {"dfki-28", "dfki-50", "dfki-120", "dfki-300", "elastomer"};
 
-DeflectionController::Settings settings_of(const char* actuator) {
+DeflectionController::Settings deflection_settings(const char* actuator) {
   return {.joint = series_elastic_joint(data_sheet(actuator))};
 }
 
@@ -34,7 +36,7 @@ DeflectionController::Settings settings_of(const char* actuator) {
 TEST(DeflectionController, FollowsAStepAsTheSecondOrderSystemDoes) {
   constexpr double kFast_Hz = 100'000.0;
   constexpr double kStep_rad = 1e-3;
-  DeflectionController::Settings settings = settings_of("dfki-50");
+  DeflectionController::Settings settings = deflection_settings("dfki-50");
   settings.joint.drive.current_time_constant_s = 1e-6;
   settings.joint.drive.viscous_Nms_rad = 0.0;
   settings.integral_1_s = 0.0;
@@ -54,9 +56,9 @@ TEST(DeflectionController, FollowsAStepAsTheSecondOrderSystemDoes) {
 }
 
 TEST(DeflectionController, FollowsASineOfItsCutoffWithTheRootOfAHalf) {
-  for (const char* actuator : kActuators) {
+  for (const char* actuator : kWithoutClutch) {
     SCOPED_TRACE(actuator);
-    const auto settings = settings_of(actuator);
+    const auto settings = deflection_settings(actuator);
     DeflectionController controller(settings, kRate_Hz);
     const double rad_s = controller.cutoff_rad_s();
     EXPECT_NEAR(std::abs(controller.tracking(rad_s)), std::sqrt(0.5), 1e-6);
@@ -73,8 +75,8 @@ TEST(DeflectionController, FollowsASineOfItsCutoffWithTheRootOfAHalf) {
 }
 
 TEST(DeflectionController, HoldsADeflectionAgainstALockedOutput) {
-  for (const char* actuator : kActuators) {
-    const auto settings = settings_of(actuator);
+  for (const char* actuator : kWithoutClutch) {
+    const auto settings = deflection_settings(actuator);
     DeflectionController controller(settings, kRate_Hz);
     SpringJoint joint(settings.joint, JointOutput::locked);
     for (int n = 0; n < 3000; ++n)
@@ -84,8 +86,8 @@ TEST(DeflectionController, HoldsADeflectionAgainstALockedOutput) {
 }
 
 TEST(DeflectionController, LetsAFreeJointComeToRestAfterAPush) {
-  for (const char* actuator : kActuators) {
-    const auto settings = settings_of(actuator);
+  for (const char* actuator : kWithoutClutch) {
+    const auto settings = deflection_settings(actuator);
     DeflectionController controller(settings, kRate_Hz);
     SpringJoint joint(settings.joint, JointOutput::free);
     double max_J = 0.0;
@@ -101,8 +103,8 @@ TEST(DeflectionController, LetsAFreeJointComeToRestAfterAPush) {
 }
 
 TEST(DeflectionController, ActsOnTheSpeedOfADriveWithALoopOfItsOwn) {
-  for (const char* actuator : kActuators) {
-    auto settings = settings_of(actuator);
+  for (const char* actuator : kWithoutClutch) {
+    auto settings = deflection_settings(actuator);
     settings.actuation = Actuation::velocity;
     const auto drive = JointCascade::gains_for(settings.joint.drive, 200.0);
     settings.speed_loop = drive.velocity;
@@ -118,7 +120,7 @@ TEST(DeflectionController, ActsOnTheSpeedOfADriveWithALoopOfItsOwn) {
 }
 
 TEST(DeflectionController, CutsTheDeflectionAndTheCurrent) {
-  const auto settings = settings_of("dfki-50");
+  const auto settings = deflection_settings("dfki-50");
   DeflectionController controller(settings, kRate_Hz);
   const auto output = controller.step(1.0, 0.0);
   EXPECT_EQ(output.wanted_deflection_rad, settings.largest_deflection_rad);
@@ -127,7 +129,7 @@ TEST(DeflectionController, CutsTheDeflectionAndTheCurrent) {
 }
 
 TEST(DeflectionController, KeepsTheLastFiniteReferenceAndFadesWithoutAMeasurement) {
-  const auto settings = settings_of("dfki-50");
+  const auto settings = deflection_settings("dfki-50");
   DeflectionController disturbed(settings, kRate_Hz);
   DeflectionController sound(settings, kRate_Hz);
   (void)disturbed.step(0.01, 0.0);
@@ -147,7 +149,7 @@ TEST(DeflectionController, KeepsTheLastFiniteReferenceAndFadesWithoutAMeasuremen
 
 TEST(DeflectionController, RefusesGainsThatAreUnstableAndStatesTheMargin) {
   const auto refusal = [](auto change) {
-    DeflectionController::Settings settings = settings_of("dfki-50");
+    DeflectionController::Settings settings = deflection_settings("dfki-50");
     change(settings);
     return test::error_message([&] { DeflectionController(settings, kRate_Hz); });
   };
@@ -167,13 +169,14 @@ TEST(DeflectionController, RefusesGainsThatAreUnstableAndStatesTheMargin) {
 
 // 100 cases of 10^4 ticks: any reference, any measurement, gains changed during the run.
 RC_GTEST_PROP(DeflectionController, KeepsToItsLimitsAndChangesItsGainsWithoutABump, ()) {
-  auto settings = settings_of(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"));
+  auto settings =
+      deflection_settings(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"));
   settings.anti_windup =
       *rc::gen::element(Pid::AntiWindup::back_calculation, Pid::AntiWindup::conditional);
   DeflectionController controller(settings, kRate_Hz);
   const Pid::Gains usual = controller.gains();
   const double peak_A = settings.joint.drive.peak_current_A;
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   double wanted_rad = 0.0;
   double deflection_rad = 0.0;
   double last_A = 0.0;
@@ -210,7 +213,7 @@ RC_GTEST_PROP(DeflectionController, KeepsToItsLimitsAndChangesItsGainsWithoutABu
 
 // Colgate's and Vallery's limit: at low frequency Re Z has the sign of b (K + a K_p − …) − J a K_i.
 TEST(Passivity, EndsAtZeroWhereTheIntegralOutrunsTheFriction) {
-  DeflectionController::Settings settings = settings_of("dfki-50");
+  DeflectionController::Settings settings = deflection_settings("dfki-50");
   const Pid::Gains gains = DeflectionController::gains_for(settings);
   const Drive& drive = settings.joint.drive;
   const double a = drive.torque_per_current();

@@ -2,12 +2,13 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "control/loop_design.hpp"
 #include "spring_joint.hpp"
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
@@ -16,11 +17,11 @@
 namespace torsio {
 namespace {
 
+using test::any_random;
+using test::kInfinity;
+using test::kNaN;
+using test::kRate_Hz;
 using test::SpringJoint;
-
-constexpr double kRate_Hz = 1000.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(JointImpedance, IsASpringAndADamper) {
   JointImpedance impedance({.gains = {.stiffness_Nm_rad = 50.0, .damping_Nms_rad = 2.0}}, kRate_Hz);
@@ -101,7 +102,7 @@ TEST(JointImpedance, FollowsTheJointWhileItsGainsMove) {
 // Under equal conditions; changes due to the joint and the reference are not a bump.
 RC_GTEST_PROP(JointImpedance, ChangesItsGainsWithoutABump, ()) {
   JointImpedance impedance({.torque_Nm = 5.0}, kRate_Hz);
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   for (int n = 0; n < 10; ++n) {
     const JointImpedance::Reference reference = {.angle_rad = 0.1 * random.normal(),
                                                  .speed_rad_s = random.normal()};
@@ -119,7 +120,7 @@ RC_GTEST_PROP(JointImpedance, KeepsToItsLimits, ()) {
   const double max_Nm = 5.0;
   const double rate_Nm_s = 400.0;
   JointImpedance impedance({.torque_Nm = max_Nm, .torque_rate_Nm_s = rate_Nm_s}, kRate_Hz);
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   double last_Nm = 0.0;
   for (int n = 0; n < 10'000; ++n) {
     const bool is_lost = random.uniform() < 0.01;
@@ -270,7 +271,7 @@ RC_GTEST_PROP(TubeImpedance, GivesAFaultAndASafeCurrentForAnyNumbers, ()) {
   const auto settings =
       tube_settings(*rc::gen::element(TubeImpedance::kHigh, TubeImpedance::kZero));
   TubeImpedance impedance(settings, kRate_Hz);
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   const auto spoil = [&](double value) {
     const double draw = random.uniform();
     return draw < 0.02 ? kNaN : draw < 0.04 ? kInfinity : draw < 0.06 ? 1e308 : value;

@@ -5,25 +5,27 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "rigid_joint.hpp"
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
+using test::any_number;
+using test::any_random;
+using test::kInfinity;
+using test::kNaN;
+using test::kRate_Hz;
 using test::RigidJoint;
 
-constexpr double kRate_Hz = 1000.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-JointCascade::Settings settings_of(const char* actuator) {
+JointCascade::Settings cascade_settings(const char* actuator) {
   const DataSheet sheet = data_sheet(actuator);
   return {.drive = drive_of(sheet),
           .limits = {.lowest_rad = -1.0,
@@ -47,7 +49,7 @@ JointCascade::Output run(JointCascade& cascade, RigidJoint& joint, const JointRe
 
 TEST(JointCascade, GoesToAPositionAndHoldsItUnderLoad) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
-    const JointCascade::Settings settings = settings_of(actuator);
+    const JointCascade::Settings settings = cascade_settings(actuator);
     JointCascade cascade(settings, kRate_Hz);
     RigidJoint joint(settings.drive);
     const double max_unmeasured_load_Nm = 0.5 * settings.limits.max_measured_load_Nm;
@@ -60,7 +62,7 @@ TEST(JointCascade, GoesToAPositionAndHoldsItUnderLoad) {
 
 // P on position over P on speed: q'' + w q' + w k_q q = w k_q q*, a second-order system.
 TEST(JointCascade, FollowsAStepAsTheSecondOrderSystemDoes) {
-  JointCascade::Settings settings = settings_of("dfki-50");
+  JointCascade::Settings settings = cascade_settings("dfki-50");
   settings.drive.current_time_constant_s = 1e-6;
   settings.limits.max_unmeasured_load_Nm = 0.0;
   JointCascade::Gains gains = JointCascade::gains_for(settings.drive, 50.0);
@@ -87,7 +89,7 @@ TEST(JointCascade, FollowsAStepAsTheSecondOrderSystemDoes) {
 }
 
 TEST(JointCascade, AddsUpTheTermsThatItNames) {
-  const JointCascade::Settings settings = settings_of("dfki-50");
+  const JointCascade::Settings settings = cascade_settings("dfki-50");
   JointCascade cascade(settings, kRate_Hz);
   RigidJoint joint(settings.drive);
   run(cascade, joint, {.mode = JointMode::velocity, .velocity_rad_s = 0.1}, 20);
@@ -108,7 +110,7 @@ TEST(JointCascade, AddsUpTheTermsThatItNames) {
 }
 
 TEST(JointCascade, StaysAtALimitThatItIsPushedIntoAndLetsGoAtOnce) {
-  const JointCascade::Settings settings = settings_of("dfki-50");
+  const JointCascade::Settings settings = cascade_settings("dfki-50");
   JointCascade cascade(settings, kRate_Hz);
   RigidJoint joint(settings.drive);
   const JointReference push = {.mode = JointMode::current, .current_A = 3.0};
@@ -123,7 +125,7 @@ TEST(JointCascade, StaysAtALimitThatItIsPushedIntoAndLetsGoAtOnce) {
 }
 
 TEST(JointCascade, CarriesTheLoadOnWhenAPositionBecomesASpeed) {
-  const JointCascade::Settings settings = settings_of("dfki-50");
+  const JointCascade::Settings settings = cascade_settings("dfki-50");
   JointCascade cascade(settings, kRate_Hz);
   RigidJoint joint(settings.drive);
   // The cascade does not measure it: only its integral compensates it.
@@ -142,7 +144,7 @@ TEST(JointCascade, CarriesTheLoadOnWhenAPositionBecomesASpeed) {
 // docs/faults.md 30: the loop that was overridden for a minute has not wound up.
 TEST(JointCascade, DoesNotWindUpWhileOverridden) {
   for (const JointMode mode : {JointMode::velocity, JointMode::position, JointMode::torque}) {
-    JointCascade::Settings settings = settings_of("dfki-50");
+    JointCascade::Settings settings = cascade_settings("dfki-50");
     settings.gains = JointCascade::gains_for(settings.drive, 50.0);
     settings.gains->torque = {.proportional = 0.5, .integral = 5.0};
     JointCascade cascade(settings, kRate_Hz);
@@ -159,7 +161,7 @@ TEST(JointCascade, DoesNotWindUpWhileOverridden) {
 // docs/faults.md 31: speed, position and current all at once; the approach is smooth and ends at rest.
 TEST(JointCascade, DoesNotChatterBetweenTwoLimits) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
-    const JointCascade::Settings settings = settings_of(actuator);
+    const JointCascade::Settings settings = cascade_settings(actuator);
     JointCascade cascade(settings, kRate_Hz);
     RigidJoint joint(settings.drive);
     auto last = JointCascade::Limit::none;
@@ -187,7 +189,7 @@ TEST(JointCascade, DoesNotChatterBetweenTwoLimits) {
 }
 
 TEST(JointCascade, KeepsTheLastReferenceWhenOneIsNotFinite) {
-  const JointCascade::Settings settings = settings_of("dfki-50");
+  const JointCascade::Settings settings = cascade_settings("dfki-50");
   JointCascade disturbed(settings, kRate_Hz);
   JointCascade sound(settings, kRate_Hz);
   RigidJoint joint(settings.drive);
@@ -205,7 +207,7 @@ TEST(JointCascade, KeepsTheLastReferenceWhenOneIsNotFinite) {
 }
 
 TEST(JointCascade, RefusesAModeThatItHasNoSensorFor) {
-  JointCascade::Settings settings = settings_of("dfki-50");
+  JointCascade::Settings settings = cascade_settings("dfki-50");
   settings.has_torque = false;
   JointCascade cascade(settings, kRate_Hz);
   for (const JointMode mode : {JointMode::torque, JointMode::impedance}) {
@@ -221,7 +223,7 @@ TEST(JointCascade, RefusesAModeThatItHasNoSensorFor) {
 }
 
 TEST(JointCascade, LetsTheCurrentFadeWithoutAMeasurementAndGoesOnFromThere) {
-  const JointCascade::Settings settings = settings_of("dfki-50");
+  const JointCascade::Settings settings = cascade_settings("dfki-50");
   JointCascade cascade(settings, kRate_Hz);
   RigidJoint joint(settings.drive);
   const JointReference reference = {.mode = JointMode::velocity, .velocity_rad_s = 1.0};
@@ -241,7 +243,7 @@ TEST(JointCascade, LetsTheCurrentFadeWithoutAMeasurementAndGoesOnFromThere) {
 }
 
 TEST(JointCascade, KeepsToTheVoltageThatItsSupplyHas) {
-  JointCascade::Settings settings = settings_of("dfki-50");
+  JointCascade::Settings settings = cascade_settings("dfki-50");
   settings.limits.speed_rad_s = 3.8;
   settings.limits.max_unmeasured_load_Nm = 0.0;
   JointCascade cascade(settings, kRate_Hz);
@@ -257,7 +259,7 @@ TEST(JointCascade, KeepsToTheVoltageThatItsSupplyHas) {
 
 TEST(JointCascade, RefusesLimitsThatContradictEachOther) {
   const auto refusal = [](auto change) {
-    JointCascade::Settings settings = settings_of("dfki-50");
+    JointCascade::Settings settings = cascade_settings("dfki-50");
     change(settings);
     return test::error_message([&] { JointCascade(settings, kRate_Hz); });
   };
@@ -295,27 +297,22 @@ TEST(JointCascade, RefusesLimitsThatContradictEachOther) {
 
 // ------------------------------------------------------------------------------------ properties
 
-double number(double lowest, double highest) {
-  return lowest + (highest - lowest) * 1e-6 * *rc::gen::inRange(0, 1'000'001);
-}
-
-Random any_random() { return Random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30))); }
-
-JointCascade::Settings any_settings() {
+JointCascade::Settings any_cascade_settings() {
   JointCascade::Settings settings =
-      settings_of(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"));
-  settings.bandwidth_rad_s = number(20.0, 100.0);
-  settings.limits.lowest_rad = number(-2.0, -0.5);
-  settings.limits.highest_rad = number(0.5, 2.0);
-  settings.limits.thermal_time_s = number(0.2, 5.0);
+      cascade_settings(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"));
+  settings.bandwidth_rad_s = any_number(20.0, 100.0);
+  settings.limits.lowest_rad = any_number(-2.0, -0.5);
+  settings.limits.highest_rad = any_number(0.5, 2.0);
+  settings.limits.thermal_time_s = any_number(0.2, 5.0);
   settings.limits.max_measured_load_Nm =
-      number(0.0, 0.8) * settings.drive.rated_current_A * settings.drive.torque_per_current();
+      any_number(0.0, 0.8) * settings.drive.rated_current_A * settings.drive.torque_per_current();
   settings.gains = JointCascade::gains_for(settings.drive, settings.bandwidth_rad_s);
-  settings.gains->velocity.integral *= number(0.0, 3.0);
-  settings.gains->position_1_s *= number(0.1, 5.0);
-  settings.gains->torque = {.proportional = number(0.0, 2.0) / settings.drive.torque_per_current(),
-                            .integral = number(0.0, 20.0) / settings.drive.torque_per_current(),
-                            .derivative = 0.0};
+  settings.gains->velocity.integral *= any_number(0.0, 3.0);
+  settings.gains->position_1_s *= any_number(0.1, 5.0);
+  settings.gains->torque = {
+      .proportional = any_number(0.0, 2.0) / settings.drive.torque_per_current(),
+      .integral = any_number(0.0, 20.0) / settings.drive.torque_per_current(),
+      .derivative = 0.0};
   return settings;
 }
 
@@ -349,7 +346,7 @@ JointReference finite_reference(Random& random) {
 // during the run, loads up to those of the limits' settings. A fifth of the unknown load is
 // reserved for the known one, which the current follows late.
 RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
-  const JointCascade::Settings settings = any_settings();
+  const JointCascade::Settings settings = any_cascade_settings();
   const JointCascade::Limits& limits = settings.limits;
   Random random = any_random();
   JointCascade cascade(settings, kRate_Hz);
@@ -394,7 +391,7 @@ RC_GTEST_PROP(JointCascade, NeverLetsTheJointOutOfItsLimits, ()) {
 TEST(JointCascade, StopsAtItsLimitWithAHotWindingUnderTheWholeLoadOfItsSettings) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
     for (const double share : {0.3, 0.6, 0.9}) {
-      JointCascade::Settings settings = settings_of(actuator);
+      JointCascade::Settings settings = cascade_settings(actuator);
       const Drive& drive = settings.drive;
       const double rated_Nm = drive.rated_current_A * drive.torque_per_current();
       settings.limits.max_measured_load_Nm = share * rated_Nm;
@@ -422,7 +419,7 @@ TEST(JointCascade, StopsAtItsLimitWithAHotWindingUnderTheWholeLoadOfItsSettings)
 }
 
 RC_GTEST_PROP(JointCascade, SwitchesItsModeAndItsGainsWithoutAJump, ()) {
-  const JointCascade::Settings settings = any_settings();
+  const JointCascade::Settings settings = any_cascade_settings();
   Random random = any_random();
   JointCascade cascade(settings, kRate_Hz);
   RigidJoint joint(settings.drive);
@@ -433,7 +430,7 @@ RC_GTEST_PROP(JointCascade, SwitchesItsModeAndItsGainsWithoutAJump, ()) {
     const JointState state = joint.state(0.0);
     const double before_A = cascade.step(reference, state).current_A;
     if (change % 2 == 0) {
-      RC_ASSERT(cascade.set_gains(*any_settings().gains));
+      RC_ASSERT(cascade.set_gains(*any_cascade_settings().gains));
     } else {
       const int mode =
           static_cast<int>(reference.mode) + 1 + static_cast<int>(random.uniform() * 4.0);
@@ -448,7 +445,7 @@ RC_GTEST_PROP(JointCascade, SwitchesItsModeAndItsGainsWithoutAJump, ()) {
 
 // Stiffness and damping travel in the reference: a change of them within the mode is one of gains.
 TEST(JointCascade, ChangesItsImpedanceWithoutAJump) {
-  JointCascade::Settings settings = settings_of("dfki-50");
+  JointCascade::Settings settings = cascade_settings("dfki-50");
   settings.gains = JointCascade::gains_for(settings.drive, 50.0);
   settings.gains->torque = {.proportional = 0.1, .integral = 1.0};
   JointCascade cascade(settings, kRate_Hz);
@@ -469,7 +466,7 @@ TEST(JointCascade, ChangesItsImpedanceWithoutAJump) {
 }
 
 TEST(JointCascade, HasTheTorqueOfItsImpedanceFromTheFirstTickOn) {
-  const JointCascade::Settings settings = settings_of("dfki-50");
+  const JointCascade::Settings settings = cascade_settings("dfki-50");
   JointCascade cascade(settings, kRate_Hz);
   const JointReference reference = {
       .mode = JointMode::impedance, .position_rad = 0.2, .stiffness_Nm_rad = 20.0};
@@ -480,7 +477,7 @@ TEST(JointCascade, HasTheTorqueOfItsImpedanceFromTheFirstTickOn) {
 }
 
 RC_GTEST_PROP(JointCascade, GivesAFaultAndASafeCurrentForAnyNumberThatIsNotFinite, ()) {
-  const JointCascade::Settings settings = any_settings();
+  const JointCascade::Settings settings = any_cascade_settings();
   Random random = any_random();
   JointCascade cascade(settings, kRate_Hz);
   double last_A = 0.0;
@@ -504,10 +501,10 @@ RC_GTEST_PROP(JointCascade, GivesAFaultAndASafeCurrentForAnyNumberThatIsNotFinit
 }
 
 RC_GTEST_PROP(JointCascade, KeepsToItsCurrentRateWhereNothingDisturbsIt, ()) {
-  JointCascade::Settings settings = any_settings();
+  JointCascade::Settings settings = any_cascade_settings();
   const Drive& drive = settings.drive;
   const double gain = drive.inertia() * settings.bandwidth_rad_s / drive.torque_per_current();
-  const double rate_A_s = number(1.01, 3.0) * gain *
+  const double rate_A_s = any_number(1.01, 3.0) * gain *
                           (0.2 * settings.bandwidth_rad_s * settings.limits.speed_rad_s +
                            drive.peak_current_A * drive.torque_per_current() / drive.inertia());
   settings.limits.current_rate_A_s = rate_A_s;

@@ -6,30 +6,33 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "spring_joint.hpp"
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
+using test::any_random;
+using test::kNaN;
+using test::kRate_Hz;
 using test::SpringJoint;
 using Actuation = DeflectionController::Actuation;
 using Controller = JointController<LinearInverse>;
 
-constexpr double kRate_Hz = 1000.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kActuators[] = {"dfki-28",  "dfki-50",   "dfki-120",
                                       "dfki-300", "elastomer", "rubber-clutch"};
 
 /// The spring's largest torque is half of what the rated current makes.
-Controller::Settings settings_of(const char* actuator, Actuation actuation = Actuation::current) {
+Controller::Settings controller_settings(const char* actuator,
+                                         Actuation actuation = Actuation::current) {
   const DataSheet sheet = data_sheet(actuator);
   const SeriesElasticJoint joint = series_elastic_joint(sheet);
   const double rated_Nm = joint.drive.rated_current_A * joint.drive.torque_per_current();
@@ -59,12 +62,6 @@ const Drive& drive_of(const Controller::Settings& settings) {
   return settings.torque.deflection.joint.drive;
 }
 
-JointSample sample_of(const SpringJoint& joint, const Drive& drive) {
-  return {.motor_angle_rad = joint.angle_rad() * drive.ratio,
-          .gear_angle_rad = joint.angle_rad(),
-          .joint_angle_rad = joint.joint_rad()};
-}
-
 Controller::Output run(Controller& controller, SpringJoint& joint, const Drive& drive,
                        const JointReference& reference, int ticks) {
   Controller::Output output;
@@ -78,7 +75,7 @@ Controller::Output run(Controller& controller, SpringJoint& joint, const Drive& 
 TEST(JointController, FollowsTorqueAndDeflectionThroughEitherLoop) {
   for (const char* actuator : kActuators)
     for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
-      const auto settings = settings_of(actuator, actuation);
+      const auto settings = controller_settings(actuator, actuation);
       const double torque_Nm = 0.5 * settings.torque.largest_torque_Nm;
       for (const JointMode mode : {JointMode::torque, JointMode::deflection}) {
         Controller controller = controller_of(settings);
@@ -96,7 +93,7 @@ TEST(JointController, FollowsTorqueAndDeflectionThroughEitherLoop) {
 }
 
 TEST(JointController, RendersAnImpedanceAtTheMotorSide) {
-  const auto settings = settings_of("dfki-50");
+  const auto settings = controller_settings("dfki-50");
   Controller controller = controller_of(settings);
   SpringJoint joint(settings.torque.deflection.joint, JointOutput::locked);
   const JointReference reference = {
@@ -108,7 +105,7 @@ TEST(JointController, RendersAnImpedanceAtTheMotorSide) {
 // Paper 000, section 4: the limits are kept without a stop of the system, and released.
 TEST(JointController, StaysAtALimitInSpringModesAndReleasesItAtOnce) {
   for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
-    auto settings = settings_of("dfki-50", actuation);
+    auto settings = controller_settings("dfki-50", actuation);
     settings.limits.lowest_rad = -0.2;
     settings.limits.highest_rad = 0.2;
     for (const JointMode mode : {JointMode::torque, JointMode::deflection}) {
@@ -130,7 +127,7 @@ TEST(JointController, StaysAtALimitInSpringModesAndReleasesItAtOnce) {
 
 TEST(JointController, FadesWithoutAMeasurementAndKeepsTheLastReference) {
   for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
-    const auto settings = settings_of("dfki-50", actuation);
+    const auto settings = controller_settings("dfki-50", actuation);
     Controller controller = controller_of(settings);
     SpringJoint joint(settings.torque.deflection.joint, JointOutput::locked);
     const JointReference reference = {.mode = JointMode::torque, .torque_Nm = 10.0};
@@ -162,7 +159,7 @@ TEST(JointController, FadesWithoutAMeasurementAndKeepsTheLastReference) {
 
 TEST(JointController, RefusesWhatContradicts) {
   const auto refusal = [](auto change, Actuation actuation = Actuation::current) -> std::string {
-    auto settings = settings_of("dfki-50", actuation);
+    auto settings = controller_settings("dfki-50", actuation);
     change(settings);
     return test::error_message([&] { static_cast<void>(controller_of(settings)); });
   };
@@ -203,7 +200,7 @@ JointReference any_reference(Random& random, const Controller::Settings& setting
 
 // Neither may take its damping away: the rate that they use is that of the reference.
 TEST(JointController, KeepsItsDampingInModesWhoseTorqueFollowsFromMeasurements) {
-  auto settings = settings_of("dfki-50");
+  auto settings = controller_settings("dfki-50");
   const auto swings = [&](const JointReference& reference) {
     Controller controller = controller_of(settings);
     SpringJoint joint(settings.torque.deflection.joint, JointOutput::locked);
@@ -229,7 +226,7 @@ TEST(JointController, KeepsItsDampingInModesWhoseTorqueFollowsFromMeasurements) 
 }
 
 TEST(JointController, LimitsTheDeflectionByTheLargestTorque) {
-  auto settings = settings_of("dfki-50");
+  auto settings = controller_settings("dfki-50");
   settings.limits.torque_Nm = 5.0;  // below `largest_torque_Nm`
   for (const JointMode mode : {JointMode::torque, JointMode::deflection}) {
     Controller controller = controller_of(settings);
@@ -242,7 +239,7 @@ TEST(JointController, LimitsTheDeflectionByTheLargestTorque) {
 
 // A current that is fed forward is not a disturbance that the observer may remove.
 TEST(JointController, LetsTheObserverSeeTheWholeCurrent) {
-  auto settings = settings_of("dfki-50");
+  auto settings = controller_settings("dfki-50");
   settings.torque.observer_cutoff_Hz = 10.0;
   Controller controller = controller_of(settings);
   SpringJoint joint(settings.torque.deflection.joint, JointOutput::locked);
@@ -253,7 +250,7 @@ TEST(JointController, LetsTheObserverSeeTheWholeCurrent) {
 
 // A drive that cuts the current during a transfer winds nothing up.
 TEST(JointController, TracksWhatADriveAppliedDuringATransfer) {
-  const auto settings = settings_of("dfki-50");
+  const auto settings = controller_settings("dfki-50");
   Controller controller = controller_of(settings);
   SpringJoint joint(settings.torque.deflection.joint, JointOutput::locked);
   run(controller, joint, drive_of(settings), {.mode = JointMode::current, .current_A = 0.6}, 300);
@@ -272,7 +269,7 @@ TEST(JointController, TracksWhatADriveAppliedDuringATransfer) {
 // The override begins and ends where its bound meets the command: no step of the current.
 TEST(JointController, OverridesAndReleasesWithoutAJump) {
   for (const Actuation actuation : {Actuation::current, Actuation::velocity}) {
-    const auto settings = settings_of("dfki-50", actuation);
+    const auto settings = controller_settings("dfki-50", actuation);
     Controller controller = controller_of(settings);
     SpringJoint joint(settings.torque.deflection.joint, JointOutput::free);
     const Drive& drive = drive_of(settings);
@@ -306,7 +303,7 @@ TEST(JointController, NeverLetsTheMotorSideOutOfItsLimits) {
   joints.emplace_back("harmonic-drive", Actuation::velocity);
   for (const auto& [actuator, actuation] : joints) {
     for (const JointOutput end : {JointOutput::locked, JointOutput::free}) {
-      auto settings = settings_of(actuator, actuation);
+      auto settings = controller_settings(actuator, actuation);
       if (actuator == std::string_view("harmonic-drive")) {
         // Locked, its tube allows less motion than the margin for the load.
         if (end == JointOutput::locked) continue;
@@ -352,9 +349,10 @@ TEST(JointController, NeverLetsTheMotorSideOutOfItsLimits) {
 }
 
 RC_GTEST_PROP(JointController, SwitchesItsModeWithoutAJump, ()) {
-  const auto settings = settings_of(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"),
-                                    *rc::gen::element(Actuation::current, Actuation::velocity));
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  const auto settings =
+      controller_settings(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"),
+                          *rc::gen::element(Actuation::current, Actuation::velocity));
+  Random random = any_random();
   Controller controller = controller_of(settings);
   SpringJoint joint(settings.torque.deflection.joint, JointOutput::free);
   for (int change = 0; change < 20; ++change) {

@@ -5,21 +5,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <string>
 
 #include "sim/plant/plant.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/control/joint_controller.hpp"
 
 namespace torsio {
 namespace {
 
+using test::kNaN;
+using test::kRate_Hz;
 using Phase = JointStop::Phase;
 
-constexpr double kRate_Hz = 1000.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kActuators[] = {"dfki-28", "dfki-50", "dfki-120", "dfki-300"};
 
 JointStop::Settings stop_settings(const DataSheet& sheet, double load_Nm) {

@@ -10,6 +10,7 @@
 #include "control/frequency_response.hpp"
 #include "control/loop_design.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/signal/differentiator.hpp"
 #include "torsio/signal/lowpass.hpp"
@@ -17,7 +18,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kRate_Hz;
 using Complex = std::complex<double>;
 
 Complex z_at(double rad_s) { return std::polar(1.0, rad_s / kRate_Hz); }

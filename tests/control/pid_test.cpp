@@ -5,20 +5,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
 
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::any_number;
+using test::any_random;
+using test::kInfinity;
+using test::kNaN;
+using test::kRate_Hz;
+
 constexpr double kPeriod_s = 1.0 / kRate_Hz;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Pid::Settings limited_pi(Pid::AntiWindup scheme) {
   return {.gains = {.proportional = 2.0, .integral = 10.0},
@@ -143,33 +147,27 @@ TEST(Pid, KeepsItsGainsIfOneOfTheNewIsImpossible) {
 
 // ------------------------------------------------------------------------------------ properties
 
-double number(double lowest, double highest) {
-  return lowest + (highest - lowest) * 1e-6 * *rc::gen::inRange(0, 1'000'001);
-}
-
 Pid::Gains any_gains() {
-  return {.proportional = number(0.0, 20.0),
-          .integral = number(0.0, 100.0),
-          .derivative = number(0.0, 0.1)};
+  return {.proportional = any_number(0.0, 20.0),
+          .integral = any_number(0.0, 100.0),
+          .derivative = any_number(0.0, 0.1)};
 }
 
-Pid::Settings any_settings() {
+Pid::Settings any_pid_settings() {
   return {
       .gains = any_gains(),
-      .limits = {.lowest = number(-3.0, -0.1),
-                 .highest = number(0.1, 3.0),
-                 .rate_per_s = number(1.0, 500.0)},
+      .limits = {.lowest = any_number(-3.0, -0.1),
+                 .highest = any_number(0.1, 3.0),
+                 .rate_per_s = any_number(1.0, 500.0)},
       .anti_windup =
           *rc::gen::element(Pid::AntiWindup::back_calculation, Pid::AntiWindup::conditional),
       .derivative_of = *rc::gen::element(Pid::DerivativeOf::measurement, Pid::DerivativeOf::error),
       .derivative_cutoff_Hz = 100.0};
 }
 
-Random any_random() { return Random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30))); }
-
 // 100 cases of 10^4 steps.
 RC_GTEST_PROP(Pid, NeverLeavesItsLimitsOrItsRateForAnyInput, ()) {
-  const Pid::Settings settings = any_settings();
+  const Pid::Settings settings = any_pid_settings();
   const double step = settings.limits.rate_per_s * kPeriod_s * (1.0 + 1e-12);
   Random random = any_random();
   Pid pid(settings, kRate_Hz);
@@ -191,7 +189,7 @@ RC_GTEST_PROP(Pid, NeverLeavesItsLimitsOrItsRateForAnyInput, ()) {
 }
 
 RC_GTEST_PROP(Pid, ChangesItsGainsWithoutABump, ()) {
-  Pid::Settings settings = any_settings();
+  Pid::Settings settings = any_pid_settings();
   settings.limits = {};
   settings.derivative_cutoff_Hz = std::nullopt;
   Random random = any_random();
@@ -215,11 +213,11 @@ RC_GTEST_PROP(Pid, ChangesItsGainsWithoutABump, ()) {
 }
 
 RC_GTEST_PROP(Pid, StartsFromTheCommandThatItIsGiven, ()) {
-  Pid::Settings settings = any_settings();
+  Pid::Settings settings = any_pid_settings();
   Random random = any_random();
   Pid pid(settings, kRate_Hz);
   for (int n = 0; n < 20; ++n) (void)pid.step(random.normal(), random.normal());
-  const double command = number(-0.1, 0.1);
+  const double command = any_number(-0.1, 0.1);
   pid.start(command);
   RC_ASSERT(std::abs(pid.step(random.normal(), random.normal(), random.normal()).command -
                      command) < 1e-9);
@@ -249,7 +247,7 @@ TEST(Pid, HasNoKickOfItsDerivativeAfterAGap) {
 
 // But for the derivative's next difference.
 RC_GTEST_PROP(Pid, PassesOverWhatIsNotFinite, ()) {
-  Pid::Settings settings = any_settings();
+  Pid::Settings settings = any_pid_settings();
   settings.gains.derivative = 0.0;
   Random random = any_random();
   Pid disturbed(settings, kRate_Hz);

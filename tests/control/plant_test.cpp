@@ -9,6 +9,7 @@
 
 #include "sim/deflection_loop.hpp"
 #include "sim/impedance_loop.hpp"
+#include "support/numbers.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
@@ -17,7 +18,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kRate_Hz;
 
 JointSample sample_of(const Plant& plant) {
   JointSample sample;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "torsio/control/series_elastic_joint.hpp"
+#include "torsio/estimate/joint_sample.hpp"
 
 namespace torsio::test {
 
@@ -59,5 +60,11 @@ class SpringJoint {
   double joint_rad_ = 0.0;
   double joint_speed_rad_s_ = 0.0;
 };
+
+inline JointSample sample_of(const SpringJoint& joint, const Drive& drive) {
+  return {.motor_angle_rad = joint.angle_rad() * drive.ratio,
+          .gear_angle_rad = joint.angle_rad(),
+          .joint_angle_rad = joint.joint_rad()};
+}
 
 }  // namespace torsio::test

@@ -5,17 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 
 #include "model/grey_box/grey_box.hpp"
 #include "spring_joint.hpp"
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
 #include "support/example_settings.hpp"
 #include "support/examples/linear.hpp"
 #include "support/examples/mixture.hpp"
 #include "support/examples/network.hpp"
+#include "support/numbers.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/core/random.hpp"
@@ -24,24 +25,16 @@
 namespace torsio {
 namespace {
 
+using test::any_random;
+using test::kInfinity;
+using test::kNaN;
+using test::kRate_Hz;
 using test::SpringJoint;
 
-constexpr double kRate_Hz = 1000.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-TorqueLoopCore::Settings settings_of(const char* actuator) {
+TorqueLoopCore::Settings torque_settings(const char* actuator) {
   const DataSheet sheet = data_sheet(actuator);
   return {.deflection = {.joint = series_elastic_joint(sheet)},
           .largest_torque_Nm = sheet.rating.torque_Nm.value};
-}
-
-JointSample sample_of(const SpringJoint& joint, const Drive& drive) {
-  JointSample sample;
-  sample.motor_angle_rad = joint.angle_rad() * drive.ratio;
-  sample.gear_angle_rad = joint.angle_rad();
-  sample.joint_angle_rad = joint.joint_rad();
-  return sample;
 }
 
 /// Runs a loop on the linear joint for so long; the last output.
@@ -148,7 +141,7 @@ ModelInverse relaxing_inverse() {
 // A reference that only the limit of the deflection cuts, not one of the torque: the spring was
 // never at the deflection that the inverse requested.
 TEST(TorqueController, UpdatesTheInverseWithTheRequestedDeflectionAndNotWithTheWantedOne) {
-  auto settings = settings_of("dfki-50");
+  auto settings = torque_settings("dfki-50");
   settings.largest_torque_Nm = kInfinity;
   settings.deflection.largest_deflection_rad = 0.05;
   const auto asked_rad = [&](double reference_Nm) {
@@ -258,7 +251,7 @@ TEST(TrainedInverse, RefusesAnotherTargetAndOtherInputs) {
 
 TEST(TorqueController, ReachesTheWantedTorqueAgainstALockedOutput) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
-    const auto settings = settings_of(actuator);
+    const auto settings = torque_settings(actuator);
     const SeriesElasticJoint& parts = settings.deflection.joint;
     TorqueController controller(LinearInverse(parts.stiffness_Nm_rad), settings, kRate_Hz);
     SpringJoint joint(parts, JointOutput::locked);
@@ -274,13 +267,13 @@ TEST(TorqueController, ReachesTheWantedTorqueAgainstALockedOutput) {
 }
 
 TEST(TorqueController, CutsTheReferenceToTheRating) {
-  const auto settings = settings_of("dfki-50");
+  const auto settings = torque_settings("dfki-50");
   TorqueController controller(LinearInverse(573.0), settings, kRate_Hz);
   EXPECT_EQ(controller.step(1e9, wound(0.0)).wanted_torque_Nm, settings.largest_torque_Nm);
 }
 
 TEST(TorqueController, ObservesADisturbanceThatNoIntegralMakesUpFor) {
-  auto settings = settings_of("dfki-50");
+  auto settings = torque_settings("dfki-50");
   settings.deflection.integral_1_s = 0.0;
   const SeriesElasticJoint& parts = settings.deflection.joint;
   const auto error_Nm = [&] {
@@ -296,7 +289,7 @@ TEST(TorqueController, ObservesADisturbanceThatNoIntegralMakesUpFor) {
 }
 
 TEST(TorqueController, CompensatesFrictionWhereTheSpringIsToBeWound) {
-  auto settings = settings_of("dfki-50");
+  auto settings = torque_settings("dfki-50");
   settings.friction = FrictionCompensation{.share = 0.5, .speed_rad_s = 1e-6};
   TorqueController controller(LinearInverse(573.0), settings, kRate_Hz);
   TorqueLoopCore::Output output;
@@ -311,7 +304,7 @@ TEST(TorqueController, CompensatesFrictionWhereTheSpringIsToBeWound) {
 
 // For a torque that rises steadily the plain loop has a lag of 2 ζ / ω, whatever the slope.
 TEST(TorqueController, FollowsARampWithoutLagWhereItsRateIsFedForward) {
-  auto settings = settings_of("dfki-50");
+  auto settings = torque_settings("dfki-50");
   settings.deflection.integral_1_s = 0.0;
   settings.deflection.joint.drive.viscous_Nms_rad = 0.0;
   const SeriesElasticJoint& parts = settings.deflection.joint;
@@ -334,7 +327,7 @@ TEST(TorqueController, FollowsARampWithoutLagWhereItsRateIsFedForward) {
 }
 
 TEST(TorqueController, ReportsTheFaultAndTheCurrentFades) {
-  auto settings = settings_of("dfki-50");
+  auto settings = torque_settings("dfki-50");
   settings.observer_cutoff_Hz = 5.0;
   const SeriesElasticJoint& parts = settings.deflection.joint;
   TorqueController controller(LinearInverse(parts.stiffness_Nm_rad), settings, kRate_Hz);
@@ -388,7 +381,7 @@ double change_after_a_loss_A(const TorqueLoopCore::Settings& settings, int lost_
 // the measurement nor return with it at once, nor after the ticks that the observer waits for.
 TEST(TorqueController, LosesAndFindsItsMeasurementWithoutAJumpOfTheCurrent) {
   for (const int lost_ticks : {1, 5, 300}) {
-    auto settings = settings_of("dfki-50");
+    auto settings = torque_settings("dfki-50");
     // The joint has moved: its deflection is damped in either case.
     const double plain_A = change_after_a_loss_A(settings, lost_ticks);
     settings.observer_cutoff_Hz = 5.0;
@@ -400,7 +393,7 @@ TEST(TorqueController, LosesAndFindsItsMeasurementWithoutAJumpOfTheCurrent) {
 
 TEST(TorqueController, RefusesWhatItCannotDo) {
   const auto refusal = [](auto change) {
-    TorqueLoopCore::Settings settings = settings_of("dfki-50");
+    TorqueLoopCore::Settings settings = torque_settings("dfki-50");
     change(settings);
     return test::error_message([&] { TorqueController(LinearInverse(573.0), settings, kRate_Hz); });
   };
@@ -432,14 +425,14 @@ TEST(TorqueController, RefusesWhatItCannotDo) {
 // 100 cases of 10^4 ticks on a free joint: any references, NaN among them, then none; the energy
 // stays within what the peak current can supply in that time, and decreases again.
 RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyReferenceAndReleasesIt, ()) {
-  auto settings = settings_of(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"));
+  auto settings = torque_settings(*rc::gen::element("dfki-28", "dfki-50", "dfki-120", "dfki-300"));
   if (*rc::gen::arbitrary<bool>()) settings.observer_cutoff_Hz = 3.0;
   if (*rc::gen::arbitrary<bool>()) settings.friction = FrictionCompensation{};
   settings.feeds_rate_forward = *rc::gen::arbitrary<bool>();
   SeriesElasticJoint parts = settings.deflection.joint;
   parts.joint_viscous_Nms_rad = 1.0;
   settings.deflection.joint = parts;
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   TorqueController controller(LinearInverse(parts.stiffness_Nm_rad), settings, kRate_Hz);
   SpringJoint joint(parts, JointOutput::free);
   const double max_Nm = parts.drive.peak_current_A * parts.drive.torque_per_current();
@@ -467,11 +460,11 @@ RC_GTEST_PROP(TorqueController, BoundsTheEnergyForAnyReferenceAndReleasesIt, ())
 
 // 100 cases of 10^4 ticks.
 RC_GTEST_PROP(TorqueController, GivesAFiniteCurrentForAnyNumbers, ()) {
-  auto settings = settings_of("dfki-50");
+  auto settings = torque_settings("dfki-50");
   settings.observer_cutoff_Hz = 5.0;
   settings.friction = FrictionCompensation{};
   settings.feeds_rate_forward = true;
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   TorqueController controller(ModelInverse(deflection_and_rate(), test::example<Dgmm>()), settings,
                               kRate_Hz);
   for (int n = 0; n < 10'000; ++n) {

@@ -16,6 +16,7 @@
 #include "data/read_log.hpp"
 #include "data/ros/message_topics.hpp"
 #include "support/error_message.hpp"
+#include "support/file_bytes.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/load.hpp"
@@ -27,16 +28,12 @@ namespace torsio {
 namespace {
 
 using test::error_message;
+using test::file_bytes;
 using testing::HasSubstr;
 
 constexpr std::size_t kSamples = 200;
 
-std::string path_of(const std::string& name) { return std::string(TORSIO_LOG_FILES "/") + name; }
-
-std::string bytes_of_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+std::string log_path(const std::string& name) { return std::string(TORSIO_LOG_FILES "/") + name; }
 
 double q(std::size_t n) { return std::sin(0.05 * static_cast<double>(n)); }
 
@@ -48,14 +45,14 @@ void expect_sine(const std::vector<double>& values, double factor, double tolera
 class MessageFile : public testing::TestWithParam<std::string> {};
 
 TEST_P(MessageFile, HasTheNumbersAndTimesOfItsMessages) {
-  const LogTable table = read_log(path_of(GetParam()));
+  const LogTable table = read_log(log_path(GetParam()));
   expect_sine(table.find("/joint_states/elbow/position")->values, 1.0, 1e-12);
   expect_sine(table.find("/joint_states/wrist/effort")->values, -20.0, 1e-12);
   EXPECT_EQ(table.find("/joint_states/elbow/velocity"), nullptr);
   EXPECT_NEAR(table.find("t_s")->values.back(), 0.995, 1e-9);
   EXPECT_EQ(table.source.sha256.size(), 64U);
   EXPECT_FALSE(table.has_units);
-  const LogSummary summary = list_log(path_of(GetParam()));
+  const LogSummary summary = list_log(log_path(GetParam()));
   ASSERT_EQ(summary.topics.size(), 1U);
   EXPECT_EQ(summary.topics[0].messages, kSamples);
   EXPECT_EQ(summary.topics[0].problem, "");
@@ -77,7 +74,7 @@ LogTable table_of_bag(std::string_view bytes) {
 }
 
 TEST(Bag, IsReadUpToItsLastWholeRecordIfTheRecorderWasStopped) {
-  const std::string whole = bytes_of_file(path_of("joints_none.bag"));
+  const std::string whole = file_bytes(log_path("joints_none.bag"));
   const LogTable cut = table_of_bag(std::string_view(whole).substr(0, whole.size() * 6 / 10));
   ASSERT_LT(cut.rows(), kSamples);
   ASSERT_GT(cut.rows(), kSamples / 4);
@@ -86,7 +83,7 @@ TEST(Bag, IsReadUpToItsLastWholeRecordIfTheRecorderWasStopped) {
 }
 
 TEST(Bag, AnyChangedByteIsAnErrorOrAnotherNumber) {
-  const std::string whole = bytes_of_file(path_of("joints_lz4.bag"));
+  const std::string whole = file_bytes(log_path("joints_lz4.bag"));
   std::size_t refused = 0;
   for (std::size_t at = 0; at < whole.size(); at += 41) {
     std::string changed = whole;
@@ -112,7 +109,7 @@ TEST(Bag, NamesThePlaceOfWhatIsWrong) {
 
 TEST(Db3, RefusesOtherDatabasesAndDamagedOnes) {
   const TemporaryFolder folder;
-  const std::string whole = bytes_of_file(path_of("iron.db3"));
+  const std::string whole = file_bytes(log_path("iron.db3"));
   std::ofstream(folder.path("cut.db3"), std::ios::binary) << whole.substr(0, whole.size() / 3);
   EXPECT_THAT(error_message([&] { (void)read_log(folder.path("cut.db3")); }),
               HasSubstr("a database of rosbag2"));
@@ -127,7 +124,7 @@ TEST(Db3, RefusesOtherDatabasesAndDamagedOnes) {
 class ArrayFile : public testing::TestWithParam<std::string> {};
 
 TEST_P(ArrayFile, HasItsRealNumbersAsColumns) {
-  const LogTable table = read_log(path_of(GetParam()));
+  const LogTable table = read_log(log_path(GetParam()));
   expect_sine(table.find("q")->values, 1.0, 1e-15);
   expect_sine(table.find("tau")->values, 20.0, 1e-5);  // single precision
   for (const char* both : {"both", "both_f"}) {
@@ -140,7 +137,7 @@ TEST_P(ArrayFile, HasItsRealNumbersAsColumns) {
   EXPECT_EQ(table.find("z"), nullptr);     // complex
   const auto refused = [&](const std::string& name) {
     return error_message(
-        [&] { (void)read_log(path_of(GetParam()), {.skip = {}, .wanted = {name}}); });
+        [&] { (void)read_log(log_path(GetParam()), {.skip = {}, .wanted = {name}}); });
   };
   EXPECT_THAT(refused("z"), HasSubstr("numbers of type '<c16' are not read"));
   EXPECT_THAT(refused("qq"),
@@ -153,7 +150,7 @@ INSTANTIATE_TEST_SUITE_P(Files, ArrayFile, testing::Values("arrays.npz", "packed
                          });
 
 TEST(Npz, AnyChangedByteIsAnErrorOrAnotherNumber) {
-  const std::string whole = bytes_of_file(path_of("packed.npz"));
+  const std::string whole = file_bytes(log_path("packed.npz"));
   std::size_t refused = 0;
   for (std::size_t at = 0; at < whole.size(); at += 29) {
     std::string changed = whole;
@@ -180,7 +177,7 @@ TEST_P(MatFiles, HasItsArraysAndThoseOfStructures) {
   const auto& [file, q_name, tau_name] = GetParam();
   std::vector<std::string> wanted{q_name};
   if (!tau_name.empty()) wanted.push_back(tau_name);
-  const LogTable table = read_log(path_of(file), {.skip = {}, .wanted = wanted});
+  const LogTable table = read_log(log_path(file), {.skip = {}, .wanted = wanted});
   ASSERT_NE(table.find(q_name), nullptr);
   expect_sine(table.find(q_name)->values, 1.0, 1e-12);
   if (!tau_name.empty()) expect_sine(table.find(tau_name)->values, 20.0, 1e-5);
@@ -201,7 +198,7 @@ INSTANTIATE_TEST_SUITE_P(Versions, MatFiles,
 TEST(Mat, DamagedFilesAreErrorsAndNoCrash) {
   const TemporaryFolder folder;
   for (const char* name : {"octave_v7.mat", "matlab_v73.mat", "octave_v4.mat"}) {
-    const std::string whole = bytes_of_file(path_of(name));
+    const std::string whole = file_bytes(log_path(name));
     for (std::size_t part = 1; part < 8; ++part) {
       std::string changed = whole.substr(0, whole.size() * part / 8);
       if (part % 2 == 0) changed[changed.size() / 2] ^= 0x55;
@@ -217,7 +214,7 @@ TEST(Mat, DamagedFilesAreErrorsAndNoCrash) {
   EXPECT_THAT(error_message([&] { (void)read_log(folder.path("text.mat")); }),
               HasSubstr("MATLAB file, or is damaged"));
   EXPECT_THAT(error_message([&] {
-                (void)read_log(path_of("octave_v7.mat"), {.skip = {}, .wanted = {"lag.q"}});
+                (void)read_log(log_path("octave_v7.mat"), {.skip = {}, .wanted = {"lag.q"}});
               }),
               HasSubstr("log.deep.tau (200)"));
 }
@@ -244,7 +241,7 @@ TEST(ChildProcess, ACrashOfItsWorkIsAnError) {
 }
 
 /// Two channels that need every bit, one of them slower, on a clock that does not begin at zero.
-Recording example() {
+Recording two_channels() {
   Recording recording("example", 1000.0, -0.25);
   Channel angle{.name = "joint_angle_rad", .values = {}};
   Channel torque{.name = "torque_Nm", .values = {}};
@@ -263,7 +260,7 @@ class WrittenFile : public testing::TestWithParam<std::string> {};
 TEST_P(WrittenFile, ReadsBackBitByBit) {
   const TemporaryFolder folder;
   const std::string path = folder.path("run" + GetParam());
-  const Recording written = example();
+  const Recording written = two_channels();
   write_recording(written, path);
   const std::vector<Recording> read = load_recordings(path);
   ASSERT_EQ(read.size(), 1U);
@@ -279,9 +276,9 @@ TEST_P(WrittenFile, ReadsBackBitByBit) {
       ASSERT_TRUE(again.values[n] == channel.values[n] ||
                   (std::isnan(again.values[n]) && std::isnan(channel.values[n])));
   }
-  const std::string bytes = bytes_of_file(path);
+  const std::string bytes = file_bytes(path);
   write_recording(written, path);
-  EXPECT_EQ(bytes_of_file(path), bytes);
+  EXPECT_EQ(file_bytes(path), bytes);
 }
 
 TEST_P(WrittenFile, IsNotWrittenWithAnInfiniteValue) {
@@ -352,7 +349,7 @@ TEST(JointsOfAMapping, MakeTheRecordingOfEachFromOneFile) {
   for (const auto& [joint, sign, ratio] :
        {std::tuple{"upper", 1.0, 2.0}, std::tuple{"lower", -1.0, 0.25}}) {
     options.joint = joint;
-    const Recording recording = load_recordings(path_of("joints_bz2.bag"), options).front();
+    const Recording recording = load_recordings(log_path("joints_bz2.bag"), options).front();
     expect_sine(recording.channel("joint_angle_rad").values, sign, 1e-12);
     expect_sine(recording.channel("motor_angle_rad").values, sign / ratio, 1e-12);
     expect_sine(recording.channel("torque_Nm").values, 20.0 * sign * ratio, 1e-12);
@@ -385,7 +382,7 @@ TEST(ReadyMappings, ArePresentAndValid) {
   LoadOptions options;
   options.mapping = "ros2_control_joint";
   options.joint = "elbow";
-  EXPECT_THAT(error_message([&] { (void)load_recordings(path_of("iron.db3"), options); }),
+  EXPECT_THAT(error_message([&] { (void)load_recordings(log_path("iron.db3"), options); }),
               HasSubstr("velocity"));  // this robot publishes none
   EXPECT_THAT(error_message([] { (void)read_mapping("ros2_contrl_joint"); }),
               HasSubstr("ros2_contrl_joint"));

@@ -14,6 +14,7 @@
 #include "data/ros/message_topics.hpp"
 #include "data/ros/ros_schema.hpp"
 #include "support/error_message.hpp"
+#include "support/file_bytes.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/report/log_summary.hpp"
@@ -22,17 +23,13 @@ namespace torsio {
 namespace {
 
 using test::error_message;
+using test::file_bytes;
 using testing::HasSubstr;
 
 // Written by the reference implementation of MCAP: tools/recording_peers/make_mcap.mjs has the equations.
 constexpr std::size_t kMessages = 200;
 
-std::string path_of(const std::string& name) { return std::string(TORSIO_MCAP_FILES "/") + name; }
-
-std::string bytes_of_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+std::string mcap_path(const std::string& name) { return std::string(TORSIO_MCAP_FILES "/") + name; }
 
 LogTable parsed(std::string_view bytes, const TopicOptions& options = {}) {
   const auto source = bytes_in_memory(bytes, "test.mcap");
@@ -46,7 +43,7 @@ double elbow(std::size_t n) { return std::sin(0.05 * static_cast<double>(n)); }
 class McapFile : public testing::TestWithParam<std::string> {};
 
 TEST_P(McapFile, HasTheNumbersOfItsMessagesWhateverItsPacking) {
-  const LogTable table = read_log(path_of(GetParam()));
+  const LogTable table = read_log(mcap_path(GetParam()));
   ASSERT_EQ(table.rows(), kMessages - 3);  // before the first message of the load cell
   EXPECT_EQ(table.source.sha256.size(), 64U);
   const LogColumn& position = *table.find("/joint_states/elbow/position");
@@ -77,13 +74,13 @@ INSTANTIATE_TEST_SUITE_P(Packings, McapFile,
 
 TEST(Mcap, ReadsOnlyTheTopicsThatAreWanted) {
   const LogTable table =
-      read_log(path_of("zstd.mcap"), {.skip = {}, .wanted = {"/load_cell/wrench/torque/z"}});
+      read_log(mcap_path("zstd.mcap"), {.skip = {}, .wanted = {"/load_cell/wrench/torque/z"}});
   EXPECT_EQ(table.rows(), kMessages / 4);  // its rows are those of that topic
   EXPECT_EQ(table.find("/joint_states/elbow/position"), nullptr);
   const LogColumn& cell = *table.find("/load_cell/wrench/torque/z");
   EXPECT_TRUE(cell.fresh.empty());
   EXPECT_EQ(cell.values[2], 5.0);
-  EXPECT_EQ(table.place(1, cell).substr(0, path_of("zstd.mcap").size()), path_of("zstd.mcap"));
+  EXPECT_EQ(table.place(1, cell).substr(0, mcap_path("zstd.mcap").size()), mcap_path("zstd.mcap"));
   EXPECT_THAT(table.place(1, cell), HasSubstr(": message 1"));
 }
 
@@ -96,7 +93,7 @@ TEST(Mcap, BecomesChannelsByAMapping) {
                                               "/motor/temperature/temperature, unit: degC}\n";
   LoadOptions options;
   options.mapping = folder.path("joint.yaml");
-  const std::vector<Recording> recordings = load_recordings(path_of("lz4.mcap"), options);
+  const std::vector<Recording> recordings = load_recordings(mcap_path("lz4.mcap"), options);
   ASSERT_EQ(recordings.size(), 1U);
   EXPECT_NEAR(recordings[0].sample_rate_Hz(), 200.0, 1e-6);
   EXPECT_EQ(recordings[0].channels().size(), 3U);
@@ -106,7 +103,7 @@ TEST(Mcap, BecomesChannelsByAMapping) {
 }
 
 TEST(Mcap, IsReadUpToItsLastWholeRecordIfTheRecorderWasStopped) {
-  const std::string whole = bytes_of_file(path_of("no_chunks.mcap"));
+  const std::string whole = file_bytes(mcap_path("no_chunks.mcap"));
   const LogTable all = parsed(whole);
   for (const std::size_t size : {whole.size() / 2, whole.size() / 2 + 1, whole.size() / 3}) {
     const LogTable cut = parsed(std::string_view(whole).substr(0, size));
@@ -118,7 +115,7 @@ TEST(Mcap, IsReadUpToItsLastWholeRecordIfTheRecorderWasStopped) {
 }
 
 TEST(Mcap, AnyChangedByteIsAnErrorOrAnotherNumber) {
-  const std::string whole = bytes_of_file(path_of("zstd.mcap"));
+  const std::string whole = file_bytes(mcap_path("zstd.mcap"));
   std::size_t refused = 0;
   for (std::size_t at = 0; at < whole.size(); at += 37) {
     std::string changed = whole;
@@ -234,7 +231,7 @@ TEST(RosSchema, HasFieldsArraysConstantsAndDefaults) {
 
 TEST(ReadLog, ReadsTheFolderOfRosbag2InItsOrder) {
   const TemporaryFolder folder;
-  const std::string whole = bytes_of_file(path_of("no_chunks.mcap"));
+  const std::string whole = file_bytes(mcap_path("no_chunks.mcap"));
   for (const char* name : {"run_0.mcap", "run_1.mcap"})
     std::ofstream(folder.path(name), std::ios::binary) << whole;
   std::ofstream(folder.path("metadata.yaml"))
@@ -258,7 +255,7 @@ TEST(ReadLog, NamesFormatsThatItDoesNotRead) {
 }
 
 TEST(ListLog, HasTopicsRatesGapsAndFields) {
-  const LogSummary summary = list_log(path_of("lz4.mcap"));
+  const LogSummary summary = list_log(mcap_path("lz4.mcap"));
   ASSERT_EQ(summary.topics.size(), 4U);
   EXPECT_FALSE(summary.is_unfinished);
   const TopicSummary& cell = summary.topics[1];

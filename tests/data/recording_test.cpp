@@ -10,7 +10,7 @@
 namespace torsio {
 namespace {
 
-Recording example() {
+Recording short_recording() {
   Recording recording("bench", 500.0, 2.0);
   recording.add({.name = "angle_rad", .values = {0.0, 0.1, 0.2}});
   recording.add({.name = "torque_Nm", .values = {1.0, 1.0, 2.0}, .fresh = {1, 0, 1}});
@@ -18,15 +18,15 @@ Recording example() {
 }
 
 TEST(Recording, KnowsItsClock) {
-  EXPECT_EQ(example().size(), 3U);
-  EXPECT_DOUBLE_EQ(example().time_s(2), 2.004);
+  EXPECT_EQ(short_recording().size(), 3U);
+  EXPECT_DOUBLE_EQ(short_recording().time_s(2), 2.004);
   EXPECT_THROW(Recording("x", 0.0), Error);
   EXPECT_THROW(Recording("x", -1.0), Error);
   EXPECT_THROW(Recording("x", std::nan("")), Error);
 }
 
 TEST(Recording, DistinguishesNewSamplesFromHeldOnes) {
-  const Recording recording = example();
+  const Recording recording = short_recording();
   EXPECT_TRUE(recording.channel("angle_rad").is_fresh(1));
   EXPECT_FALSE(recording.channel("torque_Nm").is_fresh(1));
   EXPECT_TRUE(recording.channel("torque_Nm").is_fresh(2));
@@ -34,7 +34,7 @@ TEST(Recording, DistinguishesNewSamplesFromHeldOnes) {
 
 TEST(Recording, AnUnknownChannelIsAnErrorThatListsTheKnownOnes) {
   try {
-    static_cast<void>(example().channel("torqe_Nm"));
+    static_cast<void>(short_recording().channel("torqe_Nm"));
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(std::string(error.what()),
@@ -44,7 +44,7 @@ TEST(Recording, AnUnknownChannelIsAnErrorThatListsTheKnownOnes) {
 }
 
 TEST(Recording, RefusesChannelsThatDoNotFit) {
-  Recording recording = example();
+  Recording recording = short_recording();
   EXPECT_THROW(recording.add({.name = "b_rad", .values = {1.0}}), Error);
   EXPECT_THROW(recording.add({.name = "angle_rad", .values = {1.0, 2.0, 3.0}}), Error);
   EXPECT_THROW(recording.add({.name = "b_deg", .values = {1.0, 2.0, 3.0}}), Error);
@@ -53,7 +53,7 @@ TEST(Recording, RefusesChannelsThatDoNotFit) {
 }
 
 TEST(Recording, AConditionIsAConstantChannel) {
-  Recording recording = example();
+  Recording recording = short_recording();
   recording.add_condition("support_m", 0.033);
   EXPECT_EQ(recording.channel("support_m").values, std::vector<double>(3, 0.033));
   EXPECT_EQ(recording.conditions(), std::vector<std::string>{"support_m"});

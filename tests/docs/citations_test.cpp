@@ -14,6 +14,8 @@
 #include <string_view>
 #include <vector>
 
+#include "support/file_bytes.hpp"
+
 namespace torsio {
 namespace {
 
@@ -27,11 +29,6 @@ constexpr std::array kPlaces = {"src",   "studies",   "include",      "apps",
 constexpr std::array kEndings = {".hpp", ".cpp", ".h", ".c", ".md", ".txt", ".cmake", ".py", ""};
 
 bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
-
-std::string contents(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// @returns the number at the start of `text`, such as "4" or "3.11"; empty if there is none
 std::string leading_number(std::string_view text) {
@@ -93,12 +90,12 @@ std::vector<std::string> cited_sections(std::string_view text) {
 /// @returns "file: section" for each citation without a heading
 std::vector<std::string> dangling_citations() {
   const std::filesystem::path specification = kRoot / "docs/specification.md";
-  const std::set<std::string> sections = section_numbers(contents(specification));
+  const std::set<std::string> sections = section_numbers(test::file_bytes(specification));
   std::vector<std::string> dangling;
   const auto check = [&](const std::filesystem::path& path) {
     if (std::ranges::find(kEndings, path.extension().string()) == kEndings.end()) return;
     if (path == specification || path.filename() == "citations_test.cpp") return;
-    for (const std::string& section : cited_sections(contents(path)))
+    for (const std::string& section : cited_sections(test::file_bytes(path)))
       if (!sections.contains(section))
         dangling.push_back(std::filesystem::relative(path, kRoot).string() + ": " + section);
   };
@@ -133,7 +130,7 @@ TEST(Citations, SectionsAreTheNumberedHeadings) {
 }
 
 TEST(Citations, LeadToASectionOfTheSpecification) {
-  EXPECT_GT(section_numbers(contents(kRoot / "docs/specification.md")).size(), 20U);
+  EXPECT_GT(section_numbers(test::file_bytes(kRoot / "docs/specification.md")).size(), 20U);
   EXPECT_THAT(dangling_citations(), IsEmpty());
 }
 

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "support/example_settings.hpp"
 #include "support/examples/linear.hpp"
 #include "support/examples/network.hpp"
+#include "support/numbers.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 
 namespace torsio {
@@ -22,9 +22,8 @@ namespace {
 
 using test::error_message;
 using test::example;
+using test::kNaN;
 using testing::HasSubstr;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 EstimatorSettings settings_without_zeros() {
   EstimatorSettings settings = test::example_settings();

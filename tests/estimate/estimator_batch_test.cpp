@@ -105,7 +105,7 @@ std::vector<AnyModel> models() {
           Overflowing({.level = 0.055})};
 }
 
-EstimatorSettings settings(const std::string& second) {
+EstimatorSettings batch_settings(const std::string& second) {
   EstimatorSettings of = test::example_settings();
   of.zeroed_channels = {};
   of.features.inputs[1] = second;
@@ -154,7 +154,7 @@ class EstimatorBatchLaw : public testing::TestWithParam<std::string> {};
 
 TEST_P(EstimatorBatchLaw, GivesEachRowWhatAnEstimatorOfItsOwnDoes) {
   for (const AnyModel& model : models()) {
-    const EstimatorSettings of = settings(GetParam());
+    const EstimatorSettings of = batch_settings(GetParam());
     EstimatorBatch batch(of, model, kRows);
     std::vector<Estimator> alone(kRows, Estimator(of, model));
     batch.set_zero("joint_angle_rad", 0.003);

@@ -8,10 +8,10 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <string>
 
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 
@@ -19,10 +19,9 @@ namespace torsio {
 namespace {
 
 using test::error_message;
+using test::kInfinity;
+using test::kNaN;
 using testing::HasSubstr;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Outputs `gain` times its input plus the number of ticks so far, or a fixed estimate.
 class Scripted {
@@ -53,7 +52,7 @@ class Scripted {
 using ScriptedEstimator = BasicEstimator<Scripted>;
 
 /// One input that needs no settling, trained on -1..1.
-EstimatorSettings settings(const std::string& input = "gear_angle_rad") {
+EstimatorSettings scripted_settings(const std::string& input = "gear_angle_rad") {
   return {.features = {.inputs = {input}, .definitions = {}},
           .sample_rate_Hz = 1000.0,
           .target = "torque_Nm",
@@ -66,7 +65,7 @@ EstimatorSettings settings(const std::string& input = "gear_angle_rad") {
 Estimate step(ScriptedEstimator& estimator, double value) { return estimator.step({{value}}); }
 
 ScriptedEstimator with_output(const Estimate& estimate) {
-  return {settings(), Scripted({.output = estimate, .is_fixed = true})};
+  return {scripted_settings(), Scripted({.output = estimate, .is_fixed = true})};
 }
 
 std::string refusal(const EstimatorSettings& bad, std::size_t inputs = 1) {
@@ -74,7 +73,7 @@ std::string refusal(const EstimatorSettings& bad, std::size_t inputs = 1) {
 }
 
 TEST(Estimator, ReturnsTheOutputOfItsModel) {
-  ScriptedEstimator estimator(settings(), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings(), Scripted({}));
   EXPECT_THAT(estimator.raw_inputs(), testing::ElementsAre("gear_angle_rad"));
   const Estimate estimate = step(estimator, 0.25);
   EXPECT_EQ(estimate.value, 2.5);
@@ -83,7 +82,7 @@ TEST(Estimator, ReturnsTheOutputOfItsModel) {
 }
 
 TEST(Estimator, HoldsTheLastGoodValueWhileAnInputIsMissing) {
-  ScriptedEstimator estimator(settings(), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings(), Scripted({}));
   EXPECT_EQ(step(estimator, kNaN).value, 0.0) << "nothing to hold yet";
   step(estimator, 0.5);
   for (const double bad : {kNaN, kInfinity, -kInfinity}) {
@@ -96,7 +95,7 @@ TEST(Estimator, HoldsTheLastGoodValueWhileAnInputIsMissing) {
 }
 
 TEST(Estimator, RefusesAnotherNumberOfInputs) {
-  ScriptedEstimator estimator(settings(), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings(), Scripted({}));
   step(estimator, 0.5);
   const Estimate none = estimator.step({});
   const Estimate two = estimator.step(std::array{0.1, 0.2});
@@ -107,7 +106,7 @@ TEST(Estimator, RefusesAnotherNumberOfInputs) {
 }
 
 TEST(Estimator, RunsOnAcrossAShortGapAndStartsAfreshAfterALongOne) {
-  ScriptedEstimator estimator(settings("lag(gear_angle_rad, 3)"), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings("lag(gear_angle_rad, 3)"), Scripted({}));
   while (!estimator.is_settled()) step(estimator, 0.5);
   ASSERT_EQ(step(estimator, 0.5).fault, Fault::none);
   for (int i = 0; i < 10; ++i) step(estimator, kNaN);  // 10 ms: the longest gap
@@ -120,7 +119,7 @@ TEST(Estimator, RunsOnAcrossAShortGapAndStartsAfreshAfterALongOne) {
 }
 
 TEST(Estimator, RecoversFromInputsThatPoisonItsFilters) {
-  ScriptedEstimator estimator(settings("lowpass(gear_angle_rad * gear_angle_rad, 100Hz)"),
+  ScriptedEstimator estimator(scripted_settings("lowpass(gear_angle_rad * gear_angle_rad, 100Hz)"),
                               Scripted({}));
   while (!estimator.is_settled()) step(estimator, 0.5);
   const double before = step(estimator, 0.5).value;
@@ -133,7 +132,7 @@ TEST(Estimator, RecoversFromInputsThatPoisonItsFilters) {
 }
 
 TEST(Estimator, ReturnsTheFallbackWhileItWarmsUp) {
-  ScriptedEstimator estimator(settings("lag(gear_angle_rad, 3)"), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings("lag(gear_angle_rad, 3)"), Scripted({}));
   const Estimate first = step(estimator, 0.5);
   EXPECT_EQ(first.fault, Fault::warming_up);
   EXPECT_EQ(first.value, 0.5 + 7.0 * 0.5);
@@ -142,7 +141,7 @@ TEST(Estimator, ReturnsTheFallbackWhileItWarmsUp) {
 }
 
 TEST(Estimator, ReturnsTheFallbackOutsideTheTrainingRange) {
-  ScriptedEstimator estimator(settings(), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings(), Scripted({}));
   const Estimate outside = step(estimator, 1.11);
   EXPECT_EQ(outside.fault, Fault::outside_training_range);
   EXPECT_DOUBLE_EQ(outside.value, 0.5 + 7.0 * 1.11);
@@ -181,7 +180,7 @@ class Continuing : public Scripted {
 /// Deflection and its rate, trained on -1..1 and -2..2, with steps of at most 1.
 template <class Model>
 BasicEstimator<Model> of_a_motion(const Estimate& output) {
-  EstimatorSettings with_rate = settings();
+  EstimatorSettings with_rate = scripted_settings();
   with_rate.features.inputs = {"gear_angle_rad", "motor_speed_rad_s"};
   with_rate.ranges = {.lowest = {-1.0, -2.0}, .highest = {1.0, 2.0}, .margin = 0.05};
   with_rate.fallback.slope = {7.0, 0.0};
@@ -226,7 +225,7 @@ TEST(Estimator, DoesNotUseAModelThatContinuesAfterAJump) {
 TEST(Estimator, ReturnsNoErrorBarForABlendWithoutEvidence) {
   ScriptedEstimator estimator = with_output({.value = 10.0});
   EXPECT_TRUE(std::isnan(step(estimator, 1.05).std_dev));
-  EstimatorSettings no_evidence = settings();
+  EstimatorSettings no_evidence = scripted_settings();
   no_evidence.fallback.residual_std = kNaN;
   ScriptedEstimator other(no_evidence,
                           Scripted({.output = {.value = 1.0, .std_dev = 2.0}, .is_fixed = true}));
@@ -234,7 +233,7 @@ TEST(Estimator, ReturnsNoErrorBarForABlendWithoutEvidence) {
 }
 
 TEST(Estimator, StaysFiniteWhenModelAndFallbackAreFurtherApartThanTheLargestNumber) {
-  EstimatorSettings far = settings();
+  EstimatorSettings far = scripted_settings();
   far.fallback = {.intercept = -1e308, .slope = {0.0}, .residual_std = 1.0};
   ScriptedEstimator estimator(
       far, Scripted({.output = {.value = 1e308, .std_dev = 1.0}, .is_fixed = true}));
@@ -248,7 +247,7 @@ EstimatorSettings any_two_ranges() {
   const auto in = [](double low, double high) {
     return low + (high - low) * 1e-3 * *rc::gen::inRange(0, 1001);
   };
-  EstimatorSettings two = settings();
+  EstimatorSettings two = scripted_settings();
   two.features.inputs = {"gear_angle_rad", "joint_angle_rad"};
   two.ranges = {.lowest = {in(-5.0, 5.0), in(-5.0, 5.0)}, .highest = {}, .margin = in(0.01, 0.3)};
   for (const double lowest : two.ranges.lowest) two.ranges.highest.push_back(lowest + in(0.1, 4.0));
@@ -293,7 +292,7 @@ RC_GTEST_PROP(Estimator, TheModelAloneAnswersWithinTheRange, ()) {
 }
 
 TEST(Estimator, AllowsRoundingWhereAFeatureWasConstantInTraining) {
-  EstimatorSettings constant = settings();
+  EstimatorSettings constant = scripted_settings();
   constant.ranges.lowest = constant.ranges.highest = {0.033};
   ScriptedEstimator estimator(constant, Scripted({}));
   const auto value_is_the_models = [&](double x) { return step(estimator, x).value == 10.0 * x; };
@@ -306,7 +305,7 @@ TEST(Estimator, AllowsRoundingWhereAFeatureWasConstantInTraining) {
 
 TEST(Estimator, JumpsNotEvenWhereAFeatureWasConstantInTraining) {
   for (const double trained_at : {0.0, 0.033, -300.0}) {
-    EstimatorSettings constant = settings();
+    EstimatorSettings constant = scripted_settings();
     constant.ranges.lowest = constant.ranges.highest = {trained_at};
     constant.fallback = {.intercept = 50.0, .slope = {0.0}};
     ScriptedEstimator estimator(constant, Scripted({.output = {.value = 10.0}, .is_fixed = true}));
@@ -341,7 +340,7 @@ class Summing : public Scripted {
 };
 
 EstimatorSettings with_steps(double largest_step) {
-  EstimatorSettings guarded = settings();
+  EstimatorSettings guarded = scripted_settings();
   guarded.disturbances.largest_step = {largest_step};
   return guarded;
 }
@@ -412,7 +411,7 @@ TEST(Estimator, AShortGapAllowsALargerStep) {
 }
 
 TEST(Estimator, RefusesDisturbanceGuardsThatDoNotFit) {
-  EstimatorSettings bad = settings();
+  EstimatorSettings bad = scripted_settings();
   bad.disturbances.largest_step = {0.1, 0.2};
   EXPECT_THAT(refusal(bad), HasSubstr("guards.disturbances.largest_step"));
   bad.disturbances.largest_step = {-0.1};
@@ -442,7 +441,7 @@ TEST(Estimator, PassesOnTheFaultOfTheModel) {
 }
 
 TEST(Estimator, TakesTheErrorBarFromTheResidualsOfTheNearestRegion) {
-  EstimatorSettings with_table = settings();
+  EstimatorSettings with_table = scripted_settings();
   with_table.residuals = {.edges = {-5.0, 0.0, 5.0}, .std_dev = {1.0, 2.0}};
   ScriptedEstimator estimator(with_table, Scripted({}));
   EXPECT_EQ(step(estimator, -1.0).std_dev, 1.0);
@@ -452,7 +451,7 @@ TEST(Estimator, TakesTheErrorBarFromTheResidualsOfTheNearestRegion) {
 }
 
 TEST(Estimator, NeverReturnsAnErrorBarOfZero) {
-  EstimatorSettings zeros = settings();
+  EstimatorSettings zeros = scripted_settings();
   zeros.residuals = {.edges = {0.0, 1.0}, .std_dev = {0.0}};
   zeros.fallback.residual_std = 0.0;
   ScriptedEstimator sure(zeros,
@@ -465,7 +464,7 @@ TEST(Estimator, NeverReturnsAnErrorBarOfZero) {
 }
 
 TEST(Estimator, HoldsTheLastValueWhenTheFallbackOverflows) {
-  EstimatorSettings steep = settings();
+  EstimatorSettings steep = scripted_settings();
   steep.fallback.slope = {1e308};
   ScriptedEstimator estimator(steep, Scripted({}));
   step(estimator, 0.5);
@@ -475,13 +474,14 @@ TEST(Estimator, HoldsTheLastValueWhenTheFallbackOverflows) {
 }
 
 RC_GTEST_PROP(Estimator, ItsValueIsFiniteForAnyBits, (const std::vector<std::uint64_t>& bits)) {
-  ScriptedEstimator estimator(settings("lowpass(rate(gear_angle_rad), 50Hz)"), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings("lowpass(rate(gear_angle_rad), 50Hz)"),
+                              Scripted({}));
   for (const std::uint64_t pattern : bits)
     RC_ASSERT(std::isfinite(step(estimator, std::bit_cast<double>(pattern)).value));
 }
 
 TEST(Estimator, RepeatsItsRunAfterReset) {
-  ScriptedEstimator estimator(settings("lowpass(gear_angle_rad, 20Hz)"), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings("lowpass(gear_angle_rad, 20Hz)"), Scripted({}));
   const auto run = [&] {
     std::vector<double> values;
     for (int i = 0; i < 300; ++i) {
@@ -496,7 +496,7 @@ TEST(Estimator, RepeatsItsRunAfterReset) {
 }
 
 TEST(Estimator, CopiesShareNoState) {
-  ScriptedEstimator one(settings("lag(gear_angle_rad, 1)"), Scripted({}));
+  ScriptedEstimator one(scripted_settings("lag(gear_angle_rad, 1)"), Scripted({}));
   step(one, 0.5);
   ScriptedEstimator other = one;
   step(one, 0.7);
@@ -505,7 +505,7 @@ TEST(Estimator, CopiesShareNoState) {
 }
 
 TEST(Estimator, SubtractsAZero) {
-  ScriptedEstimator estimator(settings(), Scripted({}));
+  ScriptedEstimator estimator(scripted_settings(), Scripted({}));
   estimator.set_zero("gear_angle_rad", 0.2);
   EXPECT_DOUBLE_EQ(step(estimator, 0.5).value, 3.0);
   EXPECT_THROW(estimator.set_zero("gear_angle_rad", kNaN), UsageError);
@@ -514,7 +514,7 @@ TEST(Estimator, SubtractsAZero) {
 
 /// Trained on records whose zero was taken from each.
 EstimatorSettings zeroed_settings(const std::string& input = "gear_angle_rad") {
-  EstimatorSettings zeroed = settings(input);
+  EstimatorSettings zeroed = scripted_settings(input);
   zeroed.zeroed_channels = {"gear_angle_rad"};
   zeroed.residuals = {.edges = {-10.0, 10.0}, .std_dev = {1.0}};
   return zeroed;
@@ -574,21 +574,21 @@ TEST(Estimator, ReportsAMissingZeroAfterInputsAndWarmUpAndBeforeTheRange) {
 
 TEST(Estimator, RefusesSettingsThatDoNotFitTheModel) {
   EXPECT_THAT(
-      refusal(settings(), 2),
+      refusal(scripted_settings(), 2),
       HasSubstr("inputs: expected 2, as many as the model takes, found 1 (gear_angle_rad)"));
-  EstimatorSettings bad = settings();
+  EstimatorSettings bad = scripted_settings();
   bad.ranges.lowest = {};
   EXPECT_THAT(refusal(bad), HasSubstr("guards.ranges.lowest: expected 1 values, found 0"));
-  bad = settings();
+  bad = scripted_settings();
   bad.fallback.slope = {1.0, 2.0};
   EXPECT_THAT(refusal(bad), HasSubstr("fallback.slope: expected 1 values, found 2"));
-  bad = settings();
+  bad = scripted_settings();
   bad.target = "torque";
   EXPECT_THAT(refusal(bad), HasSubstr("target: expected a channel name that ends in its unit"));
-  bad = settings();
+  bad = scripted_settings();
   bad.residuals = {.edges = {0.0, 1.0}, .std_dev = {1.0, 2.0}};
   EXPECT_THAT(refusal(bad), HasSubstr("residuals.edges: expected 3 values, found 2"));
-  bad = settings();
+  bad = scripted_settings();
   bad.zeroed_channels = {"joint_angle_rad"};
   EXPECT_THAT(
       refusal(bad),
@@ -596,39 +596,39 @@ TEST(Estimator, RefusesSettingsThatDoNotFitTheModel) {
 }
 
 TEST(Estimator, RefusesGuardsThatWouldLetEverythingThrough) {
-  EstimatorSettings bad = settings();
+  EstimatorSettings bad = scripted_settings();
   bad.ranges.lowest = {kNaN};
   EXPECT_THAT(refusal(bad),
               HasSubstr("guards.ranges.lowest[0]: expected a finite number, found nan"));
-  bad = settings();
+  bad = scripted_settings();
   bad.ranges.highest = {kInfinity};
   EXPECT_THAT(refusal(bad), HasSubstr("guards.ranges.highest[0]: expected a finite number"));
-  bad = settings();
+  bad = scripted_settings();
   bad.ranges = {.lowest = {-1e308}, .highest = {1e308}, .margin = 1.0};
   EXPECT_THAT(refusal(bad), HasSubstr("guards.ranges with margin[0]: expected a finite number"));
-  bad = settings();
+  bad = scripted_settings();
   bad.ranges.margin = kNaN;
   EXPECT_THAT(refusal(bad),
               HasSubstr("guards.ranges.margin: expected a finite number, at least 0"));
-  bad = settings();
+  bad = scripted_settings();
   std::swap(bad.ranges.lowest, bad.ranges.highest);
   EXPECT_THAT(refusal(bad),
               HasSubstr("guards.ranges of gear_angle_rad: expected lowest <= highest"));
 }
 
 TEST(Estimator, RefusesNumbersThatAreNotFinite) {
-  EstimatorSettings bad = settings();
+  EstimatorSettings bad = scripted_settings();
   bad.fallback.slope = {kInfinity};
   EXPECT_THAT(refusal(bad), HasSubstr("fallback.slope[0]: expected a finite number, found inf"));
-  bad = settings();
+  bad = scripted_settings();
   bad.fallback.residual_std = -1.0;
   EXPECT_THAT(refusal(bad), HasSubstr("fallback.residual_std: expected a number, at least 0"));
-  bad = settings();
+  bad = scripted_settings();
   bad.residuals = {.edges = {0.0, 0.0}, .std_dev = {1.0}};
   EXPECT_THAT(refusal(bad), HasSubstr("residuals.edges: expected ascending numbers"));
   bad.residuals = {.edges = {0.0, 1.0}, .std_dev = {kInfinity}};
   EXPECT_THAT(refusal(bad), HasSubstr("residuals.std_dev[0]: expected a number, at least 0"));
-  bad = settings();
+  bad = scripted_settings();
   bad.sample_rate_Hz = kNaN;
   EXPECT_NE(refusal(bad), "");
 }

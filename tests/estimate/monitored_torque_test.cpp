@@ -11,16 +11,16 @@
 
 #include "support/error_message.hpp"
 #include "support/monitored_joint.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
 using State = Monitor::State;
+using test::kNaN;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// A joint under 5 Nm, at 1 kHz.
 struct Joint {

@@ -8,15 +8,16 @@
 #include <numbers>
 
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
 namespace {
 
+using test::kNaN;
 using testing::HasSubstr;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPerDeg = 180.0 / std::numbers::pi;
 
 /// Joint 3 of Table 3, as the paper prints it: per degree.

@@ -5,19 +5,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "support/error_message.hpp"
 #include "support/examples/linear.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 
 namespace torsio {
 namespace {
 
+using test::kNaN;
 using testing::HasSubstr;
 
 Estimator estimator(const FeatureSpec& features, const std::string& target = "torque_Nm") {
@@ -113,7 +114,6 @@ TEST(TorqueEstimator, SingleLateTicksAndSmallDifferencesAreNoFault) {
 }
 
 TEST(TorqueEstimator, DoesNotCheckTheRateWithoutTimeStampsOrWhereNothingDependsOnIt) {
-  const double kNaN = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(faults_at(TorqueEstimator(estimator(kFiltered)), kNaN).back(), Fault::none);
   const FeatureSpec present{.inputs = {"gear_angle_rad", "joint_angle_rad"}, .definitions = {}};
   EXPECT_EQ(faults_at(TorqueEstimator(estimator(present)), 1e-2).back(), Fault::none);

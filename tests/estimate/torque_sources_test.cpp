@@ -4,19 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "support/error_message.hpp"
 #include "support/monitored_joint.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
+using test::kNaN;
 using testing::HasSubstr;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 TEST(FrictionFilter, FollowsAFactorWithinSecondsOfMotionAndReportsItsUncertainty) {
   FrictionFilter filter({}, 1000.0);

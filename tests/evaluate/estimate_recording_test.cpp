@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluate/trained.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
@@ -22,11 +23,8 @@
 namespace torsio {
 namespace {
 
+using test::trained;
 using testing::HasSubstr;
-
-ModelFile trained(const Dataset& dataset, const std::string& family) {
-  return train_model(dataset, {.family = family, .features = resolve_inputs(dataset, {})}, 1).file;
-}
 
 /// A recording without its target; the deflection jumps out of every range in the second half, and
 /// one sample of the gear angle is missing.
@@ -53,7 +51,7 @@ std::vector<std::string> lines_of(const std::string& path) {
 
 TEST(EstimateRecording, EqualsThePredictionAndNeedsNoTarget) {
   const Dataset dataset = test::bench_dataset();
-  const ModelFile file = trained(dataset, "linear_coulomb");
+  const ModelFile file = trained(dataset, "linear_coulomb").file;
   const Recording& measured = dataset.records.back().recording;
   Recording log("log", measured.sample_rate_Hz());
   for (const Channel& channel : measured.channels())
@@ -72,7 +70,7 @@ TEST(EstimateRecording, EqualsThePredictionAndNeedsNoTarget) {
 
 TEST(EstimateRecording, ReportsEachFaultOverTime) {
   const Dataset dataset = test::bench_dataset();
-  const ModelFile file = trained(dataset, "linear_coulomb");
+  const ModelFile file = trained(dataset, "linear_coulomb").file;
   const Recording log = without_torque(dataset.records.back().recording);
   const EstimatedRecording estimated = estimate_recording(make_estimator(file), log);
   EXPECT_EQ(estimated.faults[0], Fault::warming_up);
@@ -97,7 +95,7 @@ TEST(EstimateRecording, ReportsEachFaultOverTime) {
 
 TEST(EstimateRecording, ReportsAMissingZeroInsteadOfGuessingIt) {
   const Dataset dataset = test::bench_dataset();
-  ModelFile file = trained(dataset, "linear");
+  ModelFile file = trained(dataset, "linear").file;
   file.settings.zeroed_channels = {"joint_angle_rad"};
   Recording log = dataset.records.back().recording;
   EXPECT_EQ(estimate_recording(make_estimator(file), log).faults.back(), Fault::zero_not_set);
@@ -109,7 +107,7 @@ TEST(EstimateRecording, WritesInputsEstimateBarAndFaultByName) {
   const TemporaryFolder folder;
   const Dataset dataset = test::bench_dataset();
   const Recording log = without_torque(dataset.records.back().recording);
-  const ModelFile linear = trained(dataset, "linear_coulomb");
+  const ModelFile linear = trained(dataset, "linear_coulomb").file;
   const EstimatedRecording estimated = estimate_recording(make_estimator(linear), log);
   write_estimates({estimated, estimated}, folder.path("out.csv"));
   const std::vector<std::string> lines = lines_of(folder.path("out.csv"));
@@ -122,14 +120,14 @@ TEST(EstimateRecording, WritesInputsEstimateBarAndFaultByName) {
   EXPECT_THAT(lines[700], testing::EndsWith(",none,log"));
   EXPECT_THAT(lines.back(), testing::EndsWith(",outside_training_range,log"));
   // The novelty of a model that has one.
-  const ModelFile mixture = trained(dataset, "dgmm");
+  const ModelFile mixture = trained(dataset, "dgmm").file;
   write_estimates({estimate_recording(make_estimator(mixture), log)}, folder.path("novel.csv"));
   EXPECT_THAT(lines_of(folder.path("novel.csv"))[0], HasSubstr(",novelty_1,fault,"));
 }
 
 TEST(EstimateRecording, StopsWhenAskedTo) {
   const Dataset dataset = test::bench_dataset();
-  const ModelFile file = trained(dataset, "linear");
+  const ModelFile file = trained(dataset, "linear").file;
   EXPECT_THROW((void)estimate_recording(make_estimator(file), dataset.records.back().recording,
                                         [](double, std::string_view) { return false; }),
                Cancelled);

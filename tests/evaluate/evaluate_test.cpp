@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluate/trained.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "support/fitted_families.hpp"
@@ -18,9 +19,7 @@
 namespace torsio {
 namespace {
 
-TrainedModel trained(const Dataset& dataset, const std::string& family) {
-  return train_model(dataset, {.family = family, .features = resolve_inputs(dataset, {})}, 1);
-}
+using test::trained;
 
 TEST(Evaluate, FindsTheNoiseThatARightModelCannotExplain) {
   const Dataset dataset = test::bench_dataset();

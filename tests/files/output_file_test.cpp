@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "support/error_message.hpp"
+#include "support/file_bytes.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace torsio {
@@ -22,20 +23,15 @@ using testing::HasSubstr;
 
 void write(OutputFile& file, std::string_view text) { file.write(std::as_bytes(std::span(text))); }
 
-std::string text_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 TEST(OutputFile, HasItsNameOnlyAfterCommit) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a", "old");
   OutputFile file(path);
   write(file, "one ");
   write(file, "two");
-  EXPECT_EQ(text_of(path), "old");
+  EXPECT_EQ(test::file_bytes(path), "old");
   file.commit();
-  EXPECT_EQ(text_of(path), "one two");
+  EXPECT_EQ(test::file_bytes(path), "one two");
   EXPECT_EQ(folder.files(), 1U);
 }
 
@@ -59,7 +55,7 @@ TEST(OutputFile, CanBeRemovedFromASignalHandler) {
   EXPECT_EQ(folder.files(), 4U);
   OutputFile::remove_unfinished();
   EXPECT_EQ(folder.files(), 2U);
-  EXPECT_EQ(text_of(path), "old");
+  EXPECT_EQ(test::file_bytes(path), "old");
 }
 
 TEST(OutputFile, WritesTheFileThatADanglingLinkNames) {
@@ -69,7 +65,7 @@ TEST(OutputFile, WritesTheFileThatADanglingLinkNames) {
   write(file, "text");
   file.commit();
   EXPECT_TRUE(std::filesystem::is_symlink(folder.path("link")));
-  EXPECT_EQ(text_of(folder.path("target")), "text");
+  EXPECT_EQ(test::file_bytes(folder.path("target")), "text");
 }
 
 TEST(OutputFile, KeepsTheModeOfTheFileThatItReplaces) {
@@ -80,7 +76,7 @@ TEST(OutputFile, KeepsTheModeOfTheFileThatItReplaces) {
   OutputFile file(path);
   write(file, "new");
   file.commit();
-  EXPECT_EQ(text_of(path), "new");
+  EXPECT_EQ(test::file_bytes(path), "new");
   EXPECT_EQ(std::filesystem::status(path).permissions(), kMode);
 }
 
@@ -89,7 +85,7 @@ TEST(OutputFile, DoesNotReplaceAReadOnlyFile) {
   const std::string path = folder.file("a", "old");
   std::filesystem::permissions(path, std::filesystem::perms{0444});
   EXPECT_THAT(error_message([&] { const OutputFile file(path); }), HasSubstr("Permission denied"));
-  EXPECT_EQ(text_of(path), "old");
+  EXPECT_EQ(test::file_bytes(path), "old");
   EXPECT_EQ(folder.files(), 1U);
 }
 
@@ -101,7 +97,7 @@ TEST(OutputFile, TwoOfOneNameDoNotMix) {
   write(second, "second");
   second.commit();
   first.commit();
-  EXPECT_EQ(text_of(folder.path("a")), "first");
+  EXPECT_EQ(test::file_bytes(folder.path("a")), "first");
   EXPECT_EQ(folder.files(), 1U);
 }
 
@@ -118,7 +114,7 @@ TEST(OutputFile, WritesStraightIntoADeviceOrPipeThroughALink) {
   }
   close(ends[1]);
   std::string text(20, ' ');
-  text.resize(static_cast<std::size_t>(read(ends[0], text.data(), text.size())));
+  text.resize(static_cast<std::size_t>(::read(ends[0], text.data(), text.size())));
   close(ends[0]);
   EXPECT_EQ(text, "straight");
   EXPECT_EQ(folder.files(), 1U);

@@ -31,7 +31,7 @@ std::string complaint(std::string_view header, std::size_t data_bytes = 0) {
       [&] { (void)parse_safetensors(file_bytes(header, data_bytes), "m.safetensors"); });
 }
 
-Safetensors example() {
+Safetensors example_tensors() {
   Safetensors contents;
   contents.metadata["note"] = "a \"quoted\" µ";
   contents.tensors["weights"] = {.shape = {2, 3},
@@ -45,12 +45,12 @@ Safetensors example() {
 }
 
 TEST(Safetensors, ComeBackAsTheyWere) {
-  EXPECT_EQ(parse_safetensors(safetensors_bytes(example()), "m"), example());
+  EXPECT_EQ(parse_safetensors(safetensors_bytes(example_tensors()), "m"), example_tensors());
   EXPECT_EQ(parse_safetensors(safetensors_bytes({}), "m"), Safetensors{});
 }
 
 TEST(Safetensors, AreTheSameBytesEachTime) {
-  const auto bytes = safetensors_bytes(example());
+  const auto bytes = safetensors_bytes(example_tensors());
   EXPECT_EQ(safetensors_bytes(parse_safetensors(bytes, "m")), bytes);
 }
 
@@ -67,7 +67,7 @@ RC_GTEST_PROP(Safetensors, KeepEveryBitOfADouble, (const std::vector<std::uint64
 }
 
 TEST(Safetensors, AlignEveryTensorToItsElements) {
-  const auto bytes = safetensors_bytes(example());
+  const auto bytes = safetensors_bytes(example_tensors());
   std::uint64_t header = 0;
   std::memcpy(&header, bytes.data(), 8);
   EXPECT_EQ(header % 8, 0U);

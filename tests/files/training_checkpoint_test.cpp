@@ -17,7 +17,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TrainingCheckpoint example() {
+TrainingCheckpoint example_checkpoint() {
   return {.recipe = "lstm of two, seed 1",
           .epoch = 3,
           .batch = 17,
@@ -45,35 +45,35 @@ class CheckpointFile : public testing::Test {
 };
 
 TEST_F(CheckpointFile, GivesBackEveryBit) {
-  save_checkpoint(path_, example());
-  EXPECT_EQ(load_checkpoint(path_), example());
+  save_checkpoint(path_, example_checkpoint());
+  EXPECT_EQ(load_checkpoint(path_), example_checkpoint());
 }
 
 TEST_F(CheckpointFile, OfAnotherKindIsRefused) {
   write({.tensors = {}, .metadata = {{"torsio", "a card"}}});
   EXPECT_THAT(test::error_message([&] { (void)load_checkpoint(path_); }),
               HasSubstr("the checkpoint of a training"));
-  save_checkpoint(path_, example());
+  save_checkpoint(path_, example_checkpoint());
   EXPECT_THAT(test::error_message([&] { (void)load_model(path_); }),
               HasSubstr("the card of a torsio model"));
 }
 
 TEST_F(CheckpointFile, WithTensorsMissingUnknownOrNotFiniteIsRefused) {
-  save_checkpoint(path_, example());
+  save_checkpoint(path_, example_checkpoint());
   Safetensors missing = contents();
   missing.tensors.erase("training.mean");
   write(missing);
   EXPECT_THAT(test::error_message([&] { (void)load_checkpoint(path_); }),
               HasSubstr("/training.mean"));
 
-  save_checkpoint(path_, example());
+  save_checkpoint(path_, example_checkpoint());
   Safetensors unknown = contents();
   unknown.tensors["training.more"] = unknown.tensors["training.mean"];
   write(unknown);
   EXPECT_THAT(test::error_message([&] { (void)load_checkpoint(path_); }),
               HasSubstr("/training.more"));
 
-  TrainingCheckpoint infinite = example();
+  TrainingCheckpoint infinite = example_checkpoint();
   infinite.weights[1] = std::numeric_limits<float>::infinity();
   save_checkpoint(path_, infinite);
   EXPECT_THAT(test::error_message([&] { (void)load_checkpoint(path_); }),

@@ -3,22 +3,17 @@
 
 #include <cmath>
 #include <complex>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "control/loop_design.hpp"
+#include "golden_file.hpp"
 #include "torsio/control/deflection_controller.hpp"
 
 namespace torsio {
 namespace {
 
-using Json = nlohmann::json;
-
-Json golden_loops() {
-  std::ifstream file(std::string(TORSIO_GOLDEN) + "/control.json");
-  return Json::parse(file);
-}
+using test::golden;
+using test::Json;
 
 SeriesElasticJoint joint_of(const Json& each) {
   return {.drive = {.ratio = each["ratio"],
@@ -47,7 +42,7 @@ LinearSystem loop_of(const Json& each) {
 }
 
 TEST(Golden, ADeflectionLoopHasTheFrequencyResponseOfOctave) {
-  for (const Json& each : golden_loops()) {
+  for (const Json& each : golden("control.json")) {
     const LinearSystem loop = loop_of(each);
     for (std::size_t i = 0; i < each["real"].size(); ++i) {
       const std::complex<double> expected(each["real"][i], each["imag"][i]);
@@ -58,7 +53,7 @@ TEST(Golden, ADeflectionLoopHasTheFrequencyResponseOfOctave) {
 }
 
 TEST(Golden, ADeflectionLoopHasTheMarginsOfOctave) {
-  for (const Json& each : golden_loops()) {
+  for (const Json& each : golden("control.json")) {
     const Margins found = margins(loop_of(each));
     EXPECT_TRUE(found.is_stable);
     // Ours has the angle of the joint besides, which stays where it is.

@@ -2,32 +2,21 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "fit/gaussian_process/fit_gaussian_process.hpp"
 #include "fit/gaussian_process/marginal_likelihood.hpp"
+#include "golden_file.hpp"
 #include "model/gaussian_process/gaussian_process.hpp"
 #include "support/example_data.hpp"
 
 namespace torsio {
 namespace {
 
-using Json = nlohmann::json;
-
-Json golden() {
-  std::ifstream file(std::string(TORSIO_GOLDEN) + "/gaussian_process.json");
-  return Json::parse(file);
-}
-
-Matrix matrix(const Json& rows) {
-  Matrix result(rows.size(), rows[0].size());
-  for (std::size_t i = 0; i < result.rows; ++i)
-    for (std::size_t j = 0; j < result.columns; ++j) result(i, j) = rows[i][j].get<double>();
-  return result;
-}
+using test::golden;
+using test::Json;
+using test::matrix;
 
 KernelExpression kernel_of(const Json& each, std::size_t inputs) {
   KernelExpression kernel = parse_kernel(each["kernel"].get<std::string>(), inputs);
@@ -43,7 +32,7 @@ KernelExpression kernel_of(const Json& each, std::size_t inputs) {
 }
 
 TEST(GaussianProcessGolden, AgreesWithScikitLearnForAFixedKernel) {
-  const Json document = golden();
+  const Json document = golden("gaussian_process.json");
   for (const Json& each : document["fixed"]) {
     SCOPED_TRACE(each["kernel"].get<std::string>());
     const Matrix points = matrix(each["points"]);
@@ -73,7 +62,7 @@ TEST(GaussianProcessGolden, AgreesWithScikitLearnForAFixedKernel) {
 }
 
 TEST(GaussianProcessGolden, FindsAtLeastTheLikelihoodThatScikitLearnFinds) {
-  const Json document = golden();
+  const Json document = golden("gaussian_process.json");
   for (const Json& each : document["optimised"]) {
     SCOPED_TRACE(each["kernel"].get<std::string>());
     const auto target = each["target"].get<std::vector<double>>();

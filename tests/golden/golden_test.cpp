@@ -4,14 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <numbers>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "fit/linear/fit_linear.hpp"
+#include "golden_file.hpp"
 #include "model/common/schedule.hpp"
 #include "model/mixture/mixture_regression.hpp"
 #include "support/example_data.hpp"
@@ -20,22 +18,11 @@
 namespace torsio {
 namespace {
 
-using Json = nlohmann::json;
-
-Json golden(const std::string& name) {
-  std::ifstream file(std::string(TORSIO_GOLDEN) + "/" + name);
-  if (!file) throw std::runtime_error(name + " is missing: ./run oracles writes it");
-  return Json::parse(file);
-}
+using test::golden;
+using test::Json;
+using test::matrix;
 
 std::vector<double> numbers(const Json& array) { return array.get<std::vector<double>>(); }
-
-Matrix matrix(const Json& rows) {
-  Matrix all(rows.size(), rows.front().size());
-  for (std::size_t i = 0; i < all.rows; ++i)
-    std::ranges::copy(numbers(rows[i]), all.row(i).begin());
-  return all;
-}
 
 // The response to `count` samples of a signal after a 0 (which starts the filter at rest).
 template <class Signal>

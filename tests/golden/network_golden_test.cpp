@@ -2,26 +2,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "fit/network/network_trainer.hpp"
+#include "golden_file.hpp"
 
 namespace torsio {
 namespace {
 
-using Json = nlohmann::json;
+using test::golden;
+using test::Json;
 using Kind = TrainingLayer::Kind;
-
-Json cases() {
-  std::ifstream file(std::string(TORSIO_GOLDEN) + "/networks.json");
-  if (!file) throw std::runtime_error("networks.json is missing: ./run oracles writes it");
-  return Json::parse(file);
-}
 
 TrainingNetwork network_of(const Json& shape) {
   std::vector<TrainingLayer> layers;
@@ -42,7 +35,7 @@ TrainingNetwork network_of(const Json& shape) {
 
 std::vector<float> floats(const Json& array) { return array.get<std::vector<float>>(); }
 
-FloatMatrix matrix(const Json& array, std::size_t columns) {
+FloatMatrix float_matrix(const Json& array, std::size_t columns) {
   FloatMatrix result(array.size() / columns, columns);
   result.values = floats(array);
   return result;
@@ -58,13 +51,14 @@ std::vector<float> flat(const TrainingNetwork& network, const Json& parameters, 
       return parameters[list + "." + std::to_string(index) + "." + name][what];
     };
     if (layer.kind == Kind::dense) {
-      put_layer(DenseLayer{.weights = matrix(part("dense", l - memory, "weight"), layer.inputs),
-                           .bias = floats(part("dense", l - memory, "bias"))},
-                network, l, all.data());
+      put_layer(
+          DenseLayer{.weights = float_matrix(part("dense", l - memory, "weight"), layer.inputs),
+                     .bias = floats(part("dense", l - memory, "bias"))},
+          network, l, all.data());
       continue;
     }
-    const FloatMatrix of_inputs = matrix(part("memory", l, "weight_ih_l0"), layer.inputs);
-    const FloatMatrix of_state = matrix(part("memory", l, "weight_hh_l0"), layer.units);
+    const FloatMatrix of_inputs = float_matrix(part("memory", l, "weight_ih_l0"), layer.inputs);
+    const FloatMatrix of_state = float_matrix(part("memory", l, "weight_hh_l0"), layer.units);
     const std::vector<float> bias = floats(part("memory", l, "bias_ih_l0"));
     if (layer.kind == Kind::lstm) {
       put_layer(LstmLayer{of_inputs, of_state, bias}, network, l, all.data());
@@ -98,7 +92,7 @@ WindowSet windows_of(const Json& each, std::size_t inputs) {
 std::string label(const Json& each) { return each["shape"].dump(); }
 
 TEST(NetworkGolden, OutputsAreThoseOfPyTorch) {
-  for (const Json& each : cases()) {
+  for (const Json& each : golden("networks.json")) {
     SCOPED_TRACE(label(each));
     const TrainingNetwork network = network_of(each["shape"]);
     const std::vector<float> weights = flat(network, each["parameters"], "value");
@@ -118,7 +112,7 @@ TEST(NetworkGolden, OutputsAreThoseOfPyTorch) {
 }
 
 TEST(NetworkGolden, TheGradientIsThatOfPyTorch) {
-  for (const Json& each : cases()) {
+  for (const Json& each : golden("networks.json")) {
     SCOPED_TRACE(label(each));
     const TrainingNetwork network = network_of(each["shape"]);
     const WindowSet set = windows_of(each, network.inputs());
@@ -133,7 +127,7 @@ TEST(NetworkGolden, TheGradientIsThatOfPyTorch) {
 }
 
 TEST(NetworkGolden, TheLossOverFiftyUpdatesIsThatOfPyTorch) {
-  for (const Json& each : cases()) {
+  for (const Json& each : golden("networks.json")) {
     for (const auto& [optimiser, losses] : each["losses"].items()) {
       SCOPED_TRACE(label(each) + " " + optimiser);
       const TrainingNetwork network = network_of(each["shape"]);

@@ -29,12 +29,13 @@ std::string file(const std::string& name) {
   return text.str();
 }
 
-ForeignNetwork parse(const std::string& bytes, const std::string& output = {}) {
+ForeignNetwork parse_network(const std::string& bytes, const std::string& output = {}) {
   return parse_onnx(std::as_bytes(std::span(bytes)), "net.onnx", output);
 }
 
-std::string refusal(const std::string& bytes, const std::string& output = {}) {
-  return test::error_message([&] { (void)network_parameters(parse(bytes, output), 0.01, 0); });
+std::string onnx_refusal(const std::string& bytes, const std::string& output = {}) {
+  return test::error_message(
+      [&] { (void)network_parameters(parse_network(bytes, output), 0.01, 0); });
 }
 
 using Change = std::function<void(onnx::GraphProto&)>;
@@ -60,7 +61,7 @@ onnx::TensorProto& tensor_of(onnx::GraphProto& graph, const std::string& name) {
 
 /// The error for a good graph after `change`.
 std::string refusal_after(const std::string& name, const Change& change) {
-  return refusal(changed(name, change));
+  return onnx_refusal(changed(name, change));
 }
 
 onnx::AttributeProto& attribute(onnx::NodeProto& node, const std::string& name) {
@@ -72,12 +73,12 @@ onnx::AttributeProto& attribute(onnx::NodeProto& node, const std::string& name) 
 }
 
 TEST(OnnxNetwork, ThatIsNoneOrCutOffIsRefused) {
-  EXPECT_THAT(refusal(""), HasSubstr("an ONNX model"));
-  EXPECT_THAT(refusal("torsio"), HasSubstr("an ONNX model"));
+  EXPECT_THAT(onnx_refusal(""), HasSubstr("an ONNX model"));
+  EXPECT_THAT(onnx_refusal("torsio"), HasSubstr("an ONNX model"));
   const std::string whole = file("torch_softsign.onnx");
-  EXPECT_EQ(refusal(whole), "");
+  EXPECT_EQ(onnx_refusal(whole), "");
   for (std::size_t length = 0; length < whole.size(); length += 7)
-    EXPECT_NE(refusal(whole.substr(0, length)), "") << length;
+    EXPECT_NE(onnx_refusal(whole.substr(0, length)), "") << length;
 }
 
 TEST(OnnxNetwork, ListsAllNodesThatAreNotSupported) {
@@ -98,9 +99,10 @@ TEST(OnnxNetwork, LooksOnlyAtWhatItsOutputNeeds) {
     node.add_output("gate");
     graph.add_output()->set_name("gate");
   });
-  EXPECT_EQ(refusal(bytes), "");
-  EXPECT_THAT(refusal(bytes, "gate"), HasSubstr("node 'gate' (Sigmoid)"));
-  EXPECT_THAT(refusal(bytes, "nothing"), AllOf(HasSubstr("--output-name"), HasSubstr("y, gate")));
+  EXPECT_EQ(onnx_refusal(bytes), "");
+  EXPECT_THAT(onnx_refusal(bytes, "gate"), HasSubstr("node 'gate' (Sigmoid)"));
+  EXPECT_THAT(onnx_refusal(bytes, "nothing"),
+              AllOf(HasSubstr("--output-name"), HasSubstr("y, gate")));
 }
 
 TEST(OnnxNetwork, OfUnknownOperatorSetsIsRefused) {
@@ -108,7 +110,7 @@ TEST(OnnxNetwork, OfUnknownOperatorSetsIsRefused) {
     onnx::ModelProto model;
     ASSERT_TRUE(model.ParseFromString(file("torch_relu.onnx")));
     model.mutable_opset_import(0)->set_version(version);
-    EXPECT_THAT(refusal(model.SerializeAsString()),
+    EXPECT_THAT(onnx_refusal(model.SerializeAsString()),
                 AllOf(HasSubstr("net.onnx: opset"), HasSubstr("7 to 21"),
                       HasSubstr(std::to_string(version))));
   }
@@ -298,7 +300,7 @@ TEST(OnnxNetwork, CannotSwellTheConstantsOfASmallFile) {
 
 TEST(OnnxNetwork, KeepsItsScalesAsStandardisation) {
   const auto lstm =
-      network_parameters(parse(file("torch_lstm.onnx")), 0.01, 0).get<Lstm::Parameters>();
+      network_parameters(parse_network(file("torch_lstm.onnx")), 0.01, 0).get<Lstm::Parameters>();
   EXPECT_EQ(lstm.scaling.inputs.scale, (std::vector<double>{0.5, 4.0}));
   EXPECT_EQ(lstm.scaling.target_scale, 20.0);
 }

@@ -18,7 +18,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-ForeignNetwork parse(const std::string& text, std::optional<Activation> activation = {}) {
+ForeignNetwork parse_text(const std::string& text, std::optional<Activation> activation = {}) {
   return parse_weights_json(std::as_bytes(std::span(text)), "net.json", activation);
 }
 
@@ -34,12 +34,12 @@ std::string small_lstm(const std::string& more = {}) {
                      tensor("h.weight", "1, 1", "2"), more.empty() ? "" : ",", more);
 }
 
-std::string refusal(const std::string& text) {
-  return test::error_message([&] { (void)parse(text); });
+std::string json_refusal(const std::string& text) {
+  return test::error_message([&] { (void)parse_text(text); });
 }
 
 TEST(WeightsJson, TakesScalesIntoTheStandardisation) {
-  const ForeignNetwork network = parse(
+  const ForeignNetwork network = parse_text(
       small_lstm(tensor("in_scale", "1, 1, 1", "0.25") + "," + tensor("out_scale", "1", "20")));
   const auto lstm = network_parameters(network, 0.005, 0).get<Lstm::Parameters>();
   EXPECT_EQ(lstm.scaling.inputs.scale.at(0), 4.0);
@@ -49,15 +49,15 @@ TEST(WeightsJson, TakesScalesIntoTheStandardisation) {
 }
 
 TEST(WeightsJson, NotesTheBiasesThatItTookForZero) {
-  const ForeignNetwork network = parse(small_lstm(tensor("m.bias_ih_l0", "4", "1, 2, 3, 4")));
+  const ForeignNetwork network = parse_text(small_lstm(tensor("m.bias_ih_l0", "4", "1, 2, 3, 4")));
   EXPECT_EQ(network.notes,
             (std::vector<std::string>{"the file has no m.bias_hh_l0, h.bias: taken as "
                                       "0, as of a layer without bias"}));
 }
 
 TEST(WeightsJson, KeepsTwoBiasesSeparateUnlessTheyAreFolded) {
-  ForeignNetwork network = parse(small_lstm(tensor("m.bias_ih_l0", "4", "1, 2, 3, 4") + "," +
-                                            tensor("m.bias_hh_l0", "4", "5, 6, 7, 8")));
+  ForeignNetwork network = parse_text(small_lstm(tensor("m.bias_ih_l0", "4", "1, 2, 3, 4") + "," +
+                                                 tensor("m.bias_hh_l0", "4", "5, 6, 7, 8")));
   const auto bias = [&] {
     return network_parameters(network, 0.005, 0).get<Lstm::Parameters>().layers.at(0).bias;
   };
@@ -67,42 +67,43 @@ TEST(WeightsJson, KeepsTwoBiasesSeparateUnlessTheyAreFolded) {
 }
 
 TEST(WeightsJson, RefusesWhatItCannotMean) {
-  EXPECT_THAT(refusal("{"), HasSubstr("net.json"));
-  EXPECT_THAT(refusal("{}"), HasSubstr("tensors"));
-  EXPECT_THAT(refusal(R"({"tensors": {}})"), HasSubstr("at least one layer"));
-  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": 3}})"), HasSubstr("a.weight"));
-  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [1, 2], "data": [1]}}})"),
+  EXPECT_THAT(json_refusal("{"), HasSubstr("net.json"));
+  EXPECT_THAT(json_refusal("{}"), HasSubstr("tensors"));
+  EXPECT_THAT(json_refusal(R"({"tensors": {}})"), HasSubstr("at least one layer"));
+  EXPECT_THAT(json_refusal(R"({"tensors": {"a.weight": 3}})"), HasSubstr("a.weight"));
+  EXPECT_THAT(json_refusal(R"({"tensors": {"a.weight": {"shape": [1, 2], "data": [1]}}})"),
               AllOf(HasSubstr("a.weight/data"), HasSubstr("[1, 2]")));
-  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "data": [null]}}})"),
+  EXPECT_THAT(json_refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "data": [null]}}})"),
               AllOf(HasSubstr("a.weight/data[0]"), HasSubstr("finite")));
-  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [-1, 1], "data": [1]}}})"),
+  EXPECT_THAT(json_refusal(R"({"tensors": {"a.weight": {"shape": [-1, 1], "data": [1]}}})"),
               HasSubstr("a.weight/shape"));
-  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [9999999999, 1], "data": [1]}}})"),
+  EXPECT_THAT(json_refusal(R"({"tensors": {"a.weight": {"shape": [9999999999, 1], "data": [1]}}})"),
               HasSubstr("a.weight/shape"));
-  EXPECT_THAT(refusal(small_lstm(tensor("m.weight_ih_l0_reverse", "4, 1", "1, 2, 3, 4"))),
+  EXPECT_THAT(json_refusal(small_lstm(tensor("m.weight_ih_l0_reverse", "4, 1", "1, 2, 3, 4"))),
               AllOf(HasSubstr("weight_ih_l0_reverse"), HasSubstr("both directions")));
-  EXPECT_THAT(refusal(small_lstm(tensor("m.bias_ih_l0", "3", "1, 2, 3"))),
+  EXPECT_THAT(json_refusal(small_lstm(tensor("m.bias_ih_l0", "3", "1, 2, 3"))),
               AllOf(HasSubstr("m.bias_ih_l0"), HasSubstr("[4]"), HasSubstr("[3]")));
-  EXPECT_THAT(refusal(small_lstm(tensor("m.weight_ih_l1", "4, 2", "1, 2, 3, 4, 5, 6, 7, 8") + "," +
-                                 tensor("m.weight_hh_l1", "4, 1", "1, 2, 3, 4"))),
+  EXPECT_THAT(json_refusal(small_lstm(tensor("m.weight_ih_l1", "4, 2", "1, 2, 3, 4, 5, 6, 7, 8") +
+                                      "," + tensor("m.weight_hh_l1", "4, 1", "1, 2, 3, 4"))),
               AllOf(HasSubstr("m.weight_ih_l1"), HasSubstr("1 columns"), HasSubstr("found 2")));
-  EXPECT_THAT(refusal(R"({"tensors": {)" + tensor("m.weight_ih_l0", "2, 1", "1, 2") + "," +
-                      tensor("m.weight_hh_l0", "2, 2", "1, 2, 3, 4") + "}}"),
+  EXPECT_THAT(json_refusal(R"({"tensors": {)" + tensor("m.weight_ih_l0", "2, 1", "1, 2") + "," +
+                           tensor("m.weight_hh_l0", "2, 2", "1, 2, 3, 4") + "}}"),
               HasSubstr("4 H x H of an LSTM or 3 H x H of a GRU"));
-  EXPECT_THAT(refusal(small_lstm(tensor("o.weight", "1, 1", "2"))), HasSubstr("--activation"));
+  EXPECT_THAT(json_refusal(small_lstm(tensor("o.weight", "1, 1", "2"))), HasSubstr("--activation"));
 }
 
 TEST(WeightsJson, NamesTheNearestOfAnUnknownKey) {
-  EXPECT_THAT(refusal(R"({"tensor": {}})"),
+  EXPECT_THAT(json_refusal(R"({"tensor": {}})"),
               AllOf(HasSubstr("net.json: expected only the keys tensors, arch"),
                     HasSubstr("found 'tensor'"), HasSubstr("Did you mean 'tensors'?")));
-  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "dats": [1]}}})"),
+  EXPECT_THAT(json_refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "dats": [1]}}})"),
               AllOf(HasSubstr("/tensors/a.weight: expected only the keys shape, data"),
                     HasSubstr("Did you mean 'data'?")));
-  EXPECT_THAT(refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "data": [1], "scale": 2}}})"),
-              HasSubstr("found 'scale'"));
+  EXPECT_THAT(
+      json_refusal(R"({"tensors": {"a.weight": {"shape": [1, 1], "data": [1], "scale": 2}}})"),
+      HasSubstr("found 'scale'"));
   const ForeignNetwork network =
-      parse(R"({"arch": "one layer", "tensors": {)" + tensor("a.weight", "1, 1", "1") + "}}");
+      parse_text(R"({"arch": "one layer", "tensors": {)" + tensor("a.weight", "1, 1", "1") + "}}");
   EXPECT_EQ(network.inputs, 1U);
 }
 
@@ -115,7 +116,7 @@ double seconds_of(std::size_t layers) {
   text.back() = '}';
   text += '}';
   const std::clock_t start = std::clock();  // processor time: other programs may run
-  EXPECT_EQ(parse(text, Activation::tanh).stages.size(), 2 * layers - 1);
+  EXPECT_EQ(parse_text(text, Activation::tanh).stages.size(), 2 * layers - 1);
   return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
@@ -129,8 +130,8 @@ TEST(WeightsJson, TakesTimeInProportionToTheNumberOfTensors) {
 TEST(WeightsJson, RefusesTwoOutputsAndWeightsBeyondFloat) {
   const auto refusal_of_parameters = [](const std::string& shape, const std::string& data) {
     return test::error_message([&] {
-      (void)network_parameters(parse(R"({"tensors": {)" + tensor("a.weight", shape, data) + "}}"),
-                               1.0, 0);
+      (void)network_parameters(
+          parse_text(R"({"tensors": {)" + tensor("a.weight", shape, data) + "}}"), 1.0, 0);
     });
   };
   EXPECT_THAT(refusal_of_parameters("2, 1", "1, 2"), HasSubstr("one output"));

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <map>
 #include <numbers>
 #include <string_view>
@@ -15,6 +14,7 @@
 #include "support/bench_dataset.hpp"
 #include "support/every_family.hpp"
 #include "support/example_models.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 #include "torsio/fit/common/training_data.hpp"
@@ -23,7 +23,6 @@ namespace torsio::test {
 namespace {
 
 constexpr double kSeconds = 8.0;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 const FeatureSpec kFeatures{.inputs = {"spring_deflection_rad", "rate(spring_deflection_rad)"},
                             .definitions = {}};

@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <span>
 #include <tuple>
 #include <vector>
@@ -17,6 +16,7 @@
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "support/grey_box_examples.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/state_bytes.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
@@ -24,8 +24,6 @@
 
 namespace torsio::test {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Settings with every operation that has a memory.
 EstimatorSettings remembering_settings() {

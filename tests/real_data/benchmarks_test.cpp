@@ -22,11 +22,6 @@ ResultRow scored(const Results& results, const std::string& recording) {
   return {};
 }
 
-Results compared(const std::string& manifest, const std::string& models) {
-  const Dataset dataset = load_dataset({manifest_path(manifest)}, {});
-  return compare(dataset, model_choices(dataset, models, {}), 1, false).results;
-}
-
 TEST(BoucWenBenchmark, LoadsItsOfficialRecordsAtTheirRate) {
   TORSIO_NEEDS_DATA("boucwen");
   const Dataset dataset = load_dataset({manifest_path("boucwen")}, {});

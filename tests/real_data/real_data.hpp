@@ -5,7 +5,9 @@
 #include <string>
 
 #include "torsio/core/error.hpp"
+#include "torsio/data/load.hpp"
 #include "torsio/data/manifest.hpp"
+#include "torsio/evaluate/comparison.hpp"
 
 namespace torsio {
 
@@ -23,6 +25,12 @@ inline bool has_data(const std::string& name) {
   } catch (const Error&) {
     return false;
   }
+}
+
+/// What models make of the data of a manifest.
+inline Results compared(const std::string& manifest, const std::string& models) {
+  const Dataset dataset = load_dataset({manifest_path(manifest)}, {});
+  return compare(dataset, model_choices(dataset, models, {}), 1, false).results;
 }
 
 }  // namespace torsio

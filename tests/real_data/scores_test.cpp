@@ -9,11 +9,6 @@
 namespace torsio {
 namespace {
 
-Results compared(const std::string& manifest, const std::string& models) {
-  const Dataset dataset = load_dataset({manifest_path(manifest)}, {});
-  return compare(dataset, model_choices(dataset, models, {}), 1, false).results;
-}
-
 struct Model {
   const char* family;
   const char* variant;

@@ -22,6 +22,7 @@
 #include "support/examples/network.hpp"
 #include "support/examples/viscoelastic.hpp"
 #include "support/monitored_joint.hpp"
+#include "support/numbers.hpp"
 #include "support/system_calls.hpp"
 #include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
@@ -44,8 +45,8 @@ namespace torsio {
 namespace {
 
 using test::besides_computing;
+using test::kRate_Hz;
 
-constexpr double kRate_Hz = 1000.0;
 constexpr int kCycles = 10'000'000;
 constexpr int kLeastFaults = kCycles / 1000;
 

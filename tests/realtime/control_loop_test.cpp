@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <vector>
 
 #include "realtime/simulated_clock.hpp"
 #include "sim/plant/plant.hpp"
+#include "support/numbers.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/realtime/mailbox.hpp"
@@ -19,12 +19,12 @@
 namespace torsio {
 namespace {
 
+using test::kNaN;
+using test::kRate_Hz;
 using test::SimulatedClock;
 using State = CommandWatchdog::State;
 
-constexpr double kRate_Hz = 1000.0;
 constexpr std::int64_t kTick = 1'000'000;  // ns
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// What one tick was like.
 struct Moment {

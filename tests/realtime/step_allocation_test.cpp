@@ -5,7 +5,6 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdlib>
-#include <limits>
 #include <memory>
 #include <set>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "support/example_models.hpp"
 #include "support/example_settings.hpp"
 #include "support/grey_box_examples.hpp"
+#include "support/numbers.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/motor_referenced_torques.hpp"
@@ -28,9 +28,8 @@ namespace {
 using test::example;
 using test::example_features;
 using test::heap_calls_during;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
+using test::kNaN;
 
 TEST(AllocationCounter, DetectsEveryKindOfHeapCall) {
   // volatile: the compiler may remove a pair of new and delete whose result is not used.

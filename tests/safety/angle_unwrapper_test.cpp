@@ -4,17 +4,19 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <string>
 
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::any_random;
+using test::kInfinity;
+using test::kNaN;
 
 /// An encoder with a turn of 8 rad, which moves by 1 rad in a period at most: numbers without rounding.
 AngleUnwrapper encoder() { return AngleUnwrapper({.turn_rad = 8.0, .largest_change_rad = 1.0}); }
@@ -159,7 +161,7 @@ TEST(AngleUnwrapper, RefusesSettingsThatAreNotValid) {
 // 20 power cycles of 500 periods each, at any speed below the limit, with missing samples, for encoders that
 // count from 0 or from minus half a turn: the angle is the true one, or there is a fault.
 RC_GTEST_PROP(AngleUnwrapper, IsTheTrueAngleForAnyMotionBelowTheLimit, ()) {
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   const double turn_rad = 0.1 + 10.0 * random.uniform();
   const double change_rad = turn_rad * (0.001 + 0.498 * random.uniform());
   const double lowest_rad = random.uniform() < 0.5 ? 0.0 : -0.5 * turn_rad;
@@ -191,7 +193,7 @@ RC_GTEST_PROP(AngleUnwrapper, IsTheTrueAngleForAnyMotionBelowTheLimit, ()) {
 
 // Whatever the encoder reports: no angle jumps by more than it can move.
 RC_GTEST_PROP(AngleUnwrapper, NeverMovesFasterThanItCan, ()) {
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   AngleUnwrapper unwrapper = encoder();
   RC_ASSERT(unwrapper.start(0.0, 0.0, 1.0));
   double last_rad = 0.0;

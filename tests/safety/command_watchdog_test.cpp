@@ -7,12 +7,14 @@
 #include <limits>
 #include <string>
 
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
+using test::any_random;
 using State = CommandWatchdog::State;
 using Reason = CommandWatchdog::Reason;
 
@@ -225,7 +227,7 @@ TEST(CommandWatchdog, RefusesTimesThatAreNone) {
 // 100 cases of 10^4 ticks: whatever is sent, it runs only on an arming and a valid command since,
 // the last of which is younger than the time-out.
 RC_GTEST_PROP(CommandWatchdog, RunsOnlyOnAFreshValidCommandSinceItWasArmed, ()) {
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   Loop loop;
   CommandWatchdog::Command command;
   std::int64_t armed_ns = std::numeric_limits<std::int64_t>::max();

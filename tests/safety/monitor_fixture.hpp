@@ -6,18 +6,16 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <vector>
 
+#include "support/numbers.hpp"
 #include "torsio/safety/monitor.hpp"
 
 namespace torsio::test {
 
 using State = Monitor::State;
 
-inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr double kPeriod_s = 1e-3;
 
 /// Three sources, a motor angle and a gear angle that moves with it, a temperature.

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "safety/monitor_fixture.hpp"
+#include "support/any_number.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio::test {
@@ -16,7 +17,7 @@ namespace {
 // Whatever number of any input is NaN in whatever tick: a stop if it watches, no arming if it does
 // not.
 RC_GTEST_PROP(Monitor, NeverWatchesWithNaN, ()) {
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   MonitorSettings settings = joint();
   settings.longest_loss_s = 0.0;
   settings.longest_fault_s = 0.0;
@@ -38,7 +39,7 @@ RC_GTEST_PROP(Monitor, NeverWatchesWithNaN, ()) {
 
 // The same with the default settings, for NaN that lasts: NaN in any number but a novelty.
 RC_GTEST_PROP(Monitor, StopsOnNaNWithTheDefaultSettings, ()) {
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   Loop loop;
   const bool watching = random.uniform() < 0.5;
   if (watching) loop.start();
@@ -58,7 +59,7 @@ RC_GTEST_PROP(Monitor, StopsOnNaNWithTheDefaultSettings, ()) {
 // 10^4 ticks of anything: what was stopped watches again only after a reset, a proof and an arming
 // with a command written since.
 RC_GTEST_PROP(Monitor, IsLatchedUnderAnyInputs, ()) {
-  Random random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
+  Random random = any_random();
   Loop loop;
   double reset_s = -kInfinity;
   bool was_reset = true;

@@ -14,16 +14,18 @@
 #include <string>
 #include <vector>
 
+#include "support/any_number.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
+using test::any_random;
+using test::kInfinity;
+using test::kNaN;
 using testing::ElementsAre;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The three estimates of a series-elastic joint and what they depend on.
 RedundancySettings three_sources() {
@@ -126,10 +128,6 @@ Case random_case(Random& random) {
     result.sources.push_back(torque(10.0 * random.normal(), result.std_devs[i]));
   }
   return result;
-}
-
-Random random_of_case() {
-  return Random(static_cast<std::uint64_t>(*rc::gen::inRange(0, 1 << 30)));
 }
 
 TEST(Redundancy, WeighsUncorrelatedSourcesByTheSquaresOfTheirErrorBars) {
@@ -416,7 +414,7 @@ TEST(Redundancy, RefusesWhatIsNoCorrelation) {
 
 // Against every active set that there is.
 RC_GTEST_PROP(Redundancy, HasTheSmallestVarianceOfAllWeightsThatAreNotNegative, ()) {
-  Random random = random_of_case();
+  Random random = any_random();
   for (int n = 0; n < 20; ++n) {
     const Case drawn = random_case(random);
     const FusedTorque fused = Redundancy(drawn.settings).step(drawn.sources);
@@ -426,7 +424,7 @@ RC_GTEST_PROP(Redundancy, HasTheSmallestVarianceOfAllWeightsThatAreNotNegative, 
 }
 
 RC_GTEST_PROP(Redundancy, LiesBetweenItsSources, ()) {
-  Random random = random_of_case();
+  Random random = any_random();
   for (int n = 0; n < 50; ++n) {
     const Case drawn = random_case(random);
     const double fused = Redundancy(drawn.settings).step(drawn.sources).value_Nm;
@@ -437,7 +435,7 @@ RC_GTEST_PROP(Redundancy, LiesBetweenItsSources, ()) {
 }
 
 RC_GTEST_PROP(Redundancy, IsNeverMoreCertainWithASourceLess, ()) {
-  Random random = random_of_case();
+  Random random = any_random();
   for (int n = 0; n < 20; ++n) {
     const Case drawn = random_case(random);
     Redundancy redundancy(drawn.settings);
@@ -454,7 +452,7 @@ RC_GTEST_PROP(Redundancy, IsNeverMoreCertainWithASourceLess, ()) {
 }
 
 RC_GTEST_PROP(Redundancy, DependsOnNothingThatAnInvalidSourceReports, ()) {
-  Random random = random_of_case();
+  Random random = any_random();
   for (int n = 0; n < 20; ++n) {
     const Case drawn = random_case(random);
     std::vector<Estimate> left = drawn.sources;
@@ -475,7 +473,7 @@ RC_GTEST_PROP(Redundancy, DependsOnNothingThatAnInvalidSourceReports, ()) {
 
 // Whatever the bits of its inputs are.
 RC_GTEST_PROP(Redundancy, IsFiniteForAnyBits, ()) {
-  Random random = random_of_case();
+  Random random = any_random();
   const auto any = [&] {
     return std::bit_cast<double>(static_cast<std::uint64_t>(random.uniform() * 0x1p53) << 11U |
                                  static_cast<std::uint64_t>(random.uniform() * 2048.0));

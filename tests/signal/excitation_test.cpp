@@ -4,16 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <vector>
 
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kNaN;
+using test::kRate_Hz;
+
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 template <class Signal>
@@ -193,29 +195,28 @@ TEST(Steps, HoldEachLevelForExactlyItsTime) {
 }
 
 TEST(Excitation, RefusesParametersOutOfRange) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(Chirp({.end_Hz = 500.0}, kRate_Hz), UsageError);
   EXPECT_THROW(Chirp({.start_Hz = -1.0}, kRate_Hz), UsageError);
   EXPECT_THROW(Chirp({.duration_s = 0.0}, kRate_Hz), UsageError);
-  EXPECT_THROW(Chirp({.amplitude = kNan}, kRate_Hz), UsageError);
+  EXPECT_THROW(Chirp({.amplitude = kNaN}, kRate_Hz), UsageError);
   EXPECT_THROW(Chirp({}, 0.0), UsageError);
-  EXPECT_THROW(Triangle({.frequency_Hz = kNan}, kRate_Hz), UsageError);
+  EXPECT_THROW(Triangle({.frequency_Hz = kNaN}, kRate_Hz), UsageError);
   EXPECT_THROW(TrapezoidSweep({.amplitude = 0.0}, kRate_Hz), UsageError);
   EXPECT_THROW(TrapezoidSweep({.speed = -1.0}, kRate_Hz), UsageError);
-  EXPECT_THROW(TrapezoidSweep({.acceleration = kNan}, kRate_Hz), UsageError);
+  EXPECT_THROW(TrapezoidSweep({.acceleration = kNaN}, kRate_Hz), UsageError);
   EXPECT_THROW(TrapezoidSweep({}, -1.0), UsageError);
   EXPECT_THROW(Multisine({}, kRate_Hz), UsageError);
   EXPECT_THROW(Multisine({{1.0, 2.0}, {1.0}, 1}, kRate_Hz), UsageError);
   EXPECT_THROW(Multisine({{600.0}, {1.0}, 1}, kRate_Hz), UsageError);
   EXPECT_THROW(BandLimitedNoise({.rms = -1.0}, kRate_Hz), UsageError);
   EXPECT_THROW(BandLimitedNoise({.cutoff_Hz = 500.0}, kRate_Hz), UsageError);
-  EXPECT_THROW(QuasiPeriodic({.amplitude = kNan}, kRate_Hz), UsageError);
+  EXPECT_THROW(QuasiPeriodic({.amplitude = kNaN}, kRate_Hz), UsageError);
   EXPECT_THROW(QuasiPeriodic({.period_spread = 0.31}, kRate_Hz), UsageError);
   EXPECT_THROW(QuasiPeriodic({.amplitude_spread = -0.1}, kRate_Hz), UsageError);
   EXPECT_THROW(QuasiPeriodic({.frequency_Hz = 60.0, .period_spread = 0.3}, kRate_Hz), UsageError);
   EXPECT_THROW(Steps({}, kRate_Hz), UsageError);
   EXPECT_THROW(Steps({{1.0}, 0.0}, kRate_Hz), UsageError);
-  EXPECT_THROW(Steps({{kNan}, 1.0}, kRate_Hz), UsageError);
+  EXPECT_THROW(Steps({{kNaN}, 1.0}, kRate_Hz), UsageError);
   try {
     const Chirp chirp({.end_Hz = 500.0}, kRate_Hz);
     FAIL();

@@ -9,13 +9,15 @@
 #include <string>
 #include <vector>
 
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kRate_Hz;
+
 constexpr std::size_t kSteps = 60;
 
 std::string random_expression(Random& random, int depth) {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/signal/lowpass.hpp"
@@ -17,9 +18,8 @@
 namespace torsio {
 namespace {
 
+using test::kRate_Hz;
 using Names = std::vector<std::string>;
-
-constexpr double kRate_Hz = 1000.0;
 
 FeaturePipeline pipeline(Names inputs, std::vector<ChannelDefinition> definitions = {}) {
   return {{.inputs = std::move(inputs), .definitions = std::move(definitions)}, kRate_Hz};

@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kRate_Hz;
 
 TEST(JointMove, IsTheMoveOfLeastJerk) {
   JointMove move({.waypoints_rad = {0.5, 1.5}, .speed_rad_s = 1.0, .acceleration_rad_s2 = 100.0},

@@ -6,13 +6,14 @@
 #include <limits>
 #include <vector>
 
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNaN;
 
 // The response to one 1 after a 0 (which starts the filter at rest).
 std::vector<double> impulse_response(Lowpass filter, std::size_t count) {
@@ -59,12 +60,12 @@ TEST(Butterworth, IgnoresSamplesThatAreNotFinite) {
   Lowpass disturbed(10.0, 1000.0);
   Lowpass quiet(10.0, 1000.0);
   Random random(3);
-  EXPECT_TRUE(std::isnan(disturbed.step(kNan)));
+  EXPECT_TRUE(std::isnan(disturbed.step(kNaN)));
   for (int i = 0; i < 200; ++i) {
     const double input = random.normal();
     EXPECT_EQ(disturbed.step(input), quiet.step(input));
     if (i % 50 == 0) {
-      EXPECT_TRUE(std::isnan(disturbed.step(kNan)));
+      EXPECT_TRUE(std::isnan(disturbed.step(kNaN)));
     }
     if (i % 60 == 0) {
       EXPECT_TRUE(std::isinf(disturbed.step(std::numeric_limits<double>::infinity())));
@@ -85,9 +86,9 @@ TEST(Butterworth, RefusesCutOffsThatTheRateCannotCarry) {
   EXPECT_THROW(Lowpass(500.0, 1000.0), UsageError);
   EXPECT_THROW(Lowpass(0.0, 1000.0), UsageError);
   EXPECT_THROW(Lowpass(-1.0, 1000.0), UsageError);
-  EXPECT_THROW(Lowpass(kNan, 1000.0), UsageError);
+  EXPECT_THROW(Lowpass(kNaN, 1000.0), UsageError);
   EXPECT_THROW(Lowpass(1.0, 0.0), UsageError);
-  EXPECT_THROW(Lowpass(1.0, kNan), UsageError);
+  EXPECT_THROW(Lowpass(1.0, kNaN), UsageError);
   EXPECT_NO_THROW(Lowpass(499.9, 1000.0));
 }
 

@@ -4,14 +4,16 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "signal/fit_normaliser.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
+
+using test::kNaN;
 
 Matrix noise(std::size_t rows, std::size_t columns) {
   Matrix data(rows, columns);
@@ -62,13 +64,12 @@ TEST(Normaliser, DoesNotBlowUpChannelsThatHardlyMove) {
 }
 
 TEST(Normaliser, RefusesWhatCannotBeScaled) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(Normaliser({.centre = {0.0}, .scale = {}}), UsageError);
   EXPECT_THROW(Normaliser({.centre = {0.0}, .scale = {0.0}}), UsageError);
   EXPECT_THROW(Normaliser({.centre = {0.0}, .scale = {-1.0}}), UsageError);
-  EXPECT_THROW(Normaliser({.centre = {kNan}, .scale = {1.0}}), UsageError);
+  EXPECT_THROW(Normaliser({.centre = {kNaN}, .scale = {1.0}}), UsageError);
   EXPECT_THROW((void)fit_normaliser(Matrix(0, 2)), UsageError);
-  EXPECT_THROW((void)fit_normaliser(Matrix(3, 1, kNan)), UsageError);
+  EXPECT_THROW((void)fit_normaliser(Matrix(3, 1, kNaN)), UsageError);
   const std::array<double, 1> floors{0.5};
   EXPECT_THROW((void)fit_normaliser(Matrix(3, 2), floors), UsageError);
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "results.hpp"
 #include "sim/plant/energy_audit.hpp"
 #include "sim/plant/plant.hpp"
 #include "sim/torque_loop.hpp"
@@ -22,9 +23,8 @@
 namespace torsio {
 namespace {
 
-/// What the two stages have lost: their ports of Plant::work_ports. The other friction, which loses
-/// far more, would hide their falls.
-double stage_loss(const EnergyAudit& audit) { return audit.port_loss(8) + audit.port_loss(9); }
+using test::largest;
+using test::stage_loss;
 
 constexpr double kLog_Hz = 200.0;
 constexpr std::size_t kSlowCycle = 4000;  // samples
@@ -33,7 +33,7 @@ Recording run(const std::string& actuator, const std::string& experiment) {
   return simulate({.actuator = actuator, .experiment = experiment, .with_truth = true});
 }
 
-std::vector<double> deflection_deg(const Recording& recording) {
+std::vector<double> coupling_deg(const Recording& recording) {
   std::vector<double> deflection = recording.channel("truth_coupling_deflection_rad").values;
   for (double& angle : deflection) angle = deg_from_rad(angle);
   return deflection;
@@ -88,17 +88,12 @@ std::vector<double> model_a(const std::vector<double>& twist_deg) {
 
 /// The torque at the moments when the twist passes 0, from `first` on.
 std::vector<double> torque_without_twist(const Recording& recording, std::size_t first) {
-  const std::vector<double> twist = deflection_deg(recording);
+  const std::vector<double> twist = coupling_deg(recording);
   std::vector<double> found;
   for (std::size_t i = first; i < twist.size(); ++i) {
     if (twist[i - 1] * twist[i] < 0.0) found.push_back(torque(recording)[i]);
   }
   return found;
-}
-
-double largest(const std::vector<double>& values) {
-  return std::abs(
-      *std::ranges::max_element(values, {}, [](double value) { return std::abs(value); }));
 }
 
 TEST(Triangles, AreFollowedFromTheSlowestToTheFastest) {
@@ -162,7 +157,7 @@ TEST(SlowCycles, BondedLoopSpansSixNewtonMetres) {
   const auto [low, high] = std::ranges::minmax_element(torque(recording));
   EXPECT_NEAR(*low, -6.0, 0.1);
   EXPECT_NEAR(*high, 6.0, 0.1);
-  const std::vector<double> twist = deflection_deg(recording);
+  const std::vector<double> twist = coupling_deg(recording);
   EXPECT_NEAR(*std::ranges::max_element(twist), 7.5, 0.5);
   EXPECT_NEAR(*std::ranges::min_element(twist), -4.0, 0.5);
 }
@@ -178,7 +173,7 @@ TEST(SlowCycles, UnbondedLoopsMeetAtZeroAndAreSofter) {
   EXPECT_LT(largest(met), 0.1);
   // The first rise, before lobes that crept leave a gap.
   const std::size_t top = kSlowCycle / 4;
-  EXPECT_NEAR(deflection_deg(unbonded)[top] / deflection_deg(bonded)[top], 1.4, 0.03);
+  EXPECT_NEAR(coupling_deg(unbonded)[top] / coupling_deg(bonded)[top], 1.4, 0.03);
   EXPECT_NEAR(torque(unbonded)[top], torque(bonded)[top], 0.1);
 }
 
@@ -205,7 +200,7 @@ TEST(SlowCycles, AskWhatCreepingGlueStillCarries) {
   const Recording recording = run("elastomer:creeping", "slow-cycles");
   const double highest_Nm = 6.0 * std::pow(0.997, 30.0);
   EXPECT_NEAR(largest(torque(recording)), highest_Nm, 0.1);
-  EXPECT_LT(largest(deflection_deg(recording)), 9.0);
+  EXPECT_LT(largest(coupling_deg(recording)), 9.0);
   EXPECT_NE(test::error_message([] {
               static_cast<void>(simulate({.actuator = "elastomer:creeping",
                                           .experiment = "slow-cycles",
@@ -217,7 +212,7 @@ TEST(SlowCycles, AskWhatCreepingGlueStillCarries) {
 TEST(Hold, CreepsRelaxesAndRecovers) {
   const Recording recording = run("elastomer", "hold");
   const auto at = [](double time_s) { return static_cast<std::size_t>(time_s * kLog_Hz); };
-  const std::vector<double> twist = deflection_deg(recording);
+  const std::vector<double> twist = coupling_deg(recording);
   EXPECT_NEAR(torque(recording)[at(2.0)], 3.0, 0.1);
   EXPECT_NEAR(torque(recording)[at(59.0)], 3.0, 0.05);
   EXPECT_GT(twist[at(59.0)], 2.0 * twist[at(2.0)]) << "creep";

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "results.hpp"
 #include "support/refusal.hpp"
 #include "support/straight_line.hpp"
 #include "torsio/actuator/data_sheet.hpp"
@@ -17,6 +18,7 @@ namespace torsio {
 namespace {
 
 using test::deflection_deg;
+using test::largest;
 using test::Line;
 using test::spring_line;
 
@@ -28,10 +30,6 @@ Recording test_sweep(const std::string& actuator) {
                    .inclination_rad = protocol.test_inclination_rad});
 }
 
-double largest(const std::vector<double>& values) {
-  return *std::ranges::max_element(values, {}, [](double value) { return std::abs(value); });
-}
-
 // The numbers of specification 6 come from a prototype in which the rotor did not feel the slope of
 // the kinematic error. With it the same prototype gives 10.16 Nm/deg, 1.25 Nm and 21.6 Nm (50) and
 // 19.94 Nm/deg, 1.41 Nm and 52.5 Nm (120): the brackets hold both.
@@ -40,8 +38,8 @@ TEST(Sweep, LoopOfTheFiftyNmBenchIsThatOfThePrototype) {
   const Line line = spring_line(recording);
   EXPECT_NEAR(line.slope, 10.37, 0.5);
   EXPECT_NEAR(line.rmse, 1.33, 0.25);
-  EXPECT_NEAR(std::abs(largest(recording.channel("torque_Nm").values)), 20.8, 1.2);
-  EXPECT_NEAR(std::abs(largest(deflection_deg(recording))), 1.97, 0.1);
+  EXPECT_NEAR(largest(recording.channel("torque_Nm").values), 20.8, 1.2);
+  EXPECT_NEAR(largest(deflection_deg(recording)), 1.97, 0.1);
 }
 
 TEST(Sweep, LoopOfTheHundredTwentyNmBenchIsThatOfThePrototype) {
@@ -49,8 +47,8 @@ TEST(Sweep, LoopOfTheHundredTwentyNmBenchIsThatOfThePrototype) {
   const Line line = spring_line(recording);
   EXPECT_NEAR(line.slope, 20.02, 0.8);
   EXPECT_NEAR(line.rmse, 1.58, 0.25);
-  EXPECT_NEAR(std::abs(largest(recording.channel("torque_Nm").values)), 51.1, 2.0);
-  EXPECT_NEAR(std::abs(largest(deflection_deg(recording))), 2.47, 0.1);
+  EXPECT_NEAR(largest(recording.channel("torque_Nm").values), 51.1, 2.0);
+  EXPECT_NEAR(largest(deflection_deg(recording)), 2.47, 0.1);
 }
 
 TEST(Sweep, LeverReachesBothEnds) {
@@ -70,7 +68,7 @@ TEST(StaticCycle, ReachesTheRatedTorqueAtTheSpringsStiffness) {
     const DataSheet sheet = data_sheet(actuator);
     const auto& spring = std::get<SpringSheet>(sheet.second);
     const double rated_Nm = sheet.rating.torque_Nm.value;
-    EXPECT_NEAR(std::abs(largest(recording.channel("torque_Nm").values)), rated_Nm,
+    EXPECT_NEAR(largest(recording.channel("torque_Nm").values), rated_Nm,
                 0.03 * rated_Nm + sheet.joint.bearing_friction_Nm.value);
     const Line line = spring_line(recording);
     const double stiffness_Nm_deg = rad_from_deg(spring.stiffness_Nm_rad.value);

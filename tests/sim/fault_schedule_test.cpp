@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
 
+#include "results.hpp"
 #include "sim/fault_injector.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
@@ -20,6 +21,7 @@ namespace torsio {
 namespace {
 
 using test::error_message;
+using test::kNaN;
 
 /// The output of the injector for a gear encoder that turns at 1 rad/s and a load cell at 125 Hz
 /// whose torque increases by 1 Nm/s, tick by tick at 1 kHz.
@@ -235,7 +237,6 @@ TEST(FaultInjector, RefusesWhatCannotBe) {
   const auto expect = [&](const ScheduledFault& fault, const char* text) {
     EXPECT_NE(message(fault).find(text), std::string::npos) << message(fault);
   };
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   expect({.what = "gear_angel_rad"}, "Did you mean 'gear_angle_rad'?");
   expect({.what = "gear_angle_rad", .kind = FaultKind::broken},
          "expected one of freeze, jump, drift, sign_flip, quantised, dropout, nan, gain, spike, "
@@ -379,9 +380,8 @@ ExperimentSpec faulty_sweep(std::vector<ScheduledFault> faults) {
   return {.duration_s = 4.0, .with_truth = true, .faults = {std::move(faults)}};
 }
 
-double largest(const Recording& recording, const char* channel) {
-  const auto& values = recording.channel(channel).values;
-  return std::abs(*std::ranges::max_element(values, {}, [](double v) { return std::abs(v); }));
+double largest_of(const Recording& recording, const char* channel) {
+  return test::largest(recording.channel(channel).values);
 }
 
 TEST(SimulateWithFaults, LogsWhatTheSensorSaysAndKeepsTheTruth) {
@@ -459,8 +459,8 @@ TEST(SimulateWithFaults, ABottomedSpringStopsAtItsStop) {
                                    .kind = FaultKind::bottom,
                                    .amount = stop_rad,
                                    .stop_stiffness_Nm_rad = 50000.0}});
-  EXPECT_GT(largest(sound, "truth_spring_deflection_rad"), 3.0 * stop_rad);
-  EXPECT_LT(largest(faulty, "truth_spring_deflection_rad"), 1.1 * stop_rad);
+  EXPECT_GT(largest_of(sound, "truth_spring_deflection_rad"), 3.0 * stop_rad);
+  EXPECT_LT(largest_of(faulty, "truth_spring_deflection_rad"), 1.1 * stop_rad);
 }
 
 TEST(SimulateWithFaults, AColdOldPieceInWhichEverythingFailsStaysFinite) {
@@ -486,7 +486,7 @@ TEST(SimulateWithFaults, AColdOldPieceInWhichEverythingFailsStaysFinite) {
       EXPECT_TRUE(std::ranges::all_of(channel.values, [](double v) { return std::isfinite(v); }))
           << actuator << " " << channel.name;
     }
-    EXPECT_LT(largest(recording, "truth_joint_speed_rad_s"), 100.0) << actuator;
+    EXPECT_LT(largest_of(recording, "truth_joint_speed_rad_s"), 100.0) << actuator;
   }
 }
 
@@ -504,12 +504,12 @@ TEST(SimulateWithWear, ColdAndWarmingPiecesRubAsTheirTemperatureSays) {
 
 TEST(SimulateWithWear, AnOldSpringGivesMore) {
   const auto deflection_rad = [](double age) {
-    return largest(simulate({.actuator = "dfki-120",
-                             .experiment = "static-cycle",
-                             .duration_s = 6.0,
-                             .with_truth = true,
-                             .conditions = {.age = age}}),
-                   "truth_spring_deflection_rad");
+    return largest_of(simulate({.actuator = "dfki-120",
+                                .experiment = "static-cycle",
+                                .duration_s = 6.0,
+                                .with_truth = true,
+                                .conditions = {.age = age}}),
+                      "truth_spring_deflection_rad");
   };
   // 120 Nm = K x + f + μ K x, and half the play on top of x [deg].
   const double fresh_deg = (120.0 - 0.957) / 1.0317 / 19.8 + 0.01;

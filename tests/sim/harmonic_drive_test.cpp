@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "results.hpp"
 #include "sim/impedance_loop.hpp"
 #include "sim/plant/energy_audit.hpp"
 #include "sim/plant/plant.hpp"
@@ -18,6 +19,9 @@
 
 namespace torsio {
 namespace {
+
+using test::largest;
+using test::range;
 
 constexpr const char* kTubes[] = {"harmonic-drive", "harmonic-drive:soft", "harmonic-drive:rigid"};
 constexpr double kTubeRatio = 2.0;
@@ -171,15 +175,6 @@ Values whole_twist_deg(const Recording& recording) {
   for (std::size_t i = 0; i < twist.size(); ++i)
     twist[i] = deg_from_rad(rotor[i] / kTubeRatio - kGearRatio * joint[i]);
   return twist;
-}
-
-double range(const Values& values) {
-  const auto [low, high] = std::ranges::minmax_element(values);
-  return *high - *low;
-}
-
-double largest(const Values& values) {
-  return std::abs(*std::ranges::max_element(values, {}, [](double x) { return std::abs(x); }));
 }
 
 /// RMSE of the linear least-squares fit, as a share of the largest value.

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -11,12 +10,15 @@
 #include "sim/plant/plant.hpp"
 #include "sim/position_loop.hpp"
 #include "sim/torque_loop.hpp"
+#include "support/numbers.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kInfinity;
+using test::kNaN;
+using test::kRate_Hz;
 
 /// A loop as a function of what is wanted and of one measurement.
 struct Loop {
@@ -41,9 +43,6 @@ std::vector<Loop> loops_with_memory() {
              return loop.step(wanted, measured, 0.01);
            }}};
 }
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Loops, PassOverWhatIsNotFinite) {
   std::vector<Loop> disturbed = loops_with_memory();

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "results.hpp"
 #include "sim/plant/energy_audit.hpp"
 #include "sim/position_loop.hpp"
 #include "support/refusal.hpp"
@@ -21,9 +22,9 @@
 namespace torsio {
 namespace {
 
-/// What the two stages have lost: their ports of Plant::work_ports. The other friction, which loses
-/// far more, would hide their falls.
-double stage_loss(const EnergyAudit& audit) { return audit.port_loss(8) + audit.port_loss(9); }
+using test::largest;
+using test::range;
+using test::stage_loss;
 
 constexpr double kStatic_Nm = 0.5;
 constexpr double kSliding_Nm = 0.45;
@@ -47,12 +48,6 @@ const std::vector<double>& values(const Recording& recording, const char* channe
   return recording.channel(channel).values;
 }
 
-double largest(std::span<const double> of) {
-  double most = 0.0;
-  for (const double value : of) most = std::max(most, std::abs(value));
-  return most;
-}
-
 /// How far the clutch has slipped, at each sample [rad].
 std::vector<double> slipped(const Recording& recording) {
   const auto& twist = values(recording, "truth_clutch_deflection_rad");
@@ -62,18 +57,13 @@ std::vector<double> slipped(const Recording& recording) {
   return slip;
 }
 
-double range(std::span<const double> of) {
-  const auto [low, high] = std::ranges::minmax_element(of);
-  return *high - *low;
-}
-
 /// Results from the last periods of a sine.
-struct Loop {
+struct HysteresisLoop {
   double width_Nm = 0.0;          ///< at the middle
   double stiffness_Nm_rad = 0.0;  ///< from end to end
   double height_Nm = 0.0;         ///< from end to end
 };
-Loop loop_of(const Recording& recording, double frequency_Hz) {
+HysteresisLoop loop_of(const Recording& recording, double frequency_Hz) {
   const auto& angle = values(recording, "truth_rubber_deflection_rad");
   const auto& torque = values(recording, "truth_torque_Nm");
   const std::size_t first =
@@ -221,9 +211,9 @@ TEST(RubberClutch, GridWalksAllItsPointsFromRest) {
 }
 
 TEST(RubberClutch, LoopGrowsAndSoftensWithTheAmplitude) {
-  const Loop small = loop_of(sine(1.0, 0.1), 0.1);
-  const Loop middle = loop_of(sine(4.0, 0.1), 0.1);
-  const Loop large = loop_of(sine(9.0, 0.1), 0.1);
+  const HysteresisLoop small = loop_of(sine(1.0, 0.1), 0.1);
+  const HysteresisLoop middle = loop_of(sine(4.0, 0.1), 0.1);
+  const HysteresisLoop large = loop_of(sine(9.0, 0.1), 0.1);
   EXPECT_GT(small.width_Nm, 0.005);
   EXPECT_GT(middle.width_Nm, 1.2 * small.width_Nm);
   EXPECT_GT(large.width_Nm, 1.1 * middle.width_Nm);
@@ -232,8 +222,8 @@ TEST(RubberClutch, LoopGrowsAndSoftensWithTheAmplitude) {
 }
 
 TEST(RubberClutch, RubberIsStifferWhenTurnedFaster) {
-  const Loop slow = loop_of(sine(9.0, 0.1), 0.1);
-  const Loop fast = loop_of(sine(9.0, 1.0), 1.0);
+  const HysteresisLoop slow = loop_of(sine(9.0, 0.1), 0.1);
+  const HysteresisLoop fast = loop_of(sine(9.0, 1.0), 1.0);
   EXPECT_GT(fast.stiffness_Nm_rad, 1.03 * slow.stiffness_Nm_rad);
   EXPECT_LT(fast.stiffness_Nm_rad, 1.15 * slow.stiffness_Nm_rad) << "three branches of 5 % each";
 }

@@ -11,15 +11,16 @@
 #include <vector>
 
 #include "support/moments.hpp"
+#include "support/numbers.hpp"
 #include "torsio/sim/experiment.hpp"
 
 namespace torsio {
 namespace {
 
+using test::kRate_Hz;
 using test::Moments;
 using test::moments;
 
-constexpr double kRate_Hz = 1000.0;
 constexpr int kReadings = 60000;
 
 /// One encoder of a sheet: measured and true angle.

@@ -11,6 +11,7 @@
 #include "sim/sensor_set.hpp"
 #include "sim/torque_loop.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "support/series_elastic.hpp"
 #include "support/straight_line.hpp"
 #include "torsio/core/error.hpp"
@@ -24,7 +25,8 @@
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kRate_Hz;
+
 constexpr std::size_t kSettled = 2000;
 
 /// [Nm]

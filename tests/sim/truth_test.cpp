@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "results.hpp"
 #include "support/every_actuator.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/units.hpp"
@@ -13,6 +14,8 @@
 
 namespace torsio {
 namespace {
+
+using test::range;
 
 Recording simulated(const std::string& actuator, const std::string& experiment, double duration_s) {
   return simulate({.actuator = actuator,
@@ -43,11 +46,6 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
   double largest = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
   return largest;
-}
-
-double range(const std::vector<double>& of) {
-  const auto [low, high] = std::minmax_element(of.begin(), of.end());
-  return *high - *low;
 }
 
 TEST(Truth, TheSlipElementsOfASpringAddUpToItsFriction) {

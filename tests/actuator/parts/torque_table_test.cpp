@@ -2,15 +2,17 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "actuator/parts/spring.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 
 namespace torsio {
 namespace {
+
+using test::kNaN;
 
 const std::vector<TorqueTable::Point> kPoints = {{-0.10, -70.0}, {-0.04, -20.0}, {-0.001, -0.2},
                                                  {0.002, 0.1},   {0.05, 30.0},   {0.09, 80.0}};
@@ -57,7 +59,6 @@ TEST(TorqueTable, RefusesWhatIsNoElasticCurve) {
   EXPECT_NE(refusal({{0.1, 1.0}, {-0.1, -1.0}}).find("as point 2"), std::string::npos);
   EXPECT_NE(refusal({{0.01, 1.0}, {0.1, 2.0}}).find("both sides of zero"), std::string::npos);
   EXPECT_NE(refusal({{-0.1, 1.0}, {0.1, 2.0}}).find("both sides of zero"), std::string::npos);
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(refusal({{-0.1, -1.0}, {kNaN, 2.0}}).find("finite numbers"), std::string::npos);
   EXPECT_NE(refusal({{-1e-320, -1.0}, {0.0, 1e300}}).find("slope"), std::string::npos);
 }

@@ -9,17 +9,17 @@ namespace torsio::test {
 namespace {
 
 TEST(TorqueParts, SeparatesTheElasticCurveFromTheLoop) {
-  constexpr std::size_t kSamples = 20'000;
+  constexpr std::size_t kCount = 20'000;
   constexpr double kStiffness = 500.0;
   constexpr double kFriction = 2.0;
   constexpr double kThreshold = 0.001;
-  std::vector<double> x(kSamples);
-  std::vector<double> output(kSamples);
-  std::vector<double> loop(kSamples);
+  std::vector<double> x(kCount);
+  std::vector<double> output(kCount);
+  std::vector<double> loop(kCount);
   std::vector<std::size_t> rows;
-  Matrix features(kSamples, 1);
+  Matrix features(kCount, 1);
   double stop = 0.0;
-  for (std::size_t n = 0; n < kSamples; ++n) {
+  for (std::size_t n = 0; n < kCount; ++n) {
     const double t = 0.001 * static_cast<double>(n);
     x[n] = 0.04 * std::sin(2.0 * t) + 0.01 * std::sin(7.0 * t);
     if (n > 0) stop = std::clamp(stop + x[n] - x[n - 1], -kThreshold, kThreshold);

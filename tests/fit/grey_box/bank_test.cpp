@@ -13,16 +13,17 @@
 #include "fit/grey_box/grey_box_sums.hpp"
 #include "fit/transfer/refit.hpp"
 #include "support/example_data.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
+using test::kRate_Hz;
 using testing::HasSubstr;
 using Row = std::span<const double>;
 
-constexpr double kRate_Hz = 1000.0;
-constexpr GreyBoxOptions kBoxAlone{.residual = ResidualKind::none};
+constexpr GreyBoxOptions kWithoutResidual{.residual = ResidualKind::none};
 
 /// A spring driven by a shaft whose friction follows the shaft's own angle: a record of the twist and the
 /// shaft's rate (or angle). `travel` is how far the shaft turns.
@@ -70,7 +71,7 @@ TrainingData test_data(double friction_Nm, bool by_rate = true) {
 
 TEST(GreyBoxBanks, FindFrictionThatLivesInTheIntegralOfARate) {
   const TrainingData data = shaft_data(4.0);
-  const Fitted<GreyBox> with = fit_grey_box(data, kBoxAlone);
+  const Fitted<GreyBox> with = fit_grey_box(data, kWithoutResidual);
   const Fitted<GreyBox> without =
       fit_grey_box(data, {.banks = false, .residual = ResidualKind::none});
   ASSERT_EQ(with.parameters.terms.banks.size(), 1U) << with.notes.back();
@@ -89,7 +90,7 @@ TEST(GreyBoxBanks, FindFrictionThatLivesInTheIntegralOfARate) {
 }
 
 TEST(GreyBoxBanks, FollowAnAngleWhereOneIsLogged) {
-  const Fitted<GreyBox> fitted = fit_grey_box(shaft_data(4.0, false), kBoxAlone);
+  const Fitted<GreyBox> fitted = fit_grey_box(shaft_data(4.0, false), kWithoutResidual);
   ASSERT_EQ(fitted.parameters.terms.banks.size(), 1U) << fitted.notes.back();
   EXPECT_FALSE(fitted.parameters.terms.banks[0].is_integrated);
   EXPECT_LT(evaluate(GreyBox(fitted.parameters), test_data(4.0, false)).rmse, 0.6);
@@ -97,7 +98,7 @@ TEST(GreyBoxBanks, FollowAnAngleWhereOneIsLogged) {
 
 TEST(GreyBoxBanks, AreLeftOutWhereNothingIsGained) {
   const TrainingData data = shaft_data(0.0);
-  const Fitted<GreyBox> with = fit_grey_box(data, kBoxAlone);
+  const Fitted<GreyBox> with = fit_grey_box(data, kWithoutResidual);
   const Fitted<GreyBox> without =
       fit_grey_box(data, {.banks = false, .residual = ResidualKind::none});
   EXPECT_TRUE(with.parameters.terms.banks.empty()) << with.notes.back();
@@ -111,14 +112,14 @@ TEST(GreyBoxBanks, AreNotPartOfAPassiveBox) {
 
 TEST(GreyBoxBanks, AreTheSameEachTime) {
   const TrainingData data = shaft_data(4.0);
-  const Fitted<GreyBox> first = fit_grey_box(data, kBoxAlone);
-  const Fitted<GreyBox> second = fit_grey_box(data, kBoxAlone);
+  const Fitted<GreyBox> first = fit_grey_box(data, kWithoutResidual);
+  const Fitted<GreyBox> second = fit_grey_box(data, kWithoutResidual);
   EXPECT_EQ(first.parameters.terms, second.parameters.terms);
   EXPECT_EQ(first.parameters.coefficients, second.parameters.coefficients);
 }
 
 TEST(GreyBoxBanks, AreRefittedToAnotherSpecimen) {
-  const Fitted<GreyBox> base = fit_grey_box(shaft_data(4.0), kBoxAlone);
+  const Fitted<GreyBox> base = fit_grey_box(shaft_data(4.0), kWithoutResidual);
   const FeatureRanges ranges{.lowest = {-0.08, -20.0}, .highest = {0.08, 20.0}};
   const AnyModel::Parameters other =
       refitted(base.parameters, ranges, shaft_data(6.0, true, {0.3, 5.0}), 1e-4);

@@ -4,11 +4,11 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "model/gaussian_process/double_gemm.hpp"
 #include "support/each_instruction_set.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
@@ -16,8 +16,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using test::kNaN;
 
 MatrixXd random_matrix(Index rows, Index columns, std::uint64_t seed) {
   Random random(seed);

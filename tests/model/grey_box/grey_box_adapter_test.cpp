@@ -5,12 +5,12 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "support/error_message.hpp"
 #include "support/examples/grey_box.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/model/adaptive_model.hpp"
 
@@ -19,6 +19,7 @@ namespace {
 
 using test::error_message;
 using test::example;
+using test::kNaN;
 using testing::HasSubstr;
 
 constexpr double kPeriod_s = 1e-3;
@@ -197,7 +198,6 @@ TEST(GreyBoxAdapter, NoCoefficientLeavesItsBoundsAndNoTermIsAdded) {
 }
 
 TEST(GreyBoxAdapter, ReferencesThatCannotBeTrustedChangeNothing) {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   AdaptationSettings settings{.saturation = 60.0};
   AdaptiveModel model = adaptive(passive_box(), settings);
   const auto outcome_of = [&](int n, const ReferenceSample& reference) {

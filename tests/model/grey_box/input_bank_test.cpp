@@ -79,11 +79,11 @@ TEST(InputBank, ItsCurveIsZeroAtItsOuterKnotsAndItsProductIsASlope) {
 }
 
 TEST(InputBank, AShortRelaxationOfARateIsAnInertia) {
-  constexpr double kPeriod_s = 0.01;
-  GreyBox box(with_bank({.is_integrated = true, .time_constants_s = {kPeriod_s}}, {1.0}));
+  constexpr double kTimeConstant_s = 0.01;
+  GreyBox box(with_bank({.is_integrated = true, .time_constants_s = {kTimeConstant_s}}, {1.0}));
   double value = 0.0;
-  for (int n = 0; n < 100; ++n) value = estimate(box, 0.0, 3.0 * kPeriod_s * n);
-  EXPECT_NEAR(value, 3.0 * kPeriod_s, 1e-12) << "acceleration times the time constant";
+  for (int n = 0; n < 100; ++n) value = estimate(box, 0.0, 3.0 * kTimeConstant_s * n);
+  EXPECT_NEAR(value, 3.0 * kTimeConstant_s, 1e-12) << "acceleration times the time constant";
 }
 
 TEST(InputBank, GoesOnFromAStateAndPassesOverWhatIsNoNumber) {

@@ -5,10 +5,10 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/model/adaptive_model.hpp"
 
@@ -16,9 +16,9 @@ namespace torsio {
 namespace {
 
 using test::error_message;
+using test::kNaN;
 using testing::HasSubstr;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPeriod_s = 1e-3;
 
 /// A grid of `side` x `side` components over deflection (standardised -2 to 2) and rate along a

@@ -4,13 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <limits>
 
 #include "model/mixture/random_mixture.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
+
+using test::kNaN;
 
 struct Damage {
   const char* message;
@@ -18,7 +20,6 @@ struct Damage {
 };
 
 TEST(GaussianMixture, NamesTheComponentAndWhatIsWrongWithIt) {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Damage> damages = {
       {"at least one component", [](auto& m) { m.weights.clear(); }},
       {"at least one quantity", [](auto& m) { m.centre.clear(); }},

@@ -12,16 +12,17 @@
 
 #include "support/each_instruction_set.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {
 namespace {
 
 using test::error_message;
+using test::kInfinity;
+using test::kNaN;
 using testing::HasSubstr;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPeriod_s = 1e-3;
 constexpr double kScale = 40.0;  // Nm, of the target
 

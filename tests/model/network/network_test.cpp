@@ -30,7 +30,6 @@ using test::NetworkShape;
 using test::random_network;
 using testing::HasSubstr;
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kSteps = 60;
 
 /// Error of the network's outputs over a run, relative to the spread of the target.
@@ -252,7 +251,9 @@ TEST(Networks, NameTheLayerThatIsWrong) {
               HasSubstr("lstm: layers.0.input_weights: expected 24 x 2, found 24 x 3"));
   EXPECT_THAT(complaint<Lstm>([](auto& p) { p.layers[1].bias.pop_back(); }),
               HasSubstr("lstm: layers.1.bias: expected 20 numbers, found 19"));
-  EXPECT_THAT(complaint<Gru>([](auto& p) { p.layers[1].recurrent_bias[3] = kNaN; }),
+  EXPECT_THAT(complaint<Gru>([](auto& p) {
+                p.layers[1].recurrent_bias[3] = std::numeric_limits<float>::quiet_NaN();
+              }),
               HasSubstr("gru: layers.1.recurrent_bias: expected finite numbers, found nan at "
                         "index 3"));
   EXPECT_THAT(complaint<Gru>([](auto& p) { p.layers[0].input_bias.clear(); }),

@@ -9,10 +9,12 @@
 #include <random>
 #include <vector>
 
+#include "support/numbers.hpp"
+
 namespace torsio {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNaN;
 
 TEST(Overview, KeepsThePeakOfASingleSample) {
   std::vector<double> values(100'000, 0.0);
@@ -45,8 +47,8 @@ TEST(Overview, KeepsTheExtremesOfEveryBucketInTheirOrder) {
 }
 
 TEST(Overview, ShowsAGapOnlyWhereABucketHasNoValue) {
-  const std::vector<double> values{1.0,  kNan, kNan,
-                                   kNan, 2.0,  std::numeric_limits<double>::infinity()};
+  const std::vector<double> values{1.0,  kNaN, kNaN,
+                                   kNaN, 2.0,  std::numeric_limits<double>::infinity()};
   const std::vector<float> overview = overview_of(values, 2);
   ASSERT_EQ(overview.size(), 6U);
   EXPECT_EQ(overview[0], 1.0F);
@@ -99,7 +101,7 @@ TEST(ThinnedCurve, StaysNearALoopWithFewPoints) {
 }
 
 TEST(ThinnedCurve, KeepsAGap) {
-  const std::vector<double> x{0.0, 1.0, kNan, kNan, 2.0, 3.0};
+  const std::vector<double> x{0.0, 1.0, kNaN, kNaN, 2.0, 3.0};
   const std::vector<double> y{0.0, 1.0, 1.0, 1.0, 2.0, 3.0};
   const ThinnedCurve curve = thinned(x, y);
   EXPECT_EQ(curve.kept, (std::vector<std::size_t>{0, 1, 2, 4, 5}));

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "sim/closed_loop/spring_sheet.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
@@ -17,9 +18,8 @@
 namespace torsio {
 namespace {
 
+using test::kSheet;
 using testing::HasSubstr;
-
-const DataSheet kSheet = data_sheet("dfki-50");
 
 /// 100 ticks at 10 Hz of a loop with this error from tick `begin` on, and these reported faults.
 Recording run_of(double error_Nm, std::size_t begin, const std::vector<std::size_t>& inverse_faults,

@@ -13,10 +13,10 @@
 namespace torsio {
 namespace {
 
-using Kind = ImpedanceSpec::Kind;
-
-const ImpedanceSpec kSoft = {
-    .kind = Kind::wanted, .stiffness_Nm_rad = 1000.0, .damping_Nms_rad = 30.0, .duration_s = 10.0};
+const ImpedanceSpec kSoft = {.kind = ImpedanceSpec::Kind::wanted,
+                             .stiffness_Nm_rad = 1000.0,
+                             .damping_Nms_rad = 30.0,
+                             .duration_s = 10.0};
 
 /// Without dry friction, gear errors, torque ripple and noise, its gear ten times as stiff.
 DataSheet ideal() {
@@ -72,8 +72,10 @@ TEST(ImpedanceTracking, TheLinearModelIsTheImpedanceOfTheTask) {
 
 TEST(ImpedanceTracking, HighIsStiffAndZeroGivesWay) {
   const DataSheet sheet = data_sheet("harmonic-drive");
-  const ImpedanceRun high = track_impedance(sheet, {.kind = Kind::high, .duration_s = 20.0}, 1);
-  const ImpedanceRun zero = track_impedance(sheet, {.kind = Kind::zero, .duration_s = 20.0}, 1);
+  const ImpedanceRun high =
+      track_impedance(sheet, {.kind = ImpedanceSpec::Kind::high, .duration_s = 20.0}, 1);
+  const ImpedanceRun zero =
+      track_impedance(sheet, {.kind = ImpedanceSpec::Kind::zero, .duration_s = 20.0}, 1);
   // N_h k K_pp K_tp / (K_tp + k / N_g)
   EXPECT_NEAR(high.stiffness_Nm_rad, 51.0 * 40.95 * 75.0 / (5.0 + 40.95 / 2.0), 1e-6);
   EXPECT_EQ(high.passive_to_Hz, 0.0) << "stable only with dry friction";
@@ -134,7 +136,7 @@ TEST(ImpedanceTracking, RefusesWhatIsNotPassiveOrNotAHarmonicDrive) {
   expect(refusal("dfki-50", kSoft),
          "torsion tube before its harmonic drive, harmonic-drive, found dfki-50");
   const auto wanted = [](double stiffness_Nm_rad, double damping_Nms_rad, double gain_Nm_rad) {
-    return ImpedanceSpec{.kind = Kind::wanted,
+    return ImpedanceSpec{.kind = ImpedanceSpec::Kind::wanted,
                          .stiffness_Nm_rad = stiffness_Nm_rad,
                          .damping_Nms_rad = damping_Nms_rad,
                          .torque_gain_Nm_rad = gain_Nm_rad};

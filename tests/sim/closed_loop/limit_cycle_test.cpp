@@ -8,13 +8,14 @@
 
 #include "sim/closed_loop/tracking_parts.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/sim/closed_loop/tracking_score.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kRate_Hz;
 
 std::vector<double> sine(double amplitude, double frequency_Hz, double duration_s) {
   std::vector<double> values(static_cast<std::size_t>(duration_s * kRate_Hz));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "sim/closed_loop/spring_sheet.hpp"
 #include "sim/closed_loop/tracking_parts.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
@@ -13,10 +14,8 @@
 namespace torsio {
 namespace {
 
-using Kind = TorqueReference::Kind;
 using test::error_message;
-
-const DataSheet kSheet = data_sheet("dfki-50");
+using test::kSheet;
 
 std::string message(const TorqueReference& reference) {
   return error_message([&] { (void)reference_torque(reference, kSheet, 1); });
@@ -29,7 +28,8 @@ TEST(TorqueReference, HasANameThatFindsIt) {
 }
 
 TEST(TorqueReference, LastsAsLongAndReachesAsFarAsItSays) {
-  for (const Kind kind : {Kind::chirp, Kind::steps, Kind::sweep}) {
+  for (const TorqueReference::Kind kind :
+       {TorqueReference::Kind::chirp, TorqueReference::Kind::steps, TorqueReference::Kind::sweep}) {
     const auto torque =
         reference_torque({.kind = kind, .amplitude_Nm = 7.0, .duration_s = 60.0}, kSheet, 1);
     ASSERT_EQ(torque.size(), 60000U);
@@ -40,8 +40,9 @@ TEST(TorqueReference, LastsAsLongAndReachesAsFarAsItSays) {
 }
 
 TEST(TorqueReference, ReplaysARecordedTorqueBetweenItsSamples) {
-  const TorqueReference replay{
-      .kind = Kind::replay, .recorded_Nm = std::vector<double>(400, 3.0), .recorded_Hz = 100.0};
+  const TorqueReference replay{.kind = TorqueReference::Kind::replay,
+                               .recorded_Nm = std::vector<double>(400, 3.0),
+                               .recorded_Hz = 100.0};
   TorqueReference ramp = replay;
   for (std::size_t i = 0; i < ramp.recorded_Nm.size(); ++i)
     ramp.recorded_Nm[i] = 0.01 * static_cast<double>(i);
@@ -54,13 +55,16 @@ TEST(TorqueReference, ReplaysARecordedTorqueBetweenItsSamples) {
 TEST(TorqueReference, BeyondTheRatingOrWithoutNumbersIsRefused) {
   EXPECT_NE(message({.amplitude_Nm = 51.0}).find("rated for"), std::string::npos);
   // A walk's standard deviations reach further than its chirp.
-  EXPECT_NE(message({.kind = Kind::random_walk, .amplitude_Nm = 40.0}).find("rated for"),
-            std::string::npos);
+  EXPECT_NE(
+      message({.kind = TorqueReference::Kind::random_walk, .amplitude_Nm = 40.0}).find("rated for"),
+      std::string::npos);
   EXPECT_NE(message({.amplitude_Nm = -1.0}).find("above 0"), std::string::npos);
   EXPECT_NE(message({.duration_s = 1.0}).find("3 to 3600 s"), std::string::npos);
-  EXPECT_NE(message({.kind = Kind::replay}).find("a recording"), std::string::npos);
+  EXPECT_NE(message({.kind = TorqueReference::Kind::replay}).find("a recording"),
+            std::string::npos);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(message({.kind = Kind::replay, .recorded_Nm = std::vector<double>(4000, nan)})
+  EXPECT_NE(message({.kind = TorqueReference::Kind::replay,
+                     .recorded_Nm = std::vector<double>(4000, nan)})
                 .find("above 0"),
             std::string::npos);
 }

@@ -11,13 +11,14 @@
 
 #include "sim/closed_loop/tracking_parts.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/lowpass.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kRate_Hz = 1000.0;
+using test::kRate_Hz;
 
 Recording record_of(std::vector<double> wanted, std::vector<double> torque,
                     std::vector<double> limited = {}) {

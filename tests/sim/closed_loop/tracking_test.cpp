@@ -6,14 +6,15 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "data/resample.hpp"
 #include "model/grey_box/grey_box.hpp"
+#include "sim/closed_loop/spring_sheet.hpp"
 #include "support/error_message.hpp"
+#include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/mapping.hpp"
 #include "torsio/fit/common/inputs.hpp"
@@ -24,15 +25,14 @@
 namespace torsio {
 namespace {
 
-using Kind = TorqueReference::Kind;
 using test::error_message;
-
-const DataSheet kSheet = data_sheet("dfki-50");
+using test::kInfinity;
+using test::kSheet;
 
 /// What the sweeps of dfki-50 give, roughly.
 LinearInverse line() { return LinearInverse(600.0); }
 
-TrackingSpec short_spec(Kind kind = Kind::chirp) {
+TrackingSpec short_spec(TorqueReference::Kind kind = TorqueReference::Kind::chirp) {
   return {.reference = {.kind = kind, .duration_s = 12.0}, .measures_bandwidth = false};
 }
 
@@ -111,7 +111,7 @@ TEST(Track, RecordsTermsThatAddUpToTheCommand) {
 }
 
 TEST(Track, FollowsNoiseFasterThanTheLoopWhereItsRateIsFedForward) {
-  TrackingSpec spec = short_spec(Kind::random_walk);
+  TrackingSpec spec = short_spec(TorqueReference::Kind::random_walk);
   const double plain_Nm = track(kSheet, spec, line(), 1).score.rmse;
   spec.feeds_rate_forward = true;
   EXPECT_LT(track(kSheet, spec, line(), 1).score.rmse, 0.6 * plain_Nm);
@@ -174,13 +174,14 @@ TEST(Track, MeasuresTheBandwidthThatTheGainsWereMadeFor) {
 }
 
 TEST(Track, OfStepsReportsTheOvershoot) {
-  const TrackingScore score = track(kSheet, short_spec(Kind::steps), line(), 1).score;
+  const TrackingScore score =
+      track(kSheet, short_spec(TorqueReference::Kind::steps), line(), 1).score;
   ASSERT_TRUE(score.overshoot);
   EXPECT_LT(*score.overshoot, 0.5);
 }
 
 TEST(Track, CountsLimitsWhereTheCurrentIsNotEnough) {
-  TrackingSpec spec = short_spec(Kind::steps);
+  TrackingSpec spec = short_spec(TorqueReference::Kind::steps);
   spec.reference.amplitude_Nm = 48.0;
   spec.bandwidth_rad_s = 100.0;
   const TrackingScore score = track(kSheet, spec, line(), 1).score;
@@ -189,9 +190,12 @@ TEST(Track, CountsLimitsWhereTheCurrentIsNotEnough) {
 }
 
 TEST(Track, IsTheSameForTheSameSeed) {
-  const Recording one = track(kSheet, short_spec(Kind::random_walk), line(), 7).record;
-  const Recording other = track(kSheet, short_spec(Kind::random_walk), line(), 7).record;
-  const Recording third = track(kSheet, short_spec(Kind::random_walk), line(), 8).record;
+  const Recording one =
+      track(kSheet, short_spec(TorqueReference::Kind::random_walk), line(), 7).record;
+  const Recording other =
+      track(kSheet, short_spec(TorqueReference::Kind::random_walk), line(), 7).record;
+  const Recording third =
+      track(kSheet, short_spec(TorqueReference::Kind::random_walk), line(), 8).record;
   EXPECT_EQ(one.channel("command_current_A").values, other.channel("command_current_A").values);
   EXPECT_NE(one.channel("command_current_A").values, third.channel("command_current_A").values);
 }
@@ -291,7 +295,6 @@ TEST(TrackingReport, HasTheFieldsOfItsSchemaAndNoNumbersOfARunThatFailed) {
 
 // Never down to -3 dB is the best result, down from the start the worst, and none is neither.
 TEST(TrackingReport, DistinguishesABandwidthAboveTheSweepBelowItAndNone) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   TrackingRow row;
   row.model = "m";
   std::vector<TrackingRow> rows(4, row);

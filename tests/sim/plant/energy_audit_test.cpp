@@ -14,7 +14,7 @@
 namespace torsio {
 namespace {
 
-constexpr double kStep_s = 1e-4;
+constexpr double kAuditStep_s = 1e-4;
 
 /// How far the loss of an element falls within a millisecond, and the most that it ever stores.
 class Falls {
@@ -162,14 +162,14 @@ TEST(EnergyAudit, WhatDoesNotCloseIsTheStepsError) {
 
 TEST(EnergyAudit, SeesAPlantThatCreatesEnergy) {
   const PlantParameters parts = plant_parameters(data_sheet("dfki-50"));
-  Plant plant(parts, kStep_s);
+  Plant plant(parts, kAuditStep_s);
   const Load load = lever(9.0, 0.2);
   const Load billed = lever(9.0, 0.1);
   plant.reset(PlantState{.joint_angle_rad = 0.0, .joint_speed_rad_s = 1.0});
   EnergyAudit audit(plant, billed);
   for (int i = 0; i < 10000; ++i) {
-    ASSERT_EQ(plant.step({}, load, kStep_s), Fault::none);
-    audit.observe(plant, billed, kStep_s);
+    ASSERT_EQ(plant.step({}, load, kAuditStep_s), Fault::none);
+    audit.observe(plant, billed, kAuditStep_s);
   }
   EXPECT_GT(std::abs(audit.residual()), 1e-2);
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/each_instruction_set.hpp"
+#include "support/numbers.hpp"
 #include "support/plant_batches.hpp"
 #include "torsio/core/error.hpp"
 
@@ -20,6 +21,7 @@ namespace {
 using test::batch_inputs;
 using test::BatchInputs;
 using test::every_chain;
+using test::kNaN;
 
 constexpr double kTick_s = 1e-3;
 constexpr std::size_t kTicks = 1000;
@@ -137,7 +139,6 @@ TEST_P(PlantBatchOf, AgreesOnEveryInstructionSet) {
 
 TEST_P(PlantBatchOf, LeavesAPlantWithImpossibleInputWhereItIs) {
   constexpr std::size_t kBad = 4;
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   BatchInputs inputs = batch_inputs(GetParam(), 0, 9, 60);
   PlantBatch batch(inputs.parameters);
   PlantBatch untouched(inputs.parameters);
