@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -14,14 +13,15 @@
 #include "support/examples/hysteresis.hpp"
 #include "support/examples/linear.hpp"
 #include "support/examples/viscoelastic.hpp"
+#include "support/numbers.hpp"
 #include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRate_Hz = 1000.0;
+using test::kInfinity;
+using test::kRate_Hz;
 constexpr int kTicks = 1000;
 
 /// A deflection of +-0.1 rad with a border of 0.02, and a rate of +-0.4 rad/s; a model that continues is

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "docs/source_tree.hpp"
 #include "support/file_bytes.hpp"
 
 namespace torsio {
@@ -22,7 +23,7 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-const std::filesystem::path kRoot = TORSIO_SOURCE;
+using test::kRoot;
 constexpr std::array kPlaces = {"src",   "studies",   "include",      "apps",
                                 "tests", "docs",      "examples",     "benchmarks",
                                 "tools", "README.md", "CHANGELOG.md", "CONTRIBUTING.md"};

@@ -12,6 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "docs/source_tree.hpp"
+#include "support/file_bytes.hpp"
+
 namespace torsio {
 namespace {
 
@@ -19,12 +22,8 @@ namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-const fs::path kLayersRoot = TORSIO_SOURCE;
-
-std::string text_of_file(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+using test::file_bytes;
+using test::kRoot;
 
 std::vector<std::string> matches(const std::string& text, const char* pattern) {
   std::vector<std::string> found;
@@ -72,7 +71,7 @@ struct Layers {
 
 Layers layers() {
   Layers layers;
-  std::ifstream table(kLayersRoot / "docs/architecture.md");
+  std::ifstream table(kRoot / "docs/architecture.md");
   std::size_t row = 0;
   for (std::string line; std::getline(table, line); ++row) {
     std::smatch cells;
@@ -81,7 +80,7 @@ Layers layers() {
       layers.folders[folder] = {.row = row, .library = cells[2].str()};
   }
   layers.uses = {{"runtime", {}}, {"files", {"runtime"}}, {"realtime", {"runtime"}}};
-  const std::string cmake = text_of_file(kLayersRoot / "src/CMakeLists.txt");
+  const std::string cmake = file_bytes(kRoot / "src/CMakeLists.txt");
   const std::regex library(R"(torsio_slow_library\((\w+)\s[^)]*?USES ([a-z ]+))");
   for (std::sregex_iterator at(cmake.begin(), cmake.end(), library); at != std::sregex_iterator();
        ++at) {
@@ -96,13 +95,13 @@ Layers layers() {
 
 std::vector<std::string> objections(const Layers& layers) {
   std::vector<std::string> found;
-  for (const fs::path& root : {kLayersRoot / "src", kLayersRoot / "include/torsio"})
+  for (const fs::path& root : {kRoot / "src", kRoot / "include/torsio"})
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root)) {
       const std::string extension = entry.path().extension().string();
       if (extension != ".hpp" && extension != ".cpp") continue;
       const std::string file = fs::relative(entry.path(), root).string();
       for (std::string included :
-           matches(text_of_file(entry.path()), R"re(#include "(?:torsio/)?([^"]+/[^"]+)")re")) {
+           matches(file_bytes(entry.path()), R"re(#include "(?:torsio/)?([^"]+/[^"]+)")re")) {
         const std::string objection = layers.objection(file, included);
         if (!objection.empty()) found.push_back(objection);
       }

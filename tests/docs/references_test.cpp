@@ -17,6 +17,9 @@
 #include <string_view>
 #include <vector>
 
+#include "docs/source_tree.hpp"
+#include "support/file_bytes.hpp"
+
 namespace torsio {
 namespace {
 
@@ -26,12 +29,8 @@ using testing::IsEmpty;
 using Names = std::set<std::string>;
 using Found = std::vector<std::string>;
 
-const fs::path kRoot = TORSIO_SOURCE;
-
-std::string contents(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+using test::file_bytes;
+using test::kRoot;
 
 bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
@@ -132,7 +131,7 @@ Found dangling_links(const fs::path& document, std::string_view markdown) {
     const fs::path target = file.empty() ? document : document.parent_path() / file;
     const bool leads =
         fs::exists(target) && (hash == std::string::npos ||
-                               anchors(file.empty() ? std::string(markdown) : contents(target))
+                               anchors(file.empty() ? std::string(markdown) : file_bytes(target))
                                    .contains(link.substr(hash + 1)));
     if (!leads) dangling.push_back(link);
   }
@@ -273,13 +272,14 @@ void for_each_document(const std::function<void(const fs::path&, const std::stri
   for (const char* place : {"README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs"})
     for_each_file(place, ".md", [&](const fs::path& path) {
       SCOPED_TRACE(fs::relative(path, kRoot).string());
-      use(path, contents(path));
+      use(path, file_bytes(path));
     });
 }
 
 Names names_in(const char* folder, Names (*names_of)(std::string_view)) {
   Names all;
-  for_each_file(folder, ".cpp", [&](const fs::path& path) { all.merge(names_of(contents(path))); });
+  for_each_file(folder, ".cpp",
+                [&](const fs::path& path) { all.merge(names_of(file_bytes(path))); });
   return all;
 }
 
@@ -337,10 +337,10 @@ TEST(Documents, AFaultThatDoesNotExistIsFound) {
 }
 
 TEST(Documents, TheVocabularyNamesOnlyFaultsThatExist) {
-  const std::string vocabulary = contents(kRoot / "docs/vocabulary.md");
+  const std::string vocabulary = file_bytes(kRoot / "docs/vocabulary.md");
   EXPECT_FALSE(unknown_faults(vocabulary, {}).empty()) << "no fault is named";
   EXPECT_THAT(
-      unknown_faults(vocabulary, faults_of(contents(kRoot / "include/torsio/core/fault.hpp"))),
+      unknown_faults(vocabulary, faults_of(file_bytes(kRoot / "include/torsio/core/fault.hpp"))),
       IsEmpty());
 }
 
@@ -373,7 +373,7 @@ TEST(Documents, AStudyThatDoesNotExistIsFound) {
 }
 
 TEST(Documents, ReproduceOnlyStudiesThatExist) {
-  const Names studies = studies_of(contents(kRoot / "studies/study.cpp"));
+  const Names studies = studies_of(file_bytes(kRoot / "studies/study.cpp"));
   EXPECT_GT(studies.size(), 15U);
   for_each_document([&](const fs::path&, const std::string& text) {
     EXPECT_THAT(unknown_studies(text, studies), IsEmpty());
