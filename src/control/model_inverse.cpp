@@ -99,7 +99,7 @@ double ModelInverse::on_the_line(double torque_Nm, Features features) const noex
   return rest_Nm / line.slope.front();
 }
 
-// The same verdict as of an estimator, at the deflection that is requested in place of the measured one.
+// The verdict of an estimator, at the deflection that is requested in place of the measured one.
 Estimate ModelInverse::guarded(double torque_Nm, const Core::Conditioned& input) noexcept {
   const double line_rad = on_the_line(torque_Nm, input.features);
   Estimate answer = {.value = line_rad};
@@ -112,7 +112,9 @@ Estimate ModelInverse::guarded(double torque_Nm, const Core::Conditioned& input)
   std::ranges::copy(input.features, asked_.begin());
   const bool has_inverse = inverted.fault == Fault::none && std::isfinite(inverted.value);
   asked_.front() = has_inverse ? inverted.value : line_rad;
-  const Core::Excursion excursion = core_.excursion(asked_);
+  Core::Excursion excursion = core_.excursion(asked_);
+  // At a rate beyond its range an estimator uses the model, a loop the line (docs/decisions/0027-beyond-the-range.md).
+  excursion.fallback = std::max(excursion.fallback, excursion.rate);
   answer.fault = core_.replaced_for(excursion, inverted, core_.residual_std_at(torque_Nm));
   if (answer.fault != Fault::none) return answer;
   answer.value = std::max(std::min(inverted.value, line_rad + max_departure_rad_),

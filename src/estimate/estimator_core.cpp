@@ -371,7 +371,11 @@ EstimatorCore::Excursion EstimatorCore::excursion(Features features) const noexc
     worst.fallback = std::max(worst.fallback, (left_by - range.reach) / range.border);
     if (!(range.reach > 0.0)) continue;
     worst.share = std::max(worst.share, left_by * range.per_width);
-    if (i == 0) worst.first = left_by * range.per_width;
+    if (i == 0) {
+      worst.first = left_by * range.per_width;
+    } else {
+      worst.rate = std::max(worst.rate, left_by / range.border);
+    }
   }
   return worst;
 }

@@ -1,6 +1,6 @@
 # cmake -DBUILD=<build tree> -DSOURCE=<tests/install/stranger> -DWORK=<scratch> -P install_test.cmake
-# Installs torsio into a scratch prefix, builds four strangers' projects against it (one without the lab, one with
-# it, one with a real-time loop, one in C where libtorsio.so is built) and runs them.
+# Installs torsio into a scratch prefix, builds five strangers' projects against it (one without the lab, one with it, one
+# that fits models, one with a real-time loop, one in C where libtorsio.so is built) and runs them.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -18,6 +18,12 @@ run(${CMAKE_COMMAND} --build ${WORK}/build)
 run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_of_the_lab -B ${WORK}/build_lab -DCMAKE_PREFIX_PATH=${WORK}/prefix)
 run(${CMAKE_COMMAND} --build ${WORK}/build_lab)
 run(${WORK}/build_lab/stranger_of_the_lab)
+run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_who_fits -B ${WORK}/build_fits -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+run(${CMAKE_COMMAND} --build ${WORK}/build_fits)
+run(${WORK}/build_fits/stranger_who_fits)
+if(NOT output MATCHES "grey_box")
+  message(FATAL_ERROR "the stranger's list of families: ${output}")
+endif()
 run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE}_in_real_time -B ${WORK}/build_realtime -DCMAKE_PREFIX_PATH=${WORK}/prefix)
 run(${CMAKE_COMMAND} --build ${WORK}/build_realtime)
 set(torsio ${WORK}/prefix/bin/torsio)

@@ -20,7 +20,8 @@ namespace torsio {
 /// (`AnyModel::invert`; specification 3.1 for mixtures).
 ///
 /// Guarded as an `Estimator` is, with its faults in its order and its verdict beyond the training range
-/// (`EstimatorCore::Excursion`), but at the deflection that is requested, wherever the measured one is.
+/// (`EstimatorCore::Excursion`), but at the deflection that is requested, wherever the measured one is, and
+/// with the linear fallback at a rate beyond its range.
 /// Where the model is not used, and where it has no inverse, the result is that of the linear fallback.
 /// With `outside_training_range` it must not be used but for a controlled stop, even where it is the
 /// model's. A slow sweep contains no information about the fast motions of a torque loop

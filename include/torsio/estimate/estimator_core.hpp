@@ -53,6 +53,7 @@ class EstimatorCore {
     /// As a share of the width of its range, the worst feature's for which the model remains in use.
     double share = 0.0;
     double first = 0.0;     ///< the first feature's, likewise
+    double rate = 0.0;      ///< the worst other one's, likewise, but in widths of its border
     double fallback = 0.0;  ///< weight of the fallback; above 1 it replaces the model
     [[nodiscard]] Verdict verdict() const noexcept {
       if (!(fallback > 0.0)) return Verdict::use_model;
