@@ -139,6 +139,19 @@ Found dangling_links(const fs::path& document, std::string_view markdown) {
   return dangling;
 }
 
+/// @returns the pages, by their paths below docs, to which its list of pages has no link; a link to a folder counts for
+/// the pages in it
+Found unlisted(std::string_view list, const Names& pages) {
+  Names listed;
+  for (const std::string& link : links(list))
+    listed.insert(fs::path(link.substr(0, link.find('#'))).lexically_normal().string());
+  Found missing;
+  std::ranges::copy_if(pages, std::back_inserter(missing), [&](const std::string& page) {
+    return !listed.contains(page) && !listed.contains(fs::path(page).parent_path().string());
+  });
+  return missing;
+}
+
 // ---------------------------------------------------------------------------------------- names
 
 /// @returns "Suite.Name" of each test in a source
@@ -292,11 +305,11 @@ TEST(Documents, LinksAndAnchorsAreFoundInProse) {
 }
 
 TEST(Documents, ALinkThatLeadsNowhereIsFound) {
-  const fs::path here = kRoot / "docs/limits.md";
+  const fs::path here = kRoot / "docs/use/limits.md";
   EXPECT_THAT(dangling_links(here,
-                             "# A b\n[to](safety.md), [up](../README.md), [own](#a-b)\n"
-                             "[no](none.md), [wrong](safety.md#none), [none](#c)\n"),
-              ElementsAre("none.md", "safety.md#none", "#c"));
+                             "# A b\n[to](units.md), [up](../README.md), [own](#a-b)\n"
+                             "[no](none.md), [wrong](units.md#none), [none](#c)\n"),
+              ElementsAre("none.md", "units.md#none", "#c"));
 }
 
 TEST(Documents, LinkOnlyToWhatExists) {
@@ -306,6 +319,22 @@ TEST(Documents, LinkOnlyToWhatExists) {
     count += links(text).size();
   });
   EXPECT_GT(count, 300U);
+}
+
+TEST(Documents, APageThatIsNotListedIsFound) {
+  EXPECT_THAT(unlisted("- [a](use/a.md#b), [c](use/../c.md), [d](d)\n\n    [e](use/e.md)\n",
+                       {"c.md", "d/1.md", "use/a.md", "use/e.md", "use/f.md"}),
+              ElementsAre("use/e.md", "use/f.md"));
+}
+
+TEST(Documents, TheListOfPagesHasEveryPage) {
+  const fs::path list = kRoot / "docs/README.md";
+  Names pages;
+  for_each_file("docs", ".md", [&](const fs::path& path) {
+    if (path != list) pages.insert(fs::relative(path, list.parent_path()).string());
+  });
+  EXPECT_GT(pages.size(), 60U);
+  EXPECT_THAT(unlisted(contents(list), pages), IsEmpty());
 }
 
 TEST(Documents, ATestThatDoesNotExistIsFound) {
