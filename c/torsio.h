@@ -10,7 +10,7 @@
  * fail return NULL, -1 or 0; torsio_last_error then states why, except of those that only name or count
  * something. Pointers to estimators may be NULL everywhere. "No heap" holds for calls that succeed: the first
  * refusal in a thread may allocate the text of torsio_last_error, unless that was called there before.
- * All quantities are in SI units. Documentation: docs/c.md, docs/estimator.md.
+ * All quantities are in SI units. Documentation: docs/robot/c.md, docs/robot/estimator.md.
  */
 #ifndef TORSIO_H
 #define TORSIO_H
@@ -27,7 +27,7 @@ extern "C" {
 
 typedef struct torsio_estimator torsio_estimator;
 
-/* Reasons not to use a value (docs/estimator.md). */
+/* Reasons not to use a value (docs/robot/estimator.md). */
 enum {
   TORSIO_FAULT_NONE = 0,
   TORSIO_FAULT_INPUT_NOT_FINITE = 1,

@@ -11,7 +11,7 @@ set(items_001 "Fig. 6")
 set(items_002 "section II-B" "section II-C" "Table I" "Fig. 8" "Fig. 10" "Table III" "section III-C")
 set(items_003 "Table 2" "Table 3" "section 4.2.1" "section 4.3")
 set(items_004 "Table 4" "Table 5" "Table 6" "section 5.2")
-set(items_boucwen published)  # sources: docs/benchmarks.md
+set(items_boucwen published)  # sources: docs/results/benchmarks.md
 set(items_emps published)
 
 function(refuse line_number problem expected found)

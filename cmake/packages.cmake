@@ -1,4 +1,4 @@
-# Debian packages, for example by: cmake --workflow --preset packages (docs/building.md).
+# Debian packages, for example by: cmake --workflow --preset packages (docs/development/building.md).
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "the torsio authors <torsio@example.org>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})

@@ -1,4 +1,4 @@
-"""libtorsio.so from Python by ctypes, without any package; the module `torsio` (docs/python.md) does more.
+"""libtorsio.so from Python by ctypes, without any package; the module `torsio` (docs/use/python.md) does more.
 
     python3 11_estimate_torque_by_ctypes.py LIBTORSIO MODEL < rows
 

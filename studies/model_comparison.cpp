@@ -114,7 +114,7 @@ Study model_comparison(const StudyOptions& options, const Progress& progress) {
                   "locked, tested on noise of 0.25 (random walk), both at the load cell's 125 Hz, "
                   "its latency taken off. elastomer: triangles of 0.4 to 4 Hz. rubber-clutch: "
                   "sines, tested on multisines. harmonic-drive: pushes of 10 and 20 Nm, high and "
-                  "zero impedance, tested on 15 Nm. Real ones: docs/model_comparison.md",
+                  "zero impedance, tested on 15 Nm. Real ones: docs/results/model_comparison.md",
               .unit = "Nm",
               .options = options};
   std::vector<ComparisonPlan> plans = simulated_plans(options.is_quick);

@@ -52,7 +52,7 @@ constexpr Benchmark kEmps{.name = "emps",
                           .rate_Hz = 0.0,
                           .published = kPublishedEmps};
 
-// Settings of the networks: docs/benchmarks.md describes how they were selected on the training
+// Settings of the networks: docs/results/benchmarks.md describes how they were selected on the training
 // recording.
 constexpr std::array kBoucWenModels{
     Entry{"linear", "linear", "linear"},

@@ -7,7 +7,7 @@
 #include "paper_figures.hpp"
 
 // Where the figures of paper_figures.csv belong in the tables of the studies. A study shows a figure only where its
-// condition is the paper's; where the protocols differ, docs/studies.md states how.
+// condition is the paper's; where the protocols differ, docs/results/studies.md states how.
 
 namespace torsio {
 
@@ -137,7 +137,7 @@ consteval std::size_t count_of(std::string_view paper) {
   for (const PaperFigure& figure : kPaperFigures) count += figure.paper == paper ? 1 : 0;
   return count;
 }
-/// Free runs of others on the official test record [m]; sources: docs/benchmarks.md.
+/// Free runs of others on the official test record [m]; sources: docs/results/benchmarks.md.
 template <std::size_t count>
 consteval std::array<PaperEntry, count> published_runs(std::string_view benchmark,
                                                        std::string_view condition) {

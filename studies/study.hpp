@@ -26,7 +26,7 @@ inline constexpr std::uint64_t kFirstTestSeed = 50;
 
 /// A figure that a paper prints, as it prints it.
 struct PaperFigure {
-  std::string_view paper;      ///< its number in docs/sources.md
+  std::string_view paper;      ///< its number in docs/development/sources.md
   std::string_view item;       ///< table, figure or section
   std::string_view condition;  ///< condition of the measurement
   std::string_view quantity;   ///< in the paper's term

@@ -136,7 +136,7 @@ void add_check(CLI::App& app) {
       "         torsio check sweep*.csv --advise --want input=-5deg:5deg --want "
       "frequency=0.05Hz:2Hz\n"
       "--advise divides the recordings into strokes and fits a quick model with some of them left\n"
-      "out: docs/what_to_record.md.");
+      "out: docs/use/what_to_record.md.");
   flags->data.add_recordings(*verb, "recordings, or a manifest");
   flags->data.add_mapping(*verb);
   flags->data.add_target_and_inputs(*verb);

@@ -96,7 +96,7 @@ void DataFlags::add_mapping(CLI::App& verb) {
   verb.add_option(
       "--mapping", mapping,
       "YAML file that renames and converts the columns of a foreign log, or the name of "
-      "a mapping that comes with torsio (docs/recordings.md)");
+      "a mapping that comes with torsio (docs/use/recordings.md)");
   add_rate_and_joint(verb);
 }
 

@@ -94,9 +94,10 @@ void run() {
   table.header({"what", "found", "advice"});
   table.row({"torsio", torsio::kVersion, ""});
   table.row({"model files", fmt::format("format {}", torsio::kModelFormatVersion), ""});
-  table.row(
-      {"kernel", fmt::format("{} {} {}", system.sysname, system.release, system.machine),
-       is_realtime_kernel() ? "" : "without PREEMPT_RT: expect late cycles (docs/realtime.md)"});
+  table.row({"kernel", fmt::format("{} {} {}", system.sysname, system.release, system.machine),
+             is_realtime_kernel()
+                 ? ""
+                 : "without PREEMPT_RT: expect late cycles (docs/robot/realtime.md)"});
   table.row({"processor",
              fmt::format("{} threads; {}", std::thread::hardware_concurrency(), instruction_sets()),
              ""});

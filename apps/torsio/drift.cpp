@@ -97,7 +97,7 @@ void add_drift(CLI::App& app) {
                                       "is a new one worth it");
   verb->footer(
       "Example: torsio drift joint.safetensors today.csv\n"
-      "docs/drift.md has the method, its limits and what it cannot decide.");
+      "docs/robot/drift.md has the method, its limits and what it cannot decide.");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit");
   flags->data.add_recordings(*verb,
                              "recordings of today with the inputs and the torque, or a manifest");

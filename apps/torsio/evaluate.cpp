@@ -129,7 +129,7 @@ void add_evaluate(CLI::App& app) {
       "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "
       "count,\n"
       "3 warming up, 4 zero not set, 5 outside the training range, 6 recovering, 7 wrong rate,\n"
-      "8 model not finite, 9 diverged (docs/estimator.md)");
+      "8 model not finite, 9 diverged (docs/robot/estimator.md)");
   verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
   flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
   flags->data.add_model_mapping(*verb);

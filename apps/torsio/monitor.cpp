@@ -207,7 +207,7 @@ void add_monitor(CLI::App& app) {
       "             -o joint.monitor.json\n"
       "A stop and a joint that was never ready are results: the exit code is 0, as for a joint "
       "without\na finding; scripts read stopped_at_s and watching_from_s of --json.\n"
-      "docs/safety.md has the checks, what each detects, and what none detects.");
+      "docs/robot/safety.md has the checks, what each detects, and what none detects.");
   verb->add_option("FILES", flags->files,
                    "a monitor file and recordings; with --calibrate: recordings without a fault");
   flags->data.add_model_mapping(*verb);

@@ -306,7 +306,8 @@ void add_simulate(CLI::App& app) {
       "Example: torsio simulate dfki-50 sweep --lever 0.17m --seed 2 -o sweep.csv\n"
       "An actuator of your own:\n"
       "  torsio simulate --describe dfki-50 --yaml my_joint.yaml\n"
-      "  (edit the values, or give the torque curve of the spring as a table: docs/actuators.md)\n"
+      "  (edit the values, or give the torque curve of the spring as a table: "
+      "docs/simulation/actuators.md)\n"
       "  torsio simulate my_joint.yaml sweep -o sweep.csv");
   verb->add_option("ACTUATOR", flags->actuator,
                    "--list shows the names; or a data sheet, FILE.yaml");
@@ -327,8 +328,9 @@ void add_simulate(CLI::App& app) {
                    "impedance of the joint's controller: high or zero")
       ->check(CLI::IsMember({"high", "zero"}))
       ->capture_default_str();
-  verb->add_option("--faults", flags->faults,
-                   "YAML schedule of faults (docs/faults.md); --describe shows the possible ones");
+  verb->add_option(
+      "--faults", flags->faults,
+      "YAML schedule of faults (docs/simulation/faults.md); --describe shows the possible ones");
   verb->add_option(
       "--temperature", flags->temperature,
       "gear temperature, -40degC to 85degC (default 25degC): friction decreases with it");

@@ -382,7 +382,8 @@ void add_track(CLI::App& app) {
       "--velocity-bandwidth", flags->velocity_bandwidth,
       "bandwidth of the velocity loop, as 8Hz or 50rad_s, at most 200 rad/s (default four "
       "times that of the deflection controller)");
-  verb->add_option("--faults", flags->faults, "YAML schedule of faults (docs/faults.md)");
+  verb->add_option("--faults", flags->faults,
+                   "YAML schedule of faults (docs/simulation/faults.md)");
   add_seed(*verb, flags->seed, "seed of the first run's sensor noise and of a random walk");
   verb->add_option("--seeds", flags->seeds, "runs of each model, seed after seed")
       ->capture_default_str();

@@ -26,7 +26,7 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-// Results leave as the JSON documents of docs/json.md; the package makes dataclasses of them.
+// Results leave as the JSON documents of docs/use/json.md; the package makes dataclasses of them.
 
 std::string check(const Dataset& dataset, const Names& inputs, bool advise_too) {
   return interruptible([&](const Progress& progress) {

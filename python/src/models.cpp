@@ -64,7 +64,7 @@ void bind_models(py::module_& module) {
       .def_property_readonly("family", fitted_as, "The fitter's name: grey_box, mlp, ...")
       .def_property_readonly(
           "inputs", [](const Model& self) { return self.file->settings.features.inputs; },
-          "Expressions of channels (docs/expressions.md).")
+          "Expressions of channels (docs/use/expressions.md).")
       .def_property_readonly("target", [](const Model& self) { return self.file->settings.target; })
       .def_property_readonly("sample_rate_Hz",
                              [](const Model& self) { return self.file->settings.sample_rate_Hz; })

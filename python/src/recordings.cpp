@@ -284,11 +284,12 @@ void bind_recordings(py::module_& module) {
   bind_recording(module);
   module.def("recordings_from_columns", recordings_from_columns, py::arg("columns"),
              py::arg("rate_Hz"), py::arg("mapping"), py::arg("name"));
-  module.def("read", read, py::arg("path"), py::kw_only(), py::arg("mapping") = py::none(),
-             py::arg("rate_Hz") = py::none(), py::arg("target") = "",
-             "Reads a CSV file, plain or gzipped, or every file of a manifest (.yaml).\n\n"
-             "mapping: a YAML file that names the columns of a foreign log (docs/recordings.md).\n"
-             "rate_Hz: all recordings are brought to it.");
+  module.def(
+      "read", read, py::arg("path"), py::kw_only(), py::arg("mapping") = py::none(),
+      py::arg("rate_Hz") = py::none(), py::arg("target") = "",
+      "Reads a CSV file, plain or gzipped, or every file of a manifest (.yaml).\n\n"
+      "mapping: a YAML file that names the columns of a foreign log (docs/use/recordings.md).\n"
+      "rate_Hz: all recordings are brought to it.");
   module.def(
       "simulate",
       [](const std::string& actuator, const std::string& experiment, std::uint64_t seed,
@@ -313,7 +314,8 @@ void bind_recordings(py::module_& module) {
       py::arg("inclination_rad") = 0.0, py::arg("torque_amplitude_Nm") = py::none(),
       py::arg("angle_amplitude_rad") = py::none(), py::arg("frequency_Hz") = py::none(),
       py::arg("is_electrical") = false, py::arg("with_truth") = false,
-      "One experiment on a simulated bench (docs/actuators.md). Equal arguments give equal "
+      "One experiment on a simulated bench (docs/simulation/actuators.md). Equal arguments give "
+      "equal "
       "recordings.");
   module.def(
       "sweep_dataset",

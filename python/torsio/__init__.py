@@ -9,7 +9,7 @@
     estimator = torsio.load("joint.safetensors").estimator(rate_Hz=1000.0)
     torque = estimator.step(gear_angle_rad, joint_angle_rad)       # torque.value, torque.std_dev, torque.fault
 
-All quantities are in SI units, which the names end in. Errors are ValueErrors. Documentation: docs/python.md.
+All quantities are in SI units, which the names end in. Errors are ValueErrors. Documentation: docs/use/python.md.
 """
 
 from typing import TYPE_CHECKING, Any

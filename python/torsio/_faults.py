@@ -1,4 +1,4 @@
-"""Reasons not to use a value (docs/estimator.md)."""
+"""Reasons not to use a value (docs/robot/estimator.md)."""
 
 from enum import IntEnum
 

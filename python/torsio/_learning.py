@@ -33,7 +33,7 @@ def _option(value: Any) -> str:
 
 
 def check(data: Data, *, inputs: str | Sequence[str] | None = None, advise: bool = False) -> CheckReport:
-    """Looks for errors in recordings before a fit: clock, units, signs, delay, range, ... (docs/check.md).
+    """Looks for errors in recordings before a fit: clock, units, signs, delay, range, ... (docs/use/check.md).
 
     advise: also propose which recording to make next, in `report.document["advice"]`.
     """
@@ -52,7 +52,7 @@ def fit(
 ) -> Model:
     """Trains one model on the recordings with the role train; equal arguments give equal models.
 
-    inputs: expressions of channels (docs/expressions.md); without them, the deflection of the spring, its
+    inputs: expressions of channels (docs/use/expressions.md); without them, the deflection of the spring, its
     rate and the speed of the joint, as far as they are there.
     options: those of the family (`torsio.families()`), as layers="64", branch=True.
     Ctrl-C stops it.
@@ -74,7 +74,7 @@ def compare(
     seed: int = 1,
     allow_leak: bool = False,
 ) -> Comparison:
-    """Trains several families and ranks them on the held-out recordings (docs/evaluation.md).
+    """Trains several families and ranks them on the held-out recordings (docs/use/evaluation.md).
 
     models: "all", or families with options after colons: "linear,polynomial:degree=7".
     """
@@ -115,7 +115,7 @@ def attribute(
     repeats: int = 5,
     seed: int = 1,
 ) -> Document:
-    """How much a model uses each input: Shapley values and permutation importance (docs/evaluation.md).
+    """How much a model uses each input: Shapley values and permutation importance (docs/use/evaluation.md).
 
     window_samples: 0 for the memory of the model.
     """
@@ -125,7 +125,7 @@ def attribute(
 
 
 def drift(model: Model, data: Data, *, reference: Model | None = None, seed: int = 1) -> Document:
-    """What has changed in a joint since the calibration of its model (docs/drift.md)."""
+    """What has changed in a joint since the calibration of its model (docs/robot/drift.md)."""
     text = _core.drift(model, _dataset(data, "test", model.target), reference, seed)
     return Document.from_json(text, "quantities")
 
@@ -133,7 +133,7 @@ def drift(model: Model, data: Data, *, reference: Model | None = None, seed: int
 def transfer(
     base: Model, data: Data, *, use_s: float = 10.0, method: str = "auto", seed: int = 1
 ) -> tuple[Model, Document]:
-    """A model of one joint for another one, from the first use_s seconds of its recordings (docs/transfer.md).
+    """A model of one joint for another one, from the first use_s seconds of its recordings (docs/robot/transfer.md).
 
     Returns the model and the scores of all methods, on test recordings or on what follows the used part.
     """
@@ -152,7 +152,7 @@ def track(
     is_free: bool = False,
     seeds: Sequence[int] = (1,),
 ) -> Document:
-    """A torque loop on a simulated joint, with each model and with a line from sweeps (docs/tracking.md).
+    """A torque loop on a simulated joint, with each model and with a line from sweeps (docs/simulation/tracking.md).
 
     reference: chirp, random_walk, steps or sweep. is_free: the lever moves; else the output is locked.
     """

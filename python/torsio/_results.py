@@ -160,7 +160,7 @@ class Results:
     unit: str
     inputs: list[str]
     rows: list[Score]
-    document: dict[str, Any] = field(compare=False)  #: as docs/json.md describes it
+    document: dict[str, Any] = field(compare=False)  #: as docs/use/json.md describes it
 
     @classmethod
     def from_json(cls, text: str) -> Results:
@@ -319,7 +319,7 @@ class CheckReport:
 
 @dataclass(frozen=True)
 class Margins:
-    """Stability margins of a torque loop whose output is locked or free (docs/control.md)."""
+    """Stability margins of a torque loop whose output is locked or free (docs/robot/control.md)."""
 
     output: str  #: locked or free
     is_stable: bool
@@ -332,7 +332,7 @@ class Margins:
 
 @dataclass(frozen=True, repr=False)
 class Document:
-    """A result as the JSON document of the program (docs/json.md), with one of its lists as a table."""
+    """A result as the JSON document of the program (docs/use/json.md), with one of its lists as a table."""
 
     document: dict[str, Any]
     table: str  #: key of that list

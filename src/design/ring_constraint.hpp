@@ -9,7 +9,7 @@
 namespace torsio {
 
 /// A constraint of the user's on a ring, `length <= 0.6 * outer_radius`: two expressions
-/// (docs/expressions.md) of outer_radius, inner_radius, wall, length [m], volume [m³], stress [Pa],
+/// (docs/use/expressions.md) of outer_radius, inner_radius, wall, length [m], volume [m³], stress [Pa],
 /// strain and stiffness [Nm/rad].
 class RingConstraint {
  public:

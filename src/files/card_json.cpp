@@ -46,7 +46,7 @@ AnyModel::Parameters empty_parameters(const std::string& family, const std::stri
                  .found = fmt::format("'{}'", family),
                  .advice =
                      "Update torsio if a newer one has this family. A build with -DTORSIO_FAMILIES "
-                     "has only those that it names (docs/library.md): add this one there."});
+                     "has only those that it names (docs/robot/library.md): add this one there."});
   }
 }
 

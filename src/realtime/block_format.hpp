@@ -11,7 +11,7 @@
 
 namespace torsio {
 
-// The format of docs/realtime.md, little-endian: a file is a sequence of sealed blocks, the first
+// The format of docs/robot/realtime.md, little-endian: a file is a sequence of sealed blocks, the first
 // one a header, the last one an end unless the process was killed.
 //
 //     seal     8 bytes magic, u32 kind, u32 bytes of payload, u32 CRC-32 of kind, size and payload

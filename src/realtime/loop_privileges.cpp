@@ -21,7 +21,7 @@ LoopPrivileges::LoopPrivileges(const LoopOptions& options) {
   throw Error({.place = "real-time loop",
                .problem = "the operating system refuses " + grants_.refused,
                .advice = "Run it as root, or raise rtprio and memlock in "
-                         "/etc/security/limits.conf; see docs/realtime.md."});
+                         "/etc/security/limits.conf; see docs/robot/realtime.md."});
 }
 
 LoopPrivileges::~LoopPrivileges() { give_back(); }

@@ -62,7 +62,7 @@ std::string verdict(const FitReport& report) {
   if (!with.empty())
     text = fmt::format(
         "the residuals are correlated with {}: another model could reduce them{} "
-        "(docs/fit_report.md)\n",
+        "(docs/use/fit_report.md)\n",
         fmt::join(with, ", "),
         report.table.empty() ? "" : "; the standard errors below account for it");
   if (!is_enough)

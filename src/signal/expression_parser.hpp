@@ -13,7 +13,7 @@
 
 namespace torsio {
 
-/// Reads expressions (docs/expressions.md) into one graph and puts definitions in where they are
+/// Reads expressions (docs/use/expressions.md) into one graph and puts definitions in where they are
 /// named. Text comes from model files and command lines, so length, nesting and lags are limited.
 class ExpressionParser {
  public:

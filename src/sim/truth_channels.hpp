@@ -22,7 +22,7 @@ struct TruthChannel {
   std::function<double(const BenchTruth&)> value;
 };
 
-/// Torques, motions and every internal state of this actuator (docs/actuators.md).
+/// Torques, motions and every internal state of this actuator (docs/simulation/actuators.md).
 /// @param is_electrical the plant has an electrical drive
 [[nodiscard]] std::vector<TruthChannel> truth_channels(const DataSheet& sheet,
                                                        bool is_electrical = false);

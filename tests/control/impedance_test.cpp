@@ -250,7 +250,7 @@ TEST(TubeImpedance, GoesOnFromWhereItFadedTo) {
   EXPECT_NEAR(last_A, wanted_A * (1.0 - std::exp(-1.0)), 0.01 * wanted_A);
 }
 
-// docs/faults.md 13: without a command there is no reference; the angle 0 would be far away.
+// docs/simulation/faults.md 13: without a command there is no reference; the angle 0 would be far away.
 TEST(TubeImpedance, GivesNoCurrentBeforeItsFirstFiniteReference) {
   TubeImpedance impedance(tube_settings(TubeImpedance::kHigh), kRate_Hz);
   const TubeImpedance::Angles angles = {

@@ -141,7 +141,7 @@ TEST(JointCascade, CarriesTheLoadOnWhenAPositionBecomesASpeed) {
   EXPECT_NEAR(joint.angle_rad(), before_rad, 1e-6);
 }
 
-// docs/faults.md 30: the loop that was overridden for a minute has not wound up.
+// docs/simulation/faults.md 30: the loop that was overridden for a minute has not wound up.
 TEST(JointCascade, DoesNotWindUpWhileOverridden) {
   for (const JointMode mode : {JointMode::velocity, JointMode::position, JointMode::torque}) {
     JointCascade::Settings settings = cascade_settings("dfki-50");
@@ -158,7 +158,7 @@ TEST(JointCascade, DoesNotWindUpWhileOverridden) {
   }
 }
 
-// docs/faults.md 31: speed, position and current all at once; the approach is smooth and ends at rest.
+// docs/simulation/faults.md 31: speed, position and current all at once; the approach is smooth and ends at rest.
 TEST(JointCascade, DoesNotChatterBetweenTwoLimits) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
     const JointCascade::Settings settings = cascade_settings(actuator);

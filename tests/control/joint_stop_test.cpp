@@ -199,7 +199,7 @@ TEST(JointStop, StopsUnderPowerWithoutAddingEnergy) {
         }
 }
 
-// docs/faults.md 22: what is reported is what was measured.
+// docs/simulation/faults.md 22: what is reported is what was measured.
 TEST(JointStop, ReportsTheMeasuredStateAndNotTheWantedOne) {
   Rig rig(data_sheet("dfki-120"), 0.3);
   move(rig, kMotions[0]);

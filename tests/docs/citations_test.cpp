@@ -1,4 +1,4 @@
-// Comments and documents cite sections of docs/specification.md by number. A citation whose section
+// Comments and documents cite sections of docs/development/specification.md by number. A citation whose section
 // does not exist leads nowhere, and no compiler reports it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -90,7 +90,7 @@ std::vector<std::string> cited_sections(std::string_view text) {
 
 /// @returns "file: section" for each citation without a heading
 std::vector<std::string> dangling_citations() {
-  const std::filesystem::path specification = kRoot / "docs/specification.md";
+  const std::filesystem::path specification = kRoot / "docs/development/specification.md";
   const std::set<std::string> sections = section_numbers(test::file_bytes(specification));
   std::vector<std::string> dangling;
   const auto check = [&](const std::filesystem::path& path) {
@@ -131,7 +131,8 @@ TEST(Citations, SectionsAreTheNumberedHeadings) {
 }
 
 TEST(Citations, LeadToASectionOfTheSpecification) {
-  EXPECT_GT(section_numbers(test::file_bytes(kRoot / "docs/specification.md")).size(), 20U);
+  EXPECT_GT(section_numbers(test::file_bytes(kRoot / "docs/development/specification.md")).size(),
+            20U);
   EXPECT_THAT(dangling_citations(), IsEmpty());
 }
 

@@ -1,4 +1,5 @@
-// The order of folders and libraries: docs/architecture.md lists the folders, src/CMakeLists.txt which library uses which.
+// The order of folders and libraries: docs/development/architecture.md lists the folders, src/CMakeLists.txt which
+// library uses which.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -55,9 +56,9 @@ struct Layers {
   [[nodiscard]] std::string objection(const std::string& file, const std::string& included) const {
     const std::string from = folder_of(file);
     const std::string to = folder_of(included);
-    if (from.empty()) return file + " is in no folder of docs/architecture.md";
+    if (from.empty()) return file + " is in no folder of docs/development/architecture.md";
     if (to.empty())
-      return file + " includes " + included + ", in no folder of docs/architecture.md";
+      return file + " includes " + included + ", in no folder of docs/development/architecture.md";
     const Place& user = folders.at(from);
     const Place& used = folders.at(to);
     if (used.row > user.row)
@@ -71,7 +72,7 @@ struct Layers {
 
 Layers layers() {
   Layers layers;
-  std::ifstream table(kRoot / "docs/architecture.md");
+  std::ifstream table(kRoot / "docs/development/architecture.md");
   std::size_t row = 0;
   for (std::string line; std::getline(table, line); ++row) {
     std::smatch cells;
@@ -131,7 +132,7 @@ TEST(Layers, NameWhatClimbs) {
   EXPECT_EQ(found.objection("control/pid.cpp", "files/model_file.hpp"),
             "control/pid.cpp includes files/model_file.hpp: files is below control");
   EXPECT_EQ(found.objection("spare/pid.cpp", "core/error.hpp"),
-            "spare/pid.cpp is in no folder of docs/architecture.md");
+            "spare/pid.cpp is in no folder of docs/development/architecture.md");
 }
 
 }  // namespace

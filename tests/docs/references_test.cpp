@@ -1,5 +1,5 @@
-// What the documents name exists: tests, files and headings that they link to, faults, verbs of the program, studies. A
-// name that was changed elsewhere is reported here, and by nothing else.
+// What the documents name exists: tests, files and headings that they link to, faults, verbs of the program, studies; and
+// the pages that sources name. A name that was changed elsewhere is reported here, and by nothing else.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -136,6 +136,35 @@ Found dangling_links(const fs::path& document, std::string_view markdown) {
     if (!leads) dangling.push_back(link);
   }
   return dangling;
+}
+
+/// @returns the pages, by their paths below docs, to which its list of pages has no link; a link to a folder counts for
+/// the pages in it
+Found unlisted(std::string_view list, const Names& pages) {
+  Names listed;
+  for (const std::string& link : links(list))
+    listed.insert(fs::path(link.substr(0, link.find('#'))).lexically_normal().string());
+  Found missing;
+  std::ranges::copy_if(pages, std::back_inserter(missing), [&](const std::string& page) {
+    return !listed.contains(page) && !listed.contains(fs::path(page).parent_path().string());
+  });
+  return missing;
+}
+
+/// @returns the pages that a text names by their paths, as in docs/README.md, but that do not exist
+Found missing_pages(std::string_view text) {
+  Found missing;
+  for (auto at = text.find("docs/"); at != std::string_view::npos;
+       at = text.find("docs/", at + 1)) {
+    auto end = at;
+    while (end < text.size() &&
+           (is_word(text[end]) || text[end] == '/' || text[end] == '-' || text[end] == '.'))
+      ++end;
+    while (text[end - 1] == '.') --end;  // a full stop is not part of it
+    std::string page(text.substr(at, end - at));
+    if (page.ends_with(".md") && !fs::exists(kRoot / page)) missing.push_back(std::move(page));
+  }
+  return missing;
 }
 
 // ---------------------------------------------------------------------------------------- names
@@ -292,11 +321,11 @@ TEST(Documents, LinksAndAnchorsAreFoundInProse) {
 }
 
 TEST(Documents, ALinkThatLeadsNowhereIsFound) {
-  const fs::path here = kRoot / "docs/limits.md";
+  const fs::path here = kRoot / "docs/use/limits.md";
   EXPECT_THAT(dangling_links(here,
-                             "# A b\n[to](safety.md), [up](../README.md), [own](#a-b)\n"
-                             "[no](none.md), [wrong](safety.md#none), [none](#c)\n"),
-              ElementsAre("none.md", "safety.md#none", "#c"));
+                             "# A b\n[to](units.md), [up](../README.md), [own](#a-b)\n"
+                             "[no](none.md), [wrong](units.md#none), [none](#c)\n"),
+              ElementsAre("none.md", "units.md#none", "#c"));
 }
 
 TEST(Documents, LinkOnlyToWhatExists) {
@@ -306,6 +335,47 @@ TEST(Documents, LinkOnlyToWhatExists) {
     count += links(text).size();
   });
   EXPECT_GT(count, 300U);
+}
+
+TEST(Documents, APageThatIsNotListedIsFound) {
+  EXPECT_THAT(unlisted("- [a](use/a.md#b), [c](use/../c.md), [d](d)\n\n    [e](use/e.md)\n",
+                       {"c.md", "d/1.md", "use/a.md", "use/e.md", "use/f.md"}),
+              ElementsAre("use/e.md", "use/f.md"));
+}
+
+TEST(Documents, TheListOfPagesHasEveryPage) {
+  const fs::path list = kRoot / "docs/README.md";
+  Names pages;
+  for_each_file("docs", ".md", [&](const fs::path& path) {
+    if (path != list) pages.insert(fs::relative(path, list.parent_path()).string());
+  });
+  EXPECT_GT(pages.size(), 60U);
+  EXPECT_THAT(unlisted(contents(list), pages), IsEmpty());
+}
+
+TEST(Documents, APathOfAPageThatDoesNotExistIsFound) {
+  EXPECT_THAT(
+      missing_pages("// docs/README.md. (docs/none.md), docs/results and docs/use/no-page.md."),
+      ElementsAre("docs/none.md", "docs/use/no-page.md"));
+}
+
+TEST(Documents, SourcesNameOnlyPagesThatExist) {
+  const Names endings = {"", ".c", ".cmake", ".cpp", ".h", ".hpp", ".ipynb", ".py", ".txt"};
+  std::size_t count = 0;
+  for (const char* folder : {"apps", "benchmarks", "c", "cmake", "examples", "include", "python",
+                             "src", "studies", "tests", "tools"})
+    for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
+      const fs::path& path = entry.path();
+      if (!entry.is_regular_file() || !endings.contains(path.extension().string()) ||
+          path.string().find("node_modules") != std::string::npos ||
+          path.filename() == "references_test.cpp" || path.filename() == "hooks_test.py")
+        continue;
+      SCOPED_TRACE(fs::relative(path, kRoot).string());
+      const std::string text = contents(path);
+      EXPECT_THAT(missing_pages(text), IsEmpty());
+      count += static_cast<std::size_t>(text.find("docs/") != std::string::npos);
+    }
+  EXPECT_GT(count, 60U);
 }
 
 TEST(Documents, ATestThatDoesNotExistIsFound) {

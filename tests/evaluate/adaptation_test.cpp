@@ -314,7 +314,7 @@ TEST_P(AdaptFamily, SaturatedAndStuckSensorsAndGapsAreCountedAndOtherUnitsAreRef
 INSTANTIATE_TEST_SUITE_P(, AdaptFamily, testing::Values("dgmm", "grey_box"),
                          [](const auto& family) { return std::string(family.param); });
 
-// ---- the experiment of docs/adaptation.md -------------------------------------------------------
+// ---- the experiment of docs/robot/adaptation.md -------------------------------------------------------
 
 Recording human_torque(const std::string& actuator, std::uint64_t seed) {
   return simulate(

@@ -13,7 +13,7 @@ namespace {
 struct Expectation {
   const char* actuator;
   double linear_Nm;  ///< specification 6, whose prototype left the gear's reaction out
-                     ///< (docs/actuators.md)
+                     ///< (docs/simulation/actuators.md)
 };
 
 class SimulatedBench : public testing::TestWithParam<Expectation> {};

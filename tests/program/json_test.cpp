@@ -1,4 +1,4 @@
-// Each verb with --json writes documents that begin with their schema_version (docs/json.md).
+// Each verb with --json writes documents that begin with their schema_version (docs/use/json.md).
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <string>

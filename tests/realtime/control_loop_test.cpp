@@ -150,7 +150,7 @@ TEST(ControlLoop, FollowsTheTorqueThatIsSent) {
   EXPECT_NEAR(mean_Nm, 8.0, 2.5) << "a linear model does not contain the friction of the spring";
 }
 
-// docs/faults.md 19.
+// docs/simulation/faults.md 19.
 TEST(ControlLoop, GivesNoCurrentBeforeItIsArmed) {
   Robot robot;
   robot.run(600, [&](int n) {
@@ -161,7 +161,7 @@ TEST(ControlLoop, GivesNoCurrentBeforeItIsArmed) {
   EXPECT_GT(max_current(robot, 500, 600), 0.5);
 }
 
-// docs/faults.md 17, 20, 21: at any moment of any motion. The stored energy falls from the stop
+// docs/simulation/faults.md 17, 20, 21: at any moment of any motion. The stored energy falls from the stop
 // on, and nothing starts the joint again.
 TEST(ControlLoop, StopsWithin20MsWithoutCommandsAndTakesUpNoEnergy) {
   Random random(3);
@@ -186,7 +186,7 @@ TEST(ControlLoop, StopsWithin20MsWithoutCommandsAndTakesUpNoEnergy) {
   }
 }
 
-// docs/faults.md 21: the word of an operator, and a command since.
+// docs/simulation/faults.md 21: the word of an operator, and a command since.
 TEST(ControlLoop, ContinuesOnlyWhenItIsArmedAgainAndCommandedAgain) {
   Robot robot;
   robot.run(1500, [&](int n) {
@@ -199,7 +199,7 @@ TEST(ControlLoop, ContinuesOnlyWhenItIsArmedAgainAndCommandedAgain) {
   EXPECT_GT(max_current(robot, 1001, 1500), 0.3);
 }
 
-// docs/faults.md 13, 18: the last good set-point remains in use, but does not feed the watchdog;
+// docs/simulation/faults.md 13, 18: the last good set-point remains in use, but does not feed the watchdog;
 // nor do gains.
 TEST(ControlLoop, TakesNoPartOfACommandThatIsNotANumber) {
   Robot robot;
@@ -223,7 +223,7 @@ TEST(ControlLoop, TakesNoPartOfACommandThatIsNotANumber) {
   EXPECT_LE(stop_after(robot, 0), 520U);
 }
 
-// docs/faults.md 14: a model out of its range is a line; not for ever.
+// docs/simulation/faults.md 14: a model out of its range is a line; not for ever.
 TEST(ControlLoop, FallsBackOnTheLineAndThenStops) {
   Robot robot;
   robot.run(900, [&](int n) {
@@ -249,7 +249,7 @@ TEST(ControlLoop, LetsTheCurrentFadeWithoutASensorAndThenStops) {
   EXPECT_LE(stop_after(robot, 0), 553U);
 }
 
-// docs/faults.md 28: no burst, no command that is older than its time stamp, and an end.
+// docs/simulation/faults.md 28: no burst, no command that is older than its time stamp, and an end.
 TEST(ControlLoop, StopsAfterOverrunsWithoutCatchingUp) {
   Robot robot;
   robot.run(
@@ -267,7 +267,7 @@ TEST(ControlLoop, StopsAfterOverrunsWithoutCatchingUp) {
   EXPECT_EQ(robot.loop_end.skipped_periods, 6U + 5U);
 }
 
-// docs/faults.md 27: the loop's own clock does not run backwards; a watchdog whose clock does
+// docs/simulation/faults.md 27: the loop's own clock does not run backwards; a watchdog whose clock does
 // stops.
 TEST(ControlLoop, StopsWhereTheClockOfItsCommandsIsAhead) {
   Robot robot;
@@ -278,7 +278,7 @@ TEST(ControlLoop, StopsWhereTheClockOfItsCommandsIsAhead) {
   EXPECT_LE(stop_after(robot, 0), 320U);
 }
 
-// docs/faults.md 29: taken whole or not at all, and without a jump.
+// docs/simulation/faults.md 29: taken whole or not at all, and without a jump.
 TEST(ControlLoop, TakesNewGainsWithoutABump) {
   Robot robot;
   double usual = 0.0;

@@ -153,7 +153,7 @@ TEST(RealtimeLoop, TenMillionStepsTouchNeitherHeapNorLock) {
   EXPECT_GT(step->steps_driven(), kSteps / 2);
 }
 
-// docs/faults.md 27: whoever sets the time of day, the loop does not look at it.
+// docs/simulation/faults.md 27: whoever sets the time of day, the loop does not look at it.
 TEST(RealtimeLoop, LooksAtNoClockThatMayBeSet) {
   const int others = looks_at_other_clocks;
   (void)std::chrono::system_clock::now();

@@ -22,7 +22,7 @@ TEST(Mailbox, AnInitialValueIsReadAndIsNoCommand) {
   EXPECT_EQ(mailbox.read().age_ns(140), 40);
 }
 
-// docs/faults.md 12, 27: the source's clock may be wrong, and what it sends must not stay fresh for
+// docs/simulation/faults.md 12, 27: the source's clock may be wrong, and what it sends must not stay fresh for
 // that.
 TEST(Mailbox, ALetterFromTheFutureIsNotFresh) {
   constexpr auto kEarliest = std::numeric_limits<std::int64_t>::min();

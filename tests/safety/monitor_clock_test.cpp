@@ -5,7 +5,7 @@
 namespace torsio::test {
 namespace {
 
-// docs/faults.md 27
+// docs/simulation/faults.md 27
 TEST(Monitor, StopsWhereTheClockPausesRunsBackwardsOrIsNaN) {
   for (const double period_s : {0.0, -1e-3, -50.0, kNaN, kInfinity}) {
     Loop loop;
@@ -15,7 +15,7 @@ TEST(Monitor, StopsWhereTheClockPausesRunsBackwardsOrIsNaN) {
   }
 }
 
-// docs/faults.md 28
+// docs/simulation/faults.md 28
 TEST(Monitor, PassesOverALateTickAndStopsAtTheThirdInARow) {
   Loop loop;
   loop.start();

@@ -11,7 +11,7 @@
 namespace torsio::test {
 namespace {
 
-// docs/faults.md 2: within 20 ms, without a vote.
+// docs/simulation/faults.md 2: within 20 ms, without a vote.
 TEST(Monitor, StopsOnSourcesThatDisagreeForLongerThanThePersistence) {
   for (const double sign : {1.0, -1.0}) {
     Loop loop;
@@ -166,7 +166,7 @@ TEST(Monitor, InvalidSourcesAreNotCompared) {
   }
 }
 
-// docs/faults.md 9
+// docs/simulation/faults.md 9
 TEST(Monitor, RecognisesASourceWithTheWrongSign) {
   for (const double sign : {1.0, -1.0}) {
     Loop loop;
@@ -236,7 +236,7 @@ TEST(Monitor, CountsTheTorquesThatAreLeft) {
   EXPECT_EQ(text(0.0), "0 valid torques are left, at least 2 are needed");
 }
 
-// docs/faults.md 3
+// docs/simulation/faults.md 3
 TEST(Monitor, StopsOnASmallDifferenceThatLasts) {
   for (const double sign : {1.0, -1.0}) {
     Loop loop(with_drift());

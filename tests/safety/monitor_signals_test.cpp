@@ -15,7 +15,7 @@ TEST(Monitor, StopsAtOnceOnASignalThatIsNotFinite) {
   }
 }
 
-// docs/faults.md 11, 12: the age is that of the source.
+// docs/simulation/faults.md 11, 12: the age is that of the source.
 TEST(Monitor, StopsAtOnceOnASignalThatIsTooOldOrFromTheFuture) {
   for (const double age_s : {0.0100001, kNaN, -1e-9, kInfinity}) {
     Loop loop;
@@ -37,7 +37,7 @@ TEST(Monitor, StopsAtOnceOnASignalThatIsTooOldOrFromTheFuture) {
   EXPECT_EQ(loop.monitor.reason().second, 1);
 }
 
-// docs/faults.md 6: a deflection is a signal like any other.
+// docs/simulation/faults.md 6: a deflection is a signal like any other.
 TEST(Monitor, StopsOnTheSecondSampleBeyondARange) {
   Loop loop;
   loop.start();
@@ -60,7 +60,7 @@ TEST(Monitor, StopsOnTheSecondSampleBeyondARange) {
   EXPECT_EQ(cold.text(), "motor_temperature_K is 232 K, beyond 233 K");
 }
 
-// docs/faults.md 10
+// docs/simulation/faults.md 10
 TEST(Monitor, PassesOverOneSpike) {
   Loop loop;
   loop.start();
@@ -172,7 +172,7 @@ TEST(Monitor, ASampleIsNeverAllowedLessThanAPeriod) {
   EXPECT_TRUE(loop.monitor.is_watching()) << "two ticks in quick succession";
 }
 
-// docs/faults.md 7
+// docs/simulation/faults.md 7
 TEST(Monitor, RecognisesAWrapOfAnEncoder) {
   MonitorSettings settings = joint();
   settings.signals[1] = {.name = "gear_angle_rad", .turn = 2.0};
@@ -255,7 +255,7 @@ TEST(Monitor, TheFirstSampleIsNoWrapAndHasNoRate) {
   EXPECT_EQ(loop.monitor.latest().action, MonitorAction::off);
 }
 
-// docs/faults.md 1
+// docs/simulation/faults.md 1
 TEST(Monitor, StopsOnASignalThatIsFrozenWhileItsCompanionMoves) {
   for (const double direction : {1.0, -1.0}) {
     Loop loop;

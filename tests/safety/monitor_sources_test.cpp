@@ -247,7 +247,7 @@ TEST(Monitor, ACeilingDoesNotMakeItReady) {
   EXPECT_EQ(loop.monitor.reason().limit, 2.0);
 }
 
-// docs/faults.md 14
+// docs/simulation/faults.md 14
 TEST(Monitor, StopsOnASourceWhoseModelFailsForLong) {
   for (const Estimate& faulty :
        {Estimate{.std_dev = 0.1, .fault = Fault::outside_training_range},

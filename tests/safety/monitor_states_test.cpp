@@ -44,7 +44,7 @@ TEST(Monitor, NeedsNoProofOfNoTime) {
   EXPECT_EQ(loop.step(), State::ready);
 }
 
-// docs/faults.md 8: an encoder that reports 0 until it has started.
+// docs/simulation/faults.md 8: an encoder that reports 0 until it has started.
 TEST(Monitor, BeginsTheProofAgainAtEveryFindingWarningsIncluded) {
   MonitorSettings settings = joint();
   action(settings, MonitorCheck::range) = MonitorAction::warn;

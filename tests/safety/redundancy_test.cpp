@@ -300,7 +300,7 @@ TEST(Redundancy, ReportsThePartsThatNoComparisonCovers) {
   EXPECT_THAT(not_redundant({good, bad, bad}), ElementsAre("current_sensor", "supply"));
 }
 
-// docs/faults.md 2: an offset of the encoder between gear and spring moves both estimates; the two
+// docs/simulation/faults.md 2: an offset of the encoder between gear and spring moves both estimates; the two
 // pairs that disagree have that encoder in common.
 TEST(Redundancy, NamesTheEncoderThatExplainsWhichSourcesDisagree) {
   const Redundancy redundancy(three_sources());

@@ -22,10 +22,11 @@ const std::filesystem::path kResults = std::filesystem::path(TORSIO_SOURCE) / "d
 /// (condition, model, title of the column) -> text
 using Cells = std::map<std::vector<std::string>, std::string>;
 
-/// The lines of all files in docs/results, one after the other.
+/// The lines of all outputs in docs/results, one after the other.
 std::vector<std::string> lines_of_results() {
   std::vector<std::string> lines;
   for (const auto& entry : std::filesystem::directory_iterator(kResults)) {
+    if (entry.path().extension() != ".txt") continue;
     std::ifstream file(entry.path());
     for (std::string line; std::getline(file, line);) lines.push_back(line);
   }

@@ -38,7 +38,7 @@ struct ManifestFile {
 };
 
 /// A dataset as a YAML file: the logs, their roles and how they are read. See
-/// docs/recordings.md.
+/// docs/use/recordings.md.
 struct Manifest {
   std::string file;
   std::string label;

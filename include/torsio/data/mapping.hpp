@@ -39,7 +39,7 @@ struct LatencyRule {
   double latency_s = 0.0;
 };
 
-/// From the columns of a foreign log to channels. See docs/recordings.md for the file format.
+/// From the columns of a foreign log to channels. See docs/use/recordings.md for the file format.
 struct Mapping {
   std::string file;  ///< for messages; empty: no mapping
   std::vector<ChannelRule> channels;

@@ -37,7 +37,7 @@ struct DesignReport {
 };
 
 [[nodiscard]] std::string design_text(const DesignReport& report);
-/// One JSON object; keys carry their units (docs/json.md).
+/// One JSON object; keys carry their units (docs/use/json.md).
 [[nodiscard]] std::string design_json(const DesignReport& report);
 /// The same keys as YAML.
 [[nodiscard]] std::string design_yaml(const DesignReport& report);

@@ -44,7 +44,7 @@ enum class DriftAdvice : std::uint8_t {
 };
 [[nodiscard]] std::string_view name(DriftAdvice advice) noexcept;
 
-/// What has changed since the calibration of a model (docs/drift.md).
+/// What has changed since the calibration of a model (docs/robot/drift.md).
 struct Drift {
   std::vector<DriftQuantity> quantities = {};
   std::size_t samples = 0;                  ///< measured and compared

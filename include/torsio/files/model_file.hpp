@@ -17,7 +17,7 @@
 
 namespace torsio {
 
-/// The version that this release writes; docs/model_file.md lists which release reads which.
+/// The version that this release writes; docs/robot/model_file.md lists which release reads which.
 inline constexpr int kModelFormatVersion = 1;
 
 /// A larger file is refused before memory is allocated for it.
@@ -47,7 +47,7 @@ struct ModelFile {
   AnyModel::Parameters parameters;
 };
 
-/// The bytes of a model file (docs/model_file.md).
+/// The bytes of a model file (docs/robot/model_file.md).
 [[nodiscard]] std::vector<std::byte> model_bytes(const ModelFile& model);
 
 /// Reads a model from untrusted bytes. When this returns, the estimator can be built.

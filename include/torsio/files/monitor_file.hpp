@@ -53,7 +53,7 @@ struct MonitorFile {
 /// file that was replaced or changed by mistake.
 [[nodiscard]] std::string model_hash(const std::filesystem::path& model);
 
-/// Writes a monitor file (JSON, docs/safety.md) completely or not at all.
+/// Writes a monitor file (JSON, docs/robot/safety.md) completely or not at all.
 void save_monitor(const std::filesystem::path& path, const MonitorFile& file);
 
 /// @throws Error naming the entry: not JSON, another version, an entry that is missing, unknown or

@@ -35,7 +35,7 @@ struct RecorderReport {
 /// Writes a loop's frames into a file without ever blocking the loop.
 ///
 /// `push` copies a frame into a lock-free ring; a thread of ordinary priority takes the frames out
-/// and writes them as sealed blocks (docs/realtime.md describes the format). A disk that is slow or
+/// and writes them as sealed blocks (docs/robot/realtime.md describes the format). A disk that is slow or
 /// full costs frames, which are counted and marked in the file, never time of the loop. A file
 /// whose process was killed contains every block that was sealed; `read_recording_blocks`
 /// distinguishes them from an incomplete end.

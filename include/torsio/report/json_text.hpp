@@ -5,7 +5,7 @@
 namespace torsio {
 
 /// `schema_version`, the first key of every JSON document that the program and the library write.
-/// It rises when a reader of an older document could misread a newer one (docs/json.md).
+/// It rises when a reader of an older document could misread a newer one (docs/use/json.md).
 inline constexpr int kJsonSchemaVersion = 1;
 
 /// An object as text, `schema_version` before its own keys.

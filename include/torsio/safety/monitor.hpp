@@ -15,7 +15,7 @@
 
 namespace torsio {
 
-/// What a monitor checks. docs/safety.md has the fault that each one detects.
+/// What a monitor checks. docs/robot/safety.md has the fault that each one detects.
 enum class MonitorCheck : std::uint8_t {
   disagreement,     ///< two valid sources differ by more than the threshold of their pair
   drift,            ///< they differ by a little for a long time (cumulative sum)

@@ -23,7 +23,7 @@ struct ChannelDefinition {
 /// The inputs of a model and how they are computed from raw channels. Plain data: it is stored
 /// unchanged in the model file.
 struct FeatureSpec {
-  std::vector<std::string> inputs;  ///< one expression each, causal (see docs/expressions.md)
+  std::vector<std::string> inputs;  ///< one expression each, causal (see docs/use/expressions.md)
   std::vector<ChannelDefinition>
       definitions;  ///< names that an expression may use besides raw channels
   bool operator==(const FeatureSpec&) const = default;
@@ -38,7 +38,7 @@ struct FeatureSpec {
 /// `lowpass(x, f)` a second-order Butterworth filter re-discretised for the sample rate that starts
 /// in the steady state of its first input, `lag(x, n)` the value n samples ago (before there is
 /// one, the oldest), `stop(x, r)` the stop operator s <- clip(s + change of x, +-r) that starts at 0,
-/// `dahl(x, d)` the friction of Dahl over its level. docs/expressions.md describes the whole language.
+/// `dahl(x, d)` the friction of Dahl over its level. docs/use/expressions.md describes the whole language.
 ///
 /// Finite raw values can still give a feature that is not finite (`x / y`). Its effect is limited:
 /// a low-pass returns it without changing its state, a rate is finite again one sample later, a lag

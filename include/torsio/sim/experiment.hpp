@@ -64,7 +64,7 @@ struct SweepProtocol {
 
 /// Runs an experiment on a simulated bench.
 ///
-/// The recording has the channels and the rate of the actuator's family (docs/actuators.md); a load
+/// The recording has the channels and the rate of the actuator's family (docs/simulation/actuators.md); a load
 /// cell that is slower than the log is held between its samples, which `Channel::fresh` marks. Its
 /// torque rises with the twist. Equal specs give equal recordings.
 ///

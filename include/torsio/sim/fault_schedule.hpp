@@ -56,7 +56,7 @@ struct FaultSchedule {
 [[nodiscard]] std::vector<std::string> fault_sensors(const DataSheet& sheet);
 [[nodiscard]] std::vector<std::string> fault_parts(const DataSheet& sheet);
 
-/// Reads a schedule for this actuator; docs/faults.md has the format.
+/// Reads a schedule for this actuator; docs/simulation/faults.md has the format.
 ///
 ///     faults:
 ///       - {sensor: gear_angle_rad, fault: freeze, at: 5s, for: 2s}

@@ -8,7 +8,7 @@
 
 namespace torsio {
 
-/// A data sheet as YAML: every number of `describe` with unit and origin; docs/actuators.md has the
+/// A data sheet as YAML: every number of `describe` with unit and origin; docs/simulation/actuators.md has the
 /// format. `parse_data_sheet` of it gives the same sheet, bit for bit.
 [[nodiscard]] std::string data_sheet_yaml(const DataSheet& sheet);
 

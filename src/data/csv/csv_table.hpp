@@ -28,7 +28,7 @@ struct CsvOptions {
 
 /// Reads a CSV file, plain or gzipped (detected by its first bytes); "-" is standard input. The
 /// header gives the names; separator comma, semicolon or tab; lines that start with '#' are
-/// comments. See docs/recordings.md.
+/// comments. See docs/use/recordings.md.
 /// @throws Error with line and column if it is not a table of numbers, Cancelled if the
 /// progress asks to stop.
 [[nodiscard]] LogTable read_csv(const std::string& path, const CsvOptions& options = {});

@@ -24,7 +24,7 @@ namespace torsio {
 namespace {
 
 // Thresholds: chosen on the seeds of `--campaign` from 1000 on, which are not those of the results
-// (docs/drift.md).
+// (docs/robot/drift.md).
 constexpr double kScaleTolerance = 0.012;  // a load cell that was remounted
 constexpr double kSmallestScale = 0.03;
 constexpr double kFrictionTolerance = 0.04;

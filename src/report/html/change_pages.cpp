@@ -244,7 +244,7 @@ ReportDocument monitor_report(const std::vector<MonitorReplay>& replays,
                           .summary = {fmt::format("The monitor stopped in {} of {} recording(s).",
                                                   stopped, replays.size()),
                                       "A recording without a stop does not prove a sound joint: "
-                                      "docs/safety.md states what none of the "
+                                      "docs/robot/safety.md states what none of the "
                                       "checks detects."},
                           .sections = {},
                           .origin = {}};

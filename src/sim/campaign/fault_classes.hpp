@@ -31,7 +31,7 @@ struct DrawnFault {
 /// A class of faults of one actuator.
 struct FaultClass {
   std::string name;  ///< "freeze gear_angle_rad"
-  int row = 0;       ///< number in the table of docs/faults.md
+  int row = 0;       ///< number in the table of docs/simulation/faults.md
   FaultOnset onset = FaultOnset::sensors;
   double limit_s = 0.02;  ///< largest latency
   bool must_stop = true;  ///< false: the monitor must not stop

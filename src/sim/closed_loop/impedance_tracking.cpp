@@ -276,7 +276,7 @@ TubeImpedance::Settings impedance_settings(const DataSheet& sheet, const Impedan
                                   "harmonic-drive",
                       .found = sheet.name,
                       .advice = "For a series-elastic actuator the library has JointImpedance on "
-                                "a torque loop (docs/control.md)."});
+                                "a torque loop (docs/robot/control.md)."});
   check(spec);
   TubeImpedance::Settings settings = TubeImpedance::settings_of(
       sheet, spec.kind == ImpedanceSpec::Kind::high ? TubeImpedance::kHigh : TubeImpedance::kZero);

@@ -67,7 +67,7 @@ TEST(ImpedanceTracking, TheLinearModelIsTheImpedanceOfTheTask) {
   EXPECT_NEAR(linear.real(), 1000.0, 5.0);
   EXPECT_GT(linear.imag() / rad_s, 30.0);
   EXPECT_GT(run.passive_to_Hz, ImpedanceRun::kPassiveTo_Hz);
-  EXPECT_NEAR(run.largest_passive_Nm_rad, 20694.0, 0.06 * 20694.0) << "docs/control.md";
+  EXPECT_NEAR(run.largest_passive_Nm_rad, 20694.0, 0.06 * 20694.0) << "docs/robot/control.md";
 }
 
 TEST(ImpedanceTracking, HighIsStiffAndZeroGivesWay) {

@@ -242,7 +242,7 @@ struct FirstStep {
 };
 
 // Semi-implicit Euler is of first order, also where friction sticks and slips. The table of steps,
-// errors and orders is in docs/actuators.md.
+// errors and orders is in docs/simulation/actuators.md.
 TEST(Plant, ErrorShrinksWithTheStep) {
   constexpr FirstStep kFirstSteps[] = {{"dfki-50", 1e-4},
                                        {"elastomer", 1e-4},

@@ -31,7 +31,7 @@ struct CampaignSettings {
   std::size_t injections_of_a_size = 60;  ///< count per smaller size, class and group
   double fault_free_hours = 1000.0;       ///< joints at work, all groups together
   /// Joints whose spring has another hysteresis than its model, by up to 25 %, under little load,
-  /// all groups together (docs/faults.md 5).
+  /// all groups together (docs/simulation/faults.md 5).
   double low_load_hours = 70.0;
   std::vector<std::string> classes = {};  ///< only those whose name begins so; empty: all
   std::size_t threads = 0;                ///< 0: as many as the machine has
@@ -57,7 +57,7 @@ struct Latencies {
 struct ClassResult {
   std::string name;
   std::string group = {};
-  int row = 0;  ///< number in the table of docs/faults.md
+  int row = 0;  ///< number in the table of docs/simulation/faults.md
   /// The disagreement that counts, over the rated torque: 0.2, or, in a joint with two sources,
   /// twice their threshold if that is more.
   double limit_share = 0.2;

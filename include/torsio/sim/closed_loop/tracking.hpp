@@ -108,7 +108,7 @@ struct TrackingRun {
 [[nodiscard]] AnyInverse inverse_of(const ModelFile& model);
 
 /// What `track` calls the line of `sweep_line` where others are model files: a documented keyword
-/// (docs/tracking.md), the name of its rows too.
+/// (docs/simulation/tracking.md), the name of its rows too.
 inline constexpr std::string_view kSweepLineName = "linear";
 
 /// The line that the sweeps of `sweep_dataset` give: what a loop has without a learned model.
