@@ -350,7 +350,7 @@ TEST(Documents, TheListOfPagesHasEveryPage) {
     if (path != list) pages.insert(fs::relative(path, list.parent_path()).string());
   });
   EXPECT_GT(pages.size(), 60U);
-  EXPECT_THAT(unlisted(contents(list), pages), IsEmpty());
+  EXPECT_THAT(unlisted(file_bytes(list), pages), IsEmpty());
 }
 
 TEST(Documents, APathOfAPageThatDoesNotExistIsFound) {
@@ -371,7 +371,7 @@ TEST(Documents, SourcesNameOnlyPagesThatExist) {
           path.filename() == "references_test.cpp" || path.filename() == "hooks_test.py")
         continue;
       SCOPED_TRACE(fs::relative(path, kRoot).string());
-      const std::string text = contents(path);
+      const std::string text = file_bytes(path);
       EXPECT_THAT(missing_pages(text), IsEmpty());
       count += static_cast<std::size_t>(text.find("docs/") != std::string::npos);
     }
