@@ -65,7 +65,7 @@ XyFigure drift_figure(const Drift& drift) {
   XySeries changes{.label = "change", .style = CurveStyle::columns, .x = {}, .y = {}};
   XySeries intervals{.label = "95 % interval", .role = CurveRole::measured, .x = {}, .y = {}};
   for (const DriftQuantity& quantity : drift.quantities) {
-    const double at = static_cast<double>(changes.x.size());
+    const auto at = static_cast<double>(changes.x.size());
     changes.x.push_back(at);
     changes.y.push_back(quantity.change / quantity.smallest);
     changes.names.push_back(quantity.name);
