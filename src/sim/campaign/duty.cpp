@@ -22,7 +22,7 @@ constexpr double kRubberRange_rad = 1.0;
 constexpr double kLeverAt1Nm_m = 0.13;  // length: grows with the cube root of the torque
 
 constexpr double kSlowestShare = 0.02;       // share of the rated speed
-constexpr double kShortestWay_share = 0.02;  // share of the range
+constexpr double kShortestWayShare = 0.02;  // share of the range
 constexpr double kReachTop_s = 0.3;          // a bare joint reaches its top speed in this time
 constexpr double kShortestRest_s = 0.1;
 constexpr double kShortRest_s = 2.0;
@@ -107,7 +107,7 @@ void Duty::begin_move() {
   const double acceleration_rad_s2 =
       std::min(kInertialShare * limits_.torque_Nm / inertia_kg_m2, top_speed_rad_s_ / kReachTop_s);
   double to_rad = random_.uniform(-1.0, 1.0) * limits_.range_rad;
-  const double least_rad = kShortestWay_share * limits_.range_rad;
+  const double least_rad = kShortestWayShare * limits_.range_rad;
   if (std::abs(to_rad - wanted_rad_) < least_rad)
     to_rad = wanted_rad_ > 0.0 ? wanted_rad_ - least_rad : wanted_rad_ + least_rad;
   move_ = JointMove({.waypoints_rad = {wanted_rad_, to_rad},
