@@ -21,9 +21,9 @@ constexpr double kRange_rad = 2.4;
 constexpr double kRubberRange_rad = 1.0;
 constexpr double kLeverAt1Nm_m = 0.13;  // length: grows with the cube root of the torque
 
-constexpr double kSlowestShare = 0.02;       // share of the rated speed
+constexpr double kSlowestShare = 0.02;      // share of the rated speed
 constexpr double kShortestWayShare = 0.02;  // share of the range
-constexpr double kReachTop_s = 0.3;          // a bare joint reaches its top speed in this time
+constexpr double kReachTop_s = 0.3;         // a bare joint reaches its top speed in this time
 constexpr double kShortestRest_s = 0.1;
 constexpr double kShortRest_s = 2.0;
 constexpr double kLongRest_s = 12.0;
