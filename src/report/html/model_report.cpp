@@ -82,6 +82,7 @@ std::vector<PlaceOfInterest> largest_residuals(const RecordRuns& record) {
   std::ranges::sort(peaks, std::greater<>{}, [&](std::size_t n) { return std::abs(residual[n]); });
   peaks.resize(std::min(peaks.size(), kWanted));
   std::vector<PlaceOfInterest> places;
+  places.reserve(peaks.size());
   for (const std::size_t n : peaks)
     places.push_back(
         {n, fmt::format("error {:.3g} at {:.2f} s", residual[n], record.recording->time_s(n))});
