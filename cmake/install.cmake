@@ -1,5 +1,6 @@
 # One export set for the libraries that need the same ones of others: a robot that links runtime and files needs neither
-# the readers of recordings nor cairo, and a program that fits models no cairo. The components are the Debian packages of packages.cmake.
+# the readers of recordings nor cairo, and a program that fits models no cairo. The components are the Debian packages of
+# packages.cmake.
 include(CMakePackageConfigHelpers)
 set(torsio_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/torsio)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)

@@ -161,8 +161,7 @@ void Checker::check_range() {
                       spec_.inputs[j], tested.lowest[j], tested.highest[j], trained.lowest[j],
                       trained.highest[j]),
           "Models are not valid there: estimates have the fault outside_training_range, and most "
-          "models "
-          "are replaced by the linear fallback.");
+          "models are replaced by the linear fallback.");
     }
   });
 }
