@@ -7,6 +7,7 @@
 #include "fitted_grey_box.hpp"
 #include "rows.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_impedance.hpp"

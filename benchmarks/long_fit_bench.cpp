@@ -10,7 +10,7 @@
 #include "torsio/data/load.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio::bench {
 

@@ -7,7 +7,7 @@
 
 #include "rows.hpp"
 #include "sim/plant/plant_batch.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio::bench {
 namespace {

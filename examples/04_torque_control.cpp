@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "example_joint.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/error.hpp"
@@ -38,8 +39,7 @@ class LockedJoint {
 
 int run(const char* model_file) {
   const torsio::ModelFile model = torsio::load_model(model_file);
-  const torsio::SeriesElasticJoint parts =
-      torsio::series_elastic_joint(torsio::data_sheet("dfki-50"));
+  const torsio::SeriesElasticJoint parts = example_joint();
   torsio::TorqueController controller(
       torsio::AnyInverse::of(model.settings, model.parameters),
       torsio::TorqueLoopCore::Settings{.deflection = {.joint = parts}, .largest_torque_Nm = 40.0},

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/tube_impedance.hpp"
 #include "torsio/core/error.hpp"
@@ -33,7 +34,7 @@ void deflection_loop(const torsio::DataSheet& sheet, double bandwidth_rad_s) {
 
 void tube_loop(const char* actuator, double torque_Nm_rad) {
   const auto settings =
-      torsio::TubeImpedance::settings_of(torsio::data_sheet(actuator), {0.0, 0.0, torque_Nm_rad});
+      torsio::tube_impedance_settings(torsio::data_sheet(actuator), {0.0, 0.0, torque_Nm_rad});
   std::printf("%-21s %5.1f", actuator, torque_Nm_rad);
   for (const double damping_Nms_rad : {0.0, 10.0, 30.0})
     std::printf(" %8.0f",

@@ -7,6 +7,7 @@
 #include <exception>
 #include <thread>
 
+#include "example_joint.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/realtime/mailbox.hpp"
 #include "torsio/realtime/realtime_loop.hpp"
@@ -22,7 +23,7 @@ void print(const char* what, const torsio::DurationHistogram& times) {
 }
 
 void run(const char* recording) {
-  const auto parts = torsio::series_elastic_joint(torsio::data_sheet("dfki-50"));
+  const auto parts = example_joint();
   torsio::TorqueController controller(  // in a robot: AnyInverse::of a model file, example 04
       torsio::LinearInverse(parts.stiffness_Nm_rad),
       torsio::TorqueLoopCore::Settings{.deflection = {.joint = parts}}, 1000.0);

@@ -2,6 +2,7 @@
 //   08_joint_limits
 #include <cstdio>
 
+#include "example_joint.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_stop.hpp"
 #include "torsio/core/error.hpp"
@@ -24,8 +25,7 @@ struct Motor {
 };
 
 int run() {
-  const torsio::SeriesElasticJoint joint =
-      torsio::series_elastic_joint(torsio::data_sheet("dfki-50"));
+  const torsio::SeriesElasticJoint joint = example_joint();
   torsio::JointController controller(
       torsio::LinearInverse(joint.stiffness_Nm_rad),
       torsio::JointControllerCore::Settings{.torque = {.deflection = {.joint = joint}},

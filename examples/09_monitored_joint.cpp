@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "example_joint.hpp"
 #include "torsio/control/joint_stop.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/estimate/estimator.hpp"
@@ -45,7 +46,7 @@ int main() try {
   torsio::Monitor monitor(settings);  // throws if a limit is not valid
   torsio::CommandWatchdog watchdog({.timeout_s = 0.018});
   torsio::JointStop::Settings brake{.speed_rad_s = 1.0, .deceleration_rad_s2 = 5.0};
-  brake.drive = torsio::series_elastic_joint(torsio::data_sheet("dfki-50")).drive;
+  brake.drive = example_joint().drive;
   brake.brake_static_Nm = 100.0, brake.brake_sliding_Nm = 80.0, brake.load_Nm = 20.0,
   brake.brake_engage_s = 0.02, brake.brake_release_s = 0.04;
   torsio::JointStop stop(brake, 1000.0);

@@ -8,9 +8,9 @@
 #include <string>
 
 #include "core/report_progress.hpp"
-#include "sim/bench.hpp"
-#include "sim/bench_log.hpp"
-#include "sim/position_loop.hpp"
+#include "sim/bench/bench.hpp"
+#include "sim/loops/bench_position_loop.hpp"
+#include "sim/sensors/bench_log.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/joint_move.hpp"
@@ -105,7 +105,7 @@ class ArmJoint {
   std::size_t index_;
   DataSheet sheet_;
   Bench bench_;
-  PositionLoop loop_;
+  BenchPositionLoop loop_;
   BenchLog log_;
 };
 

@@ -12,8 +12,8 @@
 #include "torsio/data/load.hpp"
 #include "torsio/data/manifest.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/sim/bench_dataset.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

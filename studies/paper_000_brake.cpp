@@ -12,6 +12,7 @@
 #include "sim/plant/plant.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_stop.hpp"
 #include "torsio/core/error.hpp"

@@ -20,7 +20,7 @@
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/fit/redundancy/fit_motor_referenced_torques.hpp"
-#include "torsio/report/plots.hpp"
+#include "torsio/report/document/report_document.hpp"
 #include "torsio/signal/differentiator.hpp"
 
 namespace torsio {
@@ -222,18 +222,15 @@ std::vector<double> shown(const std::vector<double>& values, double sample_rate_
 }
 
 /// Figure 15: a row of a joint has position, speed and the three torques.
-void draw(std::vector<std::string>& plots, std::string_view joint, const JointLog& log,
+void draw(std::vector<ReportFigure>& figures, std::string_view joint, const JointLog& log,
           double sample_rate_Hz) {
   const auto t_s = shown(log.t_s, sample_rate_Hz);
   const auto plot = [&](const char* y, const std::string& title,
                         const std::vector<std::pair<const char*, const std::vector<double>*>>& of) {
-    std::vector<std::vector<double>> values;
-    std::vector<Curve> curves;
-    values.reserve(of.size());
-    curves.reserve(of.size());
+    XyFigure figure{.title = title, .x = {"time [s]"}, .y = {y}, .series = {}};
     for (const auto& [label, all] : of)
-      curves.push_back({label, t_s, values.emplace_back(shown(*all, sample_rate_Hz))});
-    plots.push_back(svg_plot(curves, {"time [s]", y}, title));
+      figure.series.push_back({.label = label, .x = t_s, .y = shown(*all, sample_rate_Hz)});
+    figures.emplace_back(std::move(figure));
   };
   const std::string name(joint);
   plot("position [deg]", name, {{"", &log.angle_deg}});
@@ -263,7 +260,6 @@ Study redundancy_000(const StudyOptions& options, const Progress& progress) {
                        sheet.motor.torque_constant_Nm_A.value);
   }
   const std::size_t segments = options.is_quick ? kQuickSegments : kSegments;
-  std::vector<std::string> plots;
   for (std::size_t k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = repeat_seed(options, k);
     const auto training =
@@ -272,13 +268,14 @@ Study redundancy_000(const StudyOptions& options, const Progress& progress) {
                                  nth_of(progress, 2 * k + 1, 2 * options.repeats, "test"));
     for (std::size_t j = 0; j < kArmJoints; ++j) {
       const auto parameters = means[j].add(training[j], test[j], seed);
-      if (k == 0) draw(plots, kArm[j].joint, log_of(test[j], parameters), test[j].sample_rate_Hz());
+      if (k == 0)
+        draw(study.figures, kArm[j].joint, log_of(test[j], parameters), test[j].sample_rate_Hz());
     }
   }
   QuantityTable table;
   for (const JointMeans& of : means) of.write(table.rows);
   study.table = std::move(table);
-  study.picture_svg = svg_grid(plots, 3);
+  study.figure_columns = 3;
   study.notes.emplace_back(
       "k_t and k_r are those of Table 3. Its p0 contain the zeros of the encoders of that arm "
       "(p0/p1 "

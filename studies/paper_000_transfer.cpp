@@ -9,7 +9,7 @@
 
 #include "core/running_mean.hpp"
 #include "data/resample.hpp"
-#include "sim/torque_references.hpp"
+#include "sim/experiments/torque_references.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/actuator/data_sheet.hpp"
@@ -18,8 +18,8 @@
 #include "torsio/evaluate/transfer_curve.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
-#include "torsio/report/plots.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/report/document/report_document.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {
@@ -82,8 +82,8 @@ struct JointErrors {
 };
 
 /// A row of Figure 11: the measured loop and that of (14).
-std::string loop_plot(const std::string& joint, const ModelFile& transferred,
-                      const Recording& recording) {
+XyFigure loop_figure(const std::string& joint, const ModelFile& transferred,
+                     const Recording& recording) {
   const EstimatedRecording estimated = estimate_recording(make_estimator(transferred), recording);
   std::vector<double> deflection_deg;
   std::vector<double> measured_Nm;
@@ -97,13 +97,20 @@ std::string loop_plot(const std::string& joint, const ModelFile& transferred,
     measured_Nm.push_back(at(recording, "torque_Nm"));
     estimated_Nm.push_back(at(estimated.channels, estimate_channel("torque_Nm")));
   }
-  return svg_plot({{.label = "measured", .x = deflection_deg, .y = measured_Nm},
-                   {.label = "base with offset (14)", .x = deflection_deg, .y = estimated_Nm}},
-                  {"deflection [deg]", "torque [Nm]"}, joint);
+  return {
+      .title = joint,
+      .x = {"deflection [deg]"},
+      .y = {"torque [Nm]"},
+      .series = {
+          {.label = "measured",
+           .role = CurveRole::measured,
+           .x = deflection_deg,
+           .y = std::move(measured_Nm)},
+          {.label = "base with offset (14)", .x = deflection_deg, .y = std::move(estimated_Nm)}}};
 }
 
 void add_joint(const std::string& joint, const ModelFile& base, const StudyOptions& options,
-               std::uint64_t seed, JointErrors& errors, std::vector<std::string>* plots) {
+               std::uint64_t seed, JointErrors& errors, std::vector<ReportFigure>* figures) {
   Dataset dataset;
   Recording recording = sweep(joint, kTestLoad, options.is_quick ? 60.0 : kTest_s, seed);
   const std::size_t samples = recording.size();
@@ -124,8 +131,9 @@ void add_joint(const std::string& joint, const ModelFile& base, const StudyOptio
   errors.add(fmt::format("chosen of {:g} s", kNew_s), evaluation.chosen().test.metrics);
   if (const auto* const own = evaluation.find("own"))
     errors.add(fmt::format("own model of {:g} s", kNew_s), own->test.metrics);
-  if (plots != nullptr)
-    plots->push_back(loop_plot(joint, papers.transfer.best().file, dataset.records[0].recording));
+  if (figures != nullptr)
+    figures->emplace_back(
+        loop_figure(joint, papers.transfer.best().file, dataset.records[0].recording));
 }
 
 }  // namespace
@@ -141,14 +149,14 @@ Study transfer_000(const StudyOptions& options, const Progress& progress) {
       .unit = "Nm",
       .options = options};
   std::vector<JointErrors> errors(kJoints.size());
-  std::vector<std::string> plots;
   for (const char* const joint : kJoints) study.plants.push_back(study_plant(joint));
   for (std::size_t k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = repeat_seed(options, k);
     const ModelFile base =
         base_model(options, seed, nth_of(progress, k, options.repeats, "base")).file;
     for (std::size_t j = 0; j < kJoints.size(); ++j)
-      add_joint(kJoints[j], base, options, seed + 50 + j, errors[j], k == 0 ? &plots : nullptr);
+      add_joint(kJoints[j], base, options, seed + 50 + j, errors[j],
+                k == 0 ? &study.figures : nullptr);
   }
   QuantityTable table;
   for (std::size_t j = 0; j < kJoints.size(); ++j)
@@ -164,7 +172,7 @@ Study transfer_000(const StudyOptions& options, const Progress& progress) {
                             .unit = "Nm"});
     }
   study.table = std::move(table);
-  study.picture_svg = svg_grid(plots, 2);
+  study.figure_columns = 2;
   study.notes.emplace_back(
       "Figures 10 to 12 have no numbers; the paper states their order: itself with a new load "
       "best, then 300#06 and 120#01, 50#01 worst.");

@@ -13,7 +13,7 @@
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/evaluate/comparison.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

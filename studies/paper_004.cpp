@@ -12,7 +12,7 @@
 #include "study_rows.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/evaluate/cross_validation.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/progress.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 namespace torsio {
 
@@ -160,8 +161,9 @@ struct Study {
   StudyOptions options;
   std::vector<StudyPlant> plants = {};
   std::variant<ErrorTable, ComparisonTable, LoopTable, QuantityTable> table = {};
-  std::vector<std::string> notes = {};  ///< conclusions, and settings of the named models
-  std::string picture_svg = {};         ///< the paper's figure, drawn again; empty: none
+  std::vector<std::string> notes = {};     ///< conclusions, and settings of the named models
+  std::vector<ReportFigure> figures = {};  ///< the paper's, drawn again; empty: none
+  std::size_t figure_columns = 1;          ///< how many beside each other
 };
 
 /// Condition by condition. @throws Error if none is ranked under one.
@@ -174,7 +176,7 @@ struct StudyInfo {
   Study (*run)(const StudyOptions& options, const Progress& progress);
   std::span<const PaperEntry> published = {};  ///< every figure that its table shows beside ours
   bool must_be_named = false;  ///< needs recordings (TORSIO_DATA or ../shared/data) or a solver
-  bool has_picture = false;    ///< `Study::picture_svg` is set
+  bool has_figures = false;    ///< `Study::figures` are set
 };
 
 /// What `torsio reproduce` can run, in the papers' order. Claims to be tested, not targets

@@ -19,9 +19,9 @@
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
 #include "torsio/fit/train_model.hpp"
-#include "torsio/sim/bench_dataset.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

@@ -9,14 +9,14 @@
 
 #include "core/report_progress.hpp"
 #include "fit/common/model_run.hpp"
-#include "sim/torque_references.hpp"
+#include "sim/experiments/torque_references.hpp"
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/evaluate/evaluate.hpp"
 #include "torsio/evaluate/transfer_curve.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

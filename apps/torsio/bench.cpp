@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <memory>
 
-#include "data_flags.hpp"
-#include "output.hpp"
-#include "progress_bar.hpp"
+#include "common/data_flags.hpp"
+#include "common/output.hpp"
+#include "common/progress_bar.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/report/text_table.hpp"
-#include "torsio/sim/bench_dataset.hpp"
+#include "torsio/sim/experiments/bench_dataset.hpp"
 #include "verbs.hpp"
 
 namespace {

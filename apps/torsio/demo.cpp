@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-#include "data_flags.hpp"
-#include "output.hpp"
-#include "progress_bar.hpp"
-#include "report_output.hpp"
-#include "report_text.hpp"
+#include "common/data_flags.hpp"
+#include "common/output.hpp"
+#include "common/progress_bar.hpp"
+#include "common/report_output.hpp"
+#include "common/report_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
@@ -15,7 +15,7 @@
 #include "torsio/report/plots.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/report/text_table.hpp"
-#include "torsio/sim/bench_dataset.hpp"
+#include "torsio/sim/experiments/bench_dataset.hpp"
 #include "verbs.hpp"
 
 namespace {

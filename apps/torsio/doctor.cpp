@@ -10,7 +10,7 @@
 #include <string>
 #include <thread>
 
-#include "output.hpp"
+#include "common/output.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/text_table.hpp"

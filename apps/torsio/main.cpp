@@ -7,15 +7,15 @@
 #include <new>
 #include <string>
 
+#include "common/interrupt.hpp"
+#include "common/output.hpp"
+#include "common/report_output.hpp"
+#include "common/wrong_call.hpp"
 #include "completion.hpp"
-#include "interrupt.hpp"
 #include "man_pages.hpp"
-#include "output.hpp"
-#include "report_output.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
 #include "verbs.hpp"
-#include "wrong_call.hpp"
 
 namespace {
 

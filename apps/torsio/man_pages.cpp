@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "output.hpp"
+#include "common/output.hpp"
 #include "torsio/core/version.hpp"
 
 namespace {

@@ -5,14 +5,15 @@
 #include <string>
 #include <vector>
 
-#include "data_flags.hpp"
-#include "output.hpp"
-#include "progress_bar.hpp"
-#include "report_output.hpp"
+#include "common/data_flags.hpp"
+#include "common/output.hpp"
+#include "common/progress_bar.hpp"
+#include "common/report_output.hpp"
 #include "studies/study.hpp"
 #include "studies/study_report.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/report/document/report_document.hpp"
+#include "torsio/report/plot/figure_plot.hpp"
 #include "torsio/report/text_table.hpp"
 #include "verbs.hpp"
 
@@ -37,10 +38,10 @@ void list() {
 
 /// --plot is for one study that has a picture.
 void check_plot(const ReproduceFlags& flags, const std::vector<const torsio::StudyInfo*>& wanted) {
-  if (flags.plot.empty() || (wanted.size() == 1 && wanted.front()->has_picture)) return;
+  if (flags.plot.empty() || (wanted.size() == 1 && wanted.front()->has_figures)) return;
   std::string known;
   for (const torsio::StudyInfo& info : torsio::studies())
-    if (info.has_picture) known += fmt::format("{}{}", known.empty() ? "" : ", ", info.name);
+    if (info.has_figures) known += fmt::format("{}{}", known.empty() ? "" : ", ", info.name);
   throw torsio::UsageError({.place = "torsio reproduce --plot",
                             .expected = "one item that has a figure: " + known,
                             .found = wanted.size() == 1 ? std::string(wanted.front()->name)
@@ -56,7 +57,7 @@ void run(const ReproduceFlags& flags) {
       if (!info.must_be_named) wanted.push_back(&info);
   check_plot(flags, wanted);
   DataFlags().check_outputs({flags.json.destination, flags.plot, flags.report.destination});
-  require_ending("--plot", flags.plot, {".svg"});
+  if (!flags.plot.empty()) static_cast<void>(torsio::plot_format(flags.plot));
   auto documents = nlohmann::ordered_json::array();
   torsio::ReportDocument report{
       .title = "Experiments of the papers",
@@ -72,13 +73,17 @@ void run(const ReproduceFlags& flags) {
   for (const torsio::StudyInfo* info : wanted) {
     ProgressBar progress;
     const torsio::Study study = torsio::run_study(*info, flags.options, progress.listener());
-    if (!flags.plot.empty()) write_text(flags.plot, study.picture_svg);
+    if (!flags.plot.empty()) {
+      std::vector<const torsio::ReportFigure*> figures;
+      for (const torsio::ReportFigure& figure : study.figures) figures.push_back(&figure);
+      write_text(flags.plot, torsio::figure_plot(figures, torsio::plot_format(flags.plot),
+                                                 {.columns = study.figure_columns}));
+    }
     documents.push_back(nlohmann::ordered_json::parse(torsio::study_json(*info, study)));
     torsio::ReportSection section{.heading = std::string(info->name),
                                   .text = std::string(info->title),
                                   .preformatted = torsio::study_text(*info, study)};
-    if (info->has_picture)
-      section.figures.emplace_back(torsio::SvgFigure{"Figure", study.picture_svg});
+    section.figures = study.figures;
     report.sections.push_back(std::move(section));
     if (flags.json.wants_tables()) {
       print(torsio::study_text(*info, study) + "\n");
@@ -111,7 +116,7 @@ void add_reproduce(CLI::App& app) {
   verb->add_option("--json", flags->json.destination,
                    "write the figures as JSON to a file, or - for standard output");
   verb->add_option("--plot", flags->plot,
-                   "draw the figure of an experiment that has one into an SVG file");
+                   "draw the figure of an experiment that has one: SVG, PNG or PDF");
   flags->report.add_page(*verb);
   verb->callback([flags] { run(*flags); });
 }

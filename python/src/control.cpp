@@ -2,10 +2,11 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/report/tracking.hpp"
+#include "torsio/sim/bench/sheet_file.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
-#include "torsio/sim/sheet_file.hpp"
 
 namespace torsio::python {
 namespace {

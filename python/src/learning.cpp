@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "bindings.hpp"
-#include "torsio/check/advice.hpp"
+#include "torsio/check/advise/advice.hpp"
 #include "torsio/check/check.hpp"
 #include "torsio/evaluate/attribution.hpp"
 #include "torsio/evaluate/comparison.hpp"

@@ -7,8 +7,8 @@
 #include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/data/mapping.hpp"
-#include "torsio/sim/bench_dataset.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio::python {
 namespace {

@@ -17,7 +17,6 @@ namespace {
 constexpr double kLongest_s = 0.6;
 constexpr double kCoarseStep_s = 4e-3;
 constexpr double kFineStep_s = 2e-4;
-constexpr std::size_t kFewSamples = 200;
 constexpr std::size_t kEnoughSamples = 8000;
 constexpr double kExplainsLittle = 0.2;  ///< share of the variance: there is no delay to find
 constexpr double kShare = 0.75;          ///< share of what is unexplained without shift
@@ -177,7 +176,9 @@ class Search {
     samples_ = samples_for_fit(pair.input, begin + static_cast<std::size_t>(longest_),
                                end - static_cast<std::size_t>(longest_), kEnoughSamples);
   }
-  [[nodiscard]] bool is_possible() const { return longest_ > 0 && samples_.size() >= kFewSamples; }
+  [[nodiscard]] bool is_possible() const {
+    return longest_ > 0 && samples_.size() >= kFewestSamples;
+  }
 
   [[nodiscard]] Delay run() {
     columns_ = spring_columns(pair_.input, samples_, sample_rate_Hz_);
@@ -272,7 +273,7 @@ std::optional<TwoSides> relate_sides(const std::vector<double>& first,
   std::vector<double> known(first.size());
   for (std::size_t i = 0; i < known.size(); ++i) known[i] = first[i] + moved[i] + torque[i];
   const std::vector<std::size_t> samples = samples_for_fit(known, 0, known.size());
-  if (samples.size() < kFewSamples) return {};
+  if (samples.size() < kFewestSamples) return {};
   const FixedColumns columns(hysteresis_columns(torque, samples));
   const double window_s = 2.0 * static_cast<double>(half_window) / sample_rate_Hz;
   const Eigen::VectorXd angle = at_samples(second, samples);

@@ -10,6 +10,9 @@
 
 namespace torsio {
 
+/// Fewer samples do not determine how one signal depends on another.
+inline constexpr std::size_t kFewestSamples = 200;
+
 /// `std::isfinite` as a function object for algorithms.
 inline bool is_finite(double value) { return std::isfinite(value); }
 

@@ -19,11 +19,10 @@ constexpr double kFlipShare = 0.05;     ///< share of the ranges that each part 
 constexpr double kFlipCodes = 5.0;
 constexpr std::size_t kCandidates = 80;
 constexpr std::size_t kFewReversals = 2;
-constexpr std::size_t kFewSamples = 200;
 constexpr double kChangeLeaves = 0.25;  ///< share of what is unexplained without the change
 constexpr double kOffsetShare = 0.05;   ///< share of the torque's range
 constexpr double kSlopeChange = 0.12;
-constexpr double kSmallRest = 0.01;  ///< share of the torque's variance
+constexpr double kSmallTorqueRest = 0.01;  ///< share of the torque's variance
 constexpr std::size_t kManyReversals = 5;
 constexpr double kPartShare = 0.2;  ///< share of the input's range that each part passes through
 
@@ -161,7 +160,7 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
   for (std::size_t i = 0; i < known.size(); ++i)
     if (!is_finite(pair.target[i])) known[i] = kNotMeasured;
   const std::vector<std::size_t> samples = samples_for_fit(known, 0, known.size());
-  if (samples.size() < kFewSamples) return {};
+  if (samples.size() < kFewestSamples) return {};
   const Eigen::MatrixXd columns = hysteresis_columns(pair.input, samples);
   const Eigen::VectorXd target = at_samples(pair.target, samples);
   const Course course(columns, target);
@@ -188,7 +187,8 @@ std::optional<RelationChange> find_relation_change(const Pair& pair) {
   }
   // A motion that hardly repeats has another torque on each stroke: then the rest must vanish.
   const double rest = best.share * course.unexplained();
-  if (best.share > kChangeLeaves || (rest > kSmallRest && reversals < kManyReversals)) return {};
+  if (best.share > kChangeLeaves || (rest > kSmallTorqueRest && reversals < kManyReversals))
+    return {};
   change.offset = best.offset;
   // The slope without a change is the mean of early and late, each as long as it lasts.
   const double early = slope_over(columns.col(1), target) - best.mean * best.slope;
@@ -214,7 +214,7 @@ std::vector<RecordLine> compare_records(const std::vector<const Pair*>& pairs) {
     for (std::size_t i = 0; i < known.size(); ++i)
       if (!is_finite(pair->target[i])) known[i] = kNotMeasured;
     const auto samples = samples_for_fit(known, 0, known.size(), 10000 / pairs.size());
-    if (samples.size() < kFewSamples) return {};
+    if (samples.size() < kFewestSamples) return {};
     parts.push_back(hysteresis_columns(pair->input, samples, extent));
     targets.push_back(at_samples(pair->target, samples));
     rows += parts.back().rows();

@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "core/checks.hpp"
-#include "torsio/actuator/electrical_sheet.hpp"
 
 namespace torsio {
 namespace {

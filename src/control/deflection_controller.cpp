@@ -7,7 +7,8 @@
 #include <complex>
 #include <numbers>
 
-#include "control/loop_design.hpp"
+#include "control/controller_systems.hpp"
+#include "control/design/loop_design.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "control/loop_design.hpp"
+#include "control/controller_systems.hpp"
+#include "control/design/loop_design.hpp"
+#include "control/design/passive_sweep.hpp"
 #include "core/checks.hpp"
-#include "passive_sweep.hpp"
 
 namespace torsio {
 namespace {

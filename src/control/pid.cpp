@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "control/loop_design.hpp"
+#include "control/controller_systems.hpp"
 #include "core/checks.hpp"
 
 namespace torsio {

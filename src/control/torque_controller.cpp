@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "control/loop_design.hpp"
+#include "control/design/loop_design.hpp"
 #include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 

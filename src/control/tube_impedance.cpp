@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <variant>
 
-#include "control/loop_design.hpp"
+#include "control/controller_systems.hpp"
+#include "control/design/loop_design.hpp"
+#include "control/design/passive_sweep.hpp"
 #include "core/checks.hpp"
-#include "passive_sweep.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -33,20 +33,6 @@ double gear_ratio_of(const TubeImpedance::Settings& settings) {
 }
 
 }  // namespace
-
-TubeImpedance::Settings TubeImpedance::settings_of(const DataSheet& sheet, const Gains& gains) {
-  const auto* const tube = std::get_if<TubeSheet>(&sheet.first);
-  if (tube == nullptr || !std::holds_alternative<GearSheet>(sheet.second))
-    throw Error({.place = kPlace,
-                 .expected = "an actuator with a torsion tube before a gear",
-                 .found = std::string(sheet.name)});
-  return {.drive = drive_of(sheet),
-          .tube_ratio = tube->ratio.value,
-          .tube_Nm_rad = tube->stiffness_Nm_rad.value,
-          .gains = gains,
-          .joint_inertia_kg_m2 = series_elastic_joint(sheet).joint_inertia_kg_m2,
-          .joint_viscous_Nms_rad = sheet.joint.viscous_Nms_rad.value};
-}
 
 TubeImpedance::Gains TubeImpedance::gains_for(const Settings& settings, double stiffness_Nm_rad,
                                               double damping_Nms_rad, double torque_Nm_rad) {

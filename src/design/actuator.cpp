@@ -12,8 +12,9 @@
 #include "drive_load.hpp"
 #include "sim/plant/plant.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
+#include "torsio/control/design/series_elastic_joint.hpp"
 #include "torsio/control/joint_impedance.hpp"
-#include "torsio/control/series_elastic_joint.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 

@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "drive_load.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/deflection_controller.hpp"
-#include "torsio/control/drive.hpp"
+#include "torsio/control/design/drive.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/design/actuator.hpp"
 

@@ -1,7 +1,8 @@
 #pragma once
 
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/control/drive.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
+#include "torsio/control/design/drive.hpp"
 
 namespace torsio {
 

@@ -103,10 +103,9 @@ ReportDocument design_page(const DesignReport& report) {
   page.summary.emplace_back(report.is_feasible ? "The design meets all bounds."
                                                : report.infeasible);
   for (const std::string& note : report.notes) page.summary.push_back(note);
-  if (!report.pictures.empty() || !report.drawings.empty()) {
+  if (!report.pictures.empty()) {
     ReportSection pictures{.heading = "Pictures"};
-    for (const SvgFigure& drawing : report.drawings) pictures.figures.emplace_back(drawing);
-    for (const XyFigure& picture : report.pictures) pictures.figures.emplace_back(picture);
+    pictures.figures = report.pictures;
     page.sections.push_back(std::move(pictures));
   }
   for (const DesignSection& section : report.sections) {

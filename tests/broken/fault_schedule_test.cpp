@@ -1,5 +1,5 @@
 // One bad schedule for each rule; the message must say place, problem and remedy.
-#include "torsio/sim/fault_schedule.hpp"
+#include "torsio/sim/faults/fault_schedule.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "support/temporary_folder.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

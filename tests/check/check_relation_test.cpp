@@ -5,7 +5,7 @@
 
 #include "check/check_support.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

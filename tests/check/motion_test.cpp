@@ -8,8 +8,8 @@
 
 #include "support/bench_dataset.hpp"
 #include "torsio/fit/common/inputs.hpp"
-#include "torsio/sim/bench_dataset.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

@@ -13,6 +13,7 @@
 #include "support/any_number.hpp"
 #include "support/error_message.hpp"
 #include "support/numbers.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/core/random.hpp"
 

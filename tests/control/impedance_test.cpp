@@ -4,11 +4,13 @@
 #include <cmath>
 #include <string>
 
-#include "control/loop_design.hpp"
+#include "control/controller_systems.hpp"
+#include "control/design/loop_design.hpp"
 #include "spring_joint.hpp"
 #include "support/any_number.hpp"
 #include "support/error_message.hpp"
 #include "support/numbers.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
@@ -175,7 +177,7 @@ TEST(PassiveStiffness, IsBelowTheSpringAndGrowsWithTheDamping) {
 
 TubeImpedance::Settings tube_settings(const TubeImpedance::Gains& gains,
                                       const char* actuator = "harmonic-drive") {
-  auto settings = TubeImpedance::settings_of(data_sheet(actuator), gains);
+  auto settings = tube_impedance_settings(data_sheet(actuator), gains);
   settings.relies_on_friction = true;
   return settings;
 }
@@ -293,7 +295,7 @@ RC_GTEST_PROP(TubeImpedance, GivesAFaultAndASafeCurrentForAnyNumbers, ()) {
 
 TEST(TubeImpedance, RefusesWhatItCannotRender) {
   const auto refusal = [](auto change) {
-    auto settings = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kZero);
+    auto settings = tube_impedance_settings(data_sheet("harmonic-drive"), TubeImpedance::kZero);
     change(settings);
     return test::error_message([&] { TubeImpedance(settings, kRate_Hz); });
   };
@@ -304,7 +306,7 @@ TEST(TubeImpedance, RefusesWhatItCannotRender) {
   EXPECT_NE(refusal([](auto& s) { s.gains.damping_s = kNaN; }), "");
   EXPECT_NE(refusal([](auto& s) { s.tube_Nm_rad = 0.0; }), "");
   EXPECT_NE(test::error_message([] {
-              return TubeImpedance::settings_of(data_sheet("dfki-50"), {});
+              return tube_impedance_settings(data_sheet("dfki-50"), {});
             }).find("a torsion tube before a gear, found dfki-50"),
             std::string::npos);
 }
@@ -316,7 +318,7 @@ TEST(PassiveStiffness, OfATubeIsStableLockedAsWell) {
     for (const double torque_Nm_rad : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0}) {
       for (const double damping_Nms_rad : {0.0, 30.0, 100.0, 300.0}) {
         auto settings =
-            TubeImpedance::settings_of(data_sheet(actuator), {.torque_Nm_rad = torque_Nm_rad});
+            tube_impedance_settings(data_sheet(actuator), {.torque_Nm_rad = torque_Nm_rad});
         const double stiffness_Nm_rad =
             passive_stiffness(settings, damping_Nms_rad, 60.0, kRate_Hz);
         if (!(stiffness_Nm_rad > 0.0)) continue;
@@ -332,8 +334,8 @@ TEST(PassiveStiffness, OfATubeIsStableLockedAsWell) {
 }
 
 TEST(PassiveStiffness, OfATubeEndsWhereTheLoopIsFast) {
-  const auto slow = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kZero);
-  const auto fast = TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kHigh);
+  const auto slow = tube_impedance_settings(data_sheet("harmonic-drive"), TubeImpedance::kZero);
+  const auto fast = tube_impedance_settings(data_sheet("harmonic-drive"), TubeImpedance::kHigh);
   EXPECT_GT(passive_stiffness(slow, 0.0, 60.0, kRate_Hz), 5000.0);
   EXPECT_EQ(passive_stiffness(fast, 0.0, 60.0, kRate_Hz), 0.0);
 }

@@ -13,6 +13,7 @@
 #include "support/error_message.hpp"
 #include "support/numbers.hpp"
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {

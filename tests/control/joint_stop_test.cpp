@@ -11,6 +11,7 @@
 #include "sim/plant/plant.hpp"
 #include "support/error_message.hpp"
 #include "support/numbers.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/joint_controller.hpp"
 
 namespace torsio {

@@ -7,9 +7,10 @@
 #include <cmath>
 #include <string>
 
-#include "sim/deflection_loop.hpp"
-#include "sim/impedance_loop.hpp"
+#include "sim/loops/bench_deflection_loop.hpp"
+#include "sim/loops/bench_impedance_loop.hpp"
 #include "support/numbers.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
@@ -78,7 +79,7 @@ TEST(DeflectionController, IsTheLoopOfTheBenchWithinATicksIntegral) {
   for (const char* actuator : {"dfki-28", "dfki-50", "dfki-120", "dfki-300"}) {
     const DataSheet sheet = data_sheet(actuator);
     DeflectionController controller({.joint = series_elastic_joint(sheet)}, kRate_Hz);
-    DeflectionLoop bench(plant_parameters(sheet), kRate_Hz);
+    BenchDeflectionLoop bench(plant_parameters(sheet), kRate_Hz);
     for (int n = 0; n < 5000; ++n) {
       const double wanted_rad = 0.005 * std::sin(3e-3 * n);
       const double deflection_rad = 0.0045 * std::sin(3e-3 * n - 0.1);
@@ -93,11 +94,11 @@ TEST(DeflectionController, IsTheLoopOfTheBenchWithinATicksIntegral) {
 
 TEST(TubeImpedance, IsTheLoopOfTheBench) {
   const DataSheet sheet = data_sheet("harmonic-drive");
-  auto settings = TubeImpedance::settings_of(sheet, TubeImpedance::kHigh);
+  auto settings = tube_impedance_settings(sheet, TubeImpedance::kHigh);
   settings.relies_on_friction = true;
   TubeImpedance impedance(settings, kRate_Hz);
-  const ImpedanceLoop bench(plant_parameters(sheet), ImpedanceLoop::kHigh,
-                            ImpedanceLoop::Twist::tube);
+  const BenchImpedanceLoop bench(plant_parameters(sheet), BenchImpedanceLoop::kHigh,
+                                 BenchImpedanceLoop::Twist::tube);
   Random random(1);
   for (int n = 0; n < 1000; ++n) {
     const double rotor_rad = 0.01 * random.normal();

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "torsio/control/drive.hpp"
+#include "torsio/control/design/drive.hpp"
 #include "torsio/control/joint_cascade.hpp"
 
 namespace torsio::test {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "torsio/control/series_elastic_joint.hpp"
+#include "torsio/control/design/series_elastic_joint.hpp"
 #include "torsio/estimate/joint_sample.hpp"
 
 namespace torsio::test {

@@ -17,6 +17,7 @@
 #include "support/examples/mixture.hpp"
 #include "support/examples/network.hpp"
 #include "support/numbers.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/core/random.hpp"

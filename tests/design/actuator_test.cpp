@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <vector>
 
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/deflection_controller.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/sim/sheet_file.hpp"
+#include "torsio/sim/bench/sheet_file.hpp"
 
 namespace torsio {
 namespace {
@@ -112,7 +113,7 @@ TEST(DesignedActuator, HasAParetoPicture) {
   const ActuatorDesign design = design_actuator(demand, read_drives({}), "joint");
   const DesignReport report = actuator_report(demand, design);
   ASSERT_EQ(report.pictures.size(), 3U);
-  const XyFigure& pareto = report.pictures.front();
+  const auto& pareto = std::get<XyFigure>(report.pictures.front());
   EXPECT_EQ(pareto.title, "Drives for the demand");
   const XySeries& front = pareto.series[1];
   ASSERT_FALSE(front.x.empty());

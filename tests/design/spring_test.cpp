@@ -7,8 +7,8 @@
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/sim/experiment.hpp"
-#include "torsio/sim/sheet_file.hpp"
+#include "torsio/sim/bench/sheet_file.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

@@ -127,8 +127,8 @@ TEST(Layers, NameWhatClimbs) {
   EXPECT_EQ(found.objection("fit/train_model.cpp", "data/dataset.hpp"), "");
   EXPECT_EQ(found.objection("model/network/mlp.cpp", "model/any_model.hpp"),
             "model/network/mlp.cpp includes model/any_model.hpp: model is below model/network");
-  EXPECT_EQ(found.objection("sim/bench.cpp", "fit/families.hpp"),
-            "sim/bench.cpp includes fit/families.hpp: bench does not link learn");
+  EXPECT_EQ(found.objection("sim/bench/bench.cpp", "fit/families.hpp"),
+            "sim/bench/bench.cpp includes fit/families.hpp: bench does not link learn");
   EXPECT_EQ(found.objection("control/pid.cpp", "files/model_file.hpp"),
             "control/pid.cpp includes files/model_file.hpp: files is below control");
   EXPECT_EQ(found.objection("spare/pid.cpp", "core/error.hpp"),

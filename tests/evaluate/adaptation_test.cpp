@@ -16,7 +16,7 @@
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

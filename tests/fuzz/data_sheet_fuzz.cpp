@@ -6,7 +6,7 @@
 #include "sim/plant/plant.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/sim/sheet_file.hpp"
+#include "torsio/sim/bench/sheet_file.hpp"
 
 /// Any text is a sheet from which a plant can be built and which its own YAML gives back, or an
 /// Error. The first byte chooses a built-in sheet, in which the text replaces the line at the place

@@ -4,10 +4,10 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "sim/fault_injector.hpp"
+#include "sim/faults/fault_injector.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/sim/fault_schedule.hpp"
+#include "torsio/sim/faults/fault_schedule.hpp"
 
 namespace {
 

@@ -5,7 +5,7 @@
 #include <complex>
 #include <string>
 
-#include "control/loop_design.hpp"
+#include "control/design/loop_design.hpp"
 #include "golden_file.hpp"
 #include "torsio/control/deflection_controller.hpp"
 

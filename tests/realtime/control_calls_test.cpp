@@ -24,6 +24,7 @@
 #include "support/monitored_joint.hpp"
 #include "support/numbers.hpp"
 #include "support/system_calls.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_controller.hpp"
@@ -407,7 +408,7 @@ TEST(ControlCalls, OfJointImpedanceAreNone) {
 
 TEST(ControlCalls, OfTubeImpedanceAreNone) {
   TubeImpedance::Settings settings =
-      TubeImpedance::settings_of(data_sheet("harmonic-drive"), TubeImpedance::kZero);
+      tube_impedance_settings(data_sheet("harmonic-drive"), TubeImpedance::kZero);
   settings.gains = TubeImpedance::gains_for(settings, 2000.0, 20.0, 0.5);
   TubeImpedance impedance(settings, kRate_Hz);
   Spoiled wanted(0.1, 4099);

@@ -10,6 +10,7 @@
 #include "realtime/simulated_clock.hpp"
 #include "sim/plant/plant.hpp"
 #include "support/numbers.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/realtime/mailbox.hpp"

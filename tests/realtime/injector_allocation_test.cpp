@@ -3,10 +3,10 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/fault_injector.hpp"
+#include "sim/faults/fault_injector.hpp"
 #include "support/allocation_counter.hpp"
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/sim/fault_schedule.hpp"
+#include "torsio/sim/faults/fault_schedule.hpp"
 
 namespace torsio {
 namespace {

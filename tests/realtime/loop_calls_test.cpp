@@ -17,6 +17,7 @@
 #include "support/lock_counter.hpp"
 #include "support/system_calls.hpp"
 #include "support/temporary_folder.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/realtime/mailbox.hpp"
 #include "torsio/realtime/realtime_loop.hpp"

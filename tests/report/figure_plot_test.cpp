@@ -113,6 +113,47 @@ TEST(FigurePlot, DrawsAxesForFiguresWithoutARange) {
   EXPECT_THAT(svg, HasSubstr("point"));
 }
 
+/// The number after `key` in a text.
+double number_after(const std::string& text, const std::string& key) {
+  return std::stod(text.substr(text.find(key) + key.size()));
+}
+
+TEST(FigurePlot, PutsFiguresBesideEachOtherInColumns) {
+  const XyFigure figure{.title = "t", .x = {"x"}, .y = {"y"}, .series = {}};
+  const std::vector<ReportFigure> three(3, figure);
+  const std::vector<const ReportFigure*> figures = {&three[0], &three[1], &three[2]};
+  const std::string one = figure_plot({figures[0]}, PlotFormat::svg);
+  const std::string rows = figure_plot(figures, PlotFormat::svg, {.columns = 2});
+  EXPECT_NEAR(number_after(rows, "width=\""), 2.0 * number_after(one, "width=\""), 1.0);
+  EXPECT_NEAR(number_after(rows, "height=\""), 2.0 * number_after(one, "height=\""), 1.0);
+  EXPECT_THROW((void)figure_plot(figures, PlotFormat::svg, {.columns = 0}), UsageError);
+  EXPECT_THROW((void)figure_plot({}, PlotFormat::svg), UsageError);
+}
+
+TEST(FigurePlot, FillsTheAreasOfAFieldByTheirValues) {
+  FieldFigure field{.title = "strain", .value_label = "%", .highest = 20.0, .areas = {}};
+  const ReportFigure empty = field;
+  EXPECT_THAT(figure_plot({&empty}, PlotFormat::svg), HasSubstr("strain; 0; 20 %"));
+  const auto square = [](double x, double value) {
+    return FieldFigure::Area{.corners = {{x, 0.0}, {x + 1.0, 0.0}, {x + 1.0, 1.0}, {x, 1.0}},
+                             .value = value};
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  field.areas = {square(0.0, 0.0), square(1.0, 25.0), square(2.0, nan)};
+  const ReportFigure figure = field;
+  const std::string svg = figure_plot({&figure}, PlotFormat::svg);
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  const auto count = [&](const std::string& colour) {
+    std::size_t found = 0;
+    for (std::size_t at = svg.find(colour); at != std::string::npos; at = svg.find(colour, at + 1))
+      ++found;
+    return found;
+  };
+  // Each colour is that of an area and of one end of the scale.
+  EXPECT_EQ(count("rgb(10%,15%,90%)"), 2U) << svg.substr(0, 6000);
+  EXPECT_EQ(count("rgb(90%,15%,10%)"), 2U);
+}
+
 TEST(FigurePlot, NamesWhatItCanDraw) {
   const ReportDocument document = example();
   EXPECT_EQ(figures_of(document, {}, "residuals").front(), figures_of(document, {"rate"}).front());

@@ -129,19 +129,24 @@ TEST(RedundancyStudy, FindsTheLoadInTheDeflectionAloneAndTheMotorTorqueInTheSum)
 }
 
 TEST(RedundancyStudy, DrawsPositionSpeedAndTorquesOfEachJoint) {
-  EXPECT_TRUE(find_study("000-redundancy").has_picture);
-  const std::string& svg = redundancy().picture_svg;
-  const auto count = [&](const std::string& what) {
-    std::size_t found = 0;
-    for (std::size_t at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1))
-      ++found;
-    return found;
-  };
-  for (const ArmPart& part : kArm)
-    EXPECT_EQ(count(">" + std::string(part.joint) + "<"), 3U) << part.joint;
-  for (const char* axis : {"position [deg]", "speed [deg/s]", "torque [Nm]", "motor current (17)",
-                           "gear deflection (18)", "spring deflection (19)"})
-    EXPECT_EQ(count(axis), kArmJoints) << axis;
+  EXPECT_TRUE(find_study("000-redundancy").has_figures);
+  const std::vector<ReportFigure>& figures = redundancy().figures;
+  ASSERT_EQ(figures.size(), 3 * kArmJoints);
+  EXPECT_EQ(redundancy().figure_columns, 3U);
+  for (std::size_t j = 0; j < kArmJoints; ++j) {
+    const auto& position = std::get<XyFigure>(figures[3 * j]);
+    const auto& speed = std::get<XyFigure>(figures[3 * j + 1]);
+    const auto& torque = std::get<XyFigure>(figures[3 * j + 2]);
+    for (const XyFigure* figure : {&position, &speed, &torque})
+      EXPECT_EQ(figure->title, kArm[j].joint);
+    EXPECT_EQ(position.y.label, "position [deg]");
+    EXPECT_EQ(speed.y.label, "speed [deg/s]");
+    EXPECT_EQ(torque.y.label, "torque [Nm]");
+    ASSERT_EQ(torque.series.size(), 4U);
+    EXPECT_EQ(torque.series[0].label, "motor current (17)");
+    EXPECT_EQ(torque.series[1].label, "gear deflection (18)");
+    EXPECT_EQ(torque.series[2].label, "spring deflection (19)");
+  }
 }
 
 }  // namespace

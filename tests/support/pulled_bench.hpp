@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "sim/bench.hpp"
-#include "sim/bench_log.hpp"
+#include "sim/bench/bench.hpp"
+#include "sim/sensors/bench_log.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/signal/excitation.hpp"

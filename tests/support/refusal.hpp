@@ -3,7 +3,7 @@
 #include <string>
 
 #include "torsio/core/error.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio::test {
 

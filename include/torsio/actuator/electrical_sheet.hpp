@@ -9,10 +9,6 @@ namespace torsio {
 /// How the resistance of copper rises with its temperature, over its value at 20 degrees Celsius.
 inline constexpr double kCopperResistanceRise_1_K = 0.00393;
 
-/// The resistance of a phase over that of a data sheet, which is the resistance of an equivalent motor
-/// with one winding and the same copper loss: 3/2 R_phase i² = R i².
-inline constexpr double kPhaseResistanceShare = 2.0 / 3.0;
-
 /// The electrical and thermal side of an actuator's motor, SI. The papers print none of it but the
 /// 30 kHz of the modulation (001): the rest is assumed by the rules below, before any simulation.
 struct ElectricalSheet {

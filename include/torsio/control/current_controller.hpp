@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "torsio/control/drive.hpp"
+#include "torsio/control/design/drive.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
 
@@ -86,8 +86,11 @@ struct Windings {
   void check() const;
 };
 
-/// The windings that have the torque constant of a drive and its copper loss R i² at standstill: the
-/// drive's resistance is that of an equivalent motor with one winding, 3/2 of a phase's.
+/// The resistance of a phase over that of a `Drive`, which is the resistance of an equivalent motor with one
+/// winding and the same copper loss: 3/2 R_phase i² = R i².
+inline constexpr double kPhaseResistanceShare = 2.0 / 3.0;
+
+/// The windings that have the torque constant of a drive and its copper loss R i² at standstill.
 /// @throws Error if a value is not positive.
 [[nodiscard]] Windings windings_of(const Drive& drive, double inductance_H, int pole_pairs);
 

@@ -3,8 +3,8 @@
 #include <complex>
 #include <optional>
 
+#include "torsio/control/design/series_elastic_joint.hpp"
 #include "torsio/control/pid.hpp"
-#include "torsio/control/series_elastic_joint.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/core/units.hpp"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "torsio/control/series_elastic_joint.hpp"
+#include "torsio/control/design/series_elastic_joint.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/signal/differentiator.hpp"
 #include "torsio/signal/lowpass.hpp"

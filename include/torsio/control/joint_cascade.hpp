@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "torsio/control/bumpless_transfer.hpp"
-#include "torsio/control/drive.hpp"
+#include "torsio/control/design/drive.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/pid.hpp"
 #include "torsio/control/thermal_limit.hpp"

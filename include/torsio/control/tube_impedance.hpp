@@ -1,8 +1,8 @@
 #pragma once
 
 #include "torsio/control/bumpless_transfer.hpp"
+#include "torsio/control/design/series_elastic_joint.hpp"
 #include "torsio/control/pid.hpp"
-#include "torsio/control/series_elastic_joint.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/core/realtime.hpp"
@@ -68,8 +68,6 @@ class TubeImpedance {
     Fault fault = Fault::none;
   };
 
-  /// Settings from a data sheet with a tube before a gear. @throws Error if it has none.
-  [[nodiscard]] static Settings settings_of(const DataSheet& sheet, const Gains& gains);
   /// The gains that render a stiffness and a damping at the joint. @param torque_Nm_rad K_tp
   /// @throws Error if a value is negative, or K_tp not positive.
   [[nodiscard]] static Gains gains_for(const Settings& settings, double stiffness_Nm_rad,

@@ -29,8 +29,7 @@ struct DesignReport {
   std::string infeasible = {};  ///< the bound that contradicts, and the value that it would need
   std::vector<DesignSection> sections = {};
   std::vector<std::string> notes = {};
-  std::vector<XyFigure> pictures = {};
-  std::vector<SvgFigure> drawings = {};
+  std::vector<ReportFigure> pictures = {};
 
   /// @throws Error if there is no such figure.
   [[nodiscard]] const DesignFigure& at(const std::string& section, const std::string& name) const;

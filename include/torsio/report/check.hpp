@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/check/advice.hpp"
+#include "torsio/check/advise/advice.hpp"
 #include "torsio/check/check.hpp"
 
 namespace torsio {

@@ -19,16 +19,6 @@ struct PlotLabels {
   std::string y;
 };
 
-/// Draws curves as lines into an SVG picture without external files: axes through round numbers,
-/// a grid, a legend if there is more than one curve. Points closer than 0.8 pixels are
-/// left out, so that long records make small files. All text is escaped.
-[[nodiscard]] std::string svg_plot(const std::vector<Curve>& curves, const PlotLabels& labels,
-                                   const std::string& title);
-
-/// Pictures of `svg_plot` side by side in rows of `columns`, as one SVG picture.
-/// @throws UsageError if there is no picture or no column.
-[[nodiscard]] std::string svg_grid(const std::vector<std::string>& plots, std::size_t columns);
-
 /// Draws curves as braille dots, two by four per character, with axes; several curves share the
 /// canvas (their labels are printed below it, marked by the curve that was drawn last). Non-finite
 /// points are skipped; without a point the frame is empty.

@@ -8,7 +8,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/design/coupling/coupling.hpp"
-#include "torsio/report/plots.hpp"
+#include "torsio/report/document/report_document.hpp"
 
 namespace torsio::design {
 namespace {
@@ -77,47 +77,40 @@ DesignSection strain_section(const CouplingTwist& twist) {
   return section;
 }
 
-/// Blue (0) over green to red (1).
-std::string colour(double share) {
-  return fmt::format("hsl({:.0f},80%,50%)", 240.0 * (1.0 - std::clamp(share, 0.0, 1.0)));
-}
-
-std::string lobe_picture(const LobeCurve& lobe, const char* name, double full) {
-  constexpr double kWidth = 400.0;  // pixels
-  constexpr double kHeight = 270.0;
-  constexpr double kMiddle = 180.0;
-  double least_x_mm = HUGE_VAL;
-  double largest_x_mm = 0.0;
-  double largest_y_mm = 0.0;
-  for (const MeshNode& node : lobe.mesh.nodes) {
-    least_x_mm = std::min(least_x_mm, node.x_mm);
-    largest_x_mm = std::max(largest_x_mm, node.x_mm);
-    largest_y_mm = std::max(largest_y_mm, node.y_mm);
-  }
-  const double scale = std::min(kWidth / (largest_x_mm - least_x_mm), 0.5 * kHeight / largest_y_mm);
+/// A lobe, not deformed, with the strain of its last step. @param highest_pct the strain of red
+FieldFigure lobe_figure(const LobeCurve& lobe, const char* name, double highest_pct) {
   const auto& steps = lobe.curve.steps;
-  std::string svg = fmt::format(
-      "<text x=\"20\" y=\"24\" font-family=\"sans-serif\" font-size=\"14\">{}{}, strain: blue 0, "
-      "red "
-      "{:.0f} %</text>\n",
-      name,
-      steps.empty() ? ", no converged step"
-                    : fmt::format(" at {:.4g} deg", std::abs(steps.back().twist_deg)),
-      100.0 * full);
+  FieldFigure figure{
+      .title = fmt::format("Strain of the {} lobe{}", name,
+                           steps.empty()
+                               ? ", no converged step"
+                               : fmt::format(" at {:.4g} deg", std::abs(steps.back().twist_deg))),
+      .value_label = "%",
+      .highest = highest_pct,
+      .areas = {}};
+  figure.areas.reserve(lobe.mesh.triangles.size());
   for (std::size_t i = 0; i < lobe.mesh.triangles.size(); ++i) {
-    const auto& corners = lobe.mesh.triangles[i];
-    svg += "<polygon points=\"";
+    const auto& nodes = lobe.mesh.triangles[i];
+    FieldFigure::Area area{
+        .corners = {},
+        .value = steps.empty() ? kNotMeasured : 100.0 * steps.back().element_strains[i]};
     // Around the triangle: corner, middle of the edge, corner.
     for (const std::size_t k : {0U, 3U, 1U, 4U, 2U, 5U}) {
-      const MeshNode& node = lobe.mesh.nodes[static_cast<std::size_t>(corners[k])];
-      fmt::format_to(std::back_inserter(svg), "{:.1f},{:.1f} ",
-                     20.0 + scale * (node.x_mm - least_x_mm), kMiddle - scale * node.y_mm);
+      const MeshNode& node = lobe.mesh.nodes[static_cast<std::size_t>(nodes[k])];
+      area.corners.push_back({node.x_mm, node.y_mm});
     }
-    fmt::format_to(std::back_inserter(svg),
-                   "\" fill=\"{}\" stroke=\"#333\" stroke-width=\"0.4\"/>\n",
-                   steps.empty() ? "#fff" : colour(steps.back().element_strains[i] / full));
+    figure.areas.push_back(std::move(area));
   }
-  return svg;
+  return figure;
+}
+
+/// The largest strain in the last steps of both lobes.
+double largest_strain_pct(const CouplingTwist& twist) {
+  double strain = 1e-9;
+  for (const LobeCurve* lobe : {&twist.compressed, &twist.stretched})
+    if (!lobe->curve.steps.empty())
+      strain = std::max(strain, lobe->curve.steps.back().strain_outside_300um);
+  return 100.0 * strain;
 }
 
 XyFigure curve_figure(const Points& curve) {
@@ -194,8 +187,10 @@ DesignReport coupling_report(const CouplingDemand& demand, const CouplingTwist& 
                           : "the largest twist: a larger angle is needed");
     }
   }
-  report.pictures = {curve_figure(curve), strain_figure(twist)};
-  report.drawings = {{"Strains and torque", coupling_svg(twist, curve)}};
+  const double highest_pct = largest_strain_pct(twist);
+  report.pictures = {lobe_figure(twist.compressed, "compressed", highest_pct),
+                     lobe_figure(twist.stretched, "stretched", highest_pct), curve_figure(curve),
+                     strain_figure(twist)};
   report.notes = {
       demand.layers > 0
           ? "The ends of the lobes are free: the torque is less than in plane strain."
@@ -227,24 +222,6 @@ DataSheet coupling_sheet(const Points& curve, const std::string& name) {
   for (const auto& [angle_deg, torque_Nm] : curve)
     design.curve.emplace_back(rad_from_deg(angle_deg), torque_Nm);
   return spring_sheet(demand, design, name);
-}
-
-std::string coupling_svg(const CouplingTwist& twist, const Points& curve) {
-  double full = 1e-9;
-  for (const LobeCurve* lobe : {&twist.compressed, &twist.stretched})
-    if (!lobe->curve.steps.empty())
-      full = std::max(full, lobe->curve.steps.back().strain_outside_300um);
-  std::vector<double> angles;
-  std::vector<double> torques;
-  for (const auto& [angle_deg, torque_Nm] : curve) {
-    angles.push_back(angle_deg);
-    torques.push_back(torque_Nm);
-  }
-  return svg_grid({lobe_picture(twist.compressed, "compressed", full),
-                   lobe_picture(twist.stretched, "stretched", full),
-                   svg_plot({{"coupling", angles, torques}},
-                            {.x = "twist [deg]", .y = "torque [Nm]"}, "torque of the coupling")},
-                  3);
 }
 
 }  // namespace torsio::design

@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "check/strokes.hpp"
+#include "check/advise/strokes.hpp"
 #include "core/report_progress.hpp"
 #include "evaluate/drift/compared_run.hpp"
 #include "evaluate/drift/direction_fit.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/common/design.hpp"
+#include "fit/common/regression.hpp"
 #include "fit/grey_box/bank_choice.hpp"
 #include "model/grey_box/grey_box.hpp"
 #include "numerics/nnls.hpp"

@@ -3,8 +3,8 @@
 #include <limits>
 #include <numeric>
 
-#include "fit/common/design.hpp"
 #include "fit/common/fitted.hpp"
+#include "fit/common/regression.hpp"
 #include "fit/hysteresis/fit_hysteresis.hpp"
 #include "fit/hysteresis/operator_data.hpp"
 

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <optional>
 
-#include "fit/common/design.hpp"
 #include "fit/common/fitted.hpp"
+#include "fit/common/regression.hpp"
 #include "fit/hysteresis/fit_hysteresis.hpp"
 #include "fit/hysteresis/operator_data.hpp"
 #include "fit/linear/fit_polynomial.hpp"

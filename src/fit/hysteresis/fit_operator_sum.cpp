@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "fit/common/design.hpp"
 #include "fit/common/fitted.hpp"
+#include "fit/common/regression.hpp"
 #include "fit/common/usable_table.hpp"
 #include "fit/hysteresis/fit_hysteresis.hpp"
 #include "fit/hysteresis/operator_data.hpp"

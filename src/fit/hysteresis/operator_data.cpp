@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "fit/common/design.hpp"
+#include "fit/common/regression.hpp"
 #include "fit/common/usable_table.hpp"
 #include "model/linear/direction.hpp"
 #include "numerics/nnls.hpp"

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "core/hyperbolic_tangent.hpp"
-#include "fit/common/design.hpp"
 #include "fit/common/fitted.hpp"
+#include "fit/common/regression.hpp"
 #include "fit/common/usable_table.hpp"
 #include "fit/linear/named_coefficients.hpp"
 #include "numerics/least_squares.hpp"

@@ -9,9 +9,9 @@
 #include <tuple>
 #include <utility>
 
-#include "fit/common/design.hpp"
 #include "fit/common/fitted.hpp"
 #include "fit/common/folds.hpp"
+#include "fit/common/regression.hpp"
 #include "fit/common/usable_table.hpp"
 #include "fit/linear/named_coefficients.hpp"
 #include "torsio/core/error.hpp"

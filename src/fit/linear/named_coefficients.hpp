@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/common/design.hpp"
+#include "fit/common/regression.hpp"
 #include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"

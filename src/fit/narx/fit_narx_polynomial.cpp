@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "core/report_progress.hpp"
-#include "fit/common/design.hpp"
 #include "fit/common/fitted.hpp"
+#include "fit/common/regression.hpp"
 #include "fit/common/usable_table.hpp"
 #include "fit/gaussian_process/kernel_data.hpp"
 #include "fit/narx/free_run_refinement.hpp"

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <vector>
 
-#include "actuator/parts/bristle.hpp"
 #include "core/all_finite.hpp"
 #include "model/second_order/bounded_motion.hpp"
 #include "model/second_order/check_dynamics.hpp"
+#include "parts/bristle.hpp"
 
 namespace torsio {
 namespace {

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "actuator/parts/stribeck.hpp"
 #include "model/second_order/sampled_time.hpp"
+#include "parts/stribeck.hpp"
 #include "signal/causal_polynomial.hpp"
 #include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/family_traits.hpp"

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <span>
 
-#include "actuator/parts/maxwell_branches.hpp"
 #include "model/viscoelastic/spring_dashpot_network.hpp"
+#include "parts/maxwell_branches.hpp"
 
 // What the model and its fit run sample by sample.
 namespace torsio {

@@ -18,22 +18,6 @@ using Json = nlohmann::ordered_json;
 
 static_assert(std::endian::native == std::endian::little, "the page reads little-endian floats");
 
-std::string base64(std::span<const std::byte> bytes) {
-  static constexpr std::string_view kLetters =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(bytes.size() - i, 3);
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      word = word << 8U | (k < count ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k)
-      text += k <= count ? kLetters[word >> (18U - 6U * k) & 63U] : '=';
-  }
-  return text;
-}
-
 /// `<` would end the script element, or begin a comment in it.
 std::string script_json(const Json& json) {
   const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -119,7 +103,7 @@ class FigureWriter {
     return json;
   }
 
-  Json operator()(const SvgFigure& figure) { return {{"title", figure.title}}; }
+  Json operator()(const FieldFigure& figure) { return {{"title", figure.title}}; }
 
   [[nodiscard]] std::string numbers_base64() const {
     return base64(std::as_bytes(std::span(numbers_)));
@@ -145,6 +129,22 @@ class FigureWriter {
 };
 
 }  // namespace
+
+std::string base64(std::span<const std::byte> bytes) {
+  static constexpr std::string_view kLetters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(bytes.size() - i, 3);
+    std::uint32_t word = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      word = word << 8U | (k < count ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k < 4; ++k)
+      text += k <= count ? kLetters[word >> (18U - 6U * k) & 63U] : '=';
+  }
+  return text;
+}
 
 PageData page_data(const std::vector<const ReportFigure*>& figures) {
   FigureWriter writer;

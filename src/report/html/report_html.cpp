@@ -1,14 +1,17 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
+#include <span>
 #include <string_view>
+#include <variant>
 
 #include "report/html/page_data.hpp"
 #include "report/html/page_files.hpp"
 #include "report/markup_text.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/report/document/report_document.hpp"
-#include "torsio/report/plots.hpp"
+#include "torsio/report/plot/figure_plot.hpp"
 
 namespace torsio {
 namespace {
@@ -45,14 +48,19 @@ std::string table_html(const ReportTable& table, const std::string& label) {
   return html + "</table></div>\n";
 }
 
-/// The first curves of a figure, for a browser without JavaScript.
-std::string static_picture(const XyFigure& figure) {
-  std::vector<Curve> curves;
-  for (const XySeries& series : figure.series)
-    if (series.is_shown && series.style == CurveStyle::line)
-      curves.push_back({series.label, series.x, series.y});
-  if (curves.empty()) return {};
-  return svg_plot(curves, {figure.x.label, figure.y.label}, figure.title);
+/// A picture that needs no JavaScript. As an image: the names within an SVG file of cairo are those of any other.
+std::string static_picture(const ReportFigure& figure, const std::string& title) {
+  const std::string svg =
+      figure_plot({&figure}, PlotFormat::svg, {.width_mm = 120.0, .height_mm = 90.0});
+  return fmt::format("<img alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">", markup_text(title),
+                     base64(std::as_bytes(std::span(svg))));
+}
+
+bool has_line(const ReportFigure& figure) {
+  const auto* xy = std::get_if<XyFigure>(&figure);
+  return xy != nullptr && std::ranges::any_of(xy->series, [](const XySeries& series) {
+           return series.is_shown && series.style == CurveStyle::line;
+         });
 }
 
 class Page {
@@ -100,16 +108,16 @@ class Page {
   }
 
   std::string figure_html(const ReportFigure& figure) {
-    if (const auto* svg = std::get_if<SvgFigure>(&figure))
-      return fmt::format("<figure><figcaption>{}</figcaption>{}</figure>\n",
-                         markup_text(svg->title), svg->svg);
+    const std::string& title =
+        std::visit([](const auto& one) -> const std::string& { return one.title; }, figure);
+    if (std::holds_alternative<FieldFigure>(figure))
+      return fmt::format("<figure><figcaption>{}</figcaption>{}</figure>\n", markup_text(title),
+                         static_picture(figure, title));
     const std::string id = fmt::format("figure-{}", figures_.size() + 1);
     figures_.push_back(&figure);
     std::string still;
-    const auto* xy = std::get_if<XyFigure>(&figure);
-    if (xy != nullptr && !has_picture_) still = static_picture(*xy);
+    if (!has_picture_ && has_line(figure)) still = static_picture(figure, title);
     has_picture_ = has_picture_ || !still.empty();
-    const std::string& title = xy != nullptr ? xy->title : std::get<TimeFigure>(figure).title;
     return fmt::format("<figure><figcaption>{}</figcaption><div id=\"{}\"></div>{}</figure>\n",
                        markup_text(title), id,
                        still.empty() ? still : fmt::format("<noscript>{}</noscript>", still));

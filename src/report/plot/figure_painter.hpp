@@ -26,6 +26,7 @@ class FigurePainter {
 
   void draw(const XyFigure& figure, const PlotArea& area);
   void draw(const TimeFigure& figure, const PlotArea& area);
+  void draw(const FieldFigure& figure, const PlotArea& area);
   /// All texts that were drawn, in their order.
   [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
 
@@ -57,6 +58,8 @@ class FigurePainter {
             const PlotAxis& y_axis);
   void points(const XySeries& series, const PlotAxis& x, const PlotAxis& y);
   void columns(const XySeries& series, const PlotAxis& x, const PlotAxis& y);
+  /// Shades from blue to red with the values of both ends. @returns its height
+  double colour_scale(const FieldFigure& figure, double left, double top);
   void panel(const TimeFigure& figure, const TimeFigure::Panel& panel,
              const std::vector<LegendEntry>& entries, const PlotAxis& x, const PlotArea& frame,
              bool is_last);

@@ -10,6 +10,7 @@
 #include <cctype>
 #include <charconv>
 #include <memory>
+#include <numeric>
 
 #include "report/markup_text.hpp"
 #include "report/plot/figure_painter.hpp"
@@ -72,11 +73,23 @@ void require(cairo_status_t status) {
         {.place = "--plot", .problem = fmt::format("cairo: {}", cairo_status_to_string(status))});
 }
 
+/// In points.
+std::vector<double> row_heights(const std::vector<const ReportFigure*>& figures,
+                                const PlotSize& size) {
+  std::vector<double> heights((figures.size() + size.columns - 1) / size.columns);
+  for (std::size_t i = 0; i < figures.size(); ++i) {
+    double& height = heights[i / size.columns];
+    height = std::max(height, height_mm(*figures[i], size) * kPointsPerMm);
+  }
+  return heights;
+}
+
 std::string drawn(const std::vector<const ReportFigure*>& figures, PlotFormat format,
                   const PlotSize& size, double detail) {
-  double height = 0.0;
-  for (const ReportFigure* figure : figures) height += height_mm(*figure, size) * kPointsPerMm;
-  const double width = size.width_mm * kPointsPerMm;
+  const std::vector<double> heights = row_heights(figures, size);
+  const double height = std::accumulate(heights.begin(), heights.end(), 0.0);
+  const double column = size.width_mm * kPointsPerMm;
+  const double width = column * static_cast<double>(std::min(size.columns, figures.size()));
   // PNG becomes smaller by its resolution, the others by the number of points.
   const double scale = kDotsPerInch * detail / 72.0;
   std::string bytes;
@@ -91,12 +104,12 @@ std::string drawn(const std::vector<const ReportFigure*>& figures, PlotFormat fo
                            CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_font_size(cairo.get(), 7.0);
     FigurePainter painter(cairo.get(), format == PlotFormat::png ? 1.0 : detail);
-    PlotArea area{.left = 2.0, .top = 0.0, .width = width - 4.0, .height = 0.0};
-    for (const ReportFigure* figure : figures) {
-      area.height = height_mm(*figure, size) * kPointsPerMm;
-      if (const auto* xy = std::get_if<XyFigure>(figure)) painter.draw(*xy, area);
-      if (const auto* time = std::get_if<TimeFigure>(figure)) painter.draw(*time, area);
-      area.top += area.height;
+    PlotArea area{.left = 2.0, .top = 0.0, .width = column - 4.0, .height = 0.0};
+    for (std::size_t i = 0; i < figures.size(); ++i) {
+      if (i > 0 && i % size.columns == 0) area.top += area.height;
+      area.left = 2.0 + column * static_cast<double>(i % size.columns);
+      area.height = heights[i / size.columns];
+      std::visit([&](const auto& figure) { painter.draw(figure, area); }, *figures[i]);
     }
     require(cairo_status(cairo.get()));
     texts = painter.texts();
@@ -152,8 +165,7 @@ std::vector<const ReportFigure*> figures_of(const ReportDocument& document,
                                             std::string_view preferred) {
   std::vector<const ReportFigure*> all;
   for (const ReportSection& section : document.sections)
-    for (const ReportFigure& figure : section.figures)
-      if (!std::holds_alternative<SvgFigure>(figure)) all.push_back(&figure);
+    for (const ReportFigure& figure : section.figures) all.push_back(&figure);
   if (all.empty())
     throw UsageError({.place = "--plot", .problem = "this result has no figure to draw"});
   const auto containing = [&](std::string_view word) {
@@ -184,12 +196,10 @@ std::vector<const ReportFigure*> figures_of(const ReportDocument& document,
 
 std::string figure_plot(const std::vector<const ReportFigure*>& figures, PlotFormat format,
                         const PlotSize& size) {
-  if (figures.empty() || std::ranges::any_of(figures, [](const ReportFigure* figure) {
-        return std::holds_alternative<SvgFigure>(*figure);
-      }))
+  if (figures.empty() || size.columns == 0)
     throw UsageError({.place = "figure_plot",
-                      .expected = "figures with numbers",
-                      .found = figures.empty() ? "none" : "a figure that is SVG already"});
+                      .expected = "at least one figure and one column",
+                      .found = fmt::format("{} and {}", figures.size(), size.columns)});
   std::string bytes;
   double detail = 1.0;
   for (int attempt = 0; attempt < 8; ++attempt) {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <variant>
 
-#include "sim/experiment_table.hpp"
+#include "sim/experiments/experiment_table.hpp"
 
 namespace torsio {
 namespace {

@@ -8,7 +8,7 @@
 #include "torsio/actuator/wear.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/signal/joint_move.hpp"
-#include "torsio/sim/campaign.hpp"
+#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 

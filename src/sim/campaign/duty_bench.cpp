@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "sim/experiment_table.hpp"
+#include "sim/experiments/experiment_table.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -7,11 +7,11 @@
 
 #include "duty.hpp"
 #include "duty_plants.hpp"
-#include "sim/fault_injector.hpp"
-#include "sim/position_loop.hpp"
-#include "sim/sensor_set.hpp"
-#include "torsio/sim/campaign.hpp"
-#include "torsio/sim/fault_schedule.hpp"
+#include "sim/faults/fault_injector.hpp"
+#include "sim/loops/bench_position_loop.hpp"
+#include "sim/sensors/sensor_set.hpp"
+#include "torsio/sim/campaign/duty_recording.hpp"
+#include "torsio/sim/faults/fault_schedule.hpp"
 
 namespace torsio {
 
@@ -74,7 +74,7 @@ class DutyBench {
     Lane(const DutyLane& from, double run_s);
     SensorSet sensors;
     Duty duty;
-    PositionLoop loop;
+    BenchPositionLoop loop;
     FaultInjector faults;
     bool has_faults;
     bool is_loop_sound;

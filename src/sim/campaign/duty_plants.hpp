@@ -8,7 +8,7 @@
 
 #include "sim/plant/plant.hpp"
 #include "sim/plant/plant_batch.hpp"
-#include "sim/sensor_set.hpp"
+#include "sim/sensors/sensor_set.hpp"
 
 namespace torsio {
 

@@ -5,8 +5,8 @@
 
 #include "core/report_progress.hpp"
 #include "duty_bench.hpp"
-#include "sim/bench_log.hpp"
-#include "sim/experiment_table.hpp"
+#include "sim/experiments/experiment_table.hpp"
+#include "sim/sensors/bench_log.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

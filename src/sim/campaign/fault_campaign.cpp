@@ -18,9 +18,9 @@
 #include "numerics/parallel.hpp"
 #include "numerics/quantile.hpp"
 #include "numerics/shared_progress.hpp"
-#include "sim/experiment_table.hpp"
+#include "sim/experiments/experiment_table.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/sim/campaign.hpp"
+#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 namespace {

@@ -9,7 +9,7 @@
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
-#include "torsio/sim/fault_schedule.hpp"
+#include "torsio/sim/faults/fault_schedule.hpp"
 
 namespace torsio {
 

@@ -8,7 +8,7 @@
 
 #include "joint_monitor.hpp"
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/sim/campaign.hpp"
+#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 

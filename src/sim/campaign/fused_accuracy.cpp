@@ -8,8 +8,8 @@
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/sim/campaign.hpp"
-#include "torsio/sim/campaign/torque_sources.hpp"
+#include "torsio/sim/campaign/duty_recording.hpp"
+#include "torsio/sim/campaign/monitor_recipe.hpp"
 
 namespace torsio {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "duty_bench.hpp"
-#include "sim/experiment_table.hpp"
+#include "sim/experiments/experiment_table.hpp"
 #include "stop_energy.hpp"
 #include "torsio/core/not_measured.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "data/names.hpp"
 #include "safety/valid_source.hpp"
-#include "sim/sensed_channels.hpp"
+#include "sim/sensors/sensed_channels.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

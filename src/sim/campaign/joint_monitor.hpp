@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "sim/sensor_set.hpp"
+#include "sim/sensors/sensor_set.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
 

@@ -11,8 +11,8 @@
 #include "torsio/core/version.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/monitor_file.hpp"
-#include "torsio/sim/campaign.hpp"
-#include "torsio/sim/campaign/torque_sources.hpp"
+#include "torsio/sim/campaign/duty_recording.hpp"
+#include "torsio/sim/campaign/monitor_recipe.hpp"
 
 namespace torsio {
 namespace {

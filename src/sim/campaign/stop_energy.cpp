@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/experiment_table.hpp"
-#include "torsio/control/drive.hpp"
+#include "sim/experiments/experiment_table.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
+#include "torsio/control/design/drive.hpp"
 #include "torsio/control/joint_stop.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"

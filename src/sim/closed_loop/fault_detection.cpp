@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "sim/fault_rules.hpp"
+#include "sim/faults/fault_rules.hpp"
 
 namespace torsio {
 namespace {

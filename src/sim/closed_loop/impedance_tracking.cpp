@@ -10,11 +10,12 @@
 #include <utility>
 #include <variant>
 
-#include "control/loop_design.hpp"
+#include "control/design/loop_design.hpp"
 #include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
-#include "sim/bench.hpp"
-#include "sim/bench_log.hpp"
+#include "sim/bench/bench.hpp"
+#include "sim/sensors/bench_log.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
@@ -278,7 +279,7 @@ TubeImpedance::Settings impedance_settings(const DataSheet& sheet, const Impedan
                       .advice = "For a series-elastic actuator the library has JointImpedance on "
                                 "a torque loop (docs/robot/control.md)."});
   check(spec);
-  TubeImpedance::Settings settings = TubeImpedance::settings_of(
+  TubeImpedance::Settings settings = tube_impedance_settings(
       sheet, spec.kind == ImpedanceSpec::Kind::high ? TubeImpedance::kHigh : TubeImpedance::kZero);
   // A rigid tube twists too little for its encoders.
   if (sheet.variant == "rigid") settings.twist = TubeImpedance::Twist::tube_and_gear;

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "sim/closed_loop/tracking_parts.hpp"
-#include "sim/experiment_table.hpp"
-#include "sim/torque_references.hpp"
+#include "sim/experiments/experiment_table.hpp"
+#include "sim/experiments/torque_references.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 

@@ -11,15 +11,16 @@
 
 #include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
-#include "sim/bench.hpp"
-#include "sim/bench_log.hpp"
+#include "sim/bench/bench.hpp"
 #include "sim/closed_loop/tracking_parts.hpp"
-#include "sim/torque_references.hpp"
+#include "sim/experiments/torque_references.hpp"
+#include "sim/sensors/bench_log.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/common/inputs.hpp"
-#include "torsio/sim/bench_dataset.hpp"
+#include "torsio/sim/experiments/bench_dataset.hpp"
 
 namespace torsio {
 namespace {

@@ -6,14 +6,14 @@
 #include <optional>
 #include <variant>
 
-#include "actuator/parts/brake.hpp"
-#include "actuator/parts/elastomer_coupling.hpp"
-#include "actuator/parts/friction.hpp"
-#include "actuator/parts/gear.hpp"
-#include "actuator/parts/motor.hpp"
-#include "actuator/parts/rubber_spring.hpp"
-#include "actuator/parts/slip_clutch.hpp"
-#include "actuator/parts/spring.hpp"
+#include "parts/brake.hpp"
+#include "parts/elastomer_coupling.hpp"
+#include "parts/friction.hpp"
+#include "parts/gear.hpp"
+#include "parts/motor.hpp"
+#include "parts/rubber_spring.hpp"
+#include "parts/slip_clutch.hpp"
+#include "parts/spring.hpp"
 #include "sim/plant/electrical_drive.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/fault.hpp"

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <variant>
 
-#include "actuator/parts/creep_chain.hpp"
-#include "actuator/parts/maxwell_branches.hpp"
+#include "parts/creep_chain.hpp"
+#include "parts/maxwell_branches.hpp"
 #include "plant_rows.hpp"
 #include "sim/plant/plant.hpp"
 

@@ -15,7 +15,7 @@
 #include "torsio/fit/train_model.hpp"
 #include "torsio/report/drift.hpp"
 #include "torsio/sim/campaign/drift_campaign.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio::test {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "sim/campaign/duty_bench.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/sim/campaign.hpp"
+#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 namespace {

@@ -11,10 +11,10 @@
 #include "torsio/evaluate/monitor_replay.hpp"
 #include "torsio/files/monitor_file.hpp"
 #include "torsio/report/monitor.hpp"
-#include "torsio/sim/campaign.hpp"
+#include "torsio/sim/campaign/duty_recording.hpp"
 #include "torsio/sim/campaign/fault_campaign.hpp"
 #include "torsio/sim/campaign/fused_accuracy.hpp"
-#include "torsio/sim/campaign/torque_sources.hpp"
+#include "torsio/sim/campaign/monitor_recipe.hpp"
 
 namespace torsio {
 namespace {

@@ -15,12 +15,13 @@
 #include "sim/closed_loop/spring_sheet.hpp"
 #include "support/error_message.hpp"
 #include "support/numbers.hpp"
+#include "torsio/actuator/joint_parameters.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/mapping.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
 #include "torsio/report/tracking.hpp"
-#include "torsio/sim/experiment.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

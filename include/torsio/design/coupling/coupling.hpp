@@ -85,8 +85,4 @@ struct CouplingLimit {
 [[nodiscard]] DataSheet coupling_sheet(const std::vector<std::pair<double, double>>& curve,
                                        const std::string& name);
 
-/// Both lobes, not deformed, with the strain of their last steps as colour, and the torque curve.
-[[nodiscard]] std::string coupling_svg(const CouplingTwist& twist,
-                                       const std::vector<std::pair<double, double>>& curve);
-
 }  // namespace torsio::design

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -91,13 +92,19 @@ struct TimeFigure {
   std::vector<Panel> panels = {};
 };
 
-/// A picture that is already SVG, from this program.
-struct SvgFigure {
+/// A value over a part of a plane, as the strain over a mesh: areas filled by colours from blue (0) to red.
+struct FieldFigure {
+  struct Area {
+    std::vector<std::array<double, 2>> corners;  ///< around it
+    double value = 0.0;                          ///< not finite: white
+  };
   std::string title;
-  std::string svg;
+  std::string value_label;  ///< what the colours show
+  double highest = 1.0;     ///< the value of red
+  std::vector<Area> areas;
 };
 
-using ReportFigure = std::variant<XyFigure, TimeFigure, SvgFigure>;
+using ReportFigure = std::variant<XyFigure, TimeFigure, FieldFigure>;
 
 struct ReportSection {
   std::string heading;

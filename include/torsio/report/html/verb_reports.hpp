@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/check/advice.hpp"
+#include "torsio/check/advise/advice.hpp"
 #include "torsio/check/check.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/evaluate/comparison.hpp"

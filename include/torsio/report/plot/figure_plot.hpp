@@ -21,6 +21,7 @@ enum class PlotFormat : std::uint8_t { svg, png, pdf };
 struct PlotSize {
   double width_mm = 85.0;
   double height_mm = 64.0;
+  std::size_t columns = 1;  ///< figures beside each other
 };
 /// @param text such as 85x64mm
 /// @throws UsageError unless both are from 40 to 400 mm.
@@ -36,12 +37,13 @@ inline constexpr std::size_t kMaxPlotBytes = 200'000;
                                                           const std::vector<std::string>& words,
                                                           std::string_view preferred = {});
 
-/// Draws figures under each other, as their page shows them at first: the curves with `is_shown`. Text is DejaVu Sans
+/// Draws figures, in rows of `PlotSize::columns`, as their page shows them at first: the curves with `is_shown`. Text is DejaVu Sans
 /// in 7 points. The colours are by Okabe and Ito (2008); dashes distinguish the curves, too. Minima and maxima of a
 /// time series stay. The same figures give the same bytes.
 /// @return the bytes of a file; PNG has 300 dots per inch or, where it would be too large, fewer; SVG has the texts in
 /// its `desc` element, because cairo draws letters as outlines.
-/// @throws UsageError for a figure that is SVG already; Error if cairo fails.
+/// @throws UsageError if there is no figure or no column, or the file would be larger than `kMaxPlotBytes`; Error if
+/// cairo fails.
 [[nodiscard]] std::string figure_plot(const std::vector<const ReportFigure*>& figures,
                                       PlotFormat format, const PlotSize& size = {});
 

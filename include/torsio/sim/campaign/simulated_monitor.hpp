@@ -9,7 +9,7 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
-#include "torsio/sim/campaign/torque_sources.hpp"
+#include "torsio/sim/campaign/monitor_recipe.hpp"
 
 namespace torsio {
 

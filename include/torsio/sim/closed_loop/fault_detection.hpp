@@ -7,7 +7,7 @@
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/fault.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/sim/fault_schedule.hpp"
+#include "torsio/sim/faults/fault_schedule.hpp"
 
 namespace torsio {
 

@@ -19,7 +19,7 @@
 #include "torsio/sim/closed_loop/fault_detection.hpp"
 #include "torsio/sim/closed_loop/reference.hpp"
 #include "torsio/sim/closed_loop/tracking_score.hpp"
-#include "torsio/sim/fault_schedule.hpp"
+#include "torsio/sim/faults/fault_schedule.hpp"
 
 namespace torsio {
 

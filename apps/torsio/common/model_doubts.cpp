@@ -1,0 +1,109 @@
+#include "common/model_doubts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "common/output.hpp"
+#include "torsio/check/check.hpp"
+#include "torsio/check/motion.hpp"
+
+namespace {
+
+constexpr int kSettled = 2000;  // ticks of 1 ms
+
+/// Deflection range from -torque to torque with the joint at rest; none if the inverse has no
+/// solution.
+std::optional<double> deflection_range_rad(torsio::AnyInverse inverse, double torque_Nm) {
+  double range_rad = 0.0;
+  for (const double sign : {-1.0, 1.0}) {
+    inverse.reset();
+    torsio::Estimate inverted;
+    for (int tick = 0; tick < kSettled; ++tick)
+      inverted = inverse.step(sign * torque_Nm, {.t_s = 1e-3 * tick,
+                                                 .motor_angle_rad = 0.0,
+                                                 .gear_angle_rad = 0.0,
+                                                 .joint_angle_rad = 0.0,
+                                                 .motor_current_A = 0.0});
+    if (inverted.fault != torsio::Fault::none) return std::nullopt;
+    range_rad += sign * inverted.value;
+  }
+  return range_rad;
+}
+
+}  // namespace
+
+void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse,
+                            const torsio::LinearInverse& line, const torsio::DataSheet& sheet,
+                            double torque_Nm) {
+  constexpr double kAnother = 1.4;  // hysteresis and wear of one spring remain below it
+  const auto inverted = deflection_range_rad(std::move(inverse), torque_Nm);
+  const auto swept = deflection_range_rad(line, torque_Nm);
+  if (!inverted || !swept || !(*inverted > 0.0)) return;
+  const double ratio = *inverted / *swept;
+  if (ratio < kAnother && ratio > 1.0 / kAnother) return;
+  remark(
+      fmt::format("warning: for {:.3g} Nm {} deflects the spring {:.2g} times as far as the linear "
+                  "model of {} does: was it "
+                  "trained on another actuator?",
+                  torque_Nm, model, ratio, sheet.name));
+}
+
+void warn_of_failed_checks(const torsio::Dataset& dataset, const torsio::FeatureSpec& features) {
+  for (const torsio::Finding& finding : torsio::check_dataset(dataset, features))
+    if (finding.verdict == torsio::Verdict::fail)
+      remark(
+          fmt::format("warning: torsio check: FAIL {}: {}{}; run it on these recordings for "
+                      "advice",
+                      finding.check, finding.recording.empty() ? "" : finding.recording + ": ",
+                      finding.message));
+}
+
+void warn_of_other_motions(const torsio::Dataset& dataset, const torsio::FeatureSpec& features,
+                           const std::string& place) {
+  for (const torsio::OtherMotion& other : torsio::other_motions(dataset, features))
+    remark(
+        fmt::format("warning: {}{} moves {} in another way than every training recording, with "
+                    "{} of {}: its errors and error bars are those of another kind of motion",
+                    place, other.recording, features.inputs.front(), other.text(), other.nearest));
+}
+
+void warn_of_seen_recordings(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
+  const auto& trained = file.card.training_files;
+  for (const torsio::DatasetRecord& record : dataset.records) {
+    const torsio::Recording& recording = record.recording;
+    const bool is_known = std::ranges::any_of(trained, [&](const torsio::Source& source) {
+      return !source.sha256.empty() && source.sha256 == recording.source.sha256;
+    });
+    if (is_known)
+      remark("warning: the model was trained on " + recording.name() +
+             "; its score is not a held-out score");
+  }
+}
+
+void warn_of_missing_zeros(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
+  for (const torsio::DatasetRecord& record : dataset.records) {
+    const torsio::Recording& recording = record.recording;
+    for (const std::string& channel : file.settings.zeroed_channels) {
+      const bool is_zeroed = std::ranges::any_of(
+          recording.zeros, [&](const torsio::ZeroRule& zero) { return zero.channel == channel; });
+      if (!is_zeroed)
+        remark("warning: the model expects " + channel + " with its zero taken, but " +
+               recording.name() + " has it as measured: use the mapping that it was trained with");
+    }
+  }
+}
+
+void warn_of_another_unit(const torsio::ModelFile& file, const torsio::Dataset& dataset) {
+  for (const torsio::DatasetRecord& record : dataset.records) {
+    const std::string mistake = torsio::unit_doubt(record.recording, file.settings);
+    if (!mistake.empty())
+      remark("warning: " + file.settings.target + " of " + record.recording.name() + " over " +
+             file.settings.features.inputs.front() +
+             " differs from the training data by the factor between " + mistake +
+             ": check the units of the recording");
+  }
+}

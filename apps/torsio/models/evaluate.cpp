@@ -1,0 +1,143 @@
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "common/data_flags.hpp"
+#include "common/model_doubts.hpp"
+#include "common/output.hpp"
+#include "common/progress_bar.hpp"
+#include "common/report_output.hpp"
+#include "common/report_text.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/data/write.hpp"
+#include "torsio/evaluate/comparison.hpp"
+#include "torsio/evaluate/estimate_recording.hpp"
+#include "torsio/files/model_file.hpp"
+#include "torsio/report/html/model_report.hpp"
+#include "torsio/report/html/verb_reports.hpp"
+#include "torsio/report/model_description.hpp"
+#include "torsio/report/results.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct EvaluateFlags {
+  std::string model;
+  DataFlags data;
+  std::string predictions;
+  JsonOutput json;
+  ReportOutput report;
+};
+
+/// Target, estimate, error bar and fault of every sample of one recording: the run that is scored.
+torsio::Recording prediction_recording(const torsio::Estimator& estimator,
+                                       const torsio::Recording& recording,
+                                       const std::string& target, std::size_t initialise) {
+  const torsio::Prediction prediction =
+      torsio::predict(estimator, recording, {&recording.channel(target), initialise});
+  torsio::Channel estimate{torsio::estimate_channel(target), {}};
+  torsio::Channel std_dev{torsio::error_bar_channel(target), {}};
+  torsio::Channel fault{"fault_1", {}};
+  for (const torsio::Estimate& output : prediction.estimates) {
+    estimate.values.push_back(output.value);
+    std_dev.values.push_back(output.std_dev);
+    fault.values.push_back(static_cast<double>(output.fault));
+  }
+  torsio::Recording result(recording.name(), recording.sample_rate_Hz(), recording.time_s(0));
+  result.add(recording.channel(target));
+  result.add(std::move(estimate));
+  result.add(std::move(std_dev));
+  result.add(std::move(fault));
+  return result;
+}
+
+/// Without recordings they would be ignored.
+void require_no_flags_of_recordings(const EvaluateFlags& flags) {
+  for (const auto& [flag, value] : {std::pair{"--predictions", flags.predictions},
+                                    {"--mapping", flags.data.mapping},
+                                    {"--rate", flags.data.rate}})
+    if (!value.empty())
+      throw torsio::UsageError(
+          {.place = flag,
+           .expected = "a recording that it refers to",
+           .found = "none",
+           .advice = "Name the recording after the model: torsio evaluate " + flags.model +
+                     " log.csv. Without one, the description of the model is shown."});
+}
+
+void run(EvaluateFlags& flags) {
+  flags.data.check_outputs(
+      {flags.predictions, flags.json.destination, flags.report.destination, flags.report.plot},
+      {flags.model});
+  const torsio::ModelFile file = torsio::load_model(flags.model);
+  if (flags.data.recordings.empty()) {
+    require_no_flags_of_recordings(flags);
+    ProgressBar progress;
+    const torsio::SlowCycle cycle = torsio::slow_cycle(file, progress.listener());
+    if (flags.json.wants_tables()) print(torsio::model_description(file, cycle));
+    flags.json.write(torsio::model_description_json(file, cycle));
+    if (flags.report.is_wanted()) {
+      torsio::ReportDocument document = torsio::text_report(
+          "Description of " + flags.model,
+          {"Without recordings, only what the file states and what a slow cycle shows."},
+          torsio::model_description(file, cycle));
+      document.sections.push_back(torsio::card_section(file, "Card of the model"));
+      flags.report.write(std::move(document));
+    }
+    return;
+  }
+  DataFlags data = flags.data;
+  data.target = file.settings.target;
+  data.use_model_mapping(file.card.mapping, flags.model);
+  ProgressBar progress;
+  const torsio::Dataset dataset = data.load_as_test(progress.listener());
+  if (!flags.predictions.empty() && dataset.records.size() != 1)
+    throw torsio::UsageError({.place = "--predictions",
+                              .expected = "one recording",
+                              .found = std::to_string(dataset.records.size()),
+                              .advice = "Call evaluate once for each recording."});
+  warn_of_seen_recordings(file, dataset);
+  warn_of_missing_zeros(file, dataset);
+  const torsio::Results results = torsio::evaluate_model(file, dataset, progress.listener());
+  warn_of_another_unit(file, dataset);
+  if (!flags.predictions.empty()) {
+    const torsio::Estimator estimator = torsio::make_estimator(file, dataset.sample_rate_Hz());
+    torsio::write_recording(prediction_recording(estimator, dataset.records.front().recording,
+                                                 dataset.target, dataset.initialise_samples),
+                            flags.predictions);
+  }
+  if (flags.json.wants_tables()) print(evaluation_text(results));
+  flags.json.write(torsio::results_json(results));
+  if (flags.report.is_wanted())
+    flags.report.write(
+        torsio::evaluation_report(results, file, flags.model, dataset, progress.listener()));
+  if (std::ranges::all_of(results.rows,
+                          [](const torsio::ResultRow& row) { return row.status != "ok"; }))
+    throw torsio::Error({.problem = first_failure(results)});
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app) {
+  auto flags = std::make_shared<EvaluateFlags>();
+  CLI::App* verb = app.add_subcommand(
+      "evaluate",
+      "score a model file on recordings; without recordings, show its description, stiffness, loop "
+      "width and friction");
+  verb->footer(
+      "Example: torsio evaluate joint.safetensors validation.csv --predictions out.csv\n"
+      "fault_1 in the predictions is torsio::Fault: 0 none, 1 input not finite, 2 wrong input "
+      "count,\n"
+      "3 warming up, 4 zero not set, 5 outside the training range, 6 recovering, 7 wrong rate,\n"
+      "8 model not finite, 9 diverged (docs/robot/estimator.md)");
+  verb->add_option("MODEL", flags->model, "model file written by torsio fit")->required();
+  flags->data.add_recordings(*verb, "recordings to score on, or a manifest with roles");
+  flags->data.add_model_mapping(*verb);
+  flags->data.add_initialise(*verb);
+  verb->add_option("--predictions", flags->predictions,
+                   "write target, estimate, error bar and fault of one recording as CSV");
+  verb->add_option("--json", flags->json.destination,
+                   "write the results as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
+  verb->callback([flags] { run(*flags); });
+}

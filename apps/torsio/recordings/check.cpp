@@ -1,0 +1,159 @@
+#include "torsio/check/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/data_flags.hpp"
+#include "common/output.hpp"
+#include "common/progress_bar.hpp"
+#include "common/report_output.hpp"
+#include "torsio/check/advise/advice.hpp"
+#include "torsio/core/error.hpp"
+#include "torsio/data/clock.hpp"
+#include "torsio/data/log_summary.hpp"
+#include "torsio/fit/common/inputs.hpp"
+#include "torsio/report/check.hpp"
+#include "torsio/report/html/verb_reports.hpp"
+#include "torsio/report/log_summary.hpp"
+#include "verbs.hpp"
+
+namespace {
+
+struct CheckFlags {
+  DataFlags data;
+  std::vector<std::string> test;
+  bool advise = false;
+  bool list = false;
+  std::vector<std::string> want;
+  JsonOutput json;
+  ReportOutput report;
+};
+
+std::string text_of(const std::vector<torsio::Finding>& findings) {
+  std::string text;
+  for (const torsio::Finding& finding : findings) {
+    text += fmt::format("{}  {}: {}{}\n", torsio::name(finding.verdict), finding.check,
+                        finding.recording.empty() ? "" : finding.recording + ": ", finding.message);
+    if (!finding.advice.empty()) text += fmt::format("      -> {}\n", finding.advice);
+  }
+  return text;
+}
+
+struct Checked {
+  std::vector<torsio::Finding> findings;
+  std::optional<torsio::Advice> advice;
+  std::optional<torsio::Dataset> dataset = {};  ///< none: it could not be read
+  torsio::FeatureSpec spec = {};
+};
+
+std::vector<torsio::WantedRange> wanted_of(const CheckFlags& flags, const torsio::Dataset& dataset,
+                                           const torsio::FeatureSpec& spec) {
+  std::vector<torsio::WantedRange> wanted;
+  for (const std::string& text : flags.want)
+    wanted.push_back(torsio::parse_wanted(text, dataset, spec));
+  return wanted;
+}
+
+/// A recording whose clock is not uniform cannot be read: that is a finding, too.
+Checked checked(const CheckFlags& flags) {
+  try {
+    ProgressBar progress;
+    torsio::Dataset dataset = flags.data.load({}, flags.test, progress.listener());
+    const torsio::FeatureSpec spec = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
+    const auto wanted = wanted_of(flags, dataset, spec);  // a wrong call before any work
+    Checked result{.findings = {{torsio::Verdict::pass, "clock", "", "uniform", ""}}, .advice = {}};
+    std::ranges::move(torsio::check_dataset(dataset, spec), std::back_inserter(result.findings));
+    if (flags.advise && torsio::worst(result.findings) != torsio::Verdict::fail)
+      result.advice = torsio::advise(dataset, spec, wanted, progress.listener());
+    result.dataset = std::move(dataset);
+    result.spec = spec;
+    return result;
+  } catch (const torsio::ClockError& error) {
+    const std::string_view message = error.what();
+    return {
+        .findings = {{torsio::Verdict::fail, "clock", "",
+                      std::string(message.substr(0, message.find('\n'))), error.report().advice}},
+        .advice = {}};
+  }
+}
+
+/// Topics and fields instead of findings: what a mapping can name.
+void list(CheckFlags& flags) {
+  if (flags.data.recordings.size() != 1)
+    throw torsio::UsageError({.place = "--list", .expected = "one recording"});
+  flags.data.check_outputs({flags.json.destination}, flags.test);
+  const torsio::LogSummary summary = [&] {
+    ProgressBar progress;
+    return torsio::list_log(flags.data.recordings.front(), progress.listener());
+  }();
+  if (flags.json.wants_tables()) print(torsio::log_summary_text(summary));
+  flags.json.write(torsio::log_summary_json(summary));
+}
+
+void run(CheckFlags& flags) {
+  if (flags.list) return list(flags);
+  if (!flags.want.empty() && !flags.advise)
+    throw torsio::UsageError({.place = "--want",
+                              .problem = "it states the intended use for --advise",
+                              .advice = "Add --advise."});
+  flags.data.check_outputs({flags.json.destination, flags.report.destination, flags.report.plot},
+                           flags.test);
+  const Checked result = checked(flags);
+  const torsio::Verdict verdict = torsio::worst(result.findings);
+  if (flags.json.wants_tables()) {
+    print(text_of(result.findings) +
+          fmt::format("{}: {}\n", torsio::name(verdict),
+                      verdict == torsio::Verdict::fail   ? "fix this before training"
+                      : verdict == torsio::Verdict::warn ? "a model can be trained; read the "
+                                                           "warnings"
+                                                         : "a model can be trained on this"));
+    if (result.advice) print("\n" + torsio::advice_text(*result.advice));
+  }
+  const torsio::Advice* const advice = result.advice ? &*result.advice : nullptr;
+  flags.json.write(torsio::check_json(result.findings, advice));
+  if (flags.report.is_wanted())
+    flags.report.write(torsio::check_report(
+        result.findings, result.dataset ? &*result.dataset : nullptr, result.spec, advice));
+  if (verdict == torsio::Verdict::fail)
+    throw torsio::Error({.problem = "the recordings did not pass",
+                         .advice = flags.advise ? "There is no advice on further recordings until "
+                                                  "they do: its errors would be those of the fault."
+                                                : ""});
+}
+
+}  // namespace
+
+void add_check(CLI::App& app) {
+  auto flags = std::make_shared<CheckFlags>();
+  CLI::App* verb =
+      app.add_subcommand("check", "check whether a model can be trained on recordings");
+  verb->footer(
+      "Example: torsio check sweep1.csv sweep2.csv --test other_lever.csv\n"
+      "         torsio check sweep*.csv --advise --want input=-5deg:5deg --want "
+      "frequency=0.05Hz:2Hz\n"
+      "--advise divides the recordings into strokes and fits a quick model with some of them left\n"
+      "out: docs/use/what_to_record.md.");
+  flags->data.add_recordings(*verb, "recordings, or a manifest");
+  flags->data.add_mapping(*verb);
+  flags->data.add_target_and_inputs(*verb);
+  verb->add_option("--test", flags->test,
+                   "held-out recordings: are they inside the training range?");
+  verb->add_flag("--list", flags->list,
+                 "topics, rates, gaps and fields of an MCAP file or rosbag2 folder, for a mapping");
+  verb->add_flag("--advise", flags->advise,
+                 "what to record next: the motion or condition whose absence costs most");
+  verb->add_option(
+          "--want", flags->want,
+          "range that the model is used in, QUANTITY=LOWEST:HIGHEST with input, frequency, "
+          "speed (of the first input) or a condition (default: the range of the "
+          "recordings)")
+      ->allow_extra_args(false);
+  verb->add_option("--json", flags->json.destination,
+                   "write the findings as JSON to a file, or - for standard output");
+  flags->report.add(*verb);
+  verb->callback([flags] { run(*flags); });
+}
