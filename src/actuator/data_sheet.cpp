@@ -24,8 +24,8 @@ struct ActuatorName {
   std::optional<unsigned> serial;
 };
 
-[[noreturn]] void refuse(std::string_view what, std::string expected, std::string_view found,
-                         std::span<const std::string_view> known = {}) {
+[[noreturn]] void refuse_name(std::string_view what, std::string expected, std::string_view found,
+                              std::span<const std::string_view> known = {}) {
   const std::string nearest = did_you_mean(found, known);
   throw UsageError(
       {.place = "actuator",
@@ -39,7 +39,7 @@ std::optional<unsigned> serial_of(std::string_view digits) {
   unsigned serial = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), serial);
   if (error != std::errc() || end != digits.data() + digits.size() || serial > 9999)
-    refuse("serial number", "0 to 9999 after the #, as dfki-300#03", digits);
+    refuse_name("serial number", "0 to 9999 after the #, as dfki-300#03", digits);
   return serial;
 }
 
@@ -52,7 +52,7 @@ ActuatorName parse(std::string_view text) {
   if (const auto mark = name.base.find(':'); mark != std::string_view::npos) {
     name.variant = name.base.substr(mark + 1);
     name.base = name.base.substr(0, mark);
-    if (name.variant.empty()) refuse("variant", "a name after the colon", text);
+    if (name.variant.empty()) refuse_name("variant", "a name after the colon", text);
   }
   return name;
 }
@@ -79,15 +79,15 @@ DataSheet data_sheet(std::string_view name) {
   if (found == sheets.end()) {
     std::vector<std::string_view> known(sheets.size());
     std::ranges::transform(sheets, known.begin(), &DataSheet::name);
-    refuse("name", one_of(known), parts.base, known);
+    refuse_name("name", one_of(known), parts.base, known);
   }
   DataSheet sheet = *found;
   if (!parts.variant.empty()) {
     std::vector<std::string_view> known(sheet.variants.begin(), sheet.variants.end());
     std::erase(known, "");
     if (std::ranges::find(known, parts.variant) == known.end()) {
-      refuse(fmt::format("variant of {}", sheet.name),
-             known.empty() ? "none: it has no variants" : one_of(known), parts.variant, known);
+      refuse_name(fmt::format("variant of {}", sheet.name),
+                  known.empty() ? "none: it has no variants" : one_of(known), parts.variant, known);
     }
     set_variant(sheet, parts.variant);
   }

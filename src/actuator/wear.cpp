@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "actuator/stage_wear.hpp"
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
@@ -68,12 +68,6 @@ class Ageing {
   StageWear wear_;
 };
 
-void require(bool holds, const char* what, std::string expected, double found) {
-  if (holds) return;
-  throw UsageError(
-      {.place = what, .expected = std::move(expected), .found = fmt::format("{:g}", found)});
-}
-
 }  // namespace
 
 void check(const OperatingConditions& conditions) {
@@ -84,13 +78,15 @@ void check(const OperatingConditions& conditions) {
   const std::string range =
       fmt::format("{:g} to {:g} K (-40 to 85 degC)", Limits::kColdest_K, Limits::kHottest_K);
   const double last_K = conditions.temperature_K + conditions.warm_up_K;
-  require(is_possible(conditions.temperature_K), "temperature", range, conditions.temperature_K);
-  require(is_possible(last_K), "temperature after the warm-up", range, last_K);
-  require(conditions.warm_up_time_s >= Limits::kShortestWarmUp_s &&
-              std::isfinite(conditions.warm_up_time_s),
-          "warm-up time", fmt::format("at least {:g} s", Limits::kShortestWarmUp_s),
-          conditions.warm_up_time_s);
-  require(conditions.age >= 0.0 && conditions.age <= 1.0, "age", "0 to 1", conditions.age);
+  require<UsageError>(is_possible(conditions.temperature_K), "temperature", range,
+                      conditions.temperature_K);
+  require<UsageError>(is_possible(last_K), "temperature after the warm-up", range, last_K);
+  require<UsageError>(conditions.warm_up_time_s >= Limits::kShortestWarmUp_s &&
+                          std::isfinite(conditions.warm_up_time_s),
+                      "warm-up time", fmt::format("at least {:g} s", Limits::kShortestWarmUp_s),
+                      conditions.warm_up_time_s);
+  require<UsageError>(conditions.age >= 0.0 && conditions.age <= 1.0, "age", "0 to 1",
+                      conditions.age);
 }
 
 double temperature(const OperatingConditions& conditions, double time_s) noexcept {

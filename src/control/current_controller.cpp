@@ -60,7 +60,8 @@ void Windings::check() const {
   require_positive(kWindings, "resistance_Ohm", resistance_Ohm);
   require_positive(kWindings, "inductance_H", inductance_H);
   require_positive(kWindings, "torque_constant_Nm_A", torque_constant_Nm_A);
-  require(pole_pairs >= 1 && pole_pairs <= 100, kWindings, "pole_pairs from 1 to 100", pole_pairs);
+  require_parameter(pole_pairs >= 1 && pole_pairs <= 100, kWindings, "pole_pairs from 1 to 100",
+                    pole_pairs);
 }
 
 Windings windings_of(const Drive& drive, double inductance_H, int pole_pairs) {
@@ -78,17 +79,18 @@ CurrentController::CurrentController(const Settings& settings, double pwm_Hz)
   require_positive(kPlace, "pwm_Hz", pwm_Hz);
   require_positive(kPlace, "bandwidth_rad_s", settings.bandwidth_rad_s);
   require_positive(kPlace, "peak_current_A", settings.peak_current_A);
-  require(
+  require_parameter(
       settings.trip_current_A > settings.peak_current_A && std::isfinite(settings.trip_current_A),
       kPlace, fmt::format("a trip current above the peak of {} A", settings.peak_current_A),
       settings.trip_current_A);
   period_s_ = 1.0 / pwm_Hz;
   const double margin_rad =
       0.5 * std::numbers::pi - settings.bandwidth_rad_s * kDelayPeriods * period_s_;
-  require(margin_rad >= kLeastPhaseMargin_rad, kPlace,
-          fmt::format("a bandwidth of at most {:.5g} rad/s at {} Hz: a phase margin of 45 degrees",
-                      kLeastPhaseMargin_rad / (kDelayPeriods * period_s_), pwm_Hz),
-          settings.bandwidth_rad_s);
+  require_parameter(
+      margin_rad >= kLeastPhaseMargin_rad, kPlace,
+      fmt::format("a bandwidth of at most {:.5g} rad/s at {} Hz: a phase margin of 45 degrees",
+                  kLeastPhaseMargin_rad / (kDelayPeriods * period_s_), pwm_Hz),
+      settings.bandwidth_rad_s);
   const Windings& windings = settings.windings;
   inductance_H_ = windings.inductance_H;
   flux_Vs_ = windings.flux_Vs();

@@ -21,12 +21,13 @@ JointCascade::Settings checked(const JointCascade::Settings& settings, double sa
   settings.drive.check();
   require_positive(kPlace, "sample_rate_Hz", sample_rate_Hz);
   const double max_rad_s = kMaxBandwidthShare * sample_rate_Hz;
-  require(settings.bandwidth_rad_s > 0.0 && settings.bandwidth_rad_s <= max_rad_s, kPlace,
-          fmt::format("0 < bandwidth_rad_s <= {}", max_rad_s), settings.bandwidth_rad_s);
+  require_parameter(settings.bandwidth_rad_s > 0.0 && settings.bandwidth_rad_s <= max_rad_s, kPlace,
+                    fmt::format("0 < bandwidth_rad_s <= {}", max_rad_s), settings.bandwidth_rad_s);
   require_not_negative(kPlace, "max_unmeasured_load_Nm", settings.limits.max_unmeasured_load_Nm);
   require_not_negative(kPlace, "max_measured_load_Nm", settings.limits.max_measured_load_Nm);
   require_positive(kPlace, "speed_rad_s", settings.limits.speed_rad_s);
-  require(settings.limits.torque_Nm > 0.0, kPlace, "torque_Nm > 0", settings.limits.torque_Nm);
+  require_parameter(settings.limits.torque_Nm > 0.0, kPlace, "torque_Nm > 0",
+                    settings.limits.torque_Nm);
   require_positive(kPlace, "fault_decay_s", settings.fault_decay_s);
   require_positive(kPlace, "transfer_s", settings.transfer_s);
   return settings;

@@ -17,9 +17,9 @@ JointImpedance::Settings checked(const JointImpedance::Settings& settings, doubl
   require_positive(kPlace, "sample_rate_Hz", sample_rate_Hz);
   require_not_negative(kPlace, "stiffness_Nm_rad", settings.gains.stiffness_Nm_rad);
   require_not_negative(kPlace, "damping_Nms_rad", settings.gains.damping_Nms_rad);
-  require(settings.torque_Nm > 0.0, kPlace, "torque_Nm > 0", settings.torque_Nm);
-  require(settings.torque_rate_Nm_s > 0.0, kPlace, "torque_rate_Nm_s > 0",
-          settings.torque_rate_Nm_s);
+  require_parameter(settings.torque_Nm > 0.0, kPlace, "torque_Nm > 0", settings.torque_Nm);
+  require_parameter(settings.torque_rate_Nm_s > 0.0, kPlace, "torque_rate_Nm_s > 0",
+                    settings.torque_rate_Nm_s);
   require_positive(kPlace, "transfer_s", settings.transfer_s);
   require_positive(kPlace, "fault_decay_s", settings.fault_decay_s);
   return settings;

@@ -32,10 +32,10 @@ JointStop::Settings checked(const JointStop::Settings& settings, double sample_r
   require_not_negative(kPlace, "brake_release_s", settings.brake_release_s);
   require_not_negative(kPlace, "load_Nm", settings.load_Nm);
   require_positive(kPlace, "takeover_s", settings.takeover_s);
-  require(settings.brake_static_Nm >= settings.brake_sliding_Nm, kPlace,
-          fmt::format("a static torque of the brake of at least the sliding {:.4g} Nm",
-                      settings.brake_sliding_Nm),
-          settings.brake_static_Nm);
+  require_parameter(settings.brake_static_Nm >= settings.brake_sliding_Nm, kPlace,
+                    fmt::format("a static torque of the brake of at least the sliding {:.4g} Nm",
+                                settings.brake_sliding_Nm),
+                    settings.brake_static_Nm);
   if (!(settings.brake_sliding_Nm > settings.load_Nm))
     throw Error({.place = kPlace,
                  .problem = "the brake is weaker than the load",
@@ -46,14 +46,15 @@ JointStop::Settings checked(const JointStop::Settings& settings, double sample_r
   const Drive& drive = settings.drive;
   const double strongest_rad_s2 =
       drive.torque_per_current() * drive.rated_current_A / drive.inertia();
-  require(settings.deceleration_rad_s2 <= strongest_rad_s2, kPlace,
-          fmt::format("a deceleration that the rated current makes, up to {:.4g} rad/s2",
-                      strongest_rad_s2),
-          settings.deceleration_rad_s2);
-  require(settings.speed_rad_s <= settings.deceleration_rad_s2 * settings.longest_ramp_s, kPlace,
-          fmt::format("a ramp that ends within longest_ramp_s, from a speed up to {:.4g} rad/s",
-                      settings.deceleration_rad_s2 * settings.longest_ramp_s),
-          settings.speed_rad_s);
+  require_parameter(settings.deceleration_rad_s2 <= strongest_rad_s2, kPlace,
+                    fmt::format("a deceleration that the rated current makes, up to {:.4g} rad/s2",
+                                strongest_rad_s2),
+                    settings.deceleration_rad_s2);
+  require_parameter(
+      settings.speed_rad_s <= settings.deceleration_rad_s2 * settings.longest_ramp_s, kPlace,
+      fmt::format("a ramp that ends within longest_ramp_s, from a speed up to {:.4g} rad/s",
+                  settings.deceleration_rad_s2 * settings.longest_ramp_s),
+      settings.speed_rad_s);
   return settings;
 }
 

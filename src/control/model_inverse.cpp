@@ -18,28 +18,21 @@ constexpr auto kPlace = "spring inverse";
 constexpr std::string_view kDeflection = "spring_deflection_rad";
 constexpr std::string_view kTorque = "torque_Nm";
 
-[[noreturn]] void refuse(std::string expected, std::string found, std::string advice = {}) {
-  throw Error({.place = kPlace,
-               .expected = std::move(expected),
-               .found = std::move(found),
-               .advice = std::move(advice)});
-}
-
 EstimatorSettings checked(EstimatorSettings settings, const AnyModel& model) {
   if (!model.can_invert())
-    refuse("a family with an inverse", fmt::format("'{}'", model.family()),
+    refuse(kPlace, "a family with an inverse", fmt::format("'{}'", model.family()),
            "Train one the other way round: --target spring_deflection_rad.");
   const std::vector<std::string>& inputs = settings.features.inputs;
   if (inputs.empty() || inputs.front() != kDeflection)
-    refuse(fmt::format("{} as the first input", kDeflection),
+    refuse(kPlace, fmt::format("{} as the first input", kDeflection),
            inputs.empty() ? "no input" : fmt::format("'{}'", inputs.front()));
   if (settings.fallback.slope.empty() || !(settings.fallback.slope.front() > 0.0))
-    refuse("a fallback whose torque rises with the deflection", "one that does not");
+    refuse(kPlace, "a fallback whose torque rises with the deflection", "one that does not");
   return settings;
 }
 
 double departure_rad(const EstimatorSettings& settings, double max_departure) {
-  require(max_departure >= 0.0, kPlace, "max_departure >= 0", max_departure);
+  require_parameter(max_departure >= 0.0, kPlace, "max_departure >= 0", max_departure);
   const double residual_Nm = settings.fallback.residual_std;
   return std::isfinite(residual_Nm) ? max_departure * residual_Nm / settings.fallback.slope.front()
                                     : std::numeric_limits<double>::infinity();
@@ -48,17 +41,17 @@ double departure_rad(const EstimatorSettings& settings, double max_departure) {
 /// Index of the torque among the raw inputs of an inverse model.
 std::size_t torque_place(const Estimator& estimator) {
   if (estimator.settings().target != kDeflection)
-    refuse(fmt::format("a model whose target is {}", kDeflection),
+    refuse(kPlace, fmt::format("a model whose target is {}", kDeflection),
            fmt::format("the target '{}'", estimator.settings().target));
   for (const std::string& channel : estimator.settings().zeroed_channels)
     if (channel == "gear_angle_rad" || channel == "joint_angle_rad" || channel == kDeflection)
-      refuse("a deflection as it is measured",
+      refuse(kPlace, "a deflection as it is measured",
              fmt::format("one relative to the zero of {}", channel),
              "Train it without zero rules for the angles, or train a model of the torque, which "
              "can be inverted.");
   const auto place = std::ranges::find(estimator.raw_inputs(), kTorque);
   if (place == estimator.raw_inputs().end())
-    refuse(fmt::format("a model with {} among its inputs", kTorque),
+    refuse(kPlace, fmt::format("a model with {} among its inputs", kTorque),
            fmt::format("{}", fmt::join(estimator.raw_inputs(), ", ")));
   return static_cast<std::size_t>(place - estimator.raw_inputs().begin());
 }

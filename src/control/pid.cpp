@@ -44,9 +44,10 @@ Pid::Pid(const Settings& settings, double sample_rate_Hz)
   require_not_negative(kPlace, "proportional gain", gains_.proportional);
   require_not_negative(kPlace, "integral gain", gains_.integral);
   require_not_negative(kPlace, "derivative gain", gains_.derivative);
-  require(limits_.lowest < limits_.highest, kPlace,
-          fmt::format("a highest command above the lowest, {}", limits_.lowest), limits_.highest);
-  require(limits_.rate_per_s > 0.0, kPlace, "rate_per_s > 0", limits_.rate_per_s);
+  require_parameter(limits_.lowest < limits_.highest, kPlace,
+                    fmt::format("a highest command above the lowest, {}", limits_.lowest),
+                    limits_.highest);
+  require_parameter(limits_.rate_per_s > 0.0, kPlace, "rate_per_s > 0", limits_.rate_per_s);
   if (tracking_s_) require_positive(kPlace, "tracking_s", *tracking_s_);
   set_tracking_share();
   reset();

@@ -14,7 +14,7 @@ constexpr auto kPlace = "spring inverse";
 LinearInverse::LinearInverse(double stiffness_Nm_rad, double offset_Nm)
     : stiffness_Nm_rad_(stiffness_Nm_rad), offset_Nm_(offset_Nm) {
   require_positive(kPlace, "stiffness_Nm_rad", stiffness_Nm_rad);
-  require(std::isfinite(offset_Nm), kPlace, "a finite offset", offset_Nm);
+  require_parameter(std::isfinite(offset_Nm), kPlace, "a finite offset", offset_Nm);
 }
 
 }  // namespace torsio

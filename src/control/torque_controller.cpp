@@ -22,11 +22,11 @@ TorqueLoopCore::Settings checked(const TorqueLoopCore::Settings& settings) {
                  .problem = "the deflection controller acts on the speed",
                  .expected = "no disturbance observer and no feed-forward of the rate",
                  .advice = "Leave both out, or let it act on the current."});
-  require(settings.largest_torque_Nm > 0.0, kPlace, "largest_torque_Nm > 0",
-          settings.largest_torque_Nm);
+  require_parameter(settings.largest_torque_Nm > 0.0, kPlace, "largest_torque_Nm > 0",
+                    settings.largest_torque_Nm);
   if (settings.friction) {
-    require(settings.friction->share >= 0.0 && settings.friction->share <= 1.0, kPlace,
-            "a friction share from 0 to 1", settings.friction->share);
+    require_parameter(settings.friction->share >= 0.0 && settings.friction->share <= 1.0, kPlace,
+                      "a friction share from 0 to 1", settings.friction->share);
     require_positive(kPlace, "speed_rad_s of the friction", settings.friction->speed_rad_s);
   }
   return settings;

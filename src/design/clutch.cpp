@@ -5,28 +5,28 @@
 #include <cmath>
 #include <numbers>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
 
 void check(const ClutchDemand& d) {
-  const auto require = [](bool holds, const char* name, const char* expected, double found) {
-    if (!holds)
-      throw UsageError({.place = std::string("clutch: ") + name,
-                        .expected = expected,
-                        .found = fmt::format("{:g}", found)});
-  };
-  require(d.slip_Nm > 0.0 && std::isfinite(d.slip_Nm), "slip torque", "more than 0 Nm", d.slip_Nm);
-  require(d.inner_m >= 0.0 && d.outer_m > d.inner_m && std::isfinite(d.outer_m), "outer radius",
-          "more than the inner radius, in m", d.outer_m);
-  require(d.least_friction > 0.0 && d.least_friction <= d.friction, "least friction",
-          "above 0, at most the nominal friction", d.least_friction);
-  require(d.largest_friction >= d.friction && d.largest_friction < 2.0, "largest friction",
-          "at least the nominal friction, below 2", d.largest_friction);
-  require(d.surfaces >= 1 && d.surfaces <= 100, "surfaces", "1 to 100", d.surfaces);
-  require(d.parallel >= 1 && d.parallel <= 100, "washers in parallel", "1 to 100", d.parallel);
-  require(d.series >= 1 && d.series <= 100, "packs in series", "1 to 100", d.series);
+  require<UsageError>(d.slip_Nm > 0.0 && std::isfinite(d.slip_Nm), {"clutch", "slip torque"},
+                      "more than 0 Nm", d.slip_Nm);
+  require<UsageError>(d.inner_m >= 0.0 && d.outer_m > d.inner_m && std::isfinite(d.outer_m),
+                      {"clutch", "outer radius"}, "more than the inner radius, in m", d.outer_m);
+  require<UsageError>(d.least_friction > 0.0 && d.least_friction <= d.friction,
+                      {"clutch", "least friction"}, "above 0, at most the nominal friction",
+                      d.least_friction);
+  require<UsageError>(d.largest_friction >= d.friction && d.largest_friction < 2.0,
+                      {"clutch", "largest friction"}, "at least the nominal friction, below 2",
+                      d.largest_friction);
+  require<UsageError>(d.surfaces >= 1 && d.surfaces <= 100, {"clutch", "surfaces"}, "1 to 100",
+                      d.surfaces);
+  require<UsageError>(d.parallel >= 1 && d.parallel <= 100, {"clutch", "washers in parallel"},
+                      "1 to 100", d.parallel);
+  require<UsageError>(d.series >= 1 && d.series <= 100, {"clutch", "packs in series"}, "1 to 100",
+                      d.series);
   check(d.washer);
 }
 

@@ -7,31 +7,28 @@
 #include <limits>
 #include <utility>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
 
 constexpr double kHistory_s = 1.0;
 
-[[noreturn]] void refuse(std::string expected, std::string found) {
-  throw Error(
-      {.place = "monitored torque", .expected = std::move(expected), .found = std::move(found)});
-}
+constexpr std::string_view kPlace = "monitored torque";
 
 double checked_rate(const TorqueSources& sources, const RedundancySettings& redundancy,
                     const MonitorSettings& monitor) {
   if (sources.size() != redundancy.sources.size() || sources.size() != monitor.sources.size())
-    refuse("one model for each source of the redundancy and of the monitor",
+    refuse(kPlace, "one model for each source of the redundancy and of the monitor",
            fmt::format("{} models, {} and {} sources", sources.size(), redundancy.sources.size(),
                        monitor.sources.size()));
   for (std::size_t i = 0; i < sources.size(); ++i)
     if (redundancy.sources[i].name != monitor.sources[i])
-      refuse(fmt::format("source {} to be '{}'", i + 1, redundancy.sources[i].name),
+      refuse(kPlace, fmt::format("source {} to be '{}'", i + 1, redundancy.sources[i].name),
              fmt::format("'{}' in the monitor", monitor.sources[i]));
   const double rate_Hz = sources.sample_rate_Hz();
   if (std::abs(monitor.sample_period_s * rate_Hz - 1.0) > 1e-9)
-    refuse(fmt::format("a monitor with the period of the sources, {} s", 1.0 / rate_Hz),
+    refuse(kPlace, fmt::format("a monitor with the period of the sources, {} s", 1.0 / rate_Hz),
            fmt::format("{} s", monitor.sample_period_s));
   return rate_Hz;
 }

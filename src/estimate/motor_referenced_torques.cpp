@@ -15,7 +15,8 @@ constexpr double kSteepness = 100.0;  // s/deg, (16): atan(100 q̇)
 
 void require_finite(const DeflectionTorque& of, const std::string& name) {
   const auto require_number = [&](double value, const char* coefficient) {
-    require(std::isfinite(value), kPlace, name + " " + coefficient + " to be finite", value);
+    require_parameter(std::isfinite(value), kPlace, name + " " + coefficient + " to be finite",
+                      value);
   };
   require_number(of.offset_Nm, "offset_Nm");
   require_number(of.stiffness_Nm_rad, "stiffness_Nm_rad");

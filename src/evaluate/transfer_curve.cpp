@@ -7,9 +7,9 @@
 #include <map>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
-#include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/train_model.hpp"
 
@@ -37,10 +37,8 @@ std::map<std::string, std::string> fit_options(const ModelCard& card) {
 }
 
 void require_positive_time(double seconds) {
-  if (!(seconds > 0.0) || !std::isfinite(seconds))
-    throw UsageError({.place = "time of the new data that is used",
-                      .expected = "more than 0 s",
-                      .found = fmt::format("{} s", seconds)});
+  require<UsageError>(seconds > 0.0 && std::isfinite(seconds), "time of the new data that is used",
+                      "more than 0 s", as_text(seconds) + " s");
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -19,11 +20,10 @@ namespace {
 
 constexpr std::size_t kLongestEmpty = 65536;
 
-[[noreturn]] void refuse_tensor(std::string place, std::string expected, std::string found) {
-  throw Error({.place = std::move(place),
-               .expected = std::move(expected),
-               .found = std::move(found),
-               .advice = "The contents of the file do not match its card: fit the model again."});
+[[noreturn]] void refuse_tensor(const ErrorPlace& place, std::string_view expected,
+                                std::string_view found) {
+  refuse(place, expected, found,
+         "The contents of the file do not match its card: fit the model again.");
 }
 
 /// The values of a tensor that must have that element type and number of dimensions.

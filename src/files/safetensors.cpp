@@ -12,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "files/json_text.hpp"
 #include "torsio/core/error.hpp"
 
@@ -36,11 +37,9 @@ constexpr auto kElementTypes =
     std::to_array<ElementType>({{"F64", 8}, {"I64", 8}, {"F32", 4}, {"U8", 1}});
 static_assert(kElementTypes.size() == std::variant_size_v<Tensor::Values>);
 
-[[noreturn]] void refuse(std::string place, std::string expected, std::string found) {
-  throw Error({.place = std::move(place),
-               .expected = std::move(expected),
-               .found = std::move(found),
-               .advice = std::string(kDamaged)});
+[[noreturn]] void refuse_file(const ErrorPlace& place, std::string_view expected,
+                              std::string_view found) {
+  refuse(place, expected, found, kDamaged);
 }
 
 /// `first` times all factors; nothing if that overflows.
@@ -66,10 +65,10 @@ struct Entry {
 
 std::vector<std::size_t> sizes(const json& list, std::size_t most, const std::string& place) {
   if (!list.is_array() || list.size() > most)
-    refuse(place, fmt::format("a list of at most {} sizes", most), list.type_name());
+    refuse_file(place, fmt::format("a list of at most {} sizes", most), list.type_name());
   std::vector<std::size_t> result;
   for (const json& size : list) {
-    if (!size.is_number_unsigned()) refuse(place, "whole numbers from 0", size.dump());
+    if (!size.is_number_unsigned()) refuse_file(place, "whole numbers from 0", size.dump());
     result.push_back(size.get<std::size_t>());
   }
   return result;
@@ -77,42 +76,43 @@ std::vector<std::size_t> sizes(const json& list, std::size_t most, const std::st
 
 const json& member(const json& object, const char* key, const std::string& place) {
   const auto found = object.find(key);
-  if (found == object.end()) refuse(place, fmt::format("the key '{}'", key), "none");
+  if (found == object.end()) refuse_file(place, fmt::format("the key '{}'", key), "none");
   return *found;
 }
 
 Entry parse_entry(const std::string& name, const json& value, const std::string& place) {
   if (!value.is_object() || value.size() != 3)
-    refuse(place, "an object of dtype, shape and data_offsets", value.type_name());
+    refuse_file(place, "an object of dtype, shape and data_offsets", value.type_name());
   Entry entry;
   entry.name = name;
   const json& type = member(value, "dtype", place);
   const auto* const known = std::ranges::find_if(
       kElementTypes, [&](const ElementType& known_type) { return type == known_type.name; });
   if (known == kElementTypes.end())
-    refuse(place + "/dtype", R"("F64", "I64", "F32" or "U8")", type.dump());
+    refuse_file(place + "/dtype", R"("F64", "I64", "F32" or "U8")", type.dump());
   entry.type = static_cast<std::size_t>(known - kElementTypes.begin());
   entry.shape = sizes(member(value, "shape", place), kMaxDimensions, place + "/shape");
   const auto offsets = sizes(member(value, "data_offsets", place), 2, place + "/data_offsets");
   if (offsets.size() != 2 || offsets[0] > offsets[1])
-    refuse(place + "/data_offsets", "begin and end", fmt::format("{}", offsets));
+    refuse_file(place + "/data_offsets", "begin and end", fmt::format("{}", offsets));
   entry.begin = offsets[0];
   entry.end = offsets[1];
 
   const auto bytes = product(entry.shape, known->bytes);
   if (bytes != entry.end - entry.begin)
-    refuse(place,
-           fmt::format("{} bytes for {} {}", bytes ? fmt::format("{}", *bytes) : "countless",
-                       known->name, shape_text(entry.shape)),
-           fmt::format("{}", entry.end - entry.begin));
+    refuse_file(place,
+                fmt::format("{} bytes for {} {}", bytes ? fmt::format("{}", *bytes) : "countless",
+                            known->name, shape_text(entry.shape)),
+                fmt::format("{}", entry.end - entry.begin));
   return entry;
 }
 
 std::map<std::string, std::string> parse_metadata(const json& value, const std::string& place) {
-  if (!value.is_object()) refuse(place, "an object of strings", value.type_name());
+  if (!value.is_object()) refuse_file(place, "an object of strings", value.type_name());
   std::map<std::string, std::string> metadata;
   for (const auto& [key, text] : value.items()) {
-    if (!text.is_string()) refuse(fmt::format("{}/{}", place, key), "a string", text.type_name());
+    if (!text.is_string())
+      refuse_file(fmt::format("{}/{}", place, key), "a string", text.type_name());
     metadata[key] = text.get<std::string>();
   }
   return metadata;
@@ -126,15 +126,16 @@ void check_layout(std::vector<Entry>& entries, std::size_t data_bytes, std::stri
   for (const Entry& entry : entries) {
     const std::string where = fmt::format("{}: /{}/data_offsets", place, entry.name);
     if (entry.begin != at)
-      refuse(where, fmt::format("begin {}, where the tensor before it ends", at),
-             fmt::format("{} ({})", entry.begin, entry.begin < at ? "overlap" : "gap"));
+      refuse_file(where, fmt::format("begin {}, where the tensor before it ends", at),
+                  fmt::format("{} ({})", entry.begin, entry.begin < at ? "overlap" : "gap"));
     if (entry.end > data_bytes)
-      refuse(where, fmt::format("an end within the {} bytes of data", data_bytes),
-             fmt::format("{}", entry.end));
+      refuse_file(where, fmt::format("an end within the {} bytes of data", data_bytes),
+                  fmt::format("{}", entry.end));
     at = entry.end;
   }
   if (at != data_bytes)
-    refuse(std::string(place), fmt::format("{} bytes of data", at), fmt::format("{}", data_bytes));
+    refuse_file(std::string(place), fmt::format("{} bytes of data", at),
+                fmt::format("{}", data_bytes));
 }
 
 template <class T>
@@ -162,8 +163,8 @@ bool is_text(std::span<const std::byte> bytes) {
 
 std::string_view header_of(std::span<const std::byte> bytes, std::string_view place) {
   if (bytes.size() < kLengthBytes)
-    refuse(std::string(place), "a safetensors file of at least 8 bytes",
-           fmt::format("{} bytes", bytes.size()));
+    refuse_file(std::string(place), "a safetensors file of at least 8 bytes",
+                fmt::format("{} bytes", bytes.size()));
   std::uint64_t length = 0;
   std::memcpy(&length, bytes.data(), kLengthBytes);
   if (length > kMaxHeaderBytes)
@@ -176,8 +177,8 @@ std::string_view header_of(std::span<const std::byte> bytes, std::string_view pl
                          "then the recordings."
                        : "This is not a safetensors file, or torsio did not write it."});
   if (length > bytes.size() - kLengthBytes)
-    refuse(fmt::format("{}: header", place), fmt::format("{} bytes", length),
-           fmt::format("{} (the file is truncated)", bytes.size() - kLengthBytes));
+    refuse_file(fmt::format("{}: header", place), fmt::format("{} bytes", length),
+                fmt::format("{} (the file is truncated)", bytes.size() - kLengthBytes));
   return {reinterpret_cast<const char*>(bytes.data()) + kLengthBytes, length};
 }
 
@@ -203,7 +204,7 @@ Safetensors parse_safetensors(std::span<const std::byte> bytes, std::string_view
   const auto data = bytes.subspan(kLengthBytes + text.size());
   const json header = parse_json(text, fmt::format("{}: header", place));
   if (!header.is_object())
-    refuse(fmt::format("{}: header", place), "a JSON object", header.type_name());
+    refuse_file(fmt::format("{}: header", place), "a JSON object", header.type_name());
 
   Safetensors contents;
   std::vector<Entry> entries;

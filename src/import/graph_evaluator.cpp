@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio::graph {
 namespace {
@@ -27,10 +27,7 @@ std::string title(const Node& node) {
 
 void refuse(const Graph& graph, const Node& node, std::string expected, std::string found,
             std::string advice) {
-  throw Error({.place = fmt::format("{}: {}", graph.place, title(node)),
-               .expected = std::move(expected),
-               .found = std::move(found),
-               .advice = std::move(advice)});
+  torsio::refuse({graph.place, title(node)}, expected, found, advice);
 }
 
 std::int64_t integer(const Node& node, const char* attribute, std::int64_t otherwise) {

@@ -9,8 +9,8 @@
 #include <cstring>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "import/graph_value.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -20,14 +20,6 @@ constexpr std::int64_t kFirstOpset = 7;
 constexpr std::int64_t kLastOpset = 21;
 
 static_assert(std::endian::native == std::endian::little, "raw data of ONNX are little-endian");
-
-[[noreturn]] void refuse(std::string place, std::string expected, std::string found,
-                         std::string advice = {}) {
-  throw Error({.place = std::move(place),
-               .expected = std::move(expected),
-               .found = std::move(found),
-               .advice = std::move(advice)});
-}
 
 void check_count(std::size_t expected, std::size_t found, const char* of,
                  const std::string& place) {

@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "core/checks.hpp"
 #include "data/names.hpp"
 #include "files/json_text.hpp"
 #include "files/safetensors.hpp"
 #include "torsio/core/did_you_mean.hpp"
-#include "torsio/core/error.hpp"
 #include "torsio/import/foreign_network.hpp"
 
 namespace torsio {
@@ -51,14 +51,6 @@ struct NaturalOrder {
   }
 };
 using Tensors = std::map<std::string, Weights, NaturalOrder>;
-
-[[noreturn]] void refuse(std::string place, std::string expected, std::string found,
-                         std::string advice = {}) {
-  throw Error({.place = std::move(place),
-               .expected = std::move(expected),
-               .found = std::move(found),
-               .advice = std::move(advice)});
-}
 
 /// A misspelt key would otherwise be a missing one, or ignored.
 void refuse_unknown_keys(const json& object, std::span<const std::string_view> known,

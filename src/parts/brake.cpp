@@ -12,9 +12,10 @@ constexpr auto kPlace = "brake";
 const Brake::Parameters& checked(const Brake::Parameters& parameters) {
   require_positive(kPlace, "sliding_Nm", parameters.sliding_Nm);
   require_positive(kPlace, "static_Nm", parameters.static_Nm);
-  require(parameters.static_Nm >= parameters.sliding_Nm, kPlace,
-          fmt::format("a static torque of at least the sliding {} Nm", parameters.sliding_Nm),
-          parameters.static_Nm);
+  require_parameter(
+      parameters.static_Nm >= parameters.sliding_Nm, kPlace,
+      fmt::format("a static torque of at least the sliding {} Nm", parameters.sliding_Nm),
+      parameters.static_Nm);
   require_positive(kPlace, "bristle_rad", parameters.bristle_rad);
   require_positive(kPlace, "stribeck_rad_s", parameters.stribeck_rad_s);
   require_positive(kPlace, "activation_V", parameters.activation_V);

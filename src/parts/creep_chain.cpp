@@ -22,8 +22,8 @@ CreepChain::CreepChain(double stiffness_Nm_rad,
     require_positive(kPlace, "branch stiffness_Nm_rad", branch_[i]);
     require_positive(kPlace, "relaxation_s", branches.relaxation_s[i]);
     pole_[i] = 1.0 / branches.relaxation_s[i];
-    require(pole_[i] > slower_1_s, kPlace, "relaxation_s falling from branch to branch",
-            branches.relaxation_s[i]);
+    require_parameter(pole_[i] > slower_1_s, kPlace, "relaxation_s falling from branch to branch",
+                      branches.relaxation_s[i]);
     slower_1_s = pole_[i];
     stiffness_ += branch_[i];
   }

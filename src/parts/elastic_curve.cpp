@@ -26,9 +26,9 @@ ElasticCurve::ElasticCurve(const Parameters& parameters)
   require_positive(kPlace, "stiffness_Nm_rad", parameters.stiffness_Nm_rad);
   require_not_negative(kPlace, "half_gap_rad", parameters.half_gap_rad);
   require_not_negative(kPlace, "stage_stiffness_Nm_rad", parameters.stage_stiffness_Nm_rad);
-  require(std::abs(parameters.asymmetry) < 1.0, kPlace, "asymmetry inside -1..1",
-          parameters.asymmetry);
-  require(parameters.stage_rad >= 0.0, kPlace, "stage_rad >= 0", parameters.stage_rad);
+  require_parameter(std::abs(parameters.asymmetry) < 1.0, kPlace, "asymmetry inside -1..1",
+                    parameters.asymmetry);
+  require_parameter(parameters.stage_rad >= 0.0, kPlace, "stage_rad >= 0", parameters.stage_rad);
   if (!std::isfinite(parameters.stage_rad)) return;
   double below = parameters.stage_rad;
   double above = parameters.stage_rad + parameters.half_gap_rad;

@@ -26,16 +26,16 @@ ElastomerCoupling::ElastomerCoupling(const Parameters& parameters)
     : parameters_(parameters), chain_(chain_of(parameters)), slip_(parameters.slip) {
   const auto [first, second, third] = parameters.output_Nm;
   require_positive(kPlace, "output_Nm[0]", first);
-  require(std::isfinite(second), kPlace, "output_Nm[1] finite", second);
-  require((third < 0.0 && std::isfinite(third)) || (second == 0.0 && third == 0.0), kPlace,
-          "output_Nm[2] < 0 and finite (or a linear output)", third);
+  require_parameter(std::isfinite(second), kPlace, "output_Nm[1] finite", second);
+  require_parameter((third < 0.0 && std::isfinite(third)) || (second == 0.0 && third == 0.0),
+                    kPlace, "output_Nm[2] < 0 and finite (or a linear output)", third);
   quadratic_ = second / (first * first);
   cubic_ = third / (first * first * first);
   require_positive(kPlace, "slip_load_Nm", parameters.slip_load_Nm);
-  require(parameters.slip.load_factor == 0.0, kPlace, "slip load_factor = 0",
-          parameters.slip.load_factor);
-  require(parameters.creep_per_cycle >= 0.0 && parameters.creep_per_cycle < 1.0, kPlace,
-          "creep_per_cycle in 0..1", parameters.creep_per_cycle);
+  require_parameter(parameters.slip.load_factor == 0.0, kPlace, "slip load_factor = 0",
+                    parameters.slip.load_factor);
+  require_parameter(parameters.creep_per_cycle >= 0.0 && parameters.creep_per_cycle < 1.0, kPlace,
+                    "creep_per_cycle in 0..1", parameters.creep_per_cycle);
   require_not_negative(kPlace, "cycle_dead_band_rad", parameters.cycle_dead_band_rad);
   // g = T + a T² + b T³, and g′ = 1 + 2 a T + 3 b T² = 0, solved for 1 / T.
   const double root = std::sqrt(quadratic_ * quadratic_ - 3.0 * cubic_);

@@ -21,10 +21,10 @@ LuGreFriction::LuGreFriction(const Parameters& parameters)
   require_not_negative(kPlace, "viscous_Nms_rad", parameters.viscous_Nms_rad);
   require_positive(kPlace, "stribeck_rad_s", parameters.stribeck_rad_s);
   require_positive(kPlace, "bristle_rad", parameters.bristle_rad);
-  require(parameters.static_ratio >= 1.0 && std::isfinite(parameters.static_ratio), kPlace,
-          "static_ratio >= 1", parameters.static_ratio);
-  require(parameters.coulomb_Nm > 0.0 || parameters.load_factor == 0.0, kPlace,
-          "coulomb_Nm > 0 beside a load_factor", parameters.coulomb_Nm);
+  require_parameter(parameters.static_ratio >= 1.0 && std::isfinite(parameters.static_ratio),
+                    kPlace, "static_ratio >= 1", parameters.static_ratio);
+  require_parameter(parameters.coulomb_Nm > 0.0 || parameters.load_factor == 0.0, kPlace,
+                    "coulomb_Nm > 0 beside a load_factor", parameters.coulomb_Nm);
 }
 
 }  // namespace torsio

@@ -20,8 +20,8 @@ LuGreSlip::LuGreSlip(const Parameters& parameters)
   require_not_negative(kPlace, "load_factor", parameters.load_factor);
   require_positive(kPlace, "stribeck_rad_s", parameters.stribeck_rad_s);
   require_positive(kPlace, "bristle_rad", parameters.bristle_rad);
-  require(parameters.static_ratio >= 1.0 && std::isfinite(parameters.static_ratio), kPlace,
-          "static_ratio >= 1", parameters.static_ratio);
+  require_parameter(parameters.static_ratio >= 1.0 && std::isfinite(parameters.static_ratio),
+                    kPlace, "static_ratio >= 1", parameters.static_ratio);
 }
 
 }  // namespace torsio

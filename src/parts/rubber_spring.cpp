@@ -41,8 +41,9 @@ RubberSpring::RubberSpring(const Parameters& parameters)
   require_positive(kPlace, "stiffness_Nm_rad", parameters.stiffness_Nm_rad);
   require_positive(kPlace, "blend_rad", parameters.blend_rad);
   require_positive(kPlace, "elastic_share", parameters.elastic_share);
-  require(kSteepestBlend * std::abs(parameters.asymmetry_Nm_rad) < parameters.stiffness_Nm_rad,
-          kPlace, "1.2 |asymmetry_Nm_rad| < stiffness_Nm_rad", parameters.asymmetry_Nm_rad);
+  require_parameter(
+      kSteepestBlend * std::abs(parameters.asymmetry_Nm_rad) < parameters.stiffness_Nm_rad, kPlace,
+      "1.2 |asymmetry_Nm_rad| < stiffness_Nm_rad", parameters.asymmetry_Nm_rad);
 }
 
 void RubberSpring::reset(double deflection_rad) noexcept {

@@ -14,8 +14,8 @@ constexpr auto kTorqueSensor = "torque sensor";
 /// The number of ticks of a time. @throws Error if it is not an integer.
 std::size_t whole_ticks(double time_s, double tick_s, const std::string& what) {
   const double ticks = std::round(time_s / tick_s);
-  require(std::abs(ticks * tick_s - time_s) < 1e-6 * tick_s, kTorqueSensor,
-          what + " that is a whole number of loop ticks", time_s / tick_s);
+  require_parameter(std::abs(ticks * tick_s - time_s) < 1e-6 * tick_s, kTorqueSensor,
+                    what + " that is a whole number of loop ticks", time_s / tick_s);
   return static_cast<std::size_t>(ticks);
 }
 
@@ -27,10 +27,11 @@ Encoder::Encoder(const Parameters& parameters, Random& random)
       jitter_lsb_(parameters.jitter_lsb),
       offset_rad_(random.uniform() * lsb_rad_),
       zero_rad_(parameters.zero_rad) {
-  require(parameters.bits >= 1.0 && parameters.bits <= 40.0, "encoder", "1..40 bits",
-          parameters.bits);
+  require_parameter(parameters.bits >= 1.0 && parameters.bits <= 40.0, "encoder", "1..40 bits",
+                    parameters.bits);
   require_not_negative("encoder", "jitter_lsb", parameters.jitter_lsb);
-  require(std::isfinite(parameters.zero_rad), "encoder", "a finite zero_rad", parameters.zero_rad);
+  require_parameter(std::isfinite(parameters.zero_rad), "encoder", "a finite zero_rad",
+                    parameters.zero_rad);
 }
 
 CurrentSensor::CurrentSensor(const Parameters& parameters) : noise_A_(parameters.noise_A) {
@@ -45,8 +46,8 @@ TorqueSensor::TorqueSensor(const Parameters& parameters, double tick_s)
   require_positive(kTorqueSensor, "tick_s", tick_s);
   ticks_per_sample_ = whole_ticks(1.0 / parameters.sample_rate_Hz, tick_s, "a sample period");
   latency_ticks_ = whole_ticks(parameters.latency_s, tick_s, "a latency");
-  require(ticks_per_sample_ > latency_ticks_, kTorqueSensor, "a latency below the sample period",
-          parameters.latency_s);
+  require_parameter(ticks_per_sample_ > latency_ticks_, kTorqueSensor,
+                    "a latency below the sample period", parameters.latency_s);
 }
 
 void TorqueSensor::reset(double torque_Nm, Random& random) noexcept {

@@ -19,7 +19,8 @@ SlipClutch::SlipClutch(const Parameters& parameters)
   require_positive(kPlace, "stiffness_Nm_rad", parameters.stiffness_Nm_rad);
   require_positive(kPlace, "static_torque_Nm", parameters.static_torque_Nm);
   require_positive(kPlace, "sliding_ratio", parameters.sliding_ratio);
-  require(parameters.sliding_ratio <= 1.0, kPlace, "sliding_ratio <= 1", parameters.sliding_ratio);
+  require_parameter(parameters.sliding_ratio <= 1.0, kPlace, "sliding_ratio <= 1",
+                    parameters.sliding_ratio);
   require_not_negative(kPlace, "damping_Nms_rad", parameters.damping_Nms_rad);
 }
 

@@ -10,10 +10,10 @@
 #include <set>
 #include <thread>
 
+#include "core/checks.hpp"
 #include "realtime/block_file.hpp"
 #include "realtime/block_format.hpp"
 #include "realtime/frame_ring.hpp"
-#include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -45,10 +45,8 @@ void check_channels(const std::vector<std::string>& channels) {
 }
 
 void check_range(const char* what, double value, double least, double most) {
-  if (!(value >= least && value <= most))
-    throw UsageError({.place = fmt::format("recorder: {}", what),
-                      .expected = fmt::format("from {} to {}", least, most),
-                      .found = fmt::format("{}", value)});
+  require<UsageError>(value >= least && value <= most, {"recorder", what},
+                      fmt::format("from {} to {}", least, most), value);
 }
 
 std::size_t bytes_of_frame(const RecorderOptions& options) noexcept {

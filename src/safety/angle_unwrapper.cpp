@@ -1,10 +1,8 @@
 #include "torsio/safety/angle_unwrapper.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
@@ -12,21 +10,16 @@ namespace {
 /// Beyond so many turns an expected angle has too few digits, and is not an angle.
 constexpr double kMaxTurns = 1e6;
 
-void require(bool holds, const char* place, const char* expected, double found) {
-  if (!holds)
-    throw Error({.place = fmt::format("angle unwrapper: {}", place),
-                 .expected = expected,
-                 .found = fmt::format("{}", found)});
-}
+constexpr std::string_view kPlace = "angle unwrapper";
 
 }  // namespace
 
 AngleUnwrapper::AngleUnwrapper(const Settings& settings) : settings_(settings) {
-  require(settings.turn_rad > 0.0 && std::isfinite(settings.turn_rad), "turn_rad",
+  require(settings.turn_rad > 0.0 && std::isfinite(settings.turn_rad), {kPlace, "turn_rad"},
           "a positive number", settings.turn_rad);
   require(
       settings.largest_change_rad > 0.0 && settings.largest_change_rad < 0.5 * settings.turn_rad,
-      "largest_change_rad", "above 0, below half a turn", settings.largest_change_rad);
+      {kPlace, "largest_change_rad"}, "above 0, below half a turn", settings.largest_change_rad);
 }
 
 void AngleUnwrapper::set_turn(double raw_rad, double near_rad) noexcept {

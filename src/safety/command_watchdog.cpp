@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 #include "torsio/core/time_distance.hpp"
 
 namespace torsio {
@@ -14,26 +14,19 @@ namespace {
 constexpr double kLongest_s = 3600.0;
 
 std::int64_t checked_ns(double timeout_s) {
-  if (!(timeout_s > 0.0 && timeout_s <= kLongest_s))
-    throw Error({.place = "command watchdog: timeout_s",
-                 .expected = fmt::format("above 0, at most {}", kLongest_s),
-                 .found = fmt::format("{}", timeout_s)});
+  require(timeout_s > 0.0 && timeout_s <= kLongest_s, "command watchdog: timeout_s",
+          fmt::format("above 0, at most {}", kLongest_s), timeout_s);
   return std::llround(timeout_s * 1e9);
 }
 
 std::int64_t checked_ahead_ns(double longest_ahead_s) {
-  if (!(longest_ahead_s >= 0.0 && longest_ahead_s <= kLongest_s))
-    throw Error({.place = "command watchdog: longest_ahead_s",
-                 .expected = fmt::format("0 to {}", kLongest_s),
-                 .found = fmt::format("{}", longest_ahead_s)});
+  require(longest_ahead_s >= 0.0 && longest_ahead_s <= kLongest_s,
+          "command watchdog: longest_ahead_s", fmt::format("0 to {}", kLongest_s), longest_ahead_s);
   return std::llround(longest_ahead_s * 1e9);
 }
 
 double checked_s(double longest_fault_s) {
-  if (!(longest_fault_s > 0.0))
-    throw Error({.place = "command watchdog: longest_fault_s",
-                 .expected = "above 0",
-                 .found = fmt::format("{}", longest_fault_s)});
+  require(longest_fault_s > 0.0, "command watchdog: longest_fault_s", "above 0", longest_fault_s);
   return longest_fault_s;
 }
 

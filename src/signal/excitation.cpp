@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -16,27 +17,21 @@ namespace {
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kMaxHoldSamples = 1e15;  // still counted exactly
 
-void require(bool is_right, std::string_view signal, std::string_view parameter,
-             std::string expected, double found) {
-  if (is_right && std::isfinite(found)) return;
-  throw UsageError({.place = fmt::format("{}: {}", signal, parameter),
-                    .expected = std::move(expected),
-                    .found = fmt::format("{}", found)});
-}
-
 void require_finite(std::string_view signal, std::string_view parameter, double value) {
-  require(true, signal, parameter, "a finite number", value);
+  require<UsageError>(std::isfinite(value), {signal, parameter}, "a finite number", value);
 }
 
-void require_positive(std::string_view signal, std::string_view parameter, double value) {
-  require(value > 0.0, signal, parameter, "a positive number", value);
+void require_positive_number(std::string_view signal, std::string_view parameter, double value) {
+  require<UsageError>(value > 0.0 && std::isfinite(value), {signal, parameter}, "a positive number",
+                      value);
 }
 
 void require_frequency(std::string_view signal, double frequency_Hz, double sample_rate_Hz) {
-  require_positive(signal, "sample rate", sample_rate_Hz);
-  require(frequency_Hz >= 0.0 && frequency_Hz < 0.5 * sample_rate_Hz, signal, "frequency",
-          fmt::format("at least 0 and below {} Hz, half the sample rate", 0.5 * sample_rate_Hz),
-          frequency_Hz);
+  require_positive_number(signal, "sample rate", sample_rate_Hz);
+  require<UsageError>(
+      frequency_Hz >= 0.0 && frequency_Hz < 0.5 * sample_rate_Hz, {signal, "frequency"},
+      fmt::format("at least 0 and below {} Hz, half the sample rate", 0.5 * sample_rate_Hz),
+      frequency_Hz);
 }
 
 }  // namespace
@@ -46,7 +41,7 @@ Chirp::Chirp(const Parameters& parameters, double sample_rate_Hz)
   require_finite("chirp", "amplitude", parameters.amplitude);
   require_frequency("chirp", parameters.start_Hz, sample_rate_Hz);
   require_frequency("chirp", parameters.end_Hz, sample_rate_Hz);
-  require_positive("chirp", "duration", parameters.duration_s);
+  require_positive_number("chirp", "duration", parameters.duration_s);
 }
 
 double Chirp::step() noexcept {
@@ -65,9 +60,9 @@ LogSweep::LogSweep(const Parameters& parameters, double sample_rate_Hz)
   require_finite("log sweep", "amplitude", parameters.amplitude);
   require_frequency("log sweep", parameters.start_Hz, sample_rate_Hz);
   require_frequency("log sweep", parameters.end_Hz, sample_rate_Hz);
-  require_positive("log sweep", "start frequency", parameters.start_Hz);
-  require_positive("log sweep", "end frequency", parameters.end_Hz);
-  require_positive("log sweep", "duration", parameters.duration_s);
+  require_positive_number("log sweep", "start frequency", parameters.start_Hz);
+  require_positive_number("log sweep", "end frequency", parameters.end_Hz);
+  require_positive_number("log sweep", "duration", parameters.duration_s);
 }
 
 double LogSweep::step() noexcept {
@@ -112,10 +107,10 @@ TrapezoidSweep::TrapezoidSweep(const Parameters& parameters, double sample_rate_
     : first_(parameters.amplitude, parameters),
       next_(2.0 * parameters.amplitude, parameters),
       clock_(sample_rate_Hz) {
-  require_positive("trapezoid sweep", "sample rate", sample_rate_Hz);
-  require_positive("trapezoid sweep", "amplitude", parameters.amplitude);
-  require_positive("trapezoid sweep", "speed", parameters.speed);
-  require_positive("trapezoid sweep", "acceleration", parameters.acceleration);
+  require_positive_number("trapezoid sweep", "sample rate", sample_rate_Hz);
+  require_positive_number("trapezoid sweep", "amplitude", parameters.amplitude);
+  require_positive_number("trapezoid sweep", "speed", parameters.speed);
+  require_positive_number("trapezoid sweep", "acceleration", parameters.acceleration);
 }
 
 double TrapezoidSweep::step() noexcept {
@@ -157,7 +152,8 @@ BandLimitedNoise::BandLimitedNoise(const Parameters& parameters, double sample_r
       lowpass_(parameters.cutoff_Hz, sample_rate_Hz),
       step_std_(parameters.rms / lowpass_.noise_gain()),
       random_(parameters.seed) {
-  require(parameters.rms >= 0.0, "random walk", "rms", "at least 0", parameters.rms);
+  require<UsageError>(parameters.rms >= 0.0 && std::isfinite(parameters.rms),
+                      {"random walk", "rms"}, "at least 0", parameters.rms);
   reset();
 }
 
@@ -177,7 +173,8 @@ QuasiPeriodic::QuasiPeriodic(const Parameters& parameters, double sample_rate_Hz
     : parameters_(parameters), sample_rate_Hz_(sample_rate_Hz), random_(parameters.seed) {
   require_finite("quasi-periodic", "amplitude", parameters.amplitude);
   const auto require_spread = [](std::string_view name, double spread) {
-    require(spread >= 0.0 && spread <= 0.3, "quasi-periodic", name, "0 to 0.3", spread);
+    require<UsageError>(spread >= 0.0 && spread <= 0.3, {"quasi-periodic", name}, "0 to 0.3",
+                        spread);
   };
   require_spread("amplitude spread", parameters.amplitude_spread);
   require_spread("period spread", parameters.period_spread);
@@ -216,8 +213,8 @@ double QuasiPeriodic::step() noexcept {
 
 Replay::Replay(Parameters parameters, double sample_rate_Hz)
     : parameters_(std::move(parameters)), clock_(sample_rate_Hz) {
-  require_positive("replay", "sample rate", sample_rate_Hz);
-  require_positive("replay", "rate of the values", parameters_.recorded_Hz);
+  require_positive_number("replay", "sample rate", sample_rate_Hz);
+  require_positive_number("replay", "rate of the values", parameters_.recorded_Hz);
   if (parameters_.values.empty())
     throw UsageError({.place = "replay", .expected = "at least one value", .found = "none"});
   for (const double value : parameters_.values) require_finite("replay", "values", value);
@@ -236,13 +233,13 @@ double Replay::step() noexcept {
 }
 
 Steps::Steps(Parameters parameters, double sample_rate_Hz) : levels_(std::move(parameters.levels)) {
-  require_positive("steps", "sample rate", sample_rate_Hz);
+  require_positive_number("steps", "sample rate", sample_rate_Hz);
   if (levels_.empty())
     throw UsageError({.place = "steps", .expected = "at least one level", .found = "none"});
   for (const double level : levels_) require_finite("steps", "level", level);
   const double hold_samples = std::round(parameters.hold_s * sample_rate_Hz);
-  require(
-      hold_samples >= 1.0 && hold_samples < kMaxHoldSamples, "steps", "hold time",
+  require<UsageError>(
+      hold_samples >= 1.0 && hold_samples < kMaxHoldSamples, {"steps", "hold time"},
       fmt::format("from one sample ({} s) to {} samples", 1.0 / sample_rate_Hz, kMaxHoldSamples),
       parameters.hold_s);
   hold_samples_ = static_cast<std::uint64_t>(hold_samples);

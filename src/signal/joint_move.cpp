@@ -8,26 +8,22 @@
 #include <string>
 #include <string_view>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
 
 void require_positive_number(std::string_view name, double value) {
-  if (value > 0.0 && std::isfinite(value)) return;
-  throw UsageError({.place = fmt::format("joint move: {}", name),
-                    .expected = "a positive number",
-                    .found = fmt::format("{}", value)});
+  require<UsageError>(value > 0.0 && std::isfinite(value), {"joint move", name},
+                      "a positive number", value);
 }
 
 std::vector<double> distinct(std::vector<double> waypoints_rad) {
   if (waypoints_rad.empty())
     throw UsageError({.place = "joint move", .expected = "at least one waypoint", .found = "none"});
   for (const double waypoint_rad : waypoints_rad) {
-    if (!std::isfinite(waypoint_rad))
-      throw UsageError({.place = "joint move: waypoints",
-                        .expected = "finite angles",
-                        .found = fmt::format("{}", waypoint_rad)});
+    require<UsageError>(std::isfinite(waypoint_rad), "joint move: waypoints", "finite angles",
+                        waypoint_rad);
   }
   waypoints_rad.erase(std::unique(waypoints_rad.begin(), waypoints_rad.end()), waypoints_rad.end());
   return waypoints_rad;

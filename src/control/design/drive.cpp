@@ -15,9 +15,9 @@ void Drive::check() const {
   require_not_negative(kPlace, "coulomb_Nm", coulomb_Nm);
   require_positive(kPlace, "rated_current_A", rated_current_A);
   require_positive(kPlace, "peak_current_A", peak_current_A);
-  require(peak_current_A >= rated_current_A, kPlace,
-          fmt::format("a peak current of at least the rated {} A", rated_current_A),
-          peak_current_A);
+  require_parameter(peak_current_A >= rated_current_A, kPlace,
+                    fmt::format("a peak current of at least the rated {} A", rated_current_A),
+                    peak_current_A);
   require_positive(kPlace, "current_time_constant_s", current_time_constant_s);
   require_positive(kPlace, "supply_V", supply_V);
   require_positive(kPlace, "resistance_Ohm", resistance_Ohm);

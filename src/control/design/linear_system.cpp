@@ -52,9 +52,9 @@ void require_fit(bool fits, const char* what, std::size_t expected, std::size_t 
 }
 
 void require_one_rate(const LinearSystem& one, const LinearSystem& other) {
-  require(one.sample_rate_Hz() == other.sample_rate_Hz(), kPlace,
-          fmt::format("systems of one sample rate, {} Hz", one.sample_rate_Hz()),
-          other.sample_rate_Hz());
+  require_parameter(one.sample_rate_Hz() == other.sample_rate_Hz(), kPlace,
+                    fmt::format("systems of one sample rate, {} Hz", one.sample_rate_Hz()),
+                    other.sample_rate_Hz());
 }
 
 }  // namespace
@@ -70,7 +70,7 @@ LinearSystem::LinearSystem(Matrices matrices, double sample_rate_Hz)
   require_fit(c.rows == d.rows, "outputs of C", d.rows, c.rows);
   for (const Matrix* const part : {&a, &b, &c, &d}) {
     for (const double value : part->values)
-      require(std::isfinite(value), kPlace, "finite numbers", value);
+      require_parameter(std::isfinite(value), kPlace, "finite numbers", value);
   }
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio::design {
 namespace {
@@ -30,31 +30,31 @@ Point on_chord(const LobeShape& shape, double radius_mm) {
   return {x_mm, offset_mm + slope * x_mm};
 }
 
-[[noreturn]] void refuse(const char* expected, const std::string& found, const char* advice) {
-  throw UsageError(
-      {.place = "geometry of the lobe", .expected = expected, .found = found, .advice = advice});
+[[noreturn]] void refuse_shape(std::string_view expected, std::string_view found,
+                               std::string_view advice = {}) {
+  refuse<UsageError>("geometry of the lobe", expected, found, advice);
 }
 
 void check_numbers(const LobeShape& s) {
   for (const double value : {s.outer_radius_mm, s.root_radius_mm, s.half_width_mm, s.slot_angle_deg,
                              s.flank_radius_mm, s.taper_mm, s.ring_radius_mm})
-    if (!std::isfinite(value)) refuse("finite numbers", fmt::format("{}", value), "");
+    if (!std::isfinite(value)) refuse_shape("finite numbers", as_text(value));
   if (!(s.root_radius_mm > 0.0 && s.outer_radius_mm > s.root_radius_mm))
-    refuse("0 < root radius < outer radius",
-           fmt::format("root {} mm, outer {} mm", s.root_radius_mm, s.outer_radius_mm),
-           "exchange or correct the radii");
+    refuse_shape("0 < root radius < outer radius",
+                 fmt::format("root {} mm, outer {} mm", s.root_radius_mm, s.outer_radius_mm),
+                 "exchange or correct the radii");
   if (!(s.half_width_mm > 0.0 && s.half_width_mm < s.root_radius_mm))
-    refuse("0 < half width < root radius", fmt::format("{} mm", s.half_width_mm),
-           "choose a narrower slot");
+    refuse_shape("0 < half width < root radius", fmt::format("{} mm", s.half_width_mm),
+                 "choose a narrower slot");
   if (!(std::abs(s.slot_angle_deg) < 90.0))
-    refuse("a slot angle between -90 and 90 degrees", fmt::format("{} degrees", s.slot_angle_deg),
-           "choose a smaller angle");
+    refuse_shape("a slot angle between -90 and 90 degrees",
+                 fmt::format("{} degrees", s.slot_angle_deg), "choose a smaller angle");
   if (!(s.taper_mm >= 0.0 && s.taper_mm < 0.5 * (s.outer_radius_mm - s.root_radius_mm)))
-    refuse("a taper from 0 to half of the lobe's height", fmt::format("{} mm", s.taper_mm),
-           "choose a smaller taper");
+    refuse_shape("a taper from 0 to half of the lobe's height", fmt::format("{} mm", s.taper_mm),
+                 "choose a smaller taper");
   if (!(s.ring_radius_mm >= 0.0 && s.ring_radius_mm < 0.95 * s.root_radius_mm))
-    refuse("a radius of the ring from 0 (no ring) to 0.95 times the root radius",
-           fmt::format("{} mm", s.ring_radius_mm), "choose a smaller radius");
+    refuse_shape("a radius of the ring from 0 (no ring) to 0.95 times the root radius",
+                 fmt::format("{} mm", s.ring_radius_mm), "choose a smaller radius");
 }
 
 }  // namespace
@@ -77,8 +77,8 @@ const LobeShape& paper_lobe(std::string_view name) {
   const auto found = std::find_if(lobes.begin(), lobes.end(),
                                   [&](const NamedLobe& lobe) { return lobe.name == name; });
   if (found == lobes.end())
-    refuse("alpha, beta, gamma, delta, epsilon, zeta or eta", std::string(name),
-           "choose one of these names");
+    refuse_shape("alpha, beta, gamma, delta, epsilon, zeta or eta", std::string(name),
+                 "choose one of these names");
   return found->shape;
 }
 
@@ -124,22 +124,22 @@ void check_lobe(const LobeShape& shape, double least_jaw_mm) {
   const Point b = on_chord(shape, shape.outer_radius_mm);
   const double chord_mm = std::hypot(b.x_mm - a.x_mm, b.y_mm - a.y_mm);
   if (shape.flank_radius_mm != 0.0 && std::abs(shape.flank_radius_mm) < 0.5 * chord_mm)
-    refuse("a flank radius of at least half the flank's chord",
-           fmt::format("{} mm for a chord of {:.3f} mm", shape.flank_radius_mm, chord_mm),
-           "choose a larger flank radius, or 0 for a straight flank");
+    refuse_shape("a flank radius of at least half the flank's chord",
+                 fmt::format("{} mm for a chord of {:.3f} mm", shape.flank_radius_mm, chord_mm),
+                 "choose a larger flank radius, or 0 for a straight flank");
   for (int i = 0; i <= kRadiiChecked; ++i) {
     const double radius_mm = std::lerp(shape.root_radius_mm, shape.outer_radius_mm,
                                        static_cast<double>(i) / kRadiiChecked);
     if (!(flank_angle_rad(shape, radius_mm) > 0.0))
-      refuse("flanks that do not cross the lobe's axis",
-             fmt::format("no rubber left at radius {:.3f} mm", radius_mm),
-             "choose a wider slot, a larger flank radius or a larger angle");
+      refuse_shape("flanks that do not cross the lobe's axis",
+                   fmt::format("no rubber left at radius {:.3f} mm", radius_mm),
+                   "choose a wider slot, a larger flank radius or a larger angle");
   }
   const double jaw_mm = thinnest_jaw_mm(shape);
   if (!(jaw_mm >= least_jaw_mm))
-    refuse("jaws between the lobes",
-           fmt::format("{:.3f} mm, at least {} mm are needed", jaw_mm, least_jaw_mm),
-           "choose a narrower slot or a smaller slot angle");
+    refuse_shape("jaws between the lobes",
+                 fmt::format("{:.3f} mm, at least {} mm are needed", jaw_mm, least_jaw_mm),
+                 "choose a narrower slot or a smaller slot angle");
 }
 
 }  // namespace torsio::design

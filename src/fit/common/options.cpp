@@ -9,9 +9,9 @@
 #include <cmath>
 #include <vector>
 
+#include "core/checks.hpp"
 #include "fit/common/option_fields.hpp"
 #include "torsio/core/did_you_mean.hpp"
-#include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 
 namespace torsio {
@@ -74,10 +74,9 @@ std::string names_of(std::span<const OptionInfo> options) {
   return list.empty() ? "no option at all" : "one of " + list;
 }
 
-[[noreturn]] void refuse(const OptionInfo& option, std::string expected, std::string_view found) {
-  throw UsageError({.place = fmt::format("option {}", option.name),
-                    .expected = std::move(expected),
-                    .found = fmt::format("\"{}\"", found)});
+[[noreturn]] void refuse_option(const OptionInfo& option, std::string_view expected,
+                                std::string_view found) {
+  refuse<UsageError>(fmt::format("option {}", option.name), expected, fmt::format("\"{}\"", found));
 }
 
 }  // namespace
@@ -101,7 +100,7 @@ Options::Options(std::span<const OptionInfo> known,
                         .expected = names_of(known),
                         .advice = did_you_mean(option_name, names)});
     }
-    if (!is_valid(*option, value)) refuse(*option, expected_of(*option), value);
+    if (!is_valid(*option, value)) refuse_option(*option, expected_of(*option), value);
     values_.find(option_name)->second = value;
   }
 }
@@ -173,7 +172,7 @@ void read_option(std::string_view text, const OptionInfo& stated, std::vector<st
     const auto [next, failure] = std::from_chars(at, end, value.emplace_back());
     const bool goes_on = next != end && (*next == '-' || *next == ',') && next + 1 != end;
     if (failure != std::errc{} || (next != end && !goes_on))
-      refuse(stated, "numbers of units with - between them: 50-20-10", text);
+      refuse_option(stated, "numbers of units with - between them: 50-20-10", text);
     at = goes_on ? next + 1 : next;
   }
 }
@@ -189,14 +188,14 @@ void read_option(std::string_view text, const OptionInfo& stated,
     const auto [next, code] = std::from_chars(at, end, numbers[j]);
     const bool is_last = j + 1 == numbers.size();
     if (code != std::errc() || (is_last ? next != end : next == end || *next != '/'))
-      refuse(stated, "nine numbers joined by /", text);
+      refuse_option(stated, "nine numbers joined by /", text);
     at = next + (is_last ? 0 : 1);
   }
 }
 
 std::size_t chosen(std::string_view text, const OptionInfo& stated) {
   const auto at = std::ranges::find(stated.choices, text);
-  if (at == stated.choices.end()) refuse(stated, expected_of(stated), text);
+  if (at == stated.choices.end()) refuse_option(stated, expected_of(stated), text);
   return static_cast<std::size_t>(at - stated.choices.begin());
 }
 

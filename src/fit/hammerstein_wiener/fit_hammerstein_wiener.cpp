@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "core/checks.hpp"
 #include "fit/common/excited_band.hpp"
 #include "fit/common/fitted.hpp"
 #include "fit/hammerstein_wiener/wiener_problem.hpp"
 #include "fit/hammerstein_wiener/wiener_search.hpp"
-#include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {
@@ -25,20 +25,19 @@ namespace {
 constexpr std::size_t kSamplesPerNumber = 10;
 
 void check_options(const HammersteinWienerOptions& options) {
-  const auto require = [](const std::optional<std::size_t>& value, const char* name,
-                          std::size_t lowest, std::size_t highest) {
-    if (value && (*value < lowest || *value > highest))
-      throw UsageError({.place = name,
-                        .expected = fmt::format("{} to {}", lowest, highest),
-                        .found = fmt::format("{}", *value)});
+  const auto require_range = [](const std::optional<std::size_t>& value, const char* name,
+                                std::size_t lowest, std::size_t highest) {
+    if (value)
+      require<UsageError>(*value >= lowest && *value <= highest, name,
+                          fmt::format("{} to {}", lowest, highest), fmt::format("{}", *value));
   };
   constexpr std::size_t kMaxOrder = 2 * kMaxSections;
-  require(options.zeros, "zeros", 0, kMaxOrder);
-  require(options.poles, "poles", 0, kMaxOrder);
-  require(options.input_degree, "input_degree", 1, StaticCurve::kMaxValues - 1);
-  require(options.output_degree, "output_degree", 1, StaticCurve::kMaxValues - 1);
-  require(options.knots, "knots", 3, StaticCurve::kMaxValues);
-  require(options.iterations, "iterations", 1, 100'000);
+  require_range(options.zeros, "zeros", 0, kMaxOrder);
+  require_range(options.poles, "poles", 0, kMaxOrder);
+  require_range(options.input_degree, "input_degree", 1, StaticCurve::kMaxValues - 1);
+  require_range(options.output_degree, "output_degree", 1, StaticCurve::kMaxValues - 1);
+  require_range(options.knots, "knots", 3, StaticCurve::kMaxValues);
+  require_range(options.iterations, "iterations", 1, 100'000);
 }
 
 void check_continuous(const HammersteinWienerOptions& options, const WienerShape& shape) {

@@ -9,8 +9,8 @@
 #include <numeric>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "fit/mixture/nearest_kernel.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -19,10 +19,8 @@ using nearest_kernel::kFarAway;
 constexpr std::size_t kSearchLanes = nearest_kernel::kLanes;
 
 void check_range(const char* name, double value, double low, double high) {
-  if (value >= low && value <= high) return;
-  throw Error({.place = std::string("online mixture: ") + name,
-               .expected = fmt::format("a value from {} to {}", low, high),
-               .found = fmt::format("{}", value)});
+  if (!(value >= low && value <= high))
+    refuse({"online mixture", name}, fmt::format("a value from {} to {}", low, high), value);
 }
 
 void check_settings(const Standardisation& standardisation, const OnlineMixtureSettings& s) {

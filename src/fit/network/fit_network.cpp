@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "core/report_progress.hpp"
 #include "fit/common/fitted.hpp"
 #include "fit/common/least_samples.hpp"
@@ -17,7 +18,6 @@
 #include "fit/network/network_initialisation.hpp"
 #include "fit/network/network_trainer.hpp"
 #include "fit/network/network_windows.hpp"
-#include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/files/model_file.hpp"
 
@@ -26,40 +26,39 @@ namespace {
 
 using Kind = TrainingLayer::Kind;
 
-void require(bool is_good, std::string_view option, std::string expected, std::string found) {
-  if (!is_good)
-    throw UsageError({.place = fmt::format("option {}", option),
-                      .expected = std::move(expected),
-                      .found = std::move(found)});
+void require_option(bool is_good, std::string_view option, std::string_view expected,
+                    std::string_view found) {
+  require<UsageError>(is_good, fmt::format("option {}", option), expected, found);
 }
 
 void check_layers(const std::vector<std::size_t>& layers, std::size_t fewest) {
-  require(layers.size() >= fewest && layers.size() < kMaxLayers, "layers",
-          fmt::format("{} to {} layers", fewest, kMaxLayers - 1), fmt::format("{}", layers.size()));
+  require_option(layers.size() >= fewest && layers.size() < kMaxLayers, "layers",
+                 fmt::format("{} to {} layers", fewest, kMaxLayers - 1),
+                 fmt::format("{}", layers.size()));
   for (const std::size_t units : layers)
-    require(units >= 1 && units <= kMaxUnits, "layers",
-            fmt::format("1 to {} units a layer", kMaxUnits), fmt::format("{}", units));
+    require_option(units >= 1 && units <= kMaxUnits, "layers",
+                   fmt::format("1 to {} units a layer", kMaxUnits), fmt::format("{}", units));
 }
 
 void check(const NetworkTraining& training) {
   const auto is_from = [](double value, double least) {
     return std::isfinite(value) && value >= least;
   };
-  require(training.epochs >= 1, "epochs", "at least 1", "0");
-  require(training.batch >= 1, "batch", "at least 1", "0");
-  require(is_from(training.learning_rate, 0.0) && training.learning_rate > 0.0, "learning_rate",
-          "a positive number", fmt::format("{}", training.learning_rate));
-  require(is_from(training.weight_decay, 0.0), "weight_decay", "a number from 0",
-          fmt::format("{}", training.weight_decay));
-  require(is_from(training.clip, 0.0), "clip", "a number from 0", fmt::format("{}", training.clip));
+  require_option(training.epochs >= 1, "epochs", "at least 1", "0");
+  require_option(training.batch >= 1, "batch", "at least 1", "0");
+  require_option(is_from(training.learning_rate, 0.0) && training.learning_rate > 0.0,
+                 "learning_rate", "a positive number", as_text(training.learning_rate));
+  require_option(is_from(training.weight_decay, 0.0), "weight_decay", "a number from 0",
+                 as_text(training.weight_decay));
+  require_option(is_from(training.clip, 0.0), "clip", "a number from 0", as_text(training.clip));
 }
 
 void check(const TrainingWindows& windows) {
-  require(windows.length >= 1, "window", "at least 1 sample", "0");
-  require(windows.stride >= 1, "stride", "at least 1 sample", "0");
-  require(windows.last_only || windows.burn_in < windows.length, "burn_in",
-          fmt::format("less than the window of {} samples", windows.length),
-          fmt::format("{}", windows.burn_in));
+  require_option(windows.length >= 1, "window", "at least 1 sample", "0");
+  require_option(windows.stride >= 1, "stride", "at least 1 sample", "0");
+  require_option(windows.last_only || windows.burn_in < windows.length, "burn_in",
+                 fmt::format("less than the window of {} samples", windows.length),
+                 fmt::format("{}", windows.burn_in));
 }
 
 void check_fits_a_file(const TrainingNetwork& network, std::size_t members) {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
@@ -31,11 +31,7 @@ struct StatedRange {
   std::string_view help;
 };
 
-[[noreturn]] void refuse(std::string_view setting, std::string expected, double found) {
-  throw Error({.place = fmt::format("adaptation: {}", setting),
-               .expected = std::move(expected),
-               .found = fmt::format("{}", found)});
-}
+constexpr std::string_view kPlace = "adaptation";
 
 /// NaN, the default of some, means "auto".
 bool takes_auto(std::string_view name) {
@@ -47,24 +43,24 @@ bool takes_auto(std::string_view name) {
   return found;
 }
 
-void refuse_not_positive(double value, const char* setting) {
-  if (!(value > 0.0 && std::isfinite(value))) refuse(setting, "a positive number", value);
+void require_positive_setting(double value, const char* setting) {
+  require(value > 0.0 && std::isfinite(value), {kPlace, setting}, "a positive number", value);
 }
 
 AdaptationSettings checked(AdaptationSettings settings, AdaptationRule rule,
                            double initial_covariance, double target_scale) {
-  refuse_not_positive(target_scale, "target_scale");
+  require_positive_setting(target_scale, "target_scale");
   AdaptationSettings::visit_options(settings, [](auto given, const StatedRange& stated) {
     const auto value = static_cast<double>(given);
     if (value >= stated.minimum && value <= stated.maximum) return;
     const bool has_auto = takes_auto(stated.name);
     if (has_auto && std::isnan(value)) return;
-    refuse(stated.name,
+    refuse({kPlace, stated.name},
            fmt::format("{} to {}{}", stated.minimum, stated.maximum, has_auto ? ", or NaN" : ""),
            value);
   });
-  if (!(settings.oldest_reference_s >= 0.0))
-    refuse("oldest_reference_s", "at least 0", settings.oldest_reference_s);
+  require(settings.oldest_reference_s >= 0.0, {kPlace, "oldest_reference_s"}, "at least 0",
+          settings.oldest_reference_s);
   if (settings.rule == AdaptationRule::automatic) settings.rule = rule;
   if (std::isnan(settings.initial_covariance)) settings.initial_covariance = initial_covariance;
   if (std::isnan(settings.largest_error)) settings.largest_error = target_scale;
@@ -93,7 +89,7 @@ void detail::require_rule(AdaptationRule rule, bool is_supported, const std::str
 
 ModelAdapter::ModelAdapter(const AdaptationSettings& settings, const Defaults& defaults,
                            double target_scale, double sample_period_s)
-    : settings_((refuse_not_positive(sample_period_s, "sample_period_s"),
+    : settings_((require_positive_setting(sample_period_s, "sample_period_s"),
                  checked(settings, defaults.rule, defaults.initial_covariance, target_scale))),
       target_scale_(target_scale),
       frozen_after_ticks_(ticks_in(settings.frozen_after_s, sample_period_s,

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "core/all_finite.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {
@@ -22,8 +23,7 @@ double end_slope(double h0, double h1, double secant0, double secant1) {
 }
 
 void check(const CoefficientSchedule& schedule, std::size_t input_count, const std::string& place) {
-  const auto finite = [](double value) { return std::isfinite(value); };
-  if (!std::ranges::all_of(schedule.values.values, finite))
+  if (!all_finite(schedule.values.values))
     throw Error({.place = place + ": coefficients", .expected = "finite numbers"});
   const std::size_t rows = schedule.scheduled ? schedule.knots.size() : 1;
   if (schedule.values.rows != rows || rows == 0 ||
@@ -44,9 +44,7 @@ void check(const CoefficientSchedule& schedule, std::size_t input_count, const s
     throw Error({.place = place + ": scheduling feature",
                  .expected = "one of the " + std::to_string(input_count) + " inputs",
                  .found = "number " + std::to_string(schedule.feature)});
-  const bool ascending =
-      std::ranges::adjacent_find(schedule.knots, std::greater_equal<>()) == schedule.knots.end();
-  if (!ascending || !std::ranges::all_of(schedule.knots, finite))
+  if (!all_ascending(schedule.knots))
     throw Error({.place = place + ": knots", .expected = "finite, strictly ascending numbers"});
 }
 

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "model/gaussian_process/kernel_kernels.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -25,34 +25,27 @@ bool has_shape(KernelKind kind) {
          kind == KernelKind::rational_quadratic;
 }
 
-[[noreturn]] void refuse(std::size_t node, const std::string& field, std::string expected,
-                         std::string found) {
-  throw Error({.place = fmt::format("kernel.nodes.{}: {}", node, field),
-               .expected = std::move(expected),
-               .found = std::move(found)});
-}
+std::string place_of(std::size_t node) { return fmt::format("kernel.nodes.{}", node); }
 
 void check_leaf(const KernelNode& node, std::size_t index, std::size_t inputs) {
-  const auto require = [&](bool good, const std::string& field, std::string expected,
-                           double found) {
-    if (!good) refuse(index, field, std::move(expected), fmt::format("{}", found));
-  };
+  const std::string place = place_of(index);
   const std::size_t scales = node.length_scales.size();
-  if (scales != 1 && scales != inputs)
-    refuse(index, "length_scales", fmt::format("1 value, or {}: one per input", inputs),
-           std::to_string(scales));
+  require(scales == 1 || scales == inputs, {place, "length_scales"},
+          fmt::format("1 value, or {}: one per input", inputs), std::to_string(scales));
   // A scale whose square is 0 or infinite would make 0 times infinity of equal points.
   const auto is_scale = [](double value) { return value >= 1e-150 && value <= 1e150; };
   for (const double scale : node.length_scales)
-    require(is_scale(scale), "length_scales", "positive finite numbers", scale);
-  require(is_scale(node.amplitude), "amplitude", "a positive finite number", node.amplitude);
+    require(is_scale(scale), {place, "length_scales"}, "positive finite numbers", scale);
+  require(is_scale(node.amplitude), {place, "amplitude"}, "a positive finite number",
+          node.amplitude);
   const auto kind = static_cast<KernelKind>(node.kind);
   if (kind == KernelKind::linear)
-    require(std::isfinite(node.shape), "shape", "a finite number", node.shape);
+    require(std::isfinite(node.shape), {place, "shape"}, "a finite number", node.shape);
   if (kind == KernelKind::periodic)
-    require(is_scale(node.shape), "shape", "a positive finite number", node.shape);
+    require(is_scale(node.shape), {place, "shape"}, "a positive finite number", node.shape);
   if (kind == KernelKind::rational_quadratic)
-    require(is_scale(std::abs(node.shape)), "shape", "a finite number that is not 0", node.shape);
+    require(is_scale(std::abs(node.shape)), {place, "shape"}, "a finite number that is not 0",
+            node.shape);
 }
 
 }  // namespace
@@ -101,7 +94,7 @@ void Kernel::prepare() {
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     const KernelNode& node = nodes[n];
     if (node.kind > static_cast<std::size_t>(KernelKind::product))
-      refuse(n, "kind", "a number from 0 to 7", std::to_string(node.kind));
+      refuse({place_of(n), "kind"}, "a number from 0 to 7", std::to_string(node.kind));
     KernelTerm term{.kind = static_cast<KernelKind>(node.kind),
                     .scaled = node.scaled,
                     .shared_scale = node.length_scales.size() == 1,
@@ -115,10 +108,10 @@ void Kernel::prepare() {
       operands.push_back(n);
     } else {
       if (!node.length_scales.empty())
-        refuse(n, "length_scales", "none of a sum or product",
+        refuse({place_of(n), "length_scales"}, "none of a sum or product",
                std::to_string(node.length_scales.size()));
       if (operands.size() < 2)
-        refuse(n, "kind", "a sum or product of two kernels", "fewer before it");
+        refuse({place_of(n), "kind"}, "a sum or product of two kernels", "fewer before it");
       operands.pop_back();
       term.left = operands.back();
       operands.back() = n;

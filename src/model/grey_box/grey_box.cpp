@@ -7,48 +7,39 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/checks.hpp"
 #include "core/hyperbolic_tangent.hpp"
 #include "model/common/affine_inverse.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
-
-void require(bool holds, const char* field, const char* expected, const std::string& found) {
-  if (!holds)
-    throw Error({.place = std::string("grey_box: ") + field, .expected = expected, .found = found});
-}
-
-bool is_ascending(std::span<const double> knots) {
-  return all_finite(knots) &&
-         std::ranges::adjacent_find(knots, std::greater_equal<>()) == knots.end();
-}
-
-bool is_positive(std::span<const double> values) {
-  return all_finite(values) && std::ranges::all_of(values, [](double v) { return v > 0.0; });
-}
 
 GreyBoxTerms::Structure checked(GreyBoxTerms::Structure structure) {
   using Terms = GreyBoxTerms;
   const auto count = [](const auto& list) { return std::to_string(list.size()) + " of them"; };
   require(structure.curve_knots.size() >= 2 && structure.curve_knots.size() <= Terms::kMaxKnots &&
-              is_ascending(structure.curve_knots),
-          "curve_knots", "2 to 1000 finite, ascending numbers", count(structure.curve_knots));
+              all_ascending(structure.curve_knots),
+          {GreyBox::kFamily, "curve_knots"}, "2 to 1000 finite, ascending numbers",
+          count(structure.curve_knots));
   require(!structure.friction_knots.empty() &&
               structure.friction_knots.size() <= Terms::kMaxKnots &&
-              is_ascending(structure.friction_knots),
-          "friction_knots", "1 to 1000 finite, ascending numbers", count(structure.friction_knots));
-  require(structure.thresholds.size() <= Terms::kMaxThresholds && is_positive(structure.thresholds),
-          "thresholds", "at most 32 positive numbers", count(structure.thresholds));
+              all_ascending(structure.friction_knots),
+          {GreyBox::kFamily, "friction_knots"}, "1 to 1000 finite, ascending numbers",
+          count(structure.friction_knots));
+  require(
+      structure.thresholds.size() <= Terms::kMaxThresholds && all_positive(structure.thresholds),
+      {GreyBox::kFamily, "thresholds"}, "at most 32 positive numbers", count(structure.thresholds));
   require(structure.time_constants_s.size() <= Terms::kMaxTimeConstants &&
-              is_positive(structure.time_constants_s),
-          "time_constants_s", "at most 32 positive numbers", count(structure.time_constants_s));
+              all_positive(structure.time_constants_s),
+          {GreyBox::kFamily, "time_constants_s"}, "at most 32 positive numbers",
+          count(structure.time_constants_s));
   const auto is_scale = [](double scale) { return std::isfinite(scale) && scale >= 0.0; };
   require(!structure.rate_scales.empty() && std::ranges::all_of(structure.rate_scales, is_scale),
-          "rate_scales", "one number >= 0 for each input", count(structure.rate_scales));
+          {GreyBox::kFamily, "rate_scales"}, "one number >= 0 for each input",
+          count(structure.rate_scales));
   require(std::isfinite(structure.sample_period_s) && structure.sample_period_s > 0.0,
-          "sample_period_s", "a positive number", std::to_string(structure.sample_period_s));
-  require(structure.banks.size() <= Terms::kMaxBanks, "banks", "at most 64",
+          {GreyBox::kFamily, "sample_period_s"}, "a positive number", structure.sample_period_s);
+  require(structure.banks.size() <= Terms::kMaxBanks, {GreyBox::kFamily, "banks"}, "at most 64",
           count(structure.banks));
   for (std::size_t k = 0; k < structure.banks.size(); ++k)
     structure.banks[k].check(structure.inputs(), "grey_box: banks/" + std::to_string(k));
@@ -141,7 +132,7 @@ GreyBox::GreyBox(Parameters parameters)
     : parameters_(std::move(parameters)),
       terms_(parameters_.terms),
       coefficients_(parameters_.coefficients, parameters_.terms.inputs(), kFamily) {
-  require(coefficients_.size() == parameters_.terms.columns(), "coefficients",
+  require(coefficients_.size() == parameters_.terms.columns(), {GreyBox::kFamily, "coefficients"},
           "one column for each term", std::to_string(coefficients_.size()) + " columns");
   jumped_.resize(terms_.bank_states());
   if (!parameters_.residual) return;
@@ -153,14 +144,15 @@ GreyBox::GreyBox(Parameters parameters)
   const std::size_t expected = input_count() + parameters_.terms.thresholds.size();
   require(
       inputs == expected && learned.lowest.size() == expected && learned.highest.size() == expected,
-      "residual", "the inputs of the box and its slips", std::to_string(inputs) + " inputs");
+      {GreyBox::kFamily, "residual"}, "the inputs of the box and its slips",
+      std::to_string(inputs) + " inputs");
   for (std::size_t j = 0; j < expected; ++j)
     require(std::isfinite(learned.lowest[j]) && std::isfinite(learned.highest[j]) &&
                 learned.lowest[j] <= learned.highest[j],
-            "residual range", "lowest <= highest",
-            std::to_string(learned.lowest[j]) + ", " + std::to_string(learned.highest[j]));
-  require(std::isfinite(learned.bound) && learned.bound >= 0.0, "residual bound", "a number >= 0",
-          std::to_string(learned.bound));
+            {GreyBox::kFamily, "residual range"}, "lowest <= highest",
+            as_text(learned.lowest[j]) + ", " + as_text(learned.highest[j]));
+  require(std::isfinite(learned.bound) && learned.bound >= 0.0,
+          {GreyBox::kFamily, "residual bound"}, "a number >= 0", learned.bound);
   residual_inputs_.resize(expected);
 }
 

@@ -1,48 +1,31 @@
 #include "model/grey_box/input_bank.hpp"
 
 #include <algorithm>
-#include <functional>
 
 #include "core/all_finite.hpp"
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
-namespace {
-
-bool is_ascending(std::span<const double> knots) {
-  return all_finite(knots) &&
-         std::ranges::adjacent_find(knots, std::greater_equal<>()) == knots.end();
-}
-
-bool is_positive(std::span<const double> values) {
-  return all_finite(values) && std::ranges::all_of(values, [](double v) { return v > 0.0; });
-}
-
-}  // namespace
 
 void InputBank::check(std::size_t inputs, const std::string& place) const {
-  const auto require = [&](bool holds, const char* field, const char* expected,
-                           const std::string& found) {
-    if (!holds) throw Error({.place = place + "/" + field, .expected = expected, .found = found});
-  };
   const auto count = [](const auto& list) { return std::to_string(list.size()) + " of them"; };
   const auto are_knots = [](const std::vector<double>& knots, std::size_t least) {
-    return knots.size() >= least && knots.size() <= kMaxKnots && is_ascending(knots);
+    return knots.size() >= least && knots.size() <= kMaxKnots && all_ascending(knots);
   };
-  require(input > 0 && input < inputs, "input", "another input of the model than the first",
-          std::to_string(input));
-  require(thresholds.size() <= kMaxThresholds && is_positive(thresholds), "thresholds",
+  require(input > 0 && input < inputs, {place, "input"},
+          "another input of the model than the first", std::to_string(input));
+  require(thresholds.size() <= kMaxThresholds && all_positive(thresholds), {place, "thresholds"},
           "at most 32 positive numbers", count(thresholds));
-  require(are_knots(force_knots, 1), "force_knots", "1 to 1000 finite, ascending numbers",
+  require(are_knots(force_knots, 1), {place, "force_knots"}, "1 to 1000 finite, ascending numbers",
           count(force_knots));
-  require(curve_knots.empty() || are_knots(curve_knots, 3), "curve_knots",
+  require(curve_knots.empty() || are_knots(curve_knots, 3), {place, "curve_knots"},
           "none, or 3 to 1000 finite, ascending numbers", count(curve_knots));
-  require(product_knots.empty() || are_knots(product_knots, 2), "product_knots",
+  require(product_knots.empty() || are_knots(product_knots, 2), {place, "product_knots"},
           "none, or 2 to 1000 finite, ascending numbers", count(product_knots));
-  require(product_input < inputs && product_input != input, "product_input",
+  require(product_input < inputs && product_input != input, {place, "product_input"},
           "another input of the model", std::to_string(product_input));
-  require(time_constants_s.size() <= kMaxTimeConstants && is_positive(time_constants_s),
-          "time_constants_s", "at most 32 positive numbers", count(time_constants_s));
+  require(time_constants_s.size() <= kMaxTimeConstants && all_positive(time_constants_s),
+          {place, "time_constants_s"}, "at most 32 positive numbers", count(time_constants_s));
 }
 
 namespace detail {

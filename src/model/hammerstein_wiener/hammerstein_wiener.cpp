@@ -7,46 +7,42 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
 
-void require(bool holds, const char* field, const char* expected, const std::string& found) {
-  if (!holds)
-    throw Error({.place = std::string("hammerstein_wiener: ") + field,
-                 .expected = expected,
-                 .found = found});
-}
+constexpr auto kFamily = HammersteinWiener::kFamily;
 
 void check_sections(const Sections& sections) {
   require(sections.columns == kSectionColumns && sections.rows >= 1 &&
               sections.rows <= kMaxSections &&
               sections.values.size() == sections.rows * sections.columns,
-          "sections", "1 to 50 rows of b0 b1 b2 a1 a2",
+          {kFamily, "sections"}, "1 to 50 rows of b0 b1 b2 a1 a2",
           std::to_string(sections.rows) + " x " + std::to_string(sections.columns));
-  require(all_finite(sections.values), "sections", "finite numbers", "one that is not finite");
-  require(is_stable(sections), "sections", "poles inside the unit circle", "one that is not");
+  require(all_finite(sections.values), {kFamily, "sections"}, "finite numbers",
+          "one that is not finite");
+  require(is_stable(sections), {kFamily, "sections"}, "poles inside the unit circle",
+          "one that is not");
 }
 
 HammersteinWiener::Parameters checked(HammersteinWiener::Parameters p) {
-  require(p.inputs >= 1, "inputs", "1 or more", "0");
-  require(std::isfinite(p.sample_period_s) && p.sample_period_s > 0.0, "sample_period_s",
-          "a positive number", std::to_string(p.sample_period_s));
-  require(std::isfinite(p.rest_input), "rest_input", "a finite number",
-          std::to_string(p.rest_input));
+  require(p.inputs >= 1, {kFamily, "inputs"}, "1 or more", "0");
+  require(std::isfinite(p.sample_period_s) && p.sample_period_s > 0.0, {kFamily, "sample_period_s"},
+          "a positive number", p.sample_period_s);
+  require(std::isfinite(p.rest_input), {kFamily, "rest_input"}, "a finite number", p.rest_input);
   p.input.check("hammerstein_wiener: input");
   p.output.check("hammerstein_wiener: output");
   check_sections(p.sections);
-  require(std::isfinite(p.lowest) && std::isfinite(p.highest) && p.lowest < p.highest, "lowest",
-          "finite, below highest", std::to_string(p.lowest) + " and " + std::to_string(p.highest));
+  require(std::isfinite(p.lowest) && std::isfinite(p.highest) && p.lowest < p.highest,
+          {kFamily, "lowest"}, "finite, below highest",
+          as_text(p.lowest) + " and " + as_text(p.highest));
   const Interval part = monotone_part(p.output, {p.lowest, p.highest});
   constexpr double kRounding = 1e-6;  // an end may be the very turn
   const double room = kRounding * (p.highest - p.lowest);
-  require(
-      part.lowest - p.lowest <= room && p.highest - part.highest <= room, "output",
-      "a curve that is monotone from lowest to highest",
-      "a turn at " + std::to_string(part.lowest - p.lowest > room ? part.lowest : part.highest));
+  require(part.lowest - p.lowest <= room && p.highest - part.highest <= room, {kFamily, "output"},
+          "a curve that is monotone from lowest to highest",
+          "a turn at " + as_text(part.lowest - p.lowest > room ? part.lowest : part.highest));
   return p;
 }
 

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "core/all_finite.hpp"
+#include "core/checks.hpp"
 #include "model/hammerstein_wiener/transfer_function.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -31,19 +31,17 @@ std::vector<double> possible_turns(const StaticCurve& curve) {
 }  // namespace
 
 void StaticCurve::check(std::string_view place) const {
-  const auto require = [&](bool holds, const char* expected, const std::string& found) {
-    if (!holds) throw Error({.place = std::string(place), .expected = expected, .found = found});
-  };
-  require(!values.empty() && values.size() <= kMaxValues, "1 to 200 values",
+  require(!values.empty() && values.size() <= kMaxValues, place, "1 to 200 values",
           std::to_string(values.size()));
-  require(all_finite(values) && all_finite(knots) && std::isfinite(centre), "finite numbers",
+  require(all_finite(values) && all_finite(knots) && std::isfinite(centre), place, "finite numbers",
           "one that is not finite");
-  require(std::isfinite(half_range) && half_range > 0.0, "a positive half_range",
-          std::to_string(half_range));
+  require(std::isfinite(half_range) && half_range > 0.0, place, "a positive half_range",
+          half_range);
   if (knots.empty()) return;
-  require(knots.size() == values.size() && knots.size() >= 2, "two knots or more, one a value",
+  require(knots.size() == values.size() && knots.size() >= 2, place,
+          "two knots or more, one a value",
           std::to_string(knots.size()) + " knots, " + std::to_string(values.size()) + " values");
-  require(std::ranges::is_sorted(knots, std::ranges::less_equal{}), "knots that ascend",
+  require(std::ranges::is_sorted(knots, std::ranges::less_equal{}), place, "knots that ascend",
           "one that does not");
 }
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/checks.hpp"
 #include "core/matrix_functions.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -89,18 +89,16 @@ void append_roots(std::vector<Complex>& roots, double first, double second, doub
 }
 
 void check(const DiscreteTransfer& transfer) {
-  const auto require = [](bool holds, const char* expected, const std::string& found) {
-    if (!holds) throw Error({.place = "transfer function", .expected = expected, .found = found});
-  };
-  require(!transfer.denominator.empty() && transfer.denominator.front() == 1.0,
+  constexpr auto kPlace = "transfer function";
+  require(!transfer.denominator.empty() && transfer.denominator.front() == 1.0, kPlace,
           "a denominator that begins with 1",
-          transfer.denominator.empty() ? "none" : std::to_string(transfer.denominator.front()));
-  require(all_finite(transfer.numerator) && all_finite(transfer.denominator), "finite numbers",
-          "one that is not finite");
-  require(std::ranges::any_of(transfer.numerator, [](double b) { return b != 0.0; }), "a numerator",
-          "none");
+          transfer.denominator.empty() ? "none" : as_text(transfer.denominator.front()));
+  require(all_finite(transfer.numerator) && all_finite(transfer.denominator), kPlace,
+          "finite numbers", "one that is not finite");
+  require(std::ranges::any_of(transfer.numerator, [](double b) { return b != 0.0; }), kPlace,
+          "a numerator", "none");
   const std::size_t most = std::max(transfer.numerator.size(), transfer.denominator.size());
-  require(most <= 2 * kMaxSections, "at most 100 coefficients", std::to_string(most));
+  require(most <= 2 * kMaxSections, kPlace, "at most 100 coefficients", std::to_string(most));
 }
 
 }  // namespace

@@ -58,20 +58,20 @@ BoucWenModel::BoucWenModel(const Parameters& parameters)
   const Parameters& given = parameters_;
   check_other_inputs(given.slopes, kFamily);
   for (const double each : {given.stiffness, given.elastic_share, given.bias, given.centre})
-    require_parameter(std::isfinite(each), kFamily, "stiffness, elastic_share, bias, centre",
-                      "finite numbers", each);
-  require_parameter((1.0 - given.elastic_share) * given.stiffness >= 0.0, kFamily, "elastic_share",
-                    "(1 - elastic_share) stiffness not below 0", given.elastic_share);
-  require_parameter(std::isfinite(given.beta) && given.beta > 0.0, kFamily, "beta",
-                    "a positive number", given.beta);
-  require_parameter(given.gamma > -given.beta && given.gamma <= given.beta, kFamily, "gamma",
-                    "a number above -beta and at most beta", given.gamma);
-  require_parameter(given.exponent >= 1.0 && given.exponent <= kMaxExponent, kFamily, "exponent",
-                    "1 to 20", given.exponent);
-  require_parameter(std::isfinite(largest_) && largest_ > 0.0, kFamily, "beta + gamma",
-                    "numbers whose z_max is positive and finite", largest_);
-  require_parameter(std::isfinite(given.half_range) && given.half_range > 0.0, kFamily,
-                    "half_range", "a positive number", given.half_range);
+    require(std::isfinite(each), {kFamily, "stiffness, elastic_share, bias, centre"},
+            "finite numbers", each);
+  require((1.0 - given.elastic_share) * given.stiffness >= 0.0, {kFamily, "elastic_share"},
+          "(1 - elastic_share) stiffness not below 0", given.elastic_share);
+  require(std::isfinite(given.beta) && given.beta > 0.0, {kFamily, "beta"}, "a positive number",
+          given.beta);
+  require(given.gamma > -given.beta && given.gamma <= given.beta, {kFamily, "gamma"},
+          "a number above -beta and at most beta", given.gamma);
+  require(given.exponent >= 1.0 && given.exponent <= kMaxExponent, {kFamily, "exponent"}, "1 to 20",
+          given.exponent);
+  require(std::isfinite(largest_) && largest_ > 0.0, {kFamily, "beta + gamma"},
+          "numbers whose z_max is positive and finite", largest_);
+  require(std::isfinite(given.half_range) && given.half_range > 0.0, {kFamily, "half_range"},
+          "a positive number", given.half_range);
 }
 
 std::size_t BoucWenModel::parameter_count() const noexcept {

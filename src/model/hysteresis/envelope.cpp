@@ -8,14 +8,14 @@ namespace torsio {
 
 void Envelope::check(std::string_view family) const {
   for (const std::vector<double>* each : {&middle, &half_width})
-    require_parameter(!each->empty() && each->size() <= kHighestDegree + 1, family, "envelope",
-                      "1 to " + std::to_string(kHighestDegree + 1) + " coefficients",
-                      static_cast<double>(each->size()));
+    require(!each->empty() && each->size() <= kHighestDegree + 1, {family, "envelope"},
+            "1 to " + std::to_string(kHighestDegree + 1) + " coefficients",
+            static_cast<double>(each->size()));
   require_finite(middle, family, "middle");
   require_finite(half_width, family, "half_width");
-  require_parameter(std::isfinite(centre), family, "centre", "a finite number", centre);
-  require_parameter(std::isfinite(half_range) && half_range > 0.0, family, "half_range",
-                    "a positive number", half_range);
+  require(std::isfinite(centre), {family, "centre"}, "a finite number", centre);
+  require(std::isfinite(half_range) && half_range > 0.0, {family, "half_range"},
+          "a positive number", half_range);
 }
 
 Envelope::At Envelope::at(double x) const noexcept {

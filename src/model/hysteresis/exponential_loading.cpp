@@ -13,8 +13,7 @@ ExponentialLoading::ExponentialLoading(Parameters parameters) : parameters_(std:
   parameters_.curves.check(kFamily);
   check_other_inputs(parameters_.slopes, kFamily);
   for (const double decay : {parameters_.rising_decay, parameters_.falling_decay})
-    require_parameter(std::isfinite(decay) && decay > 0.0, kFamily, "decay", "a positive number",
-                      decay);
+    require(std::isfinite(decay) && decay > 0.0, {kFamily, "decay"}, "a positive number", decay);
 }
 
 std::size_t ExponentialLoading::parameter_count() const noexcept {

@@ -6,23 +6,14 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
-
-/// @throws Error that names family and field.
-inline void require_parameter(bool good, std::string_view family, std::string_view field,
-                              std::string expected, double found) {
-  if (!good)
-    throw Error({.place = std::string(family) + ": " + std::string(field),
-                 .expected = std::move(expected),
-                 .found = std::to_string(found)});
-}
 
 inline void require_finite(std::span<const double> values, std::string_view family,
                            std::string_view field) {
   for (const double each : values)
-    require_parameter(std::isfinite(each), family, field, "finite numbers", each);
+    require(std::isfinite(each), {family, field}, "finite numbers", each);
 }
 
 /// The same values. @throws Error unless they are positive, finite and ascending.
@@ -30,8 +21,8 @@ inline const std::vector<double>& ascending_thresholds(const std::vector<double>
                                                        std::string_view family) {
   double before = 0.0;
   for (const double each : thresholds) {
-    require_parameter(std::isfinite(each) && each > before, family, "thresholds",
-                      "positive, ascending numbers", each);
+    require(std::isfinite(each) && each > before, {family, "thresholds"},
+            "positive, ascending numbers", each);
     before = each;
   }
   return thresholds;

@@ -16,24 +16,23 @@ constexpr auto kFamily = ImprovedPrandtlIshlinskii::kFamily;
 
 void check(const ImprovedPrandtlIshlinskii::Parameters& parameters) {
   const auto same = [](std::size_t found, std::size_t expected, std::string_view field) {
-    require_parameter(found == expected, kFamily, field, std::to_string(expected) + " numbers",
-                      static_cast<double>(found));
+    require(found == expected, {kFamily, field}, std::to_string(expected) + " numbers",
+            static_cast<double>(found));
   };
-  require_parameter(!parameters.slopes.empty(), kFamily, "slopes", "one for each input", 0.0);
+  require(!parameters.slopes.empty(), {kFamily, "slopes"}, "one for each input", 0.0);
   same(parameters.weights.size(), parameters.thresholds.size(), "weights");
   same(parameters.bends.size(), parameters.knots.size(), "bends");
-  require_parameter(std::isfinite(parameters.bias), kFamily, "bias", "a finite number",
-                    parameters.bias);
+  require(std::isfinite(parameters.bias), {kFamily, "bias"}, "a finite number", parameters.bias);
   require_finite(parameters.slopes, kFamily, "slopes");
   require_finite(parameters.weights, kFamily, "weights");
-  require_parameter(std::isfinite(parameters.rate_gain) && parameters.rate_gain >= 0.0, kFamily,
-                    "rate_gain", "a number not below 0", parameters.rate_gain);
-  require_parameter(parameters.rate_feature < parameters.slopes.size(), kFamily, "rate_feature",
-                    "one of the inputs", static_cast<double>(parameters.rate_feature));
+  require(std::isfinite(parameters.rate_gain) && parameters.rate_gain >= 0.0,
+          {kFamily, "rate_gain"}, "a number not below 0", parameters.rate_gain);
+  require(parameters.rate_feature < parameters.slopes.size(), {kFamily, "rate_feature"},
+          "one of the inputs", static_cast<double>(parameters.rate_feature));
   double before = -std::numeric_limits<double>::infinity();
   for (const double knot : parameters.knots) {
-    require_parameter(std::isfinite(knot) && knot > before && knot != 0.0, kFamily, "knots",
-                      "ascending numbers, none of them 0", knot);
+    require(std::isfinite(knot) && knot > before && knot != 0.0, {kFamily, "knots"},
+            "ascending numbers, none of them 0", knot);
     before = knot;
   }
   require_finite(parameters.bends, kFamily, "bends");
@@ -48,9 +47,9 @@ double require_rising(const ImprovedPrandtlIshlinskii::Parameters& parameters) {
   for (std::size_t j = 0; j < count; ++j) {
     if (parameters.knots[j] > 0.0) up += parameters.bends[j];
     if (parameters.knots[count - 1 - j] < 0.0) down += parameters.bends[count - 1 - j];
-    require_parameter(up > 0.0 && down > 0.0, kFamily, "bends",
-                      "a curve that rises everywhere, sums from 0 outwards above -1",
-                      std::min(up, down) - 1.0);
+    require(up > 0.0 && down > 0.0, {kFamily, "bends"},
+            "a curve that rises everywhere, sums from 0 outwards above -1",
+            std::min(up, down) - 1.0);
     steepest = std::max({steepest, up, down});
   }
   return steepest;

@@ -15,15 +15,15 @@ template <bool kByRate>
 Backlash<kByRate>::Backlash(Parameters parameters) : parameters_(std::move(parameters)) {
   parameters_.boundaries.check(kFamily);
   check_other_inputs(parameters_.slopes, kFamily);
-  require_parameter(std::isfinite(parameters_.stiffness) && parameters_.stiffness > 0.0, kFamily,
-                    "stiffness", "a positive number", parameters_.stiffness);
+  require(std::isfinite(parameters_.stiffness) && parameters_.stiffness > 0.0,
+          {kFamily, "stiffness"}, "a positive number", parameters_.stiffness);
   const BacklashRate& rate = parameters_.rate;
-  require_parameter(std::isfinite(rate.gain) && rate.gain >= 0.0 && (kByRate || rate.gain == 0.0),
-                    kFamily, "rate.gain", kByRate ? "a number not below 0" : "0", rate.gain);
-  require_parameter(std::isfinite(rate.exponent) && rate.exponent > 0.0, kFamily, "rate.exponent",
-                    "a positive number", rate.exponent);
-  require_parameter(rate.feature < parameters_.slopes.size(), kFamily, "rate.feature",
-                    "one of the inputs", static_cast<double>(rate.feature));
+  require(std::isfinite(rate.gain) && rate.gain >= 0.0 && (kByRate || rate.gain == 0.0),
+          {kFamily, "rate.gain"}, kByRate ? "a number not below 0" : "0", rate.gain);
+  require(std::isfinite(rate.exponent) && rate.exponent > 0.0, {kFamily, "rate.exponent"},
+          "a positive number", rate.exponent);
+  require(rate.feature < parameters_.slopes.size(), {kFamily, "rate.feature"}, "one of the inputs",
+          static_cast<double>(rate.feature));
 }
 
 template <bool kByRate>

@@ -18,10 +18,10 @@ inline double other_inputs(std::span<const double> slopes, Features features) no
 
 /// @throws Error unless there is a finite slope for each input, that of the first one 0.
 inline void check_other_inputs(std::span<const double> slopes, std::string_view family) {
-  require_parameter(!slopes.empty(), family, "slopes", "one for each input", 0.0);
+  require(!slopes.empty(), {family, "slopes"}, "one for each input", 0.0);
   require_finite(slopes, family, "slopes");
-  require_parameter(slopes[0] == 0.0, family, "slope of the first input",
-                    "0, since other terms hold it", slopes[0]);
+  require(slopes[0] == 0.0, {family, "slope of the first input"}, "0, since other terms hold it",
+          slopes[0]);
 }
 
 /// How many numbers a fit chose among the slopes.

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
@@ -14,9 +14,8 @@ void require_not_negative(std::span<const double> values, std::string_view field
                           std::string_view place) {
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!(std::isfinite(values[i]) && values[i] >= 0.0))
-      throw Error({.place = fmt::format("{}: {} of element {}", place, field, i + 1),
-                   .expected = "a number not below 0",
-                   .found = fmt::format("{}", values[i])});
+      refuse({place, fmt::format("{} of element {}", field, i + 1)}, "a number not below 0",
+             values[i]);
 }
 
 }  // namespace

@@ -6,30 +6,22 @@
 #include <string>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "model/common/affine_inverse.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
 std::size_t inputs_of(const Polynomial::Parameters& parameters) {
-  if (parameters.degree > Polynomial::kHighestDegree)
-    throw Error({.place = "polynomial: degree",
-                 .expected = "at most " + std::to_string(Polynomial::kHighestDegree),
-                 .found = std::to_string(parameters.degree)});
+  require(parameters.degree <= Polynomial::kHighestDegree, "polynomial: degree",
+          "at most " + std::to_string(Polynomial::kHighestDegree),
+          std::to_string(parameters.degree));
   const std::size_t columns = parameters.coefficients.values.columns;
-  if (columns <= parameters.curve_columns())
-    throw Error({.place = "polynomial: coefficients",
-                 .expected = std::to_string(parameters.curve_columns()) +
-                             " columns for the curve and one for each input",
-                 .found = std::to_string(columns) + " columns"});
+  require(
+      columns > parameters.curve_columns(), "polynomial: coefficients",
+      std::to_string(parameters.curve_columns()) + " columns for the curve and one for each input",
+      std::to_string(columns) + " columns");
   return columns - parameters.curve_columns();
-}
-
-void require(bool good, const std::string& field, const std::string& expected, double found) {
-  if (!good)
-    throw Error(
-        {.place = "polynomial: " + field, .expected = expected, .found = std::to_string(found)});
 }
 
 /// The ranges as a schedule over the coefficients' knots.
@@ -38,11 +30,10 @@ CoefficientSchedule ranges_of(const Polynomial::Parameters& parameters) {
   const std::size_t columns = 2 * parameters.curves();
   if (!parameters.ranges.values.empty()) {
     const Matrix& given = parameters.ranges;
-    if (given.rows != schedule.values.rows || given.columns != columns)
-      throw Error({.place = "polynomial: ranges",
-                   .expected = std::to_string(schedule.values.rows) + " x " +
-                               std::to_string(columns) + ", lowest and highest of each curve",
-                   .found = std::to_string(given.rows) + " x " + std::to_string(given.columns)});
+    require(given.rows == schedule.values.rows && given.columns == columns, "polynomial: ranges",
+            std::to_string(schedule.values.rows) + " x " + std::to_string(columns) +
+                ", lowest and highest of each curve",
+            std::to_string(given.rows) + " x " + std::to_string(given.columns));
     schedule.values = given;
     return schedule;
   }
@@ -66,20 +57,20 @@ Polynomial::Polynomial(const Parameters& parameters)
       coefficients_(parameters.coefficients, inputs_of(parameters), kFamily),
       ranges_(ranges_of(parameters), input_count(), "polynomial: ranges"),
       direction_(parameters.dead_band) {
-  require(std::isfinite(centre_), "centre", "a finite number", centre_);
-  require(std::isfinite(half_range_) && half_range_ > 0.0, "half_range", "a positive number",
-          half_range_);
-  require(std::isfinite(dead_band_) && dead_band_ >= 0.0, "dead_band", "a number not below 0",
-          dead_band_);
+  require(std::isfinite(centre_), {kFamily, "centre"}, "a finite number", centre_);
+  require(std::isfinite(half_range_) && half_range_ > 0.0, {kFamily, "half_range"},
+          "a positive number", half_range_);
+  require(std::isfinite(dead_band_) && dead_band_ >= 0.0, {kFamily, "dead_band"},
+          "a number not below 0", dead_band_);
   const Matrix& values = parameters.coefficients.values;
   for (std::size_t k = 0; k < values.rows; ++k)
-    require(values(k, first_slope_) == 0.0, "slope of the first input",
+    require(values(k, first_slope_) == 0.0, {kFamily, "slope of the first input"},
             "0, since the curve holds that term", values(k, first_slope_));
   const Matrix& ranges = ranges_.schedule().values;
   for (std::size_t k = 0; k < ranges.rows; ++k)
     for (std::size_t j = 0; j < ranges.columns; j += 2)
-      require(ranges(k, j) <= ranges(k, j + 1), "ranges", "a highest that is not below the lowest",
-              ranges(k, j + 1));
+      require(ranges(k, j) <= ranges(k, j + 1), {kFamily, "ranges"},
+              "a highest that is not below the lowest", ranges(k, j + 1));
 }
 
 Polynomial::Parameters Polynomial::parameters() const {

@@ -4,34 +4,29 @@
 #include <string>
 #include <utility>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
 
-void require(bool holds, const char* field, const std::string& expected, const std::string& found) {
-  if (!holds)
-    throw Error(
-        {.place = std::string("polynomial: ") + field, .expected = expected, .found = found});
-}
+constexpr std::string_view kPlace = "polynomial";
 
 void check_shapes(const MultivariatePolynomial::Parameters& p) {
-  require(p.powers.rows >= 1 && p.powers.columns >= 1, "powers", "at least one term and one input",
+  require(p.powers.rows >= 1 && p.powers.columns >= 1, {kPlace, "powers"},
+          "at least one term and one input",
           std::to_string(p.powers.rows) + " x " + std::to_string(p.powers.columns));
-  require(p.powers.values.size() == p.powers.rows * p.powers.columns, "powers", "rows x columns",
-          std::to_string(p.powers.values.size()) + " numbers");
-  require(p.scales.size() == p.powers.columns, "scales",
+  require(p.powers.values.size() == p.powers.rows * p.powers.columns, {kPlace, "powers"},
+          "rows x columns", std::to_string(p.powers.values.size()) + " numbers");
+  require(p.scales.size() == p.powers.columns, {kPlace, "scales"},
           std::to_string(p.powers.columns) + ", one for each input",
           std::to_string(p.scales.size()));
-  require(p.coefficients.size() == p.powers.rows, "coefficients",
+  require(p.coefficients.size() == p.powers.rows, {kPlace, "coefficients"},
           std::to_string(p.powers.rows) + ", one for each term",
           std::to_string(p.coefficients.size()));
   for (const double scale : p.scales)
-    require(std::isfinite(scale) && scale > 0.0, "scales", "positive numbers",
-            std::to_string(scale));
+    require(std::isfinite(scale) && scale > 0.0, {kPlace, "scales"}, "positive numbers", scale);
   for (const double coefficient : p.coefficients)
-    require(std::isfinite(coefficient), "coefficients", "finite numbers",
-            std::to_string(coefficient));
+    require(std::isfinite(coefficient), {kPlace, "coefficients"}, "finite numbers", coefficient);
 }
 
 /// @returns the degree of the term.
@@ -39,13 +34,12 @@ std::size_t checked_degree(const Matrix& powers, std::size_t term) {
   constexpr auto kHighest = static_cast<double>(MultivariatePolynomial::kHighestDegree);
   double degree = 0.0;
   for (const double power : powers.row(term)) {
-    require(power >= 0.0 && power <= kHighest && power == std::floor(power), "powers",
-            "whole numbers not below 0", std::to_string(power));
+    require(power >= 0.0 && power <= kHighest && power == std::floor(power), {kPlace, "powers"},
+            "whole numbers not below 0", power);
     degree += power;
   }
-  require(degree <= kHighest, "powers",
-          "a degree of at most " + std::to_string(MultivariatePolynomial::kHighestDegree),
-          std::to_string(degree));
+  require(degree <= kHighest, {kPlace, "powers"},
+          "a degree of at most " + std::to_string(MultivariatePolynomial::kHighestDegree), degree);
   return static_cast<std::size_t>(degree);
 }
 

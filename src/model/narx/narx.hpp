@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/checks.hpp"
 #include "core/joined_name.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/model/common/memory.hpp"
@@ -138,25 +139,20 @@ class Narx {
   }
 
   [[nodiscard]] std::size_t checked_regressors() const {
-    const auto require = [](bool holds, const char* expected, const std::string& found) {
-      if (!holds)
-        throw Error({.place = std::string(kFamily), .expected = expected, .found = found});
-    };
     const Parameters& p = parameters_;
-    require(p.inputs >= 1 && p.inputs <= model_.input_count(), "an input that the inner model has",
-            std::to_string(p.inputs));
-    require(p.input_lags <= kMaxLags && p.output_lags >= 1 && p.output_lags <= kMaxLags,
+    require(p.inputs >= 1 && p.inputs <= model_.input_count(), kFamily,
+            "an input that the inner model has", std::to_string(p.inputs));
+    require(p.input_lags <= kMaxLags && p.output_lags >= 1 && p.output_lags <= kMaxLags, kFamily,
             "0 to 1000 input lags and 1 to 1000 output lags",
             std::to_string(p.input_lags) + " and " + std::to_string(p.output_lags));
-    require(model_.input_count() == p.regressors(), "an inner model of as many inputs as lags make",
-            std::to_string(model_.input_count()));
-    require(std::isfinite(p.sample_period_s) && p.sample_period_s > 0.0,
-            "a positive sample_period_s", std::to_string(p.sample_period_s));
+    require(model_.input_count() == p.regressors(), kFamily,
+            "an inner model of as many inputs as lags make", std::to_string(model_.input_count()));
+    require(std::isfinite(p.sample_period_s) && p.sample_period_s > 0.0, kFamily,
+            "a positive sample_period_s", p.sample_period_s);
     require(std::isfinite(p.lowest) && std::isfinite(p.highest) && p.lowest < p.highest &&
                 p.start >= p.lowest && p.start <= p.highest,
-            "lowest < highest, and start between them",
-            std::to_string(p.lowest) + ", " + std::to_string(p.highest) + ", " +
-                std::to_string(p.start));
+            kFamily, "lowest < highest, and start between them",
+            as_text(p.lowest) + ", " + as_text(p.highest) + ", " + as_text(p.start));
     return p.regressors();
   }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/checks.hpp"
 #include "core/joined_name.hpp"
 #include "model/network/gru.hpp"
 #include "model/network/lstm.hpp"
@@ -52,22 +53,18 @@ class Ensemble {
   /// @throws Error as its members do, if there are not 2 to `kMaxMembers` of them, if they have not
   /// as many inputs or not one sample period, or r is not positive.
   explicit Ensemble(Parameters parameters) : parameters_(std::move(parameters)) {
-    const auto require = [](bool holds, const char* expected, std::string found) {
-      if (!holds)
-        throw Error(
-            {.place = std::string(kFamily), .expected = expected, .found = std::move(found)});
-    };
     const std::size_t count = parameters_.members.size();
-    require(count >= 2 && count <= kMaxMembers, "2 to 64 members", std::to_string(count));
-    require(std::isfinite(parameters_.residual_std) && parameters_.residual_std > 0.0,
-            "a positive residual_std", std::to_string(parameters_.residual_std));
+    require(count >= 2 && count <= kMaxMembers, kFamily, "2 to 64 members", std::to_string(count));
+    require(std::isfinite(parameters_.residual_std) && parameters_.residual_std > 0.0, kFamily,
+            "a positive residual_std", parameters_.residual_std);
     for (const auto& member : parameters_.members) {
       members_.emplace_back(member);
-      require(members_.back().input_count() == input_count(), "members with the same inputs",
+      require(members_.back().input_count() == input_count(), kFamily,
+              "members with the same inputs",
               std::to_string(members_.back().input_count()) + " inputs");
       if constexpr (requires { member.sample_period_s; }) {
-        require(member.sample_period_s == sample_period(), "members of one sample period",
-                std::to_string(member.sample_period_s) + " s");
+        require(member.sample_period_s == sample_period(), kFamily, "members of one sample period",
+                as_text(member.sample_period_s) + " s");
       }
     }
   }

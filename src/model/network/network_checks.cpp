@@ -6,17 +6,12 @@
 #include <cmath>
 #include <utility>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
 
 namespace torsio {
 namespace {
 
 constexpr auto kActivations = static_cast<std::size_t>(Activation::elu) + 1;
-
-[[noreturn]] void refuse(std::string place, std::string expected, std::string found) {
-  throw Error(
-      {.place = std::move(place), .expected = std::move(expected), .found = std::move(found)});
-}
 
 template <class Number>
 void check_finite(std::span<const Number> values, const std::string& place) {
@@ -119,8 +114,7 @@ void check_last_layer(const DenseLayer& layer, const std::string& place) {
 }
 
 void check_positive(double value, const std::string& place) {
-  if (!std::isfinite(value) || value <= 0.0)
-    refuse(place, "a positive, finite number", fmt::format("{}", value));
+  require(std::isfinite(value) && value > 0.0, place, "a positive, finite number", value);
 }
 
 void check_shape(const Matrix& matrix, std::size_t rows, std::size_t columns,

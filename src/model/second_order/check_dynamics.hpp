@@ -6,19 +6,10 @@
 #include <string>
 #include <string_view>
 
+#include "core/checks.hpp"
 #include "model/second_order/sampled_time.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
-
-/// @throws Error naming the family and the field.
-inline void require_parameter(bool holds, std::string_view family, const char* field,
-                              const char* expected, double found) {
-  if (!holds)
-    throw Error({.place = std::string(family) + ": " + field,
-                 .expected = expected,
-                 .found = std::to_string(found)});
-}
 
 /// The force that the inputs make together.
 inline double driving_force(std::span<const double> gains,
@@ -28,25 +19,24 @@ inline double driving_force(std::span<const double> gains,
 
 inline void check_sampled_time(const SampledTime& time, std::string_view family) {
   constexpr std::size_t kMaxSubsteps = 1000;
-  require_parameter(std::isfinite(time.sample_period_s) && time.sample_period_s > 0.0, family,
-                    "sample_period_s", "a positive number", time.sample_period_s);
-  require_parameter(time.substeps >= 1 && time.substeps <= kMaxSubsteps, family, "substeps",
-                    "1 to 1000", static_cast<double>(time.substeps));
+  require(std::isfinite(time.sample_period_s) && time.sample_period_s > 0.0,
+          {family, "sample_period_s"}, "a positive number", time.sample_period_s);
+  require(time.substeps >= 1 && time.substeps <= kMaxSubsteps, {family, "substeps"}, "1 to 1000",
+          static_cast<double>(time.substeps));
 }
 
 inline void check_gains(std::span<const double> gains, std::string_view family) {
-  require_parameter(!gains.empty(), family, "gains", "one per input", 0.0);
+  require(!gains.empty(), {family, "gains"}, "one per input", 0.0);
   for (const double gain : gains)
-    require_parameter(std::isfinite(gain), family, "gains", "finite numbers", gain);
-  require_parameter(gains.front() != 0.0, family, "gains", "a first input that drives", 0.0);
+    require(std::isfinite(gain), {family, "gains"}, "finite numbers", gain);
+  require(gains.front() != 0.0, {family, "gains"}, "a first input that drives", 0.0);
 }
 
 /// @throws Error unless 0, where a run starts, lies between finite ends.
 inline void check_end_stops(double lowest, double highest, std::string_view family) {
-  require_parameter(std::isfinite(lowest) && lowest < 0.0, family, "lowest", "a negative number",
-                    lowest);
-  require_parameter(std::isfinite(highest) && highest > 0.0, family, "highest", "a positive number",
-                    highest);
+  require(std::isfinite(lowest) && lowest < 0.0, {family, "lowest"}, "a negative number", lowest);
+  require(std::isfinite(highest) && highest > 0.0, {family, "highest"}, "a positive number",
+          highest);
 }
 
 }  // namespace torsio

@@ -21,17 +21,18 @@ std::vector<double> half_steps(std::size_t substeps) {
 
 const DynamicBoucWen::Parameters& checked(const DynamicBoucWen::Parameters& p) {
   constexpr std::string_view kFamily = DynamicBoucWen::kFamily;
-  const auto require = [&](bool holds, const char* field, const char* expected, double found) {
-    require_parameter(holds && std::isfinite(found), kFamily, field, expected, found);
+  const auto require_finite = [&](bool holds, const char* field, const char* expected,
+                                  double found) {
+    require(holds && std::isfinite(found), {kFamily, field}, expected, found);
   };
-  require(p.mass > 0.0, "mass", "a positive number", p.mass);
-  require(p.damping >= 0.0, "damping", "a number not below 0", p.damping);
-  require(p.stiffness >= 0.0, "stiffness", "a number not below 0", p.stiffness);
-  require(p.hysteretic_stiffness >= 0.0, "hysteretic_stiffness", "a number not below 0",
-          p.hysteretic_stiffness);
-  require(p.loss >= 0.0, "loss", "a number not below 0", p.loss);
-  require(true, "skew", "a number", p.skew);
-  require(p.exponent >= 1.0, "exponent", "a number not below 1", p.exponent);
+  require_finite(p.mass > 0.0, "mass", "a positive number", p.mass);
+  require_finite(p.damping >= 0.0, "damping", "a number not below 0", p.damping);
+  require_finite(p.stiffness >= 0.0, "stiffness", "a number not below 0", p.stiffness);
+  require_finite(p.hysteretic_stiffness >= 0.0, "hysteretic_stiffness", "a number not below 0",
+                 p.hysteretic_stiffness);
+  require_finite(p.loss >= 0.0, "loss", "a number not below 0", p.loss);
+  require_finite(true, "skew", "a number", p.skew);
+  require_finite(p.exponent >= 1.0, "exponent", "a number not below 1", p.exponent);
   check_gains(p.gains, kFamily);
   check_sampled_time(p.time, kFamily);
   check_end_stops(p.lowest, p.highest, kFamily);
@@ -41,7 +42,8 @@ const DynamicBoucWen::Parameters& checked(const DynamicBoucWen::Parameters& p) {
   const double fastest_per_s =
       std::max(p.damping / p.mass, std::sqrt((p.stiffness + p.hysteretic_stiffness) / p.mass));
   const double turn = fastest_per_s * p.time.sample_period_s / static_cast<double>(p.time.substeps);
-  require(turn < kStable, "substeps", "sub-steps of less than 2.7 over the fastest rate", turn);
+  require_finite(turn < kStable, "substeps", "sub-steps of less than 2.7 over the fastest rate",
+                 turn);
   return p;
 }
 

@@ -24,30 +24,33 @@ double bristle_stiffness(const RigidDrive::Parameters& p) {
 }
 
 void check_signs(const RigidDrive::Parameters& p) {
-  const auto require = [&](bool holds, const char* field, const char* expected, double found) {
-    require_parameter(holds && std::isfinite(found), RigidDrive::kFamily, field, expected, found);
+  const auto require_finite = [&](bool holds, const char* field, const char* expected,
+                                  double found) {
+    require(holds && std::isfinite(found), {RigidDrive::kFamily, field}, expected, found);
   };
-  require(p.inertia > 0.0, "inertia", "a positive number", p.inertia);
-  require(p.viscous >= 0.0, "viscous", "a number not below 0", p.viscous);
-  require(p.coulomb >= 0.0, "coulomb", "a number not below 0", p.coulomb);
-  require(true, "offset", "a number", p.offset);
-  require(p.static_ratio >= 1.0, "static_ratio", "a number not below 1", p.static_ratio);
-  require(p.stribeck_speed > 0.0, "stribeck_speed", "a positive number", p.stribeck_speed);
-  require(p.bristle >= 0.0, "bristle", "a number not below 0", p.bristle);
-  require(std::abs(p.viscous_asymmetry) <= p.viscous, "viscous_asymmetry",
-          "a number no larger than viscous", p.viscous_asymmetry);
-  require(p.viscous_quadratic >= 0.0, "viscous_quadratic", "a number not below 0",
-          p.viscous_quadratic);
-  require(true, "spring", "a number", p.spring);
-  require(true, "coulomb_slope", "a number", p.coulomb_slope);
+  require_finite(p.inertia > 0.0, "inertia", "a positive number", p.inertia);
+  require_finite(p.viscous >= 0.0, "viscous", "a number not below 0", p.viscous);
+  require_finite(p.coulomb >= 0.0, "coulomb", "a number not below 0", p.coulomb);
+  require_finite(true, "offset", "a number", p.offset);
+  require_finite(p.static_ratio >= 1.0, "static_ratio", "a number not below 1", p.static_ratio);
+  require_finite(p.stribeck_speed > 0.0, "stribeck_speed", "a positive number", p.stribeck_speed);
+  require_finite(p.bristle >= 0.0, "bristle", "a number not below 0", p.bristle);
+  require_finite(std::abs(p.viscous_asymmetry) <= p.viscous, "viscous_asymmetry",
+                 "a number no larger than viscous", p.viscous_asymmetry);
+  require_finite(p.viscous_quadratic >= 0.0, "viscous_quadratic", "a number not below 0",
+                 p.viscous_quadratic);
+  require_finite(true, "spring", "a number", p.spring);
+  require_finite(true, "coulomb_slope", "a number", p.coulomb_slope);
   const VariableFriction variable = p.variable_friction.value_or(VariableFriction{});
-  require(variable.load_share >= 0.0 && variable.load_share < 1.0, "load_share",
-          "a number from 0 to less than 1", variable.load_share);
-  require(variable.dwell_gain >= 0.0, "dwell_gain", "a number not below 0", variable.dwell_gain);
-  require(variable.dwell_time_s > 0.0, "dwell_time_s", "a positive number", variable.dwell_time_s);
-  require(variable.heating >= 0.0, "heating", "a number not below 0", variable.heating);
-  require(variable.heating_time_s > 0.0, "heating_time_s", "a positive number",
-          variable.heating_time_s);
+  require_finite(variable.load_share >= 0.0 && variable.load_share < 1.0, "load_share",
+                 "a number from 0 to less than 1", variable.load_share);
+  require_finite(variable.dwell_gain >= 0.0, "dwell_gain", "a number not below 0",
+                 variable.dwell_gain);
+  require_finite(variable.dwell_time_s > 0.0, "dwell_time_s", "a positive number",
+                 variable.dwell_time_s);
+  require_finite(variable.heating >= 0.0, "heating", "a number not below 0", variable.heating);
+  require_finite(variable.heating_time_s > 0.0, "heating_time_s", "a positive number",
+                 variable.heating_time_s);
 }
 
 const RigidDrive::Parameters& checked(const RigidDrive::Parameters& p) {
@@ -58,8 +61,8 @@ const RigidDrive::Parameters& checked(const RigidDrive::Parameters& p) {
   constexpr double kStable = 2.0;  // limit of the leapfrog
   const double turn = std::sqrt((std::max(p.spring, 0.0) + bristle_stiffness(p)) / p.inertia) *
                       p.time.sample_period_s / static_cast<double>(p.time.substeps);
-  require_parameter(turn < kStable, RigidDrive::kFamily, "substeps",
-                    "sub-steps of less than 2 over the fastest rate", turn);
+  require(turn < kStable, {RigidDrive::kFamily, "substeps"},
+          "sub-steps of less than 2 over the fastest rate", turn);
   return p;
 }
 

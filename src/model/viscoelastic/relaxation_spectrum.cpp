@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/checks.hpp"
 #include "model/viscoelastic/spring_dashpot_network.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -136,21 +136,17 @@ bool is_finite(const RelaxationSpectrum& spectrum) {
          });
 }
 
-[[noreturn]] void refuse(std::size_t node, std::string expected, std::string found) {
-  throw Error({.place = fmt::format("network: node {}", node),
-               .expected = std::move(expected),
-               .found = std::move(found)});
-}
+std::string place_of(std::size_t node) { return fmt::format("network: node {}", node); }
 
 void check_leaf(const SpringDashpotNetwork& network, std::size_t index) {
   const NetworkNode& node = network.nodes[index];
   if (!(node.value >= kSmallestElement && node.value <= kLargestElement))
-    refuse(index,
+    refuse(place_of(index),
            fmt::format("{} from {:g} to {:g}", node.name(), kSmallestElement, kLargestElement),
-           fmt::format("{}", node.value));
+           node.value);
   for (std::size_t i = 0; i < index; ++i)
     if (network.nodes[i].is_leaf() && network.nodes[i].name() == node.name())
-      refuse(index, "a name that is used only once", node.name());
+      refuse(place_of(index), "a name that is used only once", node.name());
 }
 
 }  // namespace
@@ -173,9 +169,10 @@ RelaxationSpectrum relaxation_spectrum(const SpringDashpotNetwork& network) {
     }
     const bool is_series = node.is(NetworkKind::series);
     if (!is_series && !node.is(NetworkKind::parallel))
-      refuse(i, "a spring, a dashpot, series or parallel", fmt::format("kind {}", node.kind));
+      refuse(place_of(i), "a spring, a dashpot, series or parallel",
+             fmt::format("kind {}", node.kind));
     if (node.children < 2 || node.children > open.size())
-      refuse(i, fmt::format("2 to {} networks to join", open.size()),
+      refuse(place_of(i), fmt::format("2 to {} networks to join", open.size()),
              fmt::format("{}", node.children));
     const auto first = open.end() - static_cast<std::ptrdiff_t>(node.children);
     std::vector<RelaxationSpectrum> parts(first, open.end());

@@ -6,31 +6,23 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/checks.hpp"
 #include "model/common/affine_inverse.hpp"
 #include "model/viscoelastic/relaxation_step.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
-namespace {
-
-void require(bool good, const char* field, const char* expected, double found) {
-  if (!good)
-    throw Error({.place = std::string("viscoelastic: ") + field,
-                 .expected = expected,
-                 .found = std::to_string(found)});
-}
-
-}  // namespace
 
 Viscoelastic::Viscoelastic(Parameters parameters)
     : parameters_(std::move(parameters)),
       spectrum_(relaxation_spectrum(parameters_.network)),
       parameter_count_(parameters_.network.values().size() + 1) {
   const double period_s = parameters_.sample_period_s;
-  require(std::isfinite(period_s) && period_s > 0.0, "sample_period_s", "a positive number",
-          period_s);
-  require(std::isfinite(parameters_.offset), "offset", "a finite number", parameters_.offset);
-  require(parameters_.inputs >= 1, "inputs", "at least 1", static_cast<double>(parameters_.inputs));
+  require(std::isfinite(period_s) && period_s > 0.0, {kFamily, "sample_period_s"},
+          "a positive number", period_s);
+  require(std::isfinite(parameters_.offset), {kFamily, "offset"}, "a finite number",
+          parameters_.offset);
+  require(parameters_.inputs >= 1, {kFamily, "inputs"}, "at least 1",
+          static_cast<double>(parameters_.inputs));
   slope_ = spectrum_.damping / period_s;
   moving_slope_ = spectrum_.stiffness + slope_;
   for (const RelaxationBranch& branch : spectrum_.branches) {

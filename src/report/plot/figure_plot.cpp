@@ -67,7 +67,7 @@ Surface surface_of(PlotFormat format, double width, double height, double scale,
   return surface;
 }
 
-void require(cairo_status_t status) {
+void require_success(cairo_status_t status) {
   if (status != CAIRO_STATUS_SUCCESS)
     throw Error(
         {.place = "--plot", .problem = fmt::format("cairo: {}", cairo_status_to_string(status))});
@@ -111,14 +111,14 @@ std::string drawn(const std::vector<const ReportFigure*>& figures, PlotFormat fo
       area.height = heights[i / size.columns];
       std::visit([&](const auto& figure) { painter.draw(figure, area); }, *figures[i]);
     }
-    require(cairo_status(cairo.get()));
+    require_success(cairo_status(cairo.get()));
     texts = painter.texts();
   }
   if (format == PlotFormat::png) {
-    require(cairo_surface_write_to_png_stream(surface.get(), append, &bytes));
+    require_success(cairo_surface_write_to_png_stream(surface.get(), append, &bytes));
   } else {
     cairo_surface_finish(surface.get());
-    require(cairo_surface_status(surface.get()));
+    require_success(cairo_surface_status(surface.get()));
   }
   if (format == PlotFormat::svg) {
     // Cairo counts the surfaces of a process in this name, which nothing refers to.

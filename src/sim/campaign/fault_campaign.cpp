@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "actuator/text_hash.hpp"
+#include "core/checks.hpp"
 #include "fault_classes.hpp"
 #include "fault_free_run.hpp"
 #include "files/unit_file.hpp"
@@ -67,20 +68,16 @@ struct WorkUnit {
 };
 
 void check(const CampaignSettings& settings, const std::vector<CampaignGroup>& groups) {
-  const auto require = [](bool holds, const char* what, std::string expected, double found) {
-    if (holds) return;
-    throw UsageError({.place = fmt::format("campaign: {}", what),
-                      .expected = std::move(expected),
-                      .found = fmt::format("{:g}", found)});
-  };
+  constexpr std::string_view kPlace = "campaign";
   const auto hours = [&](const char* what, double value) {
-    require(value >= 0.0 && value <= kMaxHours, what, fmt::format("0 to {:g} h", kMaxHours), value);
+    require<UsageError>(value >= 0.0 && value <= kMaxHours, {kPlace, what},
+                        fmt::format("0 to {:g} h", kMaxHours), value);
   };
   const auto count = [&](const char* what, std::size_t value) {
-    require(value <= kMaxInjections, what, fmt::format("at most {}", kMaxInjections),
-            static_cast<double>(value));
+    require<UsageError>(value <= kMaxInjections, {kPlace, what},
+                        fmt::format("at most {}", kMaxInjections), static_cast<double>(value));
   };
-  require(!groups.empty(), "groups", "at least one", 0.0);
+  require<UsageError>(!groups.empty(), {kPlace, "groups"}, "at least one", 0.0);
   if (!settings.resume.empty())
     for (const CampaignGroup& group : groups)
       if (group.monitor_hash.empty())

@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "control/design/loop_design.hpp"
+#include "core/checks.hpp"
 #include "core/report_progress.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "sim/bench/bench.hpp"
@@ -61,25 +62,23 @@ struct Linear {
   }
 };
 
-void require(bool holds, const char* what, std::string expected, double found) {
-  if (holds) return;
-  throw UsageError({.place = fmt::format("{} {}", kImpedance, what),
-                    .expected = std::move(expected),
-                    .found = fmt::format("{:g}", found)});
+void require_setting(bool holds, const char* what, std::string_view expected, double found) {
+  require<UsageError>(holds, fmt::format("{} {}", kImpedance, what), expected, found);
 }
 
 void check(const ImpedanceSpec& spec) {
-  require(spec.stiffness_Nm_rad >= 0.0 && std::isfinite(spec.stiffness_Nm_rad), "stiffness",
-          "0 Nm/rad or more", spec.stiffness_Nm_rad);
-  require(spec.damping_Nms_rad >= 0.0 && std::isfinite(spec.damping_Nms_rad), "damping",
-          "0 Nms/rad or more", spec.damping_Nms_rad);
-  require(spec.torque_gain_Nm_rad > 0.0 && std::isfinite(spec.torque_gain_Nm_rad), "torque gain",
-          "above 0 Nm/rad", spec.torque_gain_Nm_rad);
-  require(spec.amplitude_Nm > 0.0 && spec.amplitude_Nm <= kLargestAmplitude_Nm, "amplitude",
-          fmt::format("above 0 and at most {:g} Nm", kLargestAmplitude_Nm), spec.amplitude_Nm);
-  require(spec.duration_s >= kShortestImpedance_s && spec.duration_s <= kLongestImpedance_s,
-          "duration", fmt::format("{:g} to {:g} s", kShortestImpedance_s, kLongestImpedance_s),
-          spec.duration_s);
+  require_setting(spec.stiffness_Nm_rad >= 0.0 && std::isfinite(spec.stiffness_Nm_rad), "stiffness",
+                  "0 Nm/rad or more", spec.stiffness_Nm_rad);
+  require_setting(spec.damping_Nms_rad >= 0.0 && std::isfinite(spec.damping_Nms_rad), "damping",
+                  "0 Nms/rad or more", spec.damping_Nms_rad);
+  require_setting(spec.torque_gain_Nm_rad > 0.0 && std::isfinite(spec.torque_gain_Nm_rad),
+                  "torque gain", "above 0 Nm/rad", spec.torque_gain_Nm_rad);
+  require_setting(spec.amplitude_Nm > 0.0 && spec.amplitude_Nm <= kLargestAmplitude_Nm, "amplitude",
+                  fmt::format("above 0 and at most {:g} Nm", kLargestAmplitude_Nm),
+                  spec.amplitude_Nm);
+  require_setting(
+      spec.duration_s >= kShortestImpedance_s && spec.duration_s <= kLongestImpedance_s, "duration",
+      fmt::format("{:g} to {:g} s", kShortestImpedance_s, kLongestImpedance_s), spec.duration_s);
 }
 
 double largest_passive_Nm_rad(const TubeImpedance::Settings& settings, double damping_Nms_rad) {

@@ -10,11 +10,11 @@
 #include <string>
 #include <utility>
 
+#include "core/checks.hpp"
 #include "sim/closed_loop/tracking_parts.hpp"
 #include "sim/experiments/experiment_table.hpp"
 #include "sim/experiments/torque_references.hpp"
 #include "torsio/core/did_you_mean.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
@@ -100,28 +100,26 @@ LogSweep::Parameters frequency_sweep(double amplitude_Nm, double duration_s) {
 std::vector<double> reference_torque(const TorqueReference& reference, const DataSheet& sheet,
                                      std::uint64_t seed) {
   const std::string place = fmt::format("reference {}", name(reference.kind));
-  const auto require = [&](bool holds, const std::string& what, const std::string& expected,
-                           double found) {
-    if (holds) return;
-    throw UsageError({.place = fmt::format("{}: {}", place, what),
-                      .expected = expected,
-                      .found = fmt::format("{:.6g}", found)});
+  const auto require_value = [&](bool holds, const std::string& what, const std::string& expected,
+                                 double found) {
+    require<UsageError>(holds, {place, what}, expected, fmt::format("{:.6g}", found));
   };
   if (reference.kind == Kind::replay && reference.recorded_Nm.empty())
     throw UsageError({.place = place, .expected = "a recording with a torque"});
   if (reference.kind == Kind::replay && reference.amplitude_Nm)
     throw UsageError({.place = place, .expected = "no amplitude: the recording has its own"});
   const double amplitude_Nm = amplitude_of(reference, sheet);
-  require(amplitude_Nm > 0.0 && std::isfinite(amplitude_Nm), "amplitude", "above 0 Nm",
-          amplitude_Nm);
+  require_value(amplitude_Nm > 0.0 && std::isfinite(amplitude_Nm), "amplitude", "above 0 Nm",
+                amplitude_Nm);
   const double duration_s = duration_of(reference);
-  require(duration_s >= kShortest_s && duration_s <= kLongest_s, "duration",
-          fmt::format("{} to {} s", kShortest_s, kLongest_s), duration_s);
+  require_value(duration_s >= kShortest_s && duration_s <= kLongest_s, "duration",
+                fmt::format("{} to {} s", kShortest_s, kLongest_s), duration_s);
   std::vector<double> torque_Nm = values_of(reference, amplitude_Nm, duration_s, seed);
   const double rating_Nm = sheet.rating.torque_Nm.value;
   for (const double value : torque_Nm)
-    require(std::abs(value) <= rating_Nm, "torque",
-            fmt::format("at most the {} Nm that {} is rated for", rating_Nm, sheet.name), value);
+    require_value(std::abs(value) <= rating_Nm, "torque",
+                  fmt::format("at most the {} Nm that {} is rated for", rating_Nm, sheet.name),
+                  value);
   return torque_Nm;
 }
 

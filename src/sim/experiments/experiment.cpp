@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/checks.hpp"
 #include "core/report_progress.hpp"
 #include "sim/bench/bench.hpp"
 #include "sim/experiments/experiment_table.hpp"
@@ -26,42 +27,39 @@ constexpr double kLongest_s = 36000.0;
 constexpr double kLowest_Hz = 0.001;  // a thousand seconds a period
 
 void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataSheet& sheet) {
-  const auto require = [&](bool holds, const char* option, const std::string& expected,
-                           const std::string& found) {
-    if (holds) return;
-    throw UsageError({.place = fmt::format("{} {}", entry.info.name, option),
-                      .expected = expected,
-                      .found = found});
+  const auto require_option = [&](bool holds, const char* option, const std::string& expected,
+                                  const std::string& found) {
+    require<UsageError>(holds, fmt::format("{} {}", entry.info.name, option), expected, found);
   };
-  const auto text = [](double value) { return fmt::format("{}", value); };
   if (spec.duration_s) {
-    require(
+    require_option(
         *spec.duration_s >= 1.0 / sheet.sensors.log_rate_Hz.value && *spec.duration_s <= kLongest_s,
         "duration", fmt::format("{} to {} s", 1.0 / sheet.sensors.log_rate_Hz.value, kLongest_s),
-        text(*spec.duration_s));
+        as_text(*spec.duration_s));
   }
   if (spec.lever_m) {
-    require(entry.has_lever, "lever", "none: this experiment has no lever", text(*spec.lever_m));
-    require(*spec.lever_m > 0.0 && *spec.lever_m <= 2.0, "lever", "0 < metres <= 2",
-            text(*spec.lever_m));
+    require_option(entry.has_lever, "lever", "none: this experiment has no lever",
+                   as_text(*spec.lever_m));
+    require_option(*spec.lever_m > 0.0 && *spec.lever_m <= 2.0, "lever", "0 < metres <= 2",
+                   as_text(*spec.lever_m));
   }
   const double inclination_deg = deg_from_rad(spec.inclination_rad);
-  require(entry.has_lever || spec.inclination_rad == 0.0, "inclination",
-          "none: this experiment has no lever", text(inclination_deg));
-  require(std::abs(inclination_deg) <= 90.0, "inclination", "-90 to 90 deg",
-          fmt::format("{:.6g} deg (a number without unit is radians)", inclination_deg));
+  require_option(entry.has_lever || spec.inclination_rad == 0.0, "inclination",
+                 "none: this experiment has no lever", as_text(inclination_deg));
+  require_option(std::abs(inclination_deg) <= 90.0, "inclination", "-90 to 90 deg",
+                 fmt::format("{:.6g} deg (a number without unit is radians)", inclination_deg));
   const auto require_amplitude = [&](const std::optional<double>& value, std::string_view unit,
                                      double highest, double shown, const char* shown_unit) {
     if (!value) return;
     const auto shown_text = [&](double of) {
       return fmt::format("{:.6g} {}", shown * of, shown_unit);
     };
-    require(!entry.info.amplitude_unit.empty(), "amplitude",
-            "none: the amplitude of this experiment is fixed", shown_text(*value));
-    require(entry.info.amplitude_unit == unit, "amplitude",
-            fmt::format("one in {}", entry.info.amplitude_unit), shown_text(*value));
-    require(*value > 0.0 && *value <= highest, "amplitude",
-            "above 0 and at most " + shown_text(highest), shown_text(*value));
+    require_option(!entry.info.amplitude_unit.empty(), "amplitude",
+                   "none: the amplitude of this experiment is fixed", shown_text(*value));
+    require_option(entry.info.amplitude_unit == unit, "amplitude",
+                   fmt::format("one in {}", entry.info.amplitude_unit), shown_text(*value));
+    require_option(*value > 0.0 && *value <= highest, "amplitude",
+                   "above 0 and at most " + shown_text(highest), shown_text(*value));
   };
   require_amplitude(
       spec.torque_amplitude_Nm, "Nm",
@@ -70,13 +68,13 @@ void check(const ExperimentSpec& spec, const ExperimentEntry& entry, const DataS
   require_amplitude(spec.angle_amplitude_rad, "rad", entry.highest_angle_rad, deg_from_rad(1.0),
                     "deg");
   if (spec.frequency_Hz) {
-    require(entry.has_frequency, "frequency", "none: the frequency of this experiment is fixed",
-            text(*spec.frequency_Hz));
-    require(*spec.frequency_Hz >= kLowest_Hz && *spec.frequency_Hz <= 10.0, "frequency",
-            fmt::format("{} to 10 Hz", kLowest_Hz), text(*spec.frequency_Hz));
+    require_option(entry.has_frequency, "frequency",
+                   "none: the frequency of this experiment is fixed", as_text(*spec.frequency_Hz));
+    require_option(*spec.frequency_Hz >= kLowest_Hz && *spec.frequency_Hz <= 10.0, "frequency",
+                   fmt::format("{} to 10 Hz", kLowest_Hz), as_text(*spec.frequency_Hz));
   }
-  require(entry.has_impedance || !spec.is_impedance_zero, "impedance",
-          "none: no impedance controller runs in this experiment", "zero");
+  require_option(entry.has_impedance || !spec.is_impedance_zero, "impedance",
+                 "none: no impedance controller runs in this experiment", "zero");
 }
 
 /// The input of the bench's loop: if a sensor gives NaN, its last number.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <variant>
 
+#include "core/checks.hpp"
 #include "data/names.hpp"
 #include "sim/plant/stages.hpp"
 #include "sim/sensors/sensed_channels.hpp"
@@ -99,29 +100,27 @@ std::string text(double value, std::string_view unit) {
   return fmt::format("{:g}{}{}", value, unit.empty() ? "" : " ", unit);
 }
 
-[[noreturn]] void refuse(const ScheduledFault& fault, std::string_view what, std::string expected,
-                         std::string found, std::string advice = {}) {
+[[noreturn]] void refuse_fault(const ScheduledFault& fault, std::string_view what,
+                               std::string_view expected, std::string_view found,
+                               std::string_view advice = {}) {
   const std::string place =
       fault.place.empty() ? fmt::format("fault of {}", printable(fault.what)) : fault.place;
-  throw UsageError({.place = place + (what.empty() ? "" : ": ") + std::string(what),
-                    .expected = std::move(expected),
-                    .found = std::move(found),
-                    .advice = std::move(advice)});
+  refuse<UsageError>({place, what}, expected, found, advice);
 }
 
 void require_within(const ScheduledFault& fault, std::string_view what, double value, double lowest,
                     double highest, std::string_view unit) {
   if (value >= lowest && value <= highest) return;
-  refuse(fault, what, fmt::format("{} to {}", text(lowest, unit), text(highest, unit)),
-         text(value, unit));
+  refuse_fault(fault, what, fmt::format("{} to {}", text(lowest, unit), text(highest, unit)),
+               text(value, unit));
 }
 
 void check_times(const ScheduledFault& fault, double run_s) {
   require_within(fault, "at", fault.start_s, 0.0, kLatestFault_s, "s");
   if (!(fault.start_s < run_s))
-    refuse(fault, "at", fmt::format("a time within the run, before {}", text(run_s, "s")),
-           text(fault.start_s, "s"),
-           "Begin the fault earlier, or let the run last longer (--duration).");
+    refuse_fault(fault, "at", fmt::format("a time within the run, before {}", text(run_s, "s")),
+                 text(fault.start_s, "s"),
+                 "Begin the fault earlier, or let the run last longer (--duration).");
   if (fault.duration_s) require_within(fault, "for", *fault.duration_s, 1e-6, kLatestFault_s, "s");
 }
 
@@ -133,9 +132,9 @@ std::string_view channel_unit(std::string_view channel) {
 /// Only an encoder has turns.
 void check_turns(const ScheduledFault& fault) {
   if (channel_unit(fault.what) != "rad")
-    refuse(fault, "", "an angle, whose encoder has turns", fault.what);
+    refuse_fault(fault, "", "an angle, whose encoder has turns", fault.what);
   if (fault.amount != std::round(fault.amount))
-    refuse(fault, "by", "a whole number of turns", text(fault.amount, ""));
+    refuse_fault(fault, "by", "a whole number of turns", text(fault.amount, ""));
 }
 
 void check_amount(const ScheduledFault& fault, const FaultRule& rule) {
@@ -198,13 +197,13 @@ void check_fault(const ScheduledFault& fault, const DataSheet& sheet, double run
   if (part.empty() && std::ranges::find(sensors, fault.what) == sensors.end()) {
     std::vector<std::string> known = sensors;
     std::ranges::move(fault_parts(sheet), std::back_inserter(known));
-    refuse(fault, "", fmt::format("a sensor or part of {}: {}", sheet.name, joined(known)),
-           fmt::format("'{}'", printable(fault.what)), did_you_mean(fault.what, known));
+    refuse_fault(fault, "", fmt::format("a sensor or part of {}: {}", sheet.name, joined(known)),
+                 fmt::format("'{}'", printable(fault.what)), did_you_mean(fault.what, known));
   }
   const FaultRule* const rule = find_fault_rule(fault.kind, part);
   if (rule == nullptr)
-    refuse(fault, fault.what, "one of " + joined(fault_names(part)),
-           std::string(std::ranges::find(kRules, fault.kind, &FaultRule::kind)->name));
+    refuse_fault(fault, fault.what, "one of " + joined(fault_names(part)),
+                 std::string(std::ranges::find(kRules, fault.kind, &FaultRule::kind)->name));
   check_times(fault, run_s);
   check_amount(fault, *rule);
   if (rule->kind == FaultKind::bottom)

@@ -26,7 +26,7 @@ void check(const ElectricalDrive::Parameters& parameters) {
   require_not_negative(kPlace, "noise_A", sensors.noise_A);
   for (const double value : {sensors.offset_a_A, sensors.offset_b_A, sensors.gain_error_a,
                              sensors.gain_error_b, parameters.commutation_error_rad})
-    require(std::isfinite(value), kPlace, "finite errors of the sensors", value);
+    require_parameter(std::isfinite(value), kPlace, "finite errors of the sensors", value);
 }
 
 }  // namespace

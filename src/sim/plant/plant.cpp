@@ -7,23 +7,15 @@
 #include <cstddef>
 #include <variant>
 
+#include "core/checks.hpp"
 #include "plant_input.hpp"
 #include "stages.hpp"
 #include "torsio/core/dispatch.hpp"
-#include "torsio/core/error.hpp"
 
 namespace torsio {
 namespace {
 
 constexpr double kGravity_m_s2 = 9.81;
-
-void require_inertia(const char* name, double value) {
-  if (value > 0.0 && std::isfinite(value)) return;
-  throw Error({.place = "plant",
-               .problem = "impossible parameter",
-               .expected = fmt::format("{} > 0 and finite", name),
-               .found = fmt::format("{}", value)});
-}
 
 template <class Stage, class Parameters>
 Stage made(const Parameters& parameters) {
@@ -111,9 +103,9 @@ Plant::Plant(const PlantParameters& parameters, double longest_step_s)
       second_(made<SecondStage>(parameters.second)),
       bearing_(parameters.bearing),
       longest_step_s_(longest_step_s) {
-  require_inertia("rotor_inertia_kg_m2", parameters.rotor_inertia_kg_m2);
-  require_inertia("middle_inertia_kg_m2", parameters.middle_inertia_kg_m2);
-  require_inertia("joint_inertia_kg_m2", parameters.joint_inertia_kg_m2);
+  require_positive("plant", "rotor_inertia_kg_m2", parameters.rotor_inertia_kg_m2);
+  require_positive("plant", "middle_inertia_kg_m2", parameters.middle_inertia_kg_m2);
+  require_positive("plant", "joint_inertia_kg_m2", parameters.joint_inertia_kg_m2);
   const StepLimits limits = step_limits(parameters);
   const double limit_s = std::min(limits.stiffness_s, limits.damping_s);
   if (longest_step_s == 0.0) longest_step_s_ = std::min(limit_s, kDefaultStep_s);

@@ -337,8 +337,9 @@ TEST(HysteresisModels, RefuseWhatBreaksTheirPromises) {
     change(parameters);
     return test::error_message([&] { decltype(example){parameters}; });
   };
-  EXPECT_THAT(refusal(test::example<MaxwellSlipModel>(), [](auto& p) { p.thresholds[1] = 1e-9; }),
-              HasSubstr("maxwell_slip: thresholds"));
+  EXPECT_THAT(
+      refusal(test::example<MaxwellSlipModel>(), [](auto& p) { p.thresholds[1] = 1e-9; }),
+      HasSubstr("maxwell_slip: thresholds: expected positive, ascending numbers, found 1e-09"));
   EXPECT_THAT(
       refusal(test::example<MaxwellSlipModel>(), [](auto& p) { p.thresholds.assign(7, 0.1); }),
       HasSubstr("maxwell_slip"));

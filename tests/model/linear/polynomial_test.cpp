@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "support/error_message.hpp"
 #include "support/examples/linear.hpp"
 #include "torsio/core/error.hpp"
 
@@ -111,6 +112,13 @@ TEST(Polynomial, RefusesParametersThatDisagree) {
   refused([](auto& p) { p.ranges = Matrix(1, 2); });
   refused([](auto& p) { p.ranges.values[0] = 0.5; });
   refused([](auto& p) { p.ranges.values[3] = kNotMeasured; });
+}
+
+TEST(Polynomial, NamesASmallNumberThatItRefuses) {
+  auto parameters = test::example<Polynomial>().parameters();
+  parameters.half_range = -1e-9;
+  EXPECT_EQ(test::error_message([&] { Polynomial{parameters}; }),
+            "polynomial: half_range: expected a positive number, found -1e-09");
 }
 
 }  // namespace

@@ -220,6 +220,7 @@ TEST(RigidDrive, RefusesWhatIsNoDrive) {
     return test::error_message([&] { RigidDrive model(parameters); });
   };
   EXPECT_THAT(refused([](auto& p) { p.inertia = 0.0; }), HasSubstr("rigid_drive: inertia"));
+  EXPECT_THAT(refused([](auto& p) { p.lowest = 1e-9; }), HasSubstr("found 1e-09"));
   EXPECT_THAT(refused([](auto& p) { p.static_ratio = 0.9; }), HasSubstr("static_ratio"));
   EXPECT_THAT(refused([](auto& p) { p.viscous_asymmetry = 300.0; }),
               HasSubstr("viscous_asymmetry"));

@@ -283,6 +283,8 @@ TEST(Viscoelastic, RefusesParametersThatMakeNoSense) {
   auto bad = good;
   bad.sample_period_s = 0.0;
   EXPECT_THAT(message(bad), HasSubstr("viscoelastic: sample_period_s: expected a positive number"));
+  bad.sample_period_s = -1e-9;
+  EXPECT_THAT(message(bad), HasSubstr("found -1e-09")) << "not -0.000000";
   bad = good;
   bad.offset = kNotMeasured;
   EXPECT_THAT(message(bad), HasSubstr("viscoelastic: offset: expected a finite number"));
