@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "actuators.hpp"
+#include "core/fnv_hash.hpp"
 #include "sheet_values.hpp"
 #include "specimen_spread.hpp"
-#include "text_hash.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "text_hash.hpp"
+#include "core/fnv_hash.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
 

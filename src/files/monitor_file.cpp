@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "actuator/text_hash.hpp"
+#include "core/fnv_hash.hpp"
 #include "files/json_object.hpp"
 #include "files/json_text.hpp"
 #include "files/whole_file.hpp"

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/checks.hpp"
+#include "core/fnv_hash.hpp"
 #include "core/report_progress.hpp"
 #include "fit/common/fitted.hpp"
 #include "fit/common/least_samples.hpp"
@@ -75,19 +76,18 @@ void check_fits_a_file(const TrainingNetwork& network, std::size_t members) {
                               : "Take fewer members, or fewer or smaller layers."});
 }
 
-/// A number that changes with the data.
-std::uint64_t fingerprint(const WindowSet& set, std::uint64_t start) {
-  std::uint64_t hash = start;
-  const auto add = [&](std::uint64_t value) { hash = (hash ^ value) * 0x100000001b3U; };
-  for (const float value : set.features) add(std::bit_cast<std::uint32_t>(value));
-  for (const float value : set.targets) add(std::bit_cast<std::uint32_t>(value));
-  for (const std::size_t window : set.starts) add(window);
-  return hash;
+void add(FnvHash& hash, const WindowSet& set) {
+  for (const float value : set.features) hash.add(std::bit_cast<std::uint32_t>(value));
+  for (const float value : set.targets) hash.add(std::bit_cast<std::uint32_t>(value));
+  for (const std::size_t window : set.starts) hash.add(window);
 }
 
 std::string recipe_of(std::string_view family, const TrainingNetwork& network,
                       const NetworkTraining& training, const WindowSet& set,
                       const WindowSet& validation, std::uint64_t seed) {
+  FnvHash data;  // changes with the data
+  add(data, set);
+  add(data, validation);
   std::string layers;
   for (const TrainingLayer& layer : network.layers())
     layers += fmt::format("{}{}x{}:{}", layers.empty() ? "" : " ", layer.inputs, layer.units,
@@ -97,8 +97,7 @@ std::string recipe_of(std::string_view family, const TrainingNetwork& network,
       "{} weight_decay {} clip {} schedule {} patience {}, seed {}, data {:016x}",
       family, layers, set.steps, set.burn_in, set.last_only, training.epochs, training.batch,
       training.learning_rate, static_cast<int>(training.optimiser), training.weight_decay,
-      training.clip, static_cast<int>(training.schedule), training.patience, seed,
-      fingerprint(validation, fingerprint(set, 0xcbf29ce484222325U)));
+      training.clip, static_cast<int>(training.schedule), training.patience, seed, data.value());
 }
 
 /// The data in the form that the trainer uses.

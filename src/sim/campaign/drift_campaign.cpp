@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "actuator/stage_wear.hpp"
-#include "actuator/text_hash.hpp"
+#include "core/fnv_hash.hpp"
 #include "files/unit_file.hpp"
 #include "numerics/event_bounds.hpp"
 #include "numerics/parallel.hpp"

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "actuator/text_hash.hpp"
 #include "core/checks.hpp"
+#include "core/fnv_hash.hpp"
 #include "fault_classes.hpp"
 #include "fault_free_run.hpp"
 #include "files/unit_file.hpp"

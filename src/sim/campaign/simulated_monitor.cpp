@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "actuator/text_hash.hpp"
+#include "core/fnv_hash.hpp"
 #include "core/report_progress.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/data/dataset.hpp"
