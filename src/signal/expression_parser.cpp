@@ -7,7 +7,8 @@
 #include <charconv>
 #include <cmath>
 
-#include "torsio/core/error.hpp"
+#include "core/checks.hpp"
+#include "core/text_cursor.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/signal/lowpass.hpp"
 
@@ -47,15 +48,9 @@ std::string function_list() {
   return list;
 }
 
-// Not <cctype>: the language does not depend on a locale.
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
-bool is_printable(char c) { return c >= ' ' && c <= '~'; }
-
 bool is_name(std::string_view text) {
   return !text.empty() && !is_digit(text.front()) &&
-         std::all_of(text.begin(), text.end(), [](char c) { return is_letter(c) || is_digit(c); });
+         std::all_of(text.begin(), text.end(), is_word_character);
 }
 
 // The text as an error message may show it: one line, no control characters, not endless.
@@ -63,10 +58,8 @@ std::string shown(std::string_view text, std::size_t around = 0) {
   constexpr std::size_t kBefore = 60;
   constexpr std::size_t kWindow = 120;
   const std::size_t from = text.size() > kWindow && around > kBefore ? around - kBefore : 0;
-  std::string result(text.substr(from, kWindow));
-  std::replace_if(
-      result.begin(), result.end(), [](char c) { return !is_printable(c); }, '?');
-  return (from > 0 ? "..." : "") + result + (text.size() > from + kWindow ? "..." : "");
+  return (from > 0 ? "..." : "") + on_one_line(text.substr(from, kWindow)) +
+         (text.size() > from + kWindow ? "..." : "");
 }
 
 }  // namespace
@@ -81,11 +74,11 @@ class ExpressionParser::Reader {
       : parser_(parser), graph_(parser.graph_), text_(text), title_(title) {}
 
   std::uint32_t read_all() {
-    if (text_.size() > kLongestExpression)
+    if (text_.text().size() > kLongestExpression)
       fail(0, fmt::format("at most {} characters", kLongestExpression),
-           fmt::format("{}", text_.size()));
+           fmt::format("{}", text_.text().size()));
     const Operand whole = sum();
-    if (!at_end()) fail_here("an operator or the end");
+    if (!text_.at_end()) fail_here("an operator or the end");
     return whole.node;
   }
 
@@ -96,53 +89,26 @@ class ExpressionParser::Reader {
     std::string_view si_unit = {};  // unit of a number that was written with one
   };
 
-  [[noreturn]] void fail(std::size_t at, std::string expected, std::string found,
-                         std::string advice = {}) const {
-    throw Error({.place = fmt::format("{} '{}': column {}", title_, shown(text_, at), at + 1),
-                 .expected = std::move(expected),
-                 .found = std::move(found),
-                 .advice = std::move(advice)});
+  [[noreturn]] void fail(std::size_t at, std::string_view expected, std::string_view found,
+                         std::string_view advice = {}) const {
+    refuse(fmt::format("{} '{}': column {}", title_, shown(text_.text(), at), at + 1), expected,
+           found, advice);
   }
 
-  [[noreturn]] void fail_here(std::string expected, std::string advice = {}) {
-    fail(position_, std::move(expected), next_token(), std::move(advice));
+  [[noreturn]] void fail_here(std::string_view expected) {
+    const std::string found = found_here();
+    fail(text_.position(), expected, found);
   }
 
-  std::string next_token() {
-    if (at_end()) return "the end";
-    const char c = text_[position_];
-    if (is_letter(c) || is_digit(c)) return fmt::format("'{}'", shown(peek_word()));
-    if (is_printable(c)) return fmt::format("'{}'", c);
-    return fmt::format("byte 0x{:02x}", static_cast<unsigned char>(c));
-  }
-
-  bool at_end() {
-    while (position_ < text_.size() && is_space(text_[position_])) ++position_;
-    return position_ == text_.size();
-  }
-
-  bool next_is(char c) { return !at_end() && text_[position_] == c; }
-
-  bool take(char c) {
-    if (!next_is(c)) return false;
-    ++position_;
-    return true;
+  std::string found_here() {
+    if (text_.at_end()) return "the end";
+    const std::string_view token = text_.next_token();
+    if (is_printable(token.front())) return fmt::format("'{}'", shown(token));
+    return fmt::format("byte 0x{:02x}", static_cast<unsigned char>(token.front()));
   }
 
   void want(char c) {
-    if (!take(c)) fail_here(fmt::format("'{}'", c));
-  }
-
-  std::string_view peek_word() const {
-    std::size_t end = position_;
-    while (end < text_.size() && (is_letter(text_[end]) || is_digit(text_[end]))) ++end;
-    return text_.substr(position_, end - position_);
-  }
-
-  std::string_view take_word() {
-    const std::string_view word = peek_word();
-    position_ += word.size();
-    return word;
+    if (!text_.take(c)) fail_here(fmt::format("'{}'", c));
   }
 
   Operand joined(Operation operation, const Operand& left, const Operand& right) {
@@ -159,9 +125,9 @@ class ExpressionParser::Reader {
   Operand sum() {
     Operand result = product();
     for (;;) {
-      if (take('+'))
+      if (text_.take('+'))
         result = joined(Operation::add, result, product());
-      else if (take('-'))
+      else if (text_.take('-'))
         result = joined(Operation::subtract, result, product());
       else
         return result;
@@ -171,9 +137,9 @@ class ExpressionParser::Reader {
   Operand product() {
     Operand result = signed_power();
     for (;;) {
-      if (take('*'))
+      if (text_.take('*'))
         result = joined(Operation::multiply, result, signed_power());
-      else if (take('/'))
+      else if (text_.take('/'))
         result = joined(Operation::divide, result, signed_power());
       else
         return result;
@@ -183,7 +149,7 @@ class ExpressionParser::Reader {
   // Every way to nest passes through here.
   Operand signed_power() {
     if (parser_.depth_ == kDeepestNesting)
-      fail(position_, fmt::format("at most {} levels of nesting", kDeepestNesting), "more");
+      fail(text_.position(), fmt::format("at most {} levels of nesting", kDeepestNesting), "more");
     ++parser_.depth_;
     const Operand result = signed_power_one_level_down();
     --parser_.depth_;
@@ -191,49 +157,47 @@ class ExpressionParser::Reader {
   }
 
   Operand signed_power_one_level_down() {
-    (void)at_end();  // to the first character, for its column
-    const std::size_t start = position_;
-    if (take('+')) return signed_power();
-    if (take('-')) {
+    text_.skip_blanks();  // to the first character, for its column
+    const std::size_t start = text_.position();
+    if (text_.take('+')) return signed_power();
+    if (text_.take('-')) {
       const std::uint32_t operand = signed_power().node;
       return {graph_.operation(Operation::negate, operand, operand), start};
     }
     const Operand base = primary();
-    return take('^') ? joined(Operation::power, base, signed_power()) : base;
+    return text_.take('^') ? joined(Operation::power, base, signed_power()) : base;
   }
 
   Operand primary() {
-    if (at_end()) fail_here("a channel, a number, a function or '('");
-    const std::size_t start = position_;
-    const char c = text_[position_];
+    if (text_.at_end()) fail_here("a channel, a number, a function or '('");
+    const std::size_t start = text_.position();
+    const char c = text_.next();
     if (is_digit(c) || c == '.') return number();
-    if (take('(')) {
+    if (text_.take('(')) {
       Operand inside = sum();
       want(')');
       inside.start = start;
       return inside;
     }
     if (!is_letter(c)) fail_here("a channel, a number, a function or '('");
-    const std::string_view word = take_word();
-    if (take('(')) return call(word, start);
+    const std::string_view word = text_.take_word();
+    if (text_.take('(')) return call(word, start);
     return {named(word, start), start};
   }
 
   Operand number() {
-    const std::size_t start = position_;
-    double value = 0.0;
-    const char* const end_of_text = text_.data() + text_.size();
-    const auto [end, code] = std::from_chars(text_.data() + start, end_of_text, value);
-    if (code != std::errc{}) fail_here("a number that a double can hold");
-    position_ = static_cast<std::size_t>(end - text_.data());
-    if (at_end() || !is_letter(text_[position_])) return {graph_.constant(value), start};
-    const std::size_t unit_start = position_;
-    const std::string_view suffix = take_word();
+    const NumberText written = text_.next_number();
+    const std::size_t start = text_.position();
+    if (!written.fits) fail_here("a number that a double can hold");
+    text_.skip(written.text);
+    if (!is_letter(text_.next())) return {graph_.constant(written.value), start};
+    const std::size_t unit_start = text_.position();
+    const std::string_view suffix = text_.take_word();
     const Unit* const unit = find_unit(suffix);
     if (unit == nullptr)
       fail(unit_start, "a unit or an operator after the number", fmt::format("'{}'", shown(suffix)),
            "a product needs its '*'; the units are " + known_unit_list());
-    return finite({graph_.constant(unit->si(value)), start, unit->si_suffix});
+    return finite({graph_.constant(unit->si(written.value)), start, unit->si_suffix});
   }
 
   std::uint32_t named(std::string_view name, std::size_t start) {
@@ -253,11 +217,11 @@ class ExpressionParser::Reader {
       fail(start, "a function", fmt::format("'{}'", shown(name)), function_list());
     std::array<Operand, 2> arguments;
     for (std::size_t i = 0; i < function->argument_count; ++i) {
-      if (i > 0 && !take(','))
+      if (i > 0 && !text_.take(','))
         fail_here(fmt::format("',' and argument {} of {}", i + 1, function->name));
       arguments[i] = sum();
     }
-    if (next_is(','))
+    if (text_.next_is(','))
       fail_here(fmt::format("')': {} takes {} argument{}", function->name, function->argument_count,
                             function->argument_count == 1 ? "" : "s"));
     want(')');
@@ -325,16 +289,16 @@ class ExpressionParser::Reader {
 
   // The argument's text; the reader is after the call's closing parenthesis.
   std::string as_written(const Operand& argument) const {
-    std::string_view written = text_.substr(argument.start, position_ - 1 - argument.start);
-    while (is_space(written.back())) written.remove_suffix(1);
+    std::string_view written = text_.since(argument.start);
+    written.remove_suffix(1);
+    while (is_blank(written.back())) written.remove_suffix(1);
     return fmt::format("'{}'", shown(written));
   }
 
   ExpressionParser& parser_;
   ExpressionGraph& graph_;
-  std::string_view text_;
+  TextCursor text_;
   std::string_view title_;
-  std::size_t position_ = 0;
 };
 
 ExpressionParser::ExpressionParser(ExpressionGraph& graph,

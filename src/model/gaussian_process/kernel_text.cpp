@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstddef>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "core/checks.hpp"
+#include "core/text_cursor.hpp"
 #include "model/gaussian_process/kernel.hpp"
 #include "torsio/core/error.hpp"
 
@@ -30,7 +31,7 @@ class Parser {
 
   KernelExpression parse() {
     expression();
-    if (peek() != '\0') refuse("'+', '*' or the end");
+    if (!text_.at_end()) refuse("'+', '*' or the end");
     return std::move(kernel_);
   }
 
@@ -38,7 +39,7 @@ class Parser {
   void expression() {
     if (++depth_ > kDeepest) refuse(fmt::format("at most {} brackets in each other", kDeepest));
     product();
-    while (take('+')) {
+    while (text_.take('+')) {
       product();
       join(KernelKind::sum);
     }
@@ -48,7 +49,7 @@ class Parser {
   void product() {
     const std::size_t first = kernel_.nodes.size();
     factor();
-    while (take('*')) {
+    while (text_.take('*')) {
       factor();
       join(KernelKind::product);
     }
@@ -65,25 +66,21 @@ class Parser {
   static bool is_scaled(const KernelNode& node) { return node.scaled; }
 
   void factor() {
-    if (take('(')) {
+    if (text_.take('(')) {
       expression();
-      if (!take(')')) refuse("')'");
+      if (!text_.take(')')) refuse("')'");
       return;
     }
-    skip_space();
-    std::size_t end = at_;
-    while (end < text_.size() &&
-           (std::isalnum(static_cast<unsigned char>(text_[end])) != 0 || text_[end] == '_'))
-      ++end;
-    std::string_view name = text_.substr(at_, end - at_);
+    const std::string_view word = text_.next_word();
+    std::string_view name = word;
     const bool is_ard = name.ends_with(kArd);
     if (is_ard) name.remove_suffix(kArd.size());
     const auto* const known = std::ranges::find(kNames, name);
     if (known == kNames.end())
       refuse(fmt::format("'(' or one of {}, each optionally followed by {}",
                          "se, linear, periodic, rq, matern32, matern52", kArd),
-             text_.substr(at_, end - at_));
-    at_ = end;
+             word);
+    text_.skip(word);
     const auto kind = static_cast<std::size_t>(known - kNames.begin());
     add({.kind = kind,
          .shape = kind == number_of(KernelKind::periodic) ||
@@ -101,31 +98,15 @@ class Parser {
     kernel_.nodes.push_back(std::move(node));
   }
 
-  void skip_space() {
-    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_])) != 0) ++at_;
-  }
-  char peek() {
-    skip_space();
-    return at_ < text_.size() ? text_[at_] : '\0';
-  }
-  bool take(char wanted) {
-    if (peek() != wanted || at_ == text_.size()) return false;
-    ++at_;
-    return true;
+  [[noreturn]] void refuse(std::string_view expected, std::string_view found = {}) {
+    if (found.empty()) found = text_.next_token();
+    torsio::refuse<UsageError>(
+        fmt::format("kernel \"{}\", column {}", text_.text(), text_.position() + 1), expected,
+        found.empty() ? std::string("the end") : fmt::format("'{}'", found));
   }
 
-  [[noreturn]] void refuse(std::string expected, std::string_view found = {}) {
-    skip_space();
-    if (found.empty()) found = text_.substr(at_, 1);
-    throw UsageError(
-        {.place = fmt::format("kernel \"{}\", column {}", text_, at_ + 1),
-         .expected = std::move(expected),
-         .found = found.empty() ? std::string("the end") : fmt::format("'{}'", found)});
-  }
-
-  std::string_view text_;
+  TextCursor text_;
   std::size_t inputs_;
-  std::size_t at_ = 0;
   std::size_t depth_ = 0;
   KernelExpression kernel_;
 };

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/checks.hpp"
+#include "core/text_cursor.hpp"
 #include "core/trimmed.hpp"
 #include "model/viscoelastic/spring_dashpot_network.hpp"
 #include "torsio/core/error.hpp"
@@ -60,96 +62,56 @@ std::string preset_names() {
   return names + fmt::format("{}(n)", kGeneralised);
 }
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_word(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || is_digit(c);
-}
-bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
-
-std::string shown(std::string_view text) {
-  std::string result(text);
-  std::ranges::replace_if(
-      result, [](char c) { return c < ' ' || c > '~'; }, '?');
-  return result;
-}
-
 /// One text, from left to right; see `parse_network`.
 class Parser {
  public:
   explicit Parser(std::string_view text) : text_(text) {}
 
   SpringDashpotNetwork parse() {
-    if (text_.size() > kLongest)
-      throw UsageError({.place = "network",
-                        .expected = fmt::format("at most {} characters", kLongest),
-                        .found = fmt::format("{}", text_.size())});
+    if (text_.text().size() > kLongest)
+      torsio::refuse<UsageError>("network", fmt::format("at most {} characters", kLongest),
+                                 fmt::format("{}", text_.text().size()));
     network();
-    if (!at_end()) refuse_here("the end");
+    if (!text_.at_end()) refuse_here("the end");
     return std::move(network_);
   }
 
   /// The n of generalised_maxwell(n), if the text has this form.
   std::size_t branches() {
-    skip_space();
-    if (take_word() != kGeneralised) return 0;
+    if (text_.take_word() != kGeneralised) return 0;
     want('(', "the number of branches in brackets");
-    const std::size_t start = position_;
-    const std::string_view number = take_word();
+    const std::string_view number = text_.take_word();
+    const std::size_t start = text_.position() - number.size();
     std::size_t count = 0;
     const auto [end, code] = std::from_chars(number.data(), number.data() + number.size(), count);
     if (code != std::errc{} || end != number.data() + number.size() || count < 1 ||
         count > kMaxBranches)
       refuse(start, fmt::format("the number of branches, 1 to {}", kMaxBranches), number);
     want(')', "')'");
-    if (!at_end()) refuse_here("the end");
+    if (!text_.at_end()) refuse_here("the end");
     return count;
   }
 
  private:
-  [[noreturn]] void refuse(std::size_t at, std::string expected, std::string_view found) const {
+  [[noreturn]] void refuse(std::size_t at, std::string_view expected,
+                           std::string_view found) const {
     constexpr std::size_t kBefore = 50;
     constexpr std::size_t kWindow = 100;
     const std::size_t from = at > kBefore ? at - kBefore : 0;
-    throw UsageError(
-        {.place = fmt::format("network: column {}", at + 1),
-         .expected = std::move(expected),
-         .found = found.empty() ? std::string("the end") : fmt::format("'{}'", shown(found)),
-         .advice = fmt::format("{}\n  {}^", shown(text_.substr(from, kWindow)),
-                               std::string(at - from, ' '))});
+    torsio::refuse<UsageError>(
+        fmt::format("network: column {}", at + 1), expected,
+        found.empty() ? std::string("the end") : fmt::format("'{}'", on_one_line(found)),
+        fmt::format("{}\n  {}^", on_one_line(text_.text().substr(from, kWindow)),
+                    std::string(at - from, ' ')));
   }
-  [[noreturn]] void refuse_here(std::string expected) {
-    skip_space();
-    const std::string_view word = peek_word();
-    refuse(position_, std::move(expected), word.empty() ? text_.substr(position_, 1) : word);
+  [[noreturn]] void refuse_here(std::string_view expected) {
+    const std::string_view found = text_.next_token();
+    refuse(text_.position(), expected, found);
   }
 
-  void skip_space() {
-    while (position_ < text_.size() && is_space(text_[position_])) ++position_;
+  void want(char c, std::string_view expected) {
+    if (!text_.take(c)) refuse_here(expected);
   }
-  bool at_end() {
-    skip_space();
-    return position_ == text_.size();
-  }
-  bool take(char c) {
-    if (at_end() || text_[position_] != c) return false;
-    ++position_;
-    return true;
-  }
-  void want(char c, std::string expected) {
-    if (!take(c)) refuse_here(std::move(expected));
-  }
-  [[nodiscard]] std::string_view peek_word() const {
-    std::size_t end = position_;
-    while (end < text_.size() && is_word(text_[end])) ++end;
-    return text_.substr(position_, end - position_);
-  }
-  std::string_view take_word() {
-    skip_space();
-    const std::string_view word = peek_word();
-    position_ += word.size();
-    return word;
-  }
-
   void add(NetworkNode node, std::size_t start) {
     if (network_.nodes.size() == kMaxNetworkNodes)
       refuse(start, fmt::format("at most {} elements and joins", kMaxNetworkNodes), "more");
@@ -158,15 +120,14 @@ class Parser {
 
   void network() {
     if (++depth_ > kDeepest)
-      refuse(position_, fmt::format("at most {} networks in each other", kDeepest), "more");
-    skip_space();
-    const std::size_t start = position_;
-    const std::string_view word = peek_word();
+      refuse(text_.position(), fmt::format("at most {} networks in each other", kDeepest), "more");
+    const std::string_view word = text_.next_word();
+    const std::size_t start = text_.position();
     if (word == "series" || word == "parallel") {
-      position_ += word.size();
+      text_.skip(word);
       join(word == "series" ? NetworkKind::series : NetworkKind::parallel, word, start);
     } else if (word == "kv" || word == "maxwell") {
-      position_ += word.size();
+      text_.skip(word);
       pair(word == "kv" ? NetworkKind::parallel : NetworkKind::series, word, start);
     } else {
       element("", "series, parallel, kv, maxwell, a spring k1 or a dashpot d1");
@@ -180,7 +141,7 @@ class Parser {
     do {
       network();
       ++children;
-    } while (take(','));
+    } while (text_.take(','));
     if (children < 2) refuse_here(fmt::format("',' and a second network to be in {}", word));
     want(')', "',' or ')'");
     add({.kind = static_cast<std::size_t>(kind), .children = children}, start);
@@ -197,9 +158,8 @@ class Parser {
 
   /// @param letters those that the name may begin with; empty: k and d
   void element(std::string_view letters, const std::string& expected) {
-    skip_space();
-    const std::size_t start = position_;
-    const std::string_view word = take_word();
+    const std::string_view word = text_.take_word();
+    const std::size_t start = text_.position() - word.size();
     const bool is_known = !word.empty() && (letters.empty() ? word[0] == 'k' || word[0] == 'd'
                                                             : word[0] == letters[0]);
     if (!is_known) refuse_at_word(start, expected, word);
@@ -212,13 +172,13 @@ class Parser {
     });
     if (is_taken)
       refuse(start, "a name that is used only once: each element is a separate parameter", word);
-    if (take('=')) node.value = value();
+    if (text_.take('=')) node.value = value();
     add(node, start);
   }
 
   [[noreturn]] void refuse_at_word(std::size_t start, const std::string& expected,
                                    std::string_view word) {
-    position_ = start;
+    text_.return_to(start);
     if (word.empty()) refuse_here(expected);
     refuse(start, expected, word);
   }
@@ -236,24 +196,18 @@ class Parser {
   }
 
   double value() {
-    skip_space();
-    const std::size_t start = position_;
-    double value = 0.0;
-    const auto [end, code] =
-        std::from_chars(text_.data() + start, text_.data() + text_.size(), value);
-    const bool is_good =
-        code == std::errc{} && value >= kSmallestElement && value <= kLargestElement;
-    if (end == text_.data() + start) refuse_here("a start value, like 0.68");
-    position_ = static_cast<std::size_t>(end - text_.data());
-    if (!is_good)
+    const NumberText number = text_.next_number();
+    const std::size_t start = text_.position();
+    if (number.text.empty()) refuse_here("a start value, like 0.68");
+    text_.skip(number.text);
+    if (!number.fits || !(number.value >= kSmallestElement && number.value <= kLargestElement))
       refuse(start,
              fmt::format("a start value from {:g} to {:g}", kSmallestElement, kLargestElement),
-             text_.substr(start, position_ - start));
-    return value;
+             number.text);
+    return number.value;
   }
 
-  std::string_view text_;
-  std::size_t position_ = 0;
+  TextCursor text_;
   std::size_t depth_ = 0;
   SpringDashpotNetwork network_;
 };
@@ -315,7 +269,7 @@ SpringDashpotNetwork parse_network(std::string_view text) {
     return Parser(text).parse();
   } catch (const UsageError& error) {
     // A single word was most likely meant as a name.
-    if (!std::ranges::all_of(name, is_word)) throw;
+    if (!std::ranges::all_of(name, is_word_character)) throw;
     ErrorReport report = error.report();
     report.expected += ", or one of " + preset_names();
     throw UsageError(std::move(report));

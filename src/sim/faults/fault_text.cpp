@@ -1,13 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "actuator/second_stage.hpp"
+#include "core/checks.hpp"
+#include "core/text_cursor.hpp"
 #include "core/trimmed.hpp"
 #include "data/names.hpp"
 #include "sim/faults/fault_rules.hpp"
@@ -56,7 +57,7 @@ class InjectionText {
     const std::size_t equals = text_.find('=');
     const std::size_t at = text_.rfind('@');
     if (equals == std::string_view::npos || at == std::string_view::npos || at < equals)
-      refuse(std::string(kForm), text_);
+      refuse(kForm, text_);
     ScheduledFault fault{.what = target(trimmed(text_.substr(0, equals))), .place = place()};
     read_times(trimmed(text_.substr(at + 1)), fault);
     read_effect(trimmed(text_.substr(equals + 1, at - equals - 1)), fault);
@@ -66,12 +67,9 @@ class InjectionText {
 
  private:
   [[nodiscard]] std::string place() const { return fmt::format("fault '{}'", printable(text_)); }
-  [[noreturn]] void refuse(std::string expected, std::string_view found,
-                           std::string advice = {}) const {
-    throw UsageError({.place = place(),
-                      .expected = std::move(expected),
-                      .found = fmt::format("'{}'", printable(found)),
-                      .advice = std::move(advice)});
+  [[noreturn]] void refuse(std::string_view expected, std::string_view found,
+                           std::string_view advice = {}) const {
+    torsio::refuse<UsageError>(place(), expected, fmt::format("'{}'", printable(found)), advice);
   }
 
   [[nodiscard]] std::string target(std::string_view written) const {
@@ -117,8 +115,7 @@ class InjectionText {
   [[nodiscard]] static const FaultRule* default_rule(std::string_view amount,
                                                      std::string_view part) {
     const bool is_number = !amount.empty() && (amount.front() == '-' || amount.front() == '+' ||
-                                               amount.front() == '.' ||
-                                               (amount.front() >= '0' && amount.front() <= '9'));
+                                               amount.front() == '.' || is_digit(amount.front()));
     if (!is_number) return nullptr;
     if (part.empty())
       return find_fault_rule(amount.back() == '%' ? FaultKind::gain : FaultKind::jump, part);
@@ -152,11 +149,10 @@ class InjectionText {
 
   [[nodiscard]] double number(std::string_view text) const {
     const std::string_view digits = without_plus(text);
-    double value = 0.0;
-    const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (code != std::errc{} || end != digits.data() + digits.size())
+    const NumberText number = leading_number(digits);
+    if (!number.fits || number.text != digits)
       refuse("a number, or a change in per cent with its sign", text);
-    return value;
+    return number.value;
   }
 
   /// "-20%" and "0.8" are the same factor.
