@@ -11,7 +11,6 @@
 #include "model/network/gru.hpp"
 #include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"
-#include "model/network/network_bank.hpp"
 #include "rows.hpp"
 #include "support/random_network.hpp"
 #include "torsio/model/last_layer_adapter.hpp"
@@ -114,12 +113,12 @@ void write_mlp() { write_network<Mlp>(kMlp); }
 
 Row lstm250_x12_step() {
   const auto parameters = plain_network<Lstm>(kLstm250);
-  LstmBank bank(parameters, kJoints);
+  RecurrentNetwork<LstmLayer> many(parameters, kJoints, Lstm::kFamily);
   const Matrix features = waves(kJoints * kLstm250.inputs);
   std::vector<Estimate> estimates(kJoints);
   const double seconds = best_seconds(
       [&] {
-        for (std::size_t n = 0; n < kTimed; ++n) bank.step(features.row(n), estimates);
+        for (std::size_t n = 0; n < kTimed; ++n) many.step(features.row(n), estimates);
       },
       2.0);
   const std::size_t weights = weight_count(parameters.layers) + weight_count(parameters.head);

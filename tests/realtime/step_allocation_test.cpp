@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-#include "model/network/network_bank.hpp"
+#include "model/network/lstm.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/every_family.hpp"
 #include "support/example_models.hpp"
@@ -132,17 +132,17 @@ TEST(GreyBoxBanks, StepNeverTouchesTheHeap) {
             0U);
 }
 
-TEST(NetworkBank, StepAndStatesNeverTouchTheHeap) {
+TEST(RecurrentNetwork, StepAndStatesOfManyJointsNeverTouchTheHeap) {
   constexpr std::size_t kJoints = 7;
   Lstm network = example<Lstm>();
-  LstmBank bank(network.parameters(), kJoints);
-  const Matrix features = example_features(50, kJoints * bank.input_count());
+  RecurrentNetwork<LstmLayer> many(network.parameters(), kJoints, Lstm::kFamily);
+  const Matrix features = example_features(50, kJoints * many.input_count());
   std::vector<Estimate> estimates(kJoints);
   std::vector<float> state(network.state_size());
   EXPECT_EQ(heap_calls_during([&] {
-              for (std::size_t n = 0; n < features.rows; ++n) bank.step(features.row(n), estimates);
-              bank.reset(3);
-              bank.reset();
+              for (std::size_t n = 0; n < features.rows; ++n) many.step(features.row(n), estimates);
+              many.reset(3);
+              many.reset();
               network.get_state(state);
               network.reset(state);
             }),

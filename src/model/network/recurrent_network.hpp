@@ -39,7 +39,9 @@ struct RecurrentParameters {
   bool operator==(const RecurrentParameters&) const = default;
 };
 
-/// What `Lstm`, `Gru` and `NetworkBank` share: one network, the states of some joints.
+/// One network, and the states of some joints that share it. A step reads the weights once for all
+/// joints: each gets the value that a network of its own would give it, to the bit, for a fraction of
+/// the time. `Lstm` and `Gru` are the networks of one joint.
 template <class Layer>
 class RecurrentNetwork {
  public:

@@ -13,7 +13,6 @@
 #include "model/network/gru.hpp"
 #include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"
-#include "model/network/network_bank.hpp"
 #include "support/each_instruction_set.hpp"
 #include "support/error_message.hpp"
 #include "support/examples/example.hpp"
@@ -187,15 +186,14 @@ TYPED_TEST(Recurrent, ReturnsTheInputsOfItsLastLayer) {
   }
 }
 
-// The law of a bank: it equals single networks to the bit, whatever the number of joints and
-// whichever of them is reset.
-TYPED_TEST(Recurrent, ABankEqualsOneNetworkAJoint) {
+// Whatever the number of joints and whichever of them is reset: equal to single networks to the bit.
+TYPED_TEST(Recurrent, ManyJointsEqualOneNetworkEach) {
   for (const std::size_t joints : {1U, 2U, 5U, 6U, 7U, 12U, 13U}) {
     SCOPED_TRACE(joints);
     const auto parameters = random_network<TypeParam>(
         {.units = {33, 17}, .hidden = {5}, .warm_up_samples = 2, .biases_apart = joints % 2 == 1},
         joints);
-    NetworkBank<TypeParam> bank(parameters, joints);
+    RecurrentNetwork<typename TypeParam::Layer> many(parameters, joints, TypeParam::kFamily);
     std::vector<TypeParam> alone(joints, TypeParam(parameters));
     std::vector<double> features(joints * 2);
     std::vector<Estimate> estimate(joints);
@@ -205,10 +203,10 @@ TYPED_TEST(Recurrent, ABankEqualsOneNetworkAJoint) {
         std::ranges::copy(wave.row(n + joint),
                           features.begin() + static_cast<std::ptrdiff_t>(2 * joint));
       if (n == kSteps / 2) {
-        bank.reset(joints / 2);
+        many.reset(joints / 2);
         alone[joints / 2].reset();
       }
-      bank.step(features, estimate);
+      many.step(features, estimate);
       for (std::size_t joint = 0; joint < joints; ++joint) {
         const Estimate expected = alone[joint].step({features.data() + 2 * joint, 2});
         ASSERT_EQ(estimate[joint].value, expected.value) << "joint " << joint << ", step " << n;
@@ -216,11 +214,6 @@ TYPED_TEST(Recurrent, ABankEqualsOneNetworkAJoint) {
       }
     }
   }
-}
-
-TEST(NetworkBank, RefusesABankWithoutJoints) {
-  EXPECT_THAT(error_message([] { LstmBank(random_network<Lstm>({}, 1), 0); }),
-              HasSubstr("network bank: expected at least one joint, found none"));
 }
 
 TEST(Networks, CountWhatTrainingMayChange) {
