@@ -78,10 +78,9 @@ std::span<const FamilyInfo> families() noexcept {
     std::vector<FamilyInfo> list;
     for (const auto& room :
          {static_families(), hysteresis_families(), mixture_families(), gaussian_process_families(),
-          network_families(), second_order_families(), hammerstein_wiener_families()})
+          network_families(), second_order_families(), hammerstein_wiener_families(),
+          narx_families()})
       list.insert(list.end(), room.begin(), room.end());
-    const auto with_feedback = narx_families(list);
-    list.insert(list.end(), with_feedback.begin(), with_feedback.end());
     return list;
   }();
   return all;

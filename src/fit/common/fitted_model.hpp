@@ -37,10 +37,12 @@ void report_start(const Progress& progress, const Fitted<Family>* /*result*/) {
 }
 
 template <auto kFit>
-FittedModel fit_with_options(const TrainingData& data, const Options& given,
-                             const FitContext& context) {
-  using Own = typename OptionsOfFitter<decltype(kFit)>::Type;
-  const Own own = filled<Own>(given);
+using OptionsOf = typename OptionsOfFitter<decltype(kFit)>::Type;
+
+template <auto kFit>
+FittedModel fit_with(const TrainingData& data, const OptionsOf<kFit>& own,
+                     const FitContext& context) {
+  using Own = OptionsOf<kFit>;
   if constexpr (std::invocable<decltype(kFit), const TrainingData&, const Own&,
                                const FitContext&>) {
     return fitted_model(kFit(data, own, context));
@@ -53,13 +55,19 @@ FittedModel fit_with_options(const TrainingData& data, const Options& given,
   }
 }
 
+template <auto kFit>
+FittedModel fit_with_options(const TrainingData& data, const Options& given,
+                             const FitContext& context) {
+  return fit_with<kFit>(data, filled<OptionsOf<kFit>>(given), context);
+}
+
 }  // namespace detail
 
 /// A row of the table of families, its options and their adapter made from the fitter's signature:
 /// (data, options), followed by nothing, a `Progress` or a `FitContext`.
 template <auto kFit>
 [[nodiscard]] FamilyInfo family_of(FamilyInfo stated) {
-  stated.options = options_of<typename detail::OptionsOfFitter<decltype(kFit)>::Type>();
+  stated.options = options_of<detail::OptionsOf<kFit>>();
   stated.fit = detail::fit_with_options<kFit>;
   return stated;
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "torsio/fit/common/family_info.hpp"
@@ -8,7 +7,6 @@
 namespace torsio {
 
 /// `arx`, and the `narx_` variants of static families.
-/// @param known the static ones. Call once: the list points to options that it keeps.
-[[nodiscard]] std::vector<FamilyInfo> narx_families(std::span<const FamilyInfo> known);
+[[nodiscard]] std::vector<FamilyInfo> narx_families();
 
 }  // namespace torsio
