@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "torsio/control/joint_cascade.hpp"
+#include "torsio/control/spring_controller.hpp"
 #include "torsio/control/torque_controller.hpp"
 
 namespace torsio {
@@ -106,36 +107,24 @@ class JointControllerCore {
 /// Source: paper 000 section 4, Figure 6 (position and velocity controllers that override); the
 /// continuous override is ours.
 template <SpringInverse I>
-class JointController {
+class JointController : public detail::SpringController<I, JointControllerCore> {
+  using Base = detail::SpringController<I, JointControllerCore>;
+
  public:
-  using Settings = JointControllerCore::Settings;
-  using Output = JointControllerCore::Output;
+  using typename Base::Output;
+  using typename Base::Settings;
 
   /// @throws Error as `JointControllerCore`.
   JointController(I inverse, const Settings& settings, double sample_rate_Hz)
-      : inverse_(std::move(inverse)), core_(settings, sample_rate_Hz) {}
-
-  void reset() noexcept {
-    inverse_.reset();
-    core_.reset();
-  }
+      : Base(std::move(inverse), settings, sample_rate_Hz) {}
 
   /// The inverse takes part in every mode, so that one with a memory is ready when it is needed.
   Output step(const JointReference& reference, const JointSample& sample) noexcept TORSIO_REALTIME {
-    const double torque_Nm = core_.accept(reference, sample);
-    const Output output = core_.step(inverse_.step(torque_Nm, sample), sample);
-    if constexpr (requires { inverse_.follow(0.0); }) inverse_.follow(output.spring_deflection_rad);
-    return output;
+    return Base::step_with(Base::own_core().accept(reference, sample), sample,
+                           &Output::spring_deflection_rad);
   }
   /// As `JointCascade::track`.
-  void track(double applied_A) noexcept TORSIO_REALTIME { core_.track(applied_A); }
-
-  [[nodiscard]] I& inverse() noexcept { return inverse_; }
-  [[nodiscard]] const JointControllerCore& core() const noexcept { return core_; }
-
- private:
-  I inverse_;
-  JointControllerCore core_;
+  void track(double applied_A) noexcept TORSIO_REALTIME { Base::own_core().track(applied_A); }
 };
 
 }  // namespace torsio

@@ -9,7 +9,7 @@
 #include "torsio/control/bumpless_transfer.hpp"
 #include "torsio/control/deflection_controller.hpp"
 #include "torsio/control/disturbance_observer.hpp"
-#include "torsio/control/spring_inverse.hpp"
+#include "torsio/control/spring_controller.hpp"
 
 namespace torsio {
 
@@ -110,37 +110,25 @@ class TorqueLoopCore {
 /// and `Output::inverse` reports it. Source: paper 000 section 4, 001 section 6;
 /// specification 3.11.
 template <SpringInverse I>
-class TorqueController {
+class TorqueController : public detail::SpringController<I, TorqueLoopCore> {
+  using Base = detail::SpringController<I, TorqueLoopCore>;
+
  public:
-  using Settings = TorqueLoopCore::Settings;
-  using Output = TorqueLoopCore::Output;
+  using typename Base::Output;
+  using typename Base::Settings;
 
   /// @throws Error as `TorqueLoopCore`.
   TorqueController(I inverse, const Settings& settings, double sample_rate_Hz)
-      : inverse_(std::move(inverse)), core_(settings, sample_rate_Hz) {}
-
-  void reset() noexcept {
-    inverse_.reset();
-    core_.reset();
-  }
+      : Base(std::move(inverse), settings, sample_rate_Hz) {}
 
   Output step(double wanted_Nm, const JointSample& sample) noexcept TORSIO_REALTIME {
-    const double accepted_Nm = core_.accept(wanted_Nm);
-    const Output output = core_.step(inverse_.step(accepted_Nm, sample), sample);
-    if constexpr (requires { inverse_.follow(0.0); }) inverse_.follow(output.wanted_deflection_rad);
-    return output;
+    return Base::step_with(Base::own_core().accept(wanted_Nm), sample,
+                           &Output::wanted_deflection_rad);
   }
-
-  [[nodiscard]] I& inverse() noexcept { return inverse_; }
-  [[nodiscard]] const TorqueLoopCore& core() const noexcept { return core_; }
   /// As `DeflectionController::set_gains`.
   [[nodiscard]] bool set_gains(const Pid::Gains& gains) noexcept TORSIO_REALTIME {
-    return core_.deflection().set_gains(gains);
+    return Base::own_core().deflection().set_gains(gains);
   }
-
- private:
-  I inverse_;
-  TorqueLoopCore core_;
 };
 
 }  // namespace torsio
