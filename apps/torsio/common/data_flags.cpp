@@ -142,6 +142,11 @@ void DataFlags::use_model_mapping(const std::string& text, const std::string& mo
   }
 }
 
+void DataFlags::use_model(const torsio::ModelFile& file, const std::string& path) {
+  target = file.settings.target;
+  use_model_mapping(file.card.mapping, path);
+}
+
 torsio::LoadOptions DataFlags::load_options(const torsio::Progress& progress) const {
   torsio::LoadOptions options;
   options.progress = progress;

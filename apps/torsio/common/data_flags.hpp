@@ -11,6 +11,7 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/data/load.hpp"
+#include "torsio/files/model_file.hpp"
 
 /// The flags of every verb that reads recordings.
 struct DataFlags {
@@ -34,6 +35,8 @@ struct DataFlags {
   /// @param text `ModelCard::mapping`
   /// @param model path of the model file, for messages
   void use_model_mapping(const std::string& text, const std::string& model);
+  /// The target and the mapping of a model, for a verb that compares it with recordings.
+  void use_model(const torsio::ModelFile& file, const std::string& path);
 
   /// The recordings as training data, further ones with other roles.
   [[nodiscard]] torsio::Dataset load(const std::vector<std::string>& validation,

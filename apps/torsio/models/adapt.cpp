@@ -41,8 +41,7 @@ std::string settings_list() {
 torsio::Dataset load(const AdaptFlags& flags, const torsio::ModelFile& file,
                      const torsio::Progress& progress) {
   DataFlags data = flags.data;
-  data.target = file.settings.target;
-  data.use_model_mapping(file.card.mapping, flags.model);
+  data.use_model(file, flags.model);
   torsio::Dataset dataset = data.load({}, flags.test, progress);
   if (!dataset.has_role(torsio::Role::test))
     torsio::hold_out_ends(dataset, flags.held_out,

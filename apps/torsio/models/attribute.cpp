@@ -41,8 +41,7 @@ std::size_t window_samples(const AttributeFlags& flags, double sample_rate_Hz) {
 torsio::Dataset load(const AttributeFlags& flags, const torsio::ModelFile& file,
                      const torsio::Progress& progress) {
   DataFlags data = flags.data;
-  data.target = file.settings.target;
-  data.use_model_mapping(file.card.mapping, flags.model);
+  data.use_model(file, flags.model);
   torsio::Dataset dataset = data.load_as_test(progress);
   for (torsio::DatasetRecord& record : dataset.records)
     record.segments = torsio::whole_record(record.recording.size(), torsio::Role::test);

@@ -32,8 +32,7 @@ void run(EstimateFlags& flags) {
       {flags.model});
   require_ending("--output", flags.output, {".csv", ".gz"});
   const torsio::ModelFile file = torsio::load_model(flags.model);
-  flags.data.use_model_mapping(file.card.mapping, flags.model);
-  flags.data.target = file.settings.target;
+  flags.data.use_model(file, flags.model);
   ProgressBar progress;
   const std::vector<std::string> inputs =
       torsio::FeaturePipeline(file.settings.features, file.settings.sample_rate_Hz).raw_inputs();

@@ -87,8 +87,7 @@ void run(EvaluateFlags& flags) {
     return;
   }
   DataFlags data = flags.data;
-  data.target = file.settings.target;
-  data.use_model_mapping(file.card.mapping, flags.model);
+  data.use_model(file, flags.model);
   ProgressBar progress;
   const torsio::Dataset dataset = data.load_as_test(progress.listener());
   if (!flags.predictions.empty() && dataset.records.size() != 1)

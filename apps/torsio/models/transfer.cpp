@@ -72,8 +72,7 @@ std::vector<double> curve_times(const TransferFlags& flags) {
 torsio::Dataset load(const TransferFlags& flags, const torsio::ModelFile& base,
                      const torsio::Progress& progress) {
   DataFlags data = flags.data;
-  data.target = base.settings.target;
-  data.use_model_mapping(base.card.mapping, flags.model);
+  data.use_model(base, flags.model);
   torsio::Dataset dataset = data.load({}, flags.test, progress);
   const double use_s = torsio::si_quantity(flags.use, "s", "--use");
   if (!dataset.has_role(torsio::Role::test))

@@ -63,8 +63,7 @@ void run(DriftFlags& flags) {
   flags.data.check_outputs({flags.json.destination, flags.report.destination, flags.report.plot},
                            models);
   const torsio::ModelFile file = torsio::load_model(flags.model, flags.serial);
-  flags.data.target = file.settings.target;
-  flags.data.use_model_mapping(file.card.mapping, flags.model);
+  flags.data.use_model(file, flags.model);
   ProgressBar progress;
   const torsio::Dataset dataset = flags.data.load_as_test(progress.listener());
   warn_of_seen_recordings(file, dataset);
