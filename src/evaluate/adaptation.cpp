@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/report_progress.hpp"
+#include "data/recording_rows.hpp"
 #include "evaluate/fit_and_score.hpp"
 #include "fit/common/guards.hpp"
 #include "fit/common/option_fields.hpp"
@@ -46,10 +47,7 @@ class Replay {
       : adaptive_(adaptive),
         record_(record),
         target_(record.recording.channel(target)),
-        raw_(adaptive.raw_inputs().size()) {
-    for (const std::string& input : adaptive.raw_inputs())
-      channels_.push_back(&record.recording.channel(input).values);
-  }
+        rows_(record.recording, adaptive.raw_inputs()) {}
 
   /// @param frozen the estimates of the frozen model for the same recording.
   void run(const Prediction& frozen, AdaptationTally& own, AdaptationTally& together,
@@ -63,9 +61,7 @@ class Replay {
         report_progress(progress, static_cast<double>(n) / static_cast<double>(samples),
                         record_.recording.name());
       age_s = target_.is_fresh(n) ? 0.0 : age_s + 1.0 / record_.recording.sample_rate_Hz();
-      std::ranges::transform(channels_, raw_.begin(),
-                             [n](const std::vector<double>* values) { return (*values)[n]; });
-      const Estimate output = adaptive_.step(raw_);
+      const Estimate output = adaptive_.step(rows_.at(n));
       if (!is_lesson(record_, n)) continue;
       if (output.fault == Fault::none && target_.is_fresh(n))
         for (AdaptationTally* tally : {&own, &together}) {
@@ -80,8 +76,7 @@ class Replay {
   AdaptiveEstimator& adaptive_;
   const DatasetRecord& record_;
   const Channel& target_;
-  std::vector<const std::vector<double>*> channels_;
-  std::vector<double> raw_;
+  RecordingRows rows_;
 };
 
 void require_role(const Dataset& dataset, Role role, const char* what, const char* advice) {

@@ -8,6 +8,7 @@
 
 #include "core/report_progress.hpp"
 #include "data/channel_names.hpp"
+#include "data/recording_rows.hpp"
 #include "data/text_sink.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/realtime.hpp"
@@ -62,26 +63,22 @@ EstimatedRecording estimate_recording(Estimator estimator, const Recording& reco
   EstimatedRecording result{
       .channels = Recording(recording.name(), recording.sample_rate_Hz(), recording.time_s(0)),
       .faults = {}};
-  std::vector<const std::vector<double>*> inputs;
-  for (const std::string& input : estimator.raw_inputs()) {
-    inputs.push_back(&recording.channel(input).values);
-    result.channels.add({.name = input, .values = *inputs.back()});
-  }
+  RecordingRows rows(recording, estimator.raw_inputs());
+  for (const Channel* input : rows.channels())
+    result.channels.add({.name = input->name, .values = input->values});
   const std::size_t samples = recording.size();
   Channel value{.name = estimate_channel(settings.target), .values = {}};
   Channel std_dev{.name = error_bar_channel(settings.target), .values = {}};
   Channel novelty{.name = kNovelty, .values = {}};
   for (Channel* channel : {&value, &std_dev, &novelty}) channel->values.reserve(samples);
   result.faults.reserve(samples);
-  std::vector<double> raw(inputs.size());
   const DenormalsOff denormals_off;
   estimator.reset();
   for (std::size_t n = 0; n < samples; ++n) {
     if (n % kSamplesPerReport == 0)
       report_progress(progress, static_cast<double>(n) / static_cast<double>(samples),
                       "estimating");
-    std::ranges::transform(inputs, raw.begin(), [n](const auto* channel) { return (*channel)[n]; });
-    const Estimate estimate = estimator.step(raw);
+    const Estimate estimate = estimator.step(rows.at(n));
     value.values.push_back(estimate.value);
     std_dev.values.push_back(estimate.std_dev);
     novelty.values.push_back(estimate.novelty);

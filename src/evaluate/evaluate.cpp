@@ -6,10 +6,12 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 
 #include "core/report_progress.hpp"
+#include "data/recording_rows.hpp"
 #include "evaluate/initial_state.hpp"
 #include "evaluate/measured_samples.hpp"
 #include "fit/common/finite_input.hpp"
@@ -40,12 +42,10 @@ double clock_cost_ns() {
   return cost;
 }
 
-std::vector<const std::vector<double>*> raw_channels(const Estimator& estimator,
-                                                     const Recording& recording) {
-  std::vector<const std::vector<double>*> channels;
-  for (const std::string& input : estimator.raw_inputs())
-    channels.push_back(&finite_input(recording, input));
-  return channels;
+/// The raw inputs of an estimator, all of them finite.
+RecordingRows raw_rows(const Estimator& estimator, const Recording& recording) {
+  for (const std::string& input : estimator.raw_inputs()) (void)finite_input(recording, input);
+  return {recording, estimator.raw_inputs()};
 }
 
 /// Counts how often the target is within one and two error bars, and adds up their width.
@@ -160,9 +160,7 @@ double usual_error(const EstimatorSettings& settings, FamilyTraits traits) {
 
 /// Sets the state of the estimator's model by the first measured samples.
 /// @returns how many samples these are, those between them that were not measured included.
-std::size_t start_with(Estimator& estimator,
-                       const std::vector<const std::vector<double>*>& channels,
-                       const Corrections& corrections) {
+std::size_t start_with(Estimator& estimator, RecordingRows& rows, const Corrections& corrections) {
   const Channel& target = *corrections.target;
   std::size_t samples = 0;
   for (std::size_t left = corrections.most; samples < target.values.size() && left > 0; ++samples)
@@ -171,10 +169,8 @@ std::size_t start_with(Estimator& estimator,
   FeaturePipeline pipeline(settings.features, settings.sample_rate_Hz);
   Matrix features(samples, pipeline.feature_count());
   std::vector<double> measured(samples, kNotMeasured);
-  std::vector<double> raw(channels.size());
   for (std::size_t n = 0; n < samples; ++n) {
-    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[n];
-    std::ranges::copy(pipeline.step(raw), features.row(n).begin());
+    std::ranges::copy(pipeline.step(rows.at(n)), features.row(n).begin());
     if (pipeline.is_settled() && target.is_fresh(n)) measured[n] = target.values[n];
   }
   start_where_measured(estimator.model(), features, measured,
@@ -188,8 +184,7 @@ Prediction predict(Estimator estimator, const Recording& recording,
                    const Corrections& corrections) {
   for (const std::string& channel : estimator.settings().zeroed_channels)
     estimator.set_zero(channel, 0.0);
-  const auto channels = raw_channels(estimator, recording);
-  std::vector<double> raw(channels.size());
+  RecordingRows rows = raw_rows(estimator, recording);
   Prediction prediction;
   prediction.estimates.resize(recording.size());
   prediction.step_ns.resize(recording.size());
@@ -198,9 +193,9 @@ Prediction predict(Estimator estimator, const Recording& recording,
   const DenormalsOff denormals_off;
   estimator.reset();
   if (!estimator.model().state().empty() && corrections.most > 0)
-    prediction.initialised = start_with(estimator, channels, corrections);
+    prediction.initialised = start_with(estimator, rows, corrections);
   for (std::size_t i = 0; i < recording.size(); ++i) {
-    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[i];
+    const std::span<const double> raw = rows.at(i);
     const auto start = Clock::now();
     prediction.estimates[i] = estimator.step(raw);
     prediction.step_ns[i] = std::max(0.0, nanoseconds(Clock::now() - start) - clock_cost);

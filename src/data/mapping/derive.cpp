@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
+#include "data/recording_rows.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/data/mapping.hpp"
@@ -13,27 +15,22 @@ namespace {
 
 std::vector<double> evaluated(const Recording& recording, FeaturePipeline& pipeline,
                               const std::string& name) {
-  std::vector<const Channel*> inputs;
-  for (const std::string& input : pipeline.raw_inputs())
-    inputs.push_back(&recording.channel(input));
+  RecordingRows rows(recording, pipeline.raw_inputs());
   const bool has_memory = pipeline.settling_samples() > 0;
-  std::vector<double> raw(inputs.size());
   std::vector<double> values(recording.size());
   pipeline.reset();
   for (std::size_t i = 0; i < values.size(); ++i) {
-    bool is_complete = true;
-    for (std::size_t j = 0; j < inputs.size(); ++j) {
-      raw[j] = inputs[j]->values[i];
-      if (std::isfinite(raw[j])) continue;
-      is_complete = false;
-      if (has_memory)
-        throw Error(
-            {.place = fmt::format("{}: {}, sample {}", recording.name(), inputs[j]->name, i),
-             .expected = "a number, for " + name + " is filtered from it",
-             .found = "nan",
-             .advice = "Hold the channel (hold:) or cut the gap out."});
+    const std::span<const double> raw = rows.at(i);
+    const auto missing = std::ranges::find_if_not(raw, [](double v) { return std::isfinite(v); });
+    if (missing != raw.end() && has_memory) {
+      const auto j = static_cast<std::size_t>(missing - raw.begin());
+      throw Error(
+          {.place = fmt::format("{}: {}, sample {}", recording.name(), rows.channels()[j]->name, i),
+           .expected = "a number, for " + name + " is filtered from it",
+           .found = "nan",
+           .advice = "Hold the channel (hold:) or cut the gap out."});
     }
-    values[i] = is_complete ? pipeline.step(raw)[0] : kNotMeasured;
+    values[i] = missing == raw.end() ? pipeline.step(raw)[0] : kNotMeasured;
   }
   return values;
 }

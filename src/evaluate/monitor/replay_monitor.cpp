@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/report_progress.hpp"
+#include "data/recording_rows.hpp"
 #include "evaluate/monitor/source_run.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/realtime.hpp"
@@ -24,21 +25,21 @@ const std::string kTorque = "torque_Nm";
 class RawChannels {
  public:
   RawChannels(const Recording& recording, const std::vector<std::string>& names)
-      : samples_(names.size()), period_s_(1.0 / recording.sample_rate_Hz()) {
-    for (const std::string& name : names) channels_.push_back(&recording.channel(name));
-  }
+      : rows_(recording, names),
+        samples_(names.size()),
+        period_s_(1.0 / recording.sample_rate_Hz()) {}
 
   std::span<const SignalSample> at(std::size_t n) {
-    for (std::size_t k = 0; k < channels_.size(); ++k) {
-      const bool is_fresh = channels_[k]->is_fresh(n);
-      samples_[k] = {.value = channels_[k]->values[n],
-                     .age_s = is_fresh ? 0.0 : samples_[k].age_s + period_s_};
+    const std::span<const double> values = rows_.at(n);
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      const bool is_fresh = rows_.channels()[k]->is_fresh(n);
+      samples_[k] = {.value = values[k], .age_s = is_fresh ? 0.0 : samples_[k].age_s + period_s_};
     }
     return samples_;
   }
 
  private:
-  std::vector<const Channel*> channels_;
+  RecordingRows rows_;
   std::vector<SignalSample> samples_;
   double period_s_;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/recording_rows.hpp"
 #include "evaluate/monitor/pair_calibration.hpp"
 #include "torsio/core/error.hpp"
 
@@ -30,19 +31,16 @@ SignalStatistics::SignalStatistics(const std::vector<MonitoredSignal>& signals, 
 
 void SignalStatistics::add(const Recording& recording) {
   FeaturePipeline pipeline(spec_, rate_Hz_);
-  std::vector<const Channel*> channels;
-  for (const std::string& name : pipeline.raw_inputs())
-    channels.push_back(&recording.channel(name));
-  std::vector<double> raw(channels.size());
+  RecordingRows rows(recording, pipeline.raw_inputs());
+  const std::span<const Channel* const> channels = rows.channels();
   std::vector<std::size_t> ages(channels.size(), 0);
   for (State& state : states_) state.is_started = false;
   for (std::size_t n = 0; n < recording.size(); ++n) {
     for (std::size_t k = 0; k < channels.size(); ++k) {
-      raw[k] = channels[k]->values[n];
       ages[k] = channels[k]->is_fresh(n) ? 0 : ages[k] + 1;
       longest_gap_ = std::max(longest_gap_, ages[k]);
     }
-    const std::span<const double> values = pipeline.step(raw);
+    const std::span<const double> values = pipeline.step(rows.at(n));
     for (std::size_t i = 0; i < values.size(); ++i) add(states_[i], values, i);
   }
 }

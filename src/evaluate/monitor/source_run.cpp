@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "data/recording_rows.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {
@@ -23,10 +24,7 @@ PartSet parts_of_all(const Redundancy& redundancy) {
 
 std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recording) {
   take_zeros(sources, recording);
-  std::vector<const std::vector<double>*> channels;
-  for (const std::string& name : sources.raw_inputs())
-    channels.push_back(&recording.channel(name).values);
-  std::vector<double> raw(channels.size());
+  RecordingRows rows(recording, sources.raw_inputs());
   std::vector<SourceRun> runs(sources.size());
   for (SourceRun& run : runs) {
     run.value_Nm.reserve(recording.size());
@@ -35,8 +33,7 @@ std::vector<SourceRun> run_sources(TorqueSources sources, const Recording& recor
   const DenormalsOff denormals_off;
   sources.reset();
   for (std::size_t n = 0; n < recording.size(); ++n) {
-    for (std::size_t k = 0; k < channels.size(); ++k) raw[k] = (*channels[k])[n];
-    const std::span<const Estimate> estimates = sources.step(raw);
+    const std::span<const Estimate> estimates = sources.step(rows.at(n));
     for (std::size_t i = 0; i < runs.size(); ++i) {
       const Fault fault = estimates[i].fault;
       runs[i].value_Nm.push_back(estimates[i].value);

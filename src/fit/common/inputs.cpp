@@ -10,9 +10,11 @@
 #include <map>
 #include <utility>
 
+#include "core/all_finite.hpp"
 #include "data/channel_names.hpp"
 #include "data/mapping/canonical_channels.hpp"
 #include "data/mapping/needed_definitions.hpp"
+#include "data/recording_rows.hpp"
 #include "numerics/least_squares.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
@@ -118,14 +120,11 @@ bool is_plane(const Dataset& dataset, const FeatureSpec& spec) {
     const Recording& recording = record.recording;
     const Channel& target = recording.channel(dataset.target);
     FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
-    std::vector<const std::vector<double>*> channels;
-    for (const std::string& input : pipeline.raw_inputs())
-      channels.push_back(&recording.channel(input).values);
-    std::vector<double> raw(channels.size());
+    RecordingRows raw_rows(recording, pipeline.raw_inputs());
     const std::size_t stride = recording.size() / kEnough + 1;
     for (std::size_t i = 0; i < recording.size(); ++i) {
-      for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*channels[j])[i];
-      if (!std::ranges::all_of(raw, [](double value) { return std::isfinite(value); })) continue;
+      const std::span<const double> raw = raw_rows.at(i);
+      if (!all_finite(raw)) continue;
       const std::span<const double> features = pipeline.step(raw);
       if (i % stride != 0 || !target.is_fresh(i) || !std::isfinite(target.values[i])) continue;
       rows.push_back(1.0);
@@ -213,15 +212,11 @@ FeatureSpec resolve_inputs(const Dataset& dataset, const std::vector<std::string
 
 std::vector<double> first_feature(const Recording& recording, const FeatureSpec& spec) {
   FeaturePipeline pipeline(spec, recording.sample_rate_Hz());
-  std::vector<const std::vector<double>*> raw_channels;
-  for (const std::string& input : pipeline.raw_inputs())
-    raw_channels.push_back(&recording.channel(input).values);
-  std::vector<double> raw(raw_channels.size());
+  RecordingRows rows(recording, pipeline.raw_inputs());
   std::vector<double> values(recording.size(), kNotMeasured);
   for (std::size_t i = 0; i < values.size(); ++i) {
-    for (std::size_t j = 0; j < raw.size(); ++j) raw[j] = (*raw_channels[j])[i];
-    if (std::ranges::all_of(raw, [](double value) { return std::isfinite(value); }))
-      values[i] = pipeline.step(raw).front();
+    const std::span<const double> raw = rows.at(i);
+    if (all_finite(raw)) values[i] = pipeline.step(raw).front();
   }
   return values;
 }

@@ -7,7 +7,9 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <utility>
 
+#include "data/recording_rows.hpp"
 #include "fit/common/finite_input.hpp"
 #include "fit/common/outliers.hpp"
 #include "numerics/parallel.hpp"
@@ -70,13 +72,15 @@ void note_left_out(std::vector<LeftOut>& left_out, const Recording& recording, s
                       .value = value});
 }
 
-/// The values of a raw input, with the last value before them instead of its outliers, whose
-/// samples are not used.
-std::vector<double> raw_channel(const Recording& recording, const std::string& input,
-                                const OutlierLimits& limits, std::vector<std::uint8_t>& use,
-                                std::vector<LeftOut>& left_out) {
-  std::vector<double> values = finite_input(recording, input);
+/// Takes the last value before them instead of the outliers of a raw input, whose samples are not
+/// used.
+void replace_outliers(RecordingRows& rows, std::size_t input, const Recording& recording,
+                      const OutlierLimits& limits, std::vector<std::uint8_t>& use,
+                      std::vector<LeftOut>& left_out) {
+  const Channel& channel = *rows.channels()[input];
   const auto is_sound = [&](double value) { return limits.contain(value); };
+  if (std::ranges::all_of(channel.values, is_sound)) return;
+  std::vector<double> values = channel.values;
   const auto first = std::ranges::find_if(values, is_sound);
   double last = first == values.end() ? 0.0 : *first;
   for (std::size_t n = 0; n < values.size(); ++n) {
@@ -84,11 +88,11 @@ std::vector<double> raw_channel(const Recording& recording, const std::string& i
       last = values[n];
       continue;
     }
-    if (use[n] != 0) note_left_out(left_out, recording, n, input, values[n]);
+    if (use[n] != 0) note_left_out(left_out, recording, n, channel.name, values[n]);
     values[n] = last;
     use[n] = 0;
   }
-  return values;
+  rows.replace(input, std::move(values));
 }
 
 Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::string& target,
@@ -105,14 +109,15 @@ Sequence run(const DatasetRecord& record, FeaturePipeline& pipeline, const std::
       note_left_out(left_out, recording, n, target, measured.values[n]);
     sequence.target[n] = kNotMeasured;
   }
-  std::vector<std::vector<double>> channels;
-  for (const std::string& input : pipeline.raw_inputs())
-    channels.push_back(raw_channel(recording, input, limits.at(input), sequence.use, left_out));
-  std::vector<double> raw(channels.size());
+  RecordingRows rows(recording, pipeline.raw_inputs());
+  for (std::size_t k = 0; k < rows.channels().size(); ++k) {
+    const std::string& input = pipeline.raw_inputs()[k];
+    (void)finite_input(recording, input);
+    replace_outliers(rows, k, recording, limits.at(input), sequence.use, left_out);
+  }
   pipeline.reset();
   for (std::size_t n = 0; n < recording.size(); ++n) {
-    std::ranges::transform(channels, raw.begin(), [n](const auto& channel) { return channel[n]; });
-    std::ranges::copy(pipeline.step(raw), sequence.features.row(n).begin());
+    std::ranges::copy(pipeline.step(rows.at(n)), sequence.features.row(n).begin());
     if (!pipeline.is_settled() || !measured.is_fresh(n) || !std::isfinite(sequence.target[n]) ||
         !sequence.has_features(n))
       sequence.use[n] = 0;

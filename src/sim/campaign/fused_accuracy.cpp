@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/report_progress.hpp"
+#include "data/recording_rows.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/recording.hpp"
@@ -31,11 +32,8 @@ struct Run {
 Run run_once(const Recording& recording, const MonitoredTorque& monitored) {
   TorqueSources sources = monitored.sources();
   Redundancy redundancy = monitored.redundancy();
-  std::vector<const std::vector<double>*> channels;
-  for (const std::string& name : sources.raw_inputs())
-    channels.push_back(&recording.channel(name).values);
+  RecordingRows rows(recording, sources.raw_inputs());
   const std::vector<double>& true_Nm = recording.channel("truth_torque_Nm").values;
-  std::vector<double> raw(channels.size());
   const std::size_t count = sources.size();
   Run run{.squares = std::vector<double>(count, 0.0),
           .without_squares = std::vector<double>(count, 0.0)};
@@ -43,8 +41,7 @@ Run run_once(const Recording& recording, const MonitoredTorque& monitored) {
   const DenormalsOff denormals_off;
   sources.reset();
   for (std::size_t n = 0; n < recording.size(); ++n) {
-    for (std::size_t k = 0; k < channels.size(); ++k) raw[k] = (*channels[k])[n];
-    const std::span<const Estimate> estimates = sources.step(raw);
+    const std::span<const Estimate> estimates = sources.step(rows.at(n));
     const auto is_sound = [](const Estimate& of) { return of.fault == Fault::none; };
     if (!std::ranges::all_of(estimates, is_sound)) continue;
     ++run.samples;
