@@ -120,13 +120,13 @@ std::vector<std::string> columns_of(const Mapping& mapping) {
 /// @param needed the channels that suffice; empty: all of the mapping, and the target
 std::vector<Recording> load(const Log& log, const std::string& target,
                             const std::vector<std::string>& needed, const Progress& progress) {
-  const LogTable table =
+  LogTable table =
       read_log(log.path,
                {.skip = log.mapping.drop, .wanted = columns_of(log.mapping), .progress = progress});
   Mapping mapping = log.mapping;
   if (!needed.empty()) keep_needed(mapping, table, needed);
   std::vector<Recording> recordings =
-      measured_recordings(table, mapping, log.rate_Hz, log.entry.name);
+      measured_recordings(std::move(table), mapping, log.rate_Hz, log.entry.name);
   const std::string text = mapping_text(log.mapping);
   for (Recording& recording : recordings) {
     if (log.rate_Hz > 0.0 && recording.sample_rate_Hz() != log.rate_Hz)

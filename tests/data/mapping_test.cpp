@@ -40,6 +40,20 @@ TEST(Mapping, WithoutOneTheHeadersAreSufficient) {
   EXPECT_TRUE(std::isnan(recording.channel("torque_Nm").values[2]));
 }
 
+TEST(Mapping, MovesTheValuesOfAColumnThatNothingElseNeeds) {
+  LogTable table = parse_csv("t_s,a_rad,b_deg,run_1\n0,1,2,7\n1,2,3,7\n", "log.csv");
+  const double* const moved = table.columns[1].values.data();
+  const double* const converted = table.columns[2].values.data();
+  const Mapping rules = parse_mapping(
+      "split_by: run_1\nchannels: {c_rad: a_rad, d_rad: b_deg, e_rad: b_deg, f_1: run_1}",
+      "m.yaml");
+  const Recording recording = measured_recordings(std::move(table), rules).front();
+  EXPECT_EQ(recording.channel("c_rad").values.data(), moved);
+  EXPECT_NE(recording.channel("d_rad").values.data(), converted);
+  EXPECT_EQ(recording.channel("e_rad").values, recording.channel("d_rad").values);
+  EXPECT_EQ(recording.channel("f_1").values, (std::vector<double>{7.0, 7.0}));
+}
+
 TEST(Mapping, RenamesFlipsScalesAndShifts) {
   const Recording recording = read("stamp,Pos,tau,cur_mA\n0,10,5,100\n1,20,6,200\n", R"(
 channels:

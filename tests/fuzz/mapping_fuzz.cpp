@@ -1,6 +1,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
 #include "data/csv/csv_table.hpp"
 #include "data/mapping/measured_recordings.hpp"
@@ -15,8 +16,8 @@ constexpr std::string_view kLog =
     "t_s,pos_deg,tau,run\n0,1,2,0\n0.1,2,3,0\n0.2,3,,0\n0.3,4,5,1\n0.4,5,6,1\n0.5,6,7,1\n";
 
 void apply(const torsio::Mapping& mapping) {
-  const torsio::LogTable table = torsio::parse_csv(kLog, "log.csv", {.skip = mapping.drop});
-  for (torsio::Recording& recording : torsio::measured_recordings(table, mapping))
+  torsio::LogTable table = torsio::parse_csv(kLog, "log.csv", {.skip = mapping.drop});
+  for (torsio::Recording& recording : torsio::measured_recordings(std::move(table), mapping))
     torsio::add_derived(recording, mapping.derive);
 }
 

@@ -26,21 +26,41 @@ std::string_view quantity_of(std::string_view column_name) {
   return parts ? parts->quantity : column_name;
 }
 
-/// scale * column + offset. @throws Error where that is too large for a number.
-std::vector<double> converted(const LogColumn& column, const LogTable& table, double scale,
-                              double offset) {
-  std::vector<double> values = column.values;
-  if (scale == 1.0 && offset == 0.0) return values;  // keeps even the sign of a zero
-  for (double& value : values) value = scale * value + offset;
-  for (std::size_t row = 0; row < values.size(); ++row)
-    if (std::isinf(values[row]))
-      throw Error({.place = table.place(row, column),
-                   .problem = "too large after its conversion to SI",
-                   .expected = "a finite number",
-                   .found = fmt::format("{:g} * {:g} + {:g}", scale, column.values[row], offset),
-                   .advice = "Check scale:, unit: and offset: of the mapping."});
-  return values;
-}
+/// A table whose columns are used up, except for those that are read again.
+class UsedTable {
+ public:
+  UsedTable(LogTable& table, const Mapping& mapping) : table_(table) {
+    std::set<const LogColumn*> met;
+    for (const ChannelRule& rule : mapping.channels)
+      if (const LogColumn* column = table.find(rule.from); column && !met.insert(column).second)
+        read_again(*column);
+  }
+
+  [[nodiscard]] LogTable& table() const noexcept { return table_; }
+  void read_again(const LogColumn& column) { read_again_.insert(&column); }
+
+  /// scale * column + offset. @throws Error where that is too large for a number.
+  [[nodiscard]] std::vector<double> converted(LogColumn& column, double scale,
+                                              double offset) const {
+    std::vector<double> values =
+        read_again_.contains(&column) ? column.values : std::move(column.values);
+    if (scale == 1.0 && offset == 0.0) return values;  // keeps even the sign of a zero
+    for (std::size_t row = 0; row < values.size(); ++row) {
+      const double raw = std::exchange(values[row], scale * values[row] + offset);
+      if (std::isinf(values[row]))
+        throw Error({.place = table_.place(row, column),
+                     .problem = "too large after its conversion to SI",
+                     .expected = "a finite number",
+                     .found = fmt::format("{:g} * {:g} + {:g}", scale, raw, offset),
+                     .advice = "Check scale:, unit: and offset: of the mapping."});
+    }
+    return values;
+  }
+
+ private:
+  LogTable& table_;
+  std::set<const LogColumn*> read_again_;
+};
 
 const Unit* unit_of_source(const ChannelRule& rule, const Unit* unit_of_channel) {
   if (!rule.unit.empty()) return find_unit(rule.unit);
@@ -48,10 +68,10 @@ const Unit* unit_of_source(const ChannelRule& rule, const Unit* unit_of_channel)
   return from ? from->unit : unit_of_channel;
 }
 
-TableChannel channel_from_rule(const ChannelRule& rule, const LogTable& table,
+TableChannel channel_from_rule(const ChannelRule& rule, const UsedTable& used,
                                const std::string& mapping_file) {
   const std::string place = mapping_file + ": channels." + rule.name;
-  const LogColumn& column = column_named(table, rule.from, place);
+  LogColumn& column = column_named(used.table(), rule.from, place);
   const auto name = split_channel_name(rule.name);
   if (!name) throw Error({.place = place, .problem = "the name has no unit"});
   const Unit* unit = unit_of_source(rule, name->unit);
@@ -66,17 +86,17 @@ TableChannel channel_from_rule(const ChannelRule& rule, const LogTable& table,
                                        "('scale:').",
                                        unit->si_suffix, name->unit->si_suffix)});
   return {.channel = {.name = name->si(),
-                      .values = converted(column, table, scale * unit->scale,
-                                          scale * unit->offset + rule.offset)},
+                      .values = used.converted(column, scale * unit->scale,
+                                               scale * unit->offset + rule.offset)},
           .column = &column};
 }
 
-TableChannel channel_from_column(const LogColumn& column, const LogTable& table) {
+TableChannel channel_from_column(LogColumn& column, const UsedTable& used) {
   const auto name = split_channel_name(column.name);
   if (!name) {
     const auto ending = column.name.rfind('_');
     const bool has_ending = ending != std::string::npos && ending + 1 < column.name.size();
-    throw Error({.place = table.header_place(column),
+    throw Error({.place = used.table().header_place(column),
                  .problem = has_ending ? fmt::format("'{}' is not a known unit",
                                                      column.name.substr(ending + 1))
                                        : "the name has no unit",
@@ -85,7 +105,7 @@ TableChannel channel_from_column(const LogColumn& column, const LogTable& table)
                  .advice = advice_without_unit(column.name)});
   }
   return {.channel = {.name = name->si(),
-                      .values = converted(column, table, name->unit->scale, name->unit->offset)},
+                      .values = used.converted(column, name->unit->scale, name->unit->offset)},
           .column = &column};
 }
 
@@ -146,9 +166,9 @@ std::optional<double> gear_scale(std::string_view si_unit, double gear_ratio) no
   return std::nullopt;
 }
 
-const LogColumn& column_named(const LogTable& table, const std::string& name,
-                              const std::string& place) {
-  if (const LogColumn* column = table.find(name)) return *column;
+LogColumn& column_named(LogTable& table, const std::string& name, const std::string& place) {
+  const auto at = std::ranges::find(table.columns, name, &LogColumn::name);
+  if (at != table.columns.end()) return *at;
   std::vector<std::string> names;
   for (const LogColumn& column : table.columns) names.push_back(column.name);
   throw Error({.place = place,
@@ -157,21 +177,23 @@ const LogColumn& column_named(const LogTable& table, const std::string& name,
                .advice = did_you_mean(name, names)});
 }
 
-TableChannels channels_of_table(const LogTable& table, const Mapping& mapping) {
+TableChannels channels_of_table(LogTable& table, const Mapping& mapping) {
+  UsedTable used(table, mapping);
   const auto masks = freshness_of(table);
   std::set<const LogColumn*> consumed;
   for (const auto& [mask, column] : masks) consumed.insert(mask);
   if (!mapping.split_by.empty())
     consumed.insert(&column_named(table, mapping.split_by, mapping.file + ": split_by"));
+  for (const LogColumn* column : consumed) used.read_again(*column);
 
   std::vector<TableChannel> all;
   for (const ChannelRule& rule : mapping.channels) {
-    all.push_back(channel_from_rule(rule, table, mapping.file));
+    all.push_back(channel_from_rule(rule, used, mapping.file));
     consumed.insert(all.back().column);
   }
-  for (const LogColumn& column : table.columns)
+  for (LogColumn& column : table.columns)
     if (!consumed.contains(&column) && (table.has_units || split_channel_name(column.name)))
-      all.push_back(channel_from_column(column, table));
+      all.push_back(channel_from_column(column, used));
   refuse_duplicates(all, table);
   for (const auto& [mask, column] : masks)
     for (TableChannel& made : all)

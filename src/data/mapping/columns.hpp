@@ -23,8 +23,9 @@ struct TableChannels {
   std::vector<TableChannel> channels;
 };
 
-/// Renames and converts the columns, and puts freshness columns to their channels.
-[[nodiscard]] TableChannels channels_of_table(const LogTable& table, const Mapping& mapping);
+/// Renames and converts the columns, and puts freshness columns to their channels. The values of
+/// the columns are moved into the channels, except for the column of `split_by`; the names stay.
+[[nodiscard]] TableChannels channels_of_table(LogTable& table, const Mapping& mapping);
 
 /// What a value in that SI unit on the motor's side of a gear is multiplied by on its output side;
 /// none if a gear does not change it.
@@ -32,7 +33,7 @@ struct TableChannels {
                                                double gear_ratio) noexcept;
 
 /// The column of that name. @throws Error that lists the columns, at `place`.
-[[nodiscard]] const LogColumn& column_named(const LogTable& table, const std::string& name,
-                                            const std::string& place);
+[[nodiscard]] LogColumn& column_named(LogTable& table, const std::string& name,
+                                      const std::string& place);
 
 }  // namespace torsio

@@ -27,7 +27,7 @@ struct NamedRows {
   Rows rows;
 };
 
-std::vector<NamedRows> runs_of_equal_value(const LogTable& table, const Mapping& mapping,
+std::vector<NamedRows> runs_of_equal_value(LogTable& table, const Mapping& mapping,
                                            const std::string& stem) {
   const LogColumn& column = column_named(table, mapping.split_by, mapping.file + ": split_by");
   std::vector<NamedRows> runs;
@@ -58,11 +58,11 @@ std::vector<NamedRows> runs_of_equal_value(const LogTable& table, const Mapping&
   return runs;
 }
 
-std::vector<NamedRows> records_of(const LogTable& table, const Mapping& mapping,
+std::vector<NamedRows> records_of(LogTable& table, std::size_t rows, const Mapping& mapping,
                                   const std::string& name) {
   const std::string stem = name.empty() ? file_stem(table.source.file) : name;
   if (!mapping.split_by.empty()) return runs_of_equal_value(table, mapping, stem);
-  return {{.name = stem, .rows = {.begin = 0, .end = table.rows()}}};
+  return {{.name = stem, .rows = {.begin = 0, .end = rows}}};
 }
 
 /// The rows of a channel; all rows are moved out, because then no other recording uses any.
@@ -177,11 +177,12 @@ Recording recording_of(const LogTable& table, TableChannels& columns, const Name
 
 }  // namespace
 
-std::vector<Recording> measured_recordings(const LogTable& table, const Mapping& mapping,
-                                           double rate_Hz, const std::string& name) {
+std::vector<Recording> measured_recordings(LogTable table, const Mapping& mapping, double rate_Hz,
+                                           const std::string& name) {
+  const std::size_t rows = table.rows();  // the columns are moved out of the table
   TableChannels columns = channels_of_table(table, mapping);
   std::vector<Recording> recordings;
-  for (const NamedRows& run : records_of(table, mapping, name))
+  for (const NamedRows& run : records_of(table, rows, mapping, name))
     recordings.push_back(recording_of(table, columns, run, mapping, rate_Hz));
   return recordings;
 }

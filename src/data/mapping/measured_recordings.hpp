@@ -14,8 +14,7 @@ namespace torsio {
 /// resampling and conditions. `rate_Hz` is the sample rate of a log without clock whose mapping
 /// gives none; `name` names the recordings, the file's name if empty.
 /// @throws Error naming place, expected, found and the mapping line that helps.
-[[nodiscard]] std::vector<Recording> measured_recordings(const LogTable& table,
-                                                         const Mapping& mapping,
+[[nodiscard]] std::vector<Recording> measured_recordings(LogTable table, const Mapping& mapping,
                                                          double rate_Hz = 0.0,
                                                          const std::string& name = {});
 
