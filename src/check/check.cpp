@@ -48,30 +48,44 @@ void Checker::for_each_record(const std::function<void(std::size_t)>& body) {
 }
 
 std::vector<Finding> Checker::run() {
+  run_checks(true);
+  return std::move(findings_);
+}
+
+std::vector<Finding> Checker::run_for_failures() {
+  run_checks(false);
+  std::erase_if(findings_, [](const Finding& found) { return found.verdict != Verdict::fail; });
+  return std::move(findings_);
+}
+
+void Checker::run_checks(bool with_warnings) {
   check_length();
-  if (has_failed()) return std::move(findings_);  // too short for the other checks
+  if (has_failed()) return;  // too short for the other checks
   check_missing();
   check_constant();
-  check_saturation();
+  if (with_warnings) check_saturation();
   check_frozen();
-  check_resolution();
-  check_repeats();
+  if (with_warnings) {
+    check_resolution();
+    check_repeats();
+  }
   check_spikes();
-  check_noise();
+  if (with_warnings) check_noise();
   relate();
   check_units();
   check_sign_flips();
-  check_gaps();
-  check_delay();
+  check_gaps(with_warnings);
+  if (with_warnings) check_delay();
   check_sign();
-  check_change();
-  check_columns();
-  check_excitation();
+  if (with_warnings) {
+    check_change();
+    check_columns();
+    check_excitation();
+  }
   check_offsets();
   check_leak();
   check_training();
-  check_range();
-  return std::move(findings_);
+  if (with_warnings) check_range();
 }
 
 void Checker::add(Verdict verdict, std::string check, std::string recording, std::string message,
@@ -133,7 +147,7 @@ void Checker::check_excitation() {
 }
 
 void Checker::check_leak() {
-  const std::string leak = find_leak(dataset_, spec_);
+  const std::string leak = leak_ ? *leak_ : find_leak(dataset_, spec_);
   if (leak.empty()) {
     add(Verdict::pass, "leak", "", "the target was not computed from an input");
   } else {
@@ -147,9 +161,9 @@ void Checker::check_leak() {
 
 // The guard acts on features, so features are compared; unusable recordings have failed before.
 void Checker::check_range() {
-  if (!dataset_.has_role(Role::test) || !dataset_.has_role(Role::train) || has_failed()) return;
-  const FeatureRanges trained = feature_ranges(training_data(dataset_, spec_, Role::train));
-  const FeatureRanges tested = feature_ranges(training_data(dataset_, spec_, Role::test));
+  if (!data_ || !data_->test || has_failed()) return;
+  const FeatureRanges trained = feature_ranges(data_->training);
+  const FeatureRanges tested = feature_ranges(*data_->test);
   pass_unless_found("range", "the test data lie inside the training range", [&] {
     for (std::size_t j = 0; j < spec_.inputs.size(); ++j) {
       const double slack = trained.margin * (trained.highest[j] - trained.lowest[j]);
@@ -191,6 +205,14 @@ std::string unit_doubt(const Recording& recording, const EstimatorSettings& trai
 
 std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec) {
   return Checker(dataset, spec).run();
+}
+
+FitCheck check_for_fit(const Dataset& dataset, const FeatureSpec& spec, bool allow_leak) {
+  FitCheck check{.failures = {}, .leak = refuse_leak(dataset, spec, allow_leak)};
+  Checker checker(dataset, spec, check.leak);
+  check.failures = checker.run_for_failures();
+  check.data = checker.take_data();
+  return check;
 }
 
 }  // namespace torsio

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <string>
+#include <utility>
 
 #include "check/checker.hpp"
 #include "fit/common/least_samples.hpp"
@@ -24,9 +25,9 @@ void Checker::check_training() {
   if (has_failed()) return;
   pass_unless_found("training data", "fit accepts the recordings", [&] {
     try {
-      const LearningData data = learning_data(dataset_, spec_);
+      LearningData data = learning_data(dataset_, spec_);
       require_samples(data.training);
-      if (dataset_.has_role(Role::test)) (void)training_data(dataset_, spec_, Role::test);
+      if (dataset_.has_role(Role::test)) data.test = training_data(dataset_, spec_, Role::test);
       std::size_t samples = 0;
       std::size_t finite = 0;
       for (const Sequence& sequence : data.training.sequences) {
@@ -49,6 +50,7 @@ void Checker::check_training() {
         add(Verdict::warn, "training data", recording, "no sample of it can be used",
             "Check the freshness column of the target and the length of the recording: filters of "
             "the inputs must settle first.");
+      data_ = std::move(data);
     } catch (const Error& error) {
       add(Verdict::fail, "training data", "", problem_of(error), error.report().advice);
     }

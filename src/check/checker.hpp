@@ -22,8 +22,12 @@ namespace torsio {
 /// Runs the checks one after the other and collects what they find.
 class Checker {
  public:
-  Checker(const Dataset& dataset, const FeatureSpec& spec)
-      : dataset_(dataset), spec_(spec), pipeline_(spec, dataset.sample_rate_Hz()) {
+  /// @param leak `find_leak(dataset, spec)`, if it is known
+  Checker(const Dataset& dataset, const FeatureSpec& spec, std::optional<std::string> leak = {})
+      : dataset_(dataset),
+        spec_(spec),
+        pipeline_(spec, dataset.sample_rate_Hz()),
+        leak_(std::move(leak)) {
     channels_ = pipeline_.raw_inputs();
     FeatureSpec first = spec;
     first.inputs.resize(1);
@@ -43,6 +47,11 @@ class Checker {
   }
 
   std::vector<Finding> run();
+  /// The FAIL findings of `run`: without the checks that can only warn and change nothing for those
+  /// after them.
+  std::vector<Finding> run_for_failures();
+  /// What `run` made for the check of the training data; see `FitCheck::data`.
+  [[nodiscard]] std::optional<LearningData> take_data() { return std::move(data_); }
 
  private:
   void add(Verdict verdict, std::string check, std::string recording, std::string message,
@@ -72,6 +81,7 @@ class Checker {
 
   [[nodiscard]] bool stands_still(std::size_t r, const std::string& name) const;
   [[nodiscard]] static bool is_condition(const Recording& recording, const std::string& channel);
+  void run_checks(bool with_warnings);
   void check_length();
   void check_missing();
   void check_constant();
@@ -82,7 +92,7 @@ class Checker {
   void check_frozen();
   [[nodiscard]] static bool is_stop_of_motion(const Channel& channel, const Rest& rest);
   [[nodiscard]] std::vector<Channel> others_of(std::size_t r, const std::string& name) const;
-  void check_gaps_of(std::size_t r);
+  void check_gaps_of(std::size_t r, bool with_warnings);
   void check_columns_of(std::size_t r);
   void check_resolution_of(std::size_t r);
   void leave_out(std::size_t r, const Rest& rest);
@@ -113,7 +123,7 @@ class Checker {
   void check_units_within(std::size_t r);
   void check_sign_flips();
   [[nodiscard]] static bool stands_out(const Jump& jump, const std::vector<double>& values);
-  void check_gaps();
+  void check_gaps(bool with_warnings);
   void check_jump_of_input(std::size_t r);
   [[nodiscard]] static std::string jump_text(const Recording& recording, const std::string& name,
                                              const Jump& jump);
@@ -178,6 +188,8 @@ class Checker {
   const Dataset& dataset_;
   const FeatureSpec& spec_;
   FeaturePipeline pipeline_;
+  std::optional<std::string> leak_;
+  std::optional<LearningData> data_;
   std::vector<std::string> channels_;  ///< raw inputs and the target
   std::vector<std::string> sources_;   ///< channels of the first input's expression
   std::vector<Pair> pairs_;

@@ -32,7 +32,7 @@ double white_noise(const std::vector<double>& values) {
 
 }  // namespace
 
-Extent extent_of(const std::vector<double>& values) {
+Extent extent_of(std::span<const double> values) {
   // The lanes do not wait for each other.
   std::array<Extent, 4> lanes;
   std::size_t i = 0;
@@ -168,7 +168,7 @@ Line line_through(const Pair& pair) {
   return line;
 }
 
-std::size_t count_reversals(const std::vector<double>& values) {
+std::size_t count_reversals(std::span<const double> values, std::size_t most) {
   const double dead_band = kReversalShare * extent_of(values).width();
   std::size_t count = 0;
   double extreme = kNotMeasured;
@@ -178,7 +178,7 @@ std::size_t count_reversals(const std::vector<double>& values) {
     if (!is_finite(extreme)) extreme = value;
     const double forward = (value - extreme) * (direction == 0 ? 1.0 : direction);
     if (direction == 0 ? std::abs(forward) > dead_band : forward < -dead_band) {
-      if (direction != 0) ++count;
+      if (direction != 0 && ++count >= most) return count;
       direction = value > extreme ? 1 : -1;
       extreme = value;
     } else if (direction != 0 && forward > 0.0) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "torsio/data/recording.hpp"
@@ -32,7 +33,7 @@ struct Extent {
   }
   [[nodiscard]] double width() const { return highest - lowest; }
 };
-[[nodiscard]] Extent extent_of(const std::vector<double>& values);
+[[nodiscard]] Extent extent_of(std::span<const double> values);
 
 /// A channel at every sample, interpolated linearly between the samples that the sensor delivered:
 /// a held value would seem delayed.
@@ -86,8 +87,9 @@ struct Line {
 };
 [[nodiscard]] Line line_through(const Pair& pair);
 
-/// The number of reversals by more than 5 % of the range.
-[[nodiscard]] std::size_t count_reversals(const std::vector<double>& values);
+/// The number of reversals by more than 5 % of the range, counted up to `most`.
+[[nodiscard]] std::size_t count_reversals(
+    std::span<const double> values, std::size_t most = std::numeric_limits<std::size_t>::max());
 
 /// Lower and upper decile of the speeds while moving; empty if nothing moves.
 [[nodiscard]] std::vector<double> typical_speeds(const std::vector<double>& differences);

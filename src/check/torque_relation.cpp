@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "check/hysteresis_fit.hpp"
@@ -58,10 +59,8 @@ std::pair<double, double> passed(const Pair& pair, std::size_t begin, std::size_
 bool is_excited(const Pair& pair, std::size_t begin, std::size_t end, double input_width,
                 double target_width) {
   const auto [input, target] = passed(pair, begin, end);
-  const std::vector<double> part(pair.input.begin() + static_cast<std::ptrdiff_t>(begin),
-                                 pair.input.begin() + static_cast<std::ptrdiff_t>(end));
-  return input > kPartShare * input_width && target > kPartShare * target_width &&
-         count_reversals(part) > 0;
+  if (!(input > kPartShare * input_width && target > kPartShare * target_width)) return false;
+  return count_reversals(std::span(pair.input).subspan(begin, end - begin), 1) > 0;
 }
 
 /// What one course over time (0 early, 1 late) of offset and slope explains of a rest.

@@ -173,15 +173,26 @@ Comparison compare(const Dataset& dataset, const std::vector<ModelChoice>& choic
   return comparison;
 }
 
+Results evaluate_model(const ModelFile& file, const Dataset& dataset,
+                       const std::vector<ScoredRun>& runs) {
+  Results results = empty_results(dataset);
+  results.inputs = file.settings.features.inputs;
+  for (const Role role : kRoles)
+    if (dataset.has_role(role))
+      std::ranges::move(rows_of(file, role, evaluate(runs, role)),
+                        std::back_inserter(results.rows));
+  return results;
+}
+
 Results evaluate_model(const ModelFile& file, const Dataset& dataset, const Progress& progress) {
   dataset.check();
   Results results = empty_results(dataset);
   results.inputs = file.settings.features.inputs;
   const Estimator estimator = make_estimator(file, dataset.sample_rate_Hz());
-  for (const Role role : kRoles)
-    if (dataset.has_role(role))
-      std::ranges::move(rows_of(file, role, evaluate(estimator, dataset, role, progress)),
-                        std::back_inserter(results.rows));
+  const std::vector<SplitScore> scores = evaluate(estimator, dataset, kRoles, progress);
+  for (std::size_t i = 0; i < kRoles.size(); ++i)
+    if (dataset.has_role(kRoles[i]))
+      std::ranges::move(rows_of(file, kRoles[i], scores[i]), std::back_inserter(results.rows));
   return results;
 }
 

@@ -80,9 +80,11 @@ ScoredModel fit_and_score(const Dataset& dataset, InputSets& input_sets, const M
     scored.trained =
         train_model(dataset, input_sets.data_of(choice.features), choice, seed, progress);
     const Estimator estimator = make_estimator(scored.trained->file);
-    for (const Role role : roles) {
+    std::vector<SplitScore> of_roles = evaluate(estimator, dataset, roles, progress);
+    for (std::size_t i = 0; i < roles.size(); ++i) {
+      const Role role = roles[i];
       if (!dataset.has_role(role)) continue;
-      SplitScore scores = evaluate(estimator, dataset, role, progress);
+      SplitScore& scores = of_roles[i];
       std::ranges::move(rows_of(scored.trained->file, role, scores),
                         std::back_inserter(scored.rows));
       if (role == Role::train) continue;

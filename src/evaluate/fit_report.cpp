@@ -4,10 +4,11 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "numerics/parallel.hpp"
-#include "torsio/evaluate/evaluate.hpp"
+#include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
@@ -16,7 +17,7 @@ namespace {
 /// Residuals of one recording, sample by sample, NaN where none is scored, and its features.
 struct Run {
   std::vector<double> residual;
-  Matrix features;
+  const Matrix* features;
 };
 
 std::size_t scored_samples(const Run& run) {
@@ -30,24 +31,18 @@ std::optional<Role> scored_role(const Dataset& dataset) {
   return std::nullopt;
 }
 
-std::vector<Run> runs_of(const TrainedModel& model, const Dataset& dataset, Role role) {
-  const Estimator estimator = make_estimator(model.file);
-  TrainingData data = training_data(dataset, model.file.settings.features, role);
-  std::vector<const Recording*> recordings;
-  for (const DatasetRecord& record : dataset.records)
-    if (record.has_role(role)) recordings.push_back(&record.recording);
-  std::vector<Run> runs(recordings.size());
-  for_each_chunk(runs.size(), 0, [&](std::size_t r) {
-    const Channel& target = recordings[r]->channel(dataset.target);
-    const Prediction prediction =
-        predict(estimator, *recordings[r], {&target, dataset.initialise_samples});
-    Sequence& sequence = data.sequences[r];
-    std::vector<double> residual(target.values.size(), kNotMeasured);
-    for (std::size_t n = prediction.initialised; n < residual.size(); ++n)
-      if (sequence.use[n] != 0 && prediction.estimates[n].fault != Fault::warming_up)
-        residual[n] = prediction.estimates[n].value - target.values[n];
-    runs[r] = {std::move(residual), std::move(sequence.features)};
-  });
+/// @param data of that role
+std::vector<Run> runs_of(const std::vector<ScoredRun>& scored, const TrainingData& data,
+                         Role role) {
+  std::vector<Run> runs;
+  for (const ScoredRun& of : scored) {
+    if (!of.record->has_role(role)) continue;
+    const Sequence& sequence = data.sequences[runs.size()];
+    std::vector<double> residual(sequence.use.size(), kNotMeasured);
+    for (std::size_t n = 0; n < residual.size(); ++n)
+      if (sequence.use[n] != 0) residual[n] = of.residual(n);
+    runs.push_back({std::move(residual), &sequence.features});
+  }
   return runs;
 }
 
@@ -82,6 +77,26 @@ double mean_of(const std::vector<Run>& runs, const Value& value) {
   return count > 0.0 ? sum / count : 0.0;
 }
 
+/// Values in an order in which those of n, n - stride, n - 2 stride, ... are neighbours; 0, which
+/// adds nothing to a sum, where a value is not finite.
+class PastValues {
+ public:
+  PastValues(const std::vector<double>& values, std::size_t stride)
+      : stride_(stride), columns_(stride) {
+    for (std::size_t n = values.size(); n-- > 0;)
+      columns_[n % stride].push_back(std::isfinite(values[n]) ? values[n] : 0.0);
+  }
+
+  [[nodiscard]] std::span<const double> from(std::size_t n) const {
+    const std::vector<double>& column = columns_[n % stride_];
+    return std::span(column).last(n / stride_ + 1);
+  }
+
+ private:
+  std::size_t stride_;
+  std::vector<std::vector<double>> columns_;
+};
+
 /// r_k for k = 0, stride, 2 stride, ...
 template <class Value>
 std::vector<double> correlations(const std::vector<Run>& runs, const Value& value, std::size_t lags,
@@ -93,15 +108,17 @@ std::vector<double> correlations(const std::vector<Run>& runs, const Value& valu
   double residual_square = 0.0;
   double value_square = 0.0;
   for (const Run& run : runs) {
-    for (std::size_t n = 0; n < run.residual.size(); ++n) {
+    std::vector<double> x(run.residual.size());
+    for (std::size_t n = 0; n < x.size(); ++n) x[n] = value(run, n) - value_mean;
+    const PastValues past(x, stride);
+    for (std::size_t n = 0; n < x.size(); ++n) {
       const double e = run.residual[n] - residual_mean;
       if (!std::isfinite(e)) continue;
       residual_square += e * e;
-      if (const double x = value(run, n) - value_mean; std::isfinite(x)) value_square += x * x;
-      for (std::size_t k = 0; k < lags && k * stride <= n; ++k) {
-        const double before = value(run, n - k * stride) - value_mean;
-        if (std::isfinite(before)) products[k] += e * before;
-      }
+      const std::span<const double> before = past.from(n);
+      value_square += before.front() * before.front();
+      const std::size_t count = std::min(lags, before.size());
+      for (std::size_t k = 0; k < count; ++k) products[k] += e * before[k];
     }
   }
   const double scale = std::sqrt(residual_square * value_square);
@@ -127,16 +144,27 @@ ResidualCorrelation summary(std::string with, const std::vector<double>& r, std:
 }  // namespace
 
 FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
+  return fit_report(model, dataset, scored_runs(make_estimator(model.file), dataset), nullptr);
+}
+
+FitReport fit_report(const TrainedModel& model, const Dataset& dataset,
+                     const std::vector<ScoredRun>& scored, const LearningData* data) {
   FitReport report{.split = {}, .samples = 0, .correlations = {}, .table = model.table};
   const std::optional<Role> role = scored_role(dataset);
   if (!role) return report;
   report.split = name(*role);
-  const std::vector<Run> runs = runs_of(model, dataset, *role);
+  const TrainingData* of_role = data == nullptr ? nullptr : data->of(*role);
+  TrainingData made;
+  if (of_role == nullptr) {
+    made = training_data(dataset, model.file.settings.features, *role);
+    of_role = &made;
+  }
+  const std::vector<Run> runs = runs_of(scored, *of_role, *role);
   std::size_t longest = 0;
   for (const Run& run : runs) {
-    const std::size_t scored = scored_samples(run);
-    report.samples += scored;
-    longest = std::max(longest, scored);
+    const std::size_t count = scored_samples(run);
+    report.samples += count;
+    longest = std::max(longest, count);
   }
   const std::size_t stride = stride_of(runs);
   const std::size_t lags = std::min(kMaxLags, longest / 10 + 1);
@@ -151,7 +179,7 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
   std::vector<std::vector<double>> all(1 + inputs.size());
   for_each_chunk(all.size(), 0, [&](std::size_t k) {
     const auto residual = [](const Run& run, std::size_t n) { return run.residual[n]; };
-    const auto input = [k](const Run& run, std::size_t n) { return run.features(n, k - 1); };
+    const auto input = [k](const Run& run, std::size_t n) { return (*run.features)(n, k - 1); };
     all[k] = k == 0 ? correlations(runs, residual, lags, stride)
                     : correlations(runs, input, lags, stride);
   });
@@ -168,6 +196,22 @@ FitReport fit_report(const TrainedModel& model, const Dataset& dataset) {
   const double widening = std::sqrt(samples / report.effective_samples);
   for (FittedParameter& parameter : report.table) parameter.std_error *= widening;
   return report;
+}
+
+ReportedFit fit_and_report(const Dataset& dataset, const FitCheck& check, const ModelChoice& choice,
+                           const FitContext& context) {
+  ReportedFit fit{.trained = check.data ? train_model(dataset, *check.data, choice, context)
+                                        : train_model(dataset, choice, context),
+                  .runs = {},
+                  .results = {},
+                  .report = {}};
+  fit.runs = scored_runs(make_estimator(fit.trained.file, dataset.sample_rate_Hz()), dataset,
+                         context.progress);
+  fit.results = evaluate_model(fit.trained.file, dataset, fit.runs);
+  mark_divergence_in_training(fit.results.rows);
+  note_held_out_scores(fit.trained.file.card, fit.results.rows);
+  fit.report = fit_report(fit.trained, dataset, fit.runs, check.data ? &*check.data : nullptr);
+  return fit;
 }
 
 }  // namespace torsio

@@ -74,9 +74,15 @@ std::string ModelChoice::variant() const {
   return text;
 }
 
+const TrainingData* LearningData::of(Role role) const noexcept {
+  if (role == Role::train) return &training;
+  const std::optional<TrainingData>& held_out = role == Role::test ? test : validation;
+  return held_out ? &*held_out : nullptr;
+}
+
 LearningData learning_data(const Dataset& dataset, const FeatureSpec& features) {
   (void)training_zeros(dataset);
-  LearningData data{.training = training_data(dataset, features), .validation = {}};
+  LearningData data{.training = training_data(dataset, features)};
   require_trainable(data.training);
   if (dataset.has_role(Role::validation))
     data.validation = training_data(dataset, features, Role::validation);
@@ -84,6 +90,16 @@ LearningData learning_data(const Dataset& dataset, const FeatureSpec& features) 
 }
 
 namespace {
+
+void refuse_wrong_choice(const ModelChoice& choice, const FitContext& context) {
+  const FamilyInfo& family = find_family(choice.family);
+  (void)Options(family.options, choice.options);
+  if (context.resume != nullptr && !family.can_resume)
+    throw UsageError(
+        {.place = "--resume",
+         .problem = choice.family + " is fitted within seconds and keeps no checkpoint",
+         .advice = "Leave --resume away."});
+}
 
 TrainedModel train(const Dataset& dataset, const LearningData& data, const ModelChoice& choice,
                    FitContext context) {
@@ -132,15 +148,14 @@ TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice, std:
 
 TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                          const FitContext& context) {
-  // A wrong setting is reported before the data are run through the filters.
-  const FamilyInfo& family = find_family(choice.family);
-  (void)Options(family.options, choice.options);
-  if (context.resume != nullptr && !family.can_resume)
-    throw UsageError(
-        {.place = "--resume",
-         .problem = choice.family + " is fitted within seconds and keeps no checkpoint",
-         .advice = "Leave --resume away."});
+  refuse_wrong_choice(choice, context);  // before the data are run through the filters
   return train(dataset, learning_data(dataset, choice.features), choice, context);
+}
+
+TrainedModel train_model(const Dataset& dataset, const LearningData& data,
+                         const ModelChoice& choice, const FitContext& context) {
+  refuse_wrong_choice(choice, context);
+  return train(dataset, data, choice, context);
 }
 
 }  // namespace torsio

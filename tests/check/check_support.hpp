@@ -13,8 +13,22 @@
 
 namespace torsio::test {
 
+/// The findings for some inputs. For a fit, the checks that can only warn are left out: what fails
+/// must be the same.
+inline std::vector<Finding> findings_of(const Dataset& dataset, const FeatureSpec& spec) {
+  const std::vector<Finding> findings = check_dataset(dataset, spec);
+  std::string failures;
+  for (const Finding& finding : findings)
+    if (finding.verdict == Verdict::fail) failures += finding.check + finding.message + '\n';
+  std::string found_for_fit;
+  for (const Finding& finding : check_for_fit(dataset, spec, true).failures)
+    found_for_fit += finding.check + finding.message + '\n';
+  EXPECT_EQ(found_for_fit, failures);
+  return findings;
+}
+
 inline std::vector<Finding> findings_of(const Dataset& dataset) {
-  return check_dataset(dataset, resolve_inputs(dataset, {}));
+  return findings_of(dataset, resolve_inputs(dataset, {}));
 }
 
 /// The worst verdict of one check.

@@ -402,7 +402,7 @@ TEST(Check, FailsOnATargetThatWasComputedFromAnInput) {
   Dataset dataset;
   add_record(dataset, std::move(recording), Role::train);
   const auto findings =
-      check_dataset(dataset, resolve_inputs(dataset, {"gear_angle_rad", "motor_current_A"}));
+      findings_of(dataset, resolve_inputs(dataset, {"gear_angle_rad", "motor_current_A"}));
   EXPECT_EQ(verdict_of(findings, "leak"), Verdict::fail);
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "check/check_support.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "torsio/check/check.hpp"
@@ -162,7 +163,7 @@ TEST_P(Refused, ByFitIsAFailOfCheck) {
   const std::string refusal = test::error_message(
       [&] { (void)train_model(dataset, {.family = "linear", .features = features}, 1); });
   EXPECT_NE(refusal.find(GetParam().message), std::string::npos) << refusal;
-  const std::vector<Finding> findings = check_dataset(dataset, features);
+  const std::vector<Finding> findings = test::findings_of(dataset, features);
   const auto failed = std::ranges::find(findings, Verdict::fail, &Finding::verdict);
   ASSERT_NE(failed, findings.end());
   EXPECT_NE(failed->message.find(GetParam().message), std::string::npos) << failed->message;
@@ -173,7 +174,7 @@ INSTANTIATE_TEST_SUITE_P(CheckTraining, Refused, testing::ValuesIn(kRefused),
 
 std::vector<Finding> training_findings(const Dataset& dataset,
                                        const std::vector<std::string>& inputs = {}) {
-  std::vector<Finding> findings = check_dataset(dataset, resolve_inputs(dataset, inputs));
+  std::vector<Finding> findings = test::findings_of(dataset, resolve_inputs(dataset, inputs));
   std::erase_if(findings, [](const Finding& finding) { return finding.check != "training data"; });
   return findings;
 }

@@ -47,7 +47,8 @@ TEST(Mapping, MovesTheValuesOfAColumnThatNothingElseNeeds) {
   const Mapping rules = parse_mapping(
       "split_by: run_1\nchannels: {c_rad: a_rad, d_rad: b_deg, e_rad: b_deg, f_1: run_1}",
       "m.yaml");
-  const Recording recording = measured_recordings(std::move(table), rules).front();
+  const auto recordings = measured_recordings(std::move(table), rules);
+  const Recording& recording = recordings.front();
   EXPECT_EQ(recording.channel("c_rad").values.data(), moved);
   EXPECT_NE(recording.channel("d_rad").values.data(), converted);
   EXPECT_EQ(recording.channel("e_rad").values, recording.channel("d_rad").values);

@@ -52,14 +52,15 @@ void warn_of_another_spring(const std::string& model, torsio::AnyInverse inverse
                   torque_Nm, model, ratio, sheet.name));
 }
 
+void warn_of_failed_checks(const torsio::FitCheck& check) {
+  for (const torsio::Finding& finding : check.failures)
+    remark(fmt::format(
+        "warning: torsio check: FAIL {}: {}{}; run it on these recordings for advice",
+        finding.check, finding.recording.empty() ? "" : finding.recording + ": ", finding.message));
+}
+
 void warn_of_failed_checks(const torsio::Dataset& dataset, const torsio::FeatureSpec& features) {
-  for (const torsio::Finding& finding : torsio::check_dataset(dataset, features))
-    if (finding.verdict == torsio::Verdict::fail)
-      remark(
-          fmt::format("warning: torsio check: FAIL {}: {}{}; run it on these recordings for "
-                      "advice",
-                      finding.check, finding.recording.empty() ? "" : finding.recording + ": ",
-                      finding.message));
+  warn_of_failed_checks(torsio::check_for_fit(dataset, features, true));
 }
 
 void warn_of_other_motions(const torsio::Dataset& dataset, const torsio::FeatureSpec& features,

@@ -3,11 +3,13 @@
 #include <string>
 
 #include "torsio/actuator/data_sheet.hpp"
+#include "torsio/check/check.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
 
 /// Repeats what `torsio check` reports as FAIL about these recordings, one line each.
+void warn_of_failed_checks(const torsio::FitCheck& check);
 void warn_of_failed_checks(const torsio::Dataset& dataset, const torsio::FeatureSpec& features);
 /// Warns of held-out recordings whose motion is of another kind than that of every training
 /// recording (`other_motions`).

@@ -30,21 +30,19 @@ struct EvaluateFlags {
 };
 
 /// Target, estimate, error bar and fault of every sample of one recording: the run that is scored.
-torsio::Recording prediction_recording(const torsio::Estimator& estimator,
-                                       const torsio::Recording& recording,
-                                       const std::string& target, std::size_t initialise) {
-  const torsio::Prediction prediction =
-      torsio::predict(estimator, recording, {&recording.channel(target), initialise});
+torsio::Recording prediction_recording(const torsio::ScoredRun& run) {
+  const torsio::Recording& recording = run.record->recording;
+  const std::string& target = run.target->name;
   torsio::Channel estimate{torsio::estimate_channel(target), {}};
   torsio::Channel std_dev{torsio::error_bar_channel(target), {}};
   torsio::Channel fault{"fault_1", {}};
-  for (const torsio::Estimate& output : prediction.estimates) {
+  for (const torsio::Estimate& output : run.prediction.estimates) {
     estimate.values.push_back(output.value);
     std_dev.values.push_back(output.std_dev);
     fault.values.push_back(static_cast<double>(output.fault));
   }
   torsio::Recording result(recording.name(), recording.sample_rate_Hz(), recording.time_s(0));
-  result.add(recording.channel(target));
+  result.add(*run.target);
   result.add(std::move(estimate));
   result.add(std::move(std_dev));
   result.add(std::move(fault));
@@ -97,19 +95,17 @@ void run(EvaluateFlags& flags) {
                               .advice = "Call evaluate once for each recording."});
   warn_of_seen_recordings(file, dataset);
   warn_of_missing_zeros(file, dataset);
-  const torsio::Results results = torsio::evaluate_model(file, dataset, progress.listener());
+  const std::vector<torsio::ScoredRun> runs = torsio::scored_runs(
+      torsio::make_estimator(file, dataset.sample_rate_Hz()), dataset, progress.listener());
+  const torsio::Results results = torsio::evaluate_model(file, dataset, runs);
   warn_of_another_unit(file, dataset);
-  if (!flags.predictions.empty()) {
-    const torsio::Estimator estimator = torsio::make_estimator(file, dataset.sample_rate_Hz());
-    torsio::write_recording(prediction_recording(estimator, dataset.records.front().recording,
-                                                 dataset.target, dataset.initialise_samples),
-                            flags.predictions);
-  }
+  if (!flags.predictions.empty())
+    torsio::write_recording(prediction_recording(runs.front()), flags.predictions);
   if (flags.json.wants_tables()) print(evaluation_text(results));
   flags.json.write(torsio::results_json(results));
   if (flags.report.is_wanted())
     flags.report.write(
-        torsio::evaluation_report(results, file, flags.model, dataset, progress.listener()));
+        torsio::evaluation_report(results, runs, file, flags.model, dataset, progress.listener()));
   if (std::ranges::all_of(results.rows,
                           [](const torsio::ResultRow& row) { return row.status != "ok"; }))
     throw torsio::Error({.problem = first_failure(results)});

@@ -59,9 +59,10 @@ std::string family_list() {
   return text;
 }
 
-/// `train_model` from the start or from the checkpoint; if it is stopped, it writes a checkpoint.
-torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset,
-                           const torsio::ModelChoice& choice, torsio::Progress progress) {
+/// `fit_and_report` from the start or from the checkpoint; if it is stopped, it writes a checkpoint.
+torsio::ReportedFit fitted(const FitFlags& flags, const torsio::Dataset& dataset,
+                           const torsio::FitCheck& check, const torsio::ModelChoice& choice,
+                           torsio::Progress progress) {
   torsio::TrainingCheckpoint start;
   torsio::FitContext context{.seed = flags.seed, .progress = std::move(progress)};
   if (flags.resume) {
@@ -75,7 +76,7 @@ torsio::TrainedModel train(const FitFlags& flags, const torsio::Dataset& dataset
     is_kept = true;
   };
   try {
-    return torsio::train_model(dataset, choice, context);
+    return torsio::fit_and_report(dataset, check, choice, context);
   } catch (const torsio::Cancelled&) {
     if (!is_kept) throw;
     throw torsio::Error({.problem = "stopped on request; the best parameters so far are saved in " +
@@ -155,20 +156,16 @@ void run_one(FitFlags& flags) {
   ProgressBar progress;
   const torsio::Dataset dataset = flags.data.load(flags.validation, {}, progress.listener());
   const torsio::FeatureSpec features = torsio::resolve_inputs(dataset, flags.data.wanted_inputs());
-  (void)torsio::refuse_leak(dataset, features, flags.allow_leak);
-  warn_of_failed_checks(dataset, features);
-  const torsio::ModelChoice choice{flags.family, settings, "", features};
-  torsio::TrainedModel trained = train(flags, dataset, choice, progress.listener());
+  const torsio::FitCheck check = torsio::check_for_fit(dataset, features, flags.allow_leak);
+  warn_of_failed_checks(check);
+  torsio::ReportedFit fit =
+      fitted(flags, dataset, check, {flags.family, settings, "", features}, progress.listener());
+  auto& [trained, runs, results, report] = fit;
   trained.file.card.device_serial = flags.device_serial;
-  torsio::Results results = torsio::evaluate_model(trained.file, dataset, progress.listener());
-  torsio::mark_divergence_in_training(results.rows);
-  torsio::note_held_out_scores(trained.file.card, results.rows);
-  const torsio::FitReport report = torsio::fit_report(trained, dataset);
   if (flags.json.wants_tables()) print(evaluation_text(results) + torsio::fit_report_text(report));
   flags.json.write(torsio::fit_json(results, report, trained.notes));
   if (flags.report.is_wanted())
-    flags.report.write(
-        torsio::fit_page(results, report, trained, flags.output, dataset, progress.listener()));
+    flags.report.write(torsio::fit_page(fit, flags.output, dataset, progress.listener()));
   refuse_diverged(results.rows.front());
   torsio::save_model(flags.output, trained.file);  // last: untouched unless all else succeeded
   if (flags.resume) std::filesystem::remove(flags.checkpoint());

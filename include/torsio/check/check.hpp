@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "torsio/data/dataset.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
+#include "torsio/fit/train_model.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {
@@ -41,6 +43,20 @@ struct Finding {
 /// outside the training range. Every check
 /// reports at least one finding, PASS ones included, in a fixed order.
 [[nodiscard]] std::vector<Finding> check_dataset(const Dataset& dataset, const FeatureSpec& spec);
+
+/// What a fit needs of the checks, and the data that they have made, so that it need not make them
+/// again.
+struct FitCheck {
+  std::vector<Finding> failures;  ///< the FAIL findings of `check_dataset`
+  std::string leak;               ///< as `find_leak`
+  /// With the test data, if there are any; none if the data are not usable or a check before
+  /// them has failed.
+  std::optional<LearningData> data = {};
+};
+/// Checks that can only warn are not run.
+/// @throws UsageError as `refuse_leak`.
+[[nodiscard]] FitCheck check_for_fit(const Dataset& dataset, const FeatureSpec& spec,
+                                     bool allow_leak);
 
 /// The unit mistake ("degrees and radians") that makes a recording's slope of target over first
 /// input differ from the one that a model was trained on, `EstimatorSettings::fallback`; empty if

@@ -9,6 +9,7 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/evaluate/results.hpp"
+#include "torsio/evaluate/scored_run.hpp"
 #include "torsio/fit/train_model.hpp"
 
 namespace torsio {
@@ -51,6 +52,10 @@ struct Comparison {
                                  const Progress& progress = {});
 
 /// One model's rows on every role that the dataset has.
+/// @param runs of the model through the recordings of the dataset
+[[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
+                                     const std::vector<ScoredRun>& runs);
+/// Runs each recording once, with one run in memory at a time.
 [[nodiscard]] Results evaluate_model(const ModelFile& file, const Dataset& dataset,
                                      const Progress& progress = {});
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -9,6 +9,7 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/estimate/any_estimator.hpp"
+#include "torsio/evaluate/scored_run.hpp"
 #include "torsio/numerics/metrics.hpp"
 
 namespace torsio {
@@ -34,29 +35,6 @@ struct Score {
   double step_ns_p999 = kNotMeasured;
 };
 
-/// The estimates of every sample of a recording, streamed through `step` from `reset()`.
-struct Prediction {
-  std::size_t initialised =
-      0;  ///< samples up to the last one that was used to initialise the model
-  std::vector<Estimate> estimates;
-  std::vector<double> step_ns;
-};
-
-/// Measured target samples that initialise a model with memory: the first `most` new samples. A
-/// model with feedback is given each in turn, one with a state (`HasState`) is set to the state
-/// that fits them best.
-struct Corrections {
-  const Channel* target = nullptr;
-  std::size_t most = 0;
-};
-
-/// Zeros of `zeroed_channels` are 0 here, whatever was set: they were already
-/// subtracted from a loaded recording.
-/// @throws Error naming the recording, the channel and the sample if a raw input is missing or not
-/// finite, or the recording has another sample rate than the estimator.
-[[nodiscard]] Prediction predict(Estimator estimator, const Recording& recording,
-                                 const Corrections& corrections = {});
-
 /// One model at the measured samples of a recording: those of its segments of one role at which the
 /// target is new and finite. They are the same samples for every model.
 struct MeasuredEstimates {
@@ -74,7 +52,14 @@ struct SplitScore {
   std::vector<OfRecording> recordings;
   Score together;
 };
+[[nodiscard]] SplitScore evaluate(const std::vector<ScoredRun>& runs, Role role);
+/// Runs the recordings of that role first.
 [[nodiscard]] SplitScore evaluate(const Estimator& estimator, const Dataset& dataset, Role role,
                                   const Progress& progress = {});
+/// The same for several roles, in their order; a recording that has segments of several is run
+/// once, and only one run is in memory at a time.
+[[nodiscard]] std::vector<SplitScore> evaluate(const Estimator& estimator, const Dataset& dataset,
+                                               std::span<const Role> roles,
+                                               const Progress& progress = {});
 
 }  // namespace torsio

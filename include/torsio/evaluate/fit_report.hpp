@@ -4,8 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "torsio/check/check.hpp"
 #include "torsio/core/not_measured.hpp"
 #include "torsio/data/dataset.hpp"
+#include "torsio/evaluate/results.hpp"
+#include "torsio/evaluate/scored_run.hpp"
 #include "torsio/fit/train_model.hpp"
 
 namespace torsio {
@@ -43,5 +46,23 @@ struct FitReport {
 /// tenth of the longest recording or `kMaxLags`.
 inline constexpr std::size_t kMaxLags = 500;
 [[nodiscard]] FitReport fit_report(const TrainedModel& model, const Dataset& dataset);
+/// @param runs of the model through the recordings of the dataset
+/// @param data with the model's inputs; those of the split are made if they are not there
+[[nodiscard]] FitReport fit_report(const TrainedModel& model, const Dataset& dataset,
+                                   const std::vector<ScoredRun>& runs, const LearningData* data);
+
+/// A fitted model with all that `torsio fit` states about it.
+struct ReportedFit {
+  TrainedModel trained;         ///< its card has the scores on held-out recordings
+  std::vector<ScoredRun> runs;  ///< one for each recording
+  Results results;              ///< diverged, if it diverges on its training data
+  FitReport report;
+};
+/// Runs each recording once through the pipeline, unless the check has done it, and once through
+/// the model.
+/// @param check of the dataset with the inputs of the choice
+/// @throws Error as `train_model`, Cancelled.
+[[nodiscard]] ReportedFit fit_and_report(const Dataset& dataset, const FitCheck& check,
+                                         const ModelChoice& choice, const FitContext& context);
 
 }  // namespace torsio

@@ -48,8 +48,13 @@ struct TrainedModel {
 /// The training data of the models with one input set: the dataset after the feature pipeline.
 struct LearningData {
   TrainingData training;
-  std::optional<TrainingData> validation;  ///< if any record has that role
+  std::optional<TrainingData> validation = {};  ///< if any record has that role
+  std::optional<TrainingData> test = {};        ///< not used for a fit; for reports, if at hand
+
+  /// Null if there are none.
+  [[nodiscard]] const TrainingData* of(Role role) const noexcept;
 };
+/// The data of the roles training and validation.
 /// @throws Error as `training_data`, if the training records disagree about which channels are
 /// zeroed, if the target or every input is constant, or if values are too large to be squared.
 [[nodiscard]] LearningData learning_data(const Dataset& dataset, const FeatureSpec& features);
@@ -65,5 +70,7 @@ struct LearningData {
 /// @throws UsageError also if there is something to resume and the family keeps no checkpoints.
 [[nodiscard]] TrainedModel train_model(const Dataset& dataset, const ModelChoice& choice,
                                        const FitContext& context);
+[[nodiscard]] TrainedModel train_model(const Dataset& dataset, const LearningData& data,
+                                       const ModelChoice& choice, const FitContext& context);
 
 }  // namespace torsio

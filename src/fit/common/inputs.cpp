@@ -15,6 +15,7 @@
 #include "data/mapping/canonical_channels.hpp"
 #include "data/mapping/needed_definitions.hpp"
 #include "data/recording_rows.hpp"
+#include "fit/common/passes.hpp"
 #include "numerics/least_squares.hpp"
 #include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
@@ -222,6 +223,7 @@ std::vector<double> first_feature(const Recording& recording, const FeatureSpec&
 }
 
 std::string find_leak(const Dataset& dataset, const FeatureSpec& spec) {
+  ++passes().leak_searches;
   const FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
   for (const std::string& input : pipeline.raw_inputs())
     if (input.starts_with(kTruthPrefix) ||

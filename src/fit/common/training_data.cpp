@@ -12,6 +12,7 @@
 #include "data/recording_rows.hpp"
 #include "fit/common/finite_input.hpp"
 #include "fit/common/outliers.hpp"
+#include "fit/common/passes.hpp"
 #include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/not_measured.hpp"
@@ -191,6 +192,7 @@ bool Sequence::has_features(std::size_t sample) const {
 }
 
 TrainingData training_data(const Dataset& dataset, const FeatureSpec& spec, Role role) {
+  ++passes().training_data;
   const FeaturePipeline pipeline(spec, dataset.sample_rate_Hz());
   TrainingData data;
   data.target = dataset.target;

@@ -101,10 +101,13 @@ ThinnedCurve thinned(std::span<const double> x, std::span<const double> y, std::
     for (std::size_t n = 0; n < x.size(); ++n) {
       const bool is_point = std::isfinite(x[n]) && std::isfinite(y[n]);
       if (!is_point && !has_last) continue;
-      const double moved =
-          std::hypot((x[n] - last_x) / x_range.width(), (y[n] - last_y) / y_range.width());
+      const double moved_x = std::abs(x[n] - last_x) / x_range.width();
+      const double moved_y = std::abs(y[n] - last_y) / y_range.width();
+      // Most points are so near that the distance need not be computed.
+      const bool is_near =
+          std::max(moved_x, moved_y) < 0.7 * step || std::hypot(moved_x, moved_y) < step;
       const bool is_last = n + 1 == x.size();
-      if (is_point && has_last && moved < step && !is_last) continue;
+      if (is_point && has_last && is_near && !is_last) continue;
       curve.x.push_back(x[n]);
       curve.y.push_back(y[n]);
       curve.kept.push_back(n);

@@ -101,9 +101,9 @@ ReportSection fit_section(const FitReport& report) {
 
 }  // namespace
 
-ReportDocument evaluation_report(const Results& results, const ModelFile& file,
-                                 const std::string& model, const Dataset& dataset,
-                                 const Progress& progress) {
+ReportDocument evaluation_report(const Results& results, const std::vector<ScoredRun>& runs,
+                                 const ModelFile& file, const std::string& model,
+                                 const Dataset& dataset, const Progress& progress) {
   ReportDocument document{.title = "Scores of " + model,
                           .summary = score_summary(results, file.card.fitted_as),
                           .sections = {},
@@ -111,19 +111,19 @@ ReportDocument evaluation_report(const Results& results, const ModelFile& file,
   document.sections.push_back({.heading = "Scores",
                                .text = fmt::format("Errors in {}, free run.", results.unit),
                                .tables = {score_table(results)}});
-  std::ranges::move(model_sections(dataset, {{file.card.fitted_as, &file}}, progress),
+  std::ranges::move(model_sections(dataset, {{file.card.fitted_as, &file, &runs}}, progress),
                     std::back_inserter(document.sections));
   document.sections.push_back(card_section(file, "Card of the model"));
   return document;
 }
 
-ReportDocument fit_page(const Results& results, const FitReport& report,
-                        const TrainedModel& trained, const std::string& model,
-                        const Dataset& dataset, const Progress& progress) {
-  ReportDocument document = evaluation_report(results, trained.file, model, dataset, progress);
+ReportDocument fit_page(const ReportedFit& fit, const std::string& model, const Dataset& dataset,
+                        const Progress& progress) {
+  ReportDocument document =
+      evaluation_report(fit.results, fit.runs, fit.trained.file, model, dataset, progress);
   document.title = "Fit of " + model;
-  ReportSection section = fit_section(report);
-  for (const std::string& note : trained.notes) section.text += " " + note + ".";
+  ReportSection section = fit_section(fit.report);
+  for (const std::string& note : fit.trained.notes) section.text += " " + note + ".";
   document.sections.insert(document.sections.begin() + 1, std::move(section));
   return document;
 }

@@ -6,37 +6,49 @@
 
 #include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/evaluate/evaluate.hpp"
+#include "torsio/evaluate/scored_run.hpp"
 #include "torsio/fit/common/inputs.hpp"
 
 namespace torsio {
 namespace {
 
-ModelRun run_model(const Dataset& dataset, const DatasetRecord& record, const ReportedModel& model,
-                   Role role) {
-  const Recording& recording = record.recording;
-  const Channel& target = recording.channel(dataset.target);
-  const Prediction prediction = predict(make_estimator(*model.file, recording.sample_rate_Hz()),
-                                        recording, {&target, dataset.initialise_samples});
-  const std::size_t samples = prediction.estimates.size();
-  ModelRun run{.label = model.label,
+ModelRun sample_by_sample(const ScoredRun& scored, const std::string& label, Role role) {
+  const std::vector<Estimate>& estimates = scored.prediction.estimates;
+  const std::size_t samples = estimates.size();
+  ModelRun run{.label = label,
                .value = std::vector<double>(samples, kNotMeasured),
                .std_dev = std::vector<double>(samples, kNotMeasured),
                .residual = std::vector<double>(samples, kNotMeasured),
                .guarded = std::vector<std::uint8_t>(samples, 0)};
   for (std::size_t n = 0; n < samples; ++n) {
-    const Estimate& estimate = prediction.estimates[n];
+    const Estimate& estimate = estimates[n];
     if (estimate.fault == Fault::warming_up) continue;
     run.value[n] = estimate.value;
     run.std_dev[n] = estimate.std_dev;
     run.guarded[n] = estimate.fault != Fault::none ? 1 : 0;
   }
-  for (const Segment& segment : record.segments) {
+  for (const Segment& segment : scored.record->segments) {
     if (segment.role != role) continue;
-    for (std::size_t n = std::max(segment.begin, prediction.initialised); n < segment.end; ++n)
-      if (target.is_fresh(n)) run.residual[n] = run.value[n] - target.values[n];
+    for (std::size_t n = segment.begin; n < segment.end; ++n)
+      if (scored.target->is_fresh(n)) run.residual[n] = scored.residual(n);
   }
   return run;
+}
+
+ModelRun run_model(const Dataset& dataset, const DatasetRecord& record, const ReportedModel& model,
+                   Role role) {
+  if (model.runs != nullptr) {
+    const auto known = std::ranges::find(*model.runs, &record, &ScoredRun::record);
+    if (known != model.runs->end()) return sample_by_sample(*known, model.label, role);
+  }
+  const Recording& recording = record.recording;
+  const Channel& target = recording.channel(dataset.target);
+  return sample_by_sample(
+      {.record = &record,
+       .target = &target,
+       .prediction = predict(make_estimator(*model.file, recording.sample_rate_Hz()), recording,
+                             {&target, dataset.initialise_samples})},
+      model.label, role);
 }
 
 }  // namespace

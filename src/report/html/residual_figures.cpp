@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <numbers>
 
 #include "torsio/core/units.hpp"
@@ -17,6 +16,8 @@ constexpr std::size_t kModels = 3;     // whose residuals are drawn
 constexpr std::size_t kPoints = 1500;  // in a scatter plot
 constexpr std::size_t kSpectrumSamples = 16384;
 constexpr std::size_t kFrequencies = 150;
+constexpr std::size_t kTogether = 10;  // frequencies
+static_assert(kFrequencies % kTogether == 0);
 
 struct Context {
   const RecordRuns& record;
@@ -117,12 +118,16 @@ XyFigure autocorrelation(const Context& of) {
     const std::vector<double>& e = of.record.runs[m].residual;
     const std::size_t samples = std::min(e.size(), kMaxSamples);
     const std::size_t stride = std::max<std::size_t>(samples / 10 / kLags, 1);
+    std::vector<std::size_t> scored;
+    for (std::size_t n = 0; n < samples; ++n)
+      if (std::isfinite(e[n])) scored.push_back(n);
     XySeries series{.label = of.record.runs[m].label, .x = {}, .y = {}};
     double at_zero = 0.0;
     for (std::size_t k = 0; k < kLags && k * stride < samples; ++k) {
       double sum = 0.0;
       std::size_t count = 0;
-      for (std::size_t n = k * stride; n < samples; ++n) {
+      for (auto at = std::ranges::lower_bound(scored, k * stride); at != scored.end(); ++at) {
+        const std::size_t n = *at;
         const double product = e[n] * e[n - k * stride];
         if (!std::isfinite(product)) continue;
         sum += product;
@@ -136,6 +141,34 @@ XyFigure autocorrelation(const Context& of) {
     figure.series.push_back(std::move(series));
   }
   return figure;
+}
+
+/// |sum_n x_n exp(i turn n)| for several turns: their recursions do not wait for each other.
+std::array<double, kTogether> fourier_sums(const std::vector<double>& x,
+                                           const std::array<double, kTogether>& turns) {
+  struct Complex {
+    std::array<double, kTogether> re{};
+    std::array<double, kTogether> im{};
+  };
+  Complex step;
+  Complex phase;
+  Complex sum;
+  phase.re.fill(1.0);
+  for (std::size_t i = 0; i < kTogether; ++i) {
+    step.re[i] = std::cos(turns[i]);
+    step.im[i] = std::sin(turns[i]);
+  }
+  for (const double value : x)
+    for (std::size_t i = 0; i < kTogether; ++i) {
+      sum.re[i] += value * phase.re[i];
+      sum.im[i] += value * phase.im[i];
+      const double re = phase.re[i] * step.re[i] - phase.im[i] * step.im[i];
+      phase.im[i] = phase.re[i] * step.im[i] + phase.im[i] * step.re[i];
+      phase.re[i] = re;
+    }
+  std::array<double, kTogether> lengths{};
+  for (std::size_t i = 0; i < kTogether; ++i) lengths[i] = std::hypot(sum.re[i], sum.im[i]);
+  return lengths;
 }
 
 /// The amplitude of a residual at frequencies that rise geometrically, from one section with a Hann window.
@@ -161,20 +194,16 @@ XyFigure spectrum(const Context& of) {
     }
     const double lowest_Hz = 4.0 * of.rate_Hz / static_cast<double>(samples);
     XySeries series{.label = run.label, .x = {}, .y = {}};
-    for (std::size_t k = 0; k < kFrequencies; ++k) {
-      const double frequency_Hz =
-          lowest_Hz * std::pow(0.5 * of.rate_Hz / lowest_Hz,
-                               static_cast<double>(k) / static_cast<double>(kFrequencies - 1));
-      const double turn = 2.0 * std::numbers::pi * frequency_Hz / of.rate_Hz;
-      const std::complex<double> step = std::polar(1.0, turn);
-      std::complex<double> phase = 1.0;
-      std::complex<double> sum = 0.0;
-      for (const double error : windowed) {
-        sum += error * phase;
-        phase *= step;
-      }
-      series.x.push_back(frequency_Hz);
-      series.y.push_back(weights > 0.0 ? 2.0 * std::abs(sum) / weights : kNotMeasured);
+    for (std::size_t k = 0; k < kFrequencies; ++k)
+      series.x.push_back(lowest_Hz *
+                         std::pow(0.5 * of.rate_Hz / lowest_Hz,
+                                  static_cast<double>(k) / static_cast<double>(kFrequencies - 1)));
+    for (std::size_t k = 0; k < kFrequencies; k += kTogether) {
+      std::array<double, kTogether> turns{};
+      for (std::size_t i = 0; i < kTogether; ++i)
+        turns[i] = 2.0 * std::numbers::pi * series.x[k + i] / of.rate_Hz;
+      for (const double sum : fourier_sums(windowed, turns))
+        series.y.push_back(weights > 0.0 ? 2.0 * sum / weights : kNotMeasured);
     }
     figure.series.push_back(std::move(series));
   }

@@ -6,6 +6,7 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
+#include "torsio/evaluate/scored_run.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/document/report_document.hpp"
 
@@ -15,6 +16,8 @@ namespace torsio {
 struct ReportedModel {
   std::string label;
   const ModelFile* file = nullptr;
+  /// Its runs through recordings of the dataset, if it was scored; null: it is run for the page.
+  const std::vector<ScoredRun>* runs = nullptr;
 };
 
 /// The recordings of a held-out role (test, else validation, else train; at most four): target over

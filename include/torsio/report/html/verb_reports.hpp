@@ -30,13 +30,15 @@ namespace torsio {
                                                      const Dataset& dataset);
 
 /// Scores of one model on each role and recording, and its pictures.
-[[nodiscard]] ReportDocument evaluation_report(const Results& results, const ModelFile& file,
-                                               const std::string& model, const Dataset& dataset,
+/// @param runs of the recordings, of which the results are the scores
+[[nodiscard]] ReportDocument evaluation_report(const Results& results,
+                                               const std::vector<ScoredRun>& runs,
+                                               const ModelFile& file, const std::string& model,
+                                               const Dataset& dataset,
                                                const Progress& progress = {});
 
 /// The scores of `evaluation_report`, correlations of the residuals, coefficients with standard errors.
-[[nodiscard]] ReportDocument fit_page(const Results& results, const FitReport& report,
-                                      const TrainedModel& trained, const std::string& model,
+[[nodiscard]] ReportDocument fit_page(const ReportedFit& fit, const std::string& model,
                                       const Dataset& dataset, const Progress& progress = {});
 
 /// Each finding, and the channels of each recording with the findings that have a place in it.
