@@ -1,5 +1,7 @@
 #include "model/grey_box/input_bank.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "core/all_finite.hpp"
@@ -12,20 +14,24 @@ void InputBank::check(std::size_t inputs, const std::string& place) const {
   const auto are_knots = [](const std::vector<double>& knots, std::size_t least) {
     return knots.size() >= least && knots.size() <= kMaxKnots && all_ascending(knots);
   };
-  require(input > 0 && input < inputs, {place, "input"},
-          "another input of the model than the first", std::to_string(input));
-  require(thresholds.size() <= kMaxThresholds && all_positive(thresholds), {place, "thresholds"},
-          "at most 32 positive numbers", count(thresholds));
-  require(are_knots(force_knots, 1), {place, "force_knots"}, "1 to 1000 finite, ascending numbers",
-          count(force_knots));
-  require(curve_knots.empty() || are_knots(curve_knots, 3), {place, "curve_knots"},
-          "none, or 3 to 1000 finite, ascending numbers", count(curve_knots));
-  require(product_knots.empty() || are_knots(product_knots, 2), {place, "product_knots"},
-          "none, or 2 to 1000 finite, ascending numbers", count(product_knots));
-  require(product_input < inputs && product_input != input, {place, "product_input"},
-          "another input of the model", std::to_string(product_input));
-  require(time_constants_s.size() <= kMaxTimeConstants && all_positive(time_constants_s),
-          {place, "time_constants_s"}, "at most 32 positive numbers", count(time_constants_s));
+  const auto require_field = [&](bool holds, std::string_view field, std::string_view expected,
+                                 const std::string& found) {
+    if (!holds) refuse(fmt::format("{}/{}", place, field), expected, found);
+  };
+  require_field(input > 0 && input < inputs, "input", "another input of the model than the first",
+                std::to_string(input));
+  require_field(thresholds.size() <= kMaxThresholds && all_positive(thresholds), "thresholds",
+                "at most 32 positive numbers", count(thresholds));
+  require_field(are_knots(force_knots, 1), "force_knots", "1 to 1000 finite, ascending numbers",
+                count(force_knots));
+  require_field(curve_knots.empty() || are_knots(curve_knots, 3), "curve_knots",
+                "none, or 3 to 1000 finite, ascending numbers", count(curve_knots));
+  require_field(product_knots.empty() || are_knots(product_knots, 2), "product_knots",
+                "none, or 2 to 1000 finite, ascending numbers", count(product_knots));
+  require_field(product_input < inputs && product_input != input, "product_input",
+                "another input of the model", std::to_string(product_input));
+  require_field(time_constants_s.size() <= kMaxTimeConstants && all_positive(time_constants_s),
+                "time_constants_s", "at most 32 positive numbers", count(time_constants_s));
 }
 
 namespace detail {
