@@ -27,8 +27,7 @@ void run(const char* recording) {
   torsio::TorqueController controller(  // in a robot: AnyInverse::of a model file, example 04
       torsio::LinearInverse(parts.stiffness_Nm_rad),
       torsio::TorqueLoopCore::Settings{.deflection = {.joint = parts}}, 1000.0);
-  torsio::CommandWatchdog watchdog(
-      {.timeout_s = 0.1});  // default 18 ms: too short for a busy desktop
+  torsio::CommandWatchdog watchdog({.timeout_s = 0.1});  // 18 ms is too short for a busy desktop
   torsio::Mailbox<double> wanted_Nm;
   torsio::Recorder recorder(recording, {.channels = {"wanted_torque_Nm", "torque_Nm"}});
   torsio::RealtimeLoop loop({.period_s = 1e-3, .stop_after_overruns = 1000});

@@ -46,9 +46,8 @@ int main() try {
   torsio::Monitor monitor(settings);  // throws if a limit is not valid
   torsio::CommandWatchdog watchdog({.timeout_s = 0.018});
   torsio::JointStop::Settings brake{.speed_rad_s = 1.0, .deceleration_rad_s2 = 5.0};
-  brake.drive = example_joint().drive;
-  brake.brake_static_Nm = 100.0, brake.brake_sliding_Nm = 80.0, brake.load_Nm = 20.0,
-  brake.brake_engage_s = 0.02, brake.brake_release_s = 0.04;
+  brake.drive = example_joint().drive, brake.load_Nm = 20.0, brake.brake_static_Nm = 100.0,
+  brake.brake_sliding_Nm = 80.0, brake.brake_engage_s = 0.02, brake.brake_release_s = 0.04;
   torsio::JointStop stop(brake, 1000.0);
   for (int tick = 0; tick < 2500; ++tick) {
     const double t_s = 1e-3 * tick;

@@ -154,6 +154,13 @@ TEST(FigurePlot, FillsTheAreasOfAFieldByTheirValues) {
   EXPECT_EQ(count("rgb(90%,15%,10%)"), 2U);
 }
 
+TEST(FigurePlot, AcceptsTextThatIsNotUtf8) {
+  const ReportFigure figure =
+      XyFigure{.title = "\xff\xfe file", .x = {"x"}, .y = {"y"}, .series = {}};
+  for (const PlotFormat format : {PlotFormat::svg, PlotFormat::png, PlotFormat::pdf})
+    EXPECT_NO_THROW((void)figure_plot({&figure}, format));
+}
+
 TEST(FigurePlot, NamesWhatItCanDraw) {
   const ReportDocument document = example();
   EXPECT_EQ(figures_of(document, {}, "residuals").front(), figures_of(document, {"rate"}).front());

@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "data/names.hpp"
 #include "report/plot/simplified_line.hpp"
 #include "torsio/report/document/decimation.hpp"
 
@@ -117,7 +118,7 @@ void FigurePainter::use_pen(CurveRole role, std::size_t index) {
 
 double FigurePainter::text_width(const std::string& text) const {
   cairo_text_extents_t extents{};
-  cairo_text_extents(cairo_, text.c_str(), &extents);
+  cairo_text_extents(cairo_, escaped(text).c_str(), &extents);
   return extents.x_advance;
 }
 
@@ -130,7 +131,7 @@ void FigurePainter::text(const std::string& text, double x, double y, Align alig
   cairo_translate(cairo_, x, y);
   if (is_upright) cairo_rotate(cairo_, -0.5 * std::numbers::pi);
   cairo_move_to(cairo_, -share * text_width(text), 0.0);
-  cairo_show_text(cairo_, text.c_str());
+  cairo_show_text(cairo_, escaped(text).c_str());  // cairo fails if it is not UTF-8
   cairo_restore(cairo_);
   cairo_new_path(cairo_);
   texts_.push_back(text);

@@ -67,7 +67,10 @@ TEST(ReportHtml, HasTablesAndAPictureWithoutJavaScript) {
 }
 
 TEST(ReportHtml, AsksForNoOtherFile) {
-  const std::string page = report_html(example("model"));
+  std::string page = report_html(example("model"));
+  constexpr std::string_view kWithin = "src=\"data:";
+  for (std::size_t at = page.find(kWithin); at != std::string::npos; at = page.find(kWithin))
+    page.erase(at, kWithin.size());
   for (const char* attribute : {"src=\"", "href=\"http", "url(http", "@import"})
     EXPECT_EQ(page.find(attribute), std::string::npos) << attribute;
 }
