@@ -153,6 +153,7 @@ std::vector<SplitScore> evaluate(const Estimator& estimator, const Dataset& data
     for (SplitTally& tally : tallies) tally.add(run);
   }
   std::vector<SplitScore> scores;
+  scores.reserve(tallies.size());
   for (SplitTally& tally : tallies) scores.push_back(std::move(tally).score());
   return scores;
 }

@@ -46,10 +46,10 @@ struct FitReport {
 /// tenth of the longest recording or `kMaxLags`.
 inline constexpr std::size_t kMaxLags = 500;
 [[nodiscard]] FitReport fit_report(const TrainedModel& model, const Dataset& dataset);
-/// @param runs of the model through the recordings of the dataset
+/// @param scored the runs of the model through the recordings of the dataset
 /// @param data with the model's inputs; those of the split are made if they are not there
 [[nodiscard]] FitReport fit_report(const TrainedModel& model, const Dataset& dataset,
-                                   const std::vector<ScoredRun>& runs, const LearningData* data);
+                                   const std::vector<ScoredRun>& scored, const LearningData* data);
 
 /// A fitted model with all that `torsio fit` states about it.
 struct ReportedFit {

@@ -32,7 +32,8 @@ class UsedTable {
   UsedTable(LogTable& table, const Mapping& mapping) : table_(table) {
     std::set<const LogColumn*> met;
     for (const ChannelRule& rule : mapping.channels)
-      if (const LogColumn* column = table.find(rule.from); column && !met.insert(column).second)
+      if (const LogColumn* column = table.find(rule.from);
+          column != nullptr && !met.insert(column).second)
         read_again(*column);
   }
 
