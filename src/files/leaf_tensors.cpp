@@ -181,8 +181,8 @@ std::size_t alternative_index(const Safetensors& contents, const std::string& na
 Tensor take_tensor(Safetensors& contents, const std::string& name, std::string_view file,
                    bool may_be_nan) {
   auto node = contents.tensors.extract(name);
-  std::string place = fmt::format("{}: /{}", file, name);
-  if (node.empty()) refuse_tensor(std::move(place), "a tensor", "none");
+  const std::string place = fmt::format("{}: /{}", file, name);
+  if (node.empty()) refuse_tensor(place, "a tensor", "none");
   check_numbers(node.mapped(), place, may_be_nan);
   return std::move(node.mapped());
 }

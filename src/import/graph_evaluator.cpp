@@ -25,8 +25,8 @@ std::string title(const Node& node) {
   return fmt::format("node '{}' ({})", name, node.op);
 }
 
-void refuse(const Graph& graph, const Node& node, std::string expected, std::string found,
-            std::string advice) {
+void refuse(const Graph& graph, const Node& node, const std::string& expected,
+            const std::string& found, const std::string& advice) {
   torsio::refuse({graph.place, title(node)}, expected, found, advice);
 }
 

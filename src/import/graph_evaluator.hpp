@@ -95,8 +95,8 @@ class Evaluator {
 };
 
 /// @throws Error naming file, node and operator.
-[[noreturn]] void refuse(const Graph& graph, const Node& node, std::string expected,
-                         std::string found, std::string advice = {});
+[[noreturn]] void refuse(const Graph& graph, const Node& node, const std::string& expected,
+                         const std::string& found, const std::string& advice = {});
 [[nodiscard]] std::string title(const Node& node);
 [[nodiscard]] std::int64_t integer(const Node& node, const char* attribute, std::int64_t otherwise);
 [[nodiscard]] double number(const Node& node, const char* attribute, double otherwise);

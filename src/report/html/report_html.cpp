@@ -52,7 +52,7 @@ std::string table_html(const ReportTable& table, const std::string& label) {
 std::string static_picture(const ReportFigure& figure, const std::string& title) {
   const std::string svg =
       figure_plot({&figure}, PlotFormat::svg, {.width_mm = 120.0, .height_mm = 90.0});
-  return fmt::format("<img alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">", markup_text(title),
+  return fmt::format(R"(<img alt="{}" src="data:image/svg+xml;base64,{}">)", markup_text(title),
                      base64(std::as_bytes(std::span(svg))));
 }
 
