@@ -159,6 +159,7 @@ TEST(FigurePlot, AcceptsTextThatIsNotUtf8) {
       XyFigure{.title = "\xff\xfe file", .x = {"x"}, .y = {"y"}, .series = {}};
   for (const PlotFormat format : {PlotFormat::svg, PlotFormat::png, PlotFormat::pdf})
     EXPECT_NO_THROW((void)figure_plot({&figure}, format));
+  EXPECT_THAT(figure_plot({&figure}, PlotFormat::svg), Not(HasSubstr("\xff")));
 }
 
 TEST(FigurePlot, NamesWhatItCanDraw) {

@@ -49,11 +49,11 @@ std::string table_html(const ReportTable& table, const std::string& label) {
 }
 
 /// A picture that needs no JavaScript. As an image: the names within an SVG file of cairo are those of any other.
-std::string static_picture(const ReportFigure& figure, const std::string& title) {
+std::string static_picture(const ReportFigure& figure) {
   const std::string svg =
       figure_plot({&figure}, PlotFormat::svg, {.width_mm = 120.0, .height_mm = 90.0});
-  return fmt::format(R"(<img alt="{}" src="data:image/svg+xml;base64,{}">)", markup_text(title),
-                     base64(std::as_bytes(std::span(svg))));
+  return fmt::format(R"(<img alt="{}" src="data:image/svg+xml;base64,{}">)",
+                     markup_text(title_of(figure)), base64(std::as_bytes(std::span(svg))));
 }
 
 bool has_line(const ReportFigure& figure) {
@@ -108,15 +108,14 @@ class Page {
   }
 
   std::string figure_html(const ReportFigure& figure) {
-    const std::string& title =
-        std::visit([](const auto& one) -> const std::string& { return one.title; }, figure);
+    const std::string& title = title_of(figure);
     if (std::holds_alternative<FieldFigure>(figure))
       return fmt::format("<figure><figcaption>{}</figcaption>{}</figure>\n", markup_text(title),
-                         static_picture(figure, title));
+                         static_picture(figure));
     const std::string id = fmt::format("figure-{}", figures_.size() + 1);
     figures_.push_back(&figure);
     std::string still;
-    if (!has_picture_ && has_line(figure)) still = static_picture(figure, title);
+    if (!has_picture_ && has_line(figure)) still = static_picture(figure);
     has_picture_ = has_picture_ || !still.empty();
     return fmt::format("<figure><figcaption>{}</figcaption><div id=\"{}\"></div>{}</figure>\n",
                        markup_text(title), id,

@@ -126,15 +126,16 @@ void FigurePainter::text(const std::string& text, double x, double y, Align alig
                          bool is_upright) {
   if (text.empty()) return;
   const double share = align == Align::begin ? 0.0 : align == Align::middle ? 0.5 : 1.0;
+  std::string drawn = escaped(text);  // cairo fails on what is not UTF-8
   cairo_save(cairo_);
   cairo_set_source_rgb(cairo_, 0.0, 0.0, 0.0);
   cairo_translate(cairo_, x, y);
   if (is_upright) cairo_rotate(cairo_, -0.5 * std::numbers::pi);
-  cairo_move_to(cairo_, -share * text_width(text), 0.0);
-  cairo_show_text(cairo_, escaped(text).c_str());  // cairo fails if it is not UTF-8
+  cairo_move_to(cairo_, -share * text_width(drawn), 0.0);
+  cairo_show_text(cairo_, drawn.c_str());
   cairo_restore(cairo_);
   cairo_new_path(cairo_);
-  texts_.push_back(text);
+  texts_.push_back(std::move(drawn));
 }
 
 double FigurePainter::head(const std::string& title, const std::vector<LegendEntry>& entries,

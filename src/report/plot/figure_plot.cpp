@@ -12,6 +12,7 @@
 #include <memory>
 #include <numeric>
 
+#include "data/names.hpp"
 #include "report/markup_text.hpp"
 #include "report/plot/figure_painter.hpp"
 #include "torsio/core/error.hpp"
@@ -36,10 +37,6 @@ std::string lower(std::string_view text) {
   std::string result(text);
   for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return result;
-}
-
-const std::string& title_of(const ReportFigure& figure) {
-  return std::visit([](const auto& one) -> const std::string& { return one.title; }, figure);
 }
 
 double height_mm(const ReportFigure& figure, const PlotSize& size) {
@@ -126,13 +123,17 @@ std::string drawn(const std::vector<const ReportFigure*>& figures, PlotFormat fo
     if (name != std::string::npos) bytes.erase(name, bytes.find('>', name) - name);
     const std::size_t at = bytes.find('>', bytes.find("<svg")) + 1;
     bytes.insert(at, fmt::format("\n<title>{}</title>\n<desc>{}</desc>",
-                                 markup_text(title_of(*figures.front())),
+                                 markup_text(escaped(title_of(*figures.front()))),
                                  markup_text(fmt::format("{}", fmt::join(texts, "; ")))));
   }
   return bytes;
 }
 
 }  // namespace
+
+const std::string& title_of(const ReportFigure& figure) {
+  return std::visit([](const auto& one) -> const std::string& { return one.title; }, figure);
+}
 
 PlotFormat plot_format(std::string_view path) {
   const std::string name = lower(path);
