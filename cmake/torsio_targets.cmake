@@ -67,7 +67,9 @@ function(torsio_unity_build target)
   endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
   # In a unit each source is an included file, whose anonymous namespace g++ takes for that of a header.
-  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  # Clang reports local names that are the same as a name of another source.
+  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>
+    $<$<CXX_COMPILER_ID:Clang>:-Wno-shadow>)
 endfunction()
 
 # torsio_library(<name>): the library torsio_<name>, known as torsio::<name>.

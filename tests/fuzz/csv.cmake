@@ -1,1 +1,1 @@
-torsio_fuzzer(csv torsio_readers)
+torsio_fuzzer(csv torsio::data)

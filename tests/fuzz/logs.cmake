@@ -1,4 +1,4 @@
-torsio_fuzzer(mcap torsio_readers)
-torsio_fuzzer(bag torsio_readers)
-torsio_fuzzer(npz torsio_readers)
-torsio_fuzzer(mat torsio_readers)
+torsio_fuzzer(mcap torsio::data)
+torsio_fuzzer(bag torsio::data)
+torsio_fuzzer(npz torsio::data)
+torsio_fuzzer(mat torsio::data)

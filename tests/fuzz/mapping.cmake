@@ -1,1 +1,1 @@
-torsio_fuzzer(mapping torsio_readers)
+torsio_fuzzer(mapping torsio::data)

@@ -1,1 +1,1 @@
-torsio_fuzzer(recording_blocks torsio_readers)
+torsio_fuzzer(recording_blocks torsio::data)
