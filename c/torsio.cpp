@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "torsio/core/version.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/files/model_file.hpp"
 
 struct torsio_estimator {

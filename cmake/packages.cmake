@@ -1,6 +1,20 @@
 # Debian packages, for example by: cmake --workflow --preset packages (docs/development/building.md).
 set(CPACK_GENERATOR DEB)
-set(CPACK_PACKAGE_CONTACT "the torsio authors <torsio@example.org>")
+# Whoever makes the packages is asked about them.
+set(TORSIO_PACKAGE_CONTACT "" CACHE STRING "Maintainer of the packages: NAME <ADDRESS>; empty: that of git config")
+if(TORSIO_PACKAGE_CONTACT)
+  set(CPACK_PACKAGE_CONTACT "${TORSIO_PACKAGE_CONTACT}")
+else()
+  foreach(key name email)
+    execute_process(COMMAND git config user.${key} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
+      OUTPUT_VARIABLE torsio_builder_${key} OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  endforeach()
+  if(torsio_builder_name AND torsio_builder_email)
+    set(CPACK_PACKAGE_CONTACT "${torsio_builder_name} <${torsio_builder_email}>")
+  else()
+    set(CPACK_PACKAGE_CONTACT "the builder of this package <root@localhost>")
+  endif()
+endif()
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
 set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)

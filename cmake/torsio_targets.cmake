@@ -81,6 +81,10 @@ function(torsio_library name)
     CXX_EXTENSIONS OFF VERIFY_INTERFACE_HEADER_SETS ON)  # each public header compiles alone
   target_include_directories(torsio_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(torsio_${name} PRIVATE $<BUILD_INTERFACE:torsio_build_settings>)
+  if(EXISTS ${PROJECT_SOURCE_DIR}/include/torsio/${name}.hpp)  # where a user of the library starts
+    target_sources(torsio_${name} PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR}/include
+      FILES ${PROJECT_SOURCE_DIR}/include/torsio/${name}.hpp)
+  endif()
 endfunction()
 
 # What half of the sources include, and more than a quarter of the time to compile them is spent on.

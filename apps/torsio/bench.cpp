@@ -9,7 +9,7 @@
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/report/text_table.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 #include "verbs.hpp"
 
 namespace {

@@ -7,15 +7,15 @@
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "common/report_text.hpp"
+#include "report/plots.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/html/verb_reports.hpp"
-#include "torsio/report/plots.hpp"
 #include "torsio/report/results.hpp"
 #include "torsio/report/text_table.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 #include "verbs.hpp"
 
 namespace {

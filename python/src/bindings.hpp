@@ -14,7 +14,7 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/family_info.hpp"
 
 namespace torsio::python {
 

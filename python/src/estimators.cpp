@@ -8,7 +8,7 @@
 #include <memory>
 #include <utility>
 
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 #include "torsio/evaluate/estimate_recording.hpp"
 
 namespace torsio::python {

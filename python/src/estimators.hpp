@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio::python {
 

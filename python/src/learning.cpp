@@ -4,6 +4,9 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "report/cross_validation.hpp"
+#include "report/drift.hpp"
+#include "report/transfer.hpp"
 #include "torsio/check/advise/advice.hpp"
 #include "torsio/check/check.hpp"
 #include "torsio/evaluate/attribution.hpp"
@@ -16,10 +19,7 @@
 #include "torsio/fit/train_model.hpp"
 #include "torsio/report/attribution.hpp"
 #include "torsio/report/check.hpp"
-#include "torsio/report/cross_validation.hpp"
-#include "torsio/report/drift.hpp"
 #include "torsio/report/results.hpp"
-#include "torsio/report/transfer.hpp"
 
 namespace torsio::python {
 namespace {

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "estimators.hpp"
+#include "report/model_description.hpp"
 #include "torsio/evaluate/slow_cycle.hpp"
-#include "torsio/report/model_description.hpp"
 
 namespace torsio::python {
 namespace {

@@ -4,10 +4,9 @@
 #include "bindings.hpp"
 #include "data/log_table.hpp"
 #include "data/mapping/measured_recordings.hpp"
-#include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/data/mapping.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/data/write.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio::python {

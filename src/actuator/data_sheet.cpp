@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "actuators.hpp"
+#include "core/did_you_mean.hpp"
 #include "core/fnv_hash.hpp"
 #include "sheet_values.hpp"
 #include "specimen_spread.hpp"
-#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

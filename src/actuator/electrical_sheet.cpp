@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "torsio/control/current_controller.hpp"
+#include "control/current_controller.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {

@@ -5,7 +5,7 @@
 
 #include "check/checker.hpp"
 #include "data/finest_step.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {

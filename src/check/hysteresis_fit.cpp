@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

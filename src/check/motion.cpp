@@ -1,4 +1,4 @@
-#include "torsio/check/motion.hpp"
+#include "check/motion.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

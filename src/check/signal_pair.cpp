@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "data/finest_step.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "check/hysteresis_fit.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

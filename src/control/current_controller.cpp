@@ -1,4 +1,4 @@
-#include "torsio/control/current_controller.hpp"
+#include "control/current_controller.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "torsio/control/disturbance_observer.hpp"
+#include "torsio/control/torque_controller.hpp"
 
 namespace torsio {
 

@@ -1,8 +1,7 @@
-#include "torsio/control/thermal_limit.hpp"
-
 #include <fmt/format.h>
 
 #include "core/checks.hpp"
+#include "torsio/control/joint_cascade.hpp"
 
 namespace torsio {
 

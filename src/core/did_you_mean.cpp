@@ -1,4 +1,4 @@
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 
 #include <algorithm>
 #include <array>

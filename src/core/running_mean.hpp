@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 

@@ -1,5 +1,3 @@
-#include "torsio/data/clock.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "data/inspect_clock.hpp"
+#include "torsio/data/load.hpp"
 
 namespace torsio {
 namespace {

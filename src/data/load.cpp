@@ -23,9 +23,8 @@
 #include "numerics/shared_progress.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/data/csv.hpp"
-#include "torsio/data/manifest.hpp"
 #include "torsio/data/mapping.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 namespace {

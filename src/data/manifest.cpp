@@ -1,5 +1,3 @@
-#include "torsio/data/manifest.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 #include "data/yaml_reader.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/data/load.hpp"
 
 namespace torsio {
 namespace {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 
 namespace torsio {
 

@@ -18,11 +18,11 @@
 #include "data/byte_source.hpp"
 #include "data/csv/csv_table.hpp"
 #include "data/db3/db3_messages.hpp"
+#include "data/log_summary.hpp"
 #include "data/mcap/mcap_records.hpp"
 #include "data/ros/message_topics.hpp"
 #include "data/yaml_reader.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/log_summary.hpp"
 
 namespace torsio {
 namespace {

@@ -14,7 +14,7 @@
 #include "data/log_table.hpp"
 #include "data/resample.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/clock.hpp"
+#include "torsio/data/load.hpp"
 
 namespace torsio {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "data/log_table.hpp"
 #include "data/mapping/columns.hpp"
-#include "torsio/data/csv.hpp"
 #include "torsio/data/mapping.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 

@@ -10,7 +10,7 @@
 #include "data/finest_step.hpp"
 #include "data/interpolate.hpp"
 #include "data/whole_samples.hpp"
-#include "torsio/data/csv.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 namespace {

@@ -3,8 +3,7 @@
 #include "data/arrays/mat.hpp"
 #include "data/arrays/npz.hpp"
 #include "data/mcap/mcap_write.hpp"
-#include "torsio/data/csv.hpp"
-#include "torsio/files/output_file.hpp"
+#include "files/output_file.hpp"
 
 namespace torsio {
 

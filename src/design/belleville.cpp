@@ -1,11 +1,10 @@
-#include "torsio/design/belleville.hpp"
-
 #include <fmt/format.h>
 
 #include <cmath>
 #include <numbers>
 
 #include "torsio/core/error.hpp"
+#include "torsio/design/spring.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/design/outline.hpp"
+#include "design/outline.hpp"
 
 #include <fmt/format.h>
 

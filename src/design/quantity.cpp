@@ -1,4 +1,4 @@
-#include "torsio/design/quantity.hpp"
+#include "design/quantity.hpp"
 
 #include <charconv>
 #include <string>

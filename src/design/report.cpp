@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "data/yaml_reader.hpp"
+#include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

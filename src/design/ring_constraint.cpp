@@ -7,7 +7,7 @@
 #include <numbers>
 #include <string_view>
 
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "bound_search.hpp"
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -5,12 +5,12 @@
 #include <array>
 #include <utility>
 
+#include "core/did_you_mean.hpp"
 #include "data/yaml_reader.hpp"
+#include "design/quantity.hpp"
 #include "shipped_tables.hpp"
-#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/design/quantity.hpp"
 
 namespace torsio {
 namespace {

@@ -1,9 +1,9 @@
-#include "torsio/estimate/memory_error.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
+
+#include "torsio/estimate/estimator_core.hpp"
 
 namespace torsio::detail {
 namespace {

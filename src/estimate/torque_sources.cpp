@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/checks.hpp"
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 

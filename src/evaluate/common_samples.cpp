@@ -7,7 +7,7 @@
 
 #include "evaluate/measured_samples.hpp"
 #include "numerics/metrics_accumulator.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

@@ -10,10 +10,10 @@
 #include "data/channel_names.hpp"
 #include "data/recording_rows.hpp"
 #include "data/text_sink.hpp"
+#include "files/output_file.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/files/output_file.hpp"
 
 namespace torsio {
 namespace {

@@ -7,7 +7,7 @@
 #include <map>
 #include <numeric>
 
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/evaluate/cross_validation.hpp"

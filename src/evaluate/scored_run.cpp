@@ -1,5 +1,3 @@
-#include "torsio/evaluate/scored_run.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -13,6 +11,7 @@
 #include "fit/common/finite_input.hpp"
 #include "fit/common/passes.hpp"
 #include "torsio/core/realtime.hpp"
+#include "torsio/evaluate/evaluate.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 
 namespace torsio {

@@ -1,5 +1,3 @@
-#include "torsio/evaluate/structure_search.hpp"
-
 #include <algorithm>
 #include <iterator>
 #include <set>

@@ -12,7 +12,7 @@
 #include "files/json_object.hpp"
 #include "files/json_text.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/core/version.hpp"
 

@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 

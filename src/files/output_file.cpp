@@ -1,4 +1,4 @@
-#include "torsio/files/output_file.hpp"
+#include "files/output_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

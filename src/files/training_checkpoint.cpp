@@ -1,4 +1,4 @@
-#include "torsio/files/training_checkpoint.hpp"
+#include "files/training_checkpoint.hpp"
 
 #include <fmt/format.h>
 

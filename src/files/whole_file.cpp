@@ -10,8 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "files/output_file.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/files/output_file.hpp"
 
 namespace torsio {
 namespace {

@@ -1,5 +1,3 @@
-#include "torsio/import/foreign_network.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/import/import_network.hpp"
 
 namespace torsio {
 namespace {

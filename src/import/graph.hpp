@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/import/foreign_network.hpp"
+#include "torsio/import/import_network.hpp"
 
 namespace torsio::graph {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "import/graph_evaluator.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio::graph {
 namespace {

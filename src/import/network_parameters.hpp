@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "torsio/import/foreign_network.hpp"
+#include "torsio/import/import_network.hpp"
 #include "torsio/model/any_model.hpp"
 
 namespace torsio {

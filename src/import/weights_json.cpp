@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "core/checks.hpp"
+#include "core/did_you_mean.hpp"
 #include "data/names.hpp"
 #include "files/json_text.hpp"
 #include "files/safetensors.hpp"
-#include "torsio/core/did_you_mean.hpp"
-#include "torsio/import/foreign_network.hpp"
+#include "torsio/import/import_network.hpp"
 
 namespace torsio {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "model/dgmm_adapter.hpp"
 #include "model/grey_box_adapter.hpp"
+#include "model/last_layer_adapter.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/model/last_layer_adapter.hpp"
 
 namespace torsio {
 namespace {

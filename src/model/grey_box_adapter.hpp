@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "model/common/linear_update.hpp"
 #include "model/grey_box/grey_box.hpp"
 #include "torsio/core/realtime.hpp"
-#include "torsio/model/common/linear_update.hpp"
 #include "torsio/model/common/model_adapter.hpp"
 
 namespace torsio {

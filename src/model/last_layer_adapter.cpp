@@ -1,4 +1,4 @@
-#include "torsio/model/last_layer_adapter.hpp"
+#include "model/last_layer_adapter.hpp"
 
 #include <cmath>
 #include <string>

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/row_major_map.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

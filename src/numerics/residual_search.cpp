@@ -13,7 +13,7 @@
 #include "core/row_major_map.hpp"
 #include "numerics/levenberg_marquardt.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

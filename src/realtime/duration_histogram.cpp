@@ -1,8 +1,8 @@
-#include "torsio/realtime/duration_histogram.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
+
+#include "torsio/realtime/realtime_loop.hpp"
 
 namespace torsio {
 namespace {

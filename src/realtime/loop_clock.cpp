@@ -1,7 +1,7 @@
-#include "torsio/realtime/loop_clock.hpp"
-
 #include <cerrno>
 #include <ctime>
+
+#include "torsio/realtime/realtime_loop.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/report/cross_validation.hpp"
+#include "report/cross_validation.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "report/json_text.hpp"
 #include "report/result_parts.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

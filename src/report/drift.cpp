@@ -1,12 +1,12 @@
-#include "torsio/report/drift.hpp"
+#include "report/drift.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
+#include "report/json_text.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

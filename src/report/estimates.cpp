@@ -7,9 +7,9 @@
 #include <cmath>
 #include <set>
 
+#include "report/json_text.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

@@ -1,4 +1,4 @@
-#include "torsio/report/fault_campaign.hpp"
+#include "report/fault_campaign.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "torsio/report/json_text.hpp"
+#include "report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

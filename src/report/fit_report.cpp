@@ -1,4 +1,4 @@
-#include "torsio/report/fit_report.hpp"
+#include "report/fit_report.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "report/json_text.hpp"
 #include "report/result_parts.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

@@ -5,8 +5,8 @@
 #include <numbers>
 #include <string_view>
 
+#include "report/json_text.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 #include "torsio/report/tracking.hpp"
 

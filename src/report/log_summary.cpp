@@ -1,10 +1,10 @@
-#include "torsio/report/log_summary.hpp"
+#include "report/log_summary.hpp"
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
-#include "torsio/report/json_text.hpp"
+#include "report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

@@ -1,4 +1,4 @@
-#include "torsio/report/model_description.hpp"
+#include "report/model_description.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,11 +14,11 @@
 
 #include "files/known_families.hpp"
 #include "model/common/parameters.hpp"
+#include "report/json_text.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/fit/families.hpp"
 #include "torsio/model/network/network_layers.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

@@ -1,4 +1,4 @@
-#include "torsio/report/monitor.hpp"
+#include "report/monitor.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -7,9 +7,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "report/json_text.hpp"
+#include "report/plots.hpp"
 #include "report/result_parts.hpp"
-#include "torsio/report/json_text.hpp"
-#include "torsio/report/plots.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

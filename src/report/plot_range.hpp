@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "torsio/report/plots.hpp"
+#include "report/plots.hpp"
 
 namespace torsio {
 

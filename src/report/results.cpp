@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "report/json_text.hpp"
 #include "report/result_parts.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

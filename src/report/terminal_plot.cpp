@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "plot_range.hpp"
-#include "torsio/report/plots.hpp"
+#include "report/plots.hpp"
 
 namespace torsio {
 namespace {

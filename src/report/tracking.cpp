@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/running_mean.hpp"
-#include "torsio/report/json_text.hpp"
+#include "report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

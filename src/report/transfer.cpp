@@ -1,13 +1,13 @@
-#include "torsio/report/transfer.hpp"
+#include "report/transfer.hpp"
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "report/json_text.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

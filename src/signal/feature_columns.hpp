@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "signal/expression_graph.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 

@@ -10,9 +10,9 @@
 #include <optional>
 #include <utility>
 
+#include "core/did_you_mean.hpp"
 #include "signal/expression_graph.hpp"
 #include "signal/expression_parser.hpp"
-#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/differentiator.hpp"
 #include "torsio/signal/lowpass.hpp"

@@ -14,10 +14,9 @@
 #include "data/mapping/measured_recordings.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"
-#include "torsio/data/manifest.hpp"
 #include "torsio/data/mapping.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 namespace {

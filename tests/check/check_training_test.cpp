@@ -12,7 +12,7 @@
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "torsio/check/check.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
 

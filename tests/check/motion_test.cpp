@@ -1,4 +1,4 @@
-#include "torsio/check/motion.hpp"
+#include "check/motion.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,6 @@
 
 #include "support/bench_dataset.hpp"
 #include "torsio/fit/common/inputs.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {

@@ -14,7 +14,6 @@
 #include "support/examples/linear.hpp"
 #include "support/examples/viscoelastic.hpp"
 #include "support/numbers.hpp"
-#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio {

@@ -21,7 +21,7 @@
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/model_inverse.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio {
 namespace {

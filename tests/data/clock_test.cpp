@@ -1,11 +1,10 @@
-#include "torsio/data/clock.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
 #include "data/inspect_clock.hpp"
+#include "torsio/data/load.hpp"
 
 namespace torsio {
 namespace {

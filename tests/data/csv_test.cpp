@@ -1,5 +1,3 @@
-#include "torsio/data/csv.hpp"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
@@ -18,6 +16,7 @@
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 namespace {

@@ -13,7 +13,6 @@
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/data/manifest.hpp"
 #include "torsio/data/mapping.hpp"
 
 namespace torsio {

@@ -13,6 +13,7 @@
 #include "data/arrays/mat.hpp"
 #include "data/arrays/npz.hpp"
 #include "data/bag/bag_records.hpp"
+#include "data/log_summary.hpp"
 #include "data/read_log.hpp"
 #include "data/ros/message_topics.hpp"
 #include "support/error_message.hpp"
@@ -20,7 +21,6 @@
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/load.hpp"
-#include "torsio/data/log_summary.hpp"
 #include "torsio/data/mapping.hpp"
 #include "torsio/data/write.hpp"
 

@@ -14,7 +14,7 @@
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/csv.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 namespace {

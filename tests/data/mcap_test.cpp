@@ -13,11 +13,11 @@
 #include "data/read_log.hpp"
 #include "data/ros/message_topics.hpp"
 #include "data/ros/ros_schema.hpp"
+#include "report/log_summary.hpp"
 #include "support/error_message.hpp"
 #include "support/file_bytes.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/data/load.hpp"
-#include "torsio/report/log_summary.hpp"
 
 namespace torsio {
 namespace {

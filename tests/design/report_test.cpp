@@ -5,10 +5,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "design/outline.hpp"
+#include "design/quantity.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/design/outline.hpp"
-#include "torsio/design/quantity.hpp"
 #include "torsio/design/tables.hpp"
 
 namespace torsio {

@@ -52,10 +52,21 @@ struct Layers {
     return {};
   }
 
+  /// Whether the file is the header in which a user of a library starts: include/torsio/<library>.hpp.
+  [[nodiscard]] bool is_start(const std::string& file) const {
+    return !fs::path(file).has_parent_path() && uses.contains(fs::path(file).stem().string());
+  }
+
   /// Why `file` may not include `included`, both below src or include/torsio; empty: it may.
   [[nodiscard]] std::string objection(const std::string& file, const std::string& included) const {
     const std::string from = folder_of(file);
     const std::string to = folder_of(included);
+    if (is_start(file) && !to.empty()) {
+      const std::string library = fs::path(file).stem().string();
+      const std::string& used = folders.at(to).library;
+      if (used == library || uses.at(library).contains(used)) return {};
+      return file + " includes " + included + ": " + library + " does not link " + used;
+    }
     if (from.empty()) return file + " is in no folder of docs/development/architecture.md";
     if (to.empty())
       return file + " includes " + included + ", in no folder of docs/development/architecture.md";
@@ -131,6 +142,9 @@ TEST(Layers, NameWhatClimbs) {
             "sim/bench/bench.cpp includes fit/families.hpp: bench does not link learn");
   EXPECT_EQ(found.objection("control/pid.cpp", "files/model_file.hpp"),
             "control/pid.cpp includes files/model_file.hpp: files is below control");
+  EXPECT_EQ(found.objection("learn.hpp", "files/model_file.hpp"), "");
+  EXPECT_EQ(found.objection("learn.hpp", "sim/faults/fault_schedule.hpp"),
+            "learn.hpp includes sim/faults/fault_schedule.hpp: learn does not link bench");
   EXPECT_EQ(found.objection("spare/pid.cpp", "core/error.hpp"),
             "spare/pid.cpp is in no folder of docs/development/architecture.md");
 }

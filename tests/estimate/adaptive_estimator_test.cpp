@@ -15,7 +15,7 @@
 #include "support/examples/linear.hpp"
 #include "support/examples/network.hpp"
 #include "support/numbers.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio {
 namespace {

@@ -13,7 +13,7 @@
 #include "support/error_message.hpp"
 #include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio {
 namespace {

@@ -1,8 +1,8 @@
-#include "torsio/estimate/memory_error.hpp"
-
 #include <gtest/gtest.h>
 
 #include <array>
+
+#include "torsio/estimate/estimator_core.hpp"
 
 namespace torsio::detail {
 namespace {

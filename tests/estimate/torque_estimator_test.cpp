@@ -13,7 +13,6 @@
 #include "support/examples/linear.hpp"
 #include "support/numbers.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/estimate/any_estimator.hpp"
 
 namespace torsio {
 namespace {

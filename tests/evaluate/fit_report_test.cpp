@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "report/fit_report.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/report/fit_report.hpp"
 
 namespace torsio {
 namespace {

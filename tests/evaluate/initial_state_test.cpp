@@ -8,7 +8,7 @@
 
 #include "model/viscoelastic/viscoelastic.hpp"
 #include "support/examples/linear.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "torsio/evaluate/comparison.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

@@ -7,13 +7,13 @@
 #include <string>
 
 #include "model/linear/linear_coulomb.hpp"
+#include "report/model_description.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/example_model_file.hpp"
 #include "support/fitted_families.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
-#include "torsio/report/model_description.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/files/output_file.hpp"
+#include "files/output_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,8 +5,8 @@
 #include "data/csv/csv_table.hpp"
 #include "data/mapping/measured_recordings.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/csv.hpp"
 #include "torsio/data/mapping.hpp"
+#include "torsio/data/write.hpp"
 
 /// Any bytes, plain or gzipped, are a recording or an Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

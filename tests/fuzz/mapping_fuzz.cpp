@@ -6,9 +6,9 @@
 #include "data/csv/csv_table.hpp"
 #include "data/mapping/measured_recordings.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/csv.hpp"
-#include "torsio/data/manifest.hpp"
+#include "torsio/data/load.hpp"
 #include "torsio/data/mapping.hpp"
+#include "torsio/data/write.hpp"
 
 namespace {
 

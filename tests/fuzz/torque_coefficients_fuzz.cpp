@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "torsio/core/error.hpp"
-#include "torsio/fit/redundancy/torque_coefficients_file.hpp"
+#include "torsio/fit/redundancy/fit_motor_referenced_torques.hpp"
 
 /// Any text is an Error, or coefficients that their own YAML gives back and that give finite
 /// torques.

@@ -9,7 +9,7 @@
 
 #include "import/network_parameters.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/import/foreign_network.hpp"
+#include "torsio/import/import_network.hpp"
 
 // Any bytes are refused as weights with an Error, or give a network that steps. With the first byte odd
 // they are the inside of {"tensors": {...}}.

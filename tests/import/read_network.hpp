@@ -3,7 +3,6 @@
 #include <string>
 
 #include "torsio/core/error.hpp"
-#include "torsio/import/foreign_network.hpp"
 #include "torsio/import/import_network.hpp"
 #ifdef TORSIO_HAS_ONNX
 #include "torsio/import/onnx_network.hpp"

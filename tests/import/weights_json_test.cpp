@@ -9,7 +9,6 @@
 #include "import/network_parameters.hpp"
 #include "model/network/lstm.hpp"
 #include "support/error_message.hpp"
-#include "torsio/import/foreign_network.hpp"
 #include "torsio/import/import_network.hpp"
 
 namespace torsio {

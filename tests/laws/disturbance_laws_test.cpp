@@ -16,7 +16,7 @@
 #include "support/example_models.hpp"
 #include "support/numbers.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio::test {

@@ -20,7 +20,7 @@
 #include "torsio/core/random.hpp"
 #include "torsio/core/state_bytes.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio::test {
 namespace {

@@ -55,7 +55,7 @@ const JsonCase kCases[] = {
     {"Track", "", "track --actuator dfki-50 --duration 5s"},
     {"TrackImpedance", "", "track --impedance zero --duration 10s"},
     {"TuneLoop", "", "tune-loop --actuator dfki-50"},
-    {"Unpack", TORSIO_EXAMPLES "/example_06_realtime_loop\n", "unpack run.tsr -o run.csv"},
+    {"Unpack", TORSIO_EXAMPLES "/example_08_run_realtime_loop\n", "unpack run.tsr -o run.csv"},
 };
 
 void PrintTo(const JsonCase& verb, std::ostream* out) { *out << verb.call; }

@@ -223,7 +223,7 @@ TEST_F(MainJob, RunsTheExamples) {
   record();
   ASSERT_EQ(torsio("fit a.csv --model dgmm -o joint.safetensors").exit_code, 0);
   const Outcome estimate =
-      shell(std::string(TORSIO_EXAMPLES) + "/example_01_estimate_torque joint.safetensors");
+      shell(std::string(TORSIO_EXAMPLES) + "/example_02_estimate_torque joint.safetensors");
   EXPECT_EQ(estimate.exit_code, 0) << estimate.err;
   EXPECT_NE(estimate.out.find("Nm +-"), std::string::npos) << estimate.out;
   ASSERT_EQ(torsio("fit a.csv --model linear --inputs spring_deflection_rad,motor_current_A -o "
@@ -231,35 +231,37 @@ TEST_F(MainJob, RunsTheExamples) {
                 .exit_code,
             0);
   const Outcome lacking =
-      shell(std::string(TORSIO_EXAMPLES) + "/example_01_estimate_torque current.safetensors");
+      shell(std::string(TORSIO_EXAMPLES) + "/example_02_estimate_torque current.safetensors");
   EXPECT_EQ(lacking.out, "t = 0.000 s: fault input_not_finite\n") << "the fault is reported once";
   const Outcome control =
-      shell(std::string(TORSIO_EXAMPLES) + "/example_04_torque_control joint.safetensors");
+      shell(std::string(TORSIO_EXAMPLES) + "/example_06_control_torque joint.safetensors");
   EXPECT_EQ(control.exit_code, 0) << control.err;
   EXPECT_NE(control.out.find("phase margin 61 degrees"), std::string::npos) << control.out;
-  const Outcome margins = shell(std::string(TORSIO_EXAMPLES) + "/example_05_loop_margins");
+  const Outcome margins = shell(std::string(TORSIO_EXAMPLES) + "/example_05_choose_loop_gains");
   EXPECT_EQ(margins.exit_code, 0) << margins.err;
   EXPECT_NE(margins.out.find("dfki-300"), std::string::npos) << margins.out;
-  const Outcome fast = shell(std::string(TORSIO_EXAMPLES) + "/example_05_loop_margins 200");
+  const Outcome fast = shell(std::string(TORSIO_EXAMPLES) + "/example_05_choose_loop_gains 200");
   EXPECT_EQ(fast.exit_code, 1) << fast.out;
   EXPECT_NE(fast.err.find("unstable with its output locked"), std::string::npos) << fast.err;
-  const Outcome limits = shell(std::string(TORSIO_EXAMPLES) + "/example_08_joint_limits");
+  const Outcome limits = shell(std::string(TORSIO_EXAMPLES) + "/example_07_limit_and_stop_joint");
   EXPECT_EQ(limits.exit_code, 0) << limits.err;
   EXPECT_NE(limits.out.find("limit position, stop running"), std::string::npos);
   EXPECT_NE(limits.out.find("stop off, at rest: yes"), std::string::npos) << limits.out;
-  const Outcome monitored = shell(std::string(TORSIO_EXAMPLES) + "/example_09_monitored_joint");
+  const Outcome monitored =
+      shell(std::string(TORSIO_EXAMPLES) + "/example_09_monitor_two_estimates");
   EXPECT_EQ(monitored.exit_code, 0) << monitored.err;
   EXPECT_NE(monitored.out.find("monitor watching, brake open"), std::string::npos);
   EXPECT_NE(monitored.out.find("monitor stopped, brake closed"), std::string::npos);
   EXPECT_NE(monitored.out.find("the torques of spring and current differ by"), std::string::npos)
       << monitored.out;
-  const Outcome own = shell(std::string(TORSIO_EXAMPLES) + "/example_02_own_model");
+  const Outcome own = shell(std::string(TORSIO_EXAMPLES) + "/example_11_estimate_with_own_model");
   EXPECT_EQ(own.exit_code, 0) << own.err;
   EXPECT_NE(own.out.find("outside_training_range"), std::string::npos) << own.out;
   EXPECT_NE(own.out.find("input_not_finite"), std::string::npos) << own.out;
   ASSERT_EQ(torsio("fit a.csv --model mlp -o network.safetensors").exit_code, 0);
-  const Outcome adapt = shell(std::string(TORSIO_EXAMPLES) +
-                              "/example_03_adapt network.safetensors adapted.safetensors");
+  const Outcome adapt =
+      shell(std::string(TORSIO_EXAMPLES) +
+            "/example_10_adapt_to_load_cell network.safetensors adapted.safetensors");
   EXPECT_EQ(adapt.exit_code, 0) << adapt.err;
   EXPECT_NE(adapt.out.find(" updates"), std::string::npos) << adapt.out;
   EXPECT_EQ(torsio("evaluate adapted.safetensors b.csv").exit_code, 0);
@@ -267,7 +269,7 @@ TEST_F(MainJob, RunsTheExamples) {
 
 TEST_F(MainJob, RunsFromCodeWhatTheProgramDoes) {
   record();
-  const std::string example = std::string(TORSIO_EXAMPLES) + "/example_07_fit_from_code";
+  const std::string example = std::string(TORSIO_EXAMPLES) + "/example_01_fit_model";
   const Outcome fit = shell(example + " b.csv code.safetensors a.csv");
   EXPECT_EQ(fit.exit_code, 0) << fit.err;
   EXPECT_NE(fit.out.find("Nm on "), std::string::npos) << fit.out;

@@ -33,7 +33,7 @@ std::string quoted_part(const std::string& example) {
 
 TEST(Readme, QuotesAnExampleThatTheTestsRun) {
   const fs::path root = TORSIO_SOURCE;
-  const std::string part = quoted_part(contents(root / "examples/01_estimate_torque.cpp"));
+  const std::string part = quoted_part(contents(root / "examples/02_estimate_torque.cpp"));
   ASSERT_FALSE(part.empty());
   EXPECT_NE(contents(root / "README.md").find(part), std::string::npos) << part;
 }

@@ -9,7 +9,7 @@ namespace {
 class RealtimeExample : public Program {
  protected:
   void record() {
-    const Outcome outcome = shell(std::string(TORSIO_EXAMPLES) + "/example_06_realtime_loop");
+    const Outcome outcome = shell(std::string(TORSIO_EXAMPLES) + "/example_08_run_realtime_loop");
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
     ASSERT_NE(outcome.out.find("ended by stop_requested"), std::string::npos) << outcome.out;
     ASSERT_NE(outcome.out.find("lateness"), std::string::npos) << outcome.out;

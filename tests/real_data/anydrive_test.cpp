@@ -11,7 +11,6 @@
 #include "real_data/real_data.hpp"
 #include "support/each_instruction_set.hpp"
 #include "support/network_reference.hpp"
-#include "torsio/import/foreign_network.hpp"
 #include "torsio/import/import_network.hpp"
 
 namespace torsio {

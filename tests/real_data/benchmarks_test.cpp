@@ -7,7 +7,7 @@
 
 #include "real_data/real_data.hpp"
 #include "studies/study.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/data/load.hpp"
 #include "torsio/evaluate/comparison.hpp"
 

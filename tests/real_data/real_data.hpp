@@ -6,7 +6,6 @@
 
 #include "torsio/core/error.hpp"
 #include "torsio/data/load.hpp"
-#include "torsio/data/manifest.hpp"
 #include "torsio/evaluate/comparison.hpp"
 
 namespace torsio {

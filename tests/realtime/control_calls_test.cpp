@@ -14,7 +14,9 @@
 #include <utility>
 #include <vector>
 
+#include "control/current_controller.hpp"
 #include "model/mixture/random_mixture.hpp"
+#include "signal/joint_move.hpp"
 #include "support/example_settings.hpp"
 #include "support/examples/grey_box.hpp"
 #include "support/examples/hysteresis.hpp"
@@ -25,7 +27,6 @@
 #include "support/numbers.hpp"
 #include "support/system_calls.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
-#include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_controller.hpp"
 #include "torsio/control/joint_impedance.hpp"
@@ -34,13 +35,12 @@
 #include "torsio/control/torque_controller.hpp"
 #include "torsio/control/tube_impedance.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/safety/history.hpp"
 #include "torsio/safety/monitor.hpp"
 #include "torsio/safety/redundancy.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/signal/joint_move.hpp"
 
 namespace torsio {
 namespace {

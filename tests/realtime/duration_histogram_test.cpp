@@ -1,5 +1,3 @@
-#include "torsio/realtime/duration_histogram.hpp"
-
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
@@ -7,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <vector>
+
+#include "torsio/realtime/realtime_loop.hpp"
 
 namespace torsio {
 namespace {

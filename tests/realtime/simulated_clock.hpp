@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "torsio/realtime/loop_clock.hpp"
+#include "torsio/realtime/realtime_loop.hpp"
 
 namespace torsio::test {
 

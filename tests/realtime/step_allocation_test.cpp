@@ -17,7 +17,6 @@
 #include "support/grey_box_examples.hpp"
 #include "support/numbers.hpp"
 #include "torsio/estimate/adaptive_estimator.hpp"
-#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/motor_referenced_torques.hpp"
 #include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/signal/feature_pipeline.hpp"

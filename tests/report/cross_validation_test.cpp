@@ -1,4 +1,4 @@
-#include "torsio/report/cross_validation.hpp"
+#include "report/cross_validation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "torsio/report/model_description.hpp"
+#include "report/model_description.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

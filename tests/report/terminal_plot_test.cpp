@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "torsio/report/plots.hpp"
+#include "report/plots.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/signal/joint_move.hpp"
+#include "signal/joint_move.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -12,7 +12,7 @@
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/fit/redundancy/torque_coefficients_file.hpp"
+#include "torsio/fit/redundancy/fit_motor_referenced_torques.hpp"
 
 namespace torsio {
 namespace {

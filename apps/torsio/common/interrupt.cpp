@@ -6,7 +6,7 @@
 #include <csignal>
 #include <string_view>
 
-#include "torsio/files/output_file.hpp"
+#include "files/output_file.hpp"
 
 namespace {
 

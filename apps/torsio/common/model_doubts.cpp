@@ -7,9 +7,9 @@
 #include <optional>
 #include <utility>
 
+#include "check/motion.hpp"
 #include "common/output.hpp"
 #include "torsio/check/check.hpp"
-#include "torsio/check/motion.hpp"
 
 namespace {
 

@@ -9,8 +9,8 @@
 #include <span>
 #include <system_error>
 
+#include "files/output_file.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/files/output_file.hpp"
 
 bool is_standard_output(std::string_view path) { return path == "-" || path == "/dev/stdout"; }
 

@@ -5,10 +5,10 @@
 #include <iterator>
 
 #include "common/output.hpp"
+#include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/report/json_text.hpp"
 #include "torsio/report/plot/figure_plot.hpp"
 
 namespace {

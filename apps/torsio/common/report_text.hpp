@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "torsio/report/cross_validation.hpp"
+#include "report/cross_validation.hpp"
 #include "torsio/report/results.hpp"
 
 /// The text of a comparison: target and inputs, the ranked test table, and the

@@ -2,9 +2,9 @@
 #include <string>
 
 #include "design/design_flags.hpp"
+#include "design/outline.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/design/clutch.hpp"
-#include "torsio/design/outline.hpp"
 #include "torsio/design/rubber_spring.hpp"
 #include "torsio/design/tables.hpp"
 #include "verbs.hpp"

@@ -1,8 +1,8 @@
 #include "design/design_flags.hpp"
 
 #include "common/data_flags.hpp"
+#include "design/quantity.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/design/quantity.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
 
 void DesignOutputs::add(CLI::App& verb, bool has_dxf, const std::string& preferred_figure) {

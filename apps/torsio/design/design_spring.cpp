@@ -3,8 +3,8 @@
 #include <string>
 
 #include "design/design_flags.hpp"
+#include "design/outline.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/design/outline.hpp"
 #include "torsio/design/spring.hpp"
 
 namespace {

@@ -5,13 +5,13 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "report/adaptation.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/adaptation.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/model/adaptive_model.hpp"
-#include "torsio/report/adaptation.hpp"
-#include "torsio/report/html/change_reports.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "verbs.hpp"
 
 namespace {

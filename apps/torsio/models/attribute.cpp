@@ -11,7 +11,7 @@
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/attribution.hpp"
-#include "torsio/report/html/change_reports.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "verbs.hpp"
 
 namespace {

@@ -9,12 +9,12 @@
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
 #include "common/report_text.hpp"
+#include "report/cross_validation.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/families.hpp"
-#include "torsio/report/cross_validation.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "verbs.hpp"
 

@@ -7,12 +7,11 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "report/model_description.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/import/foreign_network.hpp"
 #include "torsio/import/import_network.hpp"
-#include "torsio/report/model_description.hpp"
 #include "verbs.hpp"
 #ifdef TORSIO_HAS_ONNX
 #include "torsio/import/onnx_network.hpp"

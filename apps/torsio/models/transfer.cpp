@@ -1,4 +1,4 @@
-#include "torsio/report/transfer.hpp"
+#include "report/transfer.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/transfer_curve.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/report/html/change_reports.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
 #include "verbs.hpp"
 

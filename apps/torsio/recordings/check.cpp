@@ -11,14 +11,14 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "data/log_summary.hpp"
+#include "report/log_summary.hpp"
 #include "torsio/check/advise/advice.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/data/clock.hpp"
-#include "torsio/data/log_summary.hpp"
+#include "torsio/data/load.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/check.hpp"
 #include "torsio/report/html/verb_reports.hpp"
-#include "torsio/report/log_summary.hpp"
 #include "verbs.hpp"
 
 namespace {
@@ -136,7 +136,7 @@ void add_check(CLI::App& app) {
       "         torsio check sweep*.csv --advise --want input=-5deg:5deg --want "
       "frequency=0.05Hz:2Hz\n"
       "--advise divides the recordings into strokes and fits a quick model with some of them left\n"
-      "out: docs/use/what_to_record.md.");
+      "out: docs/use/advise.md.");
   flags->data.add_recordings(*verb, "recordings, or a manifest");
   flags->data.add_mapping(*verb);
   flags->data.add_target_and_inputs(*verb);

@@ -5,10 +5,10 @@
 #include "common/data_flags.hpp"
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "report/json_text.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/recording_blocks.hpp"
 #include "torsio/data/write.hpp"
-#include "torsio/report/json_text.hpp"
 #include "verbs.hpp"
 
 namespace {

@@ -12,12 +12,11 @@
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
 #include "common/report_output.hpp"
+#include "report/drift.hpp"
+#include "sim/campaign/drift_campaign.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/files/model_file.hpp"
-#include "torsio/report/drift.hpp"
-#include "torsio/report/html/change_reports.hpp"
 #include "torsio/report/html/verb_reports.hpp"
-#include "torsio/sim/campaign/drift_campaign.hpp"
 #include "verbs.hpp"
 
 namespace {

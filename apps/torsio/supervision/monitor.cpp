@@ -1,4 +1,4 @@
-#include "torsio/report/monitor.hpp"
+#include "report/monitor.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -20,7 +20,7 @@
 #include "torsio/evaluate/monitor_replay.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/files/monitor_file.hpp"
-#include "torsio/report/html/change_reports.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 #include "verbs.hpp"
 
 namespace {

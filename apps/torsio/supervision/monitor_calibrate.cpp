@@ -10,12 +10,12 @@
 
 #include "common/output.hpp"
 #include "common/progress_bar.hpp"
+#include "report/monitor.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/files/monitor_file.hpp"
-#include "torsio/report/monitor.hpp"
 
 namespace {
 

@@ -8,15 +8,15 @@
 #include <utility>
 
 #include "common/progress_bar.hpp"
+#include "report/fault_campaign.hpp"
+#include "report/monitor.hpp"
+#include "sim/campaign/duty_recording.hpp"
+#include "sim/campaign/fused_accuracy.hpp"
+#include "sim/campaign/simulated_monitor.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/files/monitor_file.hpp"
-#include "torsio/report/fault_campaign.hpp"
-#include "torsio/report/monitor.hpp"
 #include "torsio/sim/bench/sheet_file.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
-#include "torsio/sim/campaign/fused_accuracy.hpp"
-#include "torsio/sim/campaign/simulated_monitor.hpp"
 
 namespace {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "common/output.hpp"
+#include "sim/campaign/fault_campaign.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
-#include "torsio/sim/campaign/fault_campaign.hpp"
 
 /// The flags of `torsio monitor` for simulated joints.
 struct SimulatedMonitorFlags {

@@ -2,10 +2,9 @@
 
 #include <limits>
 
-#include "torsio/control/bumpless_transfer.hpp"
 #include "torsio/control/deflection_controller.hpp"
-#include "torsio/core/fault.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/control/pid.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {

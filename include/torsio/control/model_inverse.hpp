@@ -9,9 +9,9 @@
 #include "torsio/control/spring_inverse.hpp"
 #include "torsio/core/dispatch.hpp"
 #include "torsio/core/realtime.hpp"
-#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/estimator_core.hpp"
 #include "torsio/estimate/joint_sample.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/model/any_model.hpp"
 
 namespace torsio {

@@ -1,10 +1,8 @@
 #pragma once
 
-#include "torsio/control/bumpless_transfer.hpp"
 #include "torsio/control/design/series_elastic_joint.hpp"
 #include "torsio/control/pid.hpp"
-#include "torsio/core/fault.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/signal/differentiator.hpp"
 

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <limits>
+
 #include "torsio/core/fault.hpp"
-#include "torsio/core/not_measured.hpp"
 
 namespace torsio {
+
+/// A value that was not measured: it becomes a fault where it is used, never a guess.
+inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
 /// The output of a model or an estimator at one tick. `value` is finite in every case.
 struct Estimate {

@@ -20,4 +20,11 @@ void write_recording(const Recording& recording, const std::string& path,
 /// The endings that `write_recording` can write, for messages.
 inline constexpr std::string_view kRecordingEndings = ".csv, .csv.gz, .mcap, .npz, .mat";
 
+/// Writes `t_s` and every channel, each number with the fewest digits that read back bit by bit;
+/// the freshness of channel `torque_Nm` becomes the column `torque_fresh_1`. "-" is standard
+/// output; a file appears under its name only when it is complete.
+/// @throws Error if it cannot be written, Cancelled if the progress asks to stop; then no file is
+/// left.
+void write_csv(const Recording& recording, const std::string& path, const Progress& progress = {});
+
 }  // namespace torsio

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "torsio/design/belleville.hpp"
 #include "torsio/design/report.hpp"
+#include "torsio/design/spring.hpp"
 
 namespace torsio {
 

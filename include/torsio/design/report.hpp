@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/report/document/report_document.hpp"
 
 namespace torsio {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "torsio/core/progress.hpp"
-#include "torsio/design/belleville.hpp"
+#include "torsio/design/spring.hpp"
 
 namespace torsio {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <bit>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -9,7 +12,57 @@
 #include "torsio/core/state_bytes.hpp"
 #include "torsio/estimate/estimator.hpp"
 #include "torsio/estimate/joint_sample.hpp"
-#include "torsio/estimate/period_check.hpp"
+#include "torsio/model/any_model.hpp"
+
+namespace torsio::detail {
+
+/// Whether a loop runs at the sample period that it was configured for, from the time stamps of its
+/// ticks: it does not where more than half of the last 32 periods are too long, or more than half too
+/// short, by more than `kTolerance`; so the median is off by as much. A single late tick is not an error.
+class PeriodCheck {
+ public:
+  static constexpr double kTolerance = 0.2;  ///< share of the period
+  static constexpr int kPeriods = 32;
+
+  explicit PeriodCheck(double period_s)
+      : shortest_s_((1.0 - kTolerance) * period_s), longest_s_((1.0 + kTolerance) * period_s) {}
+
+  void reset() noexcept {
+    too_short_ = 0;
+    too_long_ = 0;
+    has_last_ = false;
+  }
+
+  /// @param t_s of this tick; NaN, or before the last one: the check starts again.
+  /// @returns whether the rate is wrong
+  bool step(double t_s) noexcept TORSIO_REALTIME {
+    const double period_s = t_s - last_s_;
+    last_s_ = t_s;
+    if (!has_last_ || !(period_s >= 0.0)) {
+      reset();
+      has_last_ = !std::isnan(t_s);
+      return false;
+    }
+    too_short_ = too_short_ << 1U | static_cast<std::uint32_t>(period_s < shortest_s_);
+    too_long_ = too_long_ << 1U | static_cast<std::uint32_t>(period_s > longest_s_);
+    return std::popcount(too_short_) > kPeriods / 2 || std::popcount(too_long_) > kPeriods / 2;
+  }
+
+  /// The members that change in a step.
+  void visit_state(StateBytes& bytes) noexcept {
+    bytes.visit(last_s_, too_short_, too_long_, has_last_);
+  }
+
+ private:
+  double shortest_s_;
+  double longest_s_;
+  double last_s_ = 0.0;
+  std::uint32_t too_short_ = 0;  ///< one bit per period, the newest last
+  std::uint32_t too_long_ = 0;
+  bool has_last_ = false;
+};
+
+}  // namespace torsio::detail
 
 namespace torsio {
 
@@ -65,5 +118,11 @@ class BasicTorqueEstimator {
   detail::JointInputs inputs_;
   detail::PeriodCheck period_check_;
 };
+
+/// An estimator around a model whose family is known only at run time, as in model files.
+using Estimator = BasicEstimator<AnyModel>;
+
+/// The same, for a joint's sample as input.
+using TorqueEstimator = BasicTorqueEstimator<AnyModel>;
 
 }  // namespace torsio

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "torsio/core/realtime.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio {
 

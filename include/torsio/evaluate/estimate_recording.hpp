@@ -4,11 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "torsio/core/fault.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/estimate/any_estimator.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 
 namespace torsio {
 

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "torsio/check/check.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/data/dataset.hpp"
+#include "torsio/evaluate/evaluate.hpp"
 #include "torsio/evaluate/results.hpp"
-#include "torsio/evaluate/scored_run.hpp"
 #include "torsio/fit/train_model.hpp"
 
 namespace torsio {

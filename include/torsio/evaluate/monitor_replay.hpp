@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/estimate/monitored_torque.hpp"

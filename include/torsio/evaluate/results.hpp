@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/evaluate/evaluate.hpp"
 

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/files/model_file.hpp"
 

@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/provenance.hpp"
-#include "torsio/estimate/any_estimator.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
+#include "torsio/estimate/torque_estimator.hpp"
 #include "torsio/model/any_model.hpp"
 
 namespace torsio {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/provenance.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
 #include "torsio/safety/monitor.hpp"

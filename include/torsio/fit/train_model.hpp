@@ -9,8 +9,8 @@
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/model_file.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "torsio/import/foreign_network.hpp"
+#include "torsio/import/import_network.hpp"
 
 namespace torsio {
 

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <future>
 #include <memory>
@@ -11,10 +13,57 @@
 #include <utility>
 
 #include "torsio/core/realtime.hpp"
-#include "torsio/realtime/duration_histogram.hpp"
-#include "torsio/realtime/loop_clock.hpp"
 
 namespace torsio {
+
+/// A histogram of durations in memory of fixed size: 16 buckets for each power of two, so that a
+/// quantile is at most 1/16 too large and never too small, from 0 ns to 18 minutes; longer ones are
+/// counted in the last bucket, their maximum is in `max_ns`.
+class DurationHistogram {
+ public:
+  /// A negative duration counts as 0.
+  void add(std::int64_t duration_ns) noexcept TORSIO_REALTIME;
+
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  [[nodiscard]] std::int64_t max_ns() const noexcept { return max_ns_; }  ///< exact
+  /// The smallest bucket end that is not exceeded by at least this part of all durations; 0 if
+  /// there are none. @param part in [0, 1], e.g. 0.999
+  [[nodiscard]] std::int64_t quantile_ns(double part) const noexcept;
+
+ private:
+  static constexpr std::size_t kBuckets = 592;
+
+  static std::size_t bucket_of(std::int64_t duration_ns) noexcept;
+  static std::int64_t last_of(std::size_t bucket) noexcept;
+
+  std::array<std::uint64_t, kBuckets> counts_{};
+  std::uint64_t count_ = 0;
+  std::int64_t max_ns_ = 0;
+};
+
+/// The clock of a loop. A test replaces it by a simulated one.
+class LoopClock {
+ public:
+  LoopClock() = default;
+  virtual ~LoopClock() = default;
+  LoopClock(const LoopClock&) = delete;
+  LoopClock& operator=(const LoopClock&) = delete;
+
+  /// Never runs backwards, even if the time of day is changed.
+  [[nodiscard]] virtual std::int64_t now_ns() noexcept TORSIO_REALTIME = 0;
+  /// Waits until that point of `now_ns()`; returns at once if it has passed.
+  virtual void sleep_until(std::int64_t point_ns) noexcept = 0;
+  /// CPU time that the calling thread has used.
+  [[nodiscard]] virtual std::int64_t cpu_ns() noexcept TORSIO_REALTIME = 0;
+};
+
+/// CLOCK_MONOTONIC with sleep to absolute times: a late wake-up does not delay the next one.
+class MonotonicClock final : public LoopClock {
+ public:
+  [[nodiscard]] std::int64_t now_ns() noexcept override;
+  void sleep_until(std::int64_t point_ns) noexcept override;
+  [[nodiscard]] std::int64_t cpu_ns() noexcept override;
+};
 
 struct LoopOptions {
   double period_s = 1e-3;  ///< from 10 us to 10 s

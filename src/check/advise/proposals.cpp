@@ -12,7 +12,7 @@
 
 #include "check/advise/adviser.hpp"
 #include "check/signal_pair.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

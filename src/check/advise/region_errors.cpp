@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/report_progress.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

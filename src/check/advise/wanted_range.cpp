@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/did_you_mean.hpp"
 #include "torsio/check/advise/advice.hpp"
-#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
 

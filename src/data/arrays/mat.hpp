@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "data/arrays/array_table.hpp"
+#include "files/output_file.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/files/output_file.hpp"
 
 namespace torsio {
 

@@ -5,9 +5,9 @@
 
 #include "data/arrays/array_table.hpp"
 #include "data/byte_source.hpp"
+#include "files/output_file.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/files/output_file.hpp"
 
 namespace torsio {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/files/output_file.hpp"
+#include "files/output_file.hpp"
 
 namespace torsio {
 

@@ -1,5 +1,3 @@
-#include "torsio/data/csv.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +11,8 @@
 #include "data/csv/line_reader.hpp"
 #include "data/names.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 namespace {

@@ -3,8 +3,8 @@
 #include "core/report_progress.hpp"
 #include "data/text_sink.hpp"
 #include "data/written_columns.hpp"
-#include "torsio/data/csv.hpp"
-#include "torsio/files/output_file.hpp"
+#include "files/output_file.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 void write_csv(const Recording& recording, const std::string& path, const Progress& progress) {

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "data/log_table.hpp"
-#include "torsio/data/csv.hpp"
 #include "torsio/data/mapping.hpp"
 #include "torsio/data/recording.hpp"
+#include "torsio/data/write.hpp"
 
 namespace torsio {
 

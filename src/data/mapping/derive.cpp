@@ -7,7 +7,7 @@
 
 #include "data/recording_rows.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/data/mapping.hpp"
 
 namespace torsio {

@@ -15,7 +15,7 @@
 #include "data/record_clock.hpp"
 #include "data/whole_samples.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

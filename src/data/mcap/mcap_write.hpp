@@ -1,8 +1,8 @@
 #pragma once
 
+#include "files/output_file.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/files/output_file.hpp"
 
 namespace torsio {
 

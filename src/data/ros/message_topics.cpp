@@ -14,7 +14,7 @@
 #include "data/ros/ros_decoder.hpp"
 #include "data/ros/ros_schema.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
+#include "data/log_summary.hpp"
 #include "data/log_table.hpp"
 #include "data/ros/message_source.hpp"
-#include "torsio/data/log_summary.hpp"
 
 namespace torsio {
 

@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 

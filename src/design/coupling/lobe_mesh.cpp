@@ -1,5 +1,3 @@
-#include "torsio/design/coupling/lobe_mesh.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "torsio/core/error.hpp"
+#include "torsio/design/coupling/lobe.hpp"
 
 namespace torsio::design {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "torsio/core/error.hpp"
-#include "torsio/design/coupling/lobe_twist.hpp"
+#include "torsio/design/coupling/lobe.hpp"
 
 namespace torsio::design {
 namespace {

@@ -9,7 +9,7 @@
 #include <set>
 #include <sstream>
 
-#include "torsio/design/coupling/lobe_twist.hpp"
+#include "torsio/design/coupling/lobe.hpp"
 
 namespace torsio::design {
 namespace {

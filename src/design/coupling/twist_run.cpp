@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "torsio/core/error.hpp"
-#include "torsio/design/coupling/lobe_twist.hpp"
+#include "torsio/design/coupling/lobe.hpp"
 
 namespace torsio::design {
 namespace {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/matrix.hpp"
-#include "torsio/core/not_measured.hpp"
 
 namespace torsio {
 

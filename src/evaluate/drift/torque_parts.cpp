@@ -8,7 +8,7 @@
 
 #include "model/hysteresis/slip_bank.hpp"
 #include "numerics/nnls.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "numerics/quantile.hpp"
 #include "safety/pair_difference.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

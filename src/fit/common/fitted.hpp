@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/core/estimate.hpp"
+#include "torsio/fit/common/family_info.hpp"
 
 namespace torsio {
 

@@ -9,7 +9,6 @@
 #include "fit/common/option_fields.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/fit/common/family_info.hpp"
-#include "torsio/fit/common/fitted.hpp"
 
 namespace torsio {
 

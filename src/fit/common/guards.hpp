@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/any_model.hpp"

@@ -11,15 +11,15 @@
 #include <utility>
 
 #include "core/all_finite.hpp"
+#include "core/did_you_mean.hpp"
 #include "data/channel_names.hpp"
 #include "data/mapping/canonical_channels.hpp"
 #include "data/mapping/needed_definitions.hpp"
 #include "data/recording_rows.hpp"
 #include "fit/common/passes.hpp"
 #include "numerics/least_squares.hpp"
-#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "core/checks.hpp"
+#include "core/did_you_mean.hpp"
 #include "fit/common/option_fields.hpp"
-#include "torsio/core/did_you_mean.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

@@ -7,10 +7,10 @@
 #include <map>
 #include <set>
 
+#include "core/did_you_mean.hpp"
 #include "fit/common/usable_table.hpp"
 #include "numerics/least_squares.hpp"
 #include "numerics/nnls.hpp"
-#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

@@ -15,7 +15,7 @@
 #include "fit/common/passes.hpp"
 #include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 
 namespace torsio {

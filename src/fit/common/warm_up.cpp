@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "fit/common/model_run.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

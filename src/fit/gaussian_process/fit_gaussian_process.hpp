@@ -5,8 +5,8 @@
 
 #include "fit/common/fitted.hpp"
 #include "model/gaussian_process/gaussian_process.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 

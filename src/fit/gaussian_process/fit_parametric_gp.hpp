@@ -10,8 +10,8 @@
 #include "fit/common/fitted.hpp"
 #include "fit/gaussian_process/fit_gaussian_process.hpp"
 #include "model/gaussian_process/parametric_gp.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {

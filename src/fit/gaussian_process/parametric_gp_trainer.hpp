@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "model/gaussian_process/cholesky.hpp"
 #include "model/gaussian_process/kernel.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/matrix.hpp"
 
 namespace torsio {

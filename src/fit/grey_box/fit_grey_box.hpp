@@ -9,8 +9,8 @@
 #include "fit/common/fitted.hpp"
 #include "fit/common/shared_options.hpp"
 #include "model/grey_box/grey_box.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {

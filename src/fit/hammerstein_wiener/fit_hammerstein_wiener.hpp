@@ -10,8 +10,8 @@
 
 #include "fit/common/fitted.hpp"
 #include "model/hammerstein_wiener/hammerstein_wiener.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 

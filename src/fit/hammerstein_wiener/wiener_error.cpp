@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "core/all_finite.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

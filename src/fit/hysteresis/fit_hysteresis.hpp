@@ -11,7 +11,7 @@
 #include "model/hysteresis/nonlinear_backlash.hpp"
 #include "model/hysteresis/operator_sum.hpp"
 #include "torsio/core/progress.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 

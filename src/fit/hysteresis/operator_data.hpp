@@ -8,7 +8,7 @@
 
 #include "model/hysteresis/slip_bank.hpp"
 #include "numerics/residual_search.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {

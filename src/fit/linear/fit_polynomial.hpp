@@ -6,8 +6,8 @@
 #include "fit/common/fitted.hpp"
 #include "fit/common/shared_options.hpp"
 #include "model/linear/polynomial.hpp"
-#include "torsio/core/not_measured.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/core/estimate.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {

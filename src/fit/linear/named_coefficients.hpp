@@ -6,7 +6,6 @@
 
 #include "fit/common/regression.hpp"
 #include "torsio/fit/common/family_info.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/any_model.hpp"
 

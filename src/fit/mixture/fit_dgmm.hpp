@@ -5,9 +5,9 @@
 #include "fit/common/fitted.hpp"
 #include "fit/mixture/online_mixture.hpp"
 #include "model/mixture/dgmm.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {

@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <span>
 
+#include "core/aligned_vector.hpp"
 #include "fit/mixture/online_mixture.hpp"
 #include "model/mixture/gaussian_mixture.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/matrix.hpp"
 
 namespace torsio {

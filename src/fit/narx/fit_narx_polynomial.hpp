@@ -10,8 +10,8 @@
 #include "fit/narx/frols.hpp"
 #include "model/narx/multivariate_polynomial.hpp"
 #include "model/narx/narx.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {

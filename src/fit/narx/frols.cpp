@@ -8,11 +8,11 @@
 #include <numeric>
 #include <utility>
 
+#include "core/aligned_vector.hpp"
 #include "core/report_progress.hpp"
 #include "fit/narx/frols_kernel.hpp"
 #include "model/gaussian_process/kernel_kernels.hpp"
 #include "model/narx/multivariate_polynomial.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

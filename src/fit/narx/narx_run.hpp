@@ -8,7 +8,7 @@
 
 #include "fit/narx/fit_narx.hpp"
 #include "model/narx/narx.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/fit/common/training_data.hpp"
 

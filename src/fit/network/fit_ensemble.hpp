@@ -11,12 +11,13 @@
 #include <utility>
 #include <vector>
 
+#include "files/training_checkpoint.hpp"
 #include "fit/common/fitted.hpp"
 #include "model/network/ensemble.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/random.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 
 namespace torsio {
 

@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "fit/network/training_network.hpp"
 #include "numerics/float_gemm.hpp"
-#include "torsio/core/aligned_vector.hpp"
 
 namespace torsio {
 

@@ -16,7 +16,7 @@
 #include "fit/network/layer_kernels.hpp"
 #include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {

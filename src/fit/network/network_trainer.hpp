@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
+#include "files/training_checkpoint.hpp"
 #include "fit/network/fit_network.hpp"
 #include "fit/network/network_pass.hpp"
 #include "fit/network/network_windows.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/fit/common/fit_context.hpp"
 
 namespace torsio {

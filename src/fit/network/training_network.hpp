@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "numerics/float_gemm.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/model/network/network_layers.hpp"
 
 namespace torsio {

@@ -1,5 +1,3 @@
-#include "torsio/fit/redundancy/torque_coefficients_file.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include "data/yaml_reader.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/core/units.hpp"
+#include "torsio/fit/redundancy/fit_motor_referenced_torques.hpp"
 
 namespace torsio {
 namespace {

@@ -4,9 +4,9 @@
 
 #include "fit/common/fitted.hpp"
 #include "model/second_order/dynamic_bouc_wen.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 

@@ -7,7 +7,7 @@
 #include "fit/second_order/fit_dynamic_bouc_wen.hpp"
 #include "model/second_order/rigid_drive.hpp"
 #include "torsio/core/progress.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "torsio/core/error.hpp"
 #include "torsio/core/progress.hpp"
-#include "torsio/fit/common/fitted.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/common/model.hpp"
 

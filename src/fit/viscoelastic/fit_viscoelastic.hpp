@@ -5,8 +5,8 @@
 
 #include "fit/common/fitted.hpp"
 #include "model/viscoelastic/viscoelastic.hpp"
+#include "torsio/fit/common/family_info.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {

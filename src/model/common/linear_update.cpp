@@ -1,4 +1,4 @@
-#include "torsio/model/common/linear_update.hpp"
+#include "model/common/linear_update.hpp"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
-#include "torsio/model/common/moving_comparison.hpp"
-
 #include <algorithm>
+
+#include "torsio/model/common/model_adapter.hpp"
 
 namespace torsio::detail {
 namespace {

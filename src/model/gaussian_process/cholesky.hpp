@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-#include "torsio/core/aligned_vector.hpp"
+#include "core/aligned_vector.hpp"
 
 namespace torsio {
 

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "torsio/core/aligned_vector.hpp"
+#include "core/aligned_vector.hpp"
 
 namespace torsio::double_gemm {
 

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "model/gaussian_process/kernel.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/model/network/network_layers.hpp"

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/core/aligned_vector.hpp"
+#include "core/aligned_vector.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/model/common/model.hpp"

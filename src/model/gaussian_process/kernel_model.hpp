@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "model/gaussian_process/kernel_kernels.hpp"
 #include "model/network/network_checks.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/model/network/network_layers.hpp"

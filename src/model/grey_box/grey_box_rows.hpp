@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "model/grey_box/grey_box.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/estimate.hpp"
 #include "torsio/core/realtime.hpp"
 

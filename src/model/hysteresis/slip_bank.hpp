@@ -7,7 +7,7 @@
 #include <span>
 #include <string_view>
 
-#include "torsio/core/aligned_vector.hpp"
+#include "core/aligned_vector.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/core/state_bytes.hpp"
 

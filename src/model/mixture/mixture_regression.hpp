@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "model/mixture/gaussian_mixture.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/matrix.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/model/common/model.hpp"

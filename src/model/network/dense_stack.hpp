@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/core/aligned_vector.hpp"
+#include "core/aligned_vector.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/model/network/network_layers.hpp"
 

@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "model/network/dense_stack.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/model/common/model.hpp"
 #include "torsio/model/network/network_layers.hpp"
 

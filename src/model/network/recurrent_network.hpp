@@ -5,9 +5,9 @@
 #include <string_view>
 #include <vector>
 
+#include "core/aligned_vector.hpp"
 #include "model/network/dense_stack.hpp"
 #include "model/network/recurrent_stack.hpp"
-#include "torsio/core/aligned_vector.hpp"
 #include "torsio/core/realtime.hpp"
 #include "torsio/core/state_bytes.hpp"
 #include "torsio/model/common/model.hpp"

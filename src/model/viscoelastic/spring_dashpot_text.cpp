@@ -15,7 +15,7 @@
 #include "core/trimmed.hpp"
 #include "model/viscoelastic/spring_dashpot_network.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/units.hpp"
 
 namespace torsio {

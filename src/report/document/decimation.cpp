@@ -1,4 +1,4 @@
-#include "torsio/report/document/decimation.hpp"
+#include "report/document/decimation.hpp"
 
 #include <algorithm>
 #include <cmath>

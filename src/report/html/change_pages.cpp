@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/adaptation.hpp"
+#include "report/drift.hpp"
+#include "report/html/model_report.hpp"
 #include "report/html/report_parts.hpp"
 #include "report/html/time_figure_builder.hpp"
+#include "report/monitor.hpp"
 #include "report/result_parts.hpp"
+#include "report/transfer.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/report/adaptation.hpp"
-#include "torsio/report/drift.hpp"
-#include "torsio/report/html/change_reports.hpp"
-#include "torsio/report/html/model_report.hpp"
-#include "torsio/report/monitor.hpp"
-#include "torsio/report/transfer.hpp"
+#include "torsio/report/html/verb_reports.hpp"
 
 namespace torsio {
 namespace {

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/cross_validation.hpp"
+#include "report/html/model_report.hpp"
 #include "report/html/report_parts.hpp"
 #include "report/result_parts.hpp"
-#include "torsio/report/cross_validation.hpp"
-#include "torsio/report/html/model_report.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/results.hpp"
 

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/fit_report.hpp"
+#include "report/html/model_report.hpp"
 #include "report/html/report_parts.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/report/estimates.hpp"
-#include "torsio/report/fit_report.hpp"
-#include "torsio/report/html/model_report.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 
 namespace torsio {

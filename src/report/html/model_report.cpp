@@ -1,4 +1,4 @@
-#include "torsio/report/html/model_report.hpp"
+#include "report/html/model_report.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

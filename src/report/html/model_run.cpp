@@ -6,7 +6,7 @@
 
 #include "numerics/parallel.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/evaluate/scored_run.hpp"
+#include "torsio/evaluate/evaluate.hpp"
 #include "torsio/fit/common/inputs.hpp"
 
 namespace torsio {

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "report/html/model_report.hpp"
 #include "torsio/data/dataset.hpp"
-#include "torsio/report/html/model_report.hpp"
 
 namespace torsio {
 

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/html/model_report.hpp"
 #include "report/html/report_parts.hpp"
 #include "report/html/time_figure_builder.hpp"
 #include "report/result_parts.hpp"
 #include "torsio/core/units.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/report/check.hpp"
-#include "torsio/report/html/model_report.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 #include "torsio/report/tracking.hpp"
 

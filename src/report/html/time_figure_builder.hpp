@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "report/document/decimation.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/report/document/decimation.hpp"
 
 namespace torsio {
 

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "data/names.hpp"
+#include "report/document/decimation.hpp"
 #include "report/plot/simplified_line.hpp"
-#include "torsio/report/document/decimation.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/sim/campaign/drift_campaign.hpp"
+#include "sim/campaign/drift_campaign.hpp"
 
 #include <fmt/format.h>
 

@@ -3,12 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "signal/joint_move.hpp"
+#include "sim/campaign/duty_recording.hpp"
 #include "sim/plant/plant.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/actuator/wear.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/signal/joint_move.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 

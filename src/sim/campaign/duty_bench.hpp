@@ -7,10 +7,10 @@
 
 #include "duty.hpp"
 #include "duty_plants.hpp"
+#include "sim/campaign/duty_recording.hpp"
 #include "sim/faults/fault_injector.hpp"
 #include "sim/loops/bench_position_loop.hpp"
 #include "sim/sensors/sensor_set.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
 #include "torsio/sim/faults/fault_schedule.hpp"
 
 namespace torsio {

@@ -1,4 +1,4 @@
-#include "torsio/sim/campaign/fault_campaign.hpp"
+#include "sim/campaign/fault_campaign.hpp"
 
 #include <fmt/format.h>
 
@@ -19,9 +19,9 @@
 #include "numerics/parallel.hpp"
 #include "numerics/quantile.hpp"
 #include "numerics/shared_progress.hpp"
+#include "sim/campaign/duty_recording.hpp"
 #include "sim/experiments/experiment_table.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 namespace {

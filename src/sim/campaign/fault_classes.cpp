@@ -8,10 +8,10 @@
 
 #include "actuator/second_stage.hpp"
 #include "joint_monitor.hpp"
+#include "sim/campaign/duty_recording.hpp"
 #include "sim/faults/fault_rules.hpp"
 #include "sim/plant/plant.hpp"
 #include "sim/sensors/sensed_channels.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 namespace {

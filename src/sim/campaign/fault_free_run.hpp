@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "joint_monitor.hpp"
+#include "sim/campaign/duty_recording.hpp"
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 

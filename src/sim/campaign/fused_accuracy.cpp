@@ -1,4 +1,4 @@
-#include "torsio/sim/campaign/fused_accuracy.hpp"
+#include "sim/campaign/fused_accuracy.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,11 @@
 
 #include "core/report_progress.hpp"
 #include "data/recording_rows.hpp"
+#include "sim/campaign/duty_recording.hpp"
+#include "sim/campaign/monitor_recipe.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
-#include "torsio/sim/campaign/monitor_recipe.hpp"
 
 namespace torsio {
 namespace {

@@ -8,7 +8,7 @@
 #include "duty_bench.hpp"
 #include "sim/experiments/experiment_table.hpp"
 #include "stop_energy.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/sim/campaign/monitor_recipe.hpp"
+#include "sim/campaign/monitor_recipe.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "torsio/sim/campaign/simulated_monitor.hpp"
+#include "sim/campaign/simulated_monitor.hpp"
 
 #include <fmt/format.h>
 
@@ -8,11 +8,11 @@
 
 #include "core/fnv_hash.hpp"
 #include "core/report_progress.hpp"
+#include "sim/campaign/duty_recording.hpp"
+#include "sim/campaign/monitor_recipe.hpp"
 #include "torsio/core/version.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/files/monitor_file.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
-#include "torsio/sim/campaign/monitor_recipe.hpp"
 
 namespace torsio {
 namespace {

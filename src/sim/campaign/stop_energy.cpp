@@ -8,7 +8,7 @@
 #include "torsio/control/design/drive.hpp"
 #include "torsio/control/joint_stop.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

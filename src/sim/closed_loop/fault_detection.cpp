@@ -1,11 +1,10 @@
-#include "torsio/sim/closed_loop/fault_detection.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 
 #include "sim/faults/fault_rules.hpp"
+#include "torsio/sim/closed_loop/tracking_score.hpp"
 
 namespace torsio {
 namespace {

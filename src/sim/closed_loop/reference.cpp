@@ -1,5 +1,3 @@
-#include "torsio/sim/closed_loop/reference.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -11,10 +9,11 @@
 #include <utility>
 
 #include "core/checks.hpp"
+#include "core/did_you_mean.hpp"
 #include "sim/closed_loop/tracking_parts.hpp"
 #include "sim/experiments/experiment_table.hpp"
 #include "sim/experiments/torque_references.hpp"
-#include "torsio/core/did_you_mean.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
 
 namespace torsio {
 namespace {

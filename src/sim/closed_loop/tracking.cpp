@@ -20,7 +20,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/fit/common/inputs.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

@@ -8,7 +8,7 @@
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/data/recording.hpp"
 #include "torsio/signal/excitation.hpp"
-#include "torsio/sim/closed_loop/reference.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
 #include "torsio/sim/closed_loop/tracking_score.hpp"
 
 namespace torsio {

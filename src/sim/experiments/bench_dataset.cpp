@@ -1,5 +1,3 @@
-#include "torsio/sim/experiments/bench_dataset.hpp"
-
 #include <utility>
 
 #include "torsio/sim/experiments/experiment.hpp"

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "torsio/core/did_you_mean.hpp"
+#include "core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/signal/excitation.hpp"
 

@@ -11,7 +11,7 @@
 #include "sim/faults/fault_rules.hpp"
 #include "sim/sensors/sensed_channels.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

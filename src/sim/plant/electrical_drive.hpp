@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
+#include "control/current_controller.hpp"
 #include "control/temperature_derating.hpp"
 #include "sim/plant/motor_windings.hpp"
-#include "torsio/control/current_controller.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/realtime.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <complex>
 
-#include "torsio/control/current_controller.hpp"
+#include "control/current_controller.hpp"
 #include "torsio/core/realtime.hpp"
 
 namespace torsio {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <variant>
 
-#include "torsio/core/aligned_vector.hpp"
+#include "core/aligned_vector.hpp"
 
 // Where the kernels of PlantBatch find parameters, state and torques of many plants.
 

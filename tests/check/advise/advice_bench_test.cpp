@@ -1,6 +1,6 @@
 // On simulated benches the first proposal of the advice lowers the error on an independent test, or the
 // share of it that is outside of the training range, more than the same recordings made once more;
-// docs/use/what_to_record.md has cases where it does not.
+// docs/use/advise.md has cases where it does not.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,3 @@
-#include "torsio/design/coupling/lobe_mesh.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "torsio/core/error.hpp"
+#include "torsio/design/coupling/lobe.hpp"
 
 namespace torsio::design {
 namespace {

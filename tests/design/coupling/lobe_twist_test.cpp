@@ -1,5 +1,3 @@
-#include "torsio/design/coupling/lobe_twist.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,6 +11,7 @@
 #include <sstream>
 
 #include "torsio/core/error.hpp"
+#include "torsio/design/coupling/lobe.hpp"
 
 namespace torsio::design {
 namespace {

@@ -9,12 +9,12 @@
 
 #include "actuator/stage_wear.hpp"
 #include "evaluate/drift/verdicts.hpp"
+#include "report/drift.hpp"
+#include "sim/campaign/drift_campaign.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
-#include "torsio/report/drift.hpp"
-#include "torsio/sim/campaign/drift_campaign.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio::test {

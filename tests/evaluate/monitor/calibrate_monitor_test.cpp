@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
+#include "report/monitor.hpp"
 #include "support/error_message.hpp"
 #include "support/two_torques.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
-#include "torsio/report/monitor.hpp"
 
 namespace torsio {
 namespace {

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/random.hpp"
 
 namespace torsio {

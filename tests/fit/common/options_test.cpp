@@ -12,7 +12,7 @@
 #include "fit/common/option_fields.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 namespace {

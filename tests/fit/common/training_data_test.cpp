@@ -11,7 +11,7 @@
 #include "model/linear/linear.hpp"
 #include "support/bench_dataset.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
 

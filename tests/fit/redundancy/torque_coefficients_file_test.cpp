@@ -1,5 +1,3 @@
-#include "torsio/fit/redundancy/torque_coefficients_file.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/fit/redundancy/fit_motor_referenced_torques.hpp"
 
 namespace torsio {
 namespace {

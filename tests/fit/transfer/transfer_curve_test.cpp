@@ -7,11 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "report/transfer.hpp"
 #include "support/bench_dataset.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
 #include "torsio/fit/train_model.hpp"
-#include "torsio/report/transfer.hpp"
 
 namespace torsio {
 namespace {

@@ -1,6 +1,11 @@
 #include <cstdio>
 
-#include "torsio/fit/families.hpp"
+#include "torsio/bench.hpp"
+#include "torsio/data.hpp"
+#include "torsio/design.hpp"
+#include "torsio/learn.hpp"
+#include "torsio/report.hpp"
+#include "torsio/trials.hpp"
 #ifdef TORSIO_HAS_ONNX
 #include "torsio/core/error.hpp"
 #include "torsio/import/onnx_network.hpp"

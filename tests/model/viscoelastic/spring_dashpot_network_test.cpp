@@ -16,7 +16,7 @@
 #include "support/error_message.hpp"
 #include "support/random_spring_dashpots.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "torsio/evaluate/comparison.hpp"
 #include "torsio/report/html/verb_reports.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

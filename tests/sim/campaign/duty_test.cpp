@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "sim/campaign/duty_bench.hpp"
+#include "sim/campaign/duty_recording.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
 
 namespace torsio {
 namespace {

@@ -1,4 +1,4 @@
-#include "torsio/sim/campaign/fault_campaign.hpp"
+#include "sim/campaign/fault_campaign.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include "report/fault_campaign.hpp"
 #include "sim/campaign/fault_classes.hpp"
 #include "sim/campaign/fault_free_run.hpp"
 #include "sim/campaign/injection_run.hpp"
@@ -18,7 +19,6 @@
 #include "support/error_message.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/core/error.hpp"
-#include "torsio/report/fault_campaign.hpp"
 #include "toy_monitor.hpp"
 
 namespace torsio {

@@ -1,20 +1,20 @@
-#include "torsio/sim/campaign/simulated_monitor.hpp"
+#include "sim/campaign/simulated_monitor.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 
+#include "report/monitor.hpp"
+#include "sim/campaign/duty_recording.hpp"
+#include "sim/campaign/fault_campaign.hpp"
 #include "sim/campaign/fault_classes.hpp"
+#include "sim/campaign/fused_accuracy.hpp"
+#include "sim/campaign/monitor_recipe.hpp"
 #include "support/monitored_joint.hpp"
 #include "support/temporary_folder.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
 #include "torsio/files/monitor_file.hpp"
-#include "torsio/report/monitor.hpp"
-#include "torsio/sim/campaign/duty_recording.hpp"
-#include "torsio/sim/campaign/fault_campaign.hpp"
-#include "torsio/sim/campaign/fused_accuracy.hpp"
-#include "torsio/sim/campaign/monitor_recipe.hpp"
 
 namespace torsio {
 namespace {

@@ -4,10 +4,10 @@
 #include <utility>
 #include <vector>
 
+#include "sim/campaign/fault_campaign.hpp"
 #include "support/monitored_joint.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
-#include "torsio/sim/campaign/fault_campaign.hpp"
 
 namespace torsio::test {
 

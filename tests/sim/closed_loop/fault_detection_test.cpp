@@ -1,5 +1,3 @@
-#include "torsio/sim/closed_loop/fault_detection.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,6 +12,7 @@
 #include "torsio/core/units.hpp"
 #include "torsio/report/tracking.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
+#include "torsio/sim/closed_loop/tracking_score.hpp"
 
 namespace torsio {
 namespace {

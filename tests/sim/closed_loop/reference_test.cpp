@@ -1,5 +1,3 @@
-#include "torsio/sim/closed_loop/reference.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include "sim/closed_loop/tracking_parts.hpp"
 #include "support/error_message.hpp"
 #include "torsio/core/error.hpp"
+#include "torsio/sim/closed_loop/tracking.hpp"
 
 namespace torsio {
 namespace {

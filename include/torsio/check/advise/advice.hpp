@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
@@ -97,7 +97,7 @@ struct Advice {
 /// without those beyond some amplitude, frequency, centre or condition (how fast the error rises
 /// with the distance from what was trained), with half of a region and with half of all (learning).
 /// From these follow the expected squared error in each region of the intended use and what a
-/// recording there would change; docs/use/what_to_record.md has the equations.
+/// recording there would change; docs/use/advise.md has the equations.
 ///
 /// The intended use is `wanted`; by default the range of the recordings, and within it the
 /// amplitudes down to a quarter and the frequencies that are missing.

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "torsio/core/progress.hpp"
-#include "torsio/design/coupling/lobe_twist.hpp"
+#include "torsio/design/coupling/lobe.hpp"
 #include "torsio/design/report.hpp"
 #include "torsio/design/spring.hpp"
 

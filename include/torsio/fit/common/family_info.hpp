@@ -5,15 +5,23 @@
 #include <string_view>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/estimate/estimator_settings.hpp"
 #include "torsio/fit/common/fit_context.hpp"
-#include "torsio/fit/common/fitted.hpp"
 #include "torsio/fit/common/options.hpp"
 #include "torsio/fit/common/training_data.hpp"
 #include "torsio/model/any_model.hpp"
 
 namespace torsio {
+
+/// A fitted number with a physical meaning: a stiffness, a time constant.
+struct FittedParameter {
+  std::string name;    ///< "k1"
+  std::string unit;    ///< "Nm/rad"; empty for a number without
+  double value = 0.0;  ///< in that unit
+  double std_error =
+      kNotMeasured;  ///< from the curvature of the error at the optimum; NaN if unknown
+};
 
 /// A fitted model of any family, the messages about the fit for the user, and its parameters.
 struct FittedModel {

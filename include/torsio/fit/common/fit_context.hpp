@@ -4,12 +4,12 @@
 #include <functional>
 
 #include "torsio/core/progress.hpp"
-#include "torsio/files/training_checkpoint.hpp"
 #include "torsio/fit/common/training_data.hpp"
 
 namespace torsio {
 
 class AnyModel;
+struct TrainingCheckpoint;
 
 /// The inputs of a fit in addition to data and options. Fits that end within seconds need only the
 /// first two.

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/matrix.hpp"
-#include "torsio/core/not_measured.hpp"
 #include "torsio/data/dataset.hpp"
 #include "torsio/signal/feature_pipeline.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 
 namespace torsio {
 

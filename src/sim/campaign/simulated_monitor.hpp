@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "sim/campaign/monitor_recipe.hpp"
 #include "torsio/actuator/data_sheet.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
-#include "torsio/sim/campaign/monitor_recipe.hpp"
 
 namespace torsio {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "torsio/data/log_summary.hpp"
+#include "data/log_summary.hpp"
 
 namespace torsio {
 

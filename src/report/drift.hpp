@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "sim/campaign/drift_campaign.hpp"
 #include "torsio/evaluate/drift.hpp"
-#include "torsio/sim/campaign/drift_campaign.hpp"
 
 namespace torsio {
 

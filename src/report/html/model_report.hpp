@@ -6,7 +6,7 @@
 
 #include "torsio/core/progress.hpp"
 #include "torsio/data/dataset.hpp"
-#include "torsio/evaluate/scored_run.hpp"
+#include "torsio/evaluate/evaluate.hpp"
 #include "torsio/files/model_file.hpp"
 #include "torsio/report/document/report_document.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "torsio/actuator/data_sheet.hpp"
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/estimate/monitored_torque.hpp"
 

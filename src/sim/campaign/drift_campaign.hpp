@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/evaluate/drift.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "torsio/sim/campaign/fault_campaign.hpp"
+#include "sim/campaign/fault_campaign.hpp"
 
 namespace torsio {
 

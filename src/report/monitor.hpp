@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "sim/campaign/fused_accuracy.hpp"
 #include "torsio/evaluate/monitor_calibration.hpp"
 #include "torsio/evaluate/monitor_replay.hpp"
-#include "torsio/sim/campaign/fused_accuracy.hpp"
 
 namespace torsio {
 

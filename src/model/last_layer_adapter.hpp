@@ -4,8 +4,8 @@
 #include <memory>
 #include <span>
 
+#include "model/common/linear_update.hpp"
 #include "torsio/core/realtime.hpp"
-#include "torsio/model/common/linear_update.hpp"
 #include "torsio/model/common/model_adapter.hpp"
 #include "torsio/model/network/network_layers.hpp"
 
