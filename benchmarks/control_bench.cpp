@@ -3,12 +3,12 @@
 #include <utility>
 #include <vector>
 
+#include "control/current_controller.hpp"
 #include "fit/mixture/online_mixture.hpp"
 #include "fitted_grey_box.hpp"
 #include "rows.hpp"
 #include "torsio/actuator/electrical_sheet.hpp"
 #include "torsio/actuator/joint_parameters.hpp"
-#include "torsio/control/current_controller.hpp"
 #include "torsio/control/joint_cascade.hpp"
 #include "torsio/control/joint_impedance.hpp"
 #include "torsio/control/model_inverse.hpp"

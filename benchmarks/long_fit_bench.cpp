@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "rows.hpp"
-#include "torsio/data/csv.hpp"
 #include "torsio/data/load.hpp"
+#include "torsio/data/write.hpp"
 #include "torsio/fit/common/inputs.hpp"
 #include "torsio/fit/train_model.hpp"
 #include "torsio/sim/experiments/experiment.hpp"

@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "bench_row.hpp"
-#include "torsio/core/aligned_vector.hpp"
+#include "core/aligned_vector.hpp"
 
 // Highway compiles this file once for each instruction set; the order of its headers matters.
 // clang-format off

@@ -11,8 +11,8 @@
 #include <string_view>
 
 #include "bench_row.hpp"
+#include "report/json_text.hpp"
 #include "rows.hpp"
-#include "torsio/report/json_text.hpp"
 
 namespace torsio::bench {
 namespace {

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "model/common/parameters.hpp"
+#include "model/last_layer_adapter.hpp"
 #include "model/network/gru.hpp"
 #include "model/network/lstm.hpp"
 #include "model/network/mlp.hpp"
 #include "rows.hpp"
 #include "support/random_network.hpp"
-#include "torsio/model/last_layer_adapter.hpp"
 
 namespace torsio::bench {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "report/document/decimation.hpp"
 #include "rows.hpp"
 #include "torsio/core/random.hpp"
-#include "torsio/report/document/decimation.hpp"
 #include "torsio/report/html/verb_reports.hpp"
 
 namespace torsio::bench {

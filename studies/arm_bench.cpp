@@ -8,12 +8,12 @@
 #include <string>
 
 #include "core/report_progress.hpp"
+#include "signal/joint_move.hpp"
 #include "sim/bench/bench.hpp"
 #include "sim/loops/bench_position_loop.hpp"
 #include "sim/sensors/bench_log.hpp"
 #include "torsio/core/random.hpp"
 #include "torsio/core/units.hpp"
-#include "torsio/signal/joint_move.hpp"
 
 namespace torsio {
 namespace {

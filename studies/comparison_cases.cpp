@@ -10,9 +10,7 @@
 
 #include "studies/study.hpp"
 #include "torsio/data/load.hpp"
-#include "torsio/data/manifest.hpp"
 #include "torsio/data/recording.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {

@@ -5,7 +5,7 @@
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/evaluate/comparison.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
+#include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {
 namespace {

@@ -12,7 +12,6 @@
 #include "studies.hpp"
 #include "study_rows.hpp"
 #include "torsio/data/load.hpp"
-#include "torsio/data/manifest.hpp"
 #include "torsio/evaluate/comparison.hpp"
 
 namespace torsio {

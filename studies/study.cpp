@@ -7,9 +7,9 @@
 #include <array>
 #include <limits>
 
+#include "core/did_you_mean.hpp"
 #include "published.hpp"
 #include "studies.hpp"
-#include "torsio/core/did_you_mean.hpp"
 #include "torsio/core/error.hpp"
 
 namespace torsio {

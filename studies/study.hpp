@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "torsio/core/not_measured.hpp"
+#include "torsio/core/estimate.hpp"
 #include "torsio/core/progress.hpp"
 #include "torsio/report/document/report_document.hpp"
 

@@ -13,7 +13,7 @@
 #include <variant>
 #include <vector>
 
-#include "torsio/report/json_text.hpp"
+#include "report/json_text.hpp"
 #include "torsio/report/text_table.hpp"
 
 namespace torsio {

@@ -20,7 +20,6 @@
 #include "torsio/fit/families.hpp"
 #include "torsio/fit/train_model.hpp"
 #include "torsio/sim/closed_loop/tracking.hpp"
-#include "torsio/sim/experiments/bench_dataset.hpp"
 #include "torsio/sim/experiments/experiment.hpp"
 
 namespace torsio {

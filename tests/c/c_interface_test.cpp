@@ -106,7 +106,7 @@ TEST_P(ForeignCaller, OfPythonByCtypesGetsTheNumbersOfTheCppLibrary) {
   Estimator expected = make_estimator(GetParam());
   expected.set_zero("joint_angle_rad", 0.0);
   const Outcome outcome = shell(std::string(TORSIO_PYTHON) + " " + TORSIO_EXAMPLES +
-                                "/11_estimate_torque_by_ctypes.py " + TORSIO_LIBRARY + " '" +
+                                "/04_estimate_torque_by_ctypes.py " + TORSIO_LIBRARY + " '" +
                                 model_ + "' < '" + input_ + "' 2>&1");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.out.substr(0, 2000);
   std::istringstream lines(outcome.out);

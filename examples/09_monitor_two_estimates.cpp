@@ -4,12 +4,7 @@
 #include <cstdio>
 
 #include "example_joint.hpp"
-#include "torsio/control/joint_stop.hpp"
-#include "torsio/core/error.hpp"
-#include "torsio/estimate/estimator.hpp"
-#include "torsio/safety/command_watchdog.hpp"
-#include "torsio/safety/monitor.hpp"
-#include "torsio/safety/redundancy.hpp"
+#include "torsio/runtime.hpp"
 
 constexpr double kStiffness_Nm_rad = 573.0;
 constexpr double kTorquePerCurrent_Nm_A = 12.5;

@@ -1,19 +1,13 @@
 // `torsio check`, `fit` and `evaluate` from code: loads recordings, checks them, fits, scores the model
 // on a recording that was not used for the fit, and saves it.
 //
-//     example_07_fit_from_code test.csv model.safetensors train_1.csv [train_2.csv ...]
+//     example_01_fit_model test.csv model.safetensors train_1.csv [train_2.csv ...]
 #include <cstdio>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "torsio/check/check.hpp"
-#include "torsio/core/error.hpp"
-#include "torsio/data/load.hpp"
-#include "torsio/evaluate/evaluate.hpp"
-#include "torsio/files/model_file.hpp"
-#include "torsio/fit/common/inputs.hpp"
-#include "torsio/fit/train_model.hpp"
+#include "torsio/learn.hpp"
 
 namespace {
 

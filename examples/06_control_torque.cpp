@@ -1,13 +1,11 @@
 // Controls the torque of a series-elastic joint at 1 kHz through a model of its spring:
-//   04_torque_control MODEL.safetensors
+//   06_control_torque MODEL.safetensors
 #include <cmath>
 #include <cstdio>
 
 #include "example_joint.hpp"
-#include "torsio/control/model_inverse.hpp"
-#include "torsio/control/torque_controller.hpp"
-#include "torsio/core/error.hpp"
-#include "torsio/files/model_file.hpp"
+#include "torsio/files.hpp"
+#include "torsio/runtime.hpp"
 #include "torsio/signal/excitation.hpp"
 
 namespace {

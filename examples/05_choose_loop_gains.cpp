@@ -1,5 +1,5 @@
 // Torque loops on each actuator: margins, passivity, and the stiffest passive impedance.
-//   05_loop_margins [BANDWIDTH_RAD_S]
+//   05_choose_loop_gains [BANDWIDTH_RAD_S]
 #include <cstdio>
 #include <cstdlib>
 

@@ -1,6 +1,6 @@
 """libtorsio.so from Python by ctypes, without any package; the module `torsio` (docs/use/python.md) does more.
 
-    python3 11_estimate_torque_by_ctypes.py LIBTORSIO MODEL < rows
+    python3 04_estimate_torque_by_ctypes.py LIBTORSIO MODEL < rows
 
 Each row of standard input has the channels of the model in their order, separated by blanks; `nan` is one that was not
 measured. Printed are value, standard deviation and fault.

@@ -1,12 +1,11 @@
 // Adapts a network to a load cell while it runs in a 1 kHz loop, and saves the adapted network:
-//   03_adapt joint.safetensors adapted.safetensors
+//   10_adapt_to_load_cell joint.safetensors adapted.safetensors
 #include <array>
 #include <cmath>
 #include <cstdio>
 
-#include "torsio/core/error.hpp"
-#include "torsio/estimate/adaptive_estimator.hpp"
-#include "torsio/files/model_file.hpp"
+#include "torsio/files.hpp"
+#include "torsio/runtime.hpp"
 
 namespace {
 

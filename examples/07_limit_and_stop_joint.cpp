@@ -1,11 +1,9 @@
 // Torque control within limits of position and speed, and a stop of category 1 (ramp, then brake):
-//   08_joint_limits
+//   07_limit_and_stop_joint
 #include <cstdio>
 
 #include "example_joint.hpp"
-#include "torsio/control/joint_controller.hpp"
-#include "torsio/control/joint_stop.hpp"
-#include "torsio/core/error.hpp"
+#include "torsio/runtime.hpp"
 
 namespace {
 

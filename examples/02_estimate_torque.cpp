@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <exception>
 
-#include "torsio/estimate/torque_estimator.hpp"
-#include "torsio/files/model_file.hpp"
+#include "torsio/files.hpp"
+#include "torsio/runtime.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
-/* The torque of a joint in a loop, in C99:  cc -std=c99 10_estimate_torque_in_c.c $(pkg-config --cflags --libs torsio) -lm
+/* The torque of a joint in a loop, in C99:  cc -std=c99 03_estimate_torque_in_c.c $(pkg-config --cflags --libs torsio) -lm
  *
- *   ./10_estimate_torque_in_c joint.safetensors
+ *   ./03_estimate_torque_in_c joint.safetensors
  */
 #include <math.h>
 #include <stdio.h>

@@ -8,11 +8,8 @@
 #include <thread>
 
 #include "example_joint.hpp"
-#include "torsio/control/torque_controller.hpp"
-#include "torsio/realtime/mailbox.hpp"
-#include "torsio/realtime/realtime_loop.hpp"
-#include "torsio/realtime/recorder.hpp"
-#include "torsio/safety/command_watchdog.hpp"
+#include "torsio/realtime.hpp"
+#include "torsio/runtime.hpp"
 
 namespace {
 
@@ -24,7 +21,7 @@ void print(const char* what, const torsio::DurationHistogram& times) {
 
 void run(const char* recording) {
   const auto parts = example_joint();
-  torsio::TorqueController controller(  // in a robot: AnyInverse::of a model file, example 04
+  torsio::TorqueController controller(  // in a robot: AnyInverse::of a model file, example 06
       torsio::LinearInverse(parts.stiffness_Nm_rad),
       torsio::TorqueLoopCore::Settings{.deflection = {.joint = parts}}, 1000.0);
   torsio::CommandWatchdog watchdog({.timeout_s = 0.1});  // 18 ms is too short for a busy desktop

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "torsio/core/error.hpp"
-#include "torsio/estimate/estimator.hpp"
+#include "torsio/runtime.hpp"
 
 namespace {
 
