@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "torsio/core/error.hpp"
-#include "torsio/design/spring.hpp"
+#include "torsio/design/tables.hpp"
 
 namespace torsio {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "torsio/design/report.hpp"
-#include "torsio/design/spring.hpp"
+#include "torsio/design/tables.hpp"
 
 namespace torsio {
 
